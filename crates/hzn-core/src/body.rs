@@ -1,0 +1,257 @@
+//! The body whose limb is looked for, and what a position and an altitude say about its cone.
+
+use crate::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
+use crate::error::{ConfigError, Limit, above, between, require};
+use crate::frames::{Cam, Ecef, Rotation, UnitVec3};
+use crate::real::Real;
+
+/// Radius of the Sun's photosphere in kilometres (IAU 2015).
+pub const SUN_RADIUS_KM: f64 = 695_700.0;
+/// Mean radius of the Moon in kilometres.
+pub const MOON_RADIUS_KM: f64 = 1737.4;
+/// One astronomical unit in kilometres.
+pub const AU_KM: f64 = 149_597_870.7;
+/// Mean distance of the Moon in kilometres.
+pub const MOON_DISTANCE_KM: f64 = 384_400.0;
+
+/// Which body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Kind {
+    /// WGS-84. Without a position the mean radius, with 20 km of uncertainty added.
+    #[default]
+    Earth,
+    /// A sphere of 6371.0088 km.
+    EarthSphere,
+    /// A disc of 0.2666° half-angle at 1 au; it blooms, so its half-angle is free.
+    Sun,
+    /// A disc of about 0.26° half-angle; its half-angle is free.
+    Moon,
+    /// A sphere of `radius_km`.
+    Sphere,
+}
+
+/// `[body]` of sensor.toml.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Config {
+    /// Which body.
+    pub kind: Kind,
+    /// Radius in kilometres, above 0; for `sphere`, and only there.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub radius_km: Option<f64>,
+    /// Altitude of the camera in kilometres when a frame brings none: above WGS-84 for `earth`, else above the
+    /// radius. Above 0.
+    pub altitude_km: Option<f64>,
+    /// 1-sigma of the altitude in kilometres, 0 or more.
+    pub altitude_sigma_km: f64,
+    /// Effective height of the visible limb above the surface in kilometres, −50 to 500: where the edge at half
+    /// brightness stands. Too high a value makes the cone too wide.
+    pub limb_height_km: f64,
+    /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts.
+    pub limb_height_sigma_km: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            kind: Kind::Earth,
+            radius_km: None,
+            altitude_km: None,
+            altitude_sigma_km: 0.5,
+            limb_height_km: 10.0,
+            limb_height_sigma_km: 2.0,
+        }
+    }
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        match (self.kind, self.radius_km) {
+            (Kind::Sphere, Some(r)) => above("body.radius_km", r, 0.0)?,
+            (Kind::Sphere, None) => require(false, "body.radius_km", f64::NAN, Limit::Rule("a sphere needs its radius in km"))?,
+            (_, Some(r)) => require(false, "body.radius_km", r, Limit::Rule("only body.kind = \"sphere\" takes a radius"))?,
+            (_, None) => {}
+        }
+        if let Some(h) = self.altitude_km {
+            above("body.altitude_km", h, 0.0)?;
+        }
+        between("body.altitude_sigma_km", self.altitude_sigma_km, 0.0, 1e6)?;
+        between("body.limb_height_km", self.limb_height_km, -50.0, 500.0)?;
+        between("body.limb_height_sigma_km", self.limb_height_sigma_km, 0.0, 1e4)
+    }
+
+    /// Radius of the sphere that stands for the body where no position is known, kilometres.
+    pub fn mean_radius_km(&self) -> f64 {
+        match self.kind {
+            Kind::Earth | Kind::EarthSphere => EARTH_MEAN_RADIUS_M / 1e3,
+            Kind::Sun => SUN_RADIUS_KM,
+            Kind::Moon => MOON_RADIUS_KM,
+            Kind::Sphere => self.radius_km.unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Sun and Moon bloom or show phases: their apparent radius is no prior.
+    pub fn half_angle_is_free(&self) -> bool {
+        matches!(self.kind, Kind::Sun | Kind::Moon)
+    }
+}
+
+/// What is known about one picture besides the picture itself. Everything may be missing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Frame<T> {
+    /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. Above 0.
+    pub altitude_m: Option<T>,
+    /// Position of the camera in ECEF, metres. It beats the altitude.
+    pub position_m: Option<[T; 3]>,
+    /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction.
+    pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+}
+
+/// Why a frame's own data were refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameError {
+    /// The altitude is not a finite number above zero.
+    Altitude,
+    /// The position is not finite, or not outside the body and its limb height.
+    Position,
+    /// Neither the frame nor the configuration gives an altitude.
+    NoAltitude,
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Altitude => "altitude_km must be a finite number above 0",
+            Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
+            Self::NoAltitude => "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame",
+        })
+    }
+}
+impl core::error::Error for FrameError {}
+
+/// The cone that is expected: cosine of its half-angle with its sigma, and what turns a half-angle into an altitude.
+#[derive(Debug, Clone, Copy)]
+pub struct Expected<T> {
+    /// cos α₀ of the best single cone.
+    pub(crate) cos: T,
+    /// sin α₀.
+    pub(crate) sin: T,
+    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
+    pub(crate) sigma_cos: T,
+    /// The limb cone of the ellipsoid, when the position is known.
+    pub(crate) ellipsoid: Option<LimbCone<T>>,
+    /// Prior attitude, camera to ECEF.
+    pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
+    pub(crate) radius_m: T,
+    /// Limb height in metres and its sigma.
+    pub(crate) limb_m: T,
+    pub(crate) limb_sigma_m: T,
+    /// The half-angle says nothing about the distance (Sun, Moon).
+    pub(crate) free: bool,
+}
+
+impl<T: Real> Expected<T> {
+    /// Expected half-angle in radians.
+    pub fn half_angle_rad(&self) -> T {
+        self.sin.atan2(self.cos)
+    }
+
+    /// sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    pub(crate) fn new(body: &Config, frame: &Frame<T>) -> Result<Self, FrameError> {
+        let km = T::of(1000.0);
+        let limb = T::of(body.limb_height_km) * km;
+        let mut limb_sigma = T::of(body.limb_height_sigma_km) * km;
+        let mut altitude_sigma = T::of(body.altitude_sigma_km) * km;
+        let given = match frame.altitude_m {
+            Some(h) if !(h > T::zero() && h.is_finite()) => return Err(FrameError::Altitude),
+            Some(h) => Some(h),
+            None => body.altitude_km.map(|h| T::of(h) * km),
+        };
+        let position = match frame.position_m {
+            Some(p) if !p.iter().all(|x| x.is_finite()) => return Err(FrameError::Position),
+            other => other,
+        };
+        let mut ellipsoid = None;
+        let (radius, altitude, sin) = match (body.kind, position) {
+            (Kind::Earth, Some(p)) => {
+                let (a, b) = (T::of(WGS84_A_M) + limb, T::of(WGS84_B_M) + limb);
+                let cone = LimbCone::try_new(p, a, b).ok_or(FrameError::Position)?;
+                let (h, _) = geodetic(p, T::of(WGS84_A_M), T::of(WGS84_B_M));
+                if !(h > limb && h > T::zero()) {
+                    return Err(FrameError::Position);
+                }
+                let (sin, _) = cone.mean_half_angle_rad().sin_cos();
+                ellipsoid = Some(cone);
+                // The sphere with this half-angle at this altitude.
+                ((sin * h - limb) / (T::one() - sin), h, sin)
+            }
+            (_, position) => {
+                let r = T::of(body.mean_radius_km()) * km;
+                let altitude = match (position, given, body.kind) {
+                    (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
+                        let h = (x * x + y * y + z * z).sqrt() - r;
+                        if !(h > T::zero()) {
+                            return Err(FrameError::Position);
+                        }
+                        h
+                    }
+                    (_, _, Kind::Sun) => T::of((AU_KM - SUN_RADIUS_KM) * 1e3),
+                    (_, _, Kind::Moon) => T::of((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
+                    (_, Some(h), _) => h,
+                    (_, None, _) => return Err(FrameError::NoAltitude),
+                };
+                if body.kind == Kind::Earth {
+                    // The local radius is unknown without a position.
+                    let unknown = T::of(20e3);
+                    limb_sigma = (limb_sigma * limb_sigma + unknown * unknown).sqrt();
+                }
+                (r, altitude, (r + limb) / (r + altitude))
+            }
+        };
+        let cos2 = T::one() - sin * sin;
+        if !(sin > T::zero() && cos2 > T::EPSILON) {
+            return Err(FrameError::Altitude);
+        }
+        let cos = cos2.sqrt();
+        if body.half_angle_is_free() {
+            altitude_sigma = T::zero();
+        }
+        // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
+        let tan = sin / cos;
+        let scale = tan / (radius + altitude);
+        let variance = limb_sigma * limb_sigma + sin * sin * altitude_sigma * altitude_sigma;
+        Ok(Self {
+            cos,
+            sin,
+            sigma_cos: scale * variance.sqrt(),
+            ellipsoid,
+            cam_to_ecef: frame.cam_to_ecef,
+            radius_m: radius,
+            limb_m: limb,
+            limb_sigma_m: limb_sigma,
+            free: body.half_angle_is_free(),
+        })
+    }
+
+    /// Altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle says
+    /// nothing about the distance.
+    pub(crate) fn altitude(&self, cos: T, var_cos: T) -> Option<(T, T)> {
+        let sin = (T::one() - cos * cos).sqrt();
+        if self.free || !(sin > T::zero() && cos > T::zero()) {
+            return None;
+        }
+        let distance = (self.radius_m + self.limb_m) / sin;
+        // dH/dcos = (R + d) cos/sin³, dH/dd = 1/sin − 1 + 1 for a shift of the limb at fixed radius.
+        let by_cos = distance * cos / (sin * sin);
+        let by_limb = T::one() / sin;
+        let variance = by_cos * by_cos * var_cos + by_limb * by_limb * self.limb_sigma_m * self.limb_sigma_m;
+        Some((distance - self.radius_m, variance.sqrt()))
+    }
+
+    /// The axis in ECEF, when the position is known.
+    pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
+        self.ellipsoid.as_ref().map(|c| c.axis)
+    }
+}

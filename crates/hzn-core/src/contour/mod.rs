@@ -1,0 +1,31 @@
+//! Lazy border following.
+
+use crate::error::{ConfigError, Limit, require};
+
+/// `[contour]` of sensor.toml.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Config {
+    /// Rows between two search lines for closed edges, 1 or more. Left out: from the body's expected size.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub line_spacing_px: Option<u16>,
+    /// Steps of one picture's border following before it gives up, 1000 to 100 million: the bound on the worst
+    /// picture's time.
+    pub max_steps: u32,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { line_spacing_px: None, max_steps: 1_000_000 }
+    }
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        if let Some(n) = self.line_spacing_px {
+            require(n >= 1, "contour.line_spacing_px", f64::from(n), Limit::AtLeast(1.0))?;
+        }
+        let steps = f64::from(self.max_steps);
+        require((1000..=100_000_000).contains(&self.max_steps), "contour.max_steps", steps, Limit::Between(1e3, 1e8))
+    }
+}

@@ -1,0 +1,72 @@
+//! What can be wrong with a configuration, said by field, value and limit.
+
+use core::fmt;
+
+/// A configuration was refused. Nothing after [`crate::Horizon::new`] can fail on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConfigError {
+    /// The field as it is written in sensor.toml, such as `camera.fx_px`.
+    pub field: &'static str,
+    /// The value that was given.
+    pub value: f64,
+    /// What the value must be.
+    pub limit: Limit,
+}
+
+/// The rule that a value broke.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Limit {
+    /// A finite number.
+    Finite,
+    /// Greater than this.
+    Above(f64),
+    /// This or greater.
+    AtLeast(f64),
+    /// This or smaller.
+    AtMost(f64),
+    /// Within both, ends included.
+    Between(f64, f64),
+    /// The lens is monotone only up to this angle in degrees; the image circle must end 2° below it.
+    Monotone(f64),
+    /// A rule in words.
+    Rule(&'static str),
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}: ", self.field, self.value)?;
+        match self.limit {
+            Limit::Finite => write!(f, "must be a finite number"),
+            Limit::Above(x) => write!(f, "must be above {x}"),
+            Limit::AtLeast(x) => write!(f, "must be at least {x}"),
+            Limit::AtMost(x) => write!(f, "must be at most {x}"),
+            Limit::Between(a, b) => write!(f, "must be between {a} and {b}"),
+            Limit::Monotone(deg) => write!(
+                f,
+                "the lens is monotone only up to {deg:.2} degrees off axis, so that pixels beyond have no single ray; \
+                 set camera.theta_max_deg to {:.2} or less, or correct camera.k",
+                deg - 2.0
+            ),
+            Limit::Rule(text) => f.write_str(text),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+/// Checks of one field, used by every stage's `check`.
+pub(crate) fn require(ok: bool, field: &'static str, value: f64, limit: Limit) -> Result<(), ConfigError> {
+    if ok { Ok(()) } else { Err(ConfigError { field, value, limit }) }
+}
+
+/// A finite number within `[low, high]`.
+pub(crate) fn between(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), ConfigError> {
+    require(value.is_finite(), field, value, Limit::Finite)?;
+    require(value >= low && value <= high, field, value, Limit::Between(low, high))
+}
+
+/// A finite number above `low`.
+pub(crate) fn above(field: &'static str, value: f64, low: f64) -> Result<(), ConfigError> {
+    require(value.is_finite(), field, value, Limit::Finite)?;
+    require(value > low, field, value, Limit::Above(low))
+}

@@ -1,0 +1,308 @@
+//! The picture at the door: checked once, after which no read can fail.
+//!
+//! A picture is a borrowed slice of 8- or 16-bit samples, grey or interleaved colour, with any row stride. The
+//! pipeline is generic over [`Pixels`], so each kind gets its own compiled copy and a flight computer links only
+//! the one it uses.
+
+use core::fmt;
+
+/// What the pipeline reads: one brightness per pixel.
+pub trait Pixels {
+    /// Columns, 1 to 65535.
+    fn width(&self) -> u16;
+    /// Rows, 1 to 65535.
+    fn height(&self) -> u16;
+    /// The largest value a sample can have, such as 255 or 4095.
+    fn full_scale(&self) -> u16;
+    /// Brightness at column `x`, row `y`; 0 outside the picture.
+    fn at(&self, x: u16, y: u16) -> u16;
+}
+
+impl<P: Pixels> Pixels for &P {
+    fn width(&self) -> u16 {
+        (**self).width()
+    }
+    fn height(&self) -> u16 {
+        (**self).height()
+    }
+    fn full_scale(&self) -> u16 {
+        (**self).full_scale()
+    }
+    #[inline(always)]
+    fn at(&self, x: u16, y: u16) -> u16 {
+        (**self).at(x, y)
+    }
+}
+
+/// Why a picture was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageError {
+    /// Width or height is zero, or above 65535.
+    Size,
+    /// The stride is shorter than a row of samples.
+    Stride,
+    /// The slice ends before the last row does.
+    TooShort,
+    /// No channel of that number, or a channel count of zero.
+    Channel,
+    /// Bits per sample must be 8 for bytes, 9 to 16 for words.
+    Bits,
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Size => "width and height must be 1 to 65535 pixels",
+            Self::Stride => "the row stride is shorter than a row of samples",
+            Self::TooShort => "the picture's data end before its last row",
+            Self::Channel => "there is no channel of that number",
+            Self::Bits => "bits per sample must be 8 for bytes and 8 to 16 for words",
+        })
+    }
+}
+impl core::error::Error for ImageError {}
+
+/// Which brightness a colour pixel has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Channel {
+    /// The mean of the first three channels (of all, when there are fewer), rounded down.
+    #[default]
+    Mean,
+    /// The first channel (red, in RGB order).
+    Red,
+    /// The second channel.
+    Green,
+    /// The third channel.
+    Blue,
+}
+
+/// Shape of a picture in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples from the start of a row to the start of the next; at least `width * channels`.
+    pub stride: usize,
+    /// Interleaved samples a pixel: 1 grey, 3 RGB, 4 RGBA.
+    pub channels: u8,
+    /// Significant bits of a sample: 8 for bytes, 8 to 16 for words.
+    pub bits: u8,
+}
+
+impl Layout {
+    /// A picture without padding.
+    pub const fn packed(width: u32, height: u32, channels: u8, bits: u8) -> Self {
+        Self { width, height, stride: width as usize * channels as usize, channels, bits }
+    }
+}
+
+/// A byte or a 16-bit word.
+pub trait Sample: Copy + Into<u16> {
+    /// Largest number of significant bits.
+    const BITS: u8;
+}
+impl Sample for u8 {
+    const BITS: u8 = 8;
+}
+impl Sample for u16 {
+    const BITS: u8 = 16;
+}
+
+/// A picture with one sample a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Grey<'a, S> {
+    data: &'a [S],
+    stride: usize,
+    width: u16,
+    height: u16,
+    full_scale: u16,
+}
+
+/// A picture with interleaved colours, read as one brightness a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Colour<'a, S> {
+    grey: Grey<'a, S>,
+    channels: usize,
+    first: usize,
+    count: u32,
+}
+
+fn check<S: Sample>(data: &[S], l: Layout) -> Result<Grey<'_, S>, ImageError> {
+    let (Ok(width @ 1..), Ok(height @ 1..)) = (u16::try_from(l.width), u16::try_from(l.height)) else {
+        return Err(ImageError::Size);
+    };
+    if l.channels == 0 {
+        return Err(ImageError::Channel);
+    }
+    if l.bits < 8 || l.bits > S::BITS {
+        return Err(ImageError::Bits);
+    }
+    let row = usize::from(width) * usize::from(l.channels);
+    if l.stride < row {
+        return Err(ImageError::Stride);
+    }
+    let need = l.stride.checked_mul(usize::from(height) - 1).and_then(|n| n.checked_add(row));
+    if need.is_none_or(|n| n > data.len()) {
+        return Err(ImageError::TooShort);
+    }
+    let full_scale = ((1u32 << l.bits) - 1) as u16;
+    Ok(Grey { data, stride: l.stride, width, height, full_scale })
+}
+
+impl<'a, S: Sample> Grey<'a, S> {
+    /// A grey picture; `layout.channels` must be 1.
+    pub fn try_new(data: &'a [S], layout: Layout) -> Result<Self, ImageError> {
+        if layout.channels != 1 {
+            return Err(ImageError::Channel);
+        }
+        check(data, layout)
+    }
+}
+
+impl<'a, S: Sample> Colour<'a, S> {
+    /// An interleaved colour picture, or grey with alpha (2 channels, of which the mean is the first).
+    pub fn try_new(data: &'a [S], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
+        let grey = check(data, layout)?;
+        let colours: usize = match layout.channels {
+            1 | 2 => 1,
+            _ => 3,
+        };
+        let (first, count) = match channel {
+            Channel::Mean => (0, colours as u32),
+            Channel::Red => (0, 1),
+            Channel::Green => (1, 1),
+            Channel::Blue => (2, 1),
+        };
+        if first >= colours {
+            return Err(ImageError::Channel);
+        }
+        Ok(Self { grey, channels: usize::from(layout.channels), first, count })
+    }
+}
+
+impl<S: Sample> Pixels for Grey<'_, S> {
+    fn width(&self) -> u16 {
+        self.width
+    }
+    fn height(&self) -> u16 {
+        self.height
+    }
+    fn full_scale(&self) -> u16 {
+        self.full_scale
+    }
+    #[inline(always)]
+    fn at(&self, x: u16, y: u16) -> u16 {
+        // A row's padding may be read at x >= width: callers stay within the region, which is within the picture.
+        self.data.get(usize::from(y) * self.stride + usize::from(x)).map_or(0, |&s| s.into())
+    }
+}
+
+impl<S: Sample> Pixels for Colour<'_, S> {
+    fn width(&self) -> u16 {
+        self.grey.width
+    }
+    fn height(&self) -> u16 {
+        self.grey.height
+    }
+    fn full_scale(&self) -> u16 {
+        self.grey.full_scale
+    }
+    #[inline(always)]
+    fn at(&self, x: u16, y: u16) -> u16 {
+        let start = usize::from(y) * self.grey.stride + usize::from(x) * self.channels + self.first;
+        let at = |i: usize| self.grey.data.get(start + i).map_or(0u32, |&s| u32::from(s.into()));
+        if self.count == 3 { ((at(0) + at(1) + at(2)) / 3) as u16 } else { at(0) as u16 }
+    }
+}
+
+/// A picture whose kind is known only when the program runs, as on a workstation.
+#[derive(Debug, Clone, Copy)]
+pub enum ImageView<'a> {
+    /// One byte a pixel.
+    Grey8(Grey<'a, u8>),
+    /// One word a pixel.
+    Grey16(Grey<'a, u16>),
+    /// Several bytes a pixel.
+    Colour8(Colour<'a, u8>),
+    /// Several words a pixel.
+    Colour16(Colour<'a, u16>),
+}
+
+impl<'a> ImageView<'a> {
+    /// A picture of bytes.
+    pub fn from_bytes(data: &'a [u8], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
+        Ok(if layout.channels == 1 {
+            Self::Grey8(Grey::try_new(data, layout)?)
+        } else {
+            Self::Colour8(Colour::try_new(data, layout, channel)?)
+        })
+    }
+    /// A picture of 16-bit words.
+    pub fn from_words(data: &'a [u16], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
+        Ok(if layout.channels == 1 {
+            Self::Grey16(Grey::try_new(data, layout)?)
+        } else {
+            Self::Colour16(Colour::try_new(data, layout, channel)?)
+        })
+    }
+}
+
+macro_rules! forward {
+    ($self:ident, $p:ident => $e:expr) => {
+        match $self {
+            ImageView::Grey8($p) => $e,
+            ImageView::Grey16($p) => $e,
+            ImageView::Colour8($p) => $e,
+            ImageView::Colour16($p) => $e,
+        }
+    };
+}
+pub(crate) use forward;
+
+impl Pixels for ImageView<'_> {
+    fn width(&self) -> u16 {
+        forward!(self, p => p.width())
+    }
+    fn height(&self) -> u16 {
+        forward!(self, p => p.height())
+    }
+    fn full_scale(&self) -> u16 {
+        forward!(self, p => p.full_scale())
+    }
+    fn at(&self, x: u16, y: u16) -> u16 {
+        forward!(self, p => p.at(x, y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stride_and_channels_are_honoured() {
+        let data = [1u8, 2, 3, 9, 9, 30, 60, 90, 9, 9];
+        let l = Layout { width: 1, height: 2, stride: 5, channels: 3, bits: 8 };
+        let mean = Colour::try_new(&data, l, Channel::Mean).unwrap();
+        assert_eq!((mean.at(0, 0), mean.at(0, 1)), (2, 60));
+        let blue = Colour::try_new(&data, l, Channel::Blue).unwrap();
+        assert_eq!((blue.at(0, 0), blue.at(0, 1)), (3, 90));
+        assert_eq!(mean.at(7, 7), 0);
+    }
+
+    #[test]
+    fn short_or_odd_pictures_are_refused() {
+        let data = [0u8; 11];
+        assert_eq!(Grey::try_new(&data, Layout::packed(4, 3, 1, 8)).unwrap_err(), ImageError::TooShort);
+        assert_eq!(Grey::try_new(&data, Layout::packed(0, 3, 1, 8)).unwrap_err(), ImageError::Size);
+        assert_eq!(Grey::try_new(&data, Layout::packed(70_000, 1, 1, 8)).unwrap_err(), ImageError::Size);
+        assert_eq!(Grey::try_new(&data, Layout::packed(3, 3, 1, 12)).unwrap_err(), ImageError::Bits);
+        let l = Layout { width: 4, height: 2, stride: 3, channels: 1, bits: 8 };
+        assert_eq!(Grey::try_new(&data, l).unwrap_err(), ImageError::Stride);
+        // The last row need not be padded.
+        let l = Layout { width: 1, height: 2, stride: 10, channels: 1, bits: 8 };
+        assert!(Grey::try_new(&data, l).is_ok());
+    }
+}

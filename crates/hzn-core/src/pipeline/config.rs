@@ -1,0 +1,112 @@
+//! Everything that describes a sensor, as plain values: sensor.toml without the file.
+
+use crate::error::{ConfigError, Limit, require};
+use crate::image::Channel;
+use crate::{binarize, body, camera, candidates, contour, covariance, estimate, region, reject, select};
+
+/// A sensor: the camera, the body it looks for, and every stage's parameters.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Config {
+    /// The calibration.
+    pub camera: camera::Config,
+    /// How the camera sits in the vehicle.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub mount: Option<Mount>,
+    /// The body.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub body: body::Config,
+    /// How a pixel becomes one brightness.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub input: Input,
+    /// Brightness gate.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub gate: binarize::Gate,
+    /// Level between dark and lit.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub binarize: binarize::Config,
+    /// Parts of the picture that never count.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub mask: region::Config,
+    /// Search and border following.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub contour: contour::Config,
+    /// Edges that are looked at, and their sub-pixel points.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub candidates: candidates::Config,
+    /// Outlier rejection.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub reject: reject::Config,
+    /// The fit.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub estimate: estimate::Config,
+    /// Noise model of the edge points.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub covariance: covariance::Config,
+    /// Gates of an answer.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub select: select::Config,
+}
+
+/// `[mount]`: camera to vehicle body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Mount {
+    /// Quaternion, scalar first, that takes camera coordinates to body coordinates. Normalised on loading.
+    pub q_body_from_camera_wxyz: [f64; 4],
+}
+
+/// `[input]`: from samples to brightness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Input {
+    /// Mean of the colours, or one of them.
+    pub channel: Channel,
+}
+
+impl Config {
+    /// A sensor with this camera and every other value at its default.
+    pub fn new(camera: camera::Config) -> Self {
+        Self {
+            camera,
+            mount: None,
+            body: body::Config::default(),
+            input: Input::default(),
+            gate: binarize::Gate::default(),
+            binarize: binarize::Config::default(),
+            mask: region::Config::default(),
+            contour: contour::Config::default(),
+            candidates: candidates::Config::default(),
+            reject: reject::Config::default(),
+            estimate: estimate::Config::default(),
+            covariance: covariance::Config::default(),
+            select: select::Config::default(),
+        }
+    }
+
+    /// Checks every field but the lens, which [`camera::Camera::try_new`] checks.
+    ///
+    /// # Errors
+    /// The first field out of its limits.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        if let Some(mount) = &self.mount {
+            let q = mount.q_body_from_camera_wxyz;
+            let n2: f64 = q.iter().map(|x| x * x).sum();
+            require(
+                (n2 - 1.0).abs() < 0.01,
+                "mount.q_body_from_camera_wxyz",
+                n2,
+                Limit::Rule("the quaternion's squared length must be 1 (scalar first)"),
+            )?;
+        }
+        self.body.check()?;
+        self.gate.check()?;
+        self.binarize.check()?;
+        self.mask.check(&self.camera)?;
+        self.contour.check()?;
+        self.candidates.check()?;
+        self.reject.check()?;
+        self.covariance.check()?;
+        self.select.check()
+    }
+}

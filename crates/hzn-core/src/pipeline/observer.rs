@@ -1,0 +1,33 @@
+//! A window into the pipeline for clocks, counters and pictures; without one, nothing of it is compiled.
+
+use crate::camera::Ray;
+use crate::pixel::{ImagePoint, Pixel};
+use crate::pipeline::report::{Candidate, Solution};
+use crate::status::Stage;
+
+/// Called at stage boundaries and on pixel reads. Every method does nothing by default; implement what you need.
+/// Methods take `&self`: an observer that collects uses `Cell` or `RefCell`.
+pub trait Observer<T> {
+    /// A stage begins; it may begin several times in a picture, once a candidate.
+    fn enter(&self, _stage: Stage) {}
+    /// The picture is through.
+    fn leave(&self) {}
+    /// A pixel was read.
+    #[inline(always)]
+    fn pixel(&self, _x: u16, _y: u16) {}
+    /// The level was found: in counts, with the mean and the number of pixels of the sample.
+    fn level(&self, _level: u16, _mean: T, _samples: u32) {}
+    /// An edge was followed and is candidate number `candidate`: every `stride`-th of its border pixels, in order.
+    fn edge(&self, _candidate: u32, _border: &[Pixel], _stride: u32) {}
+    /// Sub-pixel points of a candidate and their rays, in order.
+    fn points(&self, _candidate: u32, _points: &[ImagePoint<T>], _rays: &[Ray<T>]) {}
+    /// Weights of those points after the fit: 0 rejected, up to 1.
+    fn weights(&self, _candidate: u32, _weights: &[T]) {}
+    /// What became of a candidate, with its solution if there is one.
+    fn verdict(&self, _candidate: u32, _outcome: &Candidate<T>, _solution: Option<&Solution<T>>) {}
+}
+
+/// Sees nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unobserved;
+impl<T> Observer<T> for Unobserved {}

@@ -1,0 +1,127 @@
+//! What `process` answers.
+
+use crate::frames::{Body, Cam, Cov3, Ecef, UnitVec3};
+use crate::status::{Stage, Status};
+
+/// Most candidates that a report lists; further ones are only counted.
+pub const MAX_LISTED: usize = 16;
+
+/// The answer to one picture. There is always one, whatever the picture.
+#[derive(Debug, Clone)]
+pub struct Report<T> {
+    /// Outcome.
+    pub status: Status,
+    /// The last stage that was entered.
+    pub stage: Stage,
+    /// Level between dark and lit in the picture's own counts; 0 when it was not reached.
+    pub level: u16,
+    /// What was seen on the way.
+    pub counters: Counters,
+    /// The candidates that were looked at, in the order in which they were followed.
+    pub candidates: heapless::Vec<Candidate<T>, MAX_LISTED>,
+    /// The direction: with status `ok`, and never without.
+    pub solution: Option<Solution<T>>,
+}
+
+/// Counts of one picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Border pixels followed.
+    pub followed: u32,
+    /// Edges with enough points to be candidates.
+    pub candidates: u32,
+    /// Border pixels dropped because a list was full, by thinning or by leaving short edges out.
+    pub dropped: u32,
+    /// Edge points whose local mid-level was not found and that stand at the global level.
+    pub fallback_points: u32,
+    /// Sub-pixel points of the chosen candidate (of all candidates, when none was chosen).
+    pub edge_points: u32,
+    /// RANSAC draws.
+    pub draws: u32,
+}
+
+/// One candidate edge and what became of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate<T> {
+    /// Border pixels of the edge.
+    pub length_px: u32,
+    /// Sub-pixel points taken from it.
+    pub points: u32,
+    /// Points that fit the limb.
+    pub inliers: u32,
+    /// Weighted RMS distance of the inliers from the fitted limb in pixels; NaN when there was no fit.
+    pub rms_px: T,
+    /// What became of it.
+    pub verdict: Verdict,
+}
+
+/// What became of a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Verdict {
+    /// The answer.
+    Chosen = 0,
+    /// Passed every gate, but another fits better.
+    Passed = 1,
+    /// No cone goes through enough of its points.
+    NoConsensus = 2,
+    /// Fewer inliers than `select.min_inliers`.
+    FewInliers = 3,
+    /// The inliers cover less than `select.min_arc_px`.
+    ShortArc = 4,
+    /// The RMS is above `select.max_rms_px`.
+    Residuals = 5,
+    /// The fitted half-angle disagrees with the expected one.
+    HalfAngle = 6,
+    /// The standard deviation is above `select.max_sigma_deg`.
+    Uncertain = 7,
+    /// The fit did not converge or was singular.
+    NoFit = 8,
+    /// The fitted limb goes on where the picture shows none: too small a part of it is edge.
+    Unsupported = 9,
+}
+
+impl Verdict {
+    /// The name used in files and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Chosen => "chosen",
+            Self::Passed => "passed",
+            Self::NoConsensus => "no-consensus",
+            Self::FewInliers => "few-inliers",
+            Self::ShortArc => "short-arc",
+            Self::Residuals => "residuals",
+            Self::HalfAngle => "half-angle",
+            Self::Uncertain => "uncertain",
+            Self::NoFit => "no-fit",
+            Self::Unsupported => "unsupported",
+        }
+    }
+}
+
+/// A direction with its covariance.
+#[derive(Debug, Clone, Copy)]
+pub struct Solution<T> {
+    /// Unit vector to the body in the camera frame: the limb axis for `earth`, the centre for spheres.
+    pub axis: UnitVec3<Cam, T>,
+    /// Covariance of `axis`, rad², rank 2.
+    pub covariance: Cov3<Cam, T>,
+    /// The same direction in ECEF, from the position: give both to a filter. Only for `earth` with a position.
+    pub axis_ecef: Option<UnitVec3<Ecef, T>>,
+    /// The same direction in the vehicle's frame, when there is a mounting.
+    pub axis_body: Option<UnitVec3<Body, T>>,
+    /// Half-angle of the half-angle-free fit in radians, before the expected one is fused.
+    pub half_angle_rad: T,
+    /// Half-angle of the answer (after fusing) in radians; the fitted limb is drawn with it.
+    pub fused_half_angle_rad: T,
+    /// Altitude estimate of the half-angle-free fit and its 1-sigma, metres; `None` for Sun and Moon.
+    pub altitude_m: Option<(T, T)>,
+    /// Weighted RMS distance of the inliers from the limb in pixels.
+    pub rms_px: T,
+    /// Edge points that carry the answer.
+    pub inliers: u32,
+    /// Length of edge that the inliers cover, in pixels.
+    pub arc_px: T,
+    /// Which of `Report::candidates` it is, by its place in the order of following.
+    pub candidate: u32,
+}

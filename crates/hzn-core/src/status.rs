@@ -1,0 +1,133 @@
+//! What became of a picture, in numbers that never change.
+
+use core::fmt;
+
+/// Outcome of one picture. The numbers are frozen: they stand in files and telemetry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum Status {
+    /// A direction was found and passed every gate.
+    Ok = 0,
+    /// No edge in the picture is a limb of the body.
+    #[default]
+    NoLimb = 1,
+    /// The mean brightness is below `gate.min_mean`.
+    TooDark = 2,
+    /// The mean brightness is above `gate.max_mean`.
+    TooBright = 3,
+    /// Edges were found, but none has enough points to be fitted.
+    TooFewPoints = 4,
+    /// Two different directions fit about equally well.
+    Ambiguous = 5,
+    /// A direction was fitted but failed a gate (residual, half-angle, arc length).
+    Rejected = 6,
+    /// Lists overflowed and no answer came of it.
+    Truncated = 7,
+    /// The picture could not be read (host only).
+    Unreadable = 8,
+}
+
+impl Status {
+    /// Every status in the order of its number.
+    pub const ALL: [Self; 9] = [
+        Self::Ok,
+        Self::NoLimb,
+        Self::TooDark,
+        Self::TooBright,
+        Self::TooFewPoints,
+        Self::Ambiguous,
+        Self::Rejected,
+        Self::Truncated,
+        Self::Unreadable,
+    ];
+
+    /// The name used in files, such as `no-limb`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::NoLimb => "no-limb",
+            Self::TooDark => "too-dark",
+            Self::TooBright => "too-bright",
+            Self::TooFewPoints => "too-few-points",
+            Self::Ambiguous => "ambiguous",
+            Self::Rejected => "rejected",
+            Self::Truncated => "truncated",
+            Self::Unreadable => "unreadable",
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// The stages in the order in which a picture goes through them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[repr(u8)]
+pub enum Stage {
+    /// Brightness gate and level.
+    #[default]
+    Binarize = 0,
+    /// Search along the border and border following.
+    Contour = 1,
+    /// Sub-pixel edge points of a candidate.
+    Candidates = 2,
+    /// Rays of the edge points.
+    Undistort = 3,
+    /// Outlier rejection.
+    Reject = 4,
+    /// Fit of the cone.
+    Estimate = 5,
+    /// Covariance of the fit.
+    Covariance = 6,
+    /// Gates and choice.
+    Select = 7,
+}
+
+impl Stage {
+    /// Every stage in order.
+    pub const ALL: [Self; 8] = [
+        Self::Binarize,
+        Self::Contour,
+        Self::Candidates,
+        Self::Undistort,
+        Self::Reject,
+        Self::Estimate,
+        Self::Covariance,
+        Self::Select,
+    ];
+    /// The name used in files and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Binarize => "binarize",
+            Self::Contour => "contour",
+            Self::Candidates => "candidates",
+            Self::Undistort => "undistort",
+            Self::Reject => "reject",
+            Self::Estimate => "estimate",
+            Self::Covariance => "covariance",
+            Self::Select => "select",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_names_are_frozen() {
+        let names = [
+            "ok", "no-limb", "too-dark", "too-bright", "too-few-points", "ambiguous", "rejected", "truncated",
+            "unreadable",
+        ];
+        for (n, (status, name)) in Status::ALL.iter().zip(names).enumerate() {
+            assert_eq!((*status as usize, status.name()), (n, name));
+        }
+        for (n, stage) in Stage::ALL.iter().enumerate() {
+            assert_eq!(*stage as usize, n);
+        }
+    }
+}
