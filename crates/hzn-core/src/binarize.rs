@@ -1,5 +1,16 @@
-//! Brightness gate and the level between dark and lit, from a sparse sample of the picture.
+//! Brightness gate, and the level between dark and lit, from a sparse sample of the picture.
+//!
+//! The picture is cut into equal cells and one pixel is drawn in each, so that the sample is even and yet random. A
+//! body that is too small for the sample (its histogram has no second class) is sampled once more, sixteen times
+//! finer.
+
 use crate::error::{ConfigError, Limit, above, between, require};
+use crate::image::Pixels;
+use crate::pipeline::Observer;
+use crate::real::Real;
+use crate::region::Region;
+use crate::rng::Rng;
+use crate::status::Status;
 
 /// How the level is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -64,5 +75,140 @@ impl Config {
         above("binarize.factor", self.factor, 0.0)?;
         between("binarize.factor", self.factor, 0.0, 100.0)?;
         between("binarize.scale", self.scale, 0.1, 10.0)
+    }
+}
+
+/// The level, and the sample it comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level<T> {
+    /// A pixel is lit at this value or above, in counts.
+    pub level: u16,
+    /// Mean of the sample in counts.
+    pub mean: T,
+    /// Pixels in the sample.
+    pub samples: u32,
+}
+
+/// Bins of the histogram: the sample's upper eight bits.
+const BINS: usize = 256;
+/// Cells along each side of the first sample, and of the second.
+const SIDES: [u32; 2] = [16, 64];
+
+struct Histogram {
+    bins: [u16; BINS],
+    sum: u64,
+    count: u32,
+    shift: u32,
+}
+
+/// Finds the level.
+///
+/// # Errors
+/// `too-dark`, `too-bright`, or `no-limb` when dark and lit differ by less than 3 % of full scale.
+pub fn split<T: Real, P: Pixels, O: Observer<T>>(
+    picture: &P,
+    region: &Region<T>,
+    gate: &Gate,
+    config: &Config,
+    seed: u32,
+    observer: &O,
+) -> Result<Level<T>, Status> {
+    let full = u32::from(picture.full_scale());
+    for side in SIDES {
+        let sample = draw(picture, region, side, seed, observer);
+        let Some(mean) = sample.mean::<T>() else { continue };
+        let fraction = mean / T::of(f64::from(full));
+        if fraction < T::of(gate.min_mean) {
+            return Err(Status::TooDark);
+        }
+        if fraction > T::of(gate.max_mean) {
+            return Err(Status::TooBright);
+        }
+        let level = match config.method {
+            Method::Fixed => Some(T::of(config.level)),
+            Method::Dynamic => Some(mean * T::of(config.factor)),
+            Method::Otsu => sample.otsu::<T>(full).map(|l| l * T::of(config.scale)),
+        };
+        let Some(level) = level else { continue };
+        // A level of 0 would make everything lit.
+        let level = level.to_i32().clamp(1, 65535) as u16;
+        observer.level(level, mean, sample.count);
+        return Ok(Level { level, mean, samples: sample.count });
+    }
+    Err(Status::NoLimb)
+}
+
+fn draw<T: Real, P: Pixels, O: Observer<T>>(
+    picture: &P,
+    region: &Region<T>,
+    side: u32,
+    seed: u32,
+    observer: &O,
+) -> Histogram {
+    let shift = (16 - u32::from(picture.full_scale()).leading_zeros().saturating_sub(16)).saturating_sub(8);
+    let mut h = Histogram { bins: [0; BINS], sum: 0, count: 0, shift };
+    let mut rng = Rng::new(seed);
+    let (w, height) = (u32::from(region.width()), u32::from(region.height()));
+    for j in 0..side {
+        for i in 0..side {
+            // Both draws are made for every cell, so that the sample does not depend on the mask.
+            let (rx, ry) = (rng.below(65536), rng.below(65536));
+            let x = ((i * w) + ((w * rx) >> 16)) / side;
+            let y = ((j * height) + ((height * ry) >> 16)) / side;
+            let (x, y) = (x as u16, y as u16);
+            if !region.contains(x, y) || region.masked(x, y) {
+                continue;
+            }
+            observer.pixel(x, y);
+            let v = picture.at(x, y);
+            if let Some(bin) = h.bins.get_mut(usize::from(v >> shift)) {
+                *bin += 1;
+            }
+            h.sum += u64::from(v);
+            h.count += 1;
+        }
+    }
+    h
+}
+
+impl Histogram {
+    fn mean<T: Real>(&self) -> Option<T> {
+        (self.count > 0).then(|| T::of(self.sum as f64) / T::of(f64::from(self.count)))
+    }
+
+    /// Otsu's level: the largest variance between the classes; the middle of the levels that reach it.
+    fn otsu<T: Real>(&self, full_scale: u32) -> Option<T> {
+        let total = self.count;
+        let sum: u32 = self.bins.iter().zip(0u32..).map(|(&n, v)| u32::from(n) * v).sum();
+        let (mut below, mut below_sum) = (0u32, 0u32);
+        let (mut best, mut first, mut last) = (T::zero(), 0u32, 0u32);
+        let (mut dark, mut lit) = (T::zero(), T::zero());
+        for (&n, v) in self.bins.iter().zip(0u32..) {
+            below += u32::from(n);
+            below_sum += u32::from(n) * v;
+            let above = total - below;
+            if below == 0 || above == 0 {
+                continue;
+            }
+            if n == 0 && last + 1 == v && best > T::zero() {
+                // An empty bin changes nothing: the run of equal levels goes on.
+                last = v;
+                continue;
+            }
+            let m0 = T::of(f64::from(below_sum)) / T::of(f64::from(below));
+            let m1 = T::of(f64::from(sum - below_sum)) / T::of(f64::from(above));
+            let d = m1 - m0;
+            let between = T::of(f64::from(below)) * T::of(f64::from(above)) * d * d;
+            if between > best {
+                (best, first, last, dark, lit) = (between, v, v, m0, m1);
+            }
+        }
+        let scale = T::of(f64::from(1u32 << self.shift));
+        let contrast = (lit - dark) * scale;
+        if !(contrast >= T::of(0.03 * f64::from(full_scale)).most(T::of(2.0))) {
+            return None;
+        }
+        // Lit begins one bin above the dark class.
+        Some((T::of(f64::from(first + last)) * T::of(0.5) + T::one()) * scale)
     }
 }

@@ -14,8 +14,19 @@ pub trait Pixels {
     fn height(&self) -> u16;
     /// The largest value a sample can have, such as 255 or 4095.
     fn full_scale(&self) -> u16;
-    /// Brightness at column `x`, row `y`; 0 outside the picture.
-    fn at(&self, x: u16, y: u16) -> u16;
+    /// Where column `x`, row `y` stands in memory, for [`Self::read`].
+    fn index(&self, x: u16, y: u16) -> usize;
+    /// Index distance from a column to the next.
+    fn across(&self) -> usize;
+    /// Index distance from a row to the next.
+    fn down(&self) -> usize;
+    /// Brightness at an index; 0 beyond the end.
+    fn read(&self, index: usize) -> u16;
+    /// Brightness at column `x`, row `y`. The caller stays within the picture: beyond, it is some pixel or 0.
+    #[inline(always)]
+    fn at(&self, x: u16, y: u16) -> u16 {
+        self.read(self.index(x, y))
+    }
 }
 
 impl<P: Pixels> Pixels for &P {
@@ -29,8 +40,20 @@ impl<P: Pixels> Pixels for &P {
         (**self).full_scale()
     }
     #[inline(always)]
-    fn at(&self, x: u16, y: u16) -> u16 {
-        (**self).at(x, y)
+    fn index(&self, x: u16, y: u16) -> usize {
+        (**self).index(x, y)
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        (**self).across()
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        (**self).down()
+    }
+    #[inline(always)]
+    fn read(&self, index: usize) -> u16 {
+        (**self).read(index)
     }
 }
 
@@ -127,7 +150,7 @@ pub struct Colour<'a, S> {
     grey: Grey<'a, S>,
     channels: usize,
     first: usize,
-    count: u32,
+    mean: bool,
 }
 
 fn check<S: Sample>(data: &[S], l: Layout) -> Result<Grey<'_, S>, ImageError> {
@@ -170,16 +193,16 @@ impl<'a, S: Sample> Colour<'a, S> {
             1 | 2 => 1,
             _ => 3,
         };
-        let (first, count) = match channel {
-            Channel::Mean => (0, colours as u32),
-            Channel::Red => (0, 1),
-            Channel::Green => (1, 1),
-            Channel::Blue => (2, 1),
+        let (first, mean) = match channel {
+            Channel::Mean => (0, colours == 3),
+            Channel::Red => (0, false),
+            Channel::Green => (1, false),
+            Channel::Blue => (2, false),
         };
         if first >= colours {
             return Err(ImageError::Channel);
         }
-        Ok(Self { grey, channels: usize::from(layout.channels), first, count })
+        Ok(Self { grey, channels: usize::from(layout.channels), first, mean })
     }
 }
 
@@ -194,9 +217,20 @@ impl<S: Sample> Pixels for Grey<'_, S> {
         self.full_scale
     }
     #[inline(always)]
-    fn at(&self, x: u16, y: u16) -> u16 {
-        // A row's padding may be read at x >= width: callers stay within the region, which is within the picture.
-        self.data.get(usize::from(y) * self.stride + usize::from(x)).map_or(0, |&s| s.into())
+    fn index(&self, x: u16, y: u16) -> usize {
+        usize::from(y) * self.stride + usize::from(x)
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        1
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        self.stride
+    }
+    #[inline(always)]
+    fn read(&self, index: usize) -> u16 {
+        self.data.get(index).map_or(0, |&s| s.into())
     }
 }
 
@@ -211,10 +245,27 @@ impl<S: Sample> Pixels for Colour<'_, S> {
         self.grey.full_scale
     }
     #[inline(always)]
-    fn at(&self, x: u16, y: u16) -> u16 {
-        let start = usize::from(y) * self.grey.stride + usize::from(x) * self.channels + self.first;
-        let at = |i: usize| self.grey.data.get(start + i).map_or(0u32, |&s| u32::from(s.into()));
-        if self.count == 3 { ((at(0) + at(1) + at(2)) / 3) as u16 } else { at(0) as u16 }
+    fn index(&self, x: u16, y: u16) -> usize {
+        usize::from(y) * self.grey.stride + usize::from(x) * self.channels + self.first
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        self.channels
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        self.grey.stride
+    }
+    #[inline(always)]
+    fn read(&self, index: usize) -> u16 {
+        if self.mean {
+            match self.grey.data.get(index..index + 3) {
+                Some(&[r, g, b]) => ((u32::from(r.into()) + u32::from(g.into()) + u32::from(b.into())) / 3) as u16,
+                _ => 0,
+            }
+        } else {
+            self.grey.read(index)
+        }
     }
 }
 
@@ -272,8 +323,17 @@ impl Pixels for ImageView<'_> {
     fn full_scale(&self) -> u16 {
         forward!(self, p => p.full_scale())
     }
-    fn at(&self, x: u16, y: u16) -> u16 {
-        forward!(self, p => p.at(x, y))
+    fn index(&self, x: u16, y: u16) -> usize {
+        forward!(self, p => p.index(x, y))
+    }
+    fn across(&self) -> usize {
+        forward!(self, p => p.across())
+    }
+    fn down(&self) -> usize {
+        forward!(self, p => p.down())
+    }
+    fn read(&self, index: usize) -> u16 {
+        forward!(self, p => p.read(index))
     }
 }
 
@@ -289,7 +349,6 @@ mod tests {
         assert_eq!((mean.at(0, 0), mean.at(0, 1)), (2, 60));
         let blue = Colour::try_new(&data, l, Channel::Blue).unwrap();
         assert_eq!((blue.at(0, 0), blue.at(0, 1)), (3, 90));
-        assert_eq!(mean.at(7, 7), 0);
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod linalg;
 pub mod pixel;
 pub mod real;
 pub mod region;
+mod rng;
 pub mod status;
 // Stages, in the order of the data's way.
 pub mod binarize;

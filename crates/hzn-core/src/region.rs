@@ -1,7 +1,8 @@
 //! The part of the picture that counts: the picture itself, cut by the image circle and by masked polygons.
 
-use crate::camera;
+use crate::camera::{self, Camera};
 use crate::error::{ConfigError, Limit, between, require};
+use crate::real::Real;
 
 /// Most corners of one polygon.
 pub const MAX_CORNERS: usize = 16;
@@ -31,5 +32,288 @@ impl Config {
             }
         }
         Ok(())
+    }
+}
+
+/// The picture cut by the image circle, and the polygons that lie over it.
+///
+/// Beyond the region an edge ends; under a polygon nothing is lit, and the polygon's outline is no edge.
+#[derive(Debug, Clone)]
+pub struct Region<T> {
+    width: u16,
+    height: u16,
+    circle: Option<Circle<T>>,
+    polygons: heapless::Vec<Outline<T>, MAX_POLYGONS>,
+}
+
+/// An ellipse along the axes: the image circle, seen through fx and fy.
+#[derive(Debug, Clone, Copy)]
+struct Circle<T> {
+    cx: T,
+    cy: T,
+    semi_x: T,
+    semi_y: T,
+}
+
+#[derive(Debug, Clone)]
+struct Outline<T> {
+    low: [T; 2],
+    high: [T; 2],
+    corners: heapless::Vec<[T; 2], MAX_CORNERS>,
+}
+
+impl<T: Real> Region<T> {
+    /// The region of a checked configuration.
+    pub fn new(config: &Config, camera: &Camera<T>) -> Self {
+        let circle = camera
+            .image_circle_px()
+            .map(|(c, semi_x, semi_y)| Circle { cx: c.u, cy: c.v, semi_x, semi_y });
+        let polygons = config
+            .polygons_px
+            .iter()
+            .map(|polygon| {
+                let corners: heapless::Vec<[T; 2], MAX_CORNERS> =
+                    polygon.iter().map(|&[x, y]| [T::of(x), T::of(y)]).collect();
+                let (mut low, mut high) = ([T::of(1e9); 2], [T::of(-1e9); 2]);
+                for c in &corners {
+                    for k in 0..2 {
+                        low[k] = low[k].least(c[k]);
+                        high[k] = high[k].most(c[k]);
+                    }
+                }
+                Outline { low, high, corners }
+            })
+            .collect();
+        Self { width: camera.width(), height: camera.height(), circle, polygons }
+    }
+
+    /// A whole picture without mask.
+    pub fn whole(width: u16, height: u16) -> Self {
+        Self { width, height, circle: None, polygons: heapless::Vec::new() }
+    }
+
+    /// Columns of the picture.
+    pub fn width(&self) -> u16 {
+        self.width
+    }
+    /// Rows of the picture.
+    pub fn height(&self) -> u16 {
+        self.height
+    }
+
+    /// Whether the pixel lies in the picture and in the image circle.
+    #[inline(always)]
+    pub fn contains(&self, x: u16, y: u16) -> bool {
+        x < self.width && y < self.height && self.circle.as_ref().is_none_or(|c| c.contains(x, y))
+    }
+
+    /// Whether the image circle cuts the picture.
+    #[inline(always)]
+    pub(crate) fn has_circle(&self) -> bool {
+        self.circle.is_some()
+    }
+
+    /// Whether a polygon covers the pixel.
+    #[inline(always)]
+    pub fn masked(&self, x: u16, y: u16) -> bool {
+        !self.polygons.is_empty() && self.covered(x, y)
+    }
+
+    #[inline(never)]
+    fn covered(&self, x: u16, y: u16) -> bool {
+        let p = [T::of_i32(i32::from(x)), T::of_i32(i32::from(y))];
+        self.polygons.iter().any(|polygon| polygon.covers(p))
+    }
+
+    /// First and last column of a row; `None` when the circle leaves nothing of it.
+    pub fn span(&self, y: u16) -> Option<(u16, u16)> {
+        let Some(c) = &self.circle else { return Some((0, self.width - 1)) };
+        let dy = (T::of_i32(i32::from(y)) - c.cy) / c.semi_y;
+        let left = T::one() - dy * dy;
+        if !(left > T::zero()) {
+            return None;
+        }
+        let half = c.semi_x * left.sqrt();
+        let last = i32::from(self.width) - 1;
+        // Start one pixel inside and grow while the exact test holds: the ring and `contains` must agree.
+        let mut x0 = ((c.cx - half).floor().to_i32() + 2).clamp(0, last);
+        let mut x1 = ((c.cx + half).floor().to_i32() - 1).clamp(0, last);
+        if x0 > x1 {
+            let mid = c.cx.to_i32().clamp(0, last);
+            (x0, x1) = (mid, mid);
+            if !self.contains(mid as u16, y) {
+                return None;
+            }
+        }
+        for _ in 0..4 {
+            if x0 > 0 && self.contains((x0 - 1) as u16, y) {
+                x0 -= 1;
+            }
+            if x1 < last && self.contains((x1 + 1) as u16, y) {
+                x1 += 1;
+            }
+        }
+        (self.contains(x0 as u16, y) && self.contains(x1 as u16, y)).then_some((x0 as u16, x1 as u16))
+    }
+
+    /// Walks the outermost pixels of the region once around, clockwise as seen on the screen, from the left end of
+    /// the top row. `visit` says whether to go on.
+    #[inline(always)]
+    pub fn walk_ring(&self, mut visit: impl FnMut(u16, u16) -> bool) {
+        let mut rows = (0..self.height).filter_map(|y| self.span(y).map(|s| (y, s)));
+        let Some((top, (left, right))) = rows.next() else { return };
+        // The rows of a convex region follow each other.
+        let bottom = rows.last().map_or(top, |(y, _)| y);
+        for x in left..=right {
+            if !visit(x, top) {
+                return;
+            }
+        }
+        let mut x = right;
+        for y in top + 1..=bottom {
+            let Some((_, end)) = self.span(y) else { continue };
+            while x > end + 1 {
+                x -= 1;
+                if !visit(x, y - 1) {
+                    return;
+                }
+            }
+            let from = if end > x { x + 1 } else { end };
+            for at in from..=end {
+                if !visit(at, y) {
+                    return;
+                }
+            }
+            x = end;
+        }
+        let Some((low, _)) = self.span(bottom) else { return };
+        if bottom > top {
+            for at in (low..x).rev() {
+                if !visit(at, bottom) {
+                    return;
+                }
+            }
+            x = low;
+        }
+        for y in (top + 1..bottom).rev() {
+            let Some((start, _)) = self.span(y) else { continue };
+            while x + 1 < start {
+                x += 1;
+                if !visit(x, y + 1) {
+                    return;
+                }
+            }
+            let from = if start < x { x - 1 } else { start };
+            for at in (start..=from).rev() {
+                if !visit(at, y) {
+                    return;
+                }
+            }
+            x = start;
+        }
+        // Up to the left end of the top row, along the second row where the top row is shorter.
+        if bottom > top {
+            while x + 1 < left {
+                x += 1;
+                if !visit(x, top + 1) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+impl<T: Real> Circle<T> {
+    #[inline(always)]
+    fn contains(&self, x: u16, y: u16) -> bool {
+        let dx = (T::of_i32(i32::from(x)) - self.cx) / self.semi_x;
+        let dy = (T::of_i32(i32::from(y)) - self.cy) / self.semi_y;
+        dx * dx + dy * dy <= T::one()
+    }
+}
+
+impl<T: Real> Outline<T> {
+    /// Even-odd rule.
+    fn covers(&self, [x, y]: [T; 2]) -> bool {
+        if x < self.low[0] || x > self.high[0] || y < self.low[1] || y > self.high[1] {
+            return false;
+        }
+        let Some(&last) = self.corners.last() else { return false };
+        let (mut inside, mut a) = (false, last);
+        for &b in &self.corners {
+            if (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0] {
+                inside = !inside;
+            }
+            a = b;
+        }
+        inside
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Config as CameraConfig, Model};
+    use std::collections::HashSet;
+    use std::vec::Vec;
+
+    fn ring(region: &Region<f64>) -> Vec<(u16, u16)> {
+        let mut ring = Vec::new();
+        region.walk_ring(|x, y| {
+            ring.push((x, y));
+            true
+        });
+        ring
+    }
+
+    /// Closed, without repeats, and exactly the pixels of the region with a 4-neighbour outside it.
+    fn check(region: &Region<f64>) {
+        let ring = ring(region);
+        let set: HashSet<_> = ring.iter().copied().collect();
+        assert_eq!(set.len(), ring.len(), "a pixel is visited twice");
+        for (i, a) in ring.iter().enumerate() {
+            let b = ring[(i + 1) % ring.len()];
+            assert!(a.0.abs_diff(b.0) <= 1 && a.1.abs_diff(b.1) <= 1, "gap between {a:?} and {b:?}");
+        }
+        for y in 0..region.height() {
+            for x in 0..region.width() {
+                let outside = |dx: i32, dy: i32| {
+                    let (x, y) = (i32::from(x) + dx, i32::from(y) + dy);
+                    x < 0 || y < 0 || !region.contains(x as u16, y as u16)
+                };
+                let border = region.contains(x, y) && (outside(1, 0) || outside(-1, 0) || outside(0, 1) || outside(0, -1));
+                assert_eq!(border, set.contains(&(x, y)), "{x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn ring_of_a_rectangle() {
+        check(&Region::whole(7, 5));
+        check(&Region::whole(2, 2));
+    }
+
+    #[test]
+    fn ring_of_image_circles() {
+        for (w, h, f, deg) in [(80, 60, 30.0, 40.0), (80, 60, 30.0, 60.0), (61, 61, 20.0, 80.0), (90, 40, 33.3, 70.0)] {
+            let config = CameraConfig {
+                theta_max_deg: Some(deg),
+                fy_px: f * 1.1,
+                cx_px: f64::from(w) * 0.47,
+                ..CameraConfig::ideal(Model::Equidistant, w, h, f)
+            };
+            let camera = Camera::try_new(&config).unwrap();
+            assert!(camera.image_circle_px().is_some());
+            check(&Region::new(&Config::default(), &camera));
+        }
+    }
+
+    #[test]
+    fn polygons_cover_their_inside() {
+        let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Pinhole, 40, 30, 50.0)).unwrap();
+        let mut config = Config::default();
+        config.polygons_px.push(heapless::Vec::from_slice(&[[10.0, 5.0], [20.0, 5.0], [10.0, 15.0]]).unwrap()).unwrap();
+        let region = Region::new(&config, &camera);
+        assert!(region.masked(12, 8) && !region.masked(19, 14) && !region.masked(9, 8));
     }
 }

@@ -1,4 +1,17 @@
-//! Lazy border following.
+//! Lazy border following: a pixel is compared with the level only when the search or the follower touches it.
+//!
+//! Edges begin at the border of the region, where dark turns to lit ([`search`]); they are followed until they leave
+//! the picture ([`follow`]). Edges that close on themselves are found on horizontal search lines. So the cost grows
+//! with the length of the edges, not with the number of pixels.
+
+mod follow;
+mod marks;
+mod search;
+mod thinned;
+
+pub(crate) use follow::{End, Scene};
+pub(crate) use marks::Marks;
+pub(crate) use thinned::Thinned;
 
 use crate::error::{ConfigError, Limit, require};
 
@@ -16,7 +29,7 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { line_spacing_px: None, max_steps: 1_000_000 }
+        Self { line_spacing_px: None, max_steps: 250_000 }
     }
 }
 
@@ -29,3 +42,6 @@ impl Config {
         require((1000..=100_000_000).contains(&self.max_steps), "contour.max_steps", steps, Limit::Between(1e3, 1e8))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,126 @@
+//! Where edges begin: at the border of the region, and on search lines.
+
+use super::follow::{Scene, WEST};
+use super::marks::Marks;
+use crate::image::Pixels;
+use crate::pipeline::Observer;
+use crate::pixel::Pixel;
+use crate::real::Real;
+
+/// Most starts that are ranked.
+pub(crate) const RANKED: usize = 4;
+
+/// An edge begins here: a lit pixel of the ring, the direction of the dark one before it, and how long the dark
+/// stretch before it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Start {
+    pub(crate) pixel: Pixel,
+    pub(crate) dark: u8,
+    pub(crate) stretch: u32,
+}
+
+/// The starts beside the longest dark stretches of the ring, longest first. The sky is the longest of all in most
+/// pictures, so the limb comes first, however many edges the clouds have.
+pub(crate) type Ranked = heapless::Vec<Start, RANKED>;
+
+impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
+    /// Calls `found` with every start along the ring, clockwise, until it says to stop. Each open edge has exactly
+    /// one start. The first start's stretch does not count what lies beyond the place where the walk begins; the
+    /// return value does: the stretch that ends the walk.
+    pub(crate) fn each_start(&self, mut found: impl FnMut(Start) -> bool) -> u32 {
+        let mut stretch = 0u32;
+        let mut before: Option<(Pixel, bool)> = None;
+        let mut first: Option<(Pixel, bool)> = None;
+        let mut stopped = false;
+        let mut step = |pixel: Pixel, lit: bool, masked: bool| -> bool {
+            let go_on = match before {
+                Some((dark, false)) if lit => {
+                    let start = Start { pixel, dark: direction(pixel, dark), stretch };
+                    found(start)
+                }
+                _ => true,
+            };
+            if lit {
+                stretch = 0;
+            } else if !masked {
+                stretch += 1;
+            }
+            before = Some((pixel, lit));
+            go_on
+        };
+        self.region.walk_ring(|x, y| {
+            let pixel = Pixel { x, y };
+            let lit = self.lit(x, y);
+            if first.is_none() {
+                first = Some((pixel, lit));
+            }
+            stopped = !step(pixel, lit, !lit && self.region.masked(x, y));
+            !stopped
+        });
+        // Close the ring: the last pixel and the first may make a start.
+        if let (false, Some((pixel, true))) = (stopped, first) {
+            step(pixel, true, false);
+            return 0;
+        }
+        stretch
+    }
+
+    /// The ranked starts.
+    pub(crate) fn ranked_starts(&self) -> Ranked {
+        let mut ranked = Ranked::new();
+        let mut first: Option<Start> = None;
+        let tail = self.each_start(|start| {
+            if first.is_none() {
+                first = Some(start);
+            } else {
+                insert(&mut ranked, start);
+            }
+            true
+        });
+        if let Some(start) = first {
+            insert(&mut ranked, Start { stretch: start.stretch + tail, ..start });
+        }
+        ranked
+    }
+
+    /// Calls `found` with every unmarked lit pixel of the search lines whose western neighbour is dark, until it
+    /// says to stop. `found` gets the marks back, for the follower.
+    pub(crate) fn each_crossing<'m>(&self, marks: &mut Marks<'m>, mut found: impl FnMut(Pixel, u8, &mut Marks<'m>) -> bool) {
+        for y in marks.rows(self.region.height()) {
+            let Some((x0, x1)) = self.region.span(y) else { continue };
+            let mut lit = self.lit(x0, y);
+            for x in x0 + 1..=x1 {
+                let now = self.lit(x, y);
+                if now && !lit && !marks.get(x, y) && !found(Pixel { x, y }, WEST, marks) {
+                    return;
+                }
+                lit = now;
+            }
+        }
+    }
+}
+
+fn insert(ranked: &mut Ranked, start: Start) {
+    let place = ranked.iter().position(|s| s.stretch < start.stretch).unwrap_or(ranked.len());
+    if place < RANKED {
+        if ranked.is_full() {
+            ranked.pop();
+        }
+        // There is room now, so nothing is handed back.
+        let _ = ranked.insert(place, start);
+    }
+}
+
+/// The direction from `a` to its neighbour `b`, counter-clockwise from east.
+fn direction(a: Pixel, b: Pixel) -> u8 {
+    match (i32::from(b.x) - i32::from(a.x), i32::from(b.y) - i32::from(a.y)) {
+        (1, 0) => 0,
+        (1, -1) => 1,
+        (0, -1) => 2,
+        (-1, -1) => 3,
+        (-1, 0) => 4,
+        (-1, 1) => 5,
+        (0, 1) => 6,
+        _ => 7,
+    }
+}

@@ -1,0 +1,151 @@
+use super::*;
+use crate::image::{Grey, Layout};
+use crate::pipeline::Unobserved;
+use crate::pixel::Pixel;
+use crate::region::Region;
+use proptest::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::vec;
+use std::vec::Vec;
+
+type Points = Vec<(u16, u16)>;
+
+struct Bitmap {
+    w: u16,
+    h: u16,
+    data: Vec<u8>,
+}
+
+impl Bitmap {
+    /// Rows of '#' and '.', with a dark frame of one pixel around: the outside counts as dark.
+    fn framed(rows: &[&str]) -> Self {
+        let (w, h) = (rows[0].len() + 2, rows.len() + 2);
+        let mut data = vec![0; w * h];
+        for (y, row) in rows.iter().enumerate() {
+            for (x, c) in row.bytes().enumerate() {
+                data[(y + 1) * w + x + 1] = if c == b'#' { 200 } else { 10 };
+            }
+        }
+        Self { w: w as u16, h: h as u16, data }
+    }
+
+    fn grey(&self) -> Grey<'_, u8> {
+        Grey::try_new(&self.data, Layout::packed(u32::from(self.w), u32::from(self.h), 1, 8)).unwrap()
+    }
+
+    /// Every closed edge at spacing 1: (points, twice the area).
+    fn closed(&self) -> Vec<(Points, i64)> {
+        let region = Region::<f64>::whole(self.w, self.h);
+        let scene = Scene { picture: &self.grey(), region: &region, level: 128, observer: &Unobserved };
+        let mut bits = vec![0u32; 4096];
+        let mut marks = Marks::new(&mut bits, self.w, self.h, 1);
+        let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
+        let mut edges = Vec::new();
+        scene.each_crossing(&mut marks, |start, dark, marks| {
+            let mut edge = Thinned::new(&mut buffer);
+            match scene.follow(start, dark, &mut edge, marks, &mut steps) {
+                End::Closed { twice_area } => {
+                    edges.push((edge.pixels().iter().map(|p| (p.x, p.y)).collect(), twice_area));
+                }
+                other => panic!("{other:?}"),
+            }
+            true
+        });
+        edges
+    }
+
+    fn open(&self) -> Vec<Points> {
+        let region = Region::<f64>::whole(self.w, self.h);
+        let scene = Scene { picture: &self.grey(), region: &region, level: 128, observer: &Unobserved };
+        let mut bits = vec![0u32; 4096];
+        let mut marks = Marks::new(&mut bits, self.w, self.h, 1);
+        let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
+        let mut edges = Vec::new();
+        scene.each_start(|start| {
+            let mut edge = Thinned::new(&mut buffer);
+            let end = scene.follow(start.pixel, start.dark, &mut edge, &mut marks, &mut steps);
+            assert_eq!(end, End::Open);
+            edges.push(edge.pixels().iter().map(|p| (p.x, p.y)).collect());
+            true
+        });
+        edges
+    }
+}
+
+/// `tests/golden/contours.json`: OpenCV 5.0 `findContours`, RETR_CCOMP, CHAIN_APPROX_NONE.
+#[test]
+fn outer_borders_equal_opencv_point_for_point() {
+    let golden: serde_json::Value = serde_json::from_str(include_str!("../../tests/golden/contours.json")).unwrap();
+    let mut compared = 0;
+    for case in golden["cases"].as_array().unwrap() {
+        let rows: Vec<&str> = case["rows"].as_array().unwrap().iter().map(|r| r.as_str().unwrap()).collect();
+        let want: BTreeMap<(u16, u16), Points> = case["all_outer"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|c| {
+                let points: Points =
+                    serde_json::from_value::<Vec<(u16, u16)>>(c.clone()).unwrap().into_iter().map(|(x, y)| (x + 1, y + 1)).collect();
+                (points[0], points)
+            })
+            .collect();
+        let all = Bitmap::framed(&rows).closed();
+        let got: BTreeMap<(u16, u16), Points> =
+            all.iter().filter(|(_, area)| *area <= 0).map(|(p, _)| (p[0], p.clone())).collect();
+        assert_eq!(got, want, "{}", case["id"]);
+        assert_eq!(all.len() - got.len(), case["holes"].as_array().unwrap().len(), "{} holes", case["id"]);
+        compared += got.len();
+    }
+    assert!(compared > 20, "{compared}");
+}
+
+#[test]
+fn an_open_edge_ends_at_the_border() {
+    // Sky above, ground below: one edge, from the right to the left, lit side on the left.
+    let (w, h) = (6, 5);
+    let data = (0..h * w).map(|i| if i / w >= 2 { 200 } else { 0 }).collect();
+    let edges = Bitmap { w: 6, h: 5, data }.open();
+    assert_eq!(edges, [(0..6).rev().map(|x| (x, 2)).collect::<Points>()]);
+}
+
+fn random_bitmap(w: u16, h: u16, density: u8, seed: u32) -> Bitmap {
+    let mut rng = crate::rng::Rng::new(seed);
+    let data = (0..u32::from(w) * u32::from(h)).map(|_| if rng.below(100) < u32::from(density) { 255 } else { 0 }).collect();
+    Bitmap { w, h, data }
+}
+
+proptest! {
+    /// Every edge ends, its points are lit and touch a dark pixel or the border.
+    #[test]
+    fn points_are_lit_and_beside_the_dark(w in 2u16..40, h in 2u16..40, density in 0u8..=100, seed in 0u32..10_000) {
+        let map = random_bitmap(w, h, density, seed);
+        let lit = |x: i32, y: i32| {
+            x >= 0 && y >= 0 && x < i32::from(w) && y < i32::from(h) && map.data[y as usize * usize::from(w) + x as usize] >= 128
+        };
+        for edge in map.open() {
+            for (x, y) in edge {
+                let (x, y) = (i32::from(x), i32::from(y));
+                prop_assert!(lit(x, y));
+                let dark = (-1..=1).any(|dx| (-1..=1).any(|dy| !lit(x + dx, y + dy)));
+                prop_assert!(dark);
+            }
+        }
+    }
+
+    /// Open and closed edges together visit every lit pixel that has a dark 4-neighbour inside the picture.
+    #[test]
+    fn no_edge_is_missed(w in 3u16..24, h in 3u16..24, density in 5u8..=95, seed in 0u32..10_000) {
+        let mut map = random_bitmap(w, h, density, seed);
+        // A dark frame: then there are only closed edges.
+        for y in 0..h { for x in 0..w {
+            if x == 0 || y == 0 || x == w - 1 || y == h - 1 { map.data[usize::from(y * w + x)] = 0; }
+        } }
+        let seen: BTreeSet<(u16, u16)> = map.closed().into_iter().flat_map(|(p, _)| p).collect();
+        let lit = |x: u16, y: u16| map.data[usize::from(y * w + x)] >= 128;
+        for y in 1..h - 1 { for x in 1..w - 1 {
+            if lit(x, y) && (!lit(x - 1, y) || !lit(x + 1, y) || !lit(x, y - 1) || !lit(x, y + 1)) {
+                prop_assert!(seen.contains(&(x, y)), "{x} {y}");
+            }
+        } }
+    }
+}
