@@ -1,0 +1,17 @@
+//! Why a scene cannot be rendered.
+
+use hzn_core::error::ConfigError;
+
+/// Why a scene cannot be rendered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// The camera or another part of the sensor's configuration is out of its limits.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The position is not outside the body and its limb height, or the attitude is no rotation.
+    #[error("the camera must be outside the body and its limb height, and its quaternion must have a length")]
+    Pose,
+    /// The direction to the Sun has no length.
+    #[error("the direction to the Sun must have a length")]
+    Sun,
+}

@@ -1,0 +1,203 @@
+//! The body as an ellipsoid of revolution, and what one ray meets on it.
+
+use hzn_core::body::{self, Kind};
+use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
+use hzn_core::frames::{Cam, UnitVec3};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::pose::Pose;
+
+/// An ellipsoid of revolution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Globe {
+    /// Equatorial radius in metres.
+    pub a_m: f64,
+    /// Polar radius in metres.
+    pub b_m: f64,
+}
+
+impl Globe {
+    /// The body of a sensor's configuration: WGS-84 for `earth`, else its sphere.
+    pub fn of(body: &body::Config) -> Self {
+        match body.kind {
+            Kind::Earth => Self { a_m: WGS84_A_M, b_m: WGS84_B_M },
+            Kind::EarthSphere | Kind::Sun | Kind::Moon | Kind::Sphere => {
+                let r = body.mean_radius_km() * 1e3;
+                Self { a_m: r, b_m: r }
+            }
+        }
+    }
+    /// Both semi-axes longer by `height_m`.
+    pub fn raised(&self, height_m: f64) -> Self {
+        Self { a_m: self.a_m + height_m, b_m: self.b_m + height_m }
+    }
+    /// Height of a position in metres above the surface, along its normal.
+    pub fn altitude_m(&self, position_m: [f64; 3]) -> f64 {
+        geodetic(position_m, self.a_m, self.b_m).0
+    }
+}
+
+/// A globe as one camera sees it. All lengths are divided by the semi-axes, so that the globe is the unit sphere.
+#[derive(Debug, Clone)]
+pub(crate) struct View {
+    /// Camera to scaled ECEF: diag(1/a, 1/a, 1/b) times the rotation.
+    cam_to_scaled: Matrix3<f64>,
+    /// Position, scaled.
+    y: Vector3<f64>,
+    /// |y|² − 1, formed so that little is lost close to the surface.
+    outside: f64,
+    /// 1/a, 1/a, 1/b in 1/m.
+    inverse_axes: Vector3<f64>,
+}
+
+/// What one ray meets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sight {
+    /// The ray in scaled ECEF; not of unit length.
+    sigma: Vector3<f64>,
+    /// −y·σ: positive when the ray goes towards the body.
+    m: f64,
+    /// |σ|².
+    s2: f64,
+    /// Square of the closest approach to the centre, less one: the limb is its zero, negative is a hit.
+    pub(crate) miss: f64,
+}
+
+impl View {
+    /// `None` when the position is not outside the globe.
+    pub(crate) fn try_new(globe: Globe, pose: &Pose) -> Option<Self> {
+        let Globe { a_m: a, b_m: b } = globe;
+        let [x, y, z] = pose.position_m;
+        let p = libm::hypot(x, y);
+        let outside = (p - a) * (p + a) / (a * a) + z * z / (b * b);
+        let inverse_axes = Vector3::new(1.0 / a, 1.0 / a, 1.0 / b);
+        let cam_to_scaled = Matrix3::from_diagonal(&inverse_axes) * pose.matrix();
+        let ok = outside > 1e-9 && outside.is_finite() && cam_to_scaled.iter().all(|v| v.is_finite());
+        ok.then(|| Self { cam_to_scaled, y: Vector3::new(x / a, y / a, z / b), outside, inverse_axes })
+    }
+
+    /// What the ray with direction `s` (camera frame, unit length) meets.
+    #[inline(always)]
+    pub(crate) fn look(&self, s: [f64; 3]) -> Sight {
+        let sigma = self.cam_to_scaled * Vector3::from(s);
+        let m = -self.y.dot(&sigma);
+        let s2 = sigma.norm_squared();
+        // A ray that leads away is nearest to the body where it starts.
+        let along = if m > 0.0 { m * m / s2 } else { 0.0 };
+        Sight { sigma, m, s2, miss: self.outside - along }
+    }
+
+    /// How fast [`Sight::miss`] grows with the angle off the limb, 1/rad.
+    pub(crate) fn miss_per_rad(&self) -> f64 {
+        // Closest approach = |y| sin γ for the angle γ to the centre; at the limb it is one.
+        2.0 * self.outside.sqrt()
+    }
+
+    /// The point the ray meets, on the unit sphere: where it enters, or the foot of its closest approach.
+    #[inline(always)]
+    pub(crate) fn point(&self, sight: &Sight) -> Vector3<f64> {
+        let under = -sight.miss * sight.s2;
+        if under > 0.0 {
+            self.y + sight.sigma * ((sight.m - under.sqrt()) / sight.s2)
+        } else {
+            self.closest(sight).normalize()
+        }
+    }
+
+    fn closest(&self, sight: &Sight) -> Vector3<f64> {
+        self.y + sight.sigma * (sight.m.max(0.0) / sight.s2)
+    }
+
+    /// Height of the ray's closest approach above the globe in metres, negative for a hit, to first order in the
+    /// flattening times the height, and zero exactly at the limb.
+    #[inline(always)]
+    pub(crate) fn tangent_height_m(&self, sight: &Sight) -> f64 {
+        let k = (1.0 + sight.miss).max(0.0).sqrt();
+        sight.miss / (1.0 + k) * self.metres_a_unit(sight)
+    }
+
+    /// Metres along the normal for a change of the closest approach by one, close to the limb.
+    fn metres_a_unit(&self, sight: &Sight) -> f64 {
+        let q = self.closest(sight);
+        let n2 = q.norm_squared();
+        if n2 < 1e-12 {
+            return 1.0 / self.inverse_axes.x;
+        }
+        (n2 / q.component_mul(&self.inverse_axes).norm_squared()).sqrt()
+    }
+
+    /// Derivative of the tangent height by (u, v) in metres a pixel; `jacobian` is the ray's, rows x, y, z.
+    pub(crate) fn tangent_height_gradient(&self, sight: &Sight, jacobian: &[[f64; 2]; 3]) -> [f64; 2] {
+        // miss = outside − m²/s2 with dm = −y·dσ and ds2 = 2 σ·dσ.
+        let r = sight.m / sight.s2;
+        let by_sigma = self.y * (2.0 * r) + sight.sigma * (2.0 * r * r);
+        let by_ray = self.cam_to_scaled.transpose() * by_sigma;
+        let k = (1.0 + sight.miss).max(1e-12).sqrt();
+        let scale = self.metres_a_unit(sight) / (2.0 * k);
+        [0, 1].map(|c| scale * (by_ray.x * jacobian[0][c] + by_ray.y * jacobian[1][c] + by_ray.z * jacobian[2][c]))
+    }
+
+    /// Direction of the ray in ECEF, unit.
+    pub(crate) fn direction(&self, sight: &Sight) -> Vector3<f64> {
+        sight.sigma.component_div(&self.inverse_axes)
+    }
+
+    /// A direction given in ECEF (unit) as the camera sees it.
+    pub(crate) fn to_camera(&self, ecef: Vector3<f64>) -> Option<UnitVec3<Cam, f64>> {
+        // The rotation is orthogonal: its inverse is its transpose.
+        UnitVec3::try_new((self.cam_to_scaled.transpose() * ecef.component_div(&self.inverse_axes)).into())
+    }
+
+    /// The outward normal (ECEF, unit) at a point of the unit sphere.
+    #[inline(always)]
+    pub(crate) fn normal(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        point.component_mul(&self.inverse_axes).normalize()
+    }
+
+    /// Distance to a point of the unit sphere in metres, and the cosine of the angle under which the ray meets the
+    /// surface there.
+    #[inline(always)]
+    pub(crate) fn range_m_and_incidence(&self, sight: &Sight, point: &Vector3<f64>) -> (f64, f64) {
+        let scaled = (point - self.y).norm();
+        (scaled / sight.s2.sqrt(), -sight.sigma.dot(point) / sight.s2.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::{Look, position_m};
+
+    #[test]
+    fn gradient_is_the_difference_quotient() {
+        let pose = Pose::looking(position_m(40.0, 3.0, 240.0), Look { depression_rad: 0.27, ..Look::default() });
+        let globe = Globe { a_m: WGS84_A_M, b_m: WGS84_B_M }.raised(1e4);
+        let view = View::try_new(globe, &pose).unwrap();
+        let ray = |u: f64, v: f64| Vector3::new(u, v, 1.0).normalize().into();
+        let (u, v, e) = (0.1, 0.02, 1e-5);
+        let h = |u, v| view.tangent_height_m(&view.look(ray(u, v)));
+        let jac = {
+            let d = |f: [f64; 3], g: [f64; 3]| core::array::from_fn::<f64, 3, _>(|i| (f[i] - g[i]) / (2.0 * e));
+            let (a, b) = (d(ray(u + e, v), ray(u - e, v)), d(ray(u, v + e), ray(u, v - e)));
+            core::array::from_fn(|i| [a[i], b[i]])
+        };
+        let got = view.tangent_height_gradient(&view.look(ray(u, v)), &jac);
+        let want = [(h(u + e, v) - h(u - e, v)) / (2.0 * e), (h(u, v + e) - h(u, v - e)) / (2.0 * e)];
+        for i in 0..2 {
+            assert!((got[i] - want[i]).abs() < 0.01 * want[1].abs(), "{got:?} {want:?}");
+        }
+    }
+
+    #[test]
+    fn height_over_a_sphere_is_plain_geometry() {
+        let pose = Pose { position_m: [0.0, 0.0, -2000.0], cam_to_ecef_wxyz: [1.0, 0.0, 0.0, 0.0] };
+        let view = View::try_new(Globe { a_m: 1000.0, b_m: 1000.0 }, &pose).unwrap();
+        for angle in [0.1f64, 0.5, 0.6, 1.2] {
+            let sight = view.look([angle.sin(), 0.0, angle.cos()]);
+            assert!((view.tangent_height_m(&sight) - (2000.0 * angle.sin() - 1000.0)).abs() < 1e-9);
+        }
+        // A ray that leads away is at its nearest where it starts.
+        assert!((view.tangent_height_m(&view.look([0.0, 0.0, -1.0])) - 1000.0).abs() < 1e-9);
+        assert!((view.point(&view.look([0.0, 0.0, 1.0])) + Vector3::z()).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,35 @@
+//! Scenes with exact truth for the horizon sensor.
+//!
+//! A [`Scene`] holds everything one picture depends on. From it follow the rendered [`Picture`], through the same
+//! lens models as the sensor's own.
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`scene`] | what is in front of the camera |
+//! | [`pose`] | where the camera is and where it looks |
+//! | [`globe`] | the body as an ellipsoid, and what a ray meets on it |
+//! | [`texture`] | clouds |
+//! | [`foreground`] | structure of the vehicle in the picture |
+//! | `render` | light on every pixel |
+//! | [`detector`] | blur, noise, quantisation |
+//! | [`picture`] | the result, and its file |
+
+mod counter;
+pub mod detector;
+pub mod error;
+pub mod foreground;
+pub mod globe;
+pub mod picture;
+pub mod pose;
+mod render;
+pub mod scene;
+pub mod texture;
+
+pub use detector::Detector;
+pub use error::SceneError;
+pub use foreground::Foreground;
+pub use globe::Globe;
+pub use picture::{Picture, Samples};
+pub use pose::{Look, Pose};
+pub use scene::{Band, Disc, Light, Profile, Scene, Sky};
+pub use texture::Clouds;

@@ -1,0 +1,344 @@
+//! The picture of a scene.
+//!
+//! Each pixel's ray is followed once. Where the limb passes through the pixel or close by, brightness is averaged
+//! over the pixel with the tangent height taken as linear across it; a sharp limb's share of the pixel is exact.
+
+use hzn_core::camera::Camera;
+use hzn_core::ellipsoid::LimbCone;
+use hzn_core::pixel::ImagePoint;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::counter::{Counter, Stream};
+use crate::detector::Plane;
+use crate::error::SceneError;
+use crate::globe::{Globe, Sight, View};
+use crate::picture::Picture;
+use crate::scene::{Band, Light, Profile, Scene, Sky};
+use crate::texture::{CloudField, smoothstep};
+
+/// Pixels this close to the limb are averaged.
+const NEAR_PX: f64 = 3.0;
+/// Points across a pixel where it is averaged by sampling.
+const SAMPLES: i32 = 5;
+
+impl Scene {
+    /// The picture.
+    ///
+    /// # Errors
+    /// A camera that [`Camera::try_new`] refuses, or a position that is not outside the body.
+    pub fn render(&self) -> Result<Picture, SceneError> {
+        let painter = Painter::try_new(self)?;
+        let light = painter.light(self).blurred(self.detector.psf_sigma_px);
+        Ok(self.detector.expose(&painter.through_circle(light), self.seed))
+    }
+}
+
+/// A scene, prepared for asking pixel by pixel.
+pub(crate) struct Painter {
+    camera: Camera<f64>,
+    view: View,
+    edge: Edge,
+    lamp: Lamp,
+    surface: f32,
+    clouds: Option<CloudField>,
+    band: Option<Band>,
+    sky: f32,
+    /// Larger of the two angles a pixel in the middle covers, radians.
+    pixel_rad: f64,
+    /// [`Sight::miss`] of pixels that may have the limb within [`NEAR_PX`].
+    near: f64,
+    radius_km: f32,
+}
+
+impl Painter {
+    pub(crate) fn try_new(scene: &Scene) -> Result<Self, SceneError> {
+        let camera = Camera::<f64>::try_new(&scene.camera)?;
+        let globe = Globe::of(&scene.body).raised(scene.body.limb_height_km * 1e3);
+        let view = View::try_new(globe, &scene.pose).ok_or(SceneError::Pose)?;
+        let (fx, fy) = camera.focal_px();
+        let pixel_rad = 1.0 / fx.min(fy);
+        let reach_px = match scene.profile {
+            Profile::Sharp => NEAR_PX,
+            // Steep profiles have all their light within a few pixels, and all of them need averaging.
+            Profile::Exponential { .. } => 2.0 * NEAR_PX,
+        };
+        Ok(Self {
+            // Off the axis a pixel can cover more than in the middle.
+            near: 2.0 * reach_px * pixel_rad * view.miss_per_rad(),
+            edge: Edge::new(scene.profile),
+            lamp: Lamp::try_new(scene, globe)?,
+            surface: scene.disc.surface as f32,
+            clouds: scene.disc.clouds.map(|c| CloudField::new(&c, globe.a_m)),
+            band: scene.disc.band,
+            sky: scene.sky.brightness as f32,
+            pixel_rad,
+            radius_km: (globe.a_m / 1e3) as f32,
+            camera,
+            view,
+        })
+    }
+
+    /// Light on every pixel before the blur.
+    pub(crate) fn light(&self, scene: &Scene) -> Plane {
+        let (w, h) = (usize::from(scene.camera.width), usize::from(scene.camera.height));
+        let mut data = vec![0.0f32; w * h];
+        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+            for (x, p) in row.iter_mut().enumerate() {
+                *p = self.at(x as f64, y as f64);
+            }
+        });
+        self.draw_stars(&scene.sky, w, &mut data);
+        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+            for f in &scene.foreground {
+                f.draw_row(y, row);
+            }
+        });
+        Plane { width: w, data }
+    }
+
+    /// No light reaches what is beyond the image circle.
+    fn through_circle(&self, mut light: Plane) -> Plane {
+        if let Some((c, a, b)) = self.camera.image_circle_px() {
+            let w = light.width;
+            light.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+                let dy = (y as f64 - c.v) / b;
+                for (x, p) in row.iter_mut().enumerate() {
+                    let dx = (x as f64 - c.u) / a;
+                    if dx * dx + dy * dy > 1.0 {
+                        *p = 0.0;
+                    }
+                }
+            });
+        }
+        light
+    }
+
+    #[inline(always)]
+    fn at(&self, u: f64, v: f64) -> f32 {
+        // Beyond the image circle the scene goes on with the sky, so that the blur takes no dark rim inward.
+        let Some(ray) = self.camera.ray(ImagePoint { u, v }) else { return self.sky };
+        let sight = self.view.look(ray.direction().xyz());
+        if sight.miss.abs() > self.near {
+            let cover = if sight.miss <= 0.0 { 1.0 } else { self.edge.at(self.view.tangent_height_m(&sight)) };
+            return self.blend(cover, &sight);
+        }
+        let height = self.view.tangent_height_m(&sight);
+        let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
+        self.blend(self.edge.mean(height, gradient), &sight)
+    }
+
+    /// Sky and body, the body with weight `cover`.
+    #[inline(always)]
+    fn blend(&self, cover: f32, sight: &Sight) -> f32 {
+        if cover <= 1e-4 {
+            return self.sky;
+        }
+        self.sky + cover * (self.body(sight) - self.sky)
+    }
+
+    /// Brightness of the body where the ray meets or passes it.
+    fn body(&self, sight: &Sight) -> f32 {
+        let point = self.view.point(sight);
+        let lit = self.lamp.at(&self.view, sight, &point);
+        if lit <= 0.0 {
+            return self.sky;
+        }
+        let air = self.band.map_or(0.0, |b| {
+            let depth_km = (-self.view.tangent_height_m(sight) * 1e-3).max(0.0);
+            let fade = ((b.depth_km - depth_km) / b.fade_km.max(1e-6) + 0.5).clamp(0.0, 1.0);
+            smoothstep(fade as f32)
+        });
+        let ground = match &self.clouds {
+            Some(clouds) if air < 1.0 => {
+                let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
+                let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(1e-3)) as f32;
+                clouds.over(self.surface, &point, footprint_km.min(self.radius_km))
+            }
+            _ => self.surface,
+        };
+        let bright = self.band.map_or(ground, |b| ground + air * (b.brightness as f32 - ground));
+        self.sky + lit * (bright - self.sky)
+    }
+
+    /// Adds the stars that are neither behind the body nor outside the picture, each spread over four pixels.
+    fn draw_stars(&self, sky: &Sky, width: usize, data: &mut [f32]) {
+        let draws = Counter::new(sky.seed, Stream::Stars);
+        for i in 0..u64::from(sky.stars) {
+            let [a, b, c] = [3 * i, 3 * i + 1, 3 * i + 2].map(|j| draws.uniform(j));
+            let z = 2.0 * a - 1.0;
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * b);
+            let r = (1.0 - z * z).sqrt();
+            let Some(cam) = self.view.to_camera(Vector3::new(r * cos, r * sin, z)) else { continue };
+            let Some(p) = self.camera.project(&cam) else { continue };
+            let seen = 1.0 - self.edge.at(self.view.tangent_height_m(&self.view.look(cam.xyz())));
+            // Evenly distributed in magnitude over five magnitudes.
+            let light = sky.star_brightness as f32 * libm::exp(-4.6 * c) as f32 * seen;
+            let (x, y) = (p.u.floor(), p.v.floor());
+            let (fx, fy) = ((p.u - x) as f32, (p.v - y) as f32);
+            for (dx, dy, weight) in [
+                (0.0, 0.0, (1.0 - fx) * (1.0 - fy)),
+                (1.0, 0.0, fx * (1.0 - fy)),
+                (0.0, 1.0, (1.0 - fx) * fy),
+                (1.0, 1.0, fx * fy),
+            ] {
+                let (x, y) = (x + dx, y + dy);
+                if x >= 0.0 && y >= 0.0 && x < width as f64 {
+                    if let Some(pixel) = data.get_mut(y as usize * width + x as usize) {
+                        *pixel += light * weight;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The limb's profile, prepared: the body's share of the light by tangent height above the limb height.
+#[derive(Debug, Clone, Copy)]
+enum Edge {
+    Sharp,
+    Exponential { per_m: f64, knee_m: f64 },
+}
+
+impl Edge {
+    fn new(profile: Profile) -> Self {
+        match profile {
+            Profile::Exponential { scale_km } if scale_km > 0.0 => {
+                let scale_m = scale_km * 1e3;
+                Self::Exponential { per_m: 1.0 / scale_m, knee_m: -core::f64::consts::LN_2 * scale_m }
+            }
+            _ => Self::Sharp,
+        }
+    }
+
+    /// Share at a height in metres above the limb.
+    #[inline(always)]
+    fn at(&self, height_m: f64) -> f32 {
+        match *self {
+            Self::Sharp => f32::from(u8::from(height_m <= 0.0)),
+            Self::Exponential { per_m, knee_m } => libm::expf((-(height_m - knee_m).max(0.0) * per_m) as f32),
+        }
+    }
+
+    /// Mean share over a pixel with this height in its middle and this gradient in metres a pixel.
+    fn mean(&self, height_m: f64, [gu, gv]: [f64; 2]) -> f32 {
+        match self {
+            Self::Sharp => {
+                let slope = libm::hypot(gu, gv);
+                if slope > 0.0 {
+                    half_plane(-height_m / slope, gu / slope, gv / slope) as f32
+                } else {
+                    self.at(height_m)
+                }
+            }
+            Self::Exponential { .. } => {
+                let mut sum = 0.0;
+                for i in 0..SAMPLES {
+                    for j in 0..SAMPLES {
+                        let [du, dv] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(SAMPLES) - 0.5);
+                        sum += self.at(height_m + gu * du + gv * dv);
+                    }
+                }
+                sum / (SAMPLES * SAMPLES) as f32
+            }
+        }
+    }
+}
+
+/// Share of a unit square that lies in a half plane whose border, with normal (nx, ny), passes `inside` beyond the
+/// square's middle (positive when the middle is inside).
+fn half_plane(inside: f64, nx: f64, ny: f64) -> f64 {
+    let (a, b) = (nx.abs().max(ny.abs()), nx.abs().min(ny.abs()));
+    // The share is the integral of a trapezoid: a box of width a smoothed by one of width b.
+    let d = inside.abs();
+    let share = if d <= 0.5 * (a - b) {
+        0.5 + d / a
+    } else {
+        let rest = (0.5 * (a + b) - d).max(0.0);
+        1.0 - if rest > 0.0 { rest * rest / (2.0 * a * b) } else { 0.0 }
+    };
+    if inside >= 0.0 { share } else { 1.0 - share }
+}
+
+/// [`Light`], prepared.
+#[derive(Debug, Clone)]
+enum Lamp {
+    Full,
+    Sun {
+        direction: Vector3<f64>,
+        twilight_rad: f64,
+    },
+    Sector {
+        axis: Vector3<f64>,
+        east: Vector3<f64>,
+        south: Vector3<f64>,
+        centre_rad: f64,
+        half_width_rad: f64,
+        fade_rad: f64,
+    },
+}
+
+impl Lamp {
+    fn try_new(scene: &Scene, globe: Globe) -> Result<Self, SceneError> {
+        Ok(match scene.light {
+            Light::Full => Self::Full,
+            Light::Sun { direction, twilight_rad } => {
+                let direction = Vector3::from(direction).try_normalize(1e-12).ok_or(SceneError::Sun)?;
+                Self::Sun { direction, twilight_rad }
+            }
+            Light::Sector { centre_rad, half_width_rad, fade_rad } => {
+                let cone = LimbCone::try_new(scene.pose.position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)?;
+                let (axis, east) = (Vector3::from(cone.axis.xyz()), Vector3::from(cone.east.xyz()));
+                Self::Sector { axis, east, south: axis.cross(&east), centre_rad, half_width_rad, fade_rad }
+            }
+        })
+    }
+
+    /// How much of the light falls where the ray meets the body, 0 to 1.
+    #[inline(always)]
+    fn at(&self, view: &View, sight: &Sight, point: &Vector3<f64>) -> f32 {
+        let x = match self {
+            Self::Full => return 1.0,
+            Self::Sun { direction, twilight_rad } => {
+                let elevation = libm::asin(view.normal(point).dot(direction).clamp(-1.0, 1.0));
+                elevation / twilight_rad.max(1e-9)
+            }
+            Self::Sector { east, south, axis, centre_rad, half_width_rad, fade_rad } => {
+                let ray = view.direction(sight);
+                let across = ray - axis * ray.dot(axis);
+                let off = libm::atan2(across.dot(south), across.dot(east)) - centre_rad;
+                let off = (off - core::f64::consts::TAU * (off / core::f64::consts::TAU).round()).abs();
+                (half_width_rad - off) / fade_rad.max(1e-9)
+            }
+        };
+        smoothstep((x + 0.5).clamp(0.0, 1.0) as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_plane_equals_counting() {
+        for (angle, d) in [(0.0f64, 0.2), (0.3, -0.35), (0.785, 0.6), (1.2, 0.05), (2.0, -0.1), (4.0, 0.49)] {
+            let (ny, nx) = angle.sin_cos();
+            let n = 1000;
+            let inside = (0..n * n)
+                .filter(|i| {
+                    let [x, y] = [i % n, i / n].map(|k| (f64::from(k) + 0.5) / f64::from(n) - 0.5);
+                    x * nx + y * ny <= d
+                })
+                .count();
+            let share = inside as f64 / f64::from(n * n);
+            assert!((half_plane(d, nx, ny) - share).abs() < 2e-3, "{angle} {d}");
+        }
+    }
+
+    #[test]
+    fn half_brightness_is_at_the_limb_height() {
+        let edge = Edge::new(Profile::Exponential { scale_km: 7.0 });
+        assert!((edge.at(0.0) - 0.5).abs() < 1e-6 && edge.at(-1e4) == 1.0);
+        assert!((edge.at(7e3) - 0.5 / core::f32::consts::E).abs() < 1e-6);
+    }
+}
