@@ -1,7 +1,7 @@
 //! Scenes with exact truth for the horizon sensor.
 //!
-//! A [`Scene`] holds everything one picture depends on. From it follow the rendered [`Picture`], through the same
-//! lens models as the sensor's own.
+//! A [`Scene`] holds everything one picture depends on. From it follow the rendered [`Picture`] (through the same
+//! lens models as the sensor's own), the [`Truth`], and edge points on the limb without rendering.
 //!
 //! | module | idea |
 //! |---|---|
@@ -13,23 +13,29 @@
 //! | `render` | light on every pixel |
 //! | [`detector`] | blur, noise, quantisation |
 //! | [`picture`] | the result, and its file |
+//! | [`limb`] | the limb as a line in the picture, edge points on it |
+//! | [`truth`] | what is true of a scene |
 
 mod counter;
 pub mod detector;
 pub mod error;
 pub mod foreground;
 pub mod globe;
+pub mod limb;
 pub mod picture;
 pub mod pose;
 mod render;
 pub mod scene;
 pub mod texture;
+pub mod truth;
 
 pub use detector::Detector;
 pub use error::SceneError;
 pub use foreground::Foreground;
 pub use globe::Globe;
+pub use limb::{EdgeNoise, LimbCircle, LimbPoint};
 pub use picture::{Picture, Samples};
 pub use pose::{Look, Pose};
 pub use scene::{Band, Disc, Light, Profile, Scene, Sky};
 pub use texture::Clouds;
+pub use truth::Truth;

@@ -79,6 +79,12 @@ impl Pose {
         Self { cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k], ..*self }
     }
 
+    /// The quaternion at unit length, scalar first.
+    pub(crate) fn unit_quaternion_wxyz(&self) -> [f64; 4] {
+        let n = self.cam_to_ecef_wxyz.iter().map(|x| x * x).sum::<f64>().sqrt();
+        self.cam_to_ecef_wxyz.map(|x| x / n)
+    }
+
     /// Matrix that takes camera coordinates to ECEF coordinates.
     pub(crate) fn matrix(&self) -> Matrix3<f64> {
         let [w, x, y, z] = self.cam_to_ecef_wxyz;

@@ -5,6 +5,7 @@
 
 use hzn_core::camera::Camera;
 use hzn_core::ellipsoid::LimbCone;
+use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pixel::ImagePoint;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -76,6 +77,19 @@ impl Painter {
             radius_km: (globe.a_m / 1e3) as f32,
             camera,
             view,
+        })
+    }
+
+    /// A direction given in ECEF (unit) as the camera sees it.
+    pub(crate) fn to_camera(&self, ecef: [f64; 3]) -> Option<UnitVec3<Cam, f64>> {
+        self.view.to_camera(ecef.into())
+    }
+
+    /// How much light falls where this ray (ECEF, unit) meets or passes the body, 0 to 1.
+    pub(crate) fn lit(&self, ecef: [f64; 3]) -> f32 {
+        self.to_camera(ecef).map_or(0.0, |cam| {
+            let sight = self.view.look(cam.xyz());
+            self.lamp.at(&self.view, &sight, &self.view.point(&sight))
         })
     }
 

@@ -1,0 +1,333 @@
+//! The limb as a line in the picture: where it is, which of it can be seen, and edge points on it without rendering.
+
+use hzn_core::camera::Camera;
+use hzn_core::ellipsoid::LimbCone;
+use hzn_core::pixel::ImagePoint;
+use nalgebra::Vector3;
+
+use crate::counter::{Counter, Stream};
+use crate::error::SceneError;
+use crate::globe::Globe;
+use crate::render::Painter;
+use crate::scene::Scene;
+
+/// Errors of edge points along u and v, independent of each other, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum EdgeNoise {
+    /// Points exactly on the limb.
+    #[default]
+    None,
+    /// Every point has its own error.
+    White {
+        /// Standard deviation along u and along v in pixels.
+        sigma_px: f64,
+    },
+    /// A Gauss-Markov process along each piece of limb: correlation exp(−arc/`correlation_px`).
+    GaussMarkov {
+        /// Variance along u and along v in px²; the R of the covariance model.
+        variance_px2: f64,
+        /// Correlation length in pixels along the limb; the L of the covariance model.
+        correlation_px: f64,
+    },
+}
+
+/// A point of the visible limb.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimbPoint {
+    /// Where it is seen, with its error.
+    pub point: ImagePoint<f64>,
+    /// Where it is.
+    pub exact: ImagePoint<f64>,
+    /// Azimuth about the limb axis in radians, 0 = east of the position, π/2 = the direction axis × east.
+    pub azimuth_rad: f64,
+    /// Which uninterrupted piece of limb, from 0.
+    pub piece: usize,
+    /// Arc length in pixels from the start of its piece.
+    pub arc_px: f64,
+}
+
+/// The exact limb of a scene, before a lens.
+#[derive(Debug, Clone, Copy)]
+pub struct LimbCircle {
+    axis: Vector3<f64>,
+    east: Vector3<f64>,
+    third: Vector3<f64>,
+    cot2_east: f64,
+    cot2_meridian: f64,
+}
+
+impl LimbCircle {
+    /// The limb of the scene's body, raised by its limb height.
+    ///
+    /// # Errors
+    /// The position is not outside.
+    pub fn of(scene: &Scene) -> Result<Self, SceneError> {
+        let globe = Globe::of(&scene.body).raised(scene.body.limb_height_km * 1e3);
+        let cone = LimbCone::try_new(scene.pose.position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)?;
+        let (axis, east) = (Vector3::from(cone.axis.xyz()), Vector3::from(cone.east.xyz()));
+        let (cot2_east, cot2_meridian) = (cone.cot2_east, cone.cot2_meridian);
+        Ok(Self { axis, east, third: axis.cross(&east), cot2_east, cot2_meridian })
+    }
+
+    /// Unit direction (ECEF) of the limb at an azimuth about its axis: 0 = east, π/2 = axis × east.
+    pub fn ray_ecef(&self, azimuth_rad: f64) -> [f64; 3] {
+        let (sin, cos) = libm::sincos(azimuth_rad);
+        // The cone's half-angle at this azimuth, exactly: cot² α = cot² α_E cos² φ + cot² α_M sin² φ.
+        let cot = (self.cot2_east * cos * cos + self.cot2_meridian * sin * sin).sqrt();
+        (self.axis * cot + self.east * cos + self.third * sin).normalize().into()
+    }
+}
+
+/// One piece of limb that is seen without interruption.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Piece {
+    /// (azimuth in radians, arc length from the piece's start in pixels), both rising.
+    stations: Vec<(f64, f64)>,
+}
+
+impl Piece {
+    pub(crate) fn length_px(&self) -> f64 {
+        self.stations.last().map_or(0.0, |s| s.1)
+    }
+    /// Azimuth at an arc length.
+    fn azimuth_at(&self, arc_px: f64) -> f64 {
+        let i = self.stations.partition_point(|s| s.1 < arc_px).clamp(1, self.stations.len() - 1);
+        let ((a0, s0), (a1, s1)) = (self.stations[i - 1], self.stations[i]);
+        if s1 > s0 { a0 + (a1 - a0) * (arc_px - s0) / (s1 - s0) } else { a0 }
+    }
+}
+
+/// The limb of a scene through its lens.
+pub(crate) struct Walk<'a> {
+    scene: &'a Scene,
+    camera: Camera<f64>,
+    circle: LimbCircle,
+    painter: Painter,
+}
+
+impl<'a> Walk<'a> {
+    pub(crate) fn try_new(scene: &'a Scene) -> Result<Self, SceneError> {
+        let camera = Camera::try_new(&scene.camera)?;
+        Ok(Self { scene, camera, circle: LimbCircle::of(scene)?, painter: Painter::try_new(scene)? })
+    }
+
+    /// Where the limb at this azimuth is in the plane of the picture, if the lens reaches there.
+    fn project(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
+        let cam = self.painter.to_camera(self.circle.ray_ecef(azimuth_rad))?;
+        self.camera.project(&cam)
+    }
+
+    /// Whether it is in the picture, lit, and not behind the vehicle.
+    fn is_seen(&self, azimuth_rad: f64, p: ImagePoint<f64>) -> bool {
+        let (w, h) = (f64::from(self.camera.width()), f64::from(self.camera.height()));
+        let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
+        inside
+            && !self.scene.foreground.iter().any(|f| f.contains([p.u, p.v]))
+            && self.painter.lit(self.circle.ray_ecef(azimuth_rad)) > 0.5
+    }
+
+    fn seen(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
+        self.project(azimuth_rad).filter(|p| self.is_seen(azimuth_rad, *p))
+    }
+
+    /// The visible pieces, ends located to better than a hundredth of a pixel.
+    pub(crate) fn pieces(&self) -> Vec<Piece> {
+        // About two steps a pixel where the limb is a circle around the optical axis; the arc length is summed over
+        // chords, so longer steps elsewhere do no harm.
+        let steps = 4 * (usize::from(self.camera.width()) + usize::from(self.camera.height()));
+        let at = |i: usize| core::f64::consts::TAU * i as f64 / steps as f64;
+        let seen: Vec<Option<ImagePoint<f64>>> = (0..steps).map(|i| self.seen(at(i))).collect();
+        // Begin where nothing is seen, so that no piece is cut at azimuth zero; a limb seen all around has no such
+        // place and is one piece of a whole turn.
+        let Some(start) = seen.iter().position(Option::is_none) else {
+            return vec![self.piece((0..=steps).map(at).collect())];
+        };
+        let mut pieces = Vec::new();
+        let mut current: Vec<f64> = Vec::new();
+        for i in start..start + steps {
+            let (here, next) = (seen[i % steps], seen[(i + 1) % steps]);
+            match (here, next) {
+                (None, Some(_)) => current.extend([self.end(at(i + 1), at(i)), at(i + 1)]),
+                (Some(_), Some(_)) => current.push(at(i + 1)),
+                (Some(_), None) => {
+                    current.push(self.end(at(i), at(i + 1)));
+                    pieces.push(self.piece(core::mem::take(&mut current)));
+                }
+                (None, None) => {}
+            }
+        }
+        pieces
+    }
+
+    /// The last azimuth that is seen between one that is and one that is not.
+    fn end(&self, mut seen: f64, mut unseen: f64) -> f64 {
+        for _ in 0..24 {
+            let mid = 0.5 * (seen + unseen);
+            if self.seen(mid).is_some() { seen = mid } else { unseen = mid }
+        }
+        seen
+    }
+
+    fn piece(&self, azimuths_rad: Vec<f64>) -> Piece {
+        let mut last: Option<ImagePoint<f64>> = None;
+        let mut arc = 0.0;
+        let stations = azimuths_rad.into_iter().filter_map(|a| {
+            let p = self.project(a)?;
+            arc += last.map_or(0.0, |l| libm::hypot(p.u - l.u, p.v - l.v));
+            last = Some(p);
+            Some((a, arc))
+        });
+        Piece { stations: stations.collect() }
+    }
+}
+
+impl Scene {
+    /// `count` points evenly spaced along the visible limb: in the picture, lit, not behind the vehicle. Fewer come
+    /// back only when none is visible. The scene's seed chooses the errors.
+    ///
+    /// # Errors
+    /// A camera, position or light that cannot be.
+    pub fn limb_points(&self, count: usize, noise: EdgeNoise) -> Result<Vec<LimbPoint>, SceneError> {
+        let walk = Walk::try_new(self)?;
+        let pieces = walk.pieces();
+        let total: f64 = pieces.iter().map(Piece::length_px).sum();
+        if !(total > 0.0) {
+            return Ok(Vec::new());
+        }
+        let spacing = total / count.max(1) as f64;
+        let mut points: Vec<LimbPoint> = Vec::with_capacity(count);
+        let mut errors = Errors::new(self.seed, noise);
+        let mut before = 0.0;
+        let mut number = 0;
+        for (index, piece) in pieces.iter().enumerate() {
+            // Points stand in the middle of `count` equal shares of the whole length.
+            while number < count && (number as f64 + 0.5) * spacing <= before + piece.length_px() {
+                let arc_px = (number as f64 + 0.5) * spacing - before;
+                let azimuth_rad = piece.azimuth_at(arc_px);
+                if let Some(exact) = walk.project(azimuth_rad) {
+                    let [du, dv] = errors.next(index, arc_px);
+                    let point = ImagePoint { u: exact.u + du, v: exact.v + dv };
+                    points.push(LimbPoint { point, exact, azimuth_rad, piece: index, arc_px });
+                }
+                number += 1;
+            }
+            before += piece.length_px();
+        }
+        Ok(points)
+    }
+
+    /// Length in pixels of the limb that is in the picture, lit, and not behind the vehicle.
+    ///
+    /// # Errors
+    /// A camera, position or light that cannot be.
+    pub fn visible_limb_px(&self) -> Result<f64, SceneError> {
+        Ok(Walk::try_new(self)?.pieces().iter().map(Piece::length_px).sum())
+    }
+}
+
+/// The errors of successive points.
+struct Errors {
+    noise: EdgeNoise,
+    u: Counter,
+    v: Counter,
+    index: u64,
+    /// Piece, arc length and error of the point before.
+    last: Option<(usize, f64, [f64; 2])>,
+}
+
+impl Errors {
+    fn new(seed: u64, noise: EdgeNoise) -> Self {
+        Self { noise, u: Counter::new(seed, Stream::EdgeU), v: Counter::new(seed, Stream::EdgeV), index: 0, last: None }
+    }
+
+    fn next(&mut self, piece: usize, arc_px: f64) -> [f64; 2] {
+        let normal = [self.u.normal(self.index), self.v.normal(self.index)];
+        self.index += 1;
+        match self.noise {
+            EdgeNoise::None => [0.0; 2],
+            EdgeNoise::White { sigma_px } => normal.map(|n| n * sigma_px),
+            EdgeNoise::GaussMarkov { variance_px2, correlation_px } => {
+                let sigma = variance_px2.max(0.0).sqrt();
+                let (rho, before) = match self.last {
+                    Some((p, arc, e)) if p == piece => (libm::exp(-(arc_px - arc) / correlation_px), e),
+                    _ => (0.0, [0.0; 2]),
+                };
+                let fresh = sigma * (1.0 - rho * rho).sqrt();
+                let error = [0, 1].map(|i| rho * before[i] + fresh * normal[i]);
+                self.last = Some((piece, arc_px, error));
+                error
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foreground::Foreground;
+    use crate::pose::{Look, Pose, position_m};
+    use hzn_core::camera::{Config, Model};
+
+    fn scene() -> Scene {
+        let camera = Config::ideal(Model::Equidistant, 640, 480, 400.0);
+        Scene::new(
+            camera,
+            Pose::looking(position_m(50.0, 7.0, 200.0), Look { depression_rad: 0.25, ..Look::default() }),
+        )
+    }
+
+    #[test]
+    fn points_are_even_and_inside() {
+        let points = scene().limb_points(500, EdgeNoise::None).unwrap();
+        assert_eq!(points.len(), 500);
+        let step = points[1].arc_px - points[0].arc_px;
+        for pair in points.windows(2) {
+            let chord = libm::hypot(pair[1].exact.u - pair[0].exact.u, pair[1].exact.v - pair[0].exact.v);
+            assert!((chord - step).abs() < 1e-2 * step, "{chord} {step}");
+        }
+        assert!(points.iter().all(|p| p.point == p.exact && p.exact.u > -0.5 && p.exact.u < 639.5));
+    }
+
+    #[test]
+    fn a_mast_cuts_the_limb_in_two() {
+        let mut s = scene();
+        let whole = s.visible_limb_px().unwrap();
+        s.foreground.push(Foreground {
+            polygon_px: vec![[300.0, -10.0], [340.0, -10.0], [340.0, 500.0], [300.0, 500.0]],
+            brightness: 0.0,
+        });
+        let cut = s.visible_limb_px().unwrap();
+        assert!((39.9..45.0).contains(&(whole - cut)), "{whole} {cut}");
+        let points = s.limb_points(100, EdgeNoise::None).unwrap();
+        assert!(points.iter().any(|p| p.piece == 1) && points.iter().all(|p| p.piece < 2));
+        assert!(points.iter().all(|p| (p.exact.u - 320.0).abs() > 20.0));
+    }
+
+    #[test]
+    fn gauss_markov_errors_have_variance_and_length() {
+        let noise = EdgeNoise::GaussMarkov { variance_px2: 4.0, correlation_px: 30.0 };
+        let (mut square, mut lagged, mut n, mut rho) = (0.0, 0.0, 0.0, 0.0);
+        for seed in 0..40 {
+            let points = Scene { seed, ..scene() }.limb_points(600, noise).unwrap();
+            for pair in points.windows(2) {
+                let e = |p: &LimbPoint| p.point.u - p.exact.u;
+                square += e(&pair[0]) * e(&pair[0]);
+                lagged += e(&pair[0]) * e(&pair[1]);
+                n += 1.0;
+                rho = libm::exp(-(pair[1].arc_px - pair[0].arc_px) / 30.0);
+            }
+        }
+        assert!((square / n / 4.0 - 1.0).abs() < 0.1, "{}", square / n);
+        assert!((lagged / square - rho).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_full_disc_is_one_closed_piece() {
+        let camera = Config::ideal(Model::Equidistant, 384, 288, 92.0);
+        let s = Scene::new(camera, Pose::looking(position_m(0.0, 0.0, 600.0), Look::off_nadir(0.0, 0.0, 0.0)));
+        let points = s.limb_points(100, EdgeNoise::None).unwrap();
+        let r = 92.0 * 66.0f64.to_radians();
+        assert!((s.visible_limb_px().unwrap() / (core::f64::consts::TAU * r) - 1.0).abs() < 0.02);
+        assert!(points.iter().all(|p| p.piece == 0));
+    }
+}
