@@ -197,10 +197,10 @@ impl Painter {
                 (1.0, 1.0, fx * fy),
             ] {
                 let (x, y) = (x + dx, y + dy);
-                if x >= 0.0 && y >= 0.0 && x < width as f64 {
-                    if let Some(pixel) = data.get_mut(y as usize * width + x as usize) {
-                        *pixel += light * weight;
-                    }
+                let inside = x >= 0.0 && y >= 0.0 && x < width as f64;
+                let index = if inside { y as usize * width + x as usize } else { usize::MAX };
+                if let Some(pixel) = data.get_mut(index) {
+                    *pixel += light * weight;
                 }
             }
         }
