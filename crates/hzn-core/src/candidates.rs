@@ -1,6 +1,17 @@
-//! Candidates.
+//! Sub-pixel points of a candidate edge.
+//!
+//! A border pixel is lit and has a dark neighbour; the edge itself runs somewhere between. The local limb is where
+//! the brightness is half-way between the plateaus on both sides: a level of the whole picture would move it with
+//! the illumination, which is an error of the limb height. Across the edge (along the axis of the larger gradient)
+//! three rows are smoothed with 1-2-1 and read outwards on both sides only until they level off, at most ten pixels.
 
+use crate::block::{Block, LANES, Lit};
+use crate::contour::Scene;
 use crate::error::{ConfigError, Limit, require};
+use crate::image::Pixels;
+use crate::pipeline::Observer;
+use crate::pixel::{ImagePoint, Pixel};
+use crate::real::Real;
 
 /// How a border pixel becomes an edge point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,4 +53,240 @@ impl Config {
             Limit::Rule("must be 16 or more, or 0 to keep all"),
         )
     }
+}
+
+/// How far a plateau is looked for, in pixels.
+const REACH: i32 = 10;
+/// Room for a profile: `REACH` and two more on each side.
+const PROFILE: usize = 2 * (REACH as usize + 2) + 1;
+
+/// What came of a candidate's border.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Points {
+    /// Points made.
+    pub(crate) count: u32,
+    /// Of them, points at the global level, because the local one was not found.
+    pub(crate) fallback: u32,
+}
+
+/// Fills `blocks` with the points of a border, evenly thinned to `keep_points`. Lanes that stay empty have weight 0.
+pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    config: &Config,
+    border: &[Pixel],
+    candidate: u32,
+    blocks: &mut [Block<T>],
+) -> Points {
+    let room = blocks.len() * LANES;
+    let keep = match usize::from(config.keep_points) {
+        0 => room,
+        n => n.min(room),
+    };
+    let every = border.len().div_ceil(keep).max(1);
+    let mut made = Points::default();
+    let mut place = 0;
+    for &pixel in border.iter().skip(every / 2).step_by(every) {
+        let found = match config.subpixel {
+            SubPixel::Linear => linear(scene, pixel),
+            SubPixel::None => half_pixel(scene, pixel),
+        };
+        let Some((point, lit, fallback)) = found else { continue };
+        let Some(block) = blocks.get_mut(place / LANES) else { break };
+        if place % LANES == 0 {
+            *block = Block::default();
+        }
+        block.set_point(place % LANES, point, lit);
+        scene.observer.point(candidate, point);
+        place += 1;
+        made.count += 1;
+        made.fallback += u32::from(fallback);
+    }
+    made
+}
+
+/// Reads around one border pixel; `None` beyond the region and under the mask.
+struct Around<'a, 'b, T, P, O> {
+    scene: &'a Scene<'b, T, P, O>,
+    x: i32,
+    y: i32,
+    index: usize,
+    across: isize,
+    down: isize,
+    /// No read within reach needs a check.
+    free: bool,
+}
+
+impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>> Around<'a, 'b, T, P, O> {
+    fn new(scene: &'a Scene<'b, T, P, O>, p: Pixel) -> Self {
+        let (x, y) = (i32::from(p.x), i32::from(p.y));
+        let margin = REACH + 3;
+        let (w, h) = (i32::from(scene.region.width()), i32::from(scene.region.height()));
+        Self {
+            scene,
+            x,
+            y,
+            index: scene.picture.index(p.x, p.y),
+            across: scene.picture.across() as isize,
+            down: scene.picture.down() as isize,
+            free: scene.region.is_plain() && x >= margin && y >= margin && x < w - margin && y < h - margin,
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, dx: i32, dy: i32) -> Option<i32> {
+        let (x, y) = (self.x + dx, self.y + dy);
+        if !self.free {
+            let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
+            if !self.scene.region.contains(x, y) || self.scene.region.masked(x, y) {
+                return None;
+            }
+        }
+        self.scene.observer.pixel(x as u16, y as u16);
+        let index = self.index.wrapping_add_signed(dx as isize * self.across + dy as isize * self.down);
+        Some(i32::from(self.scene.picture.read(index)))
+    }
+
+    /// Brightness gradient (to the right, down) over the 3×3 neighbourhood.
+    #[inline(always)]
+    fn gradient(&self) -> Option<(i32, i32)> {
+        let (nw, n, ne) = (self.at(-1, -1)?, self.at(0, -1)?, self.at(1, -1)?);
+        let (w, e) = (self.at(-1, 0)?, self.at(1, 0)?);
+        let (sw, s, se) = (self.at(-1, 1)?, self.at(0, 1)?, self.at(1, 1)?);
+        Some(((ne + 2 * e + se) - (nw + 2 * w + sw), (sw + 2 * s + se) - (nw + 2 * n + ne)))
+    }
+}
+
+/// The side of the light by the larger component, and the step (dx, dy) towards the dark.
+fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
+    if gx == 0 && gy == 0 {
+        return None;
+    }
+    Some(if gx.abs() >= gy.abs() {
+        if gx > 0 { (Lit::Right, -1, 0) } else { (Lit::Left, 1, 0) }
+    } else if gy > 0 {
+        (Lit::Below, 0, -1)
+    } else {
+        (Lit::Above, 0, 1)
+    })
+}
+
+fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<(ImagePoint<T>, Lit, bool)> {
+    let around = Around::new(scene, p);
+    let (lit, dx, dy) = orientation(around.gradient()?)?;
+    Some((place(p, dx, dy, T::of(0.5)), lit, false))
+}
+
+fn place<T: Real>(p: Pixel, dx: i32, dy: i32, towards_dark: T) -> ImagePoint<T> {
+    ImagePoint {
+        u: T::of_i32(i32::from(p.x)) + T::of_i32(dx) * towards_dark,
+        v: T::of_i32(i32::from(p.y)) + T::of_i32(dy) * towards_dark,
+    }
+}
+
+/// Four times the smoothed brightness across the edge: offset k towards the dark stands at `CENTRE + k`.
+struct Profile {
+    values: [i32; PROFILE],
+}
+const CENTRE: i32 = REACH + 2;
+
+impl Profile {
+    #[inline(always)]
+    fn get(&self, k: i32) -> i32 {
+        self.values.get((CENTRE + k) as usize).copied().unwrap_or(0)
+    }
+    #[inline(always)]
+    fn set(&mut self, k: i32, v: i32) {
+        if let Some(slot) = self.values.get_mut((CENTRE + k) as usize) {
+            *slot = v;
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Lit,
+    Dark,
+}
+
+/// Reads on from the border pixel (or its dark neighbour) until the side has levelled off: two more pixels change it
+/// by less than a twelfth of the contrast to `other`. Gives the plateau's level and the offset where it begins.
+#[inline(always)]
+fn plateau(f: &mut Profile, side: Side, other: i32, read: impl Fn(i32) -> Option<i32>) -> (i32, i32) {
+    let (from, out, sign) = match side {
+        Side::Lit => (0, -1, 1),
+        Side::Dark => (1, 1, -1),
+    };
+    let (mut k, mut v) = (from, f.get(from));
+    loop {
+        // What lies beyond on the same level counts towards it.
+        let (mut tail, mut tails, mut moved) = (0, 0, false);
+        let slack = (((v - other) * sign) / 12).max(2);
+        for far in 1..=2 {
+            let at = k + out * far;
+            let Some(next) = read(at) else { break };
+            f.set(at, next);
+            let rise = (next - v) * sign;
+            if rise > slack * far {
+                (k, v, moved) = (at, next, true);
+                break;
+            }
+            if rise > -2 * slack {
+                tail += next;
+                tails += 1;
+            }
+        }
+        if !moved || (k - from).abs() >= REACH {
+            return if moved { (v, k) } else { ((v + tail) / (1 + tails), k) };
+        }
+    }
+}
+
+fn linear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<(ImagePoint<T>, Lit, bool)> {
+    let around = Around::new(scene, p);
+    let (lit, dx, dy) = orientation(around.gradient()?)?;
+    let read = |k: i32| -> Option<i32> {
+        let (x, y) = (k * dx, k * dy);
+        // The rows to both sides run along the edge.
+        Some(around.at(x - dy, y - dx)? + 2 * around.at(x, y)? + around.at(x + dy, y + dx)?)
+    };
+    let mut f = Profile { values: [0; PROFILE] };
+    f.set(0, read(0)?);
+    f.set(1, read(1)?);
+    let (first_lit, first_dark) = (f.get(0), f.get(1));
+    let (bright, inner) = plateau(&mut f, Side::Lit, first_dark, read);
+    let (dim, outer) = plateau(&mut f, Side::Dark, bright, read);
+    let contrast = bright - dim;
+    let level4 = i32::from(scene.level) * 4;
+    let least = 4 * (i32::from(scene.picture.full_scale()) / 64).max(2);
+    let (mid2, fallback) = if contrast >= least {
+        (bright + dim, false)
+    } else if first_lit > first_dark {
+        (2 * level4.clamp(first_dark + 1, first_lit), true)
+    } else {
+        return None;
+    };
+    // The crossing next to the border pixel: outwards from it while lit, else inwards.
+    let mut k = 0;
+    if 2 * f.get(0) >= mid2 {
+        while k < outer && 2 * f.get(k + 1) >= mid2 {
+            k += 1;
+        }
+        if k >= outer {
+            return None;
+        }
+    } else {
+        k = -1;
+        while k >= inner && 2 * f.get(k) < mid2 {
+            k -= 1;
+        }
+        if k < inner {
+            return None;
+        }
+    }
+    let (a, b) = (f.get(k), f.get(k + 1));
+    if a <= b {
+        return None;
+    }
+    let part = T::of_i32(2 * a - mid2) / T::of_i32(2 * (a - b));
+    Some((place(p, dx, dy, T::of_i32(k) + part), lit, fallback))
 }

@@ -1,6 +1,17 @@
-//! Covariance.
+//! Honest covariance in one pass: errors of neighbouring edge points are alike.
+//!
+//! Pixel errors in x and y are independent Gauss-Markov processes along the edge with variance R and correlation
+//! ρ = exp(−Δs/L) from point to point. With q = w h (the row entering the normal equations) and b = q gᵀ the
+//! covariance of the fit is P = N⁻¹ (R X) N⁻¹, X = Σ Σ b ρ… bᵀ over all pairs. The double sum collapses: with
+//! c₁ = b₁ and c_{j+1} = ρ_j c_j + b_{j+1}, X = Σ (1 − ρ_j²) c_j c_jᵀ, the last ρ being 0. Taking the errors for
+//! independent instead would give a sigma some twenty times too small.
 
+use crate::block::{Block, LANES};
+use crate::body::Expected;
 use crate::error::{ConfigError, above, between};
+use crate::estimate::{self, Fit};
+use crate::linalg::{M3, V3, basis, invert_spd2, unit};
+use crate::real::Real;
 
 /// `[covariance]` of sensor.toml: edge errors as a Gauss-Markov process along the limb.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,3 +36,151 @@ impl Config {
         between("covariance.correlation_px", self.correlation_px, 0.0, 1e6)
     }
 }
+
+/// The answer of a fit with its covariance.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fused<T> {
+    /// Axis after fusing the expected half-angle.
+    pub(crate) e: V3<T>,
+    /// cos of the half-angle after fusing.
+    pub(crate) c: T,
+    /// Covariance (11, 12, 22) on the tangent basis of `e`, rad².
+    pub(crate) p: [T; 3],
+    /// Variance of the freely fitted cos α; `None` when it was not fitted.
+    pub(crate) var_free_cos: Option<T>,
+    /// (ĉ − c₀)²/(P₃₃ + σ_c²): a χ² of one degree of freedom when the candidate is the body's limb.
+    pub(crate) chi2: T,
+}
+
+/// Covariance of the fit, raised when the residuals are larger than the noise model says, and never lowered; then
+/// the expected half-angle is fused.
+pub(crate) fn fuse<T: Real>(
+    blocks: &mut [Block<T>],
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+    config: &Config,
+    estimate: &estimate::Config,
+) -> Option<Fused<T>> {
+    let azimuth = estimate::azimuth(expected);
+    let (b1, b2) = basis(&fit.e);
+    let sums = estimate::pass(blocks, &fit.e, &b1, &b2, fit.c, [T::ZERO; 2], None, azimuth.as_ref(), false);
+    let mean = sums.means([T::ZERO; 2]);
+    let sums = estimate::pass(blocks, &fit.e, &b1, &b2, fit.c, mean, None, azimuth.as_ref(), false);
+    let x = correlated(blocks, &fit.e, &b1, &b2, mean, T::of(config.correlation_px));
+    let sigma = T::of(config.sigma_px);
+    let variance = (sigma * sigma).most(fit.rms_px * fit.rms_px);
+    let var_c = expected.sigma_cos * expected.sigma_cos;
+    if !fit.free {
+        // Half-angle held at the expected one: what it is wrong by, the axis is wrong by in proportion.
+        let p = sandwich_known(&sums, &x, mean, variance)?;
+        let n = invert_spd2(sums.known(mean))?;
+        // Σ w Bᵀs · 1: the right-hand side of δe for δc = 1.
+        let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);
+        let (d1, d2) = (n[0] * k1 + n[1] * k2, n[1] * k1 + n[2] * k2);
+        let var_c = if estimate.half_angle == estimate::HalfAngle::Known { T::ZERO } else { var_c };
+        let p = [p[0] + d1 * d1 * var_c, p[1] + d1 * d2 * var_c, p[2] + d2 * d2 * var_c];
+        return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: None, chi2: T::ZERO });
+    }
+    let p = sandwich_free(&sums, &x, mean, variance)?;
+    let var_free = p.m33;
+    if estimate.half_angle == estimate::HalfAngle::Free || expected.free {
+        return Some(Fused { e: fit.e, c: fit.c, p: [p.m11, p.m12, p.m22], var_free_cos: Some(var_free), chi2: T::ZERO });
+    }
+    let total = p.m33 + var_c;
+    let difference = expected.cos - fit.c;
+    let k = V3::new(p.m13, p.m23, p.m33) * (T::one() / total);
+    let e = unit(&(fit.e + b1 * (k.x * difference) + b2 * (k.y * difference)))?;
+    // The tangent basis at the fused axis differs by the small turn only; the covariance is carried over as it is,
+    // through the camera frame.
+    let fused = [p.m11 - k.x * p.m13, p.m12 - k.x * p.m23, p.m22 - k.y * p.m23];
+    let (n1, n2) = basis(&e);
+    let turn = |n: &V3<T>| [n.dot(&b1), n.dot(&b2)];
+    let (r1, r2) = (turn(&n1), turn(&n2));
+    let form = |a: [T; 2], b: [T; 2]| {
+        a[0] * (fused[0] * b[0] + fused[1] * b[1]) + a[1] * (fused[1] * b[0] + fused[2] * b[1])
+    };
+    Some(Fused {
+        e,
+        c: fit.c + k.z * difference,
+        p: [form(r1, r1), form(r1, r2), form(r2, r2)],
+        var_free_cos: Some(var_free),
+        chi2: difference * difference / total,
+    })
+}
+
+/// Σ (1 − ρ²) c cᵀ about `mean`, upper triangle.
+pub(crate) fn correlated<T: Real>(
+    blocks: &[Block<T>],
+    e: &V3<T>,
+    b1: &V3<T>,
+    b2: &V3<T>,
+    mean: [T; 2],
+    length_px: T,
+) -> [T; 6] {
+    let mut x = [T::ZERO; 6];
+    // c for the errors in u and in v.
+    let mut c = [[T::ZERO; 3]; 2];
+    let per_length = if length_px > T::ZERO { T::one() / length_px } else { T::ZERO };
+    for block in blocks {
+        let g = block.gradient(e);
+        let mut q = [[T::ZERO; LANES]; 3];
+        let mut rho = [T::ZERO; LANES];
+        for l in 0..LANES {
+            let (sx, sy, sz) = (block.s[0][l], block.s[1][l], block.s[2][l]);
+            let w = block.weight[l] / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).most(T::of(1e-20));
+            q[0][l] = w * (sx * b1.x + sy * b1.y + sz * b1.z - mean[0]);
+            q[1][l] = w * (sx * b2.x + sy * b2.y + sz * b2.z - mean[1]);
+            q[2][l] = -w;
+            rho[l] = if per_length > T::ZERO { (block.step_px[l] * per_length).exp_neg() } else { T::ZERO };
+        }
+        for l in 0..LANES {
+            // The step before this point: close the one before with 1 − ρ², then carry on.
+            let gap = T::one() - rho[l] * rho[l];
+            for (k, c) in c.iter_mut().enumerate() {
+                let [c1, c2, c3] = *c;
+                x[0] += gap * c1 * c1;
+                x[1] += gap * c1 * c2;
+                x[2] += gap * c1 * c3;
+                x[3] += gap * c2 * c2;
+                x[4] += gap * c2 * c3;
+                x[5] += gap * c3 * c3;
+                *c = [
+                    rho[l] * c1 + q[0][l] * g[k][l],
+                    rho[l] * c2 + q[1][l] * g[k][l],
+                    rho[l] * c3 + q[2][l] * g[k][l],
+                ];
+            }
+        }
+    }
+    for [c1, c2, c3] in c {
+        x[0] += c1 * c1;
+        x[1] += c1 * c2;
+        x[2] += c1 * c3;
+        x[3] += c2 * c2;
+        x[4] += c2 * c3;
+        x[5] += c3 * c3;
+    }
+    x
+}
+
+/// Covariance of (δ₁₂, δc): N⁻¹ (R X) N⁻¹ about the means, then moved back by T = [[I, 0], [mᵀ, 1]].
+pub(crate) fn sandwich_free<T: Real>(sums: &estimate::Sums<T>, x: &[T; 6], [m1, m2]: [T; 2], variance: T) -> Option<M3<T>> {
+    let n = estimate::inverse(sums)?;
+    let x = M3::new(x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]);
+    let p = n * x * n * variance;
+    let (one, zero) = (T::one(), T::ZERO);
+    let t = M3::new(one, zero, zero, zero, one, zero, m1, m2, one);
+    Some(t * p * t.transpose())
+}
+
+/// Covariance of δ₁₂ with the half-angle held.
+pub(crate) fn sandwich_known<T: Real>(sums: &estimate::Sums<T>, x: &[T; 6], [m1, m2]: [T; 2], variance: T) -> Option<[T; 3]> {
+    let [a, b, d] = invert_spd2(sums.known([m1, m2]))?;
+    // X of Bᵀs itself: rows h₁₂ − m h₃.
+    let x11 = x[0] - m1 * x[2] - m1 * x[2] + m1 * m1 * x[5];
+    let x12 = x[1] - m1 * x[4] - m2 * x[2] + m1 * m2 * x[5];
+    let x22 = x[3] - m2 * x[4] - m2 * x[4] + m2 * m2 * x[5];
+    let (y11, y12, y21, y22) = (a * x11 + b * x12, a * x12 + b * x22, b * x11 + d * x12, b * x12 + d * x22);
+    Some([(y11 * a + y12 * b) * variance, (y11 * b + y12 * d) * variance, (y21 * b + y22 * d) * variance])
+}
+

@@ -1,4 +1,21 @@
-//! The fit.
+//! Gauss-Newton on the sphere: the cone s·e = cos α through the edge points.
+//!
+//! State: the unit axis e and c = cos α. For each point r = c − s·e is the residual, g = ∂(s·e)/∂(u, v), and |r|/|g|
+//! the distance from the limb in pixels, so w = 1/|g|² weighs by pixels. With h = [Bᵀs − m, −1], B the tangent basis
+//! at e and m the mean of Bᵀs, a step solves (Σ w h hᵀ) δ = Σ w r h. Subtracting the means keeps the sums
+//! well-conditioned in single precision; the third unknown then is δc' = δc − m·δ₁₂.
+//!
+//! The expected half-angle enters the robust iterations as one more row, weighed against the edge's *correlated*
+//! errors. With the weights so found the half-angle is then fitted freely, for the covariance, for the altitude
+//! estimate, and for the test of the candidate; `covariance` fuses the two.
+
+use crate::block::{Block, LANES, sum};
+use crate::body::Expected;
+use crate::covariance;
+use crate::limb::Azimuth;
+use crate::linalg::{M3, V3, basis, invert_spd2, invert_spd3, unit};
+use crate::real::Real;
+use crate::reject::Consensus;
 
 /// What the fit takes for the half-angle of the cone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,4 +36,304 @@ pub enum HalfAngle {
 pub struct Config {
     /// What the fit takes for the half-angle.
     pub half_angle: HalfAngle,
+}
+
+/// A fitted cone.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fit<T> {
+    /// Axis.
+    pub(crate) e: V3<T>,
+    /// cos of the (mean) half-angle.
+    pub(crate) c: T,
+    /// The half-angle was fitted too; otherwise it is the expected one.
+    pub(crate) free: bool,
+    /// Weighted RMS distance of the points from the limb in pixels.
+    pub(crate) rms_px: T,
+    /// Points with a weight.
+    pub(crate) inliers: u32,
+    /// Length of edge before the points with a weight, in pixels.
+    pub(crate) arc_px: T,
+}
+
+/// Tukey's constant: 95 % efficiency on Gaussian errors.
+const TUKEY: f64 = 4.685;
+/// Most robust iterations, and most free ones.
+const ROBUST: usize = 8;
+const FREE: usize = 5;
+
+/// The correction by azimuth of an ellipsoid seen with a known attitude.
+pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
+    let cone = expected.ellipsoid.as_ref()?;
+    let east = expected.cam_to_ecef?.inverse().apply(&cone.east);
+    Some(Azimuth { east: *east.v(), cot2_east: cone.cot2_east, cot2_meridian: cone.cot2_meridian, mean_cos: expected.cos })
+}
+
+/// Fits the cone; leaves in each point the weight that it had. `None` when the points do not determine one.
+pub(crate) fn fit<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    expected: &Expected<T>,
+    threshold_px: T,
+    config: &Config,
+    noise: &covariance::Config,
+) -> Option<Fit<T>> {
+    let azimuth = azimuth(expected);
+    let azimuth = azimuth.as_ref();
+    let (mut e, mut c) = (unit(&start.e)?, start.c);
+    let known = config.half_angle == HalfAngle::Known && !expected.free;
+    if known {
+        c = expected.cos;
+    }
+    // Cut-offs shrink from three thresholds to what the residuals ask for.
+    let (widest, narrowest) = (threshold_px * T::of(2.0), threshold_px * T::of(0.5));
+    let mut cutoff = threshold_px * T::of(3.0);
+    let mut mean = [T::ZERO; 2];
+    let prior = Prior::new(blocks, expected, config, noise);
+    for round in 0..ROBUST {
+        let (b1, b2) = basis(&e);
+        if round == 0 {
+            mean = means(blocks, &b1, &b2);
+        }
+        let s = pass(blocks, &e, &b1, &b2, c, mean, Some(cutoff * cutoff), azimuth, false);
+        let (d, dc) = if known { s.step_known(mean)? } else { s.step(mean, prior.as_ref(), c).or_else(|| s.step_known(mean))? };
+        e = unit(&(e + b1 * d[0] + b2 * d[1]))?;
+        c = clamp(c + dc);
+        if known {
+            c = expected.cos;
+        }
+        let size = d[0].abs() + d[1].abs() + dc.abs();
+        mean = s.means(mean);
+        let spread = (s.cost / s.weight.most(T::of(1e-20))).sqrt() * T::of(1.2);
+        let next = (spread * T::of(TUKEY)).most(narrowest).least(widest);
+        let settled = (next - cutoff).abs() < cutoff * T::of(0.05);
+        cutoff = next;
+        if settled && size < T::of(1e-6) {
+            break;
+        }
+    }
+    // Weights are kept from here on.
+    let (b1, b2) = basis(&e);
+    let last = pass(blocks, &e, &b1, &b2, c, mean, Some(cutoff * cutoff), azimuth, true);
+    if last.weight <= T::of(3.0) {
+        return None;
+    }
+    let (e0, mean0) = (e, mean);
+    let mut free = !known;
+    if free {
+        for _ in 0..FREE {
+            let (b1, b2) = basis(&e);
+            let s = pass(blocks, &e, &b1, &b2, c, mean, None, azimuth, false);
+            let Some((d, dc)) = s.step(mean, None, c) else {
+                free = false;
+                break;
+            };
+            e = unit(&(e + b1 * d[0] + b2 * d[1]))?;
+            c += dc;
+            mean = s.means(mean);
+            // Too short an arc: the half-angle is not to be had from it.
+            if !(c.abs() < T::one()) || e.dot(&e0) < T::of(0.94) {
+                free = false;
+                break;
+            }
+            if d[0].abs() + d[1].abs() + dc.abs() < T::of(1e-7) {
+                break;
+            }
+        }
+    }
+    if !free {
+        // Settle at the expected half-angle with the weights found, unless it is free by nature.
+        if expected.free {
+            return None;
+        }
+        (e, c, mean) = (e0, expected.cos, mean0);
+        for _ in 0..FREE {
+            let (b1, b2) = basis(&e);
+            let (d, _) = pass(blocks, &e, &b1, &b2, c, mean, None, azimuth, false).step_known(mean)?;
+            e = unit(&(e + b1 * d[0] + b2 * d[1]))?;
+            if d[0].abs() + d[1].abs() < T::of(1e-7) {
+                break;
+            }
+        }
+    }
+    let (b1, b2) = basis(&e);
+    let end = pass(blocks, &e, &b1, &b2, c, mean, None, azimuth, false);
+    let (mut inliers, mut arc) = (0, T::ZERO);
+    for block in blocks.iter() {
+        for lane in 0..LANES {
+            if block.weight[lane] > T::ZERO {
+                inliers += 1;
+                arc += block.step_px[lane];
+            }
+        }
+    }
+    Some(Fit { e, c, free, rms_px: (end.cost / end.weight).sqrt(), inliers, arc_px: arc })
+}
+
+fn clamp<T: Real>(c: T) -> T {
+    let end = T::one() - T::of(1e-6);
+    c.least(end).most(-end)
+}
+
+/// The expected half-angle as a row of the normal equations.
+struct Prior<T> {
+    cos: T,
+    weight: T,
+}
+
+impl<T: Real> Prior<T> {
+    /// Weighed so that an edge counts for as many points as it has independent errors: one in two correlation lengths.
+    fn new(blocks: &[Block<T>], expected: &Expected<T>, config: &Config, noise: &covariance::Config) -> Option<Self> {
+        if expected.free || config.half_angle == HalfAngle::Free {
+            return None;
+        }
+        let (mut points, mut arc) = (T::ZERO, T::ZERO);
+        for block in blocks {
+            points += sum(&block.weight);
+            arc += sum(&block.step_px);
+        }
+        let correlation = T::of(2.0 * noise.correlation_px);
+        let each = if correlation > T::ZERO { (points * correlation / arc.most(correlation)).most(T::one()) } else { T::one() };
+        let sigma = T::of(noise.sigma_px);
+        let floor = expected.sin * T::of(1e-6);
+        let sigma_c = expected.sigma_cos.most(floor);
+        Some(Self { cos: expected.cos, weight: sigma * sigma * each / (sigma_c * sigma_c) })
+    }
+}
+
+/// Sums of one pass over the points.
+pub(crate) struct Sums<T> {
+    /// Upper triangle of Σ w h hᵀ.
+    pub(crate) n: [T; 6],
+    g: [T; 3],
+    /// Σ of the robust weights, and of the squared distances times them, px².
+    pub(crate) weight: T,
+    pub(crate) cost: T,
+}
+
+impl<T: Real> Sums<T> {
+    /// The step (δ₁₂, δc) with the half-angle free or under its prior.
+    fn step(&self, mean: [T; 2], prior: Option<&Prior<T>>, c: T) -> Option<([T; 2], T)> {
+        let [mut n11, mut n12, mut n13, mut n22, mut n23, mut n33] = self.n;
+        let [mut g1, mut g2, mut g3] = self.g;
+        if let Some(p) = prior {
+            // Row [m, 1] on (δ₁₂, δc') with the value c₀ − c.
+            let (w, [m1, m2], v) = (p.weight, mean, p.cos - c);
+            n11 += w * m1 * m1;
+            n12 += w * m1 * m2;
+            n13 += w * m1;
+            n22 += w * m2 * m2;
+            n23 += w * m2;
+            n33 += w;
+            g1 += w * m1 * v;
+            g2 += w * m2 * v;
+            g3 += w * v;
+        }
+        let p = invert_spd3(&[n11, n12, n13, n22, n23, n33])?;
+        let d = p * V3::new(g1, g2, g3);
+        Some(([d.x, d.y], d.z + mean[0] * d.x + mean[1] * d.y))
+    }
+
+    /// The step with the half-angle held: δc = 0, that is δc' = −m·δ₁₂.
+    fn step_known(&self, mean: [T; 2]) -> Option<([T; 2], T)> {
+        let [a, b, d] = invert_spd2(self.known(mean))?;
+        let [g1, g2, g3] = self.g;
+        let (g1, g2) = (g1 - mean[0] * g3, g2 - mean[1] * g3);
+        Some(([a * g1 + b * g2, b * g1 + d * g2], T::ZERO))
+    }
+
+    /// Σ w (Bᵀs)(Bᵀs)ᵀ, upper triangle.
+    pub(crate) fn known(&self, [m1, m2]: [T; 2]) -> [T; 3] {
+        let [n11, n12, n13, n22, n23, n33] = self.n;
+        // h₁₂ + m times (h₃ = −1): Bᵀs = h₁₂ − m h₃.
+        [
+            n11 - m1 * n13 - m1 * n13 + m1 * m1 * n33,
+            n12 - m1 * n23 - m2 * n13 + m1 * m2 * n33,
+            n22 - m2 * n23 - m2 * n23 + m2 * m2 * n33,
+        ]
+    }
+
+    /// The means of Bᵀs, from the sums about the old ones.
+    pub(crate) fn means(&self, [m1, m2]: [T; 2]) -> [T; 2] {
+        let w = self.n[5].most(T::of(1e-20));
+        [m1 - self.n[2] / w, m2 - self.n[4] / w]
+    }
+}
+
+/// Means of Bᵀs over every point that may count.
+pub(crate) fn means<T: Real>(blocks: &[Block<T>], b1: &V3<T>, b2: &V3<T>) -> [T; 2] {
+    let (mut n, mut x, mut y) = ([T::ZERO; LANES], [T::ZERO; LANES], [T::ZERO; LANES]);
+    for b in blocks {
+        for l in 0..LANES {
+            let w = b.weight[l];
+            n[l] += w;
+            x[l] += w * (b.s[0][l] * b1.x + b.s[1][l] * b1.y + b.s[2][l] * b1.z);
+            y[l] += w * (b.s[0][l] * b2.x + b.s[1][l] * b2.y + b.s[2][l] * b2.z);
+        }
+    }
+    let n = sum(&n).most(T::one());
+    [sum(&x) / n, sum(&y) / n]
+}
+
+/// One pass: sums at (e, c), with Tukey weights for squared distances up to `cutoff2` (all equal without). `keep`
+/// writes the weights into the points.
+pub(crate) fn pass<T: Real>(
+    blocks: &mut [Block<T>],
+    e: &V3<T>,
+    b1: &V3<T>,
+    b2: &V3<T>,
+    c: T,
+    mean: [T; 2],
+    cutoff2: Option<T>,
+    azimuth: Option<&Azimuth<T>>,
+    keep: bool,
+) -> Sums<T> {
+    let mut n = [[T::ZERO; LANES]; 6];
+    let mut g = [[T::ZERO; LANES]; 3];
+    let (mut weight, mut cost) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+    let inverse = cutoff2.map_or(T::ZERO, |c| T::one() / c);
+    let east_along = azimuth.map_or(T::ZERO, |a| a.east.dot(e));
+    for b in blocks {
+        let grad = b.gradient(e);
+        let mut target = [c; LANES];
+        if let Some(a) = azimuth {
+            for l in 0..LANES {
+                let s = [b.s[0][l], b.s[1][l], b.s[2][l]];
+                let d = s[0] * e.x + s[1] * e.y + s[2] * e.z;
+                target[l] += a.offset(s, d, east_along);
+            }
+        }
+        for l in 0..LANES {
+            let (x, y, z) = (b.s[0][l], b.s[1][l], b.s[2][l]);
+            let r = target[l] - (x * e.x + y * e.y + z * e.z);
+            let g2 = (grad[0][l] * grad[0][l] + grad[1][l] * grad[1][l]).most(T::of(1e-20));
+            let per = T::one() / g2;
+            let d2 = r * r * per;
+            let u = (T::one() - d2 * inverse).most(T::ZERO);
+            let robust = b.weight[l] * u * u;
+            let w = robust * per;
+            let h1 = x * b1.x + y * b1.y + z * b1.z - mean[0];
+            let h2 = x * b2.x + y * b2.y + z * b2.z - mean[1];
+            let (w1, w2) = (w * h1, w * h2);
+            n[0][l] += w1 * h1;
+            n[1][l] += w1 * h2;
+            n[2][l] -= w1;
+            n[3][l] += w2 * h2;
+            n[4][l] -= w2;
+            n[5][l] += w;
+            g[0][l] += w1 * r;
+            g[1][l] += w2 * r;
+            g[2][l] -= w * r;
+            weight[l] += robust;
+            cost[l] += robust * d2;
+            if keep {
+                b.weight[l] = robust;
+            }
+        }
+    }
+    Sums { n: n.map(|x| sum(&x)), g: g.map(|x| sum(&x)), weight: sum(&weight), cost: sum(&cost) }
+}
+
+/// Inverse of the free normal equations about `mean`.
+pub(crate) fn inverse<T: Real>(sums: &Sums<T>) -> Option<M3<T>> {
+    invert_spd3(&sums.n)
 }

@@ -311,7 +311,6 @@ macro_rules! forward {
         }
     };
 }
-pub(crate) use forward;
 
 impl Pixels for ImageView<'_> {
     fn width(&self) -> u16 {

@@ -5,12 +5,14 @@
 extern crate std;
 
 // Vocabulary.
+mod block;
 pub mod body;
 pub mod camera;
 pub mod ellipsoid;
 pub mod error;
 pub mod frames;
 pub mod image;
+mod limb;
 mod linalg;
 pub mod pixel;
 pub mod real;
@@ -21,6 +23,7 @@ pub mod status;
 pub mod binarize;
 pub mod contour;
 pub mod candidates;
+mod undistort;
 pub mod reject;
 pub mod estimate;
 pub mod covariance;

@@ -59,6 +59,8 @@ pub trait Real:
     fn to_i32(self) -> i32;
     /// The distance from 1 to the next larger number.
     const EPSILON: Self;
+    /// 0.
+    const ZERO: Self;
 
     /// The smaller of two numbers; `other` when `self` is NaN.
     #[inline(always)]
@@ -90,6 +92,7 @@ macro_rules! real {
     ($t:ty, $sqrt:ident, $sincos:ident, $atan2:ident, $asin:ident, $acos:ident, $tan:ident, $exp:ident, $ln:ident, $floor:ident) => {
         impl Real for $t {
             const EPSILON: Self = <$t>::EPSILON;
+            const ZERO: Self = 0.0;
             #[inline(always)]
             fn of(x: f64) -> Self {
                 x as $t

@@ -113,6 +113,12 @@ impl<T: Real> Region<T> {
         self.circle.is_some()
     }
 
+    /// Neither circle nor polygons.
+    #[inline(always)]
+    pub(crate) fn is_plain(&self) -> bool {
+        self.circle.is_none() && self.polygons.is_empty()
+    }
+
     /// Whether a polygon covers the pixel.
     #[inline(always)]
     pub fn masked(&self, x: u16, y: u16) -> bool {

@@ -1,6 +1,15 @@
-//! Gates and choice.
+//! Gates and choice: whether a fitted cone is the body's limb, and which of several is.
 
+use crate::camera::Camera;
+use crate::covariance::Fused;
 use crate::error::{ConfigError, Limit, above, between, require};
+use crate::estimate::Fit;
+use crate::frames::UnitVec3;
+use crate::linalg::{V3, basis};
+use crate::pipeline::Verdict;
+use crate::pixel::ImagePoint;
+use crate::real::Real;
+use crate::region::Region;
 
 /// `[select]` of sensor.toml: what an answer must fulfil.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,11 +25,14 @@ pub struct Config {
     pub max_half_angle_sigma: f64,
     /// Largest standard deviation of an answer in degrees, above 0 to 180.
     pub max_sigma_deg: f64,
+    /// Smallest part of the fitted limb in view that must be edge, 0 to 1. A limb goes on where the edge of a mast or
+    /// a cloud ends.
+    pub min_support: f64,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { min_inliers: 24, min_arc_px: 60.0, max_rms_px: 2.0, max_half_angle_sigma: 4.0, max_sigma_deg: 10.0 }
+        Self { min_inliers: 24, min_arc_px: 60.0, max_rms_px: 2.0, max_half_angle_sigma: 4.0, max_sigma_deg: 10.0, min_support: 0.15 }
     }
 }
 
@@ -31,6 +43,107 @@ impl Config {
         above("select.max_rms_px", self.max_rms_px, 0.0)?;
         above("select.max_half_angle_sigma", self.max_half_angle_sigma, 0.0)?;
         above("select.max_sigma_deg", self.max_sigma_deg, 0.0)?;
-        between("select.max_sigma_deg", self.max_sigma_deg, 0.0, 180.0)
+        between("select.max_sigma_deg", self.max_sigma_deg, 0.0, 180.0)?;
+        between("select.min_support", self.min_support, 0.0, 1.0)
     }
+}
+
+/// A fit with what the gates look at.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Judged<T> {
+    /// `Passed`, or the gate that it failed.
+    pub(crate) verdict: Verdict,
+    /// Weighted RMS over the part of the limb in view that it explains: the smallest wins.
+    pub(crate) score: T,
+    /// The part of the limb in view that is edge, 0 to 1.
+    pub(crate) support: T,
+}
+
+/// Looks a fit over. `seen` is the ray of one of its inliers.
+pub(crate) fn judge<T: Real>(
+    fit: &Fit<T>,
+    fused: &Fused<T>,
+    sigma_max_rad: T,
+    seen: &V3<T>,
+    camera: &Camera<T>,
+    region: &Region<T>,
+    config: &Config,
+) -> Judged<T> {
+    let limb_px = limb_in_view(&fused.e, fused.c, seen, camera, region);
+    let support = (fit.arc_px / limb_px.most(T::one())).least(T::one());
+    let sigma_limit = T::of(config.max_sigma_deg.to_radians());
+    let chi = T::of(config.max_half_angle_sigma);
+    let verdict = if fit.inliers < u32::from(config.min_inliers) {
+        Verdict::FewInliers
+    } else if fit.arc_px < T::of(config.min_arc_px) {
+        Verdict::ShortArc
+    } else if !(fit.rms_px <= T::of(config.max_rms_px)) {
+        Verdict::Residuals
+    } else if !(fused.chi2 <= chi * chi) {
+        Verdict::HalfAngle
+    } else if !(sigma_max_rad <= sigma_limit) {
+        Verdict::Uncertain
+    } else if support < T::of(config.min_support) {
+        Verdict::Unsupported
+    } else {
+        Verdict::Passed
+    };
+    Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
+}
+
+/// Most steps along the limb to each side.
+const STEPS: usize = 48;
+
+/// Length in pixels of the limb of the cone (e, c) in the picture, walked to both sides from the inlier `seen` until
+/// it leaves the region or comes around. What a mask covers is not counted.
+fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Camera<T>, region: &Region<T>) -> T {
+    let sin = (T::one() - c * c).most(T::ZERO).sqrt();
+    let (b1, b2) = basis(e);
+    let (fx, fy) = camera.focal_px();
+    // A step of about a sixteenth of the picture, and at least eight around.
+    let wide = T::of_i32(i32::from(region.width().max(region.height())));
+    let step = (wide / (T::of(16.0) * (fx + fy) * T::of(0.5) * sin.most(T::of(1e-6)))).least(T::of(0.785)).most(T::of(0.02));
+    let (ss, cs) = step.sin_cos();
+    let radial = (seen.dot(&b1), seen.dot(&b2));
+    let norm = (radial.0 * radial.0 + radial.1 * radial.1).sqrt().most(T::of(1e-12));
+    let start = (radial.0 / norm, radial.1 / norm);
+    let at = |(x, y): (T, T)| -> Option<ImagePoint<T>> {
+        let p = camera.project(&UnitVec3::assume_unit(e * c + (b1 * x + b2 * y) * sin))?;
+        let (half, zero) = (T::of(0.5), T::ZERO);
+        (p.u >= zero && p.v >= zero).then_some(())?;
+        let (x, y) = ((p.u + half).to_i32(), (p.v + half).to_i32());
+        let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
+        region.contains(x, y).then_some(p)
+    };
+    let masked = |p: &ImagePoint<T>| region.masked(p.u.to_i32() as u16, p.v.to_i32() as u16);
+    let half_turn = T::of(core::f64::consts::PI);
+    let mut length = T::ZERO;
+    for turn in [ss, -ss] {
+        let (mut direction, mut before) = (start, at(start));
+        let mut angle = T::ZERO;
+        for _ in 0..STEPS {
+            angle += step;
+            if angle > half_turn {
+                break;
+            }
+            let (x, y) = direction;
+            direction = (x * cs - y * turn, x * turn + y * cs);
+            let now = at(direction);
+            let (Some(a), Some(b)) = (before, now) else {
+                // The last piece, cut by the border, counts half a step.
+                if let (Some(a), None) = (before, now)
+                    && !masked(&a)
+                {
+                    length += step * sin * (fx + fy) * T::of(0.25);
+                }
+                break;
+            };
+            if !(masked(&a) || masked(&b)) {
+                let (du, dv) = (b.u - a.u, b.v - a.v);
+                length += (du * du + dv * dv).sqrt();
+            }
+            before = now;
+        }
+    }
+    length
 }

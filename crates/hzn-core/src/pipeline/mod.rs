@@ -1,4 +1,9 @@
 //! The whole: stages in order, nothing runs back.
+//!
+//! One candidate after another goes from its border to a verdict. Edges are looked at in the order in which they are
+//! likely to be the limb: those beside the longest dark stretches of the border first, then every other edge that
+//! begins at the border, then the closed ones. The picture is done when an edge passes every gate and explains most
+//! of the limb in view, or at the end of one of the three rounds in which one passed at all.
 
 mod config;
 mod observer;
@@ -8,32 +13,61 @@ pub use config::{Config, Input, Mount};
 pub use observer::{Observer, Unobserved};
 pub use report::{Candidate, Counters, MAX_LISTED, Report, Solution, Verdict};
 
+use crate::block::{Block, LANES};
 use crate::body::{Expected, Frame, FrameError};
 use crate::camera::Camera;
+use crate::contour::{End, Marks, Scene, Thinned};
 use crate::error::ConfigError;
+use crate::frames::{Body, Cam, Cov3, Rotation, UnitVec3};
 use crate::image::Pixels;
+use crate::linalg::basis;
+use crate::pixel::Pixel;
 use crate::real::Real;
+use crate::region::Region;
 use crate::status::{Stage, Status};
+use crate::{binarize, candidates, covariance, estimate, reject, select, undistort};
 
 /// The sensor of a workstation: f64, 16384 points.
-pub type HostHorizon = Horizon<f64, 16384>;
+pub type HostHorizon = Horizon<f64, 16384, 2048, 16384>;
 /// The sensor of a flight computer: f32, 2048 points.
-pub type FlightHorizon = Horizon<f32, 2048>;
+pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 
-/// A horizon sensor: configuration, lens and every list it will ever need.
-pub struct Horizon<T, const POINTS: usize> {
+/// A horizon sensor: configuration, lens and every list it will ever need. There is no heap.
+///
+/// `POINTS` border pixels of an edge are stored (beyond, the stride doubles), `BLOCKS` blocks of eight edge points are
+/// fitted, and search lines are marked in `WORDS` words of 32 bits. See [`HostHorizon`] and [`FlightHorizon`].
+///
+/// It is large: keep it in a `static` or a `Box`.
+#[derive(Debug, Clone)]
+pub struct Horizon<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
     config: Config,
     camera: Camera<T>,
+    region: Region<T>,
+    cam_to_body: Option<Rotation<Cam, Body, T>>,
+    border: [Pixel; POINTS],
+    blocks: [Block<T>; BLOCKS],
+    marks: [u32; WORDS],
 }
 
-impl<T: Real, const POINTS: usize> Horizon<T, POINTS> {
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Horizon<T, POINTS, BLOCKS, WORDS> {
     /// Checks everything that can be refused.
     ///
     /// # Errors
     /// The first field out of its limits.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
-        Ok(Self { camera: Camera::try_new(&config.camera)?, config: config.clone() })
+        let camera = Camera::try_new(&config.camera)?;
+        Ok(Self {
+            region: Region::new(&config.mask, &camera),
+            cam_to_body: config
+                .mount
+                .and_then(|m| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::of))),
+            camera,
+            config: config.clone(),
+            border: [Pixel { x: 0, y: 0 }; POINTS],
+            blocks: [Block::default(); BLOCKS],
+            marks: [0; WORDS],
+        })
     }
     /// The configuration.
     pub fn config(&self) -> &Config {
@@ -42,6 +76,10 @@ impl<T: Real, const POINTS: usize> Horizon<T, POINTS> {
     /// The lens.
     pub fn camera(&self) -> &Camera<T> {
         &self.camera
+    }
+    /// The part of the picture that counts.
+    pub fn region(&self) -> &Region<T> {
+        &self.region
     }
     /// Checks what is known about a picture and works out the cone to expect.
     ///
@@ -62,14 +100,279 @@ impl<T: Real, const POINTS: usize> Horizon<T, POINTS> {
         expected: &Expected<T>,
         observer: &O,
     ) -> Report<T> {
-        let _ = (expected, picture, observer);
-        Report {
-            status: Status::NoLimb,
+        let mut report = Report {
+            status: Status::Rejected,
             stage: Stage::Binarize,
             level: 0,
             counters: Counters::default(),
             candidates: heapless::Vec::new(),
             solution: None,
+        };
+        if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
+            self.look(picture, expected, observer, &mut report);
         }
+        observer.leave();
+        report
     }
+
+    fn look<P: Pixels, O: Observer<T>>(
+        &mut self,
+        picture: &P,
+        expected: &Expected<T>,
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        observer.enter(Stage::Binarize);
+        let config = &self.config;
+        let level =
+            match binarize::split(picture, &self.region, &config.gate, &config.binarize, config.reject.seed, observer) {
+                Ok(level) => level.level,
+                Err(status) => {
+                    report.status = status;
+                    return;
+                }
+            };
+        report.level = level;
+        report.stage = Stage::Contour;
+        observer.enter(Stage::Contour);
+        let scene = Scene { picture, region: &self.region, level, observer };
+        let spacing = config.contour.line_spacing_px.unwrap_or_else(|| line_spacing(expected, &self.camera));
+        let mut marks = Marks::new(&mut self.marks, self.region.width(), self.region.height(), spacing);
+        let mut judge = Judge {
+            config,
+            camera: &self.camera,
+            region: &self.region,
+            cam_to_body: self.cam_to_body.as_ref(),
+            expected,
+            observer,
+            blocks: &mut self.blocks,
+            steps: config.contour.max_steps,
+            best: None,
+            short: 0,
+            report,
+        };
+        let border = &mut self.border;
+
+        let ranked = scene.ranked_starts();
+        for start in &ranked {
+            if judge.done() {
+                break;
+            }
+            judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
+        }
+        if judge.best.is_none() {
+            scene.each_start(|start| {
+                if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
+                    judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
+                }
+                !judge.done()
+            });
+        }
+        if judge.best.is_none() {
+            scene.each_crossing(&mut marks, |pixel, dark, marks| {
+                judge.edge(&scene, pixel, dark, border, marks);
+                !judge.done()
+            });
+        }
+        judge.conclude();
+    }
+}
+
+/// Rows between search lines: a quarter of the least extent of the body's disc, so that a crescent is crossed too.
+///
+/// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows; the lens's own minimum is taken for half of f,
+/// which every lens in use exceeds.
+fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> u16 {
+    let (_, fy) = camera.focal_px();
+    let rows = expected.half_angle_rad() * fy * T::of(0.25);
+    rows.to_i32().clamp(1, 64) as u16
+}
+
+/// The edges of one picture, judged one by one.
+struct Judge<'a, T, O> {
+    config: &'a Config,
+    camera: &'a Camera<T>,
+    region: &'a Region<T>,
+    cam_to_body: Option<&'a Rotation<Cam, Body, T>>,
+    expected: &'a Expected<T>,
+    observer: &'a O,
+    blocks: &'a mut [Block<T>],
+    steps: u32,
+    best: Option<Best<T>>,
+    /// Edges with too few points.
+    short: u32,
+    report: &'a mut Report<T>,
+}
+
+struct Best<T> {
+    solution: Solution<T>,
+    score: T,
+    support: T,
+}
+
+impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
+    /// Nothing more to look for: the limb is found, or the picture's steps are used up.
+    fn done(&self) -> bool {
+        self.steps == 0 || self.best.as_ref().is_some_and(|b| b.support > T::of(0.5))
+    }
+
+    /// Follows one edge and takes it through every stage.
+    fn edge<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        pixel: Pixel,
+        dark: u8,
+        border: &mut [Pixel],
+        marks: &mut Marks<'_>,
+    ) {
+        let mut edge = Thinned::new(border);
+        let before = self.steps;
+        let end = scene.follow(pixel, dark, &mut edge, marks, &mut self.steps);
+        let counters = &mut self.report.counters;
+        counters.followed += before - self.steps;
+        if matches!(end, End::Closed { twice_area } if twice_area > 0) {
+            // A hole: sky or ground seen through something.
+            return;
+        }
+        let length = edge.total();
+        if length < u32::from(self.config.candidates.min_points) {
+            self.short += 1;
+            return;
+        }
+        let number = counters.candidates;
+        counters.candidates += 1;
+        counters.dropped += length - length.div_ceil(edge.stride());
+        self.observer.edge(number, edge.pixels(), edge.stride());
+        let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
+        self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
+        // Full: only counted.
+        let _ = self.report.candidates.push(outcome);
+        if let Some(new) = solution
+            && self.best.as_ref().is_none_or(|b| new.score < b.score)
+        {
+            self.best = Some(new);
+        }
+        self.observer.enter(Stage::Contour);
+    }
+
+    fn candidate<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        number: u32,
+        length: u32,
+        border: &[Pixel],
+    ) -> (Candidate<T>, Option<Best<T>>) {
+        let config = self.config;
+        let mut outcome =
+            Candidate { length_px: length, points: 0, inliers: 0, rms_px: T::of(f64::NAN), verdict: Verdict::NoConsensus };
+
+        self.enter(Stage::Candidates);
+        let points = candidates::pick(scene, &config.candidates, border, number, self.blocks);
+        outcome.points = points.count;
+        self.report.counters.edge_points += points.count;
+        self.report.counters.fallback_points += points.fallback;
+        let used = (points.count as usize).div_ceil(LANES);
+        let Some(blocks) = self.blocks.get_mut(..used) else { return (outcome, None) };
+
+        enter(self.report, self.observer, Stage::Undistort);
+        undistort::to_rays(self.camera, blocks);
+
+        enter(self.report, self.observer, Stage::Reject);
+        let (fx, fy) = self.camera.focal_px();
+        let focal = (fx + fy) * T::of(0.5);
+        let Some(consensus) = reject::keep(blocks, points.count, self.expected, focal, &config.reject) else {
+            return (outcome, None);
+        };
+        self.report.counters.draws += consensus.draws;
+
+        enter(self.report, self.observer, Stage::Estimate);
+        outcome.verdict = Verdict::NoFit;
+        let threshold = T::of(config.reject.threshold_px);
+        let fit =
+            estimate::fit(blocks, &consensus, self.expected, threshold, &config.estimate, &config.covariance);
+        let Some(fit) = fit else { return (outcome, None) };
+        outcome.inliers = fit.inliers;
+        outcome.rms_px = fit.rms_px;
+        for place in 0..points.count {
+            if let Some(block) = blocks.get(place as usize / LANES) {
+                self.observer.weight(number, place, block.weight[place as usize % LANES]);
+            }
+        }
+
+        enter(self.report, self.observer, Stage::Covariance);
+        let fused = covariance::fuse(blocks, &fit, self.expected, &config.covariance, &config.estimate);
+        let Some(fused) = fused else { return (outcome, None) };
+
+        enter(self.report, self.observer, Stage::Select);
+        let (b1, b2) = basis(&fused.e);
+        let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
+        let sigma = covariance.sigma_max_rad();
+        let Some(seen) = middle_inlier(blocks) else { return (outcome, None) };
+        let judged = select::judge(&fit, &fused, sigma, &seen, self.camera, self.region, &config.select);
+        outcome.verdict = judged.verdict;
+        if judged.verdict != Verdict::Passed || !sigma.is_finite() {
+            return (outcome, None);
+        }
+        let axis = UnitVec3::assume_unit(fused.e);
+        let one = T::one();
+        let half_angle = |c: T| ((one - c * c).most(T::ZERO)).sqrt().atan2(c);
+        let solution = Solution {
+            axis,
+            covariance,
+            axis_ecef: self.expected.axis_ecef(),
+            axis_body: self.cam_to_body.map(|r| r.apply(&axis)),
+            half_angle_rad: half_angle(fit.c),
+            fused_half_angle_rad: half_angle(fused.c),
+            altitude_m: fused.var_free_cos.and_then(|v| self.expected.altitude(fit.c, v)),
+            rms_px: fit.rms_px,
+            inliers: fit.inliers,
+            arc_px: fit.arc_px,
+            candidate: number,
+        };
+        (outcome, Some(Best { solution, score: judged.score, support: judged.support }))
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        enter(self.report, self.observer, stage);
+    }
+
+    /// Writes the answer into the report.
+    fn conclude(self) {
+        let report = self.report;
+        if let Some(best) = self.best {
+            let chosen = best.solution.candidate;
+            if let Some(candidate) = report.candidates.get_mut(chosen as usize) {
+                candidate.verdict = Verdict::Chosen;
+                report.counters.edge_points = candidate.points;
+            }
+            report.status = Status::Ok;
+            report.solution = Some(best.solution);
+            return;
+        }
+        let fitted = report
+            .candidates
+            .iter()
+            .any(|c| !matches!(c.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers));
+        report.status = if self.steps == 0 {
+            Status::Truncated
+        } else if fitted {
+            Status::Rejected
+        } else if report.counters.candidates == 0 && self.short > 0 {
+            Status::TooFewPoints
+        } else {
+            Status::NoLimb
+        };
+    }
+}
+
+fn enter<T, O: Observer<T>>(report: &mut Report<T>, observer: &O, stage: Stage) {
+    report.stage = report.stage.max(stage);
+    observer.enter(stage);
+}
+
+/// The ray of an inlier half-way along the inliers.
+fn middle_inlier<T: Real>(blocks: &[Block<T>]) -> Option<crate::linalg::V3<T>> {
+    let inliers = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l] > T::ZERO).map(move |l| (b, l)));
+    let middle = inliers().count() / 2;
+    inliers().nth(middle).map(|(b, l)| b.ray(l))
 }

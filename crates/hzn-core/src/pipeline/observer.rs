@@ -1,6 +1,5 @@
 //! A window into the pipeline for clocks, counters and pictures; without one, nothing of it is compiled.
 
-use crate::camera::Ray;
 use crate::pixel::{ImagePoint, Pixel};
 use crate::pipeline::report::{Candidate, Solution};
 use crate::status::Stage;
@@ -19,10 +18,12 @@ pub trait Observer<T> {
     fn level(&self, _level: u16, _mean: T, _samples: u32) {}
     /// An edge was followed and is candidate number `candidate`: every `stride`-th of its border pixels, in order.
     fn edge(&self, _candidate: u32, _border: &[Pixel], _stride: u32) {}
-    /// Sub-pixel points of a candidate and their rays, in order.
-    fn points(&self, _candidate: u32, _points: &[ImagePoint<T>], _rays: &[Ray<T>]) {}
-    /// Weights of those points after the fit: 0 rejected, up to 1.
-    fn weights(&self, _candidate: u32, _weights: &[T]) {}
+    /// A sub-pixel point of a candidate; they come in order, numbered from 0.
+    #[inline(always)]
+    fn point(&self, _candidate: u32, _point: ImagePoint<T>) {}
+    /// The weight of a candidate's point after the fit: 0 rejected, up to 1. Only when there was a fit.
+    #[inline(always)]
+    fn weight(&self, _candidate: u32, _point: u32, _weight: T) {}
     /// What became of a candidate, with its solution if there is one.
     fn verdict(&self, _candidate: u32, _outcome: &Candidate<T>, _solution: Option<&Solution<T>>) {}
 }
