@@ -1,22 +1,23 @@
-//! Writes a few pictures to look at into the folder given, and says how long they took.
+//! Writes a few pictures of the built-in flights to look at into the folder given, and says how long each took.
 
 use std::path::PathBuf;
 use std::time::Instant;
 
-use hzn_core::camera::{Config, Model};
-use hzn_sim::{Clouds, Detector, Disc, Look, Pose, Profile, Scene, pose::position_m};
+use hzn_sim::flight::{leo_infrared, rocket};
 
 fn main() {
     let dir = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "look".into()));
     std::fs::create_dir_all(&dir).expect("the folder can be made");
-    let camera = Config::ideal(Model::Equidistant, 1920, 1080, 1235.0);
-    let look = Look { azimuth_rad: 0.4, depression_rad: 0.25, roll_rad: 0.3 };
-    let mut scene = Scene::new(camera, Pose::looking(position_m(68.0, 21.0, 200.0), look));
-    scene.profile = Profile::Exponential { scale_km: 4.0 };
-    scene.disc = Disc { surface: 0.15, clouds: Some(Clouds::default()), band: None };
-    scene.detector = Detector { psf_sigma_px: 0.9, read_noise: 0.02, ..Detector::default() };
-    let start = Instant::now();
-    let picture = scene.render().expect("the scene is valid");
-    println!("{:?}", start.elapsed());
-    picture.save(&dir.join("clouds.png")).expect("the picture can be written");
+    for (kind, flight) in
+        [("", rocket(1920, 1080, 6, 1)), ("payload-", rocket(960, 540, 3, 1).with_payload()), ("", leo_infrared(6, 1))]
+    {
+        for frame in &flight.frames {
+            let start = Instant::now();
+            let picture = frame.render().expect("the scene is valid");
+            let took = start.elapsed();
+            let limb_px = frame.scene.visible_limb_px().expect("the scene is valid");
+            println!("{kind}{}: {took:.0?}, {limb_px:.0} px of limb", frame.file);
+            picture.save(&dir.join(format!("{kind}{}", frame.file))).expect("the picture can be written");
+        }
+    }
 }

@@ -17,6 +17,8 @@ pub(crate) enum Stream {
     EdgeU,
     /// Errors of limb points along v.
     EdgeV,
+    /// The error of an attitude that is told to the sensor.
+    AttitudePrior,
 }
 
 /// A sequence of random numbers, read by index.

@@ -15,10 +15,12 @@
 //! | [`picture`] | the result, and its file |
 //! | [`limb`] | the limb as a line in the picture, edge points on it |
 //! | [`truth`] | what is true of a scene |
+//! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
 
 mod counter;
 pub mod detector;
 pub mod error;
+pub mod flight;
 pub mod foreground;
 pub mod globe;
 pub mod limb;
@@ -31,6 +33,7 @@ pub mod truth;
 
 pub use detector::Detector;
 pub use error::SceneError;
+pub use flight::{Flight, FlightFrame};
 pub use foreground::Foreground;
 pub use globe::Globe;
 pub use limb::{EdgeNoise, LimbCircle, LimbPoint};

@@ -1,0 +1,235 @@
+//! Built-in flights: sequences of scenes with the sensor that took them.
+
+use core::f64::consts::{FRAC_PI_2, TAU};
+
+use hzn_core::camera::{self, Model};
+use hzn_core::{body, region};
+
+use crate::counter::{Counter, Stream};
+use crate::detector::Detector;
+use crate::error::SceneError;
+use crate::foreground::Foreground;
+use crate::globe::Globe;
+use crate::picture::Picture;
+use crate::pose::{Look, Pose, position_m};
+use crate::scene::{Band, Disc, Profile, Scene, Sky};
+use crate::texture::Clouds;
+use crate::truth::Truth;
+
+/// A sequence of pictures and the sensor's configuration for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flight {
+    /// Short name, usable in file names.
+    pub name: &'static str,
+    /// What the sensor is told.
+    pub sensor: hzn_core::Config,
+    /// The pictures in the order of time.
+    pub frames: Vec<FlightFrame>,
+}
+
+/// One picture of a flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlightFrame {
+    /// Name of the picture's file.
+    pub file: String,
+    /// Time since the first picture in seconds.
+    pub time_s: f64,
+    /// What is seen.
+    pub scene: Scene,
+}
+
+impl FlightFrame {
+    /// The picture.
+    ///
+    /// # Errors
+    /// As [`Scene::render`].
+    pub fn render(&self) -> Result<Picture, SceneError> {
+        self.scene.render()
+    }
+    /// The truth.
+    ///
+    /// # Errors
+    /// As [`Scene::truth`].
+    pub fn truth(&self) -> Result<Truth, SceneError> {
+        self.scene.truth(&self.file, self.time_s)
+    }
+    /// What a navigation system would tell the sensor: the position, no attitude.
+    pub fn known(&self) -> hzn_core::Frame<f64> {
+        hzn_core::Frame {
+            altitude_m: Some(Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m)),
+            position_m: Some(self.scene.pose.position_m),
+            cam_to_ecef: None,
+        }
+    }
+    /// As [`FlightFrame::known`], with an attitude that is wrong by `sigma_rad` (1-sigma, about each axis).
+    pub fn known_with_attitude(&self, sigma_rad: f64) -> hzn_core::Frame<f64> {
+        let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
+        let error_rad = [0, 1, 2].map(|i| sigma_rad * draws.normal(i));
+        hzn_core::Frame { cam_to_ecef: self.scene.pose.disturbed(error_rad).cam_to_ecef(), ..self.known() }
+    }
+}
+
+impl Flight {
+    /// The same flight with part of the vehicle at the right of every picture, in front of sky and Earth, and
+    /// the sensor's mask around it.
+    #[must_use]
+    pub fn with_payload(mut self) -> Self {
+        let (w, h) = (f64::from(self.sensor.camera.width), f64::from(self.sensor.camera.height));
+        let part = |grow: f64| {
+            [[0.80 * w - grow, -10.0], [w + 10.0, -10.0], [w + 10.0, h + 10.0], [0.76 * w - grow, h + 10.0]]
+        };
+        for frame in &mut self.frames {
+            frame.scene.foreground.push(Foreground { polygon_px: part(0.0).to_vec(), brightness: 0.45 });
+        }
+        // Four pixels more than the part itself, as its edge is blurred.
+        let mut polygon = region::Polygon::new();
+        let fits = polygon.extend_from_slice(&part(4.0)).is_ok();
+        debug_assert!(fits, "four corners are fewer than sixteen");
+        let added = self.sensor.mask.polygons_px.push(polygon).is_ok();
+        debug_assert!(added, "built-in flights have few masks");
+        self
+    }
+}
+
+/// Seed of a picture's noise.
+fn seed_of(seed: u64, index: usize) -> u64 {
+    seed.wrapping_mul(1_000_003).wrapping_add(index as u64)
+}
+
+/// Index, and its place in the flight from 0 to 1.
+fn places(count: usize) -> impl Iterator<Item = (usize, f64)> {
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(move |i| (i, i as f64 / last))
+}
+
+/// A wide-angle lens (94° across) for a picture of `width` by `height` pixels; the one of a 1920×1080 camera, scaled.
+pub fn rocket_camera(width: u16, height: u16) -> camera::Config {
+    let s = f64::from(width) / 1920.0;
+    // Pixel centres are at integers: the corner is at −½.
+    let scaled = |c: f64| (c + 0.5) * s - 0.5;
+    let middle = (f64::from(height) - 1080.0 * s) / 2.0;
+    camera::Config {
+        model: Model::KannalaBrandt,
+        fx_px: 1235.0 * s,
+        fy_px: 1231.0 * s,
+        cx_px: scaled(963.2),
+        cy_px: scaled(536.7) + middle,
+        k: [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect(),
+        theta_max_deg: Some(54.0),
+        ..camera::Config::ideal(Model::KannalaBrandt, width, height, 1.0)
+    }
+}
+
+/// A sounding rocket above northern Scandinavia: 70 km up to 240 km and down again in 380 s, slowly tumbling, over
+/// clouds and dark sea, the limb a bright band with an exponential profile; PSF 0.9 px, noise 2 %, 8 bits.
+pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
+    let camera = rocket_camera(width, height);
+    let mut sensor = hzn_core::Config::new(camera.clone());
+    sensor.body = body::Config { altitude_sigma_km: 0.1, ..body::Config::default() };
+    let half_s = 190.0;
+    let frames = places(count)
+        .map(|(index, place)| {
+            let time_s = 2.0 * half_s * place;
+            let to_apogee = (time_s - half_s) / half_s;
+            let altitude_km = 240.0 - 170.0 * to_apogee * to_apogee;
+            let look = Look {
+                azimuth_rad: 0.6 + 1.3 * place * TAU,
+                // The limb is 7° to 16° below the horizontal; half the picture's height is 25°.
+                depression_rad: (14.0 + 12.0 * libm::sin(1.7 * place * TAU)).to_radians(),
+                roll_rad: 0.2 + 1.5 * place * TAU,
+            };
+            let position = position_m(67.9 + 0.8 * place, 21.1 - 0.3 * place, altitude_km);
+            let scene = Scene {
+                body: sensor.body.clone(),
+                profile: Profile::Exponential { scale_km: 4.0 },
+                disc: Disc {
+                    surface: 0.12,
+                    clouds: Some(Clouds { seed, ..Clouds::default() }),
+                    band: Some(Band { brightness: 0.9, depth_km: 16.0, fade_km: 24.0 }),
+                },
+                sky: Sky { stars: 4000, seed, ..Sky::default() },
+                detector: Detector { psf_sigma_px: 0.9, read_noise: 0.02, ..Detector::default() },
+                seed: seed_of(seed, index),
+                ..Scene::new(camera.clone(), Pose::looking(position, look))
+            };
+            FlightFrame { file: format!("rocket-{index:04}.png"), time_s, scene }
+        })
+        .collect();
+    Flight { name: "rocket", sensor, frames }
+}
+
+/// An infrared Earth sensor in low orbit: 384×288, equidistant with 92 px/rad to 90° off axis, 600 km, a uniform disc
+/// with its limb at 25 km, blur 1 px, noise 2 %, 10 bits. Over the flight the optical axis swings from straight down
+/// to 120° off nadir.
+pub fn leo_infrared(count: usize, seed: u64) -> Flight {
+    let camera =
+        camera::Config { theta_max_deg: Some(90.0), ..camera::Config::ideal(Model::Equidistant, 384, 288, 92.0) };
+    let mut sensor = hzn_core::Config::new(camera.clone());
+    sensor.body =
+        body::Config { limb_height_km: 25.0, limb_height_sigma_km: 2.0, altitude_sigma_km: 0.1, ..sensor.body };
+    let frames = places(count)
+        .map(|(index, place)| {
+            let time_s = 5800.0 * place;
+            // A polar orbit, twice through all latitudes.
+            let (lat_deg, lon_deg) = (80.0 * libm::sin(TAU * place), 10.0 + 24.0 * place);
+            let look = Look::off_nadir(120f64.to_radians() * place, 1.1 + 5.0 * place, FRAC_PI_2 * 3.0 * place);
+            let scene = Scene {
+                body: sensor.body.clone(),
+                profile: Profile::Exponential { scale_km: 5.0 },
+                disc: Disc { surface: 0.7, clouds: None, band: None },
+                sky: Sky { brightness: 0.08, ..Sky::default() },
+                detector: Detector { psf_sigma_px: 1.0, read_noise: 0.02, bits: 10, ..Detector::default() },
+                seed: seed_of(seed, index),
+                ..Scene::new(camera.clone(), Pose::looking(position_m(lat_deg, lon_deg, 600.0), look))
+            };
+            FlightFrame { file: format!("leo-infrared-{index:04}.png"), time_s, scene }
+        })
+        .collect();
+    Flight { name: "leo-infrared", sensor, frames }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_picture_of_the_flights_shows_limb() {
+        for flight in [rocket(960, 540, 24, 1), leo_infrared(13, 1), rocket(1280, 720, 12, 2).with_payload()] {
+            flight.sensor.check().unwrap();
+            for frame in &flight.frames {
+                let truth = frame.truth().unwrap();
+                let px = frame.scene.visible_limb_px().unwrap();
+                assert!(truth.has_limb(), "{} {px}", frame.file);
+            }
+        }
+    }
+
+    #[test]
+    fn rocket_goes_up_and_comes_down() {
+        let flight = rocket(320, 180, 3, 1);
+        let km: Vec<f64> = flight.frames.iter().map(|f| f.truth().unwrap().altitude_km).collect();
+        assert!((km[0] - 70.0).abs() < 1e-6 && (km[1] - 240.0).abs() < 1e-6 && (km[2] - 70.0).abs() < 1e-6);
+        assert_eq!((flight.frames[0].time_s, flight.frames[2].time_s), (0.0, 380.0));
+    }
+
+    #[test]
+    fn scaled_camera_sees_the_same() {
+        use hzn_core::camera::Camera;
+        use hzn_core::pixel::ImagePoint;
+        let (full, half) = (rocket_camera(1920, 1080), rocket_camera(960, 540));
+        let (full, half) = (Camera::<f64>::try_new(&full).unwrap(), Camera::<f64>::try_new(&half).unwrap());
+        let a = full.unproject(ImagePoint { u: -0.5, v: 1079.5 }).unwrap();
+        let b = half.unproject(ImagePoint { u: -0.5, v: 539.5 }).unwrap();
+        assert!(a.angle_rad(&b) < 1e-12);
+    }
+
+    #[test]
+    fn attitude_prior_is_off_by_about_its_sigma() {
+        let frame = &rocket(320, 180, 2, 1).frames[0];
+        let z = hzn_core::frames::UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
+        let told = frame.known_with_attitude(0.05).cam_to_ecef.unwrap().apply(&z);
+        let is = frame.scene.pose.cam_to_ecef().unwrap().apply(&z);
+        assert!((1e-3..0.3).contains(&told.angle_rad(&is)));
+        assert!(frame.known().cam_to_ecef.is_none());
+    }
+}
