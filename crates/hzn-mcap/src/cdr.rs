@@ -1,0 +1,106 @@
+//! The little of ROS 2's CDR that two kinds of picture need.
+
+use crate::frame::EncodedImage;
+use crate::messages::{compressed_format, raw_format};
+
+/// Reads CDR fields in either byte order; alignment counts from after the four bytes of encapsulation.
+#[derive(Debug)]
+struct Cdr<'a> {
+    data: &'a [u8],
+    at: usize,
+    big_endian: bool,
+}
+
+impl<'a> Cdr<'a> {
+    fn try_new(message: &'a [u8]) -> Option<Self> {
+        let (head, data) = message.split_first_chunk::<4>()?;
+        let big_endian = match head[..2] {
+            [0, 0] => true,
+            [0, 1] => false,
+            _ => return None,
+        };
+        Some(Self { data, at: 0, big_endian })
+    }
+    fn bytes(&mut self, n: usize) -> Option<&'a [u8]> {
+        let bytes = self.data.get(self.at..self.at.checked_add(n)?)?;
+        self.at += n;
+        Some(bytes)
+    }
+    fn u8(&mut self) -> Option<u8> {
+        self.bytes(1)?.first().copied()
+    }
+    fn u32(&mut self) -> Option<u32> {
+        self.at = self.at.next_multiple_of(4);
+        let bytes = *self.bytes(4)?.first_chunk::<4>()?;
+        Some(if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+    }
+    /// Length, bytes, and a zero that counts.
+    fn text(&mut self) -> Option<&'a str> {
+        let n = self.u32()? as usize;
+        let bytes = self.bytes(n)?;
+        std::str::from_utf8(bytes.strip_suffix(&[0]).unwrap_or(bytes)).ok()
+    }
+    fn blob(&mut self) -> Option<&'a [u8]> {
+        let n = self.u32()? as usize;
+        self.bytes(n)
+    }
+    /// std_msgs/Header: the time in seconds.
+    fn header(&mut self) -> Option<f64> {
+        let (s, ns) = (self.u32()? as i32, self.u32()?);
+        self.text()?;
+        Some(f64::from(s) + f64::from(ns) * 1e-9)
+    }
+}
+
+/// A picture and its header's time in seconds from `sensor_msgs/msg/Image` or `sensor_msgs/msg/CompressedImage`.
+pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Result<(EncodedImage, f64), String> {
+    let short = || "the message ends too early".to_owned();
+    let mut c = Cdr::try_new(message).ok_or_else(|| "unknown CDR encapsulation".to_owned())?;
+    let time_s = c.header().ok_or_else(short)?;
+    if schema == "sensor_msgs/msg/CompressedImage" {
+        let (format, data) = c.text().zip(c.blob()).ok_or_else(short)?;
+        return Ok((EncodedImage { format: compressed_format(format), bytes: data.to_vec() }, time_s));
+    }
+    let fields = (|| Some((c.u32()?, c.u32()?, c.text()?, c.u8()?, c.u32()?, c.blob()?)))();
+    let (height, width, encoding, big_endian, step, data) = fields.ok_or_else(short)?;
+    Ok((raw_format(width, height, step, encoding, big_endian != 0, data)?, time_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::ImageFormat;
+
+    fn message() -> Vec<u8> {
+        let mut m = vec![0, 1, 0, 0];
+        let put = |m: &mut Vec<u8>, x: u32| {
+            while !m.len().is_multiple_of(4) {
+                m.push(0);
+            }
+            m.extend_from_slice(&x.to_le_bytes());
+        };
+        put(&mut m, 12);
+        put(&mut m, 500_000_000);
+        put(&mut m, 4);
+        m.extend_from_slice(b"cam\0");
+        put(&mut m, 1); // height
+        put(&mut m, 2); // width
+        put(&mut m, 6);
+        m.extend_from_slice(b"mono8\0");
+        m.push(0);
+        put(&mut m, 2); // step
+        put(&mut m, 2);
+        m.extend_from_slice(&[7, 9]);
+        m
+    }
+
+    #[test]
+    fn a_ros_image_is_read_and_a_cut_one_is_not() {
+        let m = message();
+        let (image, time_s) = parse_image("sensor_msgs/msg/Image", &m).unwrap();
+        assert_eq!((image.format, image.bytes, time_s), (ImageFormat::Mono8 { width: 2, height: 1 }, vec![7, 9], 12.5));
+        for n in 0..m.len() {
+            assert!(parse_image("sensor_msgs/msg/Image", &m[..n]).is_err(), "{n}");
+        }
+    }
+}

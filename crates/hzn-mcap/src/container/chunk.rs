@@ -1,0 +1,155 @@
+//! Chunks: messages gathered, compressed or not, checked by a CRC.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+
+use super::op::{Fields, Op, Put};
+use super::{MAX_RECORD_BYTES, Record};
+
+/// Compression level: the fastest that is worth it; the data are small beside the pictures.
+const ZSTD_LEVEL: i32 = 1;
+
+/// One message of a chunk.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Message<'a> {
+    pub(crate) channel: u16,
+    pub(crate) sequence: u32,
+    pub(crate) log_time_ns: u64,
+    pub(crate) data: &'a [u8],
+}
+
+impl<'a> Message<'a> {
+    pub(crate) fn parse(content: &'a [u8]) -> Option<Self> {
+        let mut f = Fields(content);
+        let (channel, sequence, log_time_ns, _publish) = (f.u16()?, f.u32()?, f.u64()?, f.u64()?);
+        Some(Self { channel, sequence, log_time_ns, data: f.0 })
+    }
+}
+
+/// Messages on their way into one chunk.
+#[derive(Debug, Default)]
+pub(crate) struct ChunkBuilder {
+    bytes: Vec<u8>,
+}
+
+impl ChunkBuilder {
+    /// Bytes gathered so far.
+    pub(crate) fn len(&self) -> usize {
+        self.bytes.len()
+    }
+    pub(crate) fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
+    }
+    /// Appends a message whose data `fill` appends.
+    pub(crate) fn push(&mut self, channel: u16, sequence: u32, time_ns: u64, fill: impl FnOnce(&mut Vec<u8>)) {
+        let start = self.bytes.len();
+        self.bytes.u8(Op::MESSAGE).u64(0).u16(channel).u32(sequence).u64(time_ns).u64(time_ns);
+        fill(&mut self.bytes);
+        let length = (self.bytes.len() - start - 9) as u64;
+        if let Some(field) = self.bytes.get_mut(start + 1..start + 9) {
+            field.copy_from_slice(&length.to_le_bytes());
+        }
+    }
+    /// Takes the chunk out and begins a new one.
+    pub(crate) fn take(&mut self, compress: bool) -> std::io::Result<Chunk> {
+        let plain = std::mem::take(&mut self.bytes);
+        let crc = crc32fast::hash(&plain);
+        let index = Index::of(&plain).unwrap_or_default();
+        let size = plain.len() as u64;
+        let (compression, records) =
+            if compress { ("zstd", zstd::bulk::compress(&plain, ZSTD_LEVEL)?) } else { ("", plain) };
+        Ok(Chunk { compression: compression.to_owned(), size, crc, records, index })
+    }
+}
+
+/// Where each channel's messages stand in the uncompressed chunk.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Index {
+    /// First and last log time in nanoseconds; `None` without messages.
+    pub(crate) times_ns: Option<(u64, u64)>,
+    /// Per channel: log time in nanoseconds and offset.
+    pub(crate) channels: BTreeMap<u16, Vec<(u64, u64)>>,
+    /// Schema and channel records that stand in the chunk: number, id, content.
+    pub(crate) declared: Vec<(u8, u16, Vec<u8>)>,
+}
+
+impl Index {
+    /// Reads through the records of an uncompressed chunk; `None` when they do not hold together.
+    fn of(plain: &[u8]) -> Option<Self> {
+        let mut index = Self::default();
+        let mut rest = Fields(plain);
+        while !rest.0.is_empty() {
+            let offset = (plain.len() - rest.0.len()) as u64;
+            let (op, length) = (rest.u8()?, rest.u64()?);
+            let content = rest.bytes(usize::try_from(length).ok()?)?;
+            match op {
+                Op::MESSAGE => {
+                    let m = Message::parse(content)?;
+                    let (first, last) = index.times_ns.unwrap_or((m.log_time_ns, m.log_time_ns));
+                    index.times_ns = Some((first.min(m.log_time_ns), last.max(m.log_time_ns)));
+                    index.channels.entry(m.channel).or_default().push((m.log_time_ns, offset));
+                }
+                Op::SCHEMA | Op::CHANNEL => index.declared.push((op, Fields(content).u16()?, content.to_vec())),
+                _ => {}
+            }
+        }
+        Some(index)
+    }
+}
+
+/// A chunk as it stands in the file, with what its index needs.
+#[derive(Debug)]
+pub(crate) struct Chunk {
+    pub(crate) compression: String,
+    /// Size of the uncompressed records in bytes.
+    pub(crate) size: u64,
+    /// CRC-32 of the uncompressed records; 0 where the writer left it out.
+    pub(crate) crc: u32,
+    /// The records as stored.
+    pub(crate) records: Vec<u8>,
+    pub(crate) index: Index,
+}
+
+impl Chunk {
+    /// Takes a chunk record apart, checks its CRC and reads through its records. With it come the uncompressed
+    /// records; `None` when anything does not hold.
+    pub(crate) fn parse(record: &Record) -> Option<(Self, Vec<u8>)> {
+        let mut f = Fields(&record.content);
+        let (_first, _last, size, crc) = (f.u64()?, f.u64()?, f.u64()?, f.u32()?);
+        let compression = f.text()?.to_owned();
+        let length = f.u64()?;
+        let records = f.bytes(usize::try_from(length).ok()?)?.to_vec();
+        if size > MAX_RECORD_BYTES {
+            return None;
+        }
+        let plain = match compression.as_str() {
+            "" => records.clone(),
+            "zstd" => {
+                let mut plain = Vec::new();
+                // One byte more than promised shows a chunk that lies, without filling the memory.
+                zstd::Decoder::new(records.as_slice()).ok()?.take(size + 1).read_to_end(&mut plain).ok()?;
+                plain
+            }
+            _ => return None,
+        };
+        if plain.len() as u64 != size || (crc != 0 && crc32fast::hash(&plain) != crc) {
+            return None;
+        }
+        let index = Index::of(&plain)?;
+        Some((Self { compression, size, crc, records, index }, plain))
+    }
+
+    /// The messages of uncompressed records, in order.
+    pub(crate) fn messages(plain: &[u8]) -> impl Iterator<Item = Message<'_>> {
+        let mut rest = Fields(plain);
+        std::iter::from_fn(move || {
+            loop {
+                let (op, length) = (rest.u8()?, rest.u64()?);
+                let content = rest.bytes(usize::try_from(length).ok()?)?;
+                if op == Op::MESSAGE {
+                    return Message::parse(content);
+                }
+            }
+        })
+    }
+}

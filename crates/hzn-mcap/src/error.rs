@@ -1,0 +1,113 @@
+//! What can go wrong with a recording, and what to do about it.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a recording could not be written or read. Each message ends with what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The output is there already and `force` was not given.
+    #[error("{} exists: choose another name, or add --force to replace it", path.display())]
+    Exists {
+        /// The output that exists.
+        path: PathBuf,
+    },
+    /// An unfinished run's file stands beside the output.
+    #[error("{} is left from an unfinished run: add --resume to go on with it, or --force to start over", path.display())]
+    Unfinished {
+        /// The unfinished file.
+        path: PathBuf,
+    },
+    /// The disk is full.
+    #[error(
+        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and --resume goes on from there",
+        folder.display(), part.display()
+    )]
+    DiskFull {
+        /// The folder that is full.
+        folder: PathBuf,
+        /// The unfinished file.
+        part: PathBuf,
+    },
+    /// The folder cannot be written to.
+    #[error("cannot write into the folder {}: {source}; make it writable or choose another with -o", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Another error of the system while writing.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file cannot be opened or read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file does not begin as an MCAP does.
+    #[error("{} is not an MCAP file: it does not begin with the MCAP magic bytes", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The MCAP holds something that cannot be decoded.
+    #[error("{} cannot be decoded: {detail}", path.display())]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What and where.
+        detail: String,
+    },
+    /// The unfinished run was made with another sensor.toml.
+    #[error(
+        "{} was begun with another sensor.toml: resume with the same one, or add --force to start over", path.display()
+    )]
+    OtherSensor {
+        /// The unfinished file.
+        path: PathBuf,
+    },
+    /// A picture or an annotation list is too large for a record.
+    #[error("a record of {bytes} bytes is too large for a recording (at most {limit})")]
+    TooLarge {
+        /// Size of the record in bytes.
+        bytes: u64,
+        /// Largest size in bytes.
+        limit: u64,
+    },
+    /// An earlier write failed; the recording takes no further frames.
+    #[error("an earlier write to {} failed: finished frames are kept there, --resume goes on", path.display())]
+    AfterFailure {
+        /// The unfinished file.
+        path: PathBuf,
+    },
+}
+
+/// Names the folder of `path`; the current one when it has none.
+pub(crate) fn folder_of(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// Sorts an error of writing to `path` by what the user can do about it.
+pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
+    match source.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            Error::DiskFull { folder: folder_of(path), part: path.to_path_buf() }
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::NotFound | io::ErrorKind::ReadOnlyFilesystem => {
+            Error::Folder { folder: folder_of(path), source }
+        }
+        _ => Error::Write { path: path.to_path_buf(), source },
+    }
+}

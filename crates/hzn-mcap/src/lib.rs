@@ -1,0 +1,52 @@
+//! Recordings of the hzn horizon sensor.
+//!
+//! ```text
+//!   hzn_core::Report ──► Row ──► FrameRecord ──► Writer ──► out.mcap.part ──► out.mcap
+//!                        │  ▲        ▲                           │
+//!               CSV, JSON Lines      └── Reader ◄── resume ◄─────┴── recover
+//! ```
+//!
+//! - [`Row`] is the flat result of one picture and body, the same in CSV, JSON Lines and MCAP.
+//! - [`FrameRecord`] adds what only an MCAP holds: the picture, drawn edges, attitude, messages.
+//! - [`Writer`] writes a `.part` file that survives the end of the program at any moment and gets its name at the end.
+//! - [`Reader`] gives the frames back, from broken files too; [`recover`] closes one, [`resume`] goes on with one.
+//! - [`ImageReader`] takes pictures out of anybody's MCAP, as an input.
+//!
+//! # The file
+//!
+//! First the attachment `sensor.toml` and the metadata `hzn`, then chunks. Pictures stand uncompressed in chunks of
+//! their own, because they are compressed already; everything else is compressed with zstd. A batch is written
+//! pictures first, so a frame whose report is there is there as a whole: a frame counts as finished when its report
+//! is in the file. Every chunk, the data and the summary carry CRCs. Message `sequence` is the frame's index.
+//!
+//! | topic | schema | encoding |
+//! |---|---|---|
+//! | `/hzn/report` | `hzn.Report`, the row plus `candidate_edges` | JSON |
+//! | `/camera/image` | `foxglove.CompressedImage`, or `foxglove.RawImage` for raw frames | protobuf |
+//! | `/camera/calibration` | `foxglove.CameraCalibration`, at the start and at most once a second | protobuf |
+//! | `/camera/annotations` | `foxglove.ImageAnnotations`, pixel corner at integers (+0.5) | protobuf |
+//! | `/hzn/axis` | `foxglove.PoseInFrame` in frame `camera`, x along the axis | protobuf |
+//! | `/tf` | `foxglove.FrameTransform`, `camera` in `ecef` | protobuf |
+//! | `/log` | `foxglove.Log` | protobuf |
+#![forbid(unsafe_code)]
+
+mod cdr;
+mod container;
+mod error;
+mod frame;
+mod images;
+mod messages;
+mod reader;
+mod recover;
+mod row;
+mod topics;
+mod writer;
+
+pub use error::Error;
+pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
+pub use images::{ImageReader, InputImage};
+pub use reader::{Contents, Reader};
+pub use recover::{Recovered, Resumed, recover, resume};
+pub use row::{Row, RowMeta, body_name, roll_pitch_deg};
+pub use topics::REPORT_SCHEMA;
+pub use writer::{FLUSH_INTERVAL, Options, Writer, part_path};

@@ -1,0 +1,354 @@
+//! Frames to Foxglove's messages and back. The only module that knows Foxglove's conventions.
+
+use foxglove::messages::points_annotation::Type;
+use foxglove::messages::{
+    CameraCalibration, Color, CompressedImage, FrameTransform, ImageAnnotations, KeyValuePair, Log, Point2,
+    PointsAnnotation, Pose, PoseInFrame, Quaternion, RawImage, Timestamp, Vector3, log::Level,
+};
+use hzn_core::camera;
+use prost::Message;
+use serde_json::{Map, Value};
+
+use crate::frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
+use crate::row::Row;
+use crate::topics::Topic;
+
+/// The coordinate frame of everything the camera sees.
+const CAMERA: &str = "camera";
+/// The frame that the camera's attitude is given in.
+const ECEF: &str = "ecef";
+/// Foxglove counts pixels from the corner of the top-left pixel, hzn from its centre.
+const CENTRE_TO_CORNER_PX: f64 = 0.5;
+/// Half the length of the cross at the axis, pixels.
+const CROSS_PX: f64 = 15.0;
+
+/// Log time in nanoseconds. Times before 0 and after the year 2106 are not representable in Foxglove's messages: they
+/// are held at the limit; the row keeps the exact one.
+pub(crate) fn time_ns(time_s: f64) -> u64 {
+    const MAX_S: f64 = u32::MAX as f64;
+    // A cast of NaN gives 0.
+    (time_s.clamp(0.0, MAX_S) * 1e9).round() as u64
+}
+
+fn stamp(ns: u64) -> Option<Timestamp> {
+    Timestamp::new_checked(u32::try_from(ns / 1_000_000_000).ok()?, (ns % 1_000_000_000) as u32)
+}
+
+/// Appends a message to a buffer that grows, which cannot fail.
+pub(crate) fn append<M: Message>(message: &M, buffer: &mut Vec<u8>) {
+    message.encode_raw(buffer);
+}
+
+/// The JSON of `/hzn/report`: the row without its empty cells, and the candidates.
+pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
+    let mut map = match serde_json::to_value(&frame.row) {
+        Ok(Value::Object(map)) => map,
+        _ => Map::new(),
+    };
+    map.retain(|_, v| !v.is_null());
+    map.insert("candidate_edges".into(), serde_json::to_value(&frame.candidates).unwrap_or_default());
+    serde_json::to_vec(&map).unwrap_or_default()
+}
+
+/// The row and candidates of a report.
+pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>), serde_json::Error> {
+    let mut value: Value = serde_json::from_slice(data)?;
+    let edges = value.as_object_mut().and_then(|map| map.remove("candidate_edges")).unwrap_or(Value::Array(Vec::new()));
+    Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?))
+}
+
+/// A picture as a message, with the topic it belongs to.
+pub(crate) fn image(image: &EncodedImage, ns: u64, buffer: &mut Vec<u8>) {
+    let raw = |width: u32, height: u32, encoding: &str, bytes_per_pixel: u32| RawImage {
+        timestamp: stamp(ns),
+        frame_id: CAMERA.into(),
+        width,
+        height,
+        encoding: encoding.into(),
+        step: width.saturating_mul(bytes_per_pixel),
+        data: image.bytes.clone().into(),
+    };
+    let compressed = |format: &str| CompressedImage {
+        timestamp: stamp(ns),
+        frame_id: CAMERA.into(),
+        data: image.bytes.clone().into(),
+        format: format.into(),
+    };
+    match &image.format {
+        ImageFormat::Png => append(&compressed("png"), buffer),
+        ImageFormat::Jpeg => append(&compressed("jpeg"), buffer),
+        ImageFormat::Other(name) => append(&compressed(name), buffer),
+        ImageFormat::Mono8 { width, height } => append(&raw(*width, *height, "mono8", 1), buffer),
+        ImageFormat::Mono16 { width, height } => append(&raw(*width, *height, "mono16", 2), buffer),
+        ImageFormat::Rgb8 { width, height } => append(&raw(*width, *height, "rgb8", 3), buffer),
+    }
+}
+
+/// The topic that a picture of this format goes to.
+pub(crate) fn image_topic(format: &ImageFormat) -> Topic {
+    match format {
+        ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Other(_) => Topic::Image,
+        ImageFormat::Mono8 { .. } | ImageFormat::Mono16 { .. } | ImageFormat::Rgb8 { .. } => Topic::RawImage,
+    }
+}
+
+/// The format that a compressed picture's name stands for. ROS writes `rgb8; jpeg compressed bgr8` and the like.
+pub(crate) fn compressed_format(name: &str) -> ImageFormat {
+    let name = name.to_ascii_lowercase();
+    if name.contains("png") {
+        ImageFormat::Png
+    } else if name.contains("jpeg") || name.contains("jpg") {
+        ImageFormat::Jpeg
+    } else {
+        ImageFormat::Other(name)
+    }
+}
+
+/// A raw picture of anybody's with rows of `step` bytes, in one of our formats; an error names what is not supported.
+pub(crate) fn raw_format(
+    width: u32,
+    height: u32,
+    step: u32,
+    encoding: &str,
+    big_endian: bool,
+    data: &[u8],
+) -> Result<EncodedImage, String> {
+    let (format, bytes_per_pixel) = match encoding {
+        "mono8" | "8UC1" => (ImageFormat::Mono8 { width, height }, 1),
+        "mono16" | "16UC1" => (ImageFormat::Mono16 { width, height }, 2),
+        "rgb8" | "bgr8" | "8UC3" => (ImageFormat::Rgb8 { width, height }, 3),
+        other => {
+            return Err(format!(
+                "raw pictures of encoding \"{other}\" are not supported (mono8, mono16, rgb8, bgr8 are)"
+            ));
+        }
+    };
+    let row = width as usize * bytes_per_pixel;
+    let step = if step == 0 { row } else { step as usize };
+    if width == 0
+        || height == 0
+        || step < row
+        || data.len() < step.saturating_mul(height as usize - 1).saturating_add(row)
+    {
+        return Err(format!("a raw picture of {width}x{height} needs more than its {} bytes", data.len()));
+    }
+    let mut bytes: Vec<u8> =
+        data.chunks(step).take(height as usize).flat_map(|r| r.iter().take(row).copied()).collect();
+    match encoding {
+        "bgr8" | "8UC3" => bytes.chunks_exact_mut(3).for_each(|p| p.swap(0, 2)),
+        "mono16" | "16UC1" if big_endian => bytes.chunks_exact_mut(2).for_each(|p| p.swap(0, 1)),
+        _ => {}
+    }
+    Ok(EncodedImage { format, bytes })
+}
+
+/// A picture out of a protobuf message with this schema.
+pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Result<EncodedImage, String> {
+    match schema {
+        "foxglove.CompressedImage" => {
+            let m = CompressedImage::decode(data).map_err(|e| e.to_string())?;
+            Ok(EncodedImage { format: compressed_format(&m.format), bytes: m.data.into() })
+        }
+        "foxglove.RawImage" => {
+            let m = RawImage::decode(data).map_err(|e| e.to_string())?;
+            raw_format(m.width, m.height, m.step, &m.encoding, false, &m.data)
+        }
+        other => Err(format!("{other} is not a picture")),
+    }
+}
+
+/// What an annotation's lines and points mean; written as its metadata `kind`.
+#[derive(Debug, Clone, Copy)]
+struct Style {
+    kind: &'static str,
+    shape: Type,
+    color: [f64; 3],
+    thickness: f64,
+}
+const EDGE: Style = Style { kind: "edge", shape: Type::LineStrip, color: [0.6, 0.6, 0.6], thickness: 1.0 };
+const INLIER: Style = Style { kind: "inlier", shape: Type::Points, color: [0.1, 0.9, 0.2], thickness: 3.0 };
+const REJECTED: Style = Style { kind: "rejected", shape: Type::Points, color: [1.0, 0.2, 0.1], thickness: 3.0 };
+const LIMB: Style = Style { kind: "limb", shape: Type::LineStrip, color: [1.0, 0.85, 0.0], thickness: 1.5 };
+const AXIS: Style = Style { kind: "axis", shape: Type::LineList, color: [0.0, 0.8, 1.0], thickness: 2.0 };
+
+pub(crate) fn annotations(a: &Annotations, ns: u64) -> ImageAnnotations {
+    let mut points = Vec::new();
+    let mut draw = |style: Style, xy: &[[f64; 2]]| {
+        if xy.is_empty() {
+            return;
+        }
+        let [r, g, b] = style.color;
+        let color = Some(Color { r, g, b, a: 1.0 });
+        points.push(PointsAnnotation {
+            timestamp: stamp(ns),
+            r#type: style.shape as i32,
+            points: xy
+                .iter()
+                .map(|&[x, y]| Point2 { x: x + CENTRE_TO_CORNER_PX, y: y + CENTRE_TO_CORNER_PX })
+                .collect(),
+            outline_color: color,
+            fill_color: color.filter(|_| style.shape == Type::Points),
+            thickness: style.thickness,
+            metadata: vec![KeyValuePair { key: "kind".into(), value: style.kind.into() }],
+            ..PointsAnnotation::default()
+        });
+    };
+    a.edges.iter().for_each(|line| draw(EDGE, line));
+    a.limb.iter().for_each(|line| draw(LIMB, line));
+    draw(REJECTED, &a.rejected);
+    draw(INLIER, &a.inliers);
+    if let Some([x, y]) = a.axis {
+        draw(AXIS, &[[x - CROSS_PX, y], [x + CROSS_PX, y], [x, y - CROSS_PX], [x, y + CROSS_PX]]);
+    }
+    ImageAnnotations { timestamp: stamp(ns), points, ..ImageAnnotations::default() }
+}
+
+pub(crate) fn parse_annotations(data: &[u8]) -> Result<Annotations, prost::DecodeError> {
+    let message = ImageAnnotations::decode(data)?;
+    let mut a = Annotations::default();
+    for p in message.points {
+        let kind = p.metadata.iter().find(|m| m.key == "kind").map_or("", |m| m.value.as_str());
+        let mut xy: Vec<[f64; 2]> =
+            p.points.iter().map(|p| [p.x - CENTRE_TO_CORNER_PX, p.y - CENTRE_TO_CORNER_PX]).collect();
+        match kind {
+            "edge" => a.edges.push(xy),
+            "limb" => a.limb.push(xy),
+            "inlier" => a.inliers.append(&mut xy),
+            "rejected" => a.rejected.append(&mut xy),
+            "axis" => a.axis = xy.first().map(|&[x, y]| [x + CROSS_PX, y]),
+            _ => {}
+        }
+    }
+    Ok(a)
+}
+
+/// The axis as a pose at the camera whose x points along it.
+pub(crate) fn axis([x, y, z]: [f64; 3], ns: u64) -> PoseInFrame {
+    // The short way from +x to the axis: (1 + x, +x × axis), normalised; half a turn about z when they are opposite.
+    let n = ((1.0 + x).powi(2) + y * y + z * z).sqrt();
+    let orientation = if n > 1e-9 {
+        Quaternion { w: (1.0 + x) / n, x: 0.0, y: -z / n, z: y / n }
+    } else {
+        Quaternion { w: 0.0, x: 0.0, y: 0.0, z: 1.0 }
+    };
+    let pose = Pose { position: Some(Vector3 { x: 0.0, y: 0.0, z: 0.0 }), orientation: Some(orientation) };
+    PoseInFrame { timestamp: stamp(ns), frame_id: CAMERA.into(), pose: Some(pose) }
+}
+
+pub(crate) fn transform(attitude: &Attitude, ns: u64) -> FrameTransform {
+    let [w, x, y, z] = attitude.q_ecef_from_camera_wxyz;
+    let [px, py, pz] = attitude.position_m;
+    FrameTransform {
+        timestamp: stamp(ns),
+        parent_frame_id: ECEF.into(),
+        child_frame_id: CAMERA.into(),
+        translation: Some(Vector3 { x: px, y: py, z: pz }),
+        rotation: Some(Quaternion { x, y, z, w }),
+    }
+}
+
+pub(crate) fn parse_transform(data: &[u8]) -> Result<Option<Attitude>, prost::DecodeError> {
+    let m = FrameTransform::decode(data)?;
+    Ok(m.rotation
+        .zip(m.translation)
+        .map(|(q, t)| Attitude { q_ecef_from_camera_wxyz: [q.w, q.x, q.y, q.z], position_m: [t.x, t.y, t.z] }))
+}
+
+pub(crate) fn log(line: &LogLine, file: &str, ns: u64) -> Log {
+    let level = match line.level {
+        LogLevel::Info => Level::Info,
+        LogLevel::Warning => Level::Warning,
+        LogLevel::Error => Level::Error,
+    };
+    Log {
+        timestamp: stamp(ns),
+        level: level as i32,
+        message: line.message.clone(),
+        name: "hzn".into(),
+        file: file.into(),
+        line: 0,
+    }
+}
+
+pub(crate) fn parse_log(data: &[u8]) -> Result<LogLine, prost::DecodeError> {
+    let m = Log::decode(data)?;
+    let level = match m.level() {
+        Level::Error | Level::Fatal => LogLevel::Error,
+        Level::Warning => LogLevel::Warning,
+        _ => LogLevel::Info,
+    };
+    Ok(LogLine { level, message: m.message })
+}
+
+/// The calibration. Its principal point keeps hzn's pixel centres at integers, as ROS has them.
+pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
+    let (model, coefficients) = match c.model {
+        camera::Model::KannalaBrandt | camera::Model::Equidistant => ("kannala_brandt", 4),
+        camera::Model::Pinhole | camera::Model::BrownConrady => ("plumb_bob", 5),
+    };
+    let (fx, fy, cx, cy) = (c.fx_px, c.fy_px, c.cx_px, c.cy_px);
+    CameraCalibration {
+        timestamp: stamp(ns),
+        frame_id: CAMERA.into(),
+        width: c.width.into(),
+        height: c.height.into(),
+        distortion_model: model.into(),
+        d: (0..coefficients).map(|i| c.coefficient(i)).collect(),
+        k: vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        r: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: vec![fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn foxglove_counts_from_the_corner() {
+        // The centre of the top-left pixel is (0, 0) here and (0.5, 0.5) there.
+        let a = Annotations {
+            edges: vec![vec![[0.0, 0.0], [1.0, 2.25]]],
+            inliers: vec![[10.0, 20.0]],
+            rejected: vec![[3.5, -0.5]],
+            limb: vec![vec![[5.0, 5.0], [6.0, 5.5]], vec![[7.0, 8.0], [9.0, 9.0]]],
+            axis: Some([100.0, 50.0]),
+        };
+        let m = annotations(&a, 0);
+        assert_eq!(m.points.first().unwrap().points, [Point2 { x: 0.5, y: 0.5 }, Point2 { x: 1.5, y: 2.75 }]);
+        let cross = &m.points.last().unwrap().points;
+        let mid = |f: fn(&Point2) -> f64| cross.iter().map(f).sum::<f64>() / 4.0;
+        assert_eq!((mid(|p| p.x), mid(|p| p.y)), (100.5, 50.5));
+        assert_eq!(parse_annotations(&m.encode_to_vec()).unwrap(), a);
+    }
+
+    #[test]
+    fn the_pose_turns_x_to_the_axis() {
+        for axis_xyz in [[0.0, 0.6, 0.8], [0.48, -0.6, 0.64], [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]] {
+            let q = axis(axis_xyz, 0).pose.unwrap().orientation.unwrap();
+            let (w, x, y, z) = (q.w, q.x, q.y, q.z);
+            let turned = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)];
+            for (a, b) in turned.iter().zip(axis_xyz) {
+                assert!((a - b).abs() < 1e-12, "{turned:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn times_outside_of_foxglove_are_held_at_the_limit() {
+        assert_eq!(time_ns(1.5), 1_500_000_000);
+        assert_eq!((time_ns(-3.0), time_ns(f64::NAN)), (0, 0));
+        assert_eq!(time_ns(1e30), u64::from(u32::MAX) * 1_000_000_000);
+        assert!(stamp(time_ns(1e30)).is_some());
+    }
+
+    #[test]
+    fn raw_pictures_lose_their_padding() {
+        let image = raw_format(2, 2, 3, "mono8", false, &[1, 2, 9, 3, 4]).unwrap();
+        assert_eq!(image.bytes, [1, 2, 3, 4]);
+        assert_eq!(raw_format(1, 1, 0, "bgr8", false, &[1, 2, 3]).unwrap().bytes, [3, 2, 1]);
+        assert_eq!(raw_format(1, 1, 2, "mono16", true, &[1, 2]).unwrap().bytes, [2, 1]);
+        assert!(raw_format(u32::MAX, u32::MAX, u32::MAX, "mono8", false, &[1]).is_err());
+        assert!(raw_format(2, 2, 2, "yuv422", false, &[0; 8]).is_err());
+    }
+}

@@ -1,0 +1,251 @@
+//! Frames out of a recording, one batch at a time, from whole and broken files.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use crate::container::{Chunk, Fields, Message, Op, Record, Scanner};
+use crate::error::Error;
+use crate::frame::{Annotations, Attitude, EncodedImage, FrameRecord, LogLine};
+use crate::messages;
+use crate::topics::Topic;
+use crate::writer::SENSOR_TOML;
+
+/// How much of each frame is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Contents {
+    /// Everything.
+    #[default]
+    All,
+    /// Everything but the pictures, which are passed over without being read.
+    WithoutImages,
+}
+
+/// Gives the frames of a recording in the order in which they were written. Memory is that of one batch of frames.
+/// A file that was cut off gives every finished frame; [`Reader::is_complete`] tells afterwards.
+#[derive(Debug)]
+pub struct Reader {
+    scanner: Scanner<BufReader<File>>,
+    path: PathBuf,
+    sensor_toml: Option<String>,
+    metadata: BTreeMap<String, String>,
+    /// The first record after the head of the file.
+    peeked: Option<Record>,
+    /// Channel ids by number, since a foreign writer's may differ from ours.
+    topics: BTreeMap<u16, Topic>,
+    schemas: BTreeMap<u16, String>,
+    images: Parts<EncodedImage>,
+    ready: VecDeque<FrameRecord>,
+    complete: bool,
+    broken_chunks: u64,
+    done: bool,
+}
+
+/// Parts of frames by their sequence number, in the order they came.
+type Parts<T> = BTreeMap<u32, VecDeque<T>>;
+
+fn take<T>(parts: &mut Parts<T>, sequence: u32) -> Option<T> {
+    let queue = parts.get_mut(&sequence)?;
+    let part = queue.pop_front();
+    if queue.is_empty() {
+        parts.remove(&sequence);
+    }
+    part
+}
+
+impl Reader {
+    /// Opens a recording and reads its sensor.toml.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no MCAP.
+    pub fn open(path: impl AsRef<Path>, contents: Contents) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let read = |source| Error::Read { path: path.to_path_buf(), source };
+        let file = File::open(path).map_err(read)?;
+        let scanner = Scanner::try_new(BufReader::with_capacity(1 << 16, file)).map_err(read)?;
+        let mut scanner = scanner.ok_or_else(|| Error::NotMcap { path: path.to_path_buf() })?;
+        scanner.skip_plain_chunks(contents == Contents::WithoutImages);
+        let mut reader = Self {
+            scanner,
+            path: path.to_path_buf(),
+            sensor_toml: None,
+            metadata: BTreeMap::new(),
+            peeked: None,
+            topics: BTreeMap::new(),
+            schemas: BTreeMap::new(),
+            images: BTreeMap::new(),
+            ready: VecDeque::new(),
+            complete: false,
+            broken_chunks: 0,
+            done: false,
+        };
+        while let Some(record) = reader.scanner.next().map_err(read)? {
+            match record.op {
+                Op::CHUNK | Op::DATA_END | Op::MESSAGE => {
+                    reader.peeked = Some(record);
+                    break;
+                }
+                _ => reader.outside(&record),
+            }
+        }
+        Ok(reader)
+    }
+
+    /// Text of the attached sensor.toml.
+    pub fn sensor_toml(&self) -> Option<&str> {
+        self.sensor_toml.as_deref()
+    }
+    /// The metadata `hzn`: versions and settings of the run.
+    pub fn metadata(&self) -> &BTreeMap<String, String> {
+        &self.metadata
+    }
+    /// After the last frame: was the recording closed properly?
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+    /// Chunks whose contents were damaged, so far; their frames are missing.
+    pub fn broken_chunks(&self) -> u64 {
+        self.broken_chunks
+    }
+
+    /// A record outside of chunks.
+    fn outside(&mut self, record: &Record) {
+        let mut f = Fields(&record.content);
+        match record.op {
+            Op::SCHEMA => {
+                if let (Some(id), Some(name)) = (f.u16(), f.text()) {
+                    self.schemas.insert(id, name.to_owned());
+                }
+            }
+            Op::CHANNEL => {
+                if let (Some(id), Some(schema), Some(topic)) = (f.u16(), f.u16(), f.text()) {
+                    let schema = self.schemas.get(&schema).map_or("", String::as_str);
+                    let ours = Topic::ALL.into_iter().find(|t| t.name() == topic && t.schema().0 == schema);
+                    if let Some(ours) = ours {
+                        self.topics.insert(id, ours);
+                    }
+                }
+            }
+            Op::ATTACHMENT => {
+                let text = (|| {
+                    f.bytes(16)?;
+                    let name = f.text()?;
+                    let (_media, size) = (f.text()?, f.u64()?);
+                    let data = f.bytes(usize::try_from(size).ok()?)?;
+                    (name == SENSOR_TOML).then(|| String::from_utf8_lossy(data).into_owned())
+                })();
+                self.sensor_toml = self.sensor_toml.take().or(text);
+            }
+            Op::METADATA => {
+                if let (Some("hzn"), Some(map)) = (f.text(), f.map()) {
+                    self.metadata = map;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes a chunk's messages apart into frames.
+    fn chunk(&mut self, record: &Record) -> Result<(), Error> {
+        let Some((chunk, plain)) = Chunk::parse(record) else {
+            self.broken_chunks += 1;
+            return Ok(());
+        };
+        for (op, _, content) in chunk.index.declared {
+            self.outside(&Record { op, content });
+        }
+        let mut annotations = Parts::<Annotations>::new();
+        let mut attitudes = Parts::<Attitude>::new();
+        let mut logs = Parts::<LogLine>::new();
+        for m in Chunk::messages(&plain) {
+            let Some(&topic) = self.topics.get(&m.channel) else { continue };
+            let broken = |what: &str, e: String| Error::Decode {
+                path: self.path.clone(),
+                detail: format!("{what} of frame {}: {e}", m.sequence),
+            };
+            match topic {
+                Topic::Image | Topic::RawImage => {
+                    let schema = if topic == Topic::Image { "foxglove.CompressedImage" } else { "foxglove.RawImage" };
+                    let image = messages::parse_image(schema, m.data).map_err(|e| broken("picture", e))?;
+                    self.images.entry(m.sequence).or_default().push_back(image);
+                }
+                Topic::Annotations => {
+                    let a = messages::parse_annotations(m.data).map_err(|e| broken("annotations", e.to_string()))?;
+                    annotations.entry(m.sequence).or_default().push_back(a);
+                }
+                Topic::Transform => {
+                    let t = messages::parse_transform(m.data).map_err(|e| broken("attitude", e.to_string()))?;
+                    attitudes.entry(m.sequence).or_default().extend(t);
+                }
+                Topic::Log => {
+                    let line = messages::parse_log(m.data).map_err(|e| broken("message", e.to_string()))?;
+                    logs.entry(m.sequence).or_default().push_back(line);
+                }
+                Topic::Report => {
+                    let (row, candidates) =
+                        messages::parse_report(m.data).map_err(|e| broken("report", e.to_string()))?;
+                    self.ready.push_back(FrameRecord {
+                        row,
+                        candidates,
+                        image: take(&mut self.images, m.sequence),
+                        annotations: take(&mut annotations, m.sequence).unwrap_or_default(),
+                        attitude: take(&mut attitudes, m.sequence),
+                        log: logs.remove(&m.sequence).unwrap_or_default().into(),
+                    });
+                }
+                Topic::Calibration | Topic::Axis => {}
+            }
+        }
+        if chunk.compression == "zstd" {
+            // Pictures of a batch come before its reports: what is left now belongs to no frame.
+            self.images.clear();
+        }
+        Ok(())
+    }
+
+    fn step(&mut self) -> Result<bool, Error> {
+        let record = match self.peeked.take() {
+            Some(record) => Some(record),
+            None => self.scanner.next().map_err(|source| Error::Read { path: self.path.clone(), source })?,
+        };
+        let Some(record) = record else { return Ok(false) };
+        match record.op {
+            Op::CHUNK => self.chunk(&record)?,
+            Op::DATA_END => {
+                self.complete = true;
+                return Ok(false);
+            }
+            _ => self.outside(&record),
+        }
+        Ok(true)
+    }
+}
+
+impl Iterator for Reader {
+    type Item = Result<FrameRecord, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if let Some(frame) = self.ready.pop_front() {
+                return Some(Ok(frame));
+            }
+            if self.done {
+                return None;
+            }
+            match self.step() {
+                Ok(true) => {}
+                Ok(false) => self.done = true,
+                Err(e) => {
+                    self.done = true;
+                    return Some(Err(e));
+                }
+            }
+        }
+    }
+}
+
+/// Is this the report of a frame? For those who only count.
+pub(crate) fn reports(plain: &[u8], channel: u16) -> u64 {
+    Chunk::messages(plain).filter(|m: &Message<'_>| m.channel == channel).count() as u64
+}

@@ -1,0 +1,169 @@
+//! Closing and continuing recordings that were cut off.
+
+use std::fs::{self, File};
+use std::io::{BufReader, BufWriter};
+use std::path::{Path, PathBuf};
+
+use crate::container::{Chunk, Container, Fields, Op, Scanner};
+use crate::error::{Error, while_writing};
+use crate::reader::{Contents, Reader, reports};
+use crate::topics::Topic;
+use crate::writer::{Options, Writer, open, part_path, refuse_existing};
+
+/// What [`recover`] found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Recovered {
+    /// Frames kept. For a recording without `/hzn/report`, 0.
+    pub frames: u64,
+    /// The file had been closed properly.
+    pub was_complete: bool,
+    /// Chunks left out because their contents were damaged.
+    pub broken_chunks: u64,
+    /// Bytes at the end of the file that were no whole record, or pictures without a result.
+    pub dropped_bytes: u64,
+}
+
+/// A recording that goes on.
+#[derive(Debug)]
+pub struct Resumed {
+    /// Frames that are finished: go on with the next one.
+    pub frames: u64,
+    /// Index of the last finished frame, from its row; `None` without frames.
+    pub last_index: Option<u64>,
+    /// Takes the further frames.
+    pub writer: Writer,
+}
+
+/// Closes a broken recording: copies every finished frame of `input` to `output`, which must not exist.
+///
+/// # Errors
+/// `input` cannot be read or is no MCAP; `output` exists or cannot be written.
+pub fn recover(input: impl AsRef<Path>, output: impl AsRef<Path>) -> Result<Recovered, Error> {
+    let (input, output) = (input.as_ref(), output.as_ref());
+    refuse_existing(output)?;
+    let part = part_path(output);
+    let mut out = open(&part).map_err(|e| while_writing(&part, e))?;
+    let closed = copy(input, &mut out, &part).and_then(|found| {
+        out.finish().map_err(|e| while_writing(&part, e))?;
+        fs::rename(&part, output).map_err(|e| while_writing(output, e))?;
+        Ok(found)
+    });
+    if closed.is_err() {
+        // The input is untouched: half a copy of it helps nobody.
+        let _ = fs::remove_file(&part);
+    }
+    closed
+}
+
+/// Goes on with the unfinished recording of `path`: its finished frames are copied into a new `.part` file, which
+/// then takes the place of the old one. Without an unfinished recording, a new one is begun.
+///
+/// # Errors
+/// The output exists already (`options.force` replaces it at the end); the unfinished recording was made with another
+/// sensor.toml; or the disk fails.
+pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Error> {
+    let path = path.as_ref();
+    let part = part_path(path);
+    if !options.force {
+        refuse_existing(path)?;
+    }
+    let fresh = || -> Result<Resumed, Error> {
+        let options = Options { force: true, ..options.clone() };
+        Ok(Resumed { frames: 0, last_index: None, writer: Writer::create(path, &options)? })
+    };
+    if !part.exists() {
+        return fresh();
+    }
+    let mut reader = match Reader::open(&part, Contents::WithoutImages) {
+        Ok(reader) => reader,
+        // Cut off before the magic bytes were out: nothing is lost.
+        Err(Error::NotMcap { .. }) => return fresh(),
+        Err(e) => return Err(e),
+    };
+    match reader.sensor_toml() {
+        None => return fresh(),
+        Some(text) if text != options.sensor_toml => return Err(Error::OtherSensor { path: part }),
+        Some(_) => {}
+    }
+    let mut last_index = None;
+    for frame in &mut reader {
+        last_index = Some(frame?.row.index);
+    }
+    let mut copy_path = part.as_os_str().to_owned();
+    copy_path.push(".new");
+    let copy_path = PathBuf::from(copy_path);
+    let failed = |e| while_writing(&copy_path, e);
+    let mut out = open(&copy_path).map_err(failed)?;
+    let found = copy(&part, &mut out, &copy_path)?;
+    out.flush().map_err(failed)?;
+    // Until here the old file has everything, from here the new one.
+    fs::rename(&copy_path, &part).map_err(|e| while_writing(&part, e))?;
+    Ok(Resumed { frames: found.frames, last_index, writer: Writer::on(out, path, &part, options) })
+}
+
+/// Copies the whole records of `input` up to the last finished frame.
+fn copy(input: &Path, out: &mut Container<BufWriter<File>>, part: &Path) -> Result<Recovered, Error> {
+    let read = |source| Error::Read { path: input.to_path_buf(), source };
+    let file = File::open(input).map_err(read)?;
+    let size = file.metadata().map_err(read)?.len();
+    let scanner = Scanner::try_new(BufReader::with_capacity(1 << 16, file)).map_err(read)?;
+    let mut scanner = scanner.ok_or_else(|| Error::NotMcap { path: input.to_path_buf() })?;
+    let write = |e| while_writing(part, e);
+
+    let mut found = Recovered::default();
+    let mut report_channel = None;
+    let mut waiting: Vec<Chunk> = Vec::new();
+    let mut kept_to = scanner.position();
+    while let Some(record) = scanner.next().map_err(read)? {
+        match record.op {
+            Op::DATA_END => {
+                found.was_complete = true;
+                kept_to = size;
+                break;
+            }
+            Op::CHUNK => match Chunk::parse(&record) {
+                Some((chunk, plain)) => {
+                    for (op, _, content) in &chunk.index.declared {
+                        if *op == Op::CHANNEL {
+                            report_channel = report_channel.or(report_id(content));
+                        }
+                    }
+                    let frames = report_channel.map_or(0, |id| reports(&plain, id));
+                    if report_channel.is_some() && frames == 0 {
+                        // Pictures wait for the results that belong to them.
+                        waiting.push(chunk);
+                        continue;
+                    }
+                    for chunk in waiting.drain(..).chain([chunk]) {
+                        out.chunk(&chunk).map_err(write)?;
+                    }
+                    found.frames += frames;
+                }
+                None => found.broken_chunks += 1,
+            },
+            // Written anew.
+            Op::MESSAGE_INDEX => {}
+            op => {
+                if op == Op::CHANNEL {
+                    report_channel = report_channel.or(report_id(&record.content));
+                }
+                out.copy(&record).map_err(write)?;
+            }
+        }
+        kept_to = scanner.position();
+    }
+    if found.was_complete {
+        for chunk in waiting {
+            out.chunk(&chunk).map_err(write)?;
+        }
+    }
+    found.dropped_bytes = size.saturating_sub(kept_to);
+    Ok(found)
+}
+
+/// The id of a channel record if it is that of the reports.
+fn report_id(content: &[u8]) -> Option<u16> {
+    let mut f = Fields(content);
+    let (id, _schema, topic) = (f.u16()?, f.u16()?, f.text()?);
+    (topic == Topic::Report.name()).then_some(id)
+}

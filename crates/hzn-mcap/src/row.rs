@@ -1,0 +1,372 @@
+//! The flat result: one row a picture and body, the same in CSV, JSON Lines and MCAP.
+
+use hzn_core::body::Kind;
+use hzn_core::frames::{Body, UnitVec3};
+use hzn_core::real::Real;
+use hzn_core::status::Status;
+use hzn_core::{Report, Solution};
+use serde::{Deserialize, Serialize};
+
+/// What is known about a picture before it is processed.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RowMeta {
+    /// Place in the sequence, from 0.
+    pub index: u64,
+    /// Name of the picture as it was given.
+    pub file: String,
+    /// Time of the picture in seconds, of the sequence's own epoch.
+    pub time_s: f64,
+    /// Name of the body; see [`body_name`].
+    pub body: String,
+    /// Altitude that was given with the picture or by sensor.toml, kilometres.
+    pub altitude_km: Option<f64>,
+}
+
+/// The result of one picture and body. The fields are the columns, in order; an empty cell is `None`.
+///
+/// With the `csv` crate a row is written by `serialize` and read by `deserialize`; with `serde_json` one row is one
+/// line. Angles of the vehicle follow [`roll_pitch_deg`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Place in the sequence, from 0.
+    pub index: u64,
+    /// Name of the picture.
+    pub file: String,
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Name of the body: `earth`, `earth-sphere`, `sun`, `moon`, `sphere`.
+    pub body: String,
+    /// Outcome, by its name such as `no-limb`.
+    #[serde(with = "status_name")]
+    pub status: Status,
+    /// Unit vector to the body in the camera frame, x; only beside `ok`, like all that follows up to `inliers`.
+    pub axis_x: Option<f64>,
+    /// Unit vector to the body in the camera frame, y.
+    pub axis_y: Option<f64>,
+    /// Unit vector to the body in the camera frame, z.
+    pub axis_z: Option<f64>,
+    /// Covariance of the axis, xx, rad².
+    pub cov_xx: Option<f64>,
+    /// Covariance of the axis, xy, rad².
+    pub cov_xy: Option<f64>,
+    /// Covariance of the axis, xz, rad².
+    pub cov_xz: Option<f64>,
+    /// Covariance of the axis, yy, rad².
+    pub cov_yy: Option<f64>,
+    /// Covariance of the axis, yz, rad².
+    pub cov_yz: Option<f64>,
+    /// Covariance of the axis, zz, rad².
+    pub cov_zz: Option<f64>,
+    /// The larger of the axis' two standard deviations, degrees.
+    pub sigma_max_deg: Option<f64>,
+    /// The same direction in ECEF, x; when the position is known.
+    pub axis_e_x: Option<f64>,
+    /// The same direction in ECEF, y.
+    pub axis_e_y: Option<f64>,
+    /// The same direction in ECEF, z.
+    pub axis_e_z: Option<f64>,
+    /// Half-angle of the half-angle-free fit, degrees.
+    pub half_angle_deg: Option<f64>,
+    /// The altitude that was given, kilometres; beside every status.
+    pub altitude_km: Option<f64>,
+    /// The altitude that follows from the half-angle-free fit, kilometres.
+    pub altitude_est_km: Option<f64>,
+    /// Its standard deviation, kilometres.
+    pub altitude_est_sigma_km: Option<f64>,
+    /// Weighted RMS distance of the inliers from the fitted limb, pixels.
+    pub rms_px: Option<f64>,
+    /// Sub-pixel edge points that were measured.
+    pub edge_points: Option<u32>,
+    /// Edge points that carry the answer.
+    pub inliers: Option<u32>,
+    /// Edges that were candidates.
+    pub candidates: Option<u32>,
+    /// Border pixels dropped because a list was full.
+    pub dropped: Option<u32>,
+    /// Level between dark and lit in the picture's own counts.
+    pub level: Option<u16>,
+    /// Roll of the vehicle, degrees; with a mounting.
+    pub roll_deg: Option<f64>,
+    /// Pitch of the vehicle, degrees; with a mounting.
+    pub pitch_deg: Option<f64>,
+    /// Time that the processing took, microseconds, decoding not included.
+    pub elapsed_us: Option<f64>,
+    /// Why there is no answer, in words; empty beside `ok`.
+    pub detail: String,
+}
+
+impl Row {
+    /// The names of the columns in order.
+    pub const COLUMNS: [&'static str; 32] = [
+        "index",
+        "file",
+        "time_s",
+        "body",
+        "status",
+        "axis_x",
+        "axis_y",
+        "axis_z",
+        "cov_xx",
+        "cov_xy",
+        "cov_xz",
+        "cov_yy",
+        "cov_yz",
+        "cov_zz",
+        "sigma_max_deg",
+        "axis_e_x",
+        "axis_e_y",
+        "axis_e_z",
+        "half_angle_deg",
+        "altitude_km",
+        "altitude_est_km",
+        "altitude_est_sigma_km",
+        "rms_px",
+        "edge_points",
+        "inliers",
+        "candidates",
+        "dropped",
+        "level",
+        "roll_deg",
+        "pitch_deg",
+        "elapsed_us",
+        "detail",
+    ];
+
+    /// The row of a processed picture. `elapsed_us` is the time `process` took in microseconds, if it was measured.
+    pub fn from_report<T: Real>(meta: &RowMeta, report: &Report<T>, elapsed_us: Option<f64>) -> Self {
+        let c = &report.counters;
+        let mut row = Self {
+            edge_points: Some(c.edge_points),
+            candidates: Some(c.candidates),
+            dropped: Some(c.dropped),
+            level: (report.level > 0).then_some(report.level),
+            elapsed_us,
+            ..Self::empty(meta, report.status)
+        };
+        match (&report.solution, report.status) {
+            (Some(solution), Status::Ok) => row.answer(solution),
+            _ => row.detail = detail(report),
+        }
+        row
+    }
+
+    /// The row of a picture that could not be read.
+    pub fn unreadable(meta: &RowMeta, reason: impl Into<String>) -> Self {
+        Self { detail: reason.into(), ..Self::empty(meta, Status::Unreadable) }
+    }
+
+    fn empty(meta: &RowMeta, status: Status) -> Self {
+        Self {
+            index: meta.index,
+            file: meta.file.clone(),
+            time_s: meta.time_s,
+            body: meta.body.clone(),
+            status,
+            axis_x: None,
+            axis_y: None,
+            axis_z: None,
+            cov_xx: None,
+            cov_xy: None,
+            cov_xz: None,
+            cov_yy: None,
+            cov_yz: None,
+            cov_zz: None,
+            sigma_max_deg: None,
+            axis_e_x: None,
+            axis_e_y: None,
+            axis_e_z: None,
+            half_angle_deg: None,
+            altitude_km: meta.altitude_km.and_then(finite),
+            altitude_est_km: None,
+            altitude_est_sigma_km: None,
+            rms_px: None,
+            edge_points: None,
+            inliers: None,
+            candidates: None,
+            dropped: None,
+            level: None,
+            roll_deg: None,
+            pitch_deg: None,
+            elapsed_us: None,
+            detail: String::new(),
+        }
+    }
+
+    fn answer<T: Real>(&mut self, s: &Solution<T>) {
+        let of = |x: T| finite(x.f64());
+        let deg = |x: T| finite(x.f64().to_degrees());
+        [self.axis_x, self.axis_y, self.axis_z] = s.axis.xyz().map(of);
+        [self.cov_xx, self.cov_xy, self.cov_xz, self.cov_yy, self.cov_yz, self.cov_zz] =
+            s.covariance.upper_rad2.map(of);
+        self.sigma_max_deg = deg(s.covariance.sigma_max_rad());
+        if let Some(e) = &s.axis_ecef {
+            [self.axis_e_x, self.axis_e_y, self.axis_e_z] = e.xyz().map(of);
+        }
+        self.half_angle_deg = deg(s.half_angle_rad);
+        if let Some((altitude_m, sigma_m)) = s.altitude_m {
+            let km = |x: T| finite(x.f64() / 1e3);
+            (self.altitude_est_km, self.altitude_est_sigma_km) = (km(altitude_m), km(sigma_m));
+        }
+        self.rms_px = of(s.rms_px);
+        self.inliers = Some(s.inliers);
+        if let Some(body) = &s.axis_body {
+            let [roll, pitch] = roll_pitch_deg(body);
+            (self.roll_deg, self.pitch_deg) = (finite(roll), finite(pitch));
+        }
+    }
+
+    /// The axis in the camera frame, when there is one.
+    pub fn axis(&self) -> Option<[f64; 3]> {
+        Some([self.axis_x?, self.axis_y?, self.axis_z?])
+    }
+}
+
+/// Roll and pitch of the vehicle in degrees from the direction to the body in the vehicle's frame.
+///
+/// The vehicle's axes are x forward, y right, z down: with the body along +z both are 0. Positive roll puts the right
+/// side (+y) down, −180 to 180; positive pitch puts the nose (+x) up, −90 to 90. In the order yaw, pitch, roll the
+/// direction is (−sin p, sin r cos p, cos r cos p).
+pub fn roll_pitch_deg<T: Real>(to_body: &UnitVec3<Body, T>) -> [f64; 2] {
+    let [x, y, z] = to_body.xyz().map(Real::f64);
+    [y.atan2(z).to_degrees(), (-x).atan2(y.hypot(z)).to_degrees()]
+}
+
+/// The name of a body in files.
+pub const fn body_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Earth => "earth",
+        Kind::EarthSphere => "earth-sphere",
+        Kind::Sun => "sun",
+        Kind::Moon => "moon",
+        Kind::Sphere => "sphere",
+    }
+}
+
+/// A number that a table can hold.
+fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}
+
+/// Where it ended and what became of each candidate.
+fn detail<T: Real>(report: &Report<T>) -> String {
+    let mut text = format!("ended at {}", report.stage.name());
+    for (i, c) in report.candidates.iter().enumerate() {
+        text.push_str(if i == 0 { ": " } else { ", " });
+        text.push_str(c.verdict.name());
+    }
+    text
+}
+
+/// A status by its name.
+mod status_name {
+    use hzn_core::status::Status;
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    pub(super) fn serialize<S: Serializer>(status: &Status, s: S) -> Result<S::Ok, S::Error> {
+        s.serialize_str(status.name())
+    }
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Status, D::Error> {
+        let name = String::deserialize(d)?;
+        Status::ALL
+            .into_iter()
+            .find(|s| s.name() == name)
+            .ok_or_else(|| de::Error::invalid_value(de::Unexpected::Str(&name), &"the name of a status, such as ok"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hzn_core::frames::Cov3;
+    use hzn_core::pipeline::Counters;
+    use hzn_core::status::Stage;
+
+    fn meta() -> RowMeta {
+        RowMeta { index: 3, file: "a,b.png".into(), time_s: 1.5, body: "earth".into(), altitude_km: Some(230.0) }
+    }
+
+    fn report<T: Real>(status: Status) -> Report<T> {
+        let of = T::of;
+        let solution = Solution {
+            axis: UnitVec3::try_new([of(0.0), of(0.6), of(0.8)]).unwrap(),
+            covariance: Cov3::from_upper([of(4e-8), of(0.0), of(0.0), of(1e-8), of(0.0), of(0.0)]),
+            axis_ecef: None,
+            axis_body: UnitVec3::try_new([of(-0.5), of(0.0), of(0.75f64.sqrt())]),
+            half_angle_rad: of(1.3),
+            fused_half_angle_rad: of(1.3),
+            altitude_m: Some((of(240e3), of(1e3))),
+            rms_px: of(f64::NAN),
+            inliers: 500,
+            arc_px: of(900.0),
+            candidate: 0,
+        };
+        Report {
+            status,
+            stage: Stage::Select,
+            level: 80,
+            counters: Counters { edge_points: 600, candidates: 2, ..Counters::default() },
+            candidates: Default::default(),
+            solution: Some(solution),
+        }
+    }
+
+    fn converts<T: Real>(tolerance: f64) {
+        let row = Row::from_report::<T>(&meta(), &report(Status::Ok), Some(45.0));
+        let near = |x: Option<f64>, y: f64| assert!((x.unwrap() / y - 1.0).abs() < tolerance, "{x:?} {y}");
+        near(row.axis_z, 0.8);
+        near(row.sigma_max_deg, 2e-4f64.to_degrees());
+        near(row.half_angle_deg, 1.3f64.to_degrees());
+        near(row.altitude_est_km, 240.0);
+        near(row.pitch_deg, 30.0);
+        assert_eq!((row.roll_deg, row.rms_px, row.axis_e_x), (Some(0.0), None, None));
+        assert_eq!((row.level, row.inliers, row.detail.as_str()), (Some(80), Some(500), ""));
+    }
+
+    #[test]
+    fn units_are_degrees_and_kilometres() {
+        converts::<f64>(1e-12);
+        converts::<f32>(1e-6);
+    }
+
+    #[test]
+    fn an_axis_stands_only_beside_ok() {
+        for status in Status::ALL {
+            let row = Row::from_report::<f64>(&meta(), &report(status), None);
+            assert_eq!(row.axis().is_some(), status == Status::Ok);
+            assert_eq!(row.detail.is_empty(), status == Status::Ok);
+        }
+        let row = Row::unreadable(&meta(), "cut off");
+        assert_eq!((row.status, row.axis(), row.edge_points), (Status::Unreadable, None, None));
+    }
+
+    #[test]
+    fn roll_and_pitch_have_the_signs_they_are_documented_with() {
+        let at = |x: f64, y: f64, z: f64| roll_pitch_deg(&UnitVec3::<Body, f64>::try_new([x, y, z]).unwrap());
+        assert_eq!(at(0.0, 0.0, 1.0), [0.0, -0.0]);
+        // Right side down: the body is seen to the right. Nose up: it is seen behind.
+        assert!((at(0.0, 1.0, 1.0)[0] - 45.0).abs() < 1e-12);
+        assert!((at(-1.0, 0.0, 1.0)[1] - 45.0).abs() < 1e-12);
+        assert!((at(0.0, 0.0, -1.0)[0].abs() - 180.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn csv_and_json_keep_every_cell() {
+        let rows = [
+            Row::from_report::<f64>(&meta(), &report(Status::Ok), Some(12.5)),
+            Row::from_report::<f32>(&meta(), &report(Status::Rejected), None),
+            Row::unreadable(&meta(), "says \"no\",\nand more"),
+        ];
+        let mut out = csv::Writer::from_writer(Vec::new());
+        for row in &rows {
+            out.serialize(row).unwrap();
+        }
+        let text = String::from_utf8(out.into_inner().unwrap()).unwrap();
+        assert_eq!(text.lines().next().unwrap(), Row::COLUMNS.join(","));
+        let back: Vec<Row> = csv::Reader::from_reader(text.as_bytes()).deserialize().map(Result::unwrap).collect();
+        assert_eq!(back, rows);
+        for row in &rows {
+            let line = serde_json::to_string(row).unwrap();
+            assert_eq!(&serde_json::from_str::<Row>(&line).unwrap(), row);
+        }
+    }
+}

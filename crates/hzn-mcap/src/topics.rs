@@ -1,0 +1,67 @@
+//! Topics, their schemas and the numbers they have in our files.
+
+use foxglove::Encode;
+use foxglove::messages::{
+    CameraCalibration, CompressedImage, FrameTransform, ImageAnnotations, Log, PoseInFrame, RawImage,
+};
+
+/// JSON Schema of the messages on `/hzn/report`, named `hzn.Report`. Cells that are empty in a table are left out.
+pub const REPORT_SCHEMA: &str = include_str!("../schema/hzn.Report.json");
+
+/// A topic; its number is both its channel's and its schema's id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u16)]
+pub(crate) enum Topic {
+    Report = 1,
+    Image = 2,
+    Calibration = 3,
+    Annotations = 4,
+    Axis = 5,
+    Transform = 6,
+    Log = 7,
+    RawImage = 8,
+}
+
+impl Topic {
+    pub(crate) const ALL: [Self; 8] = [
+        Self::Report,
+        Self::Image,
+        Self::Calibration,
+        Self::Annotations,
+        Self::Axis,
+        Self::Transform,
+        Self::Log,
+        Self::RawImage,
+    ];
+
+    pub(crate) fn id(self) -> u16 {
+        self as u16
+    }
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Report => "/hzn/report",
+            Self::Image | Self::RawImage => "/camera/image",
+            Self::Calibration => "/camera/calibration",
+            Self::Annotations => "/camera/annotations",
+            Self::Axis => "/hzn/axis",
+            Self::Transform => "/tf",
+            Self::Log => "/log",
+        }
+    }
+    /// Name, encoding and bytes of the schema, and the messages' encoding.
+    pub(crate) fn schema(self) -> (String, String, Vec<u8>, &'static str) {
+        fn of<M: Encode>() -> (String, String, Vec<u8>, &'static str) {
+            M::get_schema().map_or_else(Default::default, |s| (s.name, s.encoding, s.data.into_owned(), "protobuf"))
+        }
+        match self {
+            Self::Report => ("hzn.Report".into(), "jsonschema".into(), REPORT_SCHEMA.into(), "json"),
+            Self::Image => of::<CompressedImage>(),
+            Self::Calibration => of::<CameraCalibration>(),
+            Self::Annotations => of::<ImageAnnotations>(),
+            Self::Axis => of::<PoseInFrame>(),
+            Self::Transform => of::<FrameTransform>(),
+            Self::Log => of::<Log>(),
+            Self::RawImage => of::<RawImage>(),
+        }
+    }
+}
