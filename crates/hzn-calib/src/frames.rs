@@ -1,0 +1,311 @@
+//! `frames.csv`: what is known about every picture besides the picture itself.
+//!
+//! Columns are found by name; all but `file` are optional, and an empty cell is a value that is not known.
+//!
+//! | column | meaning |
+//! |---|---|
+//! | `file` | name of the picture in the folder |
+//! | `time_s` | time in seconds, any epoch |
+//! | `utc` | the same as ISO 8601; it gives the time where `time_s` is empty |
+//! | `altitude_km` | geodetic above WGS-84 for `earth`, else above the radius |
+//! | `x_km`, `y_km`, `z_km` | position in ECEF; beats the altitude |
+//! | `qw`, `qx`, `qy`, `qz` | prior attitude, camera to ECEF |
+//! | `attitude_sigma_deg` | 1-sigma of the prior attitude |
+//! | `sun_x`, `sun_y`, `sun_z` | direction to the Sun in the camera |
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use hzn_core::Frame;
+use hzn_core::body::Kind;
+use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
+use hzn_core::frames::Rotation;
+use hzn_core::real::Real;
+
+use crate::nearest::nearest;
+use crate::{Problem, time};
+
+/// Columns that have a meaning.
+pub const COLUMNS: &[&str] = &[
+    "file",
+    "time_s",
+    "utc",
+    "altitude_km",
+    "x_km",
+    "y_km",
+    "z_km",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "attitude_sigma_deg",
+    "sun_x",
+    "sun_y",
+    "sun_z",
+];
+
+/// One row.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameData {
+    /// Name of the picture.
+    pub file: String,
+    /// Line of the row in the file, from 1.
+    pub line: usize,
+    /// Time in seconds: `time_s`, else `utc` since 1970.
+    pub time_s: Option<f64>,
+    /// UTC in seconds since 1970.
+    pub utc_s: Option<f64>,
+    /// Altitude in kilometres.
+    pub altitude_km: Option<f64>,
+    /// Position in ECEF, kilometres.
+    pub position_km: Option<[f64; 3]>,
+    /// Prior attitude, camera to ECEF, scalar first.
+    pub camera_to_ecef_wxyz: Option<[f64; 4]>,
+    /// 1-sigma of that attitude in degrees.
+    pub attitude_sigma_deg: Option<f64>,
+    /// Direction to the Sun in the camera.
+    pub sun_camera: Option<[f64; 3]>,
+}
+
+impl FrameData {
+    /// The same for the pipeline, in metres. `altitude_km` of the row beats `default_altitude_km`.
+    pub fn to_frame<T: Real>(&self, default_altitude_km: Option<f64>) -> Frame<T> {
+        Frame {
+            altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::of(km * 1e3)),
+            position_m: self.position_km.map(|p| p.map(|km| T::of(km * 1e3))),
+            cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::of))),
+        }
+    }
+}
+
+/// A frames.csv that was read.
+#[derive(Debug, Clone, Default)]
+pub struct Frames {
+    /// The file.
+    pub path: PathBuf,
+    /// Rows in the file's order.
+    pub rows: Vec<FrameData>,
+    /// What looks odd but stops nothing.
+    pub warnings: Vec<Problem>,
+    by_file: HashMap<String, usize>,
+}
+
+impl Frames {
+    /// What is known about the picture of this name.
+    pub fn get(&self, file: &str) -> Option<&FrameData> {
+        self.by_file.get(file).and_then(|&i| self.rows.get(i))
+    }
+
+    /// Warnings for altitude and position of a row that differ by more than 0.1 km.
+    pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
+        let odd = |row: &FrameData| {
+            let (h, p) = (row.altitude_km?, row.position_km?);
+            let own = match kind {
+                Kind::Earth => geodetic(p.map(|km| km * 1e3), WGS84_A_M, WGS84_B_M).0 / 1e3,
+                Kind::EarthSphere | Kind::Sphere => p.iter().map(|x| x * x).sum::<f64>().sqrt() - radius_km,
+                Kind::Sun | Kind::Moon => return None,
+            };
+            let what = format!("altitude_km is {h} but the position is at {own:.3} km; the position is used");
+            ((own - h).abs() > 0.1).then(|| self.problem(row, what))
+        };
+        self.rows.iter().filter_map(odd).collect()
+    }
+
+    /// A problem with one row, naming it and its picture.
+    pub fn problem(&self, row: &FrameData, what: impl std::fmt::Display) -> Problem {
+        Problem::new(&self.path, format!("{what}")).at_line(row.line).in_field(row.file.clone())
+    }
+}
+
+/// Reads a frames.csv.
+///
+/// # Errors
+/// A file that cannot be read, a missing `file` column, a cell that is no finite number, a vector given in part, a
+/// picture named twice.
+pub fn load(path: &Path) -> Result<Frames, Problem> {
+    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => Problem::new(path, "no such file"),
+        _ => Problem::new(path, format!("cannot be read: {e}")),
+    })?;
+    parse(&text, path)
+}
+
+/// As [`load`], from text; `path` is named in messages.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
+    // Spreadsheets put a byte-order mark first.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|e| broken(&e, path))?.clone();
+    let mut columns: HashMap<&str, usize> = HashMap::new();
+    let mut warnings = Vec::new();
+    for (i, name) in header.iter().enumerate() {
+        if !COLUMNS.contains(&name) {
+            let hint =
+                nearest(name, COLUMNS.iter().copied()).map(|n| format!("; did you mean {n}?")).unwrap_or_default();
+            let what = format!("unknown column, not used{hint}");
+            warnings.push(Problem::new(path, what).at_line(1).in_field(name));
+        } else if columns.insert(name, i).is_some() {
+            return Err(Problem::new(path, "this column stands twice").at_line(1).in_field(name));
+        }
+    }
+    if !columns.contains_key("file") {
+        let found: Vec<&str> = header.iter().collect();
+        let what =
+            format!("the column `file` is missing (found: {}); it names the picture of each row", found.join(", "));
+        return Err(Problem::new(path, what).at_line(1));
+    }
+    let mut frames = Frames { path: path.to_owned(), rows: Vec::new(), warnings, by_file: HashMap::new() };
+    for record in reader.records() {
+        let record = record.map_err(|e| broken(&e, path))?;
+        let line = record.position().map_or(0, |p| p.line() as usize);
+        let cell = |name: &str| columns.get(name).and_then(|&i| record.get(i)).filter(|c| !c.is_empty());
+        let row = Row { path, line, file: cell("file").unwrap_or_default().to_owned() };
+        if row.file.is_empty() {
+            return Err(row.problem("file", "is empty; it must name the picture"));
+        }
+        let number = |name: &str| row.number(name, cell(name));
+        let data = FrameData {
+            file: row.file.clone(),
+            line,
+            time_s: number("time_s")?,
+            utc_s: row.utc(cell("utc"))?,
+            altitude_km: number("altitude_km")?,
+            position_km: row.vector(["x_km", "y_km", "z_km"], &number)?,
+            camera_to_ecef_wxyz: row.vector(["qw", "qx", "qy", "qz"], &number)?,
+            attitude_sigma_deg: number("attitude_sigma_deg")?,
+            sun_camera: row.vector(["sun_x", "sun_y", "sun_z"], &number)?,
+        };
+        let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if data.camera_to_ecef_wxyz.is_some_and(|q| (length(&q) - 1.0).abs() > 0.01) {
+            return Err(row.problem("qw, qx, qy, qz", "the quaternion's length must be 1"));
+        }
+        if let Some(&first) = frames.by_file.get(&row.file) {
+            let before: usize = frames.rows.get(first).map_or(0, |r| r.line);
+            return Err(row.problem("file", &format!("stands in line {before} too; a picture has one row")));
+        }
+        frames.by_file.insert(row.file.clone(), frames.rows.len());
+        let time_s = data.time_s.or(data.utc_s);
+        frames.rows.push(FrameData { time_s, ..data });
+    }
+    Ok(frames)
+}
+
+fn broken(error: &csv::Error, path: &Path) -> Problem {
+    let line = error.position().map(|p| p.line() as usize);
+    let what = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("this row has {len} cells, but the header has {expected_len} columns")
+        }
+        csv::ErrorKind::Utf8 { .. } => "is not UTF-8 text".to_owned(),
+        _ => format!("not valid CSV: {error}"),
+    };
+    let problem = Problem::new(path, what);
+    match line {
+        Some(line) => problem.at_line(line),
+        None => problem,
+    }
+}
+
+/// The row that is being read, for messages.
+struct Row<'a> {
+    path: &'a Path,
+    line: usize,
+    file: String,
+}
+
+impl Row<'_> {
+    fn problem(&self, column: &str, what: &str) -> Problem {
+        let field = if self.file.is_empty() { column.to_owned() } else { format!("{} {column}", self.file) };
+        Problem::new(self.path, what).at_line(self.line).in_field(field)
+    }
+
+    fn number(&self, column: &str, cell: Option<&str>) -> Result<Option<f64>, Problem> {
+        let Some(cell) = cell else { return Ok(None) };
+        match cell.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(Some(x)),
+            _ => Err(self
+                .problem(column, &format!("{cell:?} is not a finite number; leave the cell empty if it is not known"))),
+        }
+    }
+
+    fn utc(&self, cell: Option<&str>) -> Result<Option<f64>, Problem> {
+        let Some(cell) = cell else { return Ok(None) };
+        let what = format!("{cell:?} is no UTC time such as 2020-11-20T08:30:00Z");
+        time::unix_seconds(cell).map(Some).ok_or_else(|| self.problem("utc", &what))
+    }
+
+    fn vector<const N: usize>(
+        &self,
+        names: [&str; N],
+        number: &dyn Fn(&str) -> Result<Option<f64>, Problem>,
+    ) -> Result<Option<[f64; N]>, Problem> {
+        let mut out = [0.0; N];
+        let mut missing = Vec::new();
+        for (slot, name) in out.iter_mut().zip(names) {
+            match number(name)? {
+                Some(x) => *slot = x,
+                None => missing.push(name),
+            }
+        }
+        match missing.len() {
+            0 => Ok(Some(out)),
+            n if n == N => Ok(None),
+            _ => Err(self.problem(&missing.join(", "), &format!("missing: {} belong together", names.join(", ")))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Frames, String> {
+        parse(text, Path::new("frames.csv")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn columns_by_name_and_empty_cells() {
+        let f = read("altitude_km,file,utc,note\n230,a.png,1970-01-01T00:00:02Z,x\n,b.png,,\n").unwrap();
+        assert_eq!(f.get("a.png").unwrap().altitude_km, Some(230.0));
+        assert_eq!(f.get("a.png").unwrap().time_s, Some(2.0));
+        assert_eq!(f.get("b.png").unwrap().altitude_km, None);
+        assert!(f.get("c.png").is_none());
+        assert_eq!(f.warnings[0].to_string(), "frames.csv:1: note: unknown column, not used");
+    }
+
+    #[test]
+    fn wrong_cells_name_row_and_column() {
+        assert_eq!(
+            read("file,altitude_km\na.png,230\nb.png,NaN\n").unwrap_err(),
+            "frames.csv:3: b.png altitude_km: \"NaN\" is not a finite number; leave the cell empty if it is not known"
+        );
+        assert_eq!(
+            read("file,x_km,y_km,z_km\na.png,1,,3\n").unwrap_err(),
+            "frames.csv:2: a.png y_km: missing: x_km, y_km, z_km belong together"
+        );
+        assert_eq!(
+            read("file\na.png\na.png\n").unwrap_err(),
+            "frames.csv:3: a.png file: stands in line 2 too; a picture has one row"
+        );
+        assert_eq!(
+            read("name,altitude\na,1\n").unwrap_err(),
+            "frames.csv:1: the column `file` is missing (found: name, altitude); it names the picture of each row"
+        );
+        assert_eq!(
+            read("file,time_s\na\n").unwrap_err(),
+            "frames.csv:2: this row has 1 cells, but the header has 2 columns"
+        );
+        assert!(read("file,qw,qx,qy,qz\na,2,0,0,0\n").unwrap_err().contains("length must be 1"));
+    }
+
+    #[test]
+    fn altitude_and_position_that_disagree_are_said() {
+        let f = read("file,altitude_km,x_km,y_km,z_km\na,400,6778.137,0,0\nb,401,6778.137,0,0\n").unwrap();
+        let odd = f.check_altitudes(Kind::Earth, 6371.0);
+        assert_eq!(odd.len(), 1);
+        assert!(odd[0].to_string().starts_with("frames.csv:3: b: altitude_km is 401 but"), "{}", odd[0]);
+    }
+}

@@ -1,0 +1,23 @@
+//! Descriptions of a horizon sensor as they stand on disk.
+//!
+//! | file | read by | gives |
+//! |---|---|---|
+//! | `sensor.toml` | [`sensor::load`] | [`hzn_core::Config`], checked |
+//! | Kalibr camchain, OpenCV YAML, EuRoC `sensor.yaml` | [`camera_file::load`] | [`hzn_core::camera::Config`] |
+//! | `frames.csv` | [`frames::load`] | time, altitude, position, attitude of every picture |
+//!
+//! Whatever is wrong with a file comes back as a [`Problem`]: which file, which line, which field, what was expected
+//! and, for a misspelt name, the nearest valid one. [`template`] writes a commented sensor.toml to start from.
+
+pub mod camera_file;
+pub mod frames;
+mod nearest;
+mod problem;
+pub mod sensor;
+pub mod template;
+pub mod time;
+
+pub use frames::{FrameData, Frames};
+pub use nearest::nearest;
+pub use problem::Problem;
+pub use sensor::Sensor;

@@ -1,0 +1,331 @@
+//! `sensor.toml`: one file that describes a sensor.
+//!
+//! The structure is [`hzn_core::Config`] with two keys more: `preset` at the top, and `file` in `[camera]`, which
+//! takes the calibration from another tool's file (see [`crate::camera_file`]; its path is relative to the
+//! sensor.toml, and `camera = "cam1"` beside it picks one of several).
+
+use std::ops::Range;
+use std::path::Path;
+
+use hzn_core::Config;
+use hzn_core::camera::Camera;
+use hzn_core::error::ConfigError;
+use serde::Deserialize;
+use toml::de::{DeTable, DeValue};
+
+use crate::nearest::suggestion;
+use crate::{Problem, camera_file};
+
+/// Presets that exist.
+pub const PRESETS: &[&str] = &["hzn"];
+
+/// A sensor.toml that was read and checked.
+#[derive(Debug, Clone)]
+pub struct Sensor {
+    /// What it says.
+    pub config: Config,
+    /// The file's text as it stands on disk, to be kept beside results.
+    pub text: String,
+}
+
+/// Reads and checks a sensor.toml, lens included.
+///
+/// # Errors
+/// The first thing wrong with it.
+pub fn load(path: &Path) -> Result<Sensor, Problem> {
+    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => {
+            Problem::new(path, "no such file; `hzn init` writes a commented sensor.toml to start from")
+        }
+        std::io::ErrorKind::InvalidData => Problem::new(path, "is not text; a sensor.toml is expected"),
+        _ => Problem::new(path, format!("cannot be read: {e}")),
+    })?;
+    parse(&text, path)
+}
+
+/// As [`load`], from text. `path` is named in messages, and a camera `file` is looked for beside it.
+///
+/// # Errors
+/// The first thing wrong with the text.
+pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
+    let mut table = DeTable::parse(text).map_err(|e| syntax(&e, text, path))?;
+    // Places of every key, for errors found after the text is gone.
+    let places = places(table.get_ref());
+    let preset = take(table.get_mut(), "preset");
+    if let Some((value, span)) = preset {
+        let name = value.as_str().unwrap_or_default();
+        if !PRESETS.contains(&name) {
+            let what = format!("no preset {name:?}{}", suggestion(name, PRESETS));
+            return Err(Problem::new(path, what).at_offset(text, span.start).in_field("preset"));
+        }
+    }
+    let from_file = camera_from_file(table.get_mut(), text, path)?;
+    if from_file.is_some() {
+        // `Config` wants a camera; this one stands in until the file's own is put in below.
+        let stand_in = DeTable::parse("width = 2\nheight = 2\nfx_px = 1.0\nfy_px = 1.0\ncx_px = 0.0\ncy_px = 0.0\n");
+        if let Ok(stand_in) = stand_in {
+            let span = stand_in.span();
+            let key = toml::Spanned::new(span.clone(), "camera".into());
+            table.get_mut().insert(key, toml::Spanned::new(span, DeValue::Table(stand_in.into_inner())));
+        }
+    }
+    let mut config =
+        Config::deserialize(toml::Deserializer::from(table)).map_err(|e| meaning(&e, text, path, &places))?;
+    if let Some(camera) = from_file {
+        config.camera = camera;
+    }
+    check(&config).map_err(|e| refused(&e, text, path, &places))?;
+    Ok(Sensor { config, text: text.to_owned() })
+}
+
+/// Everything that `Horizon::new` would refuse.
+///
+/// # Errors
+/// The first field out of its limits.
+pub fn check(config: &Config) -> Result<(), ConfigError> {
+    config.check()?;
+    Camera::<f64>::try_new(&config.camera).map(|_| ())
+}
+
+/// A key with where it stands: the dotted path, the key's bytes, the value's bytes.
+struct Place {
+    path: Vec<String>,
+    key: Range<usize>,
+    value: Range<usize>,
+}
+
+impl Place {
+    fn field(&self) -> String {
+        field_name(&self.path)
+    }
+}
+
+/// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`.
+fn field_name(path: &[String]) -> String {
+    match path {
+        [] => String::new(),
+        [one] => one.clone(),
+        [section, rest @ ..] => format!("[{section}] {}", rest.join(".")),
+    }
+}
+
+fn places(table: &DeTable<'_>) -> Vec<Place> {
+    fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<Place>) {
+        for (key, value) in table {
+            path.push(key.get_ref().to_string());
+            out.push(Place { path: path.clone(), key: key.span(), value: value.span() });
+            if let DeValue::Table(inner) = value.get_ref() {
+                walk(inner, path, out);
+            }
+            path.pop();
+        }
+    }
+    let mut out = Vec::new();
+    walk(table, &mut Vec::new(), &mut out);
+    out
+}
+
+/// The innermost key whose name or value holds the byte `offset`.
+fn place_of(places: &[Place], offset: usize) -> Option<&Place> {
+    let holds = |p: &&Place| p.key.contains(&offset) || p.value.contains(&offset);
+    places.iter().filter(holds).max_by_key(|p| p.path.len())
+}
+
+fn take<'i>(table: &mut DeTable<'i>, name: &str) -> Option<(DeValue<'i>, Range<usize>)> {
+    table.remove(name).map(|value| {
+        let span = value.span();
+        (value.into_inner(), span)
+    })
+}
+
+fn camera_from_file(
+    table: &mut DeTable<'_>,
+    text: &str,
+    path: &Path,
+) -> Result<Option<hzn_core::camera::Config>, Problem> {
+    let Some(section) = table.get_mut("camera") else { return Ok(None) };
+    let DeValue::Table(camera) = section.get_mut() else { return Ok(None) };
+    let Some((file, span)) = take(camera, "file") else { return Ok(None) };
+    let here = |what: String| Problem::new(path, what).at_offset(text, span.start).in_field("[camera] file");
+    let Some(file) = file.as_str() else {
+        return Err(here("must be the path of a camera file, in quotes".into()));
+    };
+    let name = take(camera, "camera");
+    let theta_max = take(camera, "theta_max_deg");
+    if let Some((key, _)) = camera.iter().next() {
+        let what = "cannot stand beside `file`, which brings the whole calibration; only camera and theta_max_deg may";
+        let field = format!("[camera] {}", key.get_ref());
+        return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
+    }
+    let file = path.parent().unwrap_or(Path::new("")).join(file);
+    if !file.exists() {
+        return Err(here(format!("{}: no such file (paths are relative to the sensor.toml)", file.display())));
+    }
+    let mut config = camera_file::load(&file, name.as_ref().and_then(|(n, _)| n.as_str()))?;
+    if let Some((value, span)) = theta_max {
+        let number = match &value {
+            DeValue::Float(x) => x.as_str().replace('_', "").parse().ok(),
+            DeValue::Integer(x) => x.as_str().replace('_', "").parse().ok(),
+            _ => None,
+        };
+        let Some(deg) = number else {
+            let what = "must be a number of degrees";
+            return Err(Problem::new(path, what).at_offset(text, span.start).in_field("[camera] theta_max_deg"));
+        };
+        config.theta_max_deg = Some(deg);
+    }
+    Ok(Some(config))
+}
+
+fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
+    let problem = Problem::new(path, format!("not valid TOML: {}", error.message().replace('\n', "; ")));
+    match error.span() {
+        Some(span) => problem.at_exactly(text, span.start),
+        None => problem,
+    }
+}
+
+/// serde's error, said in the file's own words.
+fn meaning(error: &toml::de::Error, text: &str, path: &Path, places: &[Place]) -> Problem {
+    let message = error.message();
+    let offset = error.span().map(|s| s.start);
+    let place = offset.and_then(|o| place_of(places, o));
+    let attach = |p: Problem| match offset {
+        // An error of the table as a whole, such as a missing section, has the first byte for its place.
+        Some(o) if place.is_some() => p.at_offset(text, o),
+        _ => p,
+    };
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let first = quoted.next().unwrap_or_default();
+    let valid: Vec<&str> = quoted.collect();
+    let own = place.map(Place::field).unwrap_or_default();
+    let problem = if message.starts_with("unknown field") {
+        let valid: Vec<&str> = match place.map(|p| p.path.as_slice()) {
+            Some([_]) => valid.into_iter().chain(["preset"]).collect(),
+            Some([section, _]) if section == "camera" => valid.into_iter().chain(["file"]).collect(),
+            _ => valid,
+        };
+        let what = if own.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
+        Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(own)
+    } else if message.starts_with("unknown variant") {
+        Problem::new(path, format!("{first:?} is not a valid value{}", suggestion(first, &valid))).in_field(own)
+    } else if message.starts_with("missing field") {
+        let mut p: Vec<String> = place.map(|p| p.path.clone()).unwrap_or_default();
+        p.push(first.to_owned());
+        let what = if p.len() == 1 {
+            format!("the section [{first}] is missing")
+        } else if p.first().is_some_and(|s| s == "camera") {
+            "missing; give it, or take the calibration from a `file`".to_owned()
+        } else {
+            "missing".to_owned()
+        };
+        Problem::new(path, what).in_field(field_name(&p))
+    } else {
+        let what = message
+            .replace("expected f64", "expected a number")
+            .replace("expected u16", "expected a whole number from 0 to 65535")
+            .replace("expected u32", "expected a whole number, 0 or more")
+            .replace("floating point `", "number `")
+            .replace('\n', "; ");
+        let problem = Problem::new(path, what);
+        if own.is_empty() { problem } else { problem.in_field(own) }
+    };
+    attach(problem)
+}
+
+/// A value that hzn-core refused, with the place where it was given.
+fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Place]) -> Problem {
+    let shown = error.to_string();
+    let rule = shown.split_once(": ").map_or(shown.as_str(), |(_, rule)| rule);
+    let what = if error.value.is_nan() { rule.to_owned() } else { format!("{} is refused: {rule}", error.value) };
+    let parts: Vec<String> = error.field.split('.').map(str::to_owned).collect();
+    let problem = Problem::new(path, what).in_field(field_name(&parts));
+    // The field itself, or the section that it is missing from.
+    let place = (1..=parts.len()).rev().find_map(|n| places.iter().find(|p| p.path == parts[..n]));
+    match place {
+        Some(place) => problem.at_offset(text, place.key.start),
+        None => problem,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px = 319.5\ncy_px = 239.5\n";
+
+    fn error(rest: &str) -> String {
+        parse(&format!("{CAMERA}{rest}"), Path::new("sensor.toml")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_camera_is_enough() {
+        let sensor = parse(CAMERA, Path::new("sensor.toml")).unwrap();
+        assert_eq!(sensor.config, Config::new(sensor.config.camera.clone()));
+        assert!(parse(&format!("preset = \"hzn\"\n{CAMERA}"), Path::new("s.toml")).is_ok());
+    }
+
+    #[test]
+    fn misspelt_names_bring_the_right_one() {
+        assert_eq!(
+            error("[reject]\nthreshold_pxx = 3.0\n"),
+            "sensor.toml:10: [reject] threshold_pxx: unknown key; did you mean threshold_px?"
+        );
+        assert_eq!(error("[rejct]\nseed = 3\n"), "sensor.toml:9: rejct: unknown section or key; did you mean reject?");
+        assert_eq!(
+            error("[reject]\nmethod = \"twopoint\"\n"),
+            "sensor.toml:10: [reject] method: \"twopoint\" is not a valid value; did you mean two-point?"
+        );
+        let preset = parse(&format!("preset = \"hznn\"\n{CAMERA}"), Path::new("s.toml")).unwrap_err();
+        assert_eq!(preset.to_string(), "s.toml:1: preset: no preset \"hznn\"; did you mean hzn?");
+        assert_eq!(
+            error("[select]\ncolour = 1\n"),
+            "sensor.toml:10: [select] colour: unknown key; valid here: min_inliers, min_arc_px, max_rms_px, \
+             max_half_angle_sigma, max_sigma_deg"
+        );
+    }
+
+    #[test]
+    fn wrong_values_bring_the_limit() {
+        assert_eq!(
+            error("[reject]\nthreshold_px = -3\n"),
+            "sensor.toml:10: [reject] threshold_px: -3 is refused: must be above 0"
+        );
+        assert_eq!(error("[body]\naltitude_km = nan\n"), "sensor.toml:10: [body] altitude_km: must be a finite number");
+        assert_eq!(
+            error("[reject]\nthreshold_px = \"3\"\n"),
+            "sensor.toml:10: [reject] threshold_px: invalid type: string \"3\", expected a number"
+        );
+        let twisted = CAMERA.replace("pinhole", "kannala-brandt") + "k = [-0.9]\n";
+        let message = parse(&twisted, Path::new("s.toml")).unwrap_err().to_string();
+        assert!(message.starts_with("s.toml:9: [camera] k: ") || message.contains("monotone"), "{message}");
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let message = |text: &str| parse(text, Path::new("s.toml")).unwrap_err().to_string();
+        assert_eq!(message(""), "s.toml: camera: the section [camera] is missing");
+        assert_eq!(
+            message("[camera]\nwidth = 3\nheight = 3\nfx_px = 3\ncx_px = 1\ncy_px = 1\n"),
+            "s.toml:1: [camera] fy_px: missing; give it, or take the calibration from a `file`"
+        );
+        assert_eq!(message("[camera\n"), "s.toml:1:8: not valid TOML: unclosed table, expected `]`");
+        assert!(load(Path::new("/nowhere/s.toml")).unwrap_err().to_string().contains("hzn init"));
+    }
+
+    #[test]
+    fn the_camera_may_come_from_another_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  \
+                     distortion_model: equidistant\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, 480]\n";
+        std::fs::write(dir.path().join("camchain.yaml"), chain).unwrap();
+        let path = dir.path().join("sensor.toml");
+        std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\ntheta_max_deg = 50\n[reject]\nseed = 7\n").unwrap();
+        let config = load(&path).unwrap().config;
+        assert_eq!((config.camera.fy_px, config.camera.theta_max_deg, config.reject.seed), (301.0, Some(50.0), 7));
+        std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\nwidth = 50\n").unwrap();
+        assert!(load(&path).unwrap_err().to_string().contains(":3: [camera] width: cannot stand beside"));
+        std::fs::write(&path, "[camera]\nfile = \"other.yaml\"\n").unwrap();
+        assert!(load(&path).unwrap_err().to_string().contains("no such file (paths are relative"));
+    }
+}

@@ -1,0 +1,35 @@
+//! A commented sensor.toml to start from.
+
+/// What `hzn init` writes. It loads as it stands, and every value in it is the default.
+pub const SENSOR_TOML: &str = include_str!("template.toml");
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use hzn_core::Config;
+
+    #[test]
+    fn loads_and_equals_the_defaults() {
+        let mut config = crate::sensor::parse(super::SENSOR_TOML, Path::new("template.toml")).unwrap().config;
+        // An altitude has no default, but without one no picture can be processed.
+        assert_eq!(config.body.altitude_km.take(), Some(400.0));
+        assert_eq!(config, Config::new(config.camera.clone()));
+    }
+
+    #[test]
+    fn commented_keys_are_valid_too() {
+        let key = |l: &&str| l.starts_with("# ") && l[2..].split_once(" = ").is_some_and(|(k, _)| !k.contains(' '));
+        let commented: Vec<_> = super::SENSOR_TOML.lines().filter(key).collect();
+        assert!(commented.len() >= 4, "{commented:?}");
+        for line in commented.iter().filter(|l| !l.contains("file =")) {
+            let text = super::SENSOR_TOML
+                .replace(*line, &line[2..])
+                .replace("# [mount]", if line.contains("q_body") { "[mount]" } else { "" });
+            if let Err(e) = crate::sensor::parse(&text, Path::new("template.toml")) {
+                // Refused for what it says is fine here; not for a name that does not exist.
+                assert!(!e.what.contains("unknown"), "{e}");
+            }
+        }
+    }
+}
