@@ -159,7 +159,7 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
 }
 
 /// An infrared Earth sensor in low orbit: 384×288, equidistant with 92 px/rad to 90° off axis, 600 km, a uniform disc
-/// with its limb at 25 km, blur 1 px, noise 2 %, 10 bits. Over the flight the optical axis swings from straight down
+/// with its limb at 25 km, blur 1 px, noise 2 %, 16 bits. Over the flight the optical axis swings from straight down
 /// to 120° off nadir.
 pub fn leo_infrared(count: usize, seed: u64) -> Flight {
     let camera =
@@ -178,7 +178,7 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
                 profile: Profile::Exponential { scale_km: 5.0 },
                 disc: Disc { surface: 0.7, clouds: None, band: None },
                 sky: Sky { brightness: 0.08, ..Sky::default() },
-                detector: Detector { psf_sigma_px: 1.0, read_noise: 0.02, bits: 10, ..Detector::default() },
+                detector: Detector { psf_sigma_px: 1.0, read_noise: 0.02, bits: 16, ..Detector::default() },
                 seed: seed_of(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position_m(lat_deg, lon_deg, 600.0), look))
             };

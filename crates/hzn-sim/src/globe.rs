@@ -200,4 +200,24 @@ mod tests {
         assert!((view.tangent_height_m(&view.look([0.0, 0.0, -1.0])) - 1000.0).abs() < 1e-9);
         assert!((view.point(&view.look([0.0, 0.0, 1.0])) + Vector3::z()).norm() < 1e-12);
     }
+
+    #[test]
+    fn rays_of_an_independent_library_touch_the_globe() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../tests/data/limb_ellipsoid.json")).unwrap();
+        let three = |v: &serde_json::Value| core::array::from_fn::<f64, 3, _>(|i| v[i].as_f64().unwrap());
+        for case in golden["cases"].as_array().unwrap() {
+            // The semi-axes of the file include the atmosphere.
+            let globe = Globe { a_m: case["a_m"].as_f64().unwrap(), b_m: case["b_m"].as_f64().unwrap() };
+            let rows: [[f64; 3]; 3] = core::array::from_fn(|i| three(&case["R_ec"][i]));
+            let axes = core::array::from_fn(|c| rows.map(|row| row[c]));
+            let view = View::try_new(globe, &Pose::from_axes(three(&case["r_ecef_m"]), axes)).unwrap();
+            for ray in case["rays_c"].as_array().unwrap() {
+                let sight = view.look(three(ray));
+                // As an angle off the limb.
+                assert!((sight.miss / view.miss_per_rad()).abs() < 1e-9, "{} {:e}", case["id"], sight.miss);
+                assert!(view.tangent_height_m(&sight).abs() < 0.01);
+            }
+        }
+    }
 }

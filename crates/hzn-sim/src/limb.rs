@@ -76,6 +76,12 @@ impl LimbCircle {
         let cot = (self.cot2_east * cos * cos + self.cot2_meridian * sin * sin).sqrt();
         (self.axis * cot + self.east * cos + self.third * sin).normalize().into()
     }
+
+    /// Azimuth in radians, −π to π, of a direction (ECEF) about the axis.
+    pub fn azimuth_rad(&self, direction_ecef: [f64; 3]) -> f64 {
+        let d = Vector3::from(direction_ecef);
+        libm::atan2(d.dot(&self.third), d.dot(&self.east))
+    }
 }
 
 /// One piece of limb that is seen without interruption.

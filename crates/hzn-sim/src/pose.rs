@@ -59,7 +59,14 @@ impl Pose {
         let right = east * ca - north * sa;
         let down = forward.cross(&right);
         let axes = [right * cr + down * sr, down * cr - right * sr, forward];
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
+        Self::from_axes(position_m, axes.map(Into::into))
+    }
+
+    /// A camera at `position_m` whose own axes x, y, z point along these three directions of ECEF. They must be
+    /// orthogonal, right-handed and of unit length.
+    pub fn from_axes(position_m: [f64; 3], axes_ecef: [[f64; 3]; 3]) -> Self {
+        let columns = axes_ecef.map(Vector3::from);
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&columns));
         let q = UnitQuaternion::from_rotation_matrix(&rotation);
         Self { position_m, cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k] }
     }

@@ -23,7 +23,7 @@ pub struct Clouds {
 
 impl Default for Clouds {
     fn default() -> Self {
-        Self { cover: 0.5, largest_km: 400.0, smallest_km: 6.0, softness: 0.12, brightness: 0.85, seed: 1 }
+        Self { cover: 0.5, largest_km: 400.0, smallest_km: 2.0, softness: 0.12, brightness: 0.85, seed: 1 }
     }
 }
 
@@ -43,6 +43,8 @@ struct Octave {
     frequency: f32,
     amplitude: f32,
     salt: u32,
+    /// The most this octave and all finer ones can add.
+    rest: f32,
 }
 
 impl CloudField {
@@ -58,6 +60,7 @@ impl CloudField {
                     // Slightly rougher than 1/2 an octave: clouds have detail.
                     amplitude: 0.7f32.powi(i as i32),
                     salt: hash3([i as i32, clouds.seed as i32, (clouds.seed >> 32) as i32], 0x5EED),
+                    rest: 0.0,
                 }
             })
             .collect();
@@ -65,6 +68,11 @@ impl CloudField {
         let sum2: f32 = octaves.iter().map(|o| o.amplitude * o.amplitude).sum();
         for o in &mut octaves {
             o.amplitude *= 1.0 / sum2.sqrt();
+        }
+        let mut rest = 0.0;
+        for o in octaves.iter_mut().rev() {
+            rest += 0.5 * o.amplitude;
+            o.rest = rest;
         }
         let sigma = 0.17;
         // Inverse of the logistic curve that stands for the distribution function.
@@ -87,6 +95,9 @@ impl CloudField {
             let keep = (o.size_km / footprint_km - 1.0).clamp(0.0, 1.0);
             if keep <= 0.0 {
                 break;
+            }
+            if sum + o.rest < self.threshold - self.edge {
+                return ground;
             }
             let n = keep * o.amplitude * (value_noise(p.map(|x| x * o.frequency), o.salt) - 0.5);
             sum += n;
