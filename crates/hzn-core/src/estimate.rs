@@ -51,8 +51,10 @@ pub(crate) struct Fit<T> {
     pub(crate) rms_px: T,
     /// Points with a weight.
     pub(crate) inliers: u32,
-    /// Length of edge before the points with a weight, in pixels.
+    /// Length of edge between neighbouring points with a weight, in pixels.
     pub(crate) arc_px: T,
+    /// Points that the weights' cut-off leaves out although they lie within three times it.
+    pub(crate) nearby: u32,
 }
 
 /// Tukey's constant: 95 % efficiency on Gaussian errors.
@@ -112,6 +114,7 @@ pub(crate) fn fit<T: Real>(
         }
     }
     // Weights are kept from here on.
+    let nearby = within(blocks, &e, c, cutoff * T::of(3.0)) - within(blocks, &e, c, cutoff);
     let (b1, b2) = basis(&e);
     let last = pass(blocks, &e, &b1, &b2, c, mean, Some(cutoff * cutoff), azimuth, true);
     if last.weight <= T::of(3.0) {
@@ -157,16 +160,20 @@ pub(crate) fn fit<T: Real>(
     }
     let (b1, b2) = basis(&e);
     let end = pass(blocks, &e, &b1, &b2, c, mean, None, azimuth, false);
-    let (mut inliers, mut arc) = (0, T::ZERO);
+    let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
     for block in blocks.iter() {
         for lane in 0..LANES {
-            if block.weight[lane] > T::ZERO {
+            let inlier = block.weight[lane] > T::ZERO;
+            if inlier {
                 inliers += 1;
-                arc += block.step_px[lane];
+                if before {
+                    arc += block.step_px[lane];
+                }
             }
+            before = inlier;
         }
     }
-    Some(Fit { e, c, free, rms_px: (end.cost / end.weight).sqrt(), inliers, arc_px: arc })
+    Some(Fit { e, c, free, rms_px: (end.cost / end.weight).sqrt(), inliers, arc_px: arc, nearby })
 }
 
 fn clamp<T: Real>(c: T) -> T {
@@ -331,6 +338,20 @@ pub(crate) fn pass<T: Real>(
         }
     }
     Sums { n: n.map(|x| sum(&x)), g: g.map(|x| sum(&x)), weight: sum(&weight), cost: sum(&cost) }
+}
+
+/// Points that may count within `limit` pixels of the cone.
+fn within<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit: T) -> u32 {
+    let mut n = [T::ZERO; LANES];
+    for b in blocks {
+        let g = b.gradient(e);
+        for l in 0..LANES {
+            let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
+            let close = r * r <= limit * limit * (g[0][l] * g[0][l] + g[1][l] * g[1][l]);
+            n[l] += if close { b.weight[l] } else { T::ZERO };
+        }
+    }
+    sum(&n).to_i32() as u32
 }
 
 /// Inverse of the free normal equations about `mean`.

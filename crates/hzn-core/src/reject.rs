@@ -129,10 +129,11 @@ fn search<T: Real>(
     while draws < needed.max(FEWEST).min(config.max_draws) {
         draws += 1;
         let i = rng.below(count);
-        // Distances of every scale: far apart for precision, close together for limbs that are a small part of the edge.
-        let reach = (count >> (draws % 5)).max(4);
-        let j = (i + 1 + rng.below(reach)) % count;
-        let k = if free { (i + 1 + rng.below(reach)) % count } else { rng.below(count) };
+        // Far apart for precision, close together for a limb that is a small part of the edge: there, neighbours of a
+        // limb point are limb points more often than not.
+        let reach = (count >> (draws % 6)).max(8);
+        let mut near = || (i + 1 + rng.below(reach)) % count;
+        let (j, k, check) = (near(), near(), near());
         let (Some(a), Some(b)) = (ray(blocks, i), ray(blocks, j)) else { continue };
         let hypotheses = if free {
             let Some(third) = ray(blocks, k) else { continue };
@@ -142,7 +143,6 @@ fn search<T: Real>(
             let Some([e, f]) = through_two(&a, &b, expected.cos) else { continue };
             [Some((e, expected.cos)), Some((f, expected.cos))]
         };
-        let check = rng.below(count);
         for (e, c) in hypotheses.into_iter().flatten() {
             let faces = |i: u32| blocks.get(i as usize / LANES).is_some_and(|b| b.faces(i as usize % LANES, &e));
             if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {

@@ -17,8 +17,10 @@ use crate::region::Region;
 pub struct Config {
     /// Fewest inliers, 8 or more.
     pub min_inliers: u16,
-    /// Shortest edge that inliers must cover, in pixels, 0 or more.
-    pub min_arc_px: f64,
+    /// Shortest edge that inliers must cover, in pixels, 0 or more. Left out: a tenth of the picture's diagonal, or a
+    /// third of the body's circumference where that is less. Shorter edges fit many curves.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub min_arc_px: Option<f64>,
     /// Largest weighted RMS distance of the inliers from the limb in pixels, above 0.
     pub max_rms_px: f64,
     /// Largest difference of the fitted half-angle from the expected one in standard deviations, above 0.
@@ -32,14 +34,16 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { min_inliers: 24, min_arc_px: 60.0, max_rms_px: 2.0, max_half_angle_sigma: 4.0, max_sigma_deg: 10.0, min_support: 0.15 }
+        Self { min_inliers: 24, min_arc_px: None, max_rms_px: 2.0, max_half_angle_sigma: 4.0, max_sigma_deg: 10.0, min_support: 0.25 }
     }
 }
 
 impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         require(self.min_inliers >= 8, "select.min_inliers", f64::from(self.min_inliers), Limit::AtLeast(8.0))?;
-        between("select.min_arc_px", self.min_arc_px, 0.0, 1e6)?;
+        if let Some(arc) = self.min_arc_px {
+            between("select.min_arc_px", arc, 0.0, 1e6)?;
+        }
         above("select.max_rms_px", self.max_rms_px, 0.0)?;
         above("select.max_half_angle_sigma", self.max_half_angle_sigma, 0.0)?;
         above("select.max_sigma_deg", self.max_sigma_deg, 0.0)?;
@@ -75,7 +79,7 @@ pub(crate) fn judge<T: Real>(
     let chi = T::of(config.max_half_angle_sigma);
     let verdict = if fit.inliers < u32::from(config.min_inliers) {
         Verdict::FewInliers
-    } else if fit.arc_px < T::of(config.min_arc_px) {
+    } else if fit.arc_px < min_arc(&fused.c, camera, config) {
         Verdict::ShortArc
     } else if !(fit.rms_px <= T::of(config.max_rms_px)) {
         Verdict::Residuals
@@ -85,10 +89,24 @@ pub(crate) fn judge<T: Real>(
         Verdict::Uncertain
     } else if support < T::of(config.min_support) {
         Verdict::Unsupported
+    } else if fit.nearby > fit.inliers {
+        // A limb stands alone; a curve laid through many edges has as many beside it as on it.
+        Verdict::Indistinct
     } else {
         Verdict::Passed
     };
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
+}
+
+fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {
+    if let Some(arc) = config.min_arc_px {
+        return T::of(arc);
+    }
+    let (w, h) = (T::of_i32(i32::from(camera.width())), T::of_i32(i32::from(camera.height())));
+    let (fx, fy) = camera.focal_px();
+    let sin = (T::one() - *c * *c).most(T::ZERO).sqrt();
+    let circumference = T::of(core::f64::consts::PI) * (fx + fy) * sin;
+    ((w * w + h * h).sqrt() * T::of(0.1)).least(circumference * T::of(0.33))
 }
 
 /// Most steps along the limb to each side.

@@ -79,6 +79,8 @@ pub enum Verdict {
     NoFit = 8,
     /// The fitted limb goes on where the picture shows none: too small a part of it is edge.
     Unsupported = 9,
+    /// As many edge points lie beside the fitted limb as on it: a curve through clutter.
+    Indistinct = 10,
 }
 
 impl Verdict {
@@ -95,6 +97,7 @@ impl Verdict {
             Self::Uncertain => "uncertain",
             Self::NoFit => "no-fit",
             Self::Unsupported => "unsupported",
+            Self::Indistinct => "indistinct",
         }
     }
 }
