@@ -1,0 +1,121 @@
+"""Reads hzn recordings with the reference reader and holds them to what hzn promises.
+
+usage: check_mcap.py FILE.mcap...
+
+Every CRC is checked, every message decoded. Prints one line a file; exits 1 at the first promise that is broken.
+"""
+
+import json
+import sys
+import tomllib
+from collections import Counter
+
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Attachment, Chunk, DataEnd
+from mcap.stream_reader import StreamReader
+from mcap_protobuf.decoder import DecoderFactory
+
+SCHEMAS = {
+    "/hzn/report": {"hzn.Report"},
+    "/camera/image": {"foxglove.CompressedImage", "foxglove.RawImage"},
+    "/camera/calibration": {"foxglove.CameraCalibration"},
+    "/camera/annotations": {"foxglove.ImageAnnotations"},
+    "/hzn/axis": {"foxglove.PoseInFrame"},
+    "/tf": {"foxglove.FrameTransform"},
+    "/log": {"foxglove.Log"},
+}
+SIGNATURES = {"png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
+
+
+def need(condition, message):
+    if not condition:
+        raise SystemExit(f"check_mcap: {message}")
+
+
+def check_layout(path):
+    """The attachment is first, pictures alone are stored uncompressed, and the data section's CRC holds."""
+    with open(path, "rb") as f:
+        records = list(StreamReader(f, validate_crcs=True, emit_chunks=True).records)
+    kinds = [type(r) for r in records]
+    need(Attachment in kinds, "no attachment")
+    if Chunk in kinds:
+        need(kinds.index(Attachment) < kinds.index(Chunk), "the sensor.toml is not first")
+    need(DataEnd in kinds, "the file does not end as it should")
+    need({r.compression for r in records if isinstance(r, Chunk)} <= {"", "zstd"}, "unknown compression")
+
+
+def distance_to_line(point, line):
+    """Distance of a point from a polyline."""
+    best = float("inf")
+    for a, b in zip(line, line[1:]):
+        dx, dy = b.x - a.x, b.y - a.y
+        t = ((point.x - a.x) * dx + (point.y - a.y) * dy) / ((dx * dx + dy * dy) or 1.0)
+        t = min(1.0, max(0.0, t))
+        best = min(best, ((a.x + t * dx - point.x) ** 2 + (a.y + t * dy - point.y) ** 2) ** 0.5)
+    return best
+
+
+def check_annotations(message):
+    """Inliers lie on the drawn limb; both went through the same half pixel."""
+    by_kind = {}
+    for p in message.points:
+        kind = next((m.value for m in p.metadata if m.key == "kind"), None)
+        need(kind in {"edge", "limb", "inlier", "rejected", "axis"}, f"annotation of kind {kind}")
+        by_kind.setdefault(kind, []).append(list(p.points))
+    inliers = [q for points in by_kind.get("inlier", []) for q in points]
+    limbs = by_kind.get("limb", [])
+    if not inliers or not limbs:
+        return None
+    step = max(1, len(inliers) // 50)
+    distances = sorted(min(distance_to_line(q, line) for line in limbs) for q in inliers[::step])
+    return distances[len(distances) // 2]
+
+
+def check(path):
+    check_layout(path)
+    counts, times, reports, worst = Counter(), {}, [], 0.0
+    with open(path, "rb") as f:
+        reader = make_reader(f, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        need(summary is not None and summary.statistics is not None, "no summary")
+        for attachment in reader.iter_attachments():
+            if attachment.name == "sensor.toml":
+                tomllib.loads(attachment.data.decode())
+                break
+        else:
+            need(False, "sensor.toml is not attached")
+        need([m.name for m in reader.iter_metadata()][:1] == ["hzn"], "no metadata hzn")
+        for schema, channel, message in reader.iter_messages():
+            need(schema.name in SCHEMAS.get(channel.topic, set()), f"{channel.topic} has schema {schema.name}")
+            if schema.encoding == "protobuf":
+                decoded = DecoderFactory().decoder_for("protobuf", schema)(message.data)
+            else:
+                decoded = json.loads(message.data)
+            counts[channel.topic] += 1
+            times.setdefault(channel.topic, set()).add(message.log_time)
+            if channel.topic == "/hzn/report":
+                allowed = json.loads(schema.data)["properties"]
+                need(set(decoded) <= set(allowed), f"unknown columns {set(decoded) - set(allowed)}")
+                need(("axis_x" in decoded) == (decoded["status"] == "ok"), "an axis beside another status than ok")
+                reports.append(decoded)
+            elif schema.name == "foxglove.CompressedImage":
+                signature = SIGNATURES.get(decoded.format)
+                need(signature is not None and decoded.data.startswith(signature), f"a picture that is no {decoded.format}")
+            elif schema.name == "foxglove.RawImage":
+                need(len(decoded.data) == decoded.step * decoded.height, "a raw picture of another size than it says")
+            elif channel.topic == "/camera/annotations":
+                worst = max(worst, check_annotations(decoded) or 0.0)
+    need(sum(counts.values()) == summary.statistics.message_count, "the statistics miscount")
+    need(times.get("/camera/image", set()) <= times.get("/camera/annotations", set()), "a picture without annotations")
+    need(worst < 3.0, f"half of the inliers are more than {worst:.1f} px off the drawn limb")
+    with open(path, "rb") as f:
+        streamed = sum(1 for _ in NonSeekingReader(f, validate_crcs=True).iter_messages(log_time_order=False))
+    need(streamed == summary.statistics.message_count, "the index and the stream differ")
+    print(f"{path}: {len(reports)} reports, {counts['/camera/image']} pictures, {streamed} messages, CRCs hold")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        raise SystemExit(__doc__)
+    for name in sys.argv[1:]:
+        check(name)
