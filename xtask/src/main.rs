@@ -1,0 +1,49 @@
+//! The project's chores.
+//!
+//! ```text
+//! cargo xtask test     everything that must hold: format, lints, tests, documents, flight build, files, demo
+//! cargo xtask bench    hzn-core beside the OpenCV recipe, in one run
+//! ```
+#![forbid(unsafe_code)]
+
+mod bench;
+mod flight_build;
+mod machine;
+mod python;
+mod steps;
+mod test;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "usage: cargo xtask <test|bench> [OPTION]...
+
+  test [STEP]...     all steps, or those whose name contains one of the words;
+                     CI=true turns a step that cannot run into a failure
+  bench [ARG]...     arguments go to hzn-benches (see --help there)";
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let (command, rest) = match args.split_first() {
+        Some((command, rest)) => (command.as_str(), rest),
+        None => ("", [].as_slice()),
+    };
+    let result = match command {
+        "test" => test::run(rest),
+        "bench" => bench::run(rest),
+        "help" | "-h" | "--help" => {
+            println!("{USAGE}");
+            Ok(())
+        }
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("xtask: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Virtual environments with pinned packages, under the target folder.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::machine::{apt_install, output, target};
+use crate::steps::{Trouble, run};
+
+/// The Python of an environment that holds what `requirements` lists. It is made once and again when the list changes.
+pub(crate) fn environment(name: &str, requirements: &Path) -> Result<PathBuf, Trouble> {
+    let list = fs::read_to_string(requirements)?;
+    let dir = target().join("venv").join(name);
+    let python = dir.join("bin/python");
+    let stamp = dir.join("requirements.txt");
+    if python.exists() && fs::read_to_string(&stamp).is_ok_and(|have| have == list) {
+        return Ok(python);
+    }
+    let usable = || output(Command::new("python3").args(["-c", "import ensurepip, venv, tomllib"])).is_some();
+    if !usable() {
+        apt_install(&["python3", "python3-venv"])?;
+    }
+    if !usable() {
+        return Err(Trouble::Missing("needs python3, 3.11 or later, with its venv module".into()));
+    }
+    let _ = fs::remove_dir_all(&dir);
+    run(Command::new("python3").args(["-m", "venv"]).arg(&dir))?;
+    run(Command::new(&python)
+        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"])
+        .arg(requirements))
+    .map_err(|_| Trouble::Missing(format!("needs the Python packages of {}", requirements.display())))?;
+    fs::write(&stamp, list)?;
+    Ok(python)
+}

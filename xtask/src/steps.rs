@@ -1,0 +1,159 @@
+//! Steps with a name and a time, and a summary that leaves nothing out.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// How a step ended, other than well.
+pub(crate) enum Trouble {
+    /// It ran and something is wrong.
+    Failed(String),
+    /// It cannot run here; what would make it run.
+    Missing(String),
+}
+
+impl From<std::io::Error> for Trouble {
+    fn from(e: std::io::Error) -> Self {
+        Self::Failed(e.to_string())
+    }
+}
+
+pub(crate) type Outcome = Result<(), Trouble>;
+
+/// Runs steps and remembers how they ended.
+pub(crate) struct Steps {
+    /// Only steps whose name contains one of these; all when empty.
+    only: Vec<String>,
+    /// Nothing may be left out.
+    strict: bool,
+    began: Instant,
+    done: Vec<(String, Duration, Outcome)>,
+    passed: u64,
+    failed: u64,
+}
+
+impl Steps {
+    pub(crate) fn new(only: &[String]) -> Self {
+        Self {
+            only: only.to_vec(),
+            strict: std::env::var("CI").is_ok_and(|v| v == "true"),
+            began: Instant::now(),
+            done: Vec::new(),
+            passed: 0,
+            failed: 0,
+        }
+    }
+
+    /// Runs one step, unless it was not asked for.
+    pub(crate) fn step(&mut self, name: &str, run: impl FnOnce(&mut Self) -> Outcome) {
+        if !self.only.is_empty() && !self.only.iter().any(|word| name.contains(word.as_str())) {
+            return;
+        }
+        println!("\n== {name}");
+        let start = Instant::now();
+        let outcome = run(self);
+        let time = start.elapsed();
+        let word = match &outcome {
+            Ok(()) => "ok",
+            Err(Trouble::Failed(_)) => "FAILED",
+            Err(Trouble::Missing(_)) => "left out",
+        };
+        println!("== {name}: {word} ({:.1} s)", time.as_secs_f64());
+        if let Err(Trouble::Failed(why) | Trouble::Missing(why)) = &outcome {
+            println!("   {why}");
+        }
+        self.done.push((name.to_owned(), time, outcome));
+    }
+
+    /// Runs `cargo test` with arguments and adds up its result lines.
+    pub(crate) fn cargo_test(&mut self, args: &[&str]) -> Outcome {
+        let mut command = cargo(&["test", "--no-fail-fast"]);
+        command.args(args).stdout(Stdio::piped());
+        show(&command);
+        let mut child = command.spawn()?;
+        let out = child.stdout.take().ok_or_else(|| Trouble::Failed("no output of cargo test".into()))?;
+        for line in BufReader::new(out).lines() {
+            let line = line?;
+            if let Some((passed, failed)) = counts(&line) {
+                self.passed += passed;
+                self.failed += failed;
+            }
+            println!("{line}");
+        }
+        if child.wait()?.success() { Ok(()) } else { Err(Trouble::Failed("a test failed, see above".into())) }
+    }
+
+    /// Prints what ran and what did not; an error when anything failed.
+    pub(crate) fn conclude(self) -> Result<(), String> {
+        let mut wrong = 0;
+        println!("\nsummary, {:.0} s in all", self.began.elapsed().as_secs_f64());
+        for (name, time, outcome) in &self.done {
+            let (word, why) = match outcome {
+                Ok(()) => ("ok      ", ""),
+                Err(Trouble::Failed(why)) => ("FAILED  ", why.as_str()),
+                Err(Trouble::Missing(why)) => ("left out", why.as_str()),
+            };
+            println!("  {word} {:7.1} s  {name}{}{why}", time.as_secs_f64(), if why.is_empty() { "" } else { ": " });
+            let counts = match outcome {
+                Ok(()) => false,
+                Err(Trouble::Failed(_)) => true,
+                Err(Trouble::Missing(_)) => self.strict,
+            };
+            wrong += u32::from(counts);
+        }
+        if self.strict && self.done.iter().any(|(_, _, o)| matches!(o, Err(Trouble::Missing(_)))) {
+            println!("  CI=true: nothing may be left out");
+        }
+        println!("{} passed, {} failed", self.passed, self.failed);
+        match wrong {
+            0 => Ok(()),
+            n => Err(format!("{n} of {} steps did not succeed", self.done.len())),
+        }
+    }
+}
+
+/// The numbers of a line such as `test result: ok. 12 passed; 0 failed; ...`.
+fn counts(line: &str) -> Option<(u64, u64)> {
+    let rest = line.trim_start().strip_prefix("test result: ")?;
+    let number = |word: &str| {
+        let before = rest.split(word).next()?.trim_end();
+        before.rsplit([' ', ';']).next()?.parse().ok()
+    };
+    Some((number("passed")?, number("failed")?))
+}
+
+/// The cargo that runs this program, with the committed versions and no input.
+pub(crate) fn cargo(args: &[&str]) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.args(args).arg("--locked").stdin(Stdio::null());
+    command
+}
+
+/// Prints a command as one would type it.
+pub(crate) fn show(command: &Command) {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    let line: Vec<_> = words.map(|w| w.to_string_lossy()).collect();
+    println!("$ {}", line.join(" "));
+}
+
+/// Runs a command to its end.
+pub(crate) fn run(command: &mut Command) -> Outcome {
+    command.stdin(Stdio::null());
+    show(command);
+    let name = command.get_program().to_string_lossy().into_owned();
+    let status = command.status().map_err(|e| Trouble::Failed(format!("{name}: {e}")))?;
+    if status.success() { Ok(()) } else { Err(Trouble::Failed(format!("{name} ended with {status}"))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::counts;
+
+    #[test]
+    fn result_lines_are_read() {
+        let line = "test result: FAILED. 9 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.06s";
+        assert_eq!(counts(line), Some((9, 1)));
+        assert_eq!(counts("test result: ok. 12 passed; 0 failed; 0 ignored"), Some((12, 0)));
+        assert_eq!(counts("test results are fine"), None);
+    }
+}

@@ -1,0 +1,92 @@
+//! Everything that must hold, in the order in which it is cheapest to find out.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::machine::{apt_install, has, root, target};
+use crate::steps::{self, Outcome, Steps, Trouble, cargo};
+use crate::{flight_build, python};
+
+pub(crate) fn run(only: &[String]) -> Result<(), String> {
+    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
+    let mut all = Steps::new(only);
+    all.step("format", |_| steps::run(Command::new(cargo_program()).args(["fmt", "--all", "--check"])));
+    all.step("lints", |_| {
+        steps::run(cargo(&["clippy", "--workspace", "--all-targets"]).args(["--", "-D", "warnings"]))
+    });
+    // Video input needs a decoder; its tests pass over it where there is none, which would go unseen.
+    all.step("ffmpeg", |_| if has("ffmpeg") { Ok(()) } else { apt_install(&["ffmpeg"]) });
+    all.step("tests", |s| s.cargo_test(&["--workspace"]));
+    // Features add up over a workspace: alone, the core is built as it flies.
+    all.step("tests of hzn-core alone", |s| s.cargo_test(&["--package", "hzn-core"]));
+    all.step("feature sets of hzn-core", |_| {
+        ["std", "serde", "std,serde"].into_iter().try_for_each(|features| {
+            run_cargo(&["check", "--quiet", "--package", "hzn-core", "--no-default-features", "--features", features])
+        })
+    });
+    all.step("documents", |_| {
+        steps::run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+    });
+    all.step("flight build", |_| flight_build::run_step());
+    all.step("demo", |_| demo());
+    all.step("files read by others", |_| files_read_by_others());
+    all.conclude()
+}
+
+fn cargo_program() -> std::ffi::OsString {
+    std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
+}
+
+fn run_cargo(args: &[&str]) -> Outcome {
+    steps::run(&mut cargo(args))
+}
+
+/// Where the demo's files go.
+fn demo_dir() -> PathBuf {
+    target().join("xtask").join("hzn-demo")
+}
+
+/// `hzn demo`, by the binary that the tests have built.
+fn demo() -> Outcome {
+    // The profile of the tests, so that nothing is built a second time.
+    run_cargo(&["build", "--profile", "test", "--package", "hzn-cli", "--bin", "hzn"])?;
+    let dir = demo_dir();
+    if dir.exists() {
+        fs::remove_dir_all(&dir)?;
+    }
+    fs::create_dir_all(dir.parent().unwrap_or(&dir))?;
+    steps::run(Command::new(target().join("debug/hzn")).arg("demo").arg("-o").arg(&dir))?;
+    if recordings(&dir).is_empty() {
+        return Err(Trouble::Failed(format!("the demo left no .mcap in {}", dir.display())));
+    }
+    Ok(())
+}
+
+/// The reference readers on a sample and on what the demo has written.
+fn files_read_by_others() -> Outcome {
+    let python = python::environment("tests", Path::new("tests/python/requirements.txt"))?;
+    let sample = target().join("xtask").join("sample.mcap");
+    fs::create_dir_all(sample.parent().unwrap_or(&sample))?;
+    // Examples are built by `cargo test`, in this profile.
+    let mut command = cargo(&["run", "--quiet", "--profile", "test", "--package", "hzn-mcap", "--example", "sample"]);
+    steps::run(command.arg("--").arg(&sample))?;
+    let mut files = recordings(&demo_dir());
+    files.push(sample);
+    steps::run(Command::new(python).arg("tests/python/check_mcap.py").args(files))
+}
+
+/// The recordings in a folder and those below it.
+fn recordings(dir: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            found.append(&mut recordings(&path));
+        } else if path.extension().is_some_and(|e| e == "mcap") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
