@@ -4,6 +4,7 @@ use core::f64::consts::{FRAC_PI_2, TAU};
 
 use hzn_core::camera::{self, Model};
 use hzn_core::{body, region};
+use serde::{Deserialize, Serialize};
 
 use crate::counter::{Counter, Stream};
 use crate::detector::Detector;
@@ -38,7 +39,30 @@ pub struct FlightFrame {
     pub scene: Scene,
 }
 
+/// A row of frames.csv: what is told about one picture. The fields are the file's columns, in this order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameRow {
+    /// Name of the picture's file.
+    pub file: String,
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Altitude in kilometres, geodetic for `earth`.
+    pub altitude_km: f64,
+    /// Position in ECEF, kilometres.
+    pub x_km: f64,
+    /// Second component of the position.
+    pub y_km: f64,
+    /// Third component of the position.
+    pub z_km: f64,
+}
+
 impl FlightFrame {
+    /// What frames.csv says about the picture: time and position, no attitude.
+    pub fn row(&self) -> FrameRow {
+        let [x_km, y_km, z_km] = self.scene.pose.position_m.map(|m| m * 1e-3);
+        let altitude_km = Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m) * 1e-3;
+        FrameRow { file: self.file.clone(), time_s: self.time_s, altitude_km, x_km, y_km, z_km }
+    }
     /// The picture.
     ///
     /// # Errors
@@ -70,6 +94,16 @@ impl FlightFrame {
 }
 
 impl Flight {
+    /// The same flight with a limb height that depends on latitude: rows of (geodetic latitude in degrees, height in
+    /// kilometres). The sensor's configuration is left as it is.
+    #[must_use]
+    pub fn with_limb_height_by_latitude_km(mut self, rows: &[[f64; 2]]) -> Self {
+        for frame in &mut self.frames {
+            frame.scene.limb_height_by_latitude_km = rows.to_vec();
+        }
+        self
+    }
+
     /// The same flight with part of the vehicle at the right of every picture, in front of sky and Earth, and
     /// the sensor's mask around it.
     #[must_use]

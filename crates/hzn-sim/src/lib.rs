@@ -10,6 +10,7 @@
 //! | [`globe`] | the body as an ellipsoid, and what a ray meets on it |
 //! | [`texture`] | clouds |
 //! | [`foreground`] | structure of the vehicle in the picture |
+//! | `height` | the limb's height by latitude |
 //! | `render` | light on every pixel |
 //! | [`detector`] | blur, noise, quantisation |
 //! | [`picture`] | the result, and its file |
@@ -23,6 +24,7 @@ pub mod error;
 pub mod flight;
 pub mod foreground;
 pub mod globe;
+mod height;
 pub mod limb;
 pub mod picture;
 pub mod pose;

@@ -57,12 +57,17 @@ pub struct LimbCircle {
 }
 
 impl LimbCircle {
-    /// The limb of the scene's body, raised by its limb height.
+    /// The limb of the scene's body, raised by its limb height. Where that depends on latitude this is the limb at
+    /// `body.limb_height_km`.
     ///
     /// # Errors
     /// The position is not outside.
     pub fn of(scene: &Scene) -> Result<Self, SceneError> {
-        let globe = Globe::of(&scene.body).raised(scene.body.limb_height_km * 1e3);
+        Self::at_height(scene, scene.body.limb_height_km * 1e3)
+    }
+
+    fn at_height(scene: &Scene, height_m: f64) -> Result<Self, SceneError> {
+        let globe = Globe::of(&scene.body).raised(height_m);
         let cone = LimbCone::try_new(scene.pose.position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)?;
         let (axis, east) = (Vector3::from(cone.axis.xyz()), Vector3::from(cone.east.xyz()));
         let (cot2_east, cot2_meridian) = (cone.cot2_east, cone.cot2_meridian);
@@ -117,10 +122,23 @@ impl<'a> Walk<'a> {
         Ok(Self { scene, camera, circle: LimbCircle::of(scene)?, painter: Painter::try_new(scene)? })
     }
 
+    /// The ray (ECEF, unit) of the limb at this azimuth.
+    fn ray(&self, azimuth_rad: f64) -> [f64; 3] {
+        let mut ray = self.circle.ray_ecef(azimuth_rad);
+        if !self.scene.limb_height_by_latitude_km.is_empty() {
+            // The tangent point moves by a few kilometres with the limb's height, and its height with that by metres:
+            // three rounds leave nothing.
+            for _ in 0..3 {
+                let Ok(circle) = LimbCircle::at_height(self.scene, self.painter.limb_height_m(ray)) else { break };
+                ray = circle.ray_ecef(azimuth_rad);
+            }
+        }
+        ray
+    }
+
     /// Where the limb at this azimuth is in the plane of the picture, if the lens reaches there.
     fn project(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
-        let cam = self.painter.to_camera(self.circle.ray_ecef(azimuth_rad))?;
-        self.camera.project(&cam)
+        self.camera.project(&self.painter.to_camera(self.ray(azimuth_rad))?)
     }
 
     /// Whether it is in the picture, lit, and not behind the vehicle.
@@ -129,14 +147,15 @@ impl<'a> Walk<'a> {
         let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
         inside
             && !self.scene.foreground.iter().any(|f| f.contains([p.u, p.v]))
-            && self.painter.lit(self.circle.ray_ecef(azimuth_rad)) > 0.5
+            && self.painter.lit(self.ray(azimuth_rad)) > 0.5
     }
 
     fn seen(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
         self.project(azimuth_rad).filter(|p| self.is_seen(azimuth_rad, *p))
     }
 
-    /// The visible pieces, ends located to better than a hundredth of a pixel.
+    /// The visible pieces, ends located to better than a hundredth of a pixel. What is shorter than the step in azimuth
+    /// (a turn over four times width plus height) may be missed.
     pub(crate) fn pieces(&self) -> Vec<Piece> {
         // About two steps a pixel where the limb is a circle around the optical axis; the arc length is summed over
         // chords, so longer steps elsewhere do no harm.

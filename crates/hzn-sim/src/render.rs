@@ -14,6 +14,7 @@ use crate::counter::{Counter, Stream};
 use crate::detector::Plane;
 use crate::error::SceneError;
 use crate::globe::{Globe, Sight, View};
+use crate::height::LimbHeight;
 use crate::picture::Picture;
 use crate::scene::{Band, Light, Profile, Scene, Sky};
 use crate::texture::{CloudField, smoothstep};
@@ -49,6 +50,7 @@ pub(crate) struct Painter {
     sky: f32,
     /// Larger of the two angles a pixel in the middle covers, radians.
     pixel_rad: f64,
+    height: LimbHeight,
     /// [`Sight::miss`] of pixels that may have the limb within [`NEAR_PX`].
     near: f64,
     radius_km: f32,
@@ -57,7 +59,8 @@ pub(crate) struct Painter {
 impl Painter {
     pub(crate) fn try_new(scene: &Scene) -> Result<Self, SceneError> {
         let camera = Camera::<f64>::try_new(&scene.camera)?;
-        let globe = Globe::of(&scene.body).raised(scene.body.limb_height_km * 1e3);
+        let height = LimbHeight::of(scene);
+        let globe = Globe::of(&scene.body).raised(height.reference_m);
         let view = View::try_new(globe, &scene.pose).ok_or(SceneError::Pose)?;
         let (fx, fy) = camera.focal_px();
         let pixel_rad = 1.0 / fx.min(fy);
@@ -68,7 +71,9 @@ impl Painter {
         };
         Ok(Self {
             // Off the axis a pixel can cover more than in the middle.
-            near: 2.0 * reach_px * pixel_rad * view.miss_per_rad(),
+            near: 2.0 * reach_px * pixel_rad * view.miss_per_rad()
+                // To first order: twice the height in units of the radius.
+                + 2.2 * height.largest_departure_m() / globe.b_m,
             edge: Edge::new(scene.profile),
             lamp: Lamp::try_new(scene, globe)?,
             surface: scene.disc.surface as f32,
@@ -79,12 +84,19 @@ impl Painter {
             radius_km: (globe.a_m / 1e3) as f32,
             camera,
             view,
+            height,
         })
     }
 
     /// A direction given in ECEF (unit) as the camera sees it.
     pub(crate) fn to_camera(&self, ecef: [f64; 3]) -> Option<UnitVec3<Cam, f64>> {
         self.view.to_camera(ecef.into())
+    }
+
+    /// Height of the limb in metres at the latitude where this ray (ECEF, unit) meets or passes the body.
+    pub(crate) fn limb_height_m(&self, ecef: [f64; 3]) -> f64 {
+        let lat = |cam: UnitVec3<Cam, f64>| self.latitude_rad(&self.view.look(cam.xyz()));
+        self.height.at_m(self.to_camera(ecef).map_or(0.0, lat))
     }
 
     /// How much light falls where this ray (ECEF, unit) meets or passes the body, 0 to 1.
@@ -155,7 +167,7 @@ impl Painter {
         if sight.miss.abs() <= self.near {
             return self.exactly(x, v);
         }
-        let cover = if sight.miss <= 0.0 { 1.0 } else { self.edge.at(self.view.tangent_height_m(&sight)) };
+        let cover = if sight.miss <= 0.0 { 1.0 } else { self.edge.at(self.above_limb_m(&sight)) };
         self.blend(cover, &sight)
     }
 
@@ -164,9 +176,23 @@ impl Painter {
         // Beyond the image circle is sky until after the blur, so that no dark rim is blurred inward.
         let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { return self.sky };
         let sight = self.view.look(ray.direction().xyz());
-        let height = self.view.tangent_height_m(&sight);
         let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
-        self.blend(self.edge.mean(height, gradient), &sight)
+        self.blend(self.edge.mean(self.above_limb_m(&sight), gradient), &sight)
+    }
+
+    /// Tangent height of a ray above the limb height at its latitude, metres.
+    #[inline(always)]
+    fn above_limb_m(&self, sight: &Sight) -> f64 {
+        let above_reference = self.view.tangent_height_m(sight);
+        if !self.height.varies() {
+            return above_reference;
+        }
+        above_reference + self.height.reference_m - self.height.at_m(self.latitude_rad(sight))
+    }
+
+    /// Geodetic latitude of the point that a ray meets or passes, radians.
+    fn latitude_rad(&self, sight: &Sight) -> f64 {
+        libm::asin(self.view.normal(&self.view.point(sight)).z.clamp(-1.0, 1.0))
     }
 
     /// Sky and body, the body with weight `cover`.
@@ -186,7 +212,7 @@ impl Painter {
             return self.sky;
         }
         let air = self.band.map_or(0.0, |b| {
-            let depth_km = (-self.view.tangent_height_m(sight) * 1e-3).max(0.0);
+            let depth_km = (-self.above_limb_m(sight) * 1e-3).max(0.0);
             let fade = ((b.depth_km - depth_km) / b.fade_km.max(1e-6) + 0.5).clamp(0.0, 1.0);
             smoothstep(fade as f32)
         });
@@ -212,7 +238,7 @@ impl Painter {
             let r = (1.0 - z * z).sqrt();
             let Some(cam) = self.view.to_camera(Vector3::new(r * cos, r * sin, z)) else { continue };
             let Some(p) = self.camera.project(&cam) else { continue };
-            let seen = 1.0 - self.edge.at(self.view.tangent_height_m(&self.view.look(cam.xyz())));
+            let seen = 1.0 - self.edge.at(self.above_limb_m(&self.view.look(cam.xyz())));
             // Evenly distributed in magnitude over five magnitudes.
             let light = sky.star_brightness as f32 * libm::exp(-4.6 * c) as f32 * seen;
             let (x, y) = (p.u.floor(), p.v.floor());

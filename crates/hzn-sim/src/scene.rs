@@ -19,6 +19,10 @@ pub struct Scene {
     /// The body. Its `limb_height_km` is where the rendered edge stands at half brightness.
     #[serde(default)]
     pub body: body::Config,
+    /// Rows of (geodetic latitude in degrees, limb height in kilometres) where the limb height depends on the latitude
+    /// of the tangent point; in between it is linear. Empty: `body.limb_height_km` everywhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub limb_height_by_latitude_km: Vec<[f64; 2]>,
     /// How brightness falls off outside the limb.
     #[serde(default)]
     pub profile: Profile,
@@ -140,6 +144,7 @@ impl Scene {
             camera,
             pose,
             body: body::Config::default(),
+            limb_height_by_latitude_km: Vec::new(),
             profile: Profile::default(),
             disc: Disc::default(),
             light: Light::default(),

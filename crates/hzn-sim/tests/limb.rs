@@ -117,6 +117,27 @@ fn rendered_edge_is_on_the_limb_for_every_lens() {
 }
 
 #[test]
+fn rendered_edge_follows_a_height_that_depends_on_latitude() {
+    let camera = Config::ideal(Model::Equidistant, 640, 640, 180.0);
+    let pose = Pose::looking(position_m(30.0, 10.0, 600.0), Look::off_nadir(0.2, 0.3, 0.4));
+    let mut scene = clean(camera, pose);
+    scene.body.limb_height_km = 25.0;
+    scene.limb_height_by_latitude_km = vec![[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
+    let (worst, mean, count) = compare(&scene, 0.5);
+    // As much as a uniform height gives: 0.005 px of it is the blur of an edge with a radius of 200 px.
+    assert!(count > 500 && worst < 0.025 && mean.abs() < 0.002, "{worst} {mean} {count}");
+    // Which a uniform height would not be.
+    let uniform = Scene { limb_height_by_latitude_km: Vec::new(), ..scene.clone() };
+    let far = |s: &Scene| s.limb_points(8, EdgeNoise::None).unwrap();
+    let shift = far(&scene)
+        .iter()
+        .zip(far(&uniform))
+        .map(|(a, b)| (a.exact.u - b.exact.u).hypot(a.exact.v - b.exact.v))
+        .fold(0.0, f64::max);
+    assert!((0.05..1.0).contains(&shift), "{shift}");
+}
+
+#[test]
 fn rendered_edge_is_on_the_limb_of_a_small_disc() {
     // A Moon of 100 pixels across.
     let mut scene = clean(

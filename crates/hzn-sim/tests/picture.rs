@@ -145,3 +145,27 @@ fn impossible_scenes_are_refused() {
     s.light = Light::Sun { direction: [0.0; 3], twilight_rad: 0.1 };
     assert_eq!(s.render().unwrap_err(), SceneError::Sun);
 }
+
+#[test]
+fn truth_and_frames_have_the_columns_of_their_files() {
+    let frame = &flight::leo_infrared(2, 1).frames[1];
+    let mut truth = csv::Writer::from_writer(Vec::new());
+    truth.serialize(frame.truth().unwrap()).unwrap();
+    let text = String::from_utf8(truth.into_inner().unwrap()).unwrap();
+    let header = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,moon_y,moon_z,qw,qx,qy,qz";
+    assert_eq!(text.lines().next(), Some(header));
+    let back: hzn_sim::Truth = csv::Reader::from_reader(text.as_bytes()).deserialize().next().unwrap().unwrap();
+    assert_eq!(back, frame.truth().unwrap());
+
+    let mut frames = csv::Writer::from_writer(Vec::new());
+    frames.serialize(frame.row()).unwrap();
+    let text = String::from_utf8(frames.into_inner().unwrap()).unwrap();
+    assert!(text.starts_with("file,time_s,altitude_km,x_km,y_km,z_km\nleo-infrared-0001.png,5800.0,600."), "{text}");
+}
+
+#[test]
+fn scenes_are_written_and_read() {
+    let scene = &flight::rocket(320, 180, 2, 1).with_payload().frames[1].scene;
+    let text = serde_json::to_string(scene).unwrap();
+    assert_eq!(&serde_json::from_str::<Scene>(&text).unwrap(), scene);
+}
