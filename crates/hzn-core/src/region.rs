@@ -9,6 +9,9 @@ pub const MAX_CORNERS: usize = 16;
 /// Most polygons.
 pub const MAX_POLYGONS: usize = 8;
 
+/// Rim of the image circle that does not count, in pixels: blur makes it neither lit nor dark.
+const RIM_PX: f64 = 3.0;
+
 /// Corners (x, y) of a polygon in pixels; the last is joined to the first.
 pub type Polygon = heapless::Vec<[f64; 2], MAX_CORNERS>;
 
@@ -67,7 +70,8 @@ impl<T: Real> Region<T> {
     pub fn new(config: &Config, camera: &Camera<T>) -> Self {
         let circle = camera
             .image_circle_px()
-            .map(|(c, semi_x, semi_y)| Circle { cx: c.u, cy: c.v, semi_x, semi_y });
+            .map(|(c, x, y)| Circle { cx: c.u, cy: c.v, semi_x: x - T::of(RIM_PX), semi_y: y - T::of(RIM_PX) })
+            .filter(|c| c.semi_x > T::one() && c.semi_y > T::one());
         let polygons = config
             .polygons_px
             .iter()

@@ -74,6 +74,10 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
                 let (nx, ny) = (x + dx, y + dy);
                 if !(inside && !self.region.has_circle()) {
                     let beyond = nx < 0 || ny < 0 || !self.region.contains(nx as u16, ny as u16);
+                    // The ring is made of the pixels with an outer 4-neighbour: an outer corner is merely dark.
+                    if beyond && d % 2 == 1 {
+                        continue;
+                    }
                     if beyond {
                         if !cut {
                             edge.push(Pixel { x: x as u16, y: y as u16 });
