@@ -3,7 +3,7 @@
 use core::f64::consts::{FRAC_PI_2, TAU};
 
 use hzn_core::camera::{self, Model};
-use hzn_core::{body, region};
+use hzn_core::{body, covariance, region};
 use serde::{Deserialize, Serialize};
 
 use crate::counter::{Counter, Stream};
@@ -159,7 +159,10 @@ pub fn rocket_camera(width: u16, height: u16) -> camera::Config {
 pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     let camera = rocket_camera(width, height);
     let mut sensor = hzn_core::Config::new(camera.clone());
-    sensor.body = body::Config { altitude_sigma_km: 0.1, ..body::Config::default() };
+    sensor.body = body::Config { altitude_sigma_km: 0.1, limb_height_sigma_km: 1.0, ..body::Config::default() };
+    // Chosen so that errors are as large as they are said to be: squared errors over their covariance are 1.5 to 2.7
+    // (two degrees of freedom) on pictures 960 to 1920 pixels wide. Clouds seen through the band correlate them.
+    sensor.covariance = covariance::Config { sigma_px: 0.1, correlation_px: 30.0 };
     let half_s = 190.0;
     let frames = places(count)
         .map(|(index, place)| {
@@ -200,7 +203,9 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
         camera::Config { theta_max_deg: Some(90.0), ..camera::Config::ideal(Model::Equidistant, 384, 288, 92.0) };
     let mut sensor = hzn_core::Config::new(camera.clone());
     sensor.body =
-        body::Config { limb_height_km: 25.0, limb_height_sigma_km: 2.0, altitude_sigma_km: 0.1, ..sensor.body };
+        body::Config { limb_height_km: 25.0, limb_height_sigma_km: 1.0, altitude_sigma_km: 0.1, ..sensor.body };
+    // Noise and little else: errors of neighbouring points are unrelated beyond the blur.
+    sensor.covariance = covariance::Config { sigma_px: 0.07, correlation_px: 5.0 };
     let frames = places(count)
         .map(|(index, place)| {
             let time_s = 5800.0 * place;

@@ -3,7 +3,7 @@
 //! One ray is followed a pixel. Where the limb passes through the pixel or close by, brightness is averaged
 //! over the pixel with the tangent height taken as linear across it; a sharp limb's share of the pixel is exact.
 
-use hzn_core::camera::Camera;
+use hzn_core::camera::{self, Camera};
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pixel::ImagePoint;
@@ -38,9 +38,20 @@ impl Scene {
     }
 }
 
+/// The lens without its image circle, or with a wider one, as far as it stays monotone: the scene goes on beyond the
+/// circle, so that the blur takes light from there, as a stop close to the detector would have it.
+fn beyond_circle(config: &camera::Config) -> Result<Camera<f64>, SceneError> {
+    let with = |theta_max_deg| Camera::try_new(&camera::Config { theta_max_deg, ..config.clone() });
+    let wider = config.theta_max_deg.map(|deg| deg + 3.0);
+    with(None).or_else(|_| with(wider)).or_else(|_| with(config.theta_max_deg)).map_err(SceneError::from)
+}
+
 /// A scene, prepared for asking pixel by pixel.
 pub(crate) struct Painter {
+    /// The lens, beyond its image circle too where it can be.
     camera: Camera<f64>,
+    /// Middle and semi-axes of the image circle in pixels.
+    circle: Option<(ImagePoint<f64>, f64, f64)>,
     view: View,
     edge: Edge,
     lamp: Lamp,
@@ -58,7 +69,8 @@ pub(crate) struct Painter {
 
 impl Painter {
     pub(crate) fn try_new(scene: &Scene) -> Result<Self, SceneError> {
-        let camera = Camera::<f64>::try_new(&scene.camera)?;
+        let circle = Camera::<f64>::try_new(&scene.camera)?.image_circle_px();
+        let camera = beyond_circle(&scene.camera)?;
         let height = LimbHeight::of(scene);
         let globe = Globe::of(&scene.body).raised(height.reference_m);
         let view = View::try_new(globe, &scene.pose).ok_or(SceneError::Pose)?;
@@ -83,6 +95,7 @@ impl Painter {
             pixel_rad,
             radius_km: (globe.a_m / 1e3) as f32,
             camera,
+            circle,
             view,
             height,
         })
@@ -125,7 +138,7 @@ impl Painter {
 
     /// No light reaches what is beyond the image circle.
     fn through_circle(&self, mut light: Plane) -> Plane {
-        if let Some((c, a, b)) = self.camera.image_circle_px() {
+        if let Some((c, a, b)) = self.circle {
             let w = light.width;
             light.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
                 let dy = (y as f64 - c.v) / b;
@@ -173,7 +186,7 @@ impl Painter {
 
     /// A pixel with its own ray, averaged over its area.
     fn exactly(&self, x: usize, v: f64) -> f32 {
-        // Beyond the image circle is sky until after the blur, so that no dark rim is blurred inward.
+        // Where the lens sees nothing is sky, so that no dark rim is blurred inward.
         let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { return self.sky };
         let sight = self.view.look(ray.direction().xyz());
         let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
