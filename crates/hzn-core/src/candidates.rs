@@ -3,7 +3,8 @@
 //! A border pixel is lit and has a dark neighbour; the edge itself runs somewhere between. The local limb is where
 //! the brightness is half-way between the plateaus on both sides: a level of the whole picture would move it with
 //! the illumination, which is an error of the limb height. Across the edge (along the axis of the larger gradient)
-//! three rows are smoothed with 1-2-1 and read outwards on both sides only until they level off, at most ten pixels.
+//! three rows are smoothed with 1-2-1 and read outwards on both sides only until they level off, at most ten steps. A
+//! step is a pixel for a sharp edge, and more for one that is spread over many, such as haze through a long lens.
 
 use crate::block::{Block, LANES, Lit};
 use crate::contour::Scene;
@@ -55,8 +56,10 @@ impl Config {
     }
 }
 
-/// How far a plateau is looked for, in pixels.
+/// How far a plateau is looked for, in steps.
 const REACH: i32 = 10;
+/// Widest step of a profile in pixels.
+const WIDEST: i32 = 6;
 /// Room for a profile: `REACH` and two more on each side.
 const PROFILE: usize = 2 * (REACH as usize + 2) + 1;
 
@@ -119,7 +122,7 @@ struct Around<'a, 'b, T, P, O> {
 impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>> Around<'a, 'b, T, P, O> {
     fn new(scene: &'a Scene<'b, T, P, O>, p: Pixel) -> Self {
         let (x, y) = (i32::from(p.x), i32::from(p.y));
-        let margin = REACH + 3;
+        let margin = (REACH + 3) * WIDEST;
         let (w, h) = (i32::from(scene.region.width()), i32::from(scene.region.height()));
         Self {
             scene,
@@ -243,9 +246,14 @@ fn plateau(f: &mut Profile, side: Side, other: i32, read: impl Fn(i32) -> Option
 
 fn linear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<(ImagePoint<T>, Lit, bool)> {
     let around = Around::new(scene, p);
-    let (lit, dx, dy) = orientation(around.gradient()?)?;
+    let gradient = around.gradient()?;
+    let (lit, dx, dy) = orientation(gradient)?;
+    // A wide edge is read in wider steps: from dark to the level in about four of them. The gradient sums eight times
+    // the brightness change a pixel.
+    let steep = gradient.0.abs().max(gradient.1.abs());
+    let step = (3 * i32::from(scene.level) / (2 * steep)).clamp(1, WIDEST);
     let read = |k: i32| -> Option<i32> {
-        let (x, y) = (k * dx, k * dy);
+        let (x, y) = (k * dx * step, k * dy * step);
         // The rows to both sides run along the edge.
         Some(around.at(x - dy, y - dx)? + 2 * around.at(x, y)? + around.at(x + dy, y + dx)?)
     };
@@ -288,5 +296,5 @@ fn linear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pix
         return None;
     }
     let part = T::of_i32(2 * a - mid2) / T::of_i32(2 * (a - b));
-    Some((place(p, dx, dy, T::of_i32(k) + part), lit, fallback))
+    Some((place(p, dx, dy, (T::of_i32(k) + part) * T::of_i32(step)), lit, fallback))
 }

@@ -1,12 +1,15 @@
 //! Gates and choice: whether a fitted cone is the body's limb, and which of several is.
 
+use crate::block::{Block, LANES};
 use crate::camera::Camera;
+use crate::contour::Scene;
 use crate::covariance::Fused;
 use crate::error::{ConfigError, Limit, above, between, require};
 use crate::estimate::Fit;
 use crate::frames::UnitVec3;
+use crate::image::Pixels;
 use crate::linalg::{V3, basis};
-use crate::pipeline::Verdict;
+use crate::pipeline::{Observer, Verdict};
 use crate::pixel::ImagePoint;
 use crate::real::Real;
 use crate::region::Region;
@@ -30,11 +33,14 @@ pub struct Config {
     /// Smallest part of the fitted limb in view that must be edge, 0 to 1. A limb goes on where the edge of a mast or
     /// a cloud ends.
     pub min_support: f64,
+    /// Largest part of what lies beyond the fitted limb that may be lit, 0 to 1. Beyond a limb is the sky, but for
+    /// what stands before it; beyond the edge of a cloud are other clouds.
+    pub max_lit_sky: f64,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { min_inliers: 24, min_arc_px: None, max_rms_px: 2.0, max_half_angle_sigma: 4.0, max_sigma_deg: 10.0, min_support: 0.25 }
+        Self { min_inliers: 24, min_arc_px: None, max_rms_px: 2.0, max_half_angle_sigma: 4.0, max_sigma_deg: 10.0, min_support: 0.4, max_lit_sky: 0.15 }
     }
 }
 
@@ -48,7 +54,8 @@ impl Config {
         above("select.max_half_angle_sigma", self.max_half_angle_sigma, 0.0)?;
         above("select.max_sigma_deg", self.max_sigma_deg, 0.0)?;
         between("select.max_sigma_deg", self.max_sigma_deg, 0.0, 180.0)?;
-        between("select.min_support", self.min_support, 0.0, 1.0)
+        between("select.min_support", self.min_support, 0.0, 1.0)?;
+        between("select.max_lit_sky", self.max_lit_sky, 0.0, 1.0)
     }
 }
 
@@ -63,17 +70,19 @@ pub(crate) struct Judged<T> {
     pub(crate) support: T,
 }
 
-/// Looks a fit over. `seen` is the ray of one of its inliers.
-pub(crate) fn judge<T: Real>(
+/// Looks a fit over, with the points that carry it.
+pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
     sigma_max_rad: T,
-    seen: &V3<T>,
+    blocks: &[Block<T>],
+    scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
-    region: &Region<T>,
     config: &Config,
 ) -> Judged<T> {
-    let limb_px = limb_in_view(&fused.e, fused.c, seen, camera, region);
+    let limb_px = inliers(blocks, 1)
+        .next()
+        .map_or(T::ZERO, |(b, l)| limb_in_view(&fused.e, fused.c, &b.ray(l), camera, scene.region));
     let support = (fit.arc_px / limb_px.most(T::one())).least(T::one());
     let sigma_limit = T::of(config.max_sigma_deg.to_radians());
     let chi = T::of(config.max_half_angle_sigma);
@@ -89,9 +98,11 @@ pub(crate) fn judge<T: Real>(
         Verdict::Uncertain
     } else if support < T::of(config.min_support) {
         Verdict::Unsupported
-    } else if fit.nearby > fit.inliers {
-        // A limb stands alone; a curve laid through many edges has as many beside it as on it.
+    } else if fit.nearby * 3 > fit.inliers {
+        // A limb stands alone; a curve laid through many edges has others close beside it.
         Verdict::Indistinct
+    } else if lit_beyond(&fused.e, blocks, scene, camera) > T::of(config.max_lit_sky) {
+        Verdict::NoSky
     } else {
         Verdict::Passed
     };
@@ -107,6 +118,46 @@ fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {
     let sin = (T::one() - *c * *c).most(T::ZERO).sqrt();
     let circumference = T::of(core::f64::consts::PI) * (fx + fy) * sin;
     ((w * w + h * h).sqrt() * T::of(0.1)).least(circumference * T::of(0.33))
+}
+
+/// Up to `count` inliers, evenly along the edge, from the middle of each part.
+fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (&Block<T>, usize)> {
+    let all = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l] > T::ZERO).map(move |l| (b, l)));
+    let every = (all().count() / count).max(1);
+    all().skip(every / 2).step_by(every).take(count)
+}
+
+/// Inliers from which the sky is looked at, and the distance of the nearest look in pixels; each next is twice as far.
+const LOOKS: usize = 12;
+const NEAREST_PX: f64 = 16.0;
+
+/// The part of what lies beyond the limb, outwards to the border of the region, that is lit.
+fn lit_beyond<T: Real, P: Pixels, O: Observer<T>>(
+    e: &V3<T>,
+    blocks: &[Block<T>],
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+) -> T {
+    let (mut looks, mut lit) = (0, 0);
+    for (block, lane) in inliers(blocks, LOOKS) {
+        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
+        let [gu, gv] = block.gradient_at(lane, e);
+        let norm = (gu * gu + gv * gv).sqrt().most(T::of(1e-20));
+        let mut distance = T::of(NEAREST_PX);
+        for _ in 0..10 {
+            let (x, y) = ((from.u - gu / norm * distance).to_i32(), (from.v - gv / norm * distance).to_i32());
+            let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { break };
+            if !scene.region.contains(x, y) {
+                break;
+            }
+            if !scene.region.masked(x, y) {
+                looks += 1;
+                lit += i32::from(scene.lit(x, y));
+            }
+            distance += distance;
+        }
+    }
+    T::of_i32(lit) / T::of_i32(looks.max(1))
 }
 
 /// Most steps along the limb to each side.

@@ -2,8 +2,8 @@
 //!
 //! One candidate after another goes from its border to a verdict. Edges are looked at in the order in which they are
 //! likely to be the limb: those beside the longest dark stretches of the border first, then every other edge that
-//! begins at the border, then the closed ones. The picture is done when an edge passes every gate and explains most
-//! of the limb in view, or at the end of one of the three rounds in which one passed at all.
+//! begins at the border, then the closed ones. The picture is done as soon as an edge passes every gate and is beyond
+//! doubt; otherwise the best of all that begin at the border is taken, and closed ones are looked at when none is.
 
 mod config;
 mod observer;
@@ -141,7 +141,6 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         let mut judge = Judge {
             config,
             camera: &self.camera,
-            region: &self.region,
             cam_to_body: self.cam_to_body.as_ref(),
             expected,
             observer,
@@ -160,7 +159,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             }
             judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
         }
-        if judge.best.is_none() {
+        if !judge.done() {
             scene.each_start(|start| {
                 if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
                     judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
@@ -192,7 +191,6 @@ fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> u16 {
 struct Judge<'a, T, O> {
     config: &'a Config,
     camera: &'a Camera<T>,
-    region: &'a Region<T>,
     cam_to_body: Option<&'a Rotation<Cam, Body, T>>,
     expected: &'a Expected<T>,
     observer: &'a O,
@@ -207,13 +205,14 @@ struct Judge<'a, T, O> {
 struct Best<T> {
     solution: Solution<T>,
     score: T,
-    support: T,
+    /// It explains most of the limb in view, and most of its edge or with small residuals: no need to look further.
+    certain: bool,
 }
 
 impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
     /// Nothing more to look for: the limb is found, or the picture's steps are used up.
     fn done(&self) -> bool {
-        self.steps == 0 || self.best.as_ref().is_some_and(|b| b.support > T::of(0.5))
+        self.steps == 0 || self.best.as_ref().is_some_and(|b| b.certain)
     }
 
     /// Follows one edge and takes it through every stage.
@@ -307,8 +306,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
-        let Some(seen) = middle_inlier(blocks) else { return (outcome, None) };
-        let judged = select::judge(&fit, &fused, sigma, &seen, self.camera, self.region, &config.select);
+        let judged = select::judge(&fit, &fused, sigma, blocks, scene, self.camera, &config.select);
         outcome.verdict = judged.verdict;
         if judged.verdict != Verdict::Passed || !sigma.is_finite() {
             return (outcome, None);
@@ -329,7 +327,9 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
             arc_px: fit.arc_px,
             candidate: number,
         };
-        (outcome, Some(Best { solution, score: judged.score, support: judged.support }))
+        let certain = judged.support > T::of(0.5)
+            && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
+        (outcome, Some(Best { solution, score: judged.score, certain }))
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -368,11 +368,4 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
 fn enter<T, O: Observer<T>>(report: &mut Report<T>, observer: &O, stage: Stage) {
     report.stage = report.stage.max(stage);
     observer.enter(stage);
-}
-
-/// The ray of an inlier half-way along the inliers.
-fn middle_inlier<T: Real>(blocks: &[Block<T>]) -> Option<crate::linalg::V3<T>> {
-    let inliers = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l] > T::ZERO).map(move |l| (b, l)));
-    let middle = inliers().count() / 2;
-    inliers().nth(middle).map(|(b, l)| b.ray(l))
 }

@@ -79,8 +79,10 @@ pub enum Verdict {
     NoFit = 8,
     /// The fitted limb goes on where the picture shows none: too small a part of it is edge.
     Unsupported = 9,
-    /// As many edge points lie beside the fitted limb as on it: a curve through clutter.
+    /// Many edge points lie close beside the fitted limb: a curve through clutter.
     Indistinct = 10,
+    /// Too much of what lies beyond the fitted limb is lit.
+    NoSky = 11,
 }
 
 impl Verdict {
@@ -98,6 +100,7 @@ impl Verdict {
             Self::NoFit => "no-fit",
             Self::Unsupported => "unsupported",
             Self::Indistinct => "indistinct",
+            Self::NoSky => "no-sky",
         }
     }
 }
