@@ -1,0 +1,128 @@
+//! hzn-core beside the OpenCV recipe: the same frames, the same level, taking turns in one run.
+//!
+//! Frames are distinct and the caches are flushed before each, because a sensor sees every picture for the first time.
+//! Total times are taken without an observer; stages and pixels in further runs with one.
+//! `cargo xtask bench` prepares Python and starts this; `--help` lists the options.
+#![forbid(unsafe_code)]
+
+mod cases;
+mod observers;
+mod opencv;
+mod sensors;
+mod table;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use cases::Case;
+use opencv::Recipe;
+use sensors::Timed;
+use table::Results;
+
+const HELP: &str = "usage: cargo xtask bench [OPTION]...
+  --frames N   distinct frames a case, 8 or more (default 8)
+  --rounds N   times that every frame is measured (default 7)
+  --only WORD  cases whose name contains WORD (clean, cloudy, 640x480, ...); docs/benchmarks.md is left alone
+  --render     render the frames again even if they are there";
+
+/// What the command line says.
+struct Options {
+    python: PathBuf,
+    frames: usize,
+    rounds: usize,
+    only: Option<String>,
+    render: bool,
+}
+
+impl Options {
+    fn parse(mut args: impl Iterator<Item = String>) -> Result<Self, String> {
+        let mut o = Self { python: "python3".into(), frames: 8, rounds: 7, only: None, render: false };
+        while let Some(arg) = args.next() {
+            let mut value = || args.next().ok_or_else(|| format!("{arg} needs a value"));
+            match arg.as_str() {
+                "--python" => o.python = value()?.into(),
+                "--frames" => o.frames = value()?.parse().map_err(|e| format!("--frames: {e}"))?,
+                "--rounds" => o.rounds = value()?.parse().map_err(|e| format!("--rounds: {e}"))?,
+                "--only" => o.only = Some(value()?),
+                "--render" => o.render = true,
+                _ => return Err(HELP.into()),
+            }
+        }
+        if o.frames < 8 || o.rounds == 0 {
+            return Err("--frames must be 8 or more and --rounds 1 or more".into());
+        }
+        Ok(o)
+    }
+}
+
+fn main() -> ExitCode {
+    match Options::parse(std::env::args().skip(1)).and_then(|options| run(&options)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("{e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), String> {
+    let text = |e: std::io::Error| e.to_string();
+    let folder = PathBuf::from(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into())).join("bench");
+    let mut recipe = Recipe::start(&options.python, &folder)?;
+    let mut results = Results::new(&recipe, options.frames, options.rounds);
+    for plan in cases::plans(options.frames) {
+        if options.only.as_ref().is_some_and(|word| !plan.name.contains(word.as_str())) {
+            continue;
+        }
+        let case = plan.prepare(&folder, options.render)?;
+        eprintln!("measuring {}", case.name);
+        results.push(measure(&case, options.rounds, &mut recipe)?);
+    }
+    println!("{}", results.markdown());
+    let json = serde_json::to_string_pretty(&results).map_err(|e| e.to_string())?;
+    std::fs::write(folder.join("results.json"), json).map_err(text)?;
+    if options.only.is_none() {
+        std::fs::create_dir_all("docs").map_err(text)?;
+        std::fs::write("docs/benchmarks.md", results.markdown()).map_err(text)?;
+    }
+    Ok(())
+}
+
+/// One case: every frame by every program in turn, round after round.
+fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<table::CaseResult, String> {
+    let mut single = sensors::flight(&case.sensor)?;
+    let mut double = sensors::host(&case.sensor)?;
+    let mut result = table::CaseResult::new(case);
+    for round in 0..rounds {
+        for (i, frame) in case.frames.iter().enumerate() {
+            let f32_run = single.cold(case, frame)?;
+            let f64_run = double.cold(case, frame)?;
+            let theirs = recipe.measure(&case.name, i, f32_run.level.max(1))?;
+            if round == 0 {
+                result.answers(frame, &f32_run, &f64_run, &theirs);
+            }
+            result.f32.total(f32_run.elapsed_us);
+            result.f64.total(f64_run.elapsed_us);
+            result.opencv.total(theirs.total_us);
+            for (name, us) in theirs.stages_us {
+                result.opencv.stage(&name, us);
+            }
+            for (stage, us) in single.stages(case, frame)? {
+                result.f32.stage(stage, us);
+            }
+            for (stage, us) in double.stages(case, frame)? {
+                result.f64.stage(stage, us);
+            }
+            result.warm.total(single.warm(case, frame)?);
+        }
+    }
+    let mut every = sensors::every_point(&case.sensor)?;
+    for frame in &case.frames {
+        result.pixels(single.distinct_pixels(case, frame)?, case.pixels());
+        let Timed { elapsed_us, points, .. } = every.warm_points(case, frame)?;
+        if points > 0 {
+            result.ns_a_point.push(elapsed_us * 1e3 / f64::from(points));
+        }
+    }
+    Ok(result)
+}

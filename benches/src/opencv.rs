@@ -1,0 +1,74 @@
+//! The other program, a Python process that takes turns with this one.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use serde::Deserialize;
+use serde_json::json;
+
+/// A running recipe.
+pub(crate) struct Recipe {
+    child: Child,
+    requests: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+    /// Versions of OpenCV and NumPy.
+    pub(crate) versions: String,
+}
+
+/// What the recipe answers to one frame.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Answer {
+    pub(crate) stages_us: BTreeMap<String, f64>,
+    pub(crate) total_us: f64,
+    pub(crate) axis: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Versions {
+    opencv: String,
+    numpy: String,
+}
+
+impl Recipe {
+    pub(crate) fn start(python: &Path, folder: &Path) -> Result<Self, String> {
+        let mut child = Command::new(python)
+            .arg("benches/opencv_recipe.py")
+            .arg(folder)
+            // One thread in the linear algebra as well.
+            .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"].map(|name| (name, "1")))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|e| format!("{}: {e}", python.display()))?;
+        let requests = child.stdin.take();
+        let out = child.stdout.take().ok_or("the recipe has no output")?;
+        let mut recipe = Self { child, requests, answers: BufReader::new(out), versions: String::new() };
+        let v: Versions = recipe.read()?;
+        recipe.versions = format!("OpenCV {}, NumPy {}", v.opencv, v.numpy);
+        Ok(recipe)
+    }
+
+    fn read<A: for<'de> Deserialize<'de>>(&mut self) -> Result<A, String> {
+        let mut line = String::new();
+        self.answers.read_line(&mut line).map_err(|e| e.to_string())?;
+        serde_json::from_str(&line).map_err(|e| format!("the OpenCV recipe ended or answered nonsense: {e}"))
+    }
+
+    /// One frame with flushed caches.
+    pub(crate) fn measure(&mut self, case: &str, frame: usize, level: u16) -> Result<Answer, String> {
+        let requests = self.requests.as_mut().ok_or("the recipe takes no requests")?;
+        writeln!(requests, "{}", json!({ "case": case, "frame": frame, "level": level })).map_err(|e| e.to_string())?;
+        requests.flush().map_err(|e| e.to_string())?;
+        self.read()
+    }
+}
+
+impl Drop for Recipe {
+    fn drop(&mut self) {
+        // Without requests it ends by itself.
+        self.requests = None;
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,126 @@
+//! hzn-core in both precisions, measured in the ways the table needs.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use hzn_core::image::{Grey, Layout};
+use hzn_core::real::Real;
+use hzn_core::status::Status;
+use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon};
+
+use crate::cases::{Case, Picture};
+use crate::observers::{Clock, Touched};
+
+/// More than the caches hold.
+const FLUSH_BYTES: usize = 64 << 20;
+/// Repetitions of a warm measurement, of which the median counts.
+const WARM_RUNS: usize = 9;
+
+/// A sensor and the memory that flushes the caches.
+pub(crate) struct Sensor<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
+    horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>,
+    flush: Vec<u8>,
+}
+
+/// One run.
+pub(crate) struct Timed {
+    pub(crate) elapsed_us: f64,
+    pub(crate) level: u16,
+    pub(crate) status: Status,
+    pub(crate) points: u32,
+    pub(crate) axis: Option<[f64; 3]>,
+}
+
+/// f32 with the lists of a flight computer.
+pub(crate) fn flight(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
+    Ok(Sensor::on(Box::new(FlightHorizon::new(config).map_err(|e| e.to_string())?)))
+}
+
+/// f64 with the lists of a workstation.
+pub(crate) fn host(config: &Config) -> Result<Sensor<f64, 16384, 2048, 16384>, String> {
+    Ok(Sensor::on(Box::new(HostHorizon::new(config).map_err(|e| e.to_string())?)))
+}
+
+/// f32 that keeps every point of an edge.
+pub(crate) fn every_point(config: &Config) -> Result<Sensor<f32, 16384, 2048, 16384>, String> {
+    let mut config = config.clone();
+    config.candidates.keep_points = 0;
+    Ok(Sensor::on(Box::new(Horizon::new(&config).map_err(|e| e.to_string())?)))
+}
+
+fn picture<'a>(case: &Case, frame: &'a Picture) -> Result<Grey<'a, u8>, String> {
+    let c = &case.sensor.camera;
+    Grey::try_new(&frame.bytes, Layout::packed(c.width.into(), c.height.into(), 1, 8)).map_err(|e| e.to_string())
+}
+
+fn known<T: Real>(frame: &Picture) -> Frame<T> {
+    Frame {
+        altitude_m: frame.known.altitude_m.map(T::of),
+        position_m: frame.known.position_m.map(|p| p.map(T::of)),
+        cam_to_ecef: None,
+    }
+}
+
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sensor<T, POINTS, BLOCKS, WORDS> {
+    fn on(horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>) -> Self {
+        Self { horizon, flush: vec![1; FLUSH_BYTES] }
+    }
+
+    fn flush_caches(&mut self) {
+        self.flush.iter_mut().step_by(64).for_each(|x| *x = x.wrapping_add(1));
+        black_box(&self.flush);
+    }
+
+    fn once(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
+        let picture = picture(case, frame)?;
+        let known = known(frame);
+        let start = Instant::now();
+        let expected = self.horizon.expect(&known).map_err(|e| e.to_string())?;
+        let report = black_box(self.horizon.process(black_box(&picture), &expected));
+        let elapsed_us = start.elapsed().as_secs_f64() * 1e6;
+        Ok(Timed {
+            elapsed_us,
+            level: report.level,
+            status: report.status,
+            points: report.counters.edge_points,
+            axis: report.solution.map(|s| s.axis.xyz().map(Real::f64)),
+        })
+    }
+
+    /// With flushed caches.
+    pub(crate) fn cold(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
+        self.flush_caches();
+        self.once(case, frame)
+    }
+
+    /// Microseconds when the same frame was just processed.
+    pub(crate) fn warm(&mut self, case: &Case, frame: &Picture) -> Result<f64, String> {
+        Ok(self.warm_points(case, frame)?.elapsed_us)
+    }
+
+    /// As [`Self::warm`], with everything the run gives.
+    pub(crate) fn warm_points(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
+        let mut runs = (0..WARM_RUNS).map(|_| self.once(case, frame)).collect::<Result<Vec<_>, _>>()?;
+        runs.sort_by(|a, b| a.elapsed_us.total_cmp(&b.elapsed_us));
+        Ok(runs.swap_remove(WARM_RUNS / 2))
+    }
+
+    /// Microseconds by stage, with flushed caches.
+    pub(crate) fn stages(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
+        self.flush_caches();
+        let picture = picture(case, frame)?;
+        let expected = self.horizon.expect(&known(frame)).map_err(|e| e.to_string())?;
+        let clock = Clock::start();
+        black_box(self.horizon.process_observed(black_box(&picture), &expected, &clock));
+        Ok(clock.stages())
+    }
+
+    /// Pixels read at least once.
+    pub(crate) fn distinct_pixels(&mut self, case: &Case, frame: &Picture) -> Result<u64, String> {
+        let picture = picture(case, frame)?;
+        let expected = self.horizon.expect(&known(frame)).map_err(|e| e.to_string())?;
+        let touched = Touched::new(case.sensor.camera.width, case.sensor.camera.height);
+        self.horizon.process_observed(&picture, &expected, &touched);
+        Ok(touched.count())
+    }
+}

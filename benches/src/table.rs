@@ -1,0 +1,199 @@
+//! Medians, and the tables made of them.
+
+use std::fmt::Write;
+
+use hzn_core::status::Status;
+use serde::Serialize;
+
+use crate::cases::{Case, Picture};
+use crate::opencv::{Answer, Recipe};
+use crate::sensors::Timed;
+
+/// Everything that was measured.
+#[derive(Serialize)]
+pub(crate) struct Results {
+    machine: String,
+    versions: String,
+    frames: usize,
+    rounds: usize,
+    cases: Vec<CaseResult>,
+}
+
+/// One case.
+#[derive(Serialize)]
+pub(crate) struct CaseResult {
+    name: String,
+    pub(crate) f32: Times,
+    pub(crate) f64: Times,
+    pub(crate) warm: Times,
+    pub(crate) opencv: Times,
+    frames: usize,
+    answered: [usize; 3],
+    error_deg: [Vec<f64>; 3],
+    pixels_percent: Vec<f64>,
+    /// Nanoseconds a point, warm, with every point kept.
+    pub(crate) ns_a_point: Vec<f64>,
+}
+
+/// Times of one program, microseconds.
+#[derive(Serialize, Default)]
+pub(crate) struct Times {
+    total_us: Vec<f64>,
+    /// In the order of first appearance.
+    stages_us: Vec<(String, Vec<f64>)>,
+}
+
+impl Times {
+    pub(crate) fn total(&mut self, us: f64) {
+        self.total_us.push(us);
+    }
+    pub(crate) fn stage(&mut self, name: &str, us: f64) {
+        match self.stages_us.iter_mut().find(|(n, _)| n == name) {
+            Some((_, list)) => list.push(us),
+            None => self.stages_us.push((name.to_owned(), vec![us])),
+        }
+    }
+    fn median(&self) -> f64 {
+        median(&self.total_us)
+    }
+    fn stages(&self) -> String {
+        let runs = self.total_us.len();
+        let one = |(name, us): &(String, Vec<f64>)| {
+            // A stage that some frames do not reach took no time there.
+            let mut all = us.clone();
+            all.resize(runs.max(us.len()), 0.0);
+            format!("{name} {:.1}", median(&all))
+        };
+        self.stages_us.iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn median(list: &[f64]) -> f64 {
+    let mut sorted = list.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    match (sorted.get(n.wrapping_sub(1) / 2), sorted.get(n / 2)) {
+        (Some(a), Some(b)) => (a + b) / 2.0,
+        _ => f64::NAN,
+    }
+}
+
+/// Angle between two directions in degrees; exact for small ones.
+fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
+    cross.iter().map(|x| x * x).sum::<f64>().sqrt().atan2(dot).to_degrees()
+}
+
+impl CaseResult {
+    pub(crate) fn new(case: &Case) -> Self {
+        Self {
+            name: case.name.clone(),
+            f32: Times::default(),
+            f64: Times::default(),
+            warm: Times::default(),
+            opencv: Times::default(),
+            frames: case.frames.len(),
+            answered: [0; 3],
+            error_deg: Default::default(),
+            pixels_percent: Vec::new(),
+            ns_a_point: Vec::new(),
+        }
+    }
+
+    /// What the three programs answered to a frame.
+    pub(crate) fn answers(&mut self, frame: &Picture, single: &Timed, double: &Timed, theirs: &Answer) {
+        let hzn = |t: &Timed| t.axis.filter(|_| t.status == Status::Ok);
+        let axes = [hzn(single), hzn(double), theirs.axis];
+        for ((axis, count), errors) in axes.into_iter().zip(&mut self.answered).zip(&mut self.error_deg) {
+            if let Some(axis) = axis {
+                *count += 1;
+                errors.push(angle_deg(axis, frame.truth));
+            }
+        }
+    }
+
+    pub(crate) fn pixels(&mut self, read: u64, all: u64) {
+        self.pixels_percent.push(read as f64 * 100.0 / all as f64);
+    }
+
+    fn errors(&self) -> [String; 3] {
+        [0, 1, 2].map(|i| {
+            let worst = self.error_deg[i].iter().copied().fold(f64::NAN, f64::max);
+            format!("{:.3} / {worst:.3} ({} of {})", median(&self.error_deg[i]), self.answered[i], self.frames)
+        })
+    }
+}
+
+impl Results {
+    pub(crate) fn new(recipe: &Recipe, frames: usize, rounds: usize) -> Self {
+        let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let model =
+            cpu.lines().find_map(|l| l.strip_prefix("model name")).map(|l| l.trim_start_matches(['\t', ':', ' ']));
+        Self {
+            machine: model.unwrap_or("unknown processor").to_owned(),
+            versions: recipe.versions.clone(),
+            frames,
+            rounds,
+            cases: Vec::new(),
+        }
+    }
+
+    pub(crate) fn push(&mut self, case: CaseResult) {
+        self.cases.push(case);
+    }
+
+    /// The tables.
+    pub(crate) fn markdown(&self) -> String {
+        let mut s = String::from("# Benchmarks\n\n");
+        let _ = writeln!(
+            s,
+            "Written by `cargo xtask bench`. One thread of {}; {}. Each case has {} distinct frames, each measured {} times \
+             with flushed caches, hzn and the recipe taking turns with the same level. Medians.\n",
+            self.machine, self.versions, self.frames, self.rounds
+        );
+        s.push_str(
+            "| case | hzn f32, µs | hzn f64, µs | recipe, µs | ratio f32 | ratio f64 | f32 warm, µs | pixels read, % | \
+             all points, warm, ns a point |\n|---|---|---|---|---|---|---|---|---|\n",
+        );
+        for c in &self.cases {
+            let (single, double, theirs) = (c.f32.median(), c.f64.median(), c.opencv.median());
+            let _ = writeln!(
+                s,
+                "| {} | {single:.0} | {double:.0} | {theirs:.0} | {:.1} | {:.1} | {:.0} | {:.2} | {:.0} |",
+                c.name,
+                theirs / single,
+                theirs / double,
+                c.warm.median(),
+                median(&c.pixels_percent),
+                median(&c.ns_a_point)
+            );
+        }
+        s.push_str("\nAngle between answer and truth in degrees, median / worst (frames answered):\n\n");
+        s.push_str("| case | hzn f32 | hzn f64 | recipe |\n|---|---|---|---|\n");
+        for c in &self.cases {
+            let _ = writeln!(s, "| {} | {} |", c.name, c.errors().join(" | "));
+        }
+        s.push_str("\nStages, µs (hzn's with an observer, which costs a little):\n\n");
+        s.push_str("| case | program | stages |\n|---|---|---|\n");
+        for c in &self.cases {
+            for (name, times) in [("hzn f32", &c.f32), ("hzn f64", &c.f64), ("recipe", &c.opencv)] {
+                let _ = writeln!(s, "| {} | {name} | {} |", c.name, times.stages());
+            }
+        }
+        s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_and_angles() {
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert!(median(&[]).is_nan());
+        assert!((angle_deg([1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]) - 1e-9f64.to_degrees()).abs() < 1e-20);
+    }
+}
