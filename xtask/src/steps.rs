@@ -1,6 +1,7 @@
 //! Steps with a name and a time, and a summary that leaves nothing out.
 
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -140,9 +141,14 @@ pub(crate) fn show(command: &Command) {
 pub(crate) fn run(command: &mut Command) -> Outcome {
     command.stdin(Stdio::null());
     show(command);
-    let name = command.get_program().to_string_lossy().into_owned();
-    let status = command.status().map_err(|e| Trouble::Failed(format!("{name}: {e}")))?;
-    if status.success() { Ok(()) } else { Err(Trouble::Failed(format!("{name} ended with {status}"))) }
+    let program = Path::new(command.get_program()).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let first = command.get_args().next().unwrap_or_default().to_string_lossy().into_owned();
+    let failed = |what: String| Err(Trouble::Failed(format!("`{program} {first}` {what}, see above")));
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => failed(format!("ended with {status}")),
+        Err(e) => failed(format!("could not be started: {e}")),
+    }
 }
 
 #[cfg(test)]
