@@ -56,7 +56,7 @@ fn demo() -> Outcome {
         fs::remove_dir_all(&dir)?;
     }
     fs::create_dir_all(dir.parent().unwrap_or(&dir))?;
-    steps::run(Command::new(target().join("debug/hzn")).arg("demo").arg("-o").arg(&dir))?;
+    steps::run(Command::new(target().join("debug/hzn")).arg("demo").arg(&dir))?;
     if recordings(&dir).is_empty() {
         return Err(Trouble::Failed(format!("the demo left no .mcap in {}", dir.display())));
     }
