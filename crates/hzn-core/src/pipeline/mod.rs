@@ -9,6 +9,9 @@ mod config;
 mod observer;
 mod report;
 
+#[cfg(test)]
+mod golden;
+
 pub use config::{Config, Input, Mount};
 pub use observer::{Observer, Unobserved};
 pub use report::{Candidate, Counters, MAX_LISTED, Report, Solution, Verdict};
