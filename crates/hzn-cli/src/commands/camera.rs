@@ -1,0 +1,174 @@
+//! `hzn camera`: what a calibration means.
+
+use std::path::{Path, PathBuf};
+
+use hzn_core::Config;
+use hzn_core::body::Expected;
+use hzn_core::camera::{self, Camera, Model};
+use hzn_core::frames::UnitVec3;
+use hzn_core::pixel::ImagePoint;
+
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::input::ending;
+
+/// Look at a camera calibration
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    /// Print lens table, field of view, image circle, and the size in which the limb is expected
+    Show {
+        /// A sensor.toml, or a camera file of Kalibr, OpenCV or EuRoC (.yaml)
+        file: PathBuf,
+    },
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let Command::Show { file } = &args.command;
+    print!("{}", describe(&load(file)?)?);
+    Ok(Exit::Done)
+}
+
+fn load(file: &Path) -> Result<Config, Stop> {
+    match ending(file).as_str() {
+        "yaml" | "yml" => Ok(Config::new(hzn_calib::camera_file::load(file, None)?)),
+        _ => Ok(hzn_calib::sensor::load(file)?.config),
+    }
+}
+
+/// The calibration in words and numbers.
+pub(super) fn describe(config: &Config) -> Result<String, Stop> {
+    let c = &config.camera;
+    let camera = Camera::<f64>::try_new(c).map_err(usage)?;
+    let mut out = String::new();
+    let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
+    let model = match c.model {
+        Model::KannalaBrandt => "kannala-brandt",
+        Model::Equidistant => "equidistant",
+        Model::Pinhole => "pinhole",
+        Model::BrownConrady => "brown-conrady",
+    };
+    line("picture", format!("{} x {} px", c.width, c.height));
+    line("lens", format!("{model}, f = {} x {} px, centre at ({}, {})", c.fx_px, c.fy_px, c.cx_px, c.cy_px));
+    if !c.k.is_empty() {
+        line("coefficients", format!("{:?}", c.k.as_slice()));
+    }
+    line("field of view", field_of_view(c, &camera));
+    line(
+        "image circle",
+        match camera.image_circle_px() {
+            Some((_, a, b)) => {
+                format!("{:.2} deg off axis, {a:.1} x {b:.1} px about the centre", camera.theta_max_rad().to_degrees())
+            }
+            None => format!(
+                "does not cut the picture (farthest corner {:.2} deg off axis)",
+                camera.theta_max_rad().to_degrees()
+            ),
+        },
+    );
+    line(
+        "monotone",
+        match monotone_limit_deg(c) {
+            Some(deg) => format!("up to {deg:.2} deg off axis"),
+            None => "everywhere".into(),
+        },
+    );
+    match Expected::<f64>::of(config) {
+        Some(half_angle) => {
+            let deg = half_angle.to_degrees();
+            line("expected body", format!("{:?}, half-angle {deg:.3} deg", config.body.kind));
+            line("expected limb", limb_size(half_angle, &camera, c));
+        }
+        None => line("expected limb", "unknown: set altitude_km in [body]".into()),
+    }
+    out.push_str("\n off axis [deg]   distance from centre [px]   px a degree\n");
+    let theta_max = camera.theta_max_rad();
+    let steps = 12;
+    for i in 0..=steps {
+        let theta = theta_max * f64::from(i) / f64::from(steps);
+        let r = |theta: f64| radius_px(&camera, theta);
+        let d = 1e-4f64;
+        let slope = (r((theta + d).min(theta_max)) - r((theta - d).max(0.0)))
+            / ((theta + d).min(theta_max) - (theta - d).max(0.0)).to_degrees();
+        out.push_str(&format!("{:>15.2} {:>27.2} {slope:>13.3}\n", theta.to_degrees(), r(theta)));
+    }
+    Ok(out)
+}
+
+/// The half-angle that a configuration alone expects.
+trait FromConfig {
+    fn of(config: &Config) -> Option<f64>;
+}
+impl FromConfig for Expected<f64> {
+    fn of(config: &Config) -> Option<f64> {
+        let sensor = || crate::engine::AnySensor::new(config, false).ok()?.expected_half_angle_rad(None).ok();
+        crate::engine::on_large_stack(sensor).ok().flatten()
+    }
+}
+
+/// Distance from the principal point of a ray this far off axis, along x, pixels.
+fn radius_px(camera: &Camera<f64>, theta: f64) -> f64 {
+    let (sin, cos) = theta.min(camera.theta_max_rad() * (1.0 - 1e-12)).sin_cos();
+    let centre = camera.principal_point();
+    let point = UnitVec3::try_new([sin, 0.0, cos]).and_then(|d| camera.project(&d));
+    point.map_or(f64::NAN, |p| (p.u - centre.u).hypot(p.v - centre.v))
+}
+
+fn field_of_view(c: &camera::Config, camera: &Camera<f64>) -> String {
+    let (right, bottom) = (f64::from(c.width) - 0.5, f64::from(c.height) - 0.5);
+    let angle = |a: (f64, f64), b: (f64, f64)| {
+        let ray = |(u, v)| camera.unproject(ImagePoint { u, v });
+        Some(ray(a)?.angle_rad(&ray(b)?).to_degrees())
+    };
+    let text = |deg: Option<f64>| deg.map_or("beyond the image circle".to_owned(), |d| format!("{d:.2} deg"));
+    format!(
+        "{} horizontally, {} vertically, {} from corner to corner",
+        text(angle((-0.5, c.cy_px), (right, c.cy_px))),
+        text(angle((c.cx_px, -0.5), (c.cx_px, bottom))),
+        text(angle((-0.5, -0.5), (right, bottom)))
+    )
+}
+
+fn limb_size(half_angle: f64, camera: &Camera<f64>, c: &camera::Config) -> String {
+    let (fx, fy) = camera.focal_px();
+    if half_angle < camera.theta_max_rad() {
+        let r = radius_px(camera, half_angle);
+        let side = f64::from(c.width.min(c.height));
+        let fits =
+            if 2.0 * r < side { "the whole disc fits into the picture" } else { "the picture shows an arc of it" };
+        return format!("{:.1} px across when it is in the middle; {fits}", 2.0 * r);
+    }
+    format!(
+        "wider than the field of view: an arc, 1 deg at its middle is about {:.1} px",
+        (fx + fy) / 2.0 * 1f64.to_radians()
+    )
+}
+
+/// Where the lens stops being monotone: dr/dθ = 0 for radial lenses (for brown-conrady without its tangential part).
+fn monotone_limit_deg(c: &camera::Config) -> Option<f64> {
+    let k = |i: usize| c.coefficient(i);
+    let slope: Box<dyn Fn(f64) -> f64> = match c.model {
+        Model::Pinhole | Model::Equidistant => return None,
+        Model::KannalaBrandt => {
+            let k = [k(0), k(1), k(2), k(3)];
+            Box::new(move |t| {
+                let t2 = t * t;
+                1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])))
+            })
+        }
+        Model::BrownConrady => {
+            let k = [k(0), k(1), k(4)];
+            Box::new(move |t| {
+                let r2 = t.tan() * t.tan();
+                1.0 + r2 * (3.0 * k[0] + r2 * (5.0 * k[1] + r2 * 7.0 * k[2]))
+            })
+        }
+    };
+    let end = if c.model == Model::BrownConrady { 89.9 } else { 180.0 };
+    let steps = 18_000;
+    (1..=steps).map(|i| end * f64::from(i) / f64::from(steps)).find(|deg| slope(deg.to_radians()) <= 0.0)
+}

@@ -1,0 +1,35 @@
+//! `hzn completions`: for the shell.
+
+use clap::CommandFactory;
+
+use crate::exit::{Exit, Outcome};
+
+/// Print completions for a shell
+///
+/// For example, in ~/.bashrc:  source <(hzn completions bash)
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The shell
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Shell {
+    Bash,
+    Zsh,
+    Fish,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let shell = match args.shell {
+        Shell::Bash => clap_complete::Shell::Bash,
+        Shell::Zsh => clap_complete::Shell::Zsh,
+        Shell::Fish => clap_complete::Shell::Fish,
+    };
+    // Into memory first: the generator panics when stdout is closed early.
+    let mut text = Vec::new();
+    clap_complete::generate(shell, &mut super::Cli::command(), "hzn", &mut text);
+    std::io::Write::write_all(&mut std::io::stdout(), &text)?;
+    Ok(Exit::Done)
+}

@@ -1,0 +1,265 @@
+//! `hzn demo`: a rendered flight with known truth, and a real photograph, end to end.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use hzn_mcap::{Contents, Reader, Row};
+use hzn_sim::{Flight, Truth};
+
+use super::run as sequence;
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::output;
+use crate::overlay;
+
+const ISS_PICTURE: &[u8] = include_bytes!("../../assets/iss-limb-2020-11-20.jpg");
+const ISS_SENSOR: &str = include_str!("../../assets/iss.toml");
+const ISS_CREDITS: &str = include_str!("../../assets/CREDITS.md");
+
+/// Render a rocket flight, find its limb, compare with the truth; then find the limb in a real photograph
+///
+/// Everything stays in the folder: pictures, sensor.toml, frames.csv and truth.csv of the flight, the results as MCAP
+/// (for Foxglove) and CSV, pictures with overlay. It is a pattern for own data.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Folder that is made
+    #[arg(default_value = "hzn-demo")]
+    folder: PathBuf,
+    /// Write into a folder that exists
+    #[arg(long)]
+    force: bool,
+    /// Number of rendered pictures
+    #[arg(long, value_name = "N", default_value_t = 40)]
+    count: u16,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let folder = &args.folder;
+    if folder.exists() && !args.force {
+        let what = "exists already; choose another folder, or --force writes into it";
+        return Err(usage(format!("{}: {what}", folder.display())));
+    }
+    if args.count == 0 {
+        return Err(usage("--count: must be 1 or more"));
+    }
+    let begin = Instant::now();
+    let (flight_dir, iss_dir) = (folder.join("flight"), folder.join("iss"));
+    for dir in [&flight_dir, &iss_dir] {
+        std::fs::create_dir_all(dir).map_err(|e| output::cannot(dir, &e))?;
+    }
+    eprintln!("rendering {} pictures of a rocket flight ...", args.count);
+    let flight = hzn_sim::flight::rocket(1280, 720, usize::from(args.count), 1);
+    let truth = write_flight(&flight, &flight_dir)?;
+
+    eprintln!("looking for the limb ...");
+    let (flight_mcap, flight_csv) = (folder.join("flight.mcap"), folder.join("flight.csv"));
+    process(&flight_dir, &flight_mcap)?;
+    let rows = rows(&flight_mcap)?;
+    let mut table = output::Rows::create(&flight_csv, output::Existing::Replace)?;
+    for row in &rows {
+        table.write(row)?;
+    }
+    table.finish()?;
+
+    let write = |name: &str, bytes: &[u8]| {
+        let path = iss_dir.join(name);
+        std::fs::write(&path, bytes).map_err(|e| output::cannot(&path, &e))
+    };
+    write("iss-limb-2020-11-20.jpg", ISS_PICTURE)?;
+    write("sensor.toml", ISS_SENSOR.as_bytes())?;
+    write("CREDITS.md", ISS_CREDITS.as_bytes())?;
+    let iss_mcap = folder.join("iss.mcap");
+    process(&iss_dir, &iss_mcap)?;
+    let iss = self::rows(&iss_mcap)?;
+    let overlays = folder.join("overlay");
+    std::fs::create_dir_all(&overlays).map_err(|e| output::cannot(&overlays, &e))?;
+    let shown = draw(&flight_mcap, &overlays, 5)? + draw(&iss_mcap, &overlays, 1)?;
+
+    println!("{}", Accuracy::of(&rows, &truth).text());
+    println!("{}", iss_text(iss.first()));
+    let place = |p: &Path| p.display().to_string();
+    println!("Files, after {:.1} s:", begin.elapsed().as_secs_f64());
+    for (name, what) in [
+        (place(&flight_dir), "rendered pictures with sensor.toml, frames.csv (positions) and truth.csv"),
+        (place(&flight_mcap), "results with pictures, for Foxglove"),
+        (place(&flight_csv), "the same results as a table"),
+        (place(&iss_dir), "a photograph from the ISS with its sensor.toml"),
+        (place(&iss_mcap), "its result"),
+        (place(&overlays), &format!("{shown} pictures with everything drawn over them")),
+    ] {
+        println!("  {name:<24} {what}");
+    }
+    println!("\nNext:  hzn explain {} --overlay out.png", place(&iss_dir.join("iss-limb-2020-11-20.jpg")));
+    println!("       hzn run {} -o mine.csv", place(&flight_dir));
+    Ok(Exit::Done)
+}
+
+/// Pictures, sensor.toml, frames.csv, truth.csv. Gives the truth.
+fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
+    let config = toml::to_string(&flight.sensor).map_err(failed)?;
+    let path = folder.join("sensor.toml");
+    let text = format!("# The camera of a rendered rocket flight.\npreset = \"hzn\"\n\n{config}");
+    std::fs::write(&path, text).map_err(|e| output::cannot(&path, &e))?;
+
+    // Pictures are rendered on all cores already, one after the other.
+    for frame in &flight.frames {
+        let path = folder.join(&frame.file);
+        frame.render().map_err(failed)?.save(&path).map_err(|e| match e {
+            image::ImageError::IoError(e) => output::cannot(&path, &e),
+            e => failed(e),
+        })?;
+    }
+    let mut known = String::from("file,time_s,x_km,y_km,z_km\n");
+    for frame in &flight.frames {
+        let [x, y, z] = frame.known().position_m.unwrap_or_default().map(|m| m / 1e3);
+        known.push_str(&format!("{},{},{x},{y},{z}\n", frame.file, frame.time_s));
+    }
+    let path = folder.join("frames.csv");
+    std::fs::write(&path, known).map_err(|e| output::cannot(&path, &e))?;
+
+    let truth: Vec<Truth> = flight.frames.iter().map(|f| f.truth()).collect::<Result<_, _>>().map_err(failed)?;
+    let path = folder.join("truth.csv");
+    let mut table = csv::Writer::from_path(&path).map_err(failed)?;
+    for row in &truth {
+        table.serialize(row).map_err(failed)?;
+    }
+    table.flush()?;
+    Ok(truth)
+}
+
+fn process(folder: &Path, out: &Path) -> Result<(), Stop> {
+    match sequence::run(&sequence::Args::quietly(folder, out))? {
+        Exit::Done => Ok(()),
+        other => Err(failed(format!("{}: ended with {other:?}", folder.display()))),
+    }
+}
+
+fn rows(path: &Path) -> Result<Vec<Row>, Stop> {
+    let reader = Reader::open(path, Contents::WithoutImages).map_err(failed)?;
+    reader.map(|frame| frame.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)
+}
+
+/// Draws `count` frames of a recording, evenly spread. Gives how many.
+fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
+    let total = rows(recording)?.len();
+    let mut drawn = 0;
+    for (i, frame) in Reader::open(recording, Contents::All).map_err(failed)?.enumerate() {
+        let frame = frame.map_err(failed)?;
+        // The n-th of `count` stands in the middle of its share.
+        if drawn >= count || (i * count) / total.max(1) < drawn {
+            continue;
+        }
+        let Some(image) = frame.image else { continue };
+        let (picture, _) = crate::input::recorded(image).decode(None).map_err(failed)?;
+        let image = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
+        overlay::save(&image, &folder.join(overlay::file_name(&frame.row.file)))?;
+        drawn += 1;
+    }
+    Ok(drawn)
+}
+
+/// Results beside the truth.
+#[derive(Debug, Clone, PartialEq)]
+struct Accuracy {
+    frames: usize,
+    with_limb: usize,
+    /// Errors of the answered frames, degrees, from small to large.
+    errors_deg: Vec<f64>,
+    /// Squared errors in units of the covariance; 2 on average when it is honest.
+    nees: Vec<f64>,
+    /// Frames that were answered though no limb is in view.
+    false_answers: usize,
+    microseconds: Vec<f64>,
+}
+
+impl Accuracy {
+    fn of(rows: &[Row], truth: &[Truth]) -> Self {
+        let mut all = Self {
+            frames: rows.len(),
+            with_limb: truth.iter().filter(|t| t.has_limb()).count(),
+            errors_deg: Vec::new(),
+            nees: Vec::new(),
+            false_answers: 0,
+            microseconds: rows.iter().filter_map(|r| r.elapsed_us).collect(),
+        };
+        for (row, truth) in rows.iter().zip(truth) {
+            let Some(axis) = row.axis() else { continue };
+            if !truth.has_limb() {
+                all.false_answers += 1;
+                continue;
+            }
+            let error = [0, 1, 2].map(|i| [truth.axis_x, truth.axis_y, truth.axis_z][i] - axis[i]);
+            let chord = error.iter().map(|x| x * x).sum::<f64>().sqrt();
+            all.errors_deg.push(2.0 * (chord / 2.0).min(1.0).asin().to_degrees());
+            all.nees.extend(nees(row, axis, error));
+        }
+        all.errors_deg.sort_by(f64::total_cmp);
+        all.microseconds.sort_by(f64::total_cmp);
+        all
+    }
+
+    fn text(&self) -> String {
+        let n = self.errors_deg.len();
+        let mut out = String::from("Rendered rocket flight, against the truth\n");
+        let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));
+        let share = 100.0 * n as f64 / self.with_limb.max(1) as f64;
+        line("answered", format!("{n} of {} frames with a limb in view ({share:.1} %)", self.with_limb));
+        if self.frames > self.with_limb || self.false_answers > 0 {
+            let without = self.frames - self.with_limb;
+            line("answered without limb", format!("{} of {without}", self.false_answers));
+        }
+        if n > 0 {
+            let rms = (self.errors_deg.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
+            let at = |p: f64| self.errors_deg[((n - 1) as f64 * p).round() as usize];
+            line(
+                "error of the axis",
+                format!("{rms:.4} deg RMS, {:.4} deg for 95 %, {:.4} deg at worst", at(0.95), at(1.0)),
+            );
+            let mean = self.nees.iter().sum::<f64>() / self.nees.len().max(1) as f64;
+            line(
+                "honesty (NEES)",
+                format!("{mean:.2} on average (2 is ideal; larger: too sure, smaller: too careful)"),
+            );
+        }
+        if let Some(middle) = self.microseconds.get(self.microseconds.len() / 2) {
+            line("processing", format!("{middle:.0} us a frame in the middle, without decoding"));
+        }
+        out
+    }
+}
+
+/// Squared error in units of the covariance, on the tangent plane.
+fn nees(row: &Row, axis: [f64; 3], error: [f64; 3]) -> Option<f64> {
+    let (xx, xy, xz, yy, yz, zz) = (row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?);
+    let p = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let helper = if axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let unit = |a: [f64; 3]| a.map(|x| x / dot(a, a).sqrt());
+    let b1 = unit(cross(axis, helper));
+    let b2 = cross(axis, b1);
+    let times = |b: [f64; 3]| p.map(|r| dot(r, b));
+    let (p11, p12, p22) = (dot(b1, times(b1)), dot(b1, times(b2)), dot(b2, times(b2)));
+    let (d1, d2) = (dot(b1, error), dot(b2, error));
+    let det = p11 * p22 - p12 * p12;
+    (det > 0.0).then(|| (p22 * d1 * d1 - 2.0 * p12 * d1 * d2 + p11 * d2 * d2) / det)
+}
+
+fn iss_text(row: Option<&Row>) -> String {
+    let mut out = String::from("Photograph from the ISS, 20 November 2020 (NASA Johnson Space Center)\n");
+    let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));
+    let Some(row) = row else { return out };
+    match (row.axis(), row.sigma_max_deg) {
+        (Some([x, y, z]), Some(sigma)) => {
+            line("axis in the camera", format!("{x:.5}, {y:.5}, {z:.5}; sigma {sigma:.4} deg"));
+            let found = (row.inliers.unwrap_or(0), row.edge_points.unwrap_or(0), row.rms_px.unwrap_or(0.0));
+            line("fit", format!("{} of {} edge points, rms {:.2} px", found.0, found.1, found.2));
+            if let (Some(h), Some(s)) = (row.altitude_est_km, row.altitude_est_sigma_km) {
+                let given = row.altitude_km.unwrap_or(0.0);
+                line("altitude from the limb", format!("{h:.0} +- {s:.0} km (the station was at about {given} km)"));
+            }
+        }
+        _ => line("status", format!("{}: {}", row.status.name(), row.detail)),
+    }
+    out
+}

@@ -1,0 +1,145 @@
+//! `hzn export`: results in another form.
+
+use std::io::BufRead;
+use std::path::{Path, PathBuf};
+
+use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader, Row};
+
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::input::ending;
+use crate::output::{self, Existing, Rows};
+use crate::overlay;
+
+/// Turn a recording into a table, pictures, or pictures with overlay
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// An MCAP of hzn; for tables also a .csv or .jsonl
+    file: PathBuf,
+    /// A table: .csv or .jsonl
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// The recorded pictures, into this folder
+    #[arg(long, value_name = "DIR")]
+    images: Option<PathBuf>,
+    /// The recorded pictures with everything drawn over them, as PNG into this folder
+    #[arg(long, value_name = "DIR")]
+    overlay: Option<PathBuf>,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let file = &args.file;
+    if !file.is_file() {
+        return Err(usage(format!("{}: no such file", file.display())));
+    }
+    let pictures = args.images.is_some() || args.overlay.is_some();
+    if args.output.is_none() && !pictures {
+        return Err(usage("nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR"));
+    }
+    if let Some(path) = &args.output
+        && output::target(path)? == output::Target::Mcap
+    {
+        return Err(usage(format!("{}: a table is written here: .csv or .jsonl", path.display())));
+    }
+    let kind = if ending(file) == "part" { ending(&file.with_extension("")) } else { ending(file) };
+    if kind != "mcap" && pictures {
+        return Err(usage(format!("{}: only a recording (.mcap) holds pictures", file.display())));
+    }
+    for folder in [&args.images, &args.overlay].into_iter().flatten() {
+        std::fs::create_dir_all(folder).map_err(|e| output::cannot(folder, &e))?;
+    }
+    let existing = if args.force { Existing::Replace } else { Existing::Refuse };
+    let mut table = args.output.as_deref().map(|path| Rows::create(path, existing)).transpose()?;
+    let (mut rows, mut images) = (0u64, 0u64);
+    if kind == "mcap" {
+        let contents = if pictures { Contents::All } else { Contents::WithoutImages };
+        for frame in Reader::open(file, contents).map_err(failed)? {
+            let frame = frame.map_err(failed)?;
+            rows += 1;
+            if let Some(table) = &mut table {
+                table.write(&frame.row)?;
+            }
+            if pictures && write_pictures(args, frame)? {
+                images += 1;
+            }
+        }
+        if pictures && images == 0 {
+            eprintln!("warning: {}: holds no pictures (was it recorded with --no-images?)", file.display());
+        }
+    } else {
+        for row in self::rows(file, &kind)? {
+            rows += 1;
+            if let Some(table) = &mut table {
+                table.write(&row?)?;
+            }
+        }
+    }
+    if let Some(table) = table {
+        table.finish()?;
+    }
+    let with = if pictures { format!(", {images} pictures") } else { String::new() };
+    eprintln!("{rows} rows{with}");
+    Ok(Exit::Done)
+}
+
+fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
+    let Some(image) = frame.image else { return Ok(false) };
+    let name = frame.row.file.clone();
+    if let Some(folder) = &args.images {
+        let (bytes, ending) = match &image.format {
+            ImageFormat::Png => (image.bytes.clone(), "png"),
+            ImageFormat::Jpeg => (image.bytes.clone(), "jpg"),
+            _ => (decode(&image, &name)?.to_png().map_err(failed)?, "png"),
+        };
+        let path = folder.join(picture_name(&name, ending));
+        if path.exists() && !args.force {
+            return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
+        }
+        std::fs::write(&path, bytes).map_err(|e| output::cannot(&path, &e))?;
+    }
+    if let Some(folder) = &args.overlay {
+        let path = folder.join(overlay::file_name(&name));
+        if path.exists() && !args.force {
+            return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
+        }
+        let picture = decode(&image, &name)?;
+        let drawn = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
+        overlay::save(&drawn, &path)?;
+    }
+    Ok(true)
+}
+
+fn decode(image: &hzn_mcap::EncodedImage, name: &str) -> Result<crate::input::Picture, Stop> {
+    let decoded = crate::input::recorded(image.clone()).decode(None);
+    decoded.map(|(picture, _)| picture).map_err(|why| failed(format!("{name}: {why}")))
+}
+
+/// The picture's own name, with the ending that its bytes have.
+fn picture_name(name: &str, ending: &str) -> String {
+    let flat = name.replace(['/', '\\', ':'], "_");
+    let same = |e: &str| e == ending || (ending == "jpg" && matches!(e, "jpeg" | "jpe"));
+    if same(&self::ending(Path::new(&flat))) { flat } else { format!("{flat}.{ending}") }
+}
+
+/// Rows of a table of results.
+pub(super) fn rows(file: &Path, kind: &str) -> Result<Box<dyn Iterator<Item = Result<Row, Stop>>>, Stop> {
+    let name = file.display().to_string();
+    let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
+    match kind {
+        "csv" => {
+            let reader = csv::Reader::from_path(file).map_err(failed)?;
+            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| not(i as u64 + 2, e.to_string()));
+            Ok(Box::new(reader.into_deserialize().enumerate().map(row)))
+        }
+        "jsonl" => {
+            let lines = std::io::BufReader::new(std::fs::File::open(file)?).lines();
+            let row = move |(i, line): (usize, std::io::Result<String>)| {
+                serde_json::from_str(&line?).map_err(|e| not(i as u64 + 1, e.to_string()))
+            };
+            Ok(Box::new(lines.enumerate().map(row)))
+        }
+        _ => Err(usage(format!("{}: .mcap, .csv or .jsonl is expected", file.display()))),
+    }
+}

@@ -1,0 +1,182 @@
+//! `hzn info`: what is in a file.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use hzn_core::status::Status;
+use hzn_mcap::{Contents, Reader, Row};
+
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::input::{ending, picture};
+
+/// Summarise a file: results (.mcap, .csv, .jsonl), a sensor.toml, a frames.csv, a picture
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The file
+    file: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let file = &args.file;
+    if !file.is_file() {
+        return Err(usage(format!("{}: no such file", file.display())));
+    }
+    // An unfinished file has the ending of its kind before `.part`.
+    let kind = if ending(file) == "part" { ending(&file.with_extension("")) } else { ending(file) };
+    let text = match kind.as_str() {
+        "mcap" => recording(file)?,
+        "csv" | "jsonl" => table(file, &kind)?,
+        "toml" | "yaml" | "yml" => sensor(file, &kind)?,
+        _ => one_picture(file)?,
+    };
+    print!("{text}");
+    Ok(Exit::Done)
+}
+
+fn recording(file: &Path) -> Result<String, Stop> {
+    let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
+    let mut summary = Summary::default();
+    for frame in reader.by_ref() {
+        summary.add(&frame.map_err(failed)?.row);
+    }
+    if summary.frames == 0 && reader.sensor_toml().is_none() {
+        return foreign(file);
+    }
+    let mut out = summary.text();
+    for (key, value) in reader.metadata() {
+        out.push_str(&format!("{key:<16} {value}\n"));
+    }
+    if !reader.is_complete() {
+        let name = file.display();
+        out.push_str(&format!("unfinished       `hzn run --resume` continues it, `hzn recover {name}` closes it\n"));
+    }
+    if reader.broken_chunks() > 0 {
+        out.push_str(&format!("damaged parts    {}\n", reader.broken_chunks()));
+    }
+    if let Some(Ok(sensor)) = reader.sensor_toml().map(|t| hzn_calib::sensor::parse(t, Path::new("sensor.toml"))) {
+        let c = sensor.config.camera;
+        out.push_str(&format!("camera           {} x {} px, {:?}\n", c.width, c.height, c.model));
+    }
+    Ok(out)
+}
+
+/// A recording of another program: its pictures.
+fn foreign(file: &Path) -> Result<String, Stop> {
+    let mut reader = hzn_mcap::ImageReader::open(file, None).map_err(failed)?;
+    let (mut count, mut span) = (0u64, None::<(f64, f64)>);
+    for image in reader.by_ref() {
+        let t = image.map_err(failed)?.time_s;
+        count += 1;
+        span = Some(span.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
+    }
+    let mut out = format!("no results of hzn in this recording\npictures         {count}\n");
+    if let (Some(topic), Some((a, b))) = (reader.topic(), span) {
+        out.push_str(&format!("topic            {topic}\ntime             {a:.3} to {b:.3} s\n"));
+    }
+    for topic in reader.other_topics() {
+        out.push_str(&format!("other topic      {topic}\n"));
+    }
+    Ok(out)
+}
+
+fn table(file: &Path, kind: &str) -> Result<String, Stop> {
+    let mut summary = Summary::default();
+    if kind == "csv" {
+        let header = csv::Reader::from_path(file).and_then(|mut r| r.headers().cloned()).map_err(failed)?;
+        if !header.iter().eq(Row::COLUMNS) {
+            let frames = hzn_calib::frames::load(file)?;
+            let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
+            return Ok(format!(
+                "frames.csv       {} pictures\nwith time        {}\nwith altitude    {}\nwith position    {}\nwith attitude    {}\n",
+                frames.rows.len(),
+                with(|r| r.time_s.is_some()),
+                with(|r| r.altitude_km.is_some()),
+                with(|r| r.position_km.is_some()),
+                with(|r| r.camera_to_ecef_wxyz.is_some())
+            ));
+        }
+    }
+    for row in super::export::rows(file, kind)? {
+        summary.add(&row?);
+    }
+    Ok(summary.text())
+}
+
+fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
+    if kind != "toml" {
+        return super::camera::describe(&hzn_core::Config::new(hzn_calib::camera_file::load(file, None)?));
+    }
+    super::camera::describe(&hzn_calib::sensor::load(file)?.config)
+}
+
+fn one_picture(file: &Path) -> Result<String, Stop> {
+    let named = |why: String| failed(format!("{}: {why}", file.display()));
+    let bytes = picture::read_file(file).map_err(named)?;
+    let p = picture::decode(&bytes, None).map_err(named)?;
+    let format = picture::format_of(&bytes).map(|f| format!("{f:?}").to_uppercase()).unwrap_or_default();
+    let l = p.layout;
+    let mut out =
+        format!("{format} picture of {} x {} px, {} channel(s) of {} bits\n", l.width, l.height, l.channels, l.bits);
+    if let Some(t) = p.exif_time_s {
+        out.push_str(&format!("EXIF time        {t:.3} s since 1970, taken as UTC\n"));
+    }
+    Ok(out)
+}
+
+/// Statistics of rows, with memory for four numbers a row.
+#[derive(Debug, Default)]
+struct Summary {
+    frames: u64,
+    statuses: BTreeMap<u8, u64>,
+    bodies: BTreeMap<String, u64>,
+    time: Option<(f64, f64)>,
+    sigma_deg: Vec<f64>,
+    rms_px: Vec<f64>,
+    elapsed_us: Vec<f64>,
+    altitude_km: Vec<f64>,
+}
+
+impl Summary {
+    fn add(&mut self, row: &Row) {
+        self.frames += 1;
+        *self.statuses.entry(row.status as u8).or_default() += 1;
+        *self.bodies.entry(row.body.clone()).or_default() += 1;
+        let t = row.time_s;
+        self.time = Some(self.time.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
+        self.sigma_deg.extend(row.sigma_max_deg);
+        self.rms_px.extend(row.rms_px);
+        self.elapsed_us.extend(row.elapsed_us);
+        self.altitude_km.extend(row.altitude_est_km);
+    }
+
+    fn text(self) -> String {
+        let mut out = format!("frames           {}\n", self.frames);
+        let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
+        if let Some((a, b)) = self.time {
+            line("time", format!("{a:.3} to {b:.3} s"));
+        }
+        line("body", self.bodies.keys().cloned().collect::<Vec<_>>().join(", "));
+        for status in Status::ALL {
+            if let Some(n) = self.statuses.get(&(status as u8)) {
+                line(status.name(), format!("{n} ({:.1} %)", 100.0 * *n as f64 / self.frames as f64));
+            }
+        }
+        for (name, unit, values) in [
+            ("sigma", "deg", self.sigma_deg),
+            ("RMS", "px", self.rms_px),
+            ("altitude found", "km", self.altitude_km),
+            ("processing", "us", self.elapsed_us),
+        ] {
+            if let Some([low, middle, high]) = percentiles(values) {
+                line(name, format!("{middle:.4} {unit} in the middle, {low:.4} to {high:.4} for 90 %"));
+            }
+        }
+        out
+    }
+}
+
+fn percentiles(mut values: Vec<f64>) -> Option<[f64; 3]> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some([0.05, 0.5, 0.95].map(|p| values[(p * last as f64).round() as usize]))
+}

@@ -1,0 +1,57 @@
+//! The commands, one file each.
+
+mod camera;
+mod completions;
+mod demo;
+mod explain;
+mod export;
+mod info;
+mod init;
+mod recover;
+mod run;
+
+use clap::{Parser, Subcommand};
+
+use crate::exit::Outcome;
+
+/// Finds the limb of a planet in pictures: the direction to the body, with an honest covariance.
+///
+/// Exit codes: 0 every frame was read and processed; 1 failed; 2 wrong usage or configuration; 3 finished, but some
+/// frames could not be read; 130 interrupted (the output is valid and can be continued with --resume).
+#[derive(Debug, Parser)]
+#[command(name = "hzn", version, max_term_width = 100)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Run(run::Args),
+    Explain(explain::Args),
+    Info(info::Args),
+    Export(export::Args),
+    Recover(recover::Args),
+    Init(init::Args),
+    Camera(camera::Args),
+    Completions(completions::Args),
+}
+
+/// Runs one command.
+///
+/// # Errors
+/// What went wrong, with the exit code that belongs to it.
+pub fn run(cli: Cli) -> Outcome {
+    match cli.command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Run(args) => run::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Recover(args) => recover::run(&args),
+        Command::Init(args) => init::run(&args),
+        Command::Camera(args) => camera::run(&args),
+        Command::Completions(args) => completions::run(&args),
+    }
+}

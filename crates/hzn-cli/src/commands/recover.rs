@@ -1,0 +1,72 @@
+//! `hzn recover`: what a crash left, closed.
+
+use std::path::{Path, PathBuf};
+
+use crate::exit::{Exit, Outcome, failed, usage};
+use crate::input::ending;
+use crate::output;
+
+/// Close a file that a crash left unfinished
+///
+/// Every finished frame is kept, what was cut off is dropped. To continue the run instead, use `hzn run --resume`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The unfinished file, such as out.mcap.part
+    file: PathBuf,
+    /// Name of the result; without it, the file's name without .part (or with .recovered, where there is none)
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Replace an output that exists
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let file = &args.file;
+    if !file.is_file() {
+        return Err(usage(format!("{}: no such file", file.display())));
+    }
+    let unfinished = ending(file) == "part";
+    let path = match &args.output {
+        Some(path) => path.clone(),
+        None if unfinished => file.with_extension(""),
+        None => {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+            file.with_file_name(format!("{stem}.recovered.{}", ending(file)))
+        }
+    };
+    let target = output::target(&path)?;
+    if path.exists() {
+        if !args.force {
+            return Err(usage(format!("{}: exists already; choose another name with -o, or --force", path.display())));
+        }
+        if path.canonicalize()? == file.canonicalize()? {
+            return Err(usage("the output must be another file than the input"));
+        }
+    }
+    let (frames, lost) = match target {
+        output::Target::Mcap => recording(file, &path)?,
+        target => output::recover_text(file, &path, target).map_err(|e| output::cannot(&path, &e))?,
+    };
+    let dropped = if lost > 0 { format!(", {lost} bytes of a frame that was cut off dropped") } else { String::new() };
+    eprintln!("{}: {frames} frames{dropped}", path.display());
+    if unfinished && args.output.is_none() && file.exists() {
+        // Its frames are in the new file, and beside that it would look like another unfinished run.
+        std::fs::remove_file(file)?;
+    }
+    Ok(Exit::Done)
+}
+
+fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> {
+    // The library never replaces a file; so the result is made beside it and then takes its name.
+    let beside = path.with_extension("recovering.mcap");
+    if beside.exists() {
+        std::fs::remove_file(&beside)?;
+    }
+    let found = hzn_mcap::recover(file, &beside).map_err(failed)?;
+    std::fs::rename(&beside, path)?;
+    if found.broken_chunks > 0 {
+        eprintln!("warning: {} damaged parts were left out; their frames are missing", found.broken_chunks);
+    }
+    Ok((found.frames, found.dropped_bytes))
+}

@@ -1,0 +1,184 @@
+//! `hzn run`: a sequence, from pictures to results.
+
+use std::path::{Path, PathBuf};
+
+use hzn_calib::Frames;
+use hzn_core::status::Status;
+
+use crate::engine::{self, End, Finished, Plan};
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::input::Source;
+use crate::output::{self, Existing, Held, Output};
+use crate::progress::Progress;
+use crate::setup::{InputArgs, SensorArgs, need_altitude, stop_flag};
+
+/// Process a sequence of pictures
+///
+/// Pictures are PNG, JPEG, TIFF, PNM or BMP, in a folder, as a pattern, or one by one; or headerless (--raw); or a
+/// video (through ffmpeg on PATH); or an MCAP with an image topic. Those of a folder are taken in the order of their
+/// names. A picture that cannot be read becomes a row with status `unreadable`; the run goes on.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// A folder, a pattern in quotes, pictures, a video, or an MCAP
+    #[arg(required = true, value_name = "INPUT")]
+    input: Vec<PathBuf>,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    source: InputArgs,
+    /// Results: .mcap, .csv or .jsonl; without it, CSV on stdout
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Replace an output that exists
+    #[arg(long)]
+    force: bool,
+    /// Continue an output after its last finished frame
+    #[arg(long, conflicts_with = "force", requires = "output")]
+    resume: bool,
+    /// Leave the pictures out of an MCAP
+    #[arg(long)]
+    no_images: bool,
+    /// Draw what was found over every picture, as PNG into this folder
+    #[arg(long, value_name = "DIR")]
+    overlay: Option<PathBuf>,
+    /// Threads; without it, all cores
+    #[arg(short, long, value_name = "N")]
+    jobs: Option<std::num::NonZeroUsize>,
+    /// No progress and no summary
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+impl Args {
+    /// A folder with its own sensor.toml into `output`, replacing it, without a word.
+    pub(super) fn quietly(folder: &Path, output: &Path) -> Self {
+        Self {
+            input: vec![folder.to_owned()],
+            sensor: SensorArgs { sensor: None, altitude_km: None, flight: false },
+            source: InputArgs { frames: None, fps: 1.0, raw: None, topic: None },
+            output: Some(output.to_owned()),
+            force: true,
+            resume: false,
+            no_images: false,
+            overlay: None,
+            jobs: None,
+            quiet: true,
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if let Some(path) = &args.output {
+        output::target(path)?;
+    }
+    let mut source = args.source.open(&args.input)?;
+    let folder = source.folder();
+    let sensor = args.sensor.load(&folder)?;
+    let frames = args.source.frames(&folder, &sensor, args.sensor.flight)?;
+    need_altitude(&sensor, frames.as_ref())?;
+    // Not for one picture of many, whose table names all the others.
+    if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
+        warn_of_missing(frames, &folder, args.source.raw.is_some());
+    }
+    if let Some(folder) = &args.overlay {
+        std::fs::create_dir_all(folder).map_err(|e| output::cannot(folder, &e))?;
+    }
+    let existing = match (args.force, args.resume) {
+        (true, _) => Existing::Replace,
+        (_, true) => Existing::Resume,
+        _ => Existing::Refuse,
+    };
+    let path = args.output.as_deref();
+    let (mut output, held) = output::open(path, existing, &sensor.config, &sensor.text)?;
+    let trace = Output::wants_trace(path);
+    let plan = Plan {
+        config: sensor.config,
+        flight: args.sensor.flight,
+        threads: args.jobs.map_or_else(cores, Into::into),
+        frames,
+        fps: args.source.fps,
+        trace,
+        keep_picture: trace && !args.no_images,
+        overlay: args.overlay.clone(),
+    };
+    if !args.quiet {
+        source.notes().iter().for_each(|note| eprintln!("note: {note}"));
+    }
+    let total = source.len();
+    if let Err(stop) = skip(source.as_mut(), &held, path) {
+        // The output keeps what it has, under its name.
+        output.finish()?;
+        return Err(stop);
+    }
+    let mut progress = Progress::new(total, held.frames, args.quiet);
+    let stop = stop_flag();
+    let mut seen = |frame: &Finished| {
+        let status = frame.report.as_ref().map_or(Status::Unreadable, |r| r.status);
+        if let (Err(why), false) = (&frame.report, args.quiet) {
+            progress.say(&format!("unreadable: {}: {why}", frame.name));
+        }
+        progress.count(status);
+    };
+    let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut seen);
+    let summary = progress.summary();
+    let end = end?;
+    output.finish()?;
+    if !args.quiet {
+        let before = match held.frames {
+            0 => String::new(),
+            n => format!(" (after {n} that were finished before)"),
+        };
+        eprintln!("{summary}{before}");
+    }
+    let done = held.frames + progress.frames();
+    if end == End::Interrupted && total.is_none_or(|n| done < n) {
+        let of = total.map(|n| format!(" of {n}")).unwrap_or_default();
+        let next = match path {
+            Some(path) => format!("; {} is valid, and --resume continues it", path.display()),
+            None => String::new(),
+        };
+        eprintln!("interrupted after {done}{of} frames{next}");
+        return Ok(Exit::Interrupted);
+    }
+    Ok(if progress.of(Status::Unreadable) > 0 { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+pub(super) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, Into::into)
+}
+
+/// Passes over the frames that the output holds already.
+fn skip(source: &mut dyn Source, held: &Held, path: Option<&Path>) -> Result<(), Stop> {
+    let mut last = None;
+    let name = path.map(|p| p.display().to_string()).unwrap_or_default();
+    for n in 0..held.frames {
+        match source.next() {
+            Some(item) => last = Some(item?.name),
+            None => {
+                let what = format!("holds {} frames, but the input has only {n}: another input?", held.frames);
+                return Err(usage(format!("{name}: {what}")));
+            }
+        }
+    }
+    match (&last, &held.last) {
+        (Some(here), Some(there)) if here != there => {
+            let what = format!("its last frame is {there}, but the input has {here} in that place");
+            Err(usage(format!("{name}: {what}: another input? --force starts over")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn warn_of_missing(frames: &Frames, folder: &Path, raw: bool) {
+    for row in frames.rows.iter().filter(|r| !folder.join(&r.file).exists()) {
+        eprintln!("warning: {}", frames.problem(row, "no such picture in the folder; the row is not used"));
+    }
+    let Ok(list) = std::fs::read_dir(folder) else { return };
+    let names: Vec<String> = list.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    let picture = |n: &&String| !raw && image::ImageFormat::from_path(n).is_ok() && frames.get(n).is_none();
+    let without = names.iter().filter(picture).count();
+    if without > 0 {
+        let what = format!("{without} pictures have no row here; the defaults of sensor.toml are used");
+        eprintln!("warning: {}: {what}", frames.path.display());
+    }
+}

@@ -1,0 +1,278 @@
+//! The run over a sequence: all cores, results in order, a bounded number of frames in memory.
+//!
+//! ```text
+//!   source ──► jobs ──► N threads (decode, process, draw) ──► results ──► put in order ──► sink
+//!      ▲                                                                       │
+//!      └───────────────────────── tickets (a fixed number) ◄───────────────────┘
+//! ```
+//!
+//! The source is read only while a ticket is free, and a ticket comes back when its frame is written: so memory does
+//! not grow with the sequence, however slow one frame or the disk is.
+
+mod sensor;
+pub mod trace;
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{RecvTimeoutError, bounded};
+use hzn_calib::Frames;
+use hzn_core::{Config, Report};
+
+pub use sensor::{AnySensor, on_large_stack, prepare};
+pub use trace::Trace;
+
+use crate::input::{Item, Picture, Source};
+
+/// What a run does with every frame.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The sensor.
+    pub config: Config,
+    /// Single precision and 2048 points, as on the flight computer.
+    pub flight: bool,
+    /// Threads.
+    pub threads: usize,
+    /// What frames.csv knows.
+    pub frames: Option<Frames>,
+    /// Frames a second, where nothing else gives a time.
+    pub fps: f64,
+    /// Collect edges and points of every candidate.
+    pub trace: bool,
+    /// Hand the picture to the sink.
+    pub keep_picture: bool,
+    /// Draw an overlay of every frame into this folder.
+    pub overlay: Option<std::path::PathBuf>,
+}
+
+/// One frame, finished.
+#[derive(Debug)]
+pub struct Finished {
+    /// Place in the sequence, from 0.
+    pub index: u64,
+    /// Name of the picture.
+    pub name: String,
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Altitude that was given for this frame (frames.csv or sensor.toml), kilometres.
+    pub altitude_km: Option<f64>,
+    /// Position in ECEF, kilometres.
+    pub position_km: Option<[f64; 3]>,
+    /// Prior attitude, camera to ECEF, scalar first.
+    pub camera_to_ecef_wxyz: Option<[f64; 4]>,
+    /// The answer, or why the picture could not be read.
+    pub report: Result<Report<f64>, String>,
+    /// Time of processing, decoding not included.
+    pub elapsed: Duration,
+    /// Edges and points, when they were asked for.
+    pub trace: Option<Trace>,
+    /// The picture as PNG or JPEG, when it was asked for.
+    pub picture: Option<Vec<u8>>,
+}
+
+/// Where finished frames go, in order.
+pub trait Sink {
+    /// Takes one frame.
+    ///
+    /// # Errors
+    /// It could not be written; the run ends.
+    fn write(&mut self, frame: &Finished) -> anyhow::Result<()>;
+    /// Makes everything written so far safe from a crash of this program.
+    ///
+    /// # Errors
+    /// As for `write`.
+    fn flush(&mut self) -> anyhow::Result<()>;
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// All frames are through.
+    Complete,
+    /// It was asked to stop; every frame that was begun is written.
+    Interrupted,
+}
+
+/// At least this often, what is written is flushed.
+const FLUSH_EVERY: Duration = Duration::from_millis(200);
+
+struct Job {
+    index: u64,
+    item: Item,
+}
+
+/// Runs the sequence from frame `first` on (frames before it have been skipped by the caller).
+///
+/// # Errors
+/// The sink cannot be written, the source breaks off, or an overlay cannot be written. Frames written before stay.
+pub fn run(
+    plan: &Plan,
+    source: &mut dyn Source,
+    first: u64,
+    stop: &AtomicBool,
+    sink: &mut dyn Sink,
+    seen: &mut dyn FnMut(&Finished),
+) -> anyhow::Result<End> {
+    let threads = plan.threads.max(1);
+    let window = 2 * threads + 2;
+    let (job_in, job_out) = bounded::<Job>(window);
+    let (result_in, result_out) = bounded::<anyhow::Result<Finished>>(window);
+    let (ticket_in, ticket_out) = bounded::<()>(window);
+    for _ in 0..window {
+        ticket_in.send(())?;
+    }
+    // Set when the writer gives up, so that the source ends too.
+    let give_up = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let stopped = || stop.load(Ordering::Relaxed) || give_up.load(Ordering::Relaxed);
+        let source_end = scope.spawn(move || {
+            for index in first.. {
+                if ticket_out.recv().is_err() || stopped() {
+                    break;
+                }
+                match source.next() {
+                    None => break,
+                    Some(Err(e)) => return Err(e),
+                    Some(Ok(item)) => {
+                        if job_in.send(Job { index, item }).is_err() {
+                            break;
+                        }
+                    }
+                }
+            }
+            Ok(())
+        });
+        for _ in 0..threads {
+            let (jobs, results) = (job_out.clone(), result_in.clone());
+            // The sensor's lists are large and are made on the stack before they are boxed.
+            let thread = std::thread::Builder::new().stack_size(sensor::STACK_BYTES);
+            thread.spawn_scoped(scope, move || {
+                let mut sensor = match AnySensor::new(&plan.config, plan.flight) {
+                    Ok(sensor) => sensor,
+                    Err(e) => return drop(results.send(Err(e.into()))),
+                };
+                for job in jobs {
+                    if results.send(process(plan, &mut sensor, job)).is_err() {
+                        return;
+                    }
+                }
+            })?;
+        }
+        drop((job_out, result_in));
+        let written = write_in_order(first, &result_out, &ticket_in, sink, seen);
+        if written.is_err() {
+            give_up.store(true, Ordering::Relaxed);
+        }
+        // The threads see that nobody listens any more.
+        drop((result_out, ticket_in));
+        let read = source_end.join().unwrap_or_else(|_| Err(anyhow::anyhow!("reading the input failed")));
+        written?;
+        read?;
+        Ok(if stop.load(Ordering::Relaxed) { End::Interrupted } else { End::Complete })
+    })
+}
+
+fn write_in_order(
+    first: u64,
+    results: &crossbeam_channel::Receiver<anyhow::Result<Finished>>,
+    tickets: &crossbeam_channel::Sender<()>,
+    sink: &mut dyn Sink,
+    seen: &mut dyn FnMut(&Finished),
+) -> anyhow::Result<()> {
+    let mut next = first;
+    let mut waiting = BTreeMap::new();
+    let mut flush_at: Option<Instant> = None;
+    loop {
+        let received = match flush_at {
+            Some(at) => results.recv_deadline(at),
+            None => results.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        };
+        match received {
+            Ok(result) => {
+                let frame = result.inspect_err(|_| {
+                    // What is written so far must survive the error.
+                    let _ = sink.flush();
+                })?;
+                waiting.insert(frame.index, frame);
+                while let Some(frame) = waiting.remove(&next) {
+                    sink.write(&frame)?;
+                    seen(&frame);
+                    next += 1;
+                    flush_at.get_or_insert_with(|| Instant::now() + FLUSH_EVERY);
+                    // The source may be gone already; it then needs no ticket.
+                    let _ = tickets.try_send(());
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return sink.flush(),
+        }
+        if flush_at.is_some_and(|at| Instant::now() >= at) {
+            sink.flush()?;
+            flush_at = None;
+        }
+    }
+}
+
+/// Decodes and processes one frame.
+fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
+    let Job { index, item } = job;
+    let data = plan.frames.as_ref().and_then(|f| f.get(&item.name));
+    let altitude_km = data.and_then(|d| d.altitude_km).or(plan.config.body.altitude_km);
+    let size = (u32::from(plan.config.camera.width), u32::from(plan.config.camera.height));
+    let decoded = item.payload.decode(Some(size));
+    let exif = decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
+    let time_s = data.and_then(|d| d.time_s).or(item.time_s).or(exif).unwrap_or(index as f64 / plan.fps);
+    let mut finished = Finished {
+        index,
+        name: item.name,
+        time_s,
+        altitude_km,
+        position_km: data.and_then(|d| d.position_km),
+        camera_to_ecef_wxyz: data.and_then(|d| d.camera_to_ecef_wxyz),
+        report: Err(String::new()),
+        elapsed: Duration::ZERO,
+        trace: None,
+        picture: None,
+    };
+    let (picture, original) = match decoded {
+        Ok(decoded) => decoded,
+        Err(why) => return Ok(Finished { report: Err(why), ..finished }),
+    };
+    let trace = (plan.trace || plan.overlay.is_some()).then(Trace::default);
+    let view = match picture.view(plan.config.input.channel) {
+        Ok(view) => view,
+        Err(why) => return Ok(Finished { report: Err(format!("{why} (input.channel in sensor.toml)")), ..finished }),
+    };
+    let start = Instant::now();
+    finished.report = match sensor.process(&view, data, trace.as_ref()) {
+        Ok(report) => Ok(report),
+        // Rows of frames.csv were checked before the run: only a missing altitude comes this far.
+        Err(why) => return Err(anyhow::anyhow!("{}: {why}", finished.name)),
+    };
+    finished.elapsed = start.elapsed();
+    if let (Some(folder), Some(trace), Ok(report)) = (&plan.overlay, &trace, &finished.report) {
+        draw(folder, &finished.name, &picture, sensor, trace, report)?;
+    }
+    finished.trace = trace.filter(|_| plan.trace);
+    if plan.keep_picture {
+        finished.picture = match original {
+            Some(bytes) => Some(bytes),
+            None => Some(picture.to_png().map_err(|e| anyhow::anyhow!("{}: {e}", finished.name))?),
+        };
+    }
+    Ok(finished)
+}
+
+fn draw(
+    folder: &std::path::Path,
+    name: &str,
+    picture: &Picture,
+    sensor: &AnySensor,
+    trace: &Trace,
+    report: &Report<f64>,
+) -> anyhow::Result<()> {
+    let path = folder.join(crate::overlay::file_name(name));
+    let image = crate::overlay::draw(picture, sensor.camera(), trace, report);
+    crate::overlay::save(&image, &path)
+}

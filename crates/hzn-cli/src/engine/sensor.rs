@@ -1,0 +1,172 @@
+//! The sensor of the workstation or of the flight computer, behind one face that speaks f64.
+
+use hzn_calib::{FrameData, Frames, Problem};
+use hzn_core::body::FrameError;
+use hzn_core::camera::Camera;
+use hzn_core::error::ConfigError;
+use hzn_core::frames::{Cov3, UnitVec3};
+use hzn_core::image::ImageView;
+use hzn_core::pipeline::Candidate;
+use hzn_core::real::Real;
+use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report, Solution};
+
+use super::Trace;
+
+/// Stack of a thread that makes a sensor: its lists pass over the stack on their way to the heap.
+pub(super) const STACK_BYTES: usize = 64 << 20;
+
+enum Kind {
+    Host(Box<HostHorizon>),
+    Flight(Box<FlightHorizon>),
+}
+
+/// A sensor of either precision.
+pub struct AnySensor {
+    kind: Kind,
+    /// The lens in f64, for drawing.
+    camera: Camera<f64>,
+}
+
+impl AnySensor {
+    /// Makes the sensor. Call it on a large stack ([`on_large_stack`]).
+    ///
+    /// # Errors
+    /// The first field out of its limits.
+    pub fn new(config: &Config, flight: bool) -> Result<Self, ConfigError> {
+        let camera = Camera::try_new(&config.camera)?;
+        let kind = if flight {
+            Kind::Flight(Box::new(FlightHorizon::new(config)?))
+        } else {
+            Kind::Host(Box::new(HostHorizon::new(config)?))
+        };
+        Ok(Self { kind, camera })
+    }
+
+    /// The lens.
+    pub fn camera(&self) -> &Camera<f64> {
+        &self.camera
+    }
+
+    /// Half-angle in radians that is expected for a frame.
+    ///
+    /// # Errors
+    /// An altitude or position that cannot be.
+    pub fn expected_half_angle_rad(&self, data: Option<&FrameData>) -> Result<f64, FrameError> {
+        match &self.kind {
+            Kind::Host(h) => Ok(h.expect(&frame(data))?.half_angle_rad()),
+            Kind::Flight(h) => Ok(f64::from(h.expect(&frame(data))?.half_angle_rad())),
+        }
+    }
+
+    /// Processes one picture.
+    ///
+    /// # Errors
+    /// An altitude or position that cannot be.
+    pub fn process(
+        &mut self,
+        view: &ImageView<'_>,
+        data: Option<&FrameData>,
+        trace: Option<&Trace>,
+    ) -> Result<Report<f64>, FrameError> {
+        match &mut self.kind {
+            Kind::Host(h) => run(h, view, data, trace),
+            Kind::Flight(h) => run(h, view, data, trace).map(|r| widen(&r)),
+        }
+    }
+}
+
+fn frame<T: Real>(data: Option<&FrameData>) -> Frame<T> {
+    data.map(|d| d.to_frame(None)).unwrap_or_default()
+}
+
+fn run<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+    horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
+    view: &ImageView<'_>,
+    data: Option<&FrameData>,
+    trace: Option<&Trace>,
+) -> Result<Report<T>, FrameError> {
+    let expected = horizon.expect(&frame(data))?;
+    // Each kind of picture has its own compiled pipeline; behind the enum every pixel would cost a branch.
+    macro_rules! observed {
+        ($observer:expr) => {
+            match view {
+                ImageView::Grey8(p) => horizon.process_observed(p, &expected, $observer),
+                ImageView::Grey16(p) => horizon.process_observed(p, &expected, $observer),
+                ImageView::Colour8(p) => horizon.process_observed(p, &expected, $observer),
+                ImageView::Colour16(p) => horizon.process_observed(p, &expected, $observer),
+            }
+        };
+    }
+    Ok(match trace {
+        Some(trace) => observed!(trace),
+        None => observed!(&hzn_core::pipeline::Unobserved),
+    })
+}
+
+/// A report in f64.
+fn widen<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
+    Report {
+        status: r.status,
+        stage: r.stage,
+        level: r.level,
+        counters: r.counters,
+        candidates: r.candidates.iter().map(widen_candidate).collect(),
+        solution: r.solution.as_ref().and_then(widen_solution),
+    }
+}
+
+pub(super) fn widen_candidate<T: Real + Into<f64>>(c: &Candidate<T>) -> Candidate<f64> {
+    Candidate {
+        length_px: c.length_px,
+        points: c.points,
+        inliers: c.inliers,
+        rms_px: c.rms_px.into(),
+        verdict: c.verdict,
+    }
+}
+
+pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Solution<f64>> {
+    let [xx, xy, xz] = s.covariance.rows()[0].map(Into::into);
+    let [_, yy, yz] = s.covariance.rows()[1].map(Into::into);
+    let zz = s.covariance.rows()[2][2].into();
+    Some(Solution {
+        axis: UnitVec3::try_new(s.axis.xyz().map(Into::into))?,
+        covariance: Cov3::from_upper([xx, xy, xz, yy, yz, zz]),
+        axis_ecef: s.axis_ecef.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
+        axis_body: s.axis_body.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
+        half_angle_rad: s.half_angle_rad.into(),
+        fused_half_angle_rad: s.fused_half_angle_rad.into(),
+        altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),
+        rms_px: s.rms_px.into(),
+        inliers: s.inliers,
+        arc_px: s.arc_px.into(),
+        candidate: s.candidate,
+    })
+}
+
+/// Runs `work` on a stack that is large enough to make a sensor.
+///
+/// # Errors
+/// The thread could not be started.
+pub fn on_large_stack<R: Send>(work: impl FnOnce() -> R + Send) -> std::io::Result<R> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work)?;
+        thread.join().map_err(|_| std::io::Error::other("a thread ended unexpectedly"))
+    })
+}
+
+/// Checks a sensor, and every row of frames.csv against it, before the first frame is processed.
+///
+/// # Errors
+/// The row, the picture and the column that cannot be.
+pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result<(), Problem> {
+    let Some(frames) = frames else { return Ok(()) };
+    let check = || {
+        let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
+        for row in &frames.rows {
+            sensor.expected_half_angle_rad(Some(row)).map_err(|why| frames.problem(row, why))?;
+        }
+        Ok(())
+    };
+    on_large_stack(check).unwrap_or(Ok(()))
+}

@@ -1,0 +1,115 @@
+//! Everything that the pipeline shows of itself while it works on one picture.
+
+use std::cell::{Cell, RefCell};
+use std::time::{Duration, Instant};
+
+use hzn_core::pipeline::Candidate;
+use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::real::Real;
+use hzn_core::status::Stage;
+use hzn_core::{Observer, Solution};
+
+use super::sensor::{widen_candidate, widen_solution};
+
+/// One candidate edge.
+#[derive(Debug, Clone, Default)]
+pub struct Edge {
+    /// Its number.
+    pub candidate: u32,
+    /// Border pixels, every `stride`-th, in order.
+    pub border: Vec<Pixel>,
+    /// Step between two of them along the edge.
+    pub stride: u32,
+    /// Sub-pixel points (u, v) in pixels.
+    pub points: Vec<[f64; 2]>,
+    /// Weights of those points after the fit, 0 rejected; empty when there was no fit.
+    pub weights: Vec<f64>,
+    /// What became of it.
+    pub outcome: Option<Candidate<f64>>,
+    /// Its own fit, when there was one.
+    pub solution: Option<Solution<f64>>,
+}
+
+/// A record of one picture. Filled through [`Observer`], read when the picture is through.
+#[derive(Debug, Clone, Default)]
+pub struct Trace {
+    edges: RefCell<Vec<Edge>>,
+    level: Cell<Option<(u16, f64, u32)>>,
+    times: Cell<[Duration; 8]>,
+    running: Cell<Option<(Stage, Instant)>>,
+}
+
+impl Trace {
+    /// Candidates in the order in which they were followed.
+    pub fn edges(&self) -> std::cell::Ref<'_, Vec<Edge>> {
+        self.edges.borrow()
+    }
+    /// Level in counts, with the mean and the number of pixels of the sample.
+    pub fn level(&self) -> Option<(u16, f64, u32)> {
+        self.level.get()
+    }
+    /// Time spent in every stage.
+    pub fn times(&self) -> [(Stage, Duration); 8] {
+        let times = self.times.get();
+        std::array::from_fn(|i| (Stage::ALL[i], times[i]))
+    }
+
+    fn with(&self, candidate: u32, change: impl FnOnce(&mut Edge)) {
+        let mut edges = self.edges.borrow_mut();
+        let at = match edges.iter().rposition(|e| e.candidate == candidate) {
+            Some(at) => at,
+            None => {
+                edges.push(Edge { candidate, stride: 1, ..Edge::default() });
+                edges.len() - 1
+            }
+        };
+        if let Some(edge) = edges.get_mut(at) {
+            change(edge);
+        }
+    }
+
+    fn switch(&self, next: Option<Stage>) {
+        let now = Instant::now();
+        if let Some((stage, since)) = self.running.get() {
+            let mut times = self.times.get();
+            times[stage as usize] += now - since;
+            self.times.set(times);
+        }
+        self.running.set(next.map(|stage| (stage, now)));
+    }
+}
+
+impl<T: Real + Into<f64>> Observer<T> for Trace {
+    fn enter(&self, stage: Stage) {
+        self.switch(Some(stage));
+    }
+    fn leave(&self) {
+        self.switch(None);
+    }
+    fn level(&self, level: u16, mean: T, samples: u32) {
+        self.level.set(Some((level, mean.into(), samples)));
+    }
+    fn edge(&self, candidate: u32, border: &[Pixel], stride: u32) {
+        self.with(candidate, |e| {
+            e.border = border.to_vec();
+            e.stride = stride;
+        });
+    }
+    fn point(&self, candidate: u32, point: ImagePoint<T>) {
+        self.with(candidate, |e| e.points.push([point.u.into(), point.v.into()]));
+    }
+    fn weight(&self, candidate: u32, point: u32, weight: T) {
+        self.with(candidate, |e| {
+            e.weights.resize(e.points.len(), 0.0);
+            if let Some(slot) = e.weights.get_mut(point as usize) {
+                *slot = weight.into();
+            }
+        });
+    }
+    fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
+        self.with(candidate, |e| {
+            e.outcome = Some(widen_candidate(outcome));
+            e.solution = solution.and_then(widen_solution);
+        });
+    }
+}

@@ -1,0 +1,67 @@
+//! How a run ends: the exit code, and an error with the code that belongs to it.
+
+use std::process::ExitCode;
+
+use hzn_calib::Problem;
+
+/// Exit codes. The numbers are fixed: scripts rely on them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// Every frame was read and processed.
+    Done = 0,
+    /// Something failed on the way: a disk, a file that is broken.
+    Failed = 1,
+    /// The command line or a configuration is wrong; nothing was done.
+    Usage = 2,
+    /// Finished, but some frames could not be read.
+    SomeUnreadable = 3,
+    /// Interrupted; what was written is valid and can be continued.
+    Interrupted = 130,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// An error with its exit code.
+#[derive(Debug)]
+pub struct Stop {
+    /// The code.
+    pub exit: Exit,
+    /// What went wrong and what to do.
+    pub error: anyhow::Error,
+}
+
+/// What a command comes to.
+pub type Outcome = Result<Exit, Stop>;
+
+impl From<anyhow::Error> for Stop {
+    fn from(error: anyhow::Error) -> Self {
+        Self { exit: Exit::Failed, error }
+    }
+}
+
+impl From<std::io::Error> for Stop {
+    fn from(error: std::io::Error) -> Self {
+        Self { exit: Exit::Failed, error: error.into() }
+    }
+}
+
+impl From<Problem> for Stop {
+    fn from(problem: Problem) -> Self {
+        Self { exit: Exit::Usage, error: problem.into() }
+    }
+}
+
+/// A wrong command line or configuration.
+pub fn usage(message: impl std::fmt::Display) -> Stop {
+    Stop { exit: Exit::Usage, error: anyhow::anyhow!("{message}") }
+}
+
+/// Something that failed.
+pub fn failed(message: impl std::fmt::Display) -> Stop {
+    Stop { exit: Exit::Failed, error: anyhow::anyhow!("{message}") }
+}

@@ -1,0 +1,119 @@
+//! Pictures that are files of their own: a folder, a glob, or a list.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::{Item, Payload, Raw, Source, ending, video};
+use crate::exit::{Stop, usage};
+
+/// Endings of pictures that are read.
+const PICTURES: &[&str] = &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp"];
+/// Endings of files that lie beside pictures and are none.
+const COMPANIONS: &[&str] = &["csv", "toml", "txt", "md", "json", "jsonl", "yaml", "yml", "xml", "log", "mcap", "part"];
+
+pub(super) struct Files {
+    paths: std::vec::IntoIter<PathBuf>,
+    total: u64,
+    folder: PathBuf,
+    raw: Option<Raw>,
+    /// Names are given with their folder, because the files lie in several.
+    with_folder: bool,
+    left_out: BTreeMap<String, usize>,
+}
+
+impl Files {
+    pub(super) fn open(inputs: &[PathBuf], raw: Option<Raw>) -> Result<Self, Stop> {
+        let mut left_out = BTreeMap::new();
+        let mut paths = Vec::new();
+        let mut folder = None;
+        for input in inputs {
+            let text = input.to_string_lossy();
+            if input.is_dir() {
+                if inputs.len() > 1 {
+                    return Err(usage(format!(
+                        "{text}: a folder is a sequence of its own; give one folder, or only files"
+                    )));
+                }
+                folder = Some(input.clone());
+                paths.extend(in_folder(input, raw.is_some(), &mut left_out)?);
+            } else if input.exists() {
+                if inputs.len() > 1 && (ending(input) == "mcap" || video::ENDINGS.contains(&ending(input).as_str())) {
+                    return Err(usage(format!("{text}: a video or recording is a sequence of its own; give it alone")));
+                }
+                paths.push(input.clone());
+            } else if text.contains(['*', '?', '[']) {
+                let matches = glob::glob(&text).map_err(|e| usage(format!("{text}: not a valid pattern: {e}")))?;
+                let mut found: Vec<PathBuf> = matches.flatten().filter(|p| p.is_file()).collect();
+                if found.is_empty() {
+                    return Err(usage(format!("{text}: no file matches")));
+                }
+                found.sort();
+                paths.extend(found);
+            } else {
+                return Err(usage(format!("{text}: no such file or folder")));
+            }
+        }
+        if paths.is_empty() {
+            let what = if raw.is_some() { "no headerless files" } else { "no pictures (PNG, JPEG, TIFF, PNM, BMP)" };
+            let hint = match left_out.keys().next() {
+                Some(e) => {
+                    format!("; there are files ending in .{e}: convert them, or use --raw if they are headerless")
+                }
+                None => String::new(),
+            };
+            let name = inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
+            return Err(usage(format!("{name}: {what} in this folder{hint}")));
+        }
+        let parent = |p: &PathBuf| p.parent().map(Path::to_owned).unwrap_or_default();
+        let first = paths.first().map(parent).unwrap_or_default();
+        let with_folder = paths.iter().any(|p| parent(p) != first);
+        let folder = folder.unwrap_or(first);
+        Ok(Self { total: paths.len() as u64, paths: paths.into_iter(), folder, raw, with_folder, left_out })
+    }
+}
+
+fn in_folder(folder: &Path, raw: bool, left_out: &mut BTreeMap<String, usize>) -> Result<Vec<PathBuf>, Stop> {
+    let list = std::fs::read_dir(folder).map_err(|e| usage(format!("{}: cannot be listed: {e}", folder.display())))?;
+    let mut paths: Vec<PathBuf> = list.flatten().map(|e| e.path()).filter(|p| p.is_file()).collect();
+    paths.retain(|p| {
+        let e = ending(p);
+        let hidden = p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
+        let (picture, companion) = (PICTURES.contains(&e.as_str()), COMPANIONS.contains(&e.as_str()) || hidden);
+        let take = if raw { !picture && !companion } else { picture };
+        if !take && !companion {
+            *left_out.entry(e).or_default() += 1;
+        }
+        take
+    });
+    // By name, so that the order does not depend on the file system.
+    paths.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
+    Ok(paths)
+}
+
+impl Source for Files {
+    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+        let path = self.paths.next()?;
+        let name = match path.file_name() {
+            Some(name) if !self.with_folder => name.to_string_lossy().into_owned(),
+            _ => path.to_string_lossy().into_owned(),
+        };
+        let payload = match self.raw {
+            Some(raw) => Payload::RawFile(path, raw),
+            None => Payload::File(path),
+        };
+        Some(Ok(Item { name, time_s: None, payload }))
+    }
+    fn len(&self) -> Option<u64> {
+        Some(self.total)
+    }
+    fn folder(&self) -> PathBuf {
+        self.folder.clone()
+    }
+    fn notes(&self) -> Vec<String> {
+        let note = |(ending, n): (&String, &usize)| {
+            let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };
+            format!("{n} file{} {name} left out", if *n == 1 { "" } else { "s" })
+        };
+        self.left_out.iter().map(note).collect()
+    }
+}

@@ -1,0 +1,111 @@
+//! Where pictures come from: folders, globs, single files, headerless raw, video, MCAP.
+//!
+//! A [`Source`] hands out [`Item`]s in the sequence's order without decoding them; decoding is left to the threads.
+
+mod exif;
+mod files;
+pub mod picture;
+pub mod raw;
+mod recording;
+mod video;
+
+use std::path::{Path, PathBuf};
+
+pub use picture::Picture;
+pub use raw::Raw;
+
+use crate::exit::Stop;
+
+/// One frame before it is decoded.
+#[derive(Debug)]
+pub struct Item {
+    /// Its name in results and in frames.csv.
+    pub name: String,
+    /// Time from the container (video, MCAP) in seconds.
+    pub time_s: Option<f64>,
+    /// The picture.
+    pub payload: Payload,
+}
+
+/// A picture on its way to a thread.
+#[derive(Debug)]
+pub enum Payload {
+    /// A picture file.
+    File(PathBuf),
+    /// A headerless file.
+    RawFile(PathBuf, Raw),
+    /// A file's contents, from a container.
+    Encoded(Vec<u8>),
+    /// Decoded already.
+    Decoded(Picture),
+    /// Lost on the way: the reason.
+    Broken(String),
+}
+
+/// Frames in order.
+pub trait Source: Send {
+    /// The next frame; `None` at the end. An error ends the sequence.
+    fn next(&mut self) -> Option<anyhow::Result<Item>>;
+    /// Number of frames, when it is known before.
+    fn len(&self) -> Option<u64>;
+    /// Folder in which frames.csv and sensor.toml may lie.
+    fn folder(&self) -> PathBuf;
+    /// Things that the user should know, such as files left out.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+impl Payload {
+    /// The picture, decoded, and the file's own bytes where they are PNG or JPEG and can be kept as they are.
+    ///
+    /// # Errors
+    /// Why it cannot be read, for the record of the frame.
+    pub fn decode(self, expected: Option<(u32, u32)>) -> Result<(Picture, Option<Vec<u8>>), String> {
+        let encoded = |bytes: Vec<u8>| {
+            let picture = picture::decode(&bytes, expected)?;
+            let keep = matches!(picture::format_of(&bytes), Some(image::ImageFormat::Png | image::ImageFormat::Jpeg));
+            Ok((picture, keep.then_some(bytes)))
+        };
+        let sized = |picture: Picture| {
+            picture::check_size(picture.layout.width, picture.layout.height, expected)?;
+            Ok((picture, None))
+        };
+        match self {
+            Self::File(path) => encoded(picture::read_file(&path)?),
+            Self::Encoded(bytes) if bytes.is_empty() => Err("message without picture data".into()),
+            Self::Encoded(bytes) => encoded(bytes),
+            Self::RawFile(path, raw) => sized(raw.decode(&picture::read_file(&path)?)?),
+            Self::Decoded(picture) => sized(picture),
+            Self::Broken(why) => Err(why),
+        }
+    }
+}
+
+/// Opens whatever the arguments name. `topic` chooses among the topics of an MCAP.
+///
+/// # Errors
+/// Nothing there, nothing that is known, or a mixture that has no order.
+pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result<Box<dyn Source>, Stop> {
+    if let [one] = inputs
+        && raw.is_none()
+        && one.is_file()
+    {
+        match ending(one).as_str() {
+            "mcap" => return Ok(Box::new(recording::Recording::open(one, topic)?)),
+            e if video::ENDINGS.contains(&e) => return Ok(Box::new(video::Video::open(one)?)),
+            _ => {}
+        }
+    }
+    Ok(Box::new(files::Files::open(inputs, raw)?))
+}
+
+/// The picture of a recorded message.
+pub fn recorded(image: hzn_mcap::EncodedImage) -> Payload {
+    recording::payload(image)
+}
+
+/// The file's ending in small letters.
+pub(crate) fn ending(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}

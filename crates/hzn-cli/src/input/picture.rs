@@ -1,0 +1,202 @@
+//! A decoded picture, and the reading of picture files with limits.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use hzn_core::image::{Channel, ImageError, ImageView, Layout};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+
+/// Longest side of a picture that is read, in pixels.
+pub const MAX_SIDE_PX: u32 = 20_000;
+/// Largest decoded picture, in bytes.
+pub const MAX_BYTES: u64 = 512 << 20;
+
+/// Samples of a picture, packed.
+#[derive(Debug, Clone)]
+pub enum Samples {
+    /// 8 bits.
+    Bytes(Vec<u8>),
+    /// 9 to 16 bits.
+    Words(Vec<u16>),
+}
+
+/// A picture in memory.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// The samples.
+    pub samples: Samples,
+    /// Their arrangement.
+    pub layout: Layout,
+    /// Time of exposure from EXIF, seconds since 1970 (EXIF has no time zone: taken as UTC).
+    pub exif_time_s: Option<f64>,
+}
+
+impl Picture {
+    /// The picture for the pipeline.
+    ///
+    /// # Errors
+    /// A channel that the picture does not have.
+    pub fn view(&self, channel: Channel) -> Result<ImageView<'_>, ImageError> {
+        match &self.samples {
+            Samples::Bytes(data) => ImageView::from_bytes(data, self.layout, channel),
+            Samples::Words(data) => ImageView::from_words(data, self.layout, channel),
+        }
+    }
+
+    /// The picture as 8-bit RGB, for drawing on. Pictures of more than 8 bits are scaled down.
+    pub fn to_rgb(&self) -> image::RgbImage {
+        let (w, h, n) = (self.layout.width, self.layout.height, usize::from(self.layout.channels));
+        let shift = self.layout.bits.saturating_sub(8);
+        let byte = |i: usize| match &self.samples {
+            Samples::Bytes(d) => d.get(i).copied().unwrap_or(0),
+            Samples::Words(d) => d.get(i).map_or(0, |&v| (v >> shift) as u8),
+        };
+        image::RgbImage::from_fn(w, h, |x, y| {
+            let at = (y as usize * w as usize + x as usize) * n;
+            image::Rgb(if n >= 3 { [byte(at), byte(at + 1), byte(at + 2)] } else { [byte(at); 3] })
+        })
+    }
+
+    /// The picture as PNG bytes, grey or colour, 8 or 16 bits. Words of 9 to 15 bits keep their counts.
+    ///
+    /// # Errors
+    /// What the encoder says.
+    pub fn to_png(&self) -> Result<Vec<u8>, String> {
+        use image::ExtendedColorType as C;
+        use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+        let mut out = Vec::new();
+        let color = match (self.layout.channels, &self.samples) {
+            (1, Samples::Bytes(_)) => C::L8,
+            (2, Samples::Bytes(_)) => C::La8,
+            (3, Samples::Bytes(_)) => C::Rgb8,
+            (_, Samples::Bytes(_)) => C::Rgba8,
+            (1, Samples::Words(_)) => C::L16,
+            (2, Samples::Words(_)) => C::La16,
+            (3, Samples::Words(_)) => C::Rgb16,
+            (_, Samples::Words(_)) => C::Rgba16,
+        };
+        let words;
+        let data = match &self.samples {
+            Samples::Bytes(d) => d.as_slice(),
+            Samples::Words(d) => {
+                words = d.iter().flat_map(|w| w.to_ne_bytes()).collect::<Vec<u8>>();
+                &words
+            }
+        };
+        let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Sub);
+        image::ImageEncoder::write_image(encoder, data, self.layout.width, self.layout.height, color)
+            .map_err(|e| e.to_string())?;
+        Ok(out)
+    }
+}
+
+/// The kind of picture that these bytes are, by their first few.
+pub fn format_of(bytes: &[u8]) -> Option<ImageFormat> {
+    image::guess_format(bytes).ok()
+}
+
+/// Reads a whole file, unless it is far too large for a picture.
+///
+/// # Errors
+/// Why it cannot be read, for the record of the frame.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
+    let told = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => "no such file".to_owned(),
+        _ => format!("cannot be read: {e}"),
+    };
+    let meta = std::fs::metadata(path).map_err(told)?;
+    if meta.is_dir() {
+        return Err("is a folder".into());
+    }
+    if meta.len() > 2 * MAX_BYTES {
+        return Err(format!(
+            "file of {} MB is larger than the limit of {} MB",
+            meta.len() >> 20,
+            (2 * MAX_BYTES) >> 20
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(told)?;
+    if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
+}
+
+/// Decodes PNG, JPEG, TIFF, PNM or BMP. Palettes become colour, CMYK becomes RGB, of several pictures in one file the
+/// first is taken. `expected` is the camera's size: another one is refused before anything large is decoded.
+///
+/// # Errors
+/// Why it cannot be decoded, for the record of the frame.
+pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, String> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    let mut limits = image::Limits::no_limits();
+    limits.max_alloc = Some(MAX_BYTES);
+    reader.limits(limits);
+    let format = reader.format().ok_or("is no picture that is known here (PNG, JPEG, TIFF, PNM, BMP)")?;
+    let mut decoder = reader.into_decoder().map_err(|e| explain(&e, format))?;
+    let (width, height) = decoder.dimensions();
+    check_size(width, height, expected)?;
+    if decoder.total_bytes() > MAX_BYTES {
+        return Err(format!(
+            "picture of {width}x{height} needs {} MB, above the limit of {} MB",
+            decoder.total_bytes() >> 20,
+            MAX_BYTES >> 20
+        ));
+    }
+    if format == ImageFormat::Jpeg && jpeg_is_cut(bytes) {
+        return Err("JPEG data end before the picture does: the file is truncated".into());
+    }
+    let exif_time_s = decoder.exif_metadata().ok().flatten().and_then(super::exif::time_s);
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| explain(&e, format))?;
+    let (samples, channels, bits) = match image {
+        DynamicImage::ImageLuma8(i) => (Samples::Bytes(i.into_raw()), 1, 8),
+        DynamicImage::ImageLumaA8(i) => (Samples::Bytes(i.into_raw()), 2, 8),
+        DynamicImage::ImageRgb8(i) => (Samples::Bytes(i.into_raw()), 3, 8),
+        DynamicImage::ImageRgba8(i) => (Samples::Bytes(i.into_raw()), 4, 8),
+        DynamicImage::ImageLuma16(i) => (Samples::Words(i.into_raw()), 1, 16),
+        DynamicImage::ImageLumaA16(i) => (Samples::Words(i.into_raw()), 2, 16),
+        DynamicImage::ImageRgb16(i) => (Samples::Words(i.into_raw()), 3, 16),
+        DynamicImage::ImageRgba16(i) => (Samples::Words(i.into_raw()), 4, 16),
+        other => {
+            return Err(format!("samples of kind {:?} are not supported; use 8 or 16 bit integers", other.color()));
+        }
+    };
+    Ok(Picture { samples, layout: Layout::packed(width, height, channels, bits), exif_time_s })
+}
+
+/// Refuses sizes that are not the camera's, zero, or beyond all limits.
+pub(crate) fn check_size(width: u32, height: u32, expected: Option<(u32, u32)>) -> Result<(), String> {
+    if width == 0 || height == 0 {
+        return Err(format!("picture of {width}x{height} has no pixels"));
+    }
+    if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
+        return Err(format!("picture of {width}x{height} is larger than the limit of {MAX_SIDE_PX} px a side"));
+    }
+    match expected {
+        Some((w, h)) if (w, h) != (width, height) => Err(format!(
+            "picture is {width}x{height} but the camera is {w}x{h} (camera.width, camera.height in sensor.toml)"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// JPEG decoders fill what is missing with grey, which would pass for a picture. A scan that began (FF DA) must be
+/// followed by an end (FF D9); neither stands within entropy-coded data.
+fn jpeg_is_cut(bytes: &[u8]) -> bool {
+    let last = |marker: u8| bytes.windows(2).rposition(|w| *w == [0xff, marker]);
+    match (last(0xda), last(0xd9)) {
+        (Some(scan), Some(end)) => end < scan,
+        (Some(_), None) => true,
+        (None, _) => false,
+    }
+}
+
+fn explain(error: &image::ImageError, format: ImageFormat) -> String {
+    let name = format!("{format:?}").to_uppercase();
+    let text = error.to_string().replace('\n', " ");
+    match error {
+        image::ImageError::Limits(_) => format!("{name} needs more memory than the limit of {} MB", MAX_BYTES >> 20),
+        image::ImageError::Unsupported(_) => format!("{name} of a kind that is not supported: {text}"),
+        image::ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+            format!("{name} data end before the picture does: the file is truncated")
+        }
+        _ => format!("{name} cannot be decoded: {text}"),
+    }
+}

@@ -1,0 +1,177 @@
+//! Headerless pictures: `--raw WIDTHxHEIGHT:FORMAT`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use hzn_core::image::Layout;
+
+use super::picture::{Picture, Samples};
+
+/// How samples lie in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// One byte a pixel.
+    Mono8,
+    /// Little-endian words with 10, 12 or 16 significant bits.
+    Words(u8),
+    /// 4 pixels in 5 bytes, least significant bits first (PFNC Mono10p).
+    Mono10p,
+    /// 2 pixels in 3 bytes, least significant bits first (PFNC Mono12p).
+    Mono12p,
+    /// Bayer mosaic, one byte a photosite, any order of colours: each 2×2 cell becomes one pixel, its mean. The
+    /// picture, and with it the calibration, has half the mosaic's width and height.
+    Bayer8,
+}
+
+const FORMATS: &[(&str, Format)] = &[
+    ("mono8", Format::Mono8),
+    ("mono10", Format::Words(10)),
+    ("mono12", Format::Words(12)),
+    ("mono16", Format::Words(16)),
+    ("mono10p", Format::Mono10p),
+    ("mono12p", Format::Mono12p),
+    ("bayer8", Format::Bayer8),
+];
+
+/// Size and format of headerless pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Raw {
+    /// Columns in the file.
+    pub width: u32,
+    /// Rows in the file.
+    pub height: u32,
+    /// Arrangement of the samples.
+    pub format: Format,
+}
+
+impl FromStr for Raw {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let form = "WIDTHxHEIGHT:FORMAT is expected, such as 1920x1080:mono12";
+        let (size, name) = text.split_once(':').ok_or(form)?;
+        let (width, height) = size.split_once(['x', 'X']).ok_or(form)?;
+        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=super::picture::MAX_SIDE_PX).contains(n));
+        let (Some(width), Some(height)) = (side(width), side(height)) else {
+            return Err(format!("width and height must be 1 to {}", super::picture::MAX_SIDE_PX));
+        };
+        let names = || FORMATS.iter().map(|(n, _)| *n);
+        let Some((_, format)) = FORMATS.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)) else {
+            let hint = hzn_calib::nearest(name, names()).map(|n| format!("; did you mean {n}?")).unwrap_or_default();
+            return Err(format!("no format {name:?}{hint} (there are {})", names().collect::<Vec<_>>().join(", ")));
+        };
+        if *format == Format::Bayer8 && (width % 2 != 0 || height % 2 != 0) {
+            return Err("a Bayer mosaic has an even width and height".into());
+        }
+        Ok(Self { width, height, format: *format })
+    }
+}
+
+impl fmt::Display for Raw {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = FORMATS.iter().find(|(_, x)| *x == self.format).map_or("", |(n, _)| n);
+        write!(f, "{}x{}:{name}", self.width, self.height)
+    }
+}
+
+impl Raw {
+    /// Bytes of one picture.
+    pub fn bytes(&self) -> usize {
+        let pixels = self.width as usize * self.height as usize;
+        match self.format {
+            Format::Mono8 | Format::Bayer8 => pixels,
+            Format::Words(_) => pixels * 2,
+            Format::Mono10p => (pixels * 10).div_ceil(8),
+            Format::Mono12p => (pixels * 12).div_ceil(8),
+        }
+    }
+
+    /// The picture in these bytes, of which there must be exactly as many as it has.
+    ///
+    /// # Errors
+    /// Another number of bytes.
+    pub fn decode(&self, data: &[u8]) -> Result<Picture, String> {
+        if data.len() != self.bytes() {
+            return Err(format!("{} bytes, but {self} has {}", data.len(), self.bytes()));
+        }
+        let pixels = self.width as usize * self.height as usize;
+        let (samples, bits) = match self.format {
+            Format::Mono8 => (Samples::Bytes(data.to_vec()), 8),
+            Format::Words(bits) => {
+                // Bits above the significant ones are noise of the transport.
+                let mask = u16::MAX >> (16 - bits);
+                (Samples::Words(data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]) & mask).collect()), bits)
+            }
+            Format::Mono10p => (Samples::Words(unpack(data, 10, pixels)), 10),
+            Format::Mono12p => (Samples::Words(unpack(data, 12, pixels)), 12),
+            Format::Bayer8 => return Ok(self.bayer(data)),
+        };
+        Ok(Picture { samples, layout: Layout::packed(self.width, self.height, 1, bits), exif_time_s: None })
+    }
+
+    fn bayer(&self, data: &[u8]) -> Picture {
+        let row = self.width as usize;
+        let mut out = Vec::with_capacity(data.len() / 4);
+        for pair in data.chunks_exact(2 * row) {
+            let (top, bottom) = pair.split_at(row);
+            for (a, b) in top.chunks_exact(2).zip(bottom.chunks_exact(2)) {
+                let sum: u16 = a.iter().chain(b).map(|&v| u16::from(v)).sum();
+                out.push((sum / 4) as u8);
+            }
+        }
+        let layout = Layout::packed(self.width / 2, self.height / 2, 1, 8);
+        Picture { samples: Samples::Bytes(out), layout, exif_time_s: None }
+    }
+}
+
+/// Samples of `bits` bits, packed without gaps, least significant bit first.
+fn unpack(data: &[u8], bits: u32, count: usize) -> Vec<u16> {
+    let mut out = Vec::with_capacity(count);
+    let (mut held, mut have) = (0u32, 0u32);
+    for &byte in data {
+        held |= u32::from(byte) << have;
+        have += 8;
+        while have >= bits && out.len() < count {
+            out.push((held & ((1 << bits) - 1)) as u16);
+            held >>= bits;
+            have -= bits;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(text: &str, data: &[u8]) -> Vec<u16> {
+        match text.parse::<Raw>().unwrap().decode(data).unwrap().samples {
+            Samples::Words(w) => w,
+            Samples::Bytes(b) => b.into_iter().map(u16::from).collect(),
+        }
+    }
+
+    #[test]
+    fn formats_by_hand() {
+        assert_eq!(words("2x1:mono8", &[1, 2]), [1, 2]);
+        assert_eq!(words("2x1:mono12", &[0x34, 0xf2, 0xff, 0x0f]), [0x234, 0xfff]);
+        assert_eq!(words("2x1:mono16", &[0x34, 0x12, 0xff, 0xff]), [0x1234, 0xffff]);
+        // 0x321 and 0xcba in three bytes: 21 a3 cb.
+        assert_eq!(words("2x1:mono12p", &[0x21, 0xa3, 0xcb]), [0x321, 0xcba]);
+        // 1, 2, 3, 1023: 01 08 30 c0 ff.
+        assert_eq!(words("4x1:mono10p", &[0x01, 0x08, 0x30, 0xc0, 0xff]), [1, 2, 3, 1023]);
+        assert_eq!(words("4x2:bayer8", &[10, 20, 1, 1, 30, 40, 1, 2]), [25, 1]);
+    }
+
+    #[test]
+    fn wrong_forms_say_what_is_right() {
+        let error = |t: &str| t.parse::<Raw>().unwrap_err();
+        assert!(error("1920").contains("1920x1080:mono12"));
+        assert!(error("2x2:mono21").contains("did you mean mono12?"));
+        assert!(error("0x2:mono8").contains("1 to 20000"));
+        assert!(error("3x2:bayer8").contains("even"));
+        assert!(
+            "2x2:mono16".parse::<Raw>().unwrap().decode(&[0; 7]).unwrap_err().contains("7 bytes, but 2x2:mono16 has 8")
+        );
+    }
+}

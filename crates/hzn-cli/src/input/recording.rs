@@ -1,0 +1,100 @@
+//! MCAP recordings with image topics.
+
+use std::path::{Path, PathBuf};
+
+use hzn_core::image::Layout;
+use hzn_mcap::{EncodedImage, ImageFormat, ImageReader};
+
+use super::picture::{Picture, Samples};
+use super::{Item, Payload, Source};
+use crate::exit::{Stop, usage};
+
+/// Frames of one topic. They are named after the recording: `flight.mcap#000012`.
+pub(super) struct Recording {
+    reader: ImageReader,
+    path: PathBuf,
+    name: String,
+    /// Read ahead, so that a recording without pictures is refused at once.
+    first: Option<Item>,
+    index: u64,
+}
+
+impl Recording {
+    pub(super) fn open(path: &Path, topic: Option<&str>) -> Result<Self, Stop> {
+        let reader = ImageReader::open(path, topic).map_err(usage)?;
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let mut recording = Self { reader, path: path.to_owned(), name, first: None, index: 0 };
+        recording.first = match recording.read() {
+            Some(Ok(item)) => Some(item),
+            Some(Err(e)) => return Err(usage(e)),
+            None => {
+                let others: Vec<&str> = recording.reader.other_topics().collect();
+                let what = match (topic, others.is_empty()) {
+                    (Some(topic), false) => {
+                        format!("no pictures on topic {topic}; there are some on {}", others.join(", "))
+                    }
+                    (Some(topic), true) => format!("no pictures on topic {topic}, nor on any other"),
+                    (None, _) => "no pictures in this recording (foxglove.CompressedImage, foxglove.RawImage, \
+                                  sensor_msgs/msg/Image and CompressedImage are understood)"
+                        .to_owned(),
+                };
+                return Err(usage(format!("{}: {what}", path.display())));
+            }
+        };
+        Ok(recording)
+    }
+
+    fn read(&mut self) -> Option<anyhow::Result<Item>> {
+        let image = match self.reader.next()? {
+            Ok(image) => image,
+            Err(e) => return Some(Err(e.into())),
+        };
+        let name = format!("{}#{:06}", self.name, self.index);
+        self.index += 1;
+        let payload = match image.image {
+            Ok(image) => payload(image),
+            Err(why) => Payload::Broken(why),
+        };
+        Some(Ok(Item { name, time_s: Some(image.time_s), payload }))
+    }
+}
+
+/// The picture of a message.
+pub(crate) fn payload(image: EncodedImage) -> Payload {
+    let EncodedImage { format, bytes } = image;
+    let raw = |samples, width, height, channels, bits| {
+        let layout = Layout::packed(width, height, channels, bits);
+        Payload::Decoded(Picture { samples, layout, exif_time_s: None })
+    };
+    match format {
+        ImageFormat::Png | ImageFormat::Jpeg => Payload::Encoded(bytes),
+        ImageFormat::Other(name) => {
+            Payload::Broken(format!("pictures in {name} are not supported; record PNG or JPEG"))
+        }
+        ImageFormat::Mono8 { width, height } => raw(Samples::Bytes(bytes), width, height, 1, 8),
+        ImageFormat::Rgb8 { width, height } => raw(Samples::Bytes(bytes), width, height, 3, 8),
+        ImageFormat::Mono16 { width, height } => {
+            let words = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+            raw(Samples::Words(words), width, height, 1, 16)
+        }
+    }
+}
+
+impl Source for Recording {
+    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+        match self.first.take() {
+            Some(item) => Some(Ok(item)),
+            None => self.read(),
+        }
+    }
+    fn len(&self) -> Option<u64> {
+        None
+    }
+    fn folder(&self) -> PathBuf {
+        self.path.parent().map(Path::to_owned).unwrap_or_default()
+    }
+    fn notes(&self) -> Vec<String> {
+        let topics: Vec<&str> = self.reader.other_topics().collect();
+        if topics.is_empty() { Vec::new() } else { vec![format!("other topics with pictures: {}", topics.join(", "))] }
+    }
+}

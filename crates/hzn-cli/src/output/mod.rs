@@ -1,0 +1,278 @@
+//! Where results go: `.mcap`, `.csv`, `.jsonl` by the ending, or a CSV table on stdout.
+//!
+//! A file is written as `NAME.part` and gets its name at the end, also after Ctrl-C, so that whatever has the name is
+//! whole. What a crash leaves is the `.part` file; [`open`] goes on with either.
+
+mod record;
+mod text;
+
+use std::path::{Path, PathBuf};
+
+use hzn_core::Config;
+use hzn_mcap::{Contents, Options, Reader, part_path};
+
+pub use record::{annotations, limb_lines, record, row};
+
+use crate::engine::{Finished, Sink};
+use crate::exit::{Stop, failed, usage};
+use crate::input::ending;
+use text::{Form, Text};
+
+/// How an output is treated that exists already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// It is refused.
+    Refuse,
+    /// It is replaced.
+    Replace,
+    /// It is continued after its last finished frame.
+    Resume,
+}
+
+/// An output that takes frames.
+pub struct Output {
+    kind: Kind,
+    path: Option<PathBuf>,
+    config: Config,
+}
+
+enum Kind {
+    Mcap(Box<hzn_mcap::Writer>),
+    Text(Text),
+}
+
+/// Frames that an output holds already.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Held {
+    /// How many.
+    pub frames: u64,
+    /// Name of the last one's picture.
+    pub last: Option<String>,
+}
+
+/// Kinds of output, by ending.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// A recording.
+    Mcap,
+    /// A table.
+    Csv,
+    /// One JSON object a line.
+    Jsonl,
+}
+
+/// The kind of output that a file name asks for.
+///
+/// # Errors
+/// An ending that is not known.
+pub fn target(path: &Path) -> Result<Target, Stop> {
+    match ending(path).as_str() {
+        "mcap" => Ok(Target::Mcap),
+        "csv" => Ok(Target::Csv),
+        "jsonl" => Ok(Target::Jsonl),
+        _ => Err(usage(format!("{}: the output's ending must be .mcap, .csv or .jsonl", path.display()))),
+    }
+}
+
+/// Opens an output; without a path, CSV on stdout. Gives the frames that it holds already.
+///
+/// # Errors
+/// It exists and must not, belongs to another sensor, or cannot be written.
+pub fn open(
+    path: Option<&Path>,
+    existing: Existing,
+    config: &Config,
+    sensor_toml: &str,
+) -> Result<(Output, Held), Stop> {
+    let output = |kind, held| Ok((Output { kind, path: path.map(Path::to_owned), config: config.clone() }, held));
+    let Some(path) = path else { return output(Kind::Text(Text::stdout()?), Held::default()) };
+    let target = target(path)?;
+    if path.is_dir() {
+        return Err(usage(format!("{}: is a folder", path.display())));
+    }
+    let part = part_path(path);
+    match existing {
+        Existing::Refuse => refuse(path, &part)?,
+        Existing::Replace => {}
+        Existing::Resume => {
+            // A run that was interrupted has given its file the name already.
+            if path.exists() && !part.exists() {
+                std::fs::rename(path, &part).map_err(|e| cannot(&part, &e))?;
+                let back = |stop| {
+                    let _ = std::fs::rename(&part, path);
+                    stop
+                };
+                return resume(path, &part, target, config, sensor_toml)
+                    .map_err(back)
+                    .and_then(|(kind, held)| output(kind, held));
+            }
+            if path.exists() {
+                let what = "exists beside what an unfinished run left; remove one of the two";
+                return Err(usage(format!("{}: {what} ({})", path.display(), part.display())));
+            }
+            let (kind, held) = resume(path, &part, target, config, sensor_toml)?;
+            return output(kind, held);
+        }
+    }
+    let kind = match form(target) {
+        None => {
+            let options = options(config, sensor_toml, existing == Existing::Replace);
+            Kind::Mcap(Box::new(hzn_mcap::Writer::create(path, &options).map_err(failed)?))
+        }
+        Some(form) => Kind::Text(Text::create(path, &part, form).map_err(|e| cannot(&part, &e))?),
+    };
+    output(kind, Held::default())
+}
+
+fn refuse(path: &Path, part: &Path) -> Result<(), Stop> {
+    if path.exists() {
+        return Err(usage(format!("{}: exists already; --force replaces it, --resume continues it", path.display())));
+    }
+    if std::fs::symlink_metadata(part).is_ok() {
+        let what = "was left by a run that did not end; --resume goes on with it, --force starts over";
+        return Err(usage(format!("{}: {what}", part.display())));
+    }
+    Ok(())
+}
+
+fn form(target: Target) -> Option<Form> {
+    match target {
+        Target::Mcap => None,
+        Target::Csv => Some(Form::Csv),
+        Target::Jsonl => Some(Form::Jsonl),
+    }
+}
+
+fn options(config: &Config, sensor_toml: &str, force: bool) -> Options {
+    let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
+    Options { sensor_toml: sensor_toml.to_owned(), metadata, camera: Some(config.camera.clone()), force }
+}
+
+fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml: &str) -> Result<(Kind, Held), Stop> {
+    match form(target) {
+        Some(form) => {
+            let (text, held) = Text::resume(path, part, form).map_err(|e| cannot(part, &e))?;
+            Ok((Kind::Text(text), held))
+        }
+        None => {
+            let last = last_frame(part);
+            let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(failed)?;
+            let held = Held { frames: resumed.frames, last: last.filter(|_| resumed.frames > 0) };
+            Ok((Kind::Mcap(Box::new(resumed.writer)), held))
+        }
+    }
+}
+
+fn last_frame(part: &Path) -> Option<String> {
+    Reader::open(part, Contents::WithoutImages).ok()?.filter_map(Result::ok).last().map(|f| f.row.file)
+}
+
+/// A file that cannot be written, and what to do.
+pub(crate) fn cannot(path: &Path, error: &std::io::Error) -> Stop {
+    failed(advice(path, error))
+}
+
+pub(crate) fn advice(path: &Path, error: &std::io::Error) -> String {
+    let name = path.display();
+    match error.kind() {
+        std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
+            format!("{name}: the disk is full; finished frames are kept: free some space and go on with --resume")
+        }
+        std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => {
+            format!("{name}: no permission to write here; choose another folder for the output")
+        }
+        std::io::ErrorKind::NotFound => format!("{name}: the folder does not exist; create it first"),
+        _ => format!("{name}: cannot be written: {error}"),
+    }
+}
+
+impl Output {
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// The disk.
+    pub fn finish(self) -> Result<(), Stop> {
+        match self.kind {
+            Kind::Mcap(writer) => writer.finish().map(|_| ()).map_err(failed),
+            Kind::Text(text) => {
+                text.finish().map_err(|e| cannot(self.path.as_deref().unwrap_or(Path::new("stdout")), &e))
+            }
+        }
+    }
+
+    /// Do frames need their edges and points?
+    pub fn wants_trace(path: Option<&Path>) -> bool {
+        path.is_some_and(|p| ending(p) == "mcap")
+    }
+}
+
+impl Sink for Output {
+    fn write(&mut self, frame: &Finished) -> anyhow::Result<()> {
+        match &mut self.kind {
+            Kind::Mcap(writer) => Ok(writer.write(&record(frame, &self.config))?),
+            Kind::Text(text) => text.write(&row(frame, &self.config)),
+        }
+    }
+
+    fn flush(&mut self) -> anyhow::Result<()> {
+        match &mut self.kind {
+            Kind::Mcap(writer) => Ok(writer.flush()?),
+            Kind::Text(text) => text.flush(),
+        }
+    }
+}
+
+/// A table of rows that are at hand already.
+pub struct Rows {
+    text: Text,
+    path: PathBuf,
+}
+
+impl Rows {
+    /// Begins a CSV or JSON Lines file.
+    ///
+    /// # Errors
+    /// It exists and must not, has another ending, or cannot be written.
+    pub fn create(path: &Path, existing: Existing) -> Result<Self, Stop> {
+        let part = part_path(path);
+        if existing == Existing::Refuse {
+            refuse(path, &part)?;
+        }
+        let Some(form) = form(target(path)?) else {
+            return Err(usage(format!("{}: a table ends in .csv or .jsonl", path.display())));
+        };
+        let text = Text::create(path, &part, form).map_err(|e| cannot(&part, &e))?;
+        Ok(Self { text, path: path.to_owned() })
+    }
+    /// Appends a row.
+    ///
+    /// # Errors
+    /// The disk.
+    pub fn write(&mut self, row: &hzn_mcap::Row) -> anyhow::Result<()> {
+        self.text.write(row)
+    }
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// The disk.
+    pub fn finish(self) -> Result<(), Stop> {
+        let Self { text, path } = self;
+        text.finish().map_err(|e| cannot(&path, &e))
+    }
+}
+
+/// Keeps the whole rows of a table that was cut off. Gives their number and the bytes that were dropped.
+///
+/// # Errors
+/// The file has other columns, or the disk fails.
+pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result<(u64, u64)> {
+    let part = part_path(path);
+    let size = std::fs::metadata(file)?.len();
+    let form = if target == Target::Jsonl { Form::Jsonl } else { Form::Csv };
+    if file != part {
+        std::fs::copy(file, &part)?;
+    }
+    let (text, held) = Text::resume(path, &part, form)?;
+    text.finish()?;
+    Ok((held.frames, size.saturating_sub(std::fs::metadata(path)?.len())))
+}

@@ -1,0 +1,76 @@
+//! From a finished frame to the row and the record that files hold.
+
+use hzn_core::camera::Camera;
+use hzn_core::pixel::ImagePoint;
+use hzn_core::{Config, Solution};
+use hzn_mcap::{
+    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, Row, RowMeta,
+};
+
+use crate::engine::{Finished, Trace};
+use crate::overlay::limb;
+
+/// The row of a frame.
+pub fn row(frame: &Finished, config: &Config) -> Row {
+    let meta = RowMeta {
+        index: frame.index,
+        file: frame.name.clone(),
+        time_s: frame.time_s,
+        body: hzn_mcap::body_name(config.body.kind).to_owned(),
+        altitude_km: frame.altitude_km,
+    };
+    match &frame.report {
+        Ok(report) => Row::from_report(&meta, report, Some(frame.elapsed.as_nanos() as f64 / 1e3)),
+        Err(why) => Row::unreadable(&meta, why.clone()),
+    }
+}
+
+/// The record of a frame, with picture and drawing where the run collected them.
+pub fn record(frame: &Finished, config: &Config) -> FrameRecord {
+    let mut record = FrameRecord::new(row(frame, config));
+    record.attitude = frame.camera_to_ecef_wxyz.map(|q| Attitude {
+        q_ecef_from_camera_wxyz: q,
+        position_m: frame.position_km.unwrap_or_default().map(|km| km * 1e3),
+    });
+    record.image = frame.picture.as_ref().map(|bytes| {
+        let png = matches!(crate::input::picture::format_of(bytes), Some(image::ImageFormat::Png));
+        EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes: bytes.clone() }
+    });
+    match &frame.report {
+        Ok(report) => {
+            record.candidates = CandidateEdge::from_report(report);
+            if let (Some(trace), Ok(camera)) = (&frame.trace, Camera::try_new(&config.camera)) {
+                record.annotations = annotations(trace, report.solution.as_ref(), &camera);
+            }
+        }
+        Err(why) => record.log.push(LogLine { level: LogLevel::Error, message: why.clone() }),
+    }
+    record
+}
+
+/// What is drawn over a picture.
+pub fn annotations(trace: &Trace, solution: Option<&Solution<f64>>, camera: &Camera<f64>) -> Annotations {
+    let mut out = Annotations::default();
+    for edge in trace.edges().iter() {
+        out.edges.push(edge.border.iter().map(|p| [f64::from(p.x), f64::from(p.y)]).collect());
+        if solution.is_some_and(|s| s.candidate == edge.candidate) {
+            for (point, weight) in edge.points.iter().zip(&edge.weights) {
+                if *weight > 0.0 { out.inliers.push(*point) } else { out.rejected.push(*point) }
+            }
+        }
+    }
+    if let Some(s) = solution {
+        out.limb = limb_lines(s, camera);
+        let inside = |p: &ImagePoint<f64>| {
+            (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)
+                && (-0.5..=f64::from(camera.height()) - 0.5).contains(&p.v)
+        };
+        out.axis = camera.project(&s.axis).filter(inside).map(|p| [p.u, p.v]);
+    }
+    out
+}
+
+/// The fitted limb as lines, broken where it leaves the picture.
+pub fn limb_lines(solution: &Solution<f64>, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
+    limb::lines(solution.axis.xyz(), solution.fused_half_angle_rad, camera)
+}

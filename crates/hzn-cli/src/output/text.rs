@@ -1,0 +1,152 @@
+//! Results as text: CSV and JSON Lines.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use hzn_mcap::Row;
+
+use super::{Held, advice};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Form {
+    Csv,
+    Jsonl,
+}
+
+/// A text output with its final name.
+pub(crate) struct Text {
+    out: BufWriter<Box<dyn Write>>,
+    form: Form,
+    /// `(path, part)`; none for stdout.
+    names: Option<(PathBuf, PathBuf)>,
+}
+
+fn header() -> String {
+    Row::COLUMNS.join(",") + "\n"
+}
+
+impl Text {
+    pub(crate) fn stdout() -> io::Result<Self> {
+        let mut text = Self { out: BufWriter::new(Box::new(io::stdout())), form: Form::Csv, names: None };
+        text.out.write_all(header().as_bytes())?;
+        Ok(text)
+    }
+
+    fn on(file: File, path: &Path, part: &Path, form: Form) -> Self {
+        let out = BufWriter::with_capacity(1 << 16, Box::new(file) as Box<dyn Write>);
+        Self { out, form, names: Some((path.to_owned(), part.to_owned())) }
+    }
+
+    pub(crate) fn create(path: &Path, part: &Path, form: Form) -> io::Result<Self> {
+        let mut text = Self::on(File::create(part)?, path, part, form);
+        if form == Form::Csv {
+            text.out.write_all(header().as_bytes())?;
+            text.out.flush()?;
+        }
+        Ok(text)
+    }
+
+    /// Goes on after the last whole row; without an unfinished file, begins one.
+    pub(crate) fn resume(path: &Path, part: &Path, form: Form) -> io::Result<(Self, Held)> {
+        if !part.exists() {
+            return Ok((Self::create(path, part, form)?, Held::default()));
+        }
+        let mut file = OpenOptions::new().read(true).write(true).open(part)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        let (held, end) = match form {
+            Form::Csv => whole_csv(&bytes)?,
+            Form::Jsonl => whole_jsonl(&bytes),
+        };
+        if end == 0 {
+            drop(file);
+            return Ok((Self::create(path, part, form)?, Held::default()));
+        }
+        // What follows is a row that was cut off.
+        file.set_len(end as u64)?;
+        file.seek(SeekFrom::End(0))?;
+        Ok((Self::on(file, path, part, form), held))
+    }
+
+    pub(crate) fn write(&mut self, row: &Row) -> anyhow::Result<()> {
+        let line = match self.form {
+            Form::Csv => csv_line(row)?,
+            Form::Jsonl => {
+                let mut line = serde_json::to_vec(row)?;
+                line.push(b'\n');
+                line
+            }
+        };
+        let written = self.out.write_all(&line);
+        written.map_err(|e| self.told(e))
+    }
+
+    pub(crate) fn flush(&mut self) -> anyhow::Result<()> {
+        let flushed = self.out.flush();
+        flushed.map_err(|e| self.told(e))
+    }
+
+    fn told(&self, error: io::Error) -> anyhow::Error {
+        match &self.names {
+            Some((_, part)) => anyhow::anyhow!(advice(part, &error)),
+            None if error.kind() == io::ErrorKind::BrokenPipe => error.into(),
+            None => anyhow::anyhow!("results cannot be written to stdout: {error}"),
+        }
+    }
+
+    pub(crate) fn finish(mut self) -> io::Result<()> {
+        self.out.flush()?;
+        match self.names {
+            Some((path, part)) => std::fs::rename(part, path),
+            None => Ok(()),
+        }
+    }
+}
+
+/// One row as a line of CSV.
+pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
+    let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+    writer.serialize(row)?;
+    writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))
+}
+
+/// Whole rows, and where they end.
+fn whole_csv(bytes: &[u8]) -> io::Result<(Held, usize)> {
+    let header = header();
+    if bytes.len() < header.len() {
+        return Ok((Held::default(), 0));
+    }
+    if !bytes.starts_with(header.as_bytes()) {
+        let what = "has other columns than this version writes; start over with --force";
+        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+    }
+    let (mut held, mut end) = (Held::default(), header.len());
+    // A row may hold line breaks within quotes, so that only the reader knows where it ends.
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(&bytes[header.len()..]);
+    let mut record = csv::StringRecord::new();
+    while let Ok(true) = reader.read_record(&mut record) {
+        let to = header.len() + reader.position().byte() as usize;
+        let whole = to > 0 && bytes.get(to - 1) == Some(&b'\n');
+        let Ok(row) = record.deserialize::<Row>(None) else { break };
+        if !whole {
+            break;
+        }
+        held = Held { frames: held.frames + 1, last: Some(row.file) };
+        end = to;
+    }
+    Ok((held, end))
+}
+
+fn whole_jsonl(bytes: &[u8]) -> (Held, usize) {
+    let (mut held, mut end) = (Held::default(), 0);
+    for line in bytes.split_inclusive(|&b| b == b'\n') {
+        if !line.ends_with(b"\n") {
+            break;
+        }
+        let Ok(row) = serde_json::from_slice::<Row>(line) else { break };
+        held = Held { frames: held.frames + 1, last: Some(row.file) };
+        end += line.len();
+    }
+    (held, end)
+}

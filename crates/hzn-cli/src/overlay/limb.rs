@@ -1,0 +1,71 @@
+//! The limb of a cone in the picture.
+
+use hzn_core::camera::Camera;
+use hzn_core::frames::UnitVec3;
+
+/// Steps around the cone when it is searched for parts in view.
+const STEPS: usize = 4096;
+
+/// The cone about `axis` (unit vector, camera frame) with this half-angle, as lines in pixels, broken where it leaves
+/// the picture or the image circle.
+pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
+    let (b1, b2) = basis(axis);
+    let (sin, cos) = half_angle_rad.sin_cos();
+    let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
+    let at = |step: usize| -> Option<[f64; 2]> {
+        let (s, c) = (step as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
+        let ray = std::array::from_fn(|i| cos * axis[i] + sin * (c * b1[i] + s * b2[i]));
+        let p = camera.project(&UnitVec3::try_new(ray)?)?;
+        // Half a pixel around the picture still shows a line's edge.
+        ((-1.0..=w).contains(&p.u) && (-1.0..=h).contains(&p.v)).then_some([p.u, p.v])
+    };
+    // Begin where the picture ends, so that a line which crosses the first step is not cut there.
+    let start = (0..STEPS).find(|&i| at(i).is_none()).unwrap_or(0);
+    let mut out = Vec::new();
+    let mut line = Vec::new();
+    for step in start..=start + STEPS {
+        match at(step % STEPS) {
+            Some(p) => line.push(p),
+            None if line.len() > 1 => out.push(std::mem::take(&mut line)),
+            None => line.clear(),
+        }
+    }
+    if line.len() > 1 {
+        out.push(line);
+    }
+    out
+}
+
+/// Two unit vectors that span the plane across `axis`.
+fn basis([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    // The coordinate axis that is farthest from it gives the best conditioned product.
+    let helper = if x.abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let b1 = cross([x, y, z], helper);
+    let n = b1.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let b1 = b1.map(|v| v / n);
+    (b1, cross([x, y, z], b1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hzn_core::camera::{Config, Model};
+
+    #[test]
+    fn a_disc_is_closed_and_an_arc_is_one_line() {
+        let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, 640, 480, 500.0)).unwrap();
+        let disc = lines([0.0, 0.0, 1.0], 0.1, &camera);
+        assert_eq!(disc.len(), 1);
+        assert_eq!(disc[0].first(), disc[0].last());
+        let radius = |p: &[f64; 2]| (p[0] - 319.5).hypot(p[1] - 239.5);
+        assert!(disc[0].iter().all(|p| (radius(p) - 500.0 * 0.1f64.tan()).abs() < 1e-9));
+        // Body 70 degrees wide, straight below the camera's horizon: one arc across the picture.
+        let down = 1.25f64;
+        let arc = lines([0.0, down.sin(), down.cos()], 1.2, &camera);
+        assert_eq!(arc.len(), 1, "{arc:?}");
+        assert!(arc[0].len() > 20);
+        assert!(lines([0.0, 0.0, -1.0], 0.3, &camera).is_empty());
+    }
+}

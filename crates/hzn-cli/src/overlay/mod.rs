@@ -1,0 +1,109 @@
+//! Pictures with everything drawn over them that led to the answer.
+//!
+//! The colours are those of Okabe and Ito, which stay apart for colour-blind eyes.
+
+mod canvas;
+pub mod limb;
+
+use std::path::Path;
+
+use hzn_core::Report;
+use hzn_core::camera::Camera;
+use image::RgbImage;
+
+use crate::engine::Trace;
+use crate::input::Picture;
+use canvas::{Canvas, Colour};
+
+const EDGE: Colour = [86, 180, 233];
+const INLIER: Colour = [0, 158, 115];
+const REJECTED: Colour = [213, 94, 0];
+const LIMB: Colour = [240, 228, 66];
+const AXIS: Colour = [204, 121, 167];
+
+/// Name of the overlay of a picture.
+pub fn file_name(name: &str) -> String {
+    let flat = name.replace(['/', '\\', ':'], "_");
+    if flat.to_lowercase().ends_with(".png") { flat } else { format!("{flat}.png") }
+}
+
+/// Draws what one report stands on: candidate edges, inliers, rejected points, the fitted limb, the axis.
+pub fn draw(picture: &Picture, camera: &Camera<f64>, trace: &Trace, report: &Report<f64>) -> RgbImage {
+    let drawing = crate::output::annotations(trace, report.solution.as_ref(), camera);
+    draw_annotations(picture.to_rgb(), &drawing, report.status.name())
+}
+
+/// Draws annotations (pixel centres at integers) with a legend that begins with `title`.
+pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title: &str) -> RgbImage {
+    let mut canvas = Canvas { image };
+    let (w, h) = (canvas.image.width(), canvas.image.height());
+    // Thick enough to be seen when the whole picture is looked at on a screen of some 1600 px.
+    let pen = (f64::from(w.max(h)) / 800.0).max(1.0);
+    for edge in &drawing.edges {
+        for p in edge {
+            canvas.disc(*p, pen * 0.8, EDGE);
+        }
+    }
+    for limb in &drawing.limb {
+        canvas.polyline(limb, pen * 1.2, LIMB);
+    }
+    // Points lie over the line, smaller than it is wide in the long run, so that both are seen.
+    for p in &drawing.rejected {
+        canvas.disc(*p, pen * 1.6, REJECTED);
+    }
+    for p in &drawing.inliers {
+        canvas.disc(*p, pen, INLIER);
+    }
+    if let Some([u, v]) = drawing.axis {
+        let arm = pen * 14.0;
+        for (dx, dy) in [(arm, 0.0), (0.0, arm)] {
+            canvas.line([u - dx, v - dy], [u + dx, v + dy], pen * 5.0, [0, 0, 0]);
+            canvas.line([u - dx, v - dy], [u + dx, v + dy], pen * 2.5, AXIS);
+        }
+    }
+    legend(&mut canvas, drawing, title);
+    canvas.image
+}
+
+fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, title: &str) {
+    let (w, h) = (canvas.image.width(), canvas.image.height());
+    let scale = (w.max(h) / 800).max(1);
+    let line = 11 * scale;
+    let mut entries = vec![(title.to_owned(), [255, 255, 255])];
+    let mut add = |there: bool, text: String, colour: Colour| {
+        if there {
+            entries.push((text, colour));
+        }
+    };
+    add(!drawing.edges.is_empty(), format!("edges {}", drawing.edges.len()), EDGE);
+    add(!drawing.inliers.is_empty(), format!("inliers {}", drawing.inliers.len()), INLIER);
+    add(!drawing.rejected.is_empty(), format!("rejected {}", drawing.rejected.len()), REJECTED);
+    add(!drawing.limb.is_empty(), "fitted limb".into(), LIMB);
+    add(drawing.axis.is_some(), "axis".into(), AXIS);
+    let widest = entries.iter().map(|(t, _)| t.len()).max().unwrap_or(0) as u32 * 8 * scale;
+    let (box_w, box_h) = (widest + 4 * scale, entries.len() as u32 * line + 3 * scale);
+    // A legend that hides a small picture would help nobody.
+    if box_w > w / 2 || box_h > h / 2 {
+        return;
+    }
+    canvas.shade(0, 0, box_w, box_h);
+    for (i, (text, colour)) in entries.iter().enumerate() {
+        canvas.text(2 * scale, 3 * scale + i as u32 * line, text, scale, *colour);
+    }
+}
+
+/// Writes a PNG.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    let written = std::fs::File::create(path).map_err(|e| anyhow::anyhow!(crate::output::advice(path, &e)))?;
+    let mut out = std::io::BufWriter::new(written);
+    let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Sub);
+    image.write_with_encoder(encoder).map_err(|e| match e {
+        image::ImageError::IoError(e) => anyhow::anyhow!(crate::output::advice(path, &e)),
+        e => anyhow::anyhow!("{}: {e}", path.display()),
+    })?;
+    std::io::Write::flush(&mut out).map_err(|e| anyhow::anyhow!(crate::output::advice(path, &e)))
+}

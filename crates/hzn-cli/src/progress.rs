@@ -1,0 +1,93 @@
+//! Progress on stderr: a bar on a terminal, a line now and then otherwise.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use hzn_core::status::Status;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Between two lines where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(5);
+
+/// Counts frames and shows how far the run is.
+pub(crate) struct Progress {
+    bar: Option<ProgressBar>,
+    quiet: bool,
+    total: Option<u64>,
+    start: Instant,
+    last_line: Instant,
+    counts: [u64; Status::ALL.len()],
+    /// Frames that were finished before this run.
+    before: u64,
+}
+
+impl Progress {
+    pub(crate) fn new(total: Option<u64>, before: u64, quiet: bool) -> Self {
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = match total {
+                Some(n) => ProgressBar::new(n),
+                None => ProgressBar::no_length(),
+            };
+            let form = if total.is_some() {
+                "{bar:30} {pos}/{len} frames, {per_sec}, {eta} left  {msg}"
+            } else {
+                "{spinner} {pos} frames, {per_sec}  {msg}"
+            };
+            if let Ok(style) = ProgressStyle::with_template(form) {
+                bar.set_style(style);
+            }
+            bar.set_position(before);
+            bar.reset_eta();
+            bar
+        });
+        let now = Instant::now();
+        Self { bar, quiet, total, start: now, last_line: now, counts: [0; Status::ALL.len()], before }
+    }
+
+    pub(crate) fn count(&mut self, status: Status) {
+        if let Some(n) = self.counts.get_mut(status as usize) {
+            *n += 1;
+        }
+        if let Some(bar) = &self.bar {
+            bar.inc(1);
+        } else if !self.quiet && self.last_line.elapsed() >= LINE_EVERY {
+            self.last_line = Instant::now();
+            let done = self.before + self.frames();
+            let of = self.total.map(|n| format!(" of {n}")).unwrap_or_default();
+            eprintln!("{done}{of} frames, {:.1} a second", self.rate());
+        }
+    }
+
+    /// A message above the bar.
+    pub(crate) fn say(&self, message: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| eprintln!("{message}")),
+            None => eprintln!("{message}"),
+        }
+    }
+
+    pub(crate) fn frames(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+    pub(crate) fn of(&self, status: Status) -> u64 {
+        self.counts.get(status as usize).copied().unwrap_or(0)
+    }
+    fn rate(&self) -> f64 {
+        self.frames() as f64 / self.start.elapsed().as_secs_f64().max(1e-9)
+    }
+
+    /// Takes the bar away and sums up: `123 frames: 120 ok, 2 no-limb, 1 unreadable; 85.2 frames a second`.
+    pub(crate) fn summary(&self) -> String {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+        let present = Status::ALL.into_iter().filter(|s| self.of(*s) > 0);
+        let parts: Vec<String> = present.map(|s| format!("{} {}", self.of(s), s.name())).collect();
+        let frames = match self.frames() {
+            0 => return "no frames".to_owned(),
+            1 => "1 frame".to_owned(),
+            n => format!("{n} frames"),
+        };
+        format!("{frames}: {}; {:.1} frames a second", parts.join(", "), self.rate())
+    }
+}

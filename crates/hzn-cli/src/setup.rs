@@ -1,0 +1,123 @@
+//! What several commands need before they begin: sensor, frames.csv, sequence.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Args;
+use hzn_calib::{Frames, Sensor};
+
+use crate::engine;
+use crate::exit::{Exit, Stop, usage};
+use crate::input::{self, Raw, Source};
+
+/// Which sensor.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SensorArgs {
+    /// The sensor.toml; without it, the one beside the pictures
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) sensor: Option<PathBuf>,
+    /// Altitude of the camera where frames.csv gives none, instead of body.altitude_km
+    #[arg(long, value_name = "KM")]
+    pub(crate) altitude_km: Option<f64>,
+    /// Single precision and 2048 points, as on the flight computer
+    #[arg(long)]
+    pub(crate) flight: bool,
+}
+
+/// Which pictures.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct InputArgs {
+    /// Table with time, altitude, position, attitude of the pictures; without it, frames.csv beside them
+    #[arg(long, value_name = "FILE")]
+    pub(crate) frames: Option<PathBuf>,
+    /// Frames a second, where neither frames.csv nor the container nor EXIF gives a time
+    #[arg(long, value_name = "RATE", default_value_t = 1.0)]
+    pub(crate) fps: f64,
+    /// Pictures are headerless: their size and format (mono8, mono10, mono12, mono16: little-endian words; mono10p,
+    /// mono12p: packed; bayer8: every 2x2 cell becomes one pixel)
+    #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
+    pub(crate) raw: Option<Raw>,
+    /// Topic of the pictures in an MCAP; without it, the first with pictures
+    #[arg(long, value_name = "TOPIC")]
+    pub(crate) topic: Option<String>,
+}
+
+impl SensorArgs {
+    /// Reads the sensor; `folder` is where the pictures lie.
+    pub(crate) fn load(&self, folder: &Path) -> Result<Sensor, Stop> {
+        let beside = folder.join("sensor.toml");
+        let path = match &self.sensor {
+            Some(path) => path.clone(),
+            None if beside.exists() => beside,
+            None => {
+                let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", shown(folder));
+                return Err(usage(format!("{what} (`hzn init` writes one to start from)")));
+            }
+        };
+        let mut sensor = hzn_calib::sensor::load(&path)?;
+        if let Some(km) = self.altitude_km {
+            sensor.config.body.altitude_km = Some(km);
+            hzn_calib::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
+        }
+        Ok(sensor)
+    }
+}
+
+impl InputArgs {
+    /// Opens the sequence.
+    pub(crate) fn open(&self, inputs: &[PathBuf]) -> Result<Box<dyn Source>, Stop> {
+        if !(self.fps > 0.0 && self.fps.is_finite()) {
+            return Err(usage("--fps: must be above 0"));
+        }
+        input::open(inputs, self.raw, self.topic.as_deref())
+    }
+
+    /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings go to stderr.
+    pub(crate) fn frames(&self, folder: &Path, sensor: &Sensor, flight: bool) -> Result<Option<Frames>, Stop> {
+        let beside = folder.join("frames.csv");
+        let path = match &self.frames {
+            Some(path) => path.clone(),
+            None if beside.exists() => beside,
+            None => return Ok(None),
+        };
+        let frames = hzn_calib::frames::load(&path)?;
+        let body = &sensor.config.body;
+        for warning in frames.warnings.iter().chain(&frames.check_altitudes(body.kind, body.mean_radius_km())) {
+            eprintln!("warning: {warning}");
+        }
+        engine::prepare(&sensor.config, flight, Some(&frames))?;
+        Ok(Some(frames))
+    }
+}
+
+/// Without an altitude from anywhere, every frame would fail.
+pub(crate) fn need_altitude(sensor: &Sensor, frames: Option<&Frames>) -> Result<(), Stop> {
+    let body = &sensor.config.body;
+    let known = body.half_angle_is_free() || body.altitude_km.is_some();
+    if known || frames.is_some_and(|f| !f.rows.is_empty()) {
+        return Ok(());
+    }
+    let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or a frames.csv with it";
+    Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
+}
+
+/// A folder's name for messages.
+pub(crate) fn shown(folder: &Path) -> String {
+    if folder.as_os_str().is_empty() { "this folder".into() } else { folder.display().to_string() }
+}
+
+/// Set by Ctrl-C (and by a request to end); a second one leaves at once.
+pub(crate) fn stop_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let shared = Arc::clone(&flag);
+    let handler = ctrlc::set_handler(move || {
+        if shared.swap(true, Ordering::SeqCst) {
+            std::process::exit(i32::from(Exit::Interrupted as u8));
+        }
+        eprintln!("\nfinishing the frames that were begun; press Ctrl-C again to leave at once");
+    });
+    // Without a handler Ctrl-C ends the program at once, and the output can still be continued.
+    drop(handler);
+    flag
+}
