@@ -18,6 +18,18 @@ mod tests {
     }
 
     #[test]
+    fn every_key_is_there() {
+        let camera = hzn_core::camera::Config::ideal(Default::default(), 640, 480, 500.0);
+        let all: toml::Table = toml::from_str(&toml::to_string(&Config::new(camera)).unwrap()).unwrap();
+        for (section, keys) in &all {
+            for key in keys.as_table().unwrap().keys() {
+                let there = |l: &str| l.trim_start_matches("# ").starts_with(&format!("{key} ="));
+                assert!(super::SENSOR_TOML.lines().any(there), "[{section}] {key}");
+            }
+        }
+    }
+
+    #[test]
     fn commented_keys_are_valid_too() {
         let key = |l: &&str| l.starts_with("# ") && l[2..].split_once(" = ").is_some_and(|(k, _)| !k.contains(' '));
         let commented: Vec<_> = super::SENSOR_TOML.lines().filter(key).collect();

@@ -269,7 +269,10 @@ impl Told<'_> {
             Verdict::Passed => "passed every gate, but another fits better".into(),
             Verdict::NoConsensus => "no limb goes through enough of its points".into(),
             Verdict::FewInliers => format!("fewer than {} inliers (select.min_inliers)", s.min_inliers),
-            Verdict::ShortArc => format!("inliers cover less than {} px (select.min_arc_px)", s.min_arc_px),
+            Verdict::ShortArc => match s.min_arc_px {
+                Some(px) => format!("inliers cover less than {px} px (select.min_arc_px)"),
+                None => "inliers cover less than a tenth of the picture's diagonal (select.min_arc_px)".into(),
+            },
             Verdict::Residuals => format!("rms above {} px (select.max_rms_px)", s.max_rms_px),
             Verdict::HalfAngle => format!(
                 "half-angle more than {} sigma from the expected one (select.max_half_angle_sigma)",
@@ -277,6 +280,10 @@ impl Told<'_> {
             ),
             Verdict::Uncertain => format!("sigma above {} deg (select.max_sigma_deg)", s.max_sigma_deg),
             Verdict::NoFit => "the fit did not converge".into(),
+            Verdict::Indistinct => {
+                "many of its points lie close beside the fitted limb: a curve through clutter".into()
+            }
+            Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
             Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
         }
     }

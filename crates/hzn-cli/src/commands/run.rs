@@ -104,7 +104,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if !args.quiet {
         source.notes().iter().for_each(|note| eprintln!("note: {note}"));
     }
-    let total = source.len();
+    let total = source.total();
     if let Err(stop) = skip(source.as_mut(), &held, path) {
         // The output keeps what it has, under its name.
         output.finish()?;

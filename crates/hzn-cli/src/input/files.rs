@@ -103,7 +103,7 @@ impl Source for Files {
         };
         Some(Ok(Item { name, time_s: None, payload }))
     }
-    fn len(&self) -> Option<u64> {
+    fn total(&self) -> Option<u64> {
         Some(self.total)
     }
     fn folder(&self) -> PathBuf {

@@ -47,7 +47,7 @@ pub trait Source: Send {
     /// The next frame; `None` at the end. An error ends the sequence.
     fn next(&mut self) -> Option<anyhow::Result<Item>>;
     /// Number of frames, when it is known before.
-    fn len(&self) -> Option<u64>;
+    fn total(&self) -> Option<u64>;
     /// Folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
     /// Things that the user should know, such as files left out.

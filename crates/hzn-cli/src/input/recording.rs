@@ -87,7 +87,7 @@ impl Source for Recording {
             None => self.read(),
         }
     }
-    fn len(&self) -> Option<u64> {
+    fn total(&self) -> Option<u64> {
         None
     }
     fn folder(&self) -> PathBuf {

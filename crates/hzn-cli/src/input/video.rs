@@ -170,7 +170,7 @@ impl Source for Video {
         self.index += 1;
         Some(Ok(Item { name, time_s, payload: Payload::Decoded(picture) }))
     }
-    fn len(&self) -> Option<u64> {
+    fn total(&self) -> Option<u64> {
         self.count
     }
     fn folder(&self) -> PathBuf {

@@ -45,9 +45,9 @@ pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title:
         }
     }
     for limb in &drawing.limb {
-        canvas.polyline(limb, pen * 1.2, LIMB);
+        canvas.polyline(limb, pen * 3.2, LIMB);
     }
-    // Points lie over the line, smaller than it is wide in the long run, so that both are seen.
+    // Points lie over the line and are narrower, so that both are seen.
     for p in &drawing.rejected {
         canvas.disc(*p, pen * 1.6, REJECTED);
     }
