@@ -81,7 +81,11 @@ impl Steps {
             }
             println!("{line}");
         }
-        if child.wait()?.success() { Ok(()) } else { Err(Trouble::Failed("a test failed or did not build, see above".into())) }
+        if child.wait()?.success() {
+            Ok(())
+        } else {
+            Err(Trouble::Failed("a test failed or did not build, see above".into()))
+        }
     }
 
     /// Prints what ran and what did not; an error when anything failed.

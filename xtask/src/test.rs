@@ -42,6 +42,12 @@ fn run_cargo(args: &[&str]) -> Outcome {
     steps::run(&mut cargo(args))
 }
 
+/// Binaries and examples come out of the build of the tests. The same command again builds nothing a second time, as
+/// another selection of packages, with other features, would.
+fn built_with_the_tests() -> Outcome {
+    run_cargo(&["test", "--workspace", "--no-run", "--quiet"])
+}
+
 /// Where the demo's files go.
 fn demo_dir() -> PathBuf {
     target().join("xtask").join("hzn-demo")
@@ -49,8 +55,7 @@ fn demo_dir() -> PathBuf {
 
 /// `hzn demo`, by the binary that the tests have built.
 fn demo() -> Outcome {
-    // The profile of the tests, so that nothing is built a second time.
-    run_cargo(&["build", "--profile", "test", "--package", "hzn-cli", "--bin", "hzn"])?;
+    built_with_the_tests()?;
     let dir = demo_dir();
     if dir.exists() {
         fs::remove_dir_all(&dir)?;
@@ -68,9 +73,8 @@ fn files_read_by_others() -> Outcome {
     let python = python::environment("tests", Path::new("tests/python/requirements.txt"))?;
     let sample = target().join("xtask").join("sample.mcap");
     fs::create_dir_all(sample.parent().unwrap_or(&sample))?;
-    // Examples are built by `cargo test`, in this profile.
-    let mut command = cargo(&["run", "--quiet", "--profile", "test", "--package", "hzn-mcap", "--example", "sample"]);
-    steps::run(command.arg("--").arg(&sample))?;
+    built_with_the_tests()?;
+    steps::run(Command::new(target().join("debug/examples/sample")).arg(&sample))?;
     let mut files = recordings(&demo_dir());
     files.push(sample);
     steps::run(Command::new(python).arg("tests/python/check_mcap.py").args(files))
