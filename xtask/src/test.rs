@@ -45,7 +45,12 @@ fn run_cargo(args: &[&str]) -> Outcome {
 /// Binaries and examples come out of the build of the tests. The same command again builds nothing a second time, as
 /// another selection of packages, with other features, would.
 fn built_with_the_tests() -> Outcome {
-    run_cargo(&["test", "--workspace", "--no-run", "--quiet"])
+    run_cargo(&["test", "--workspace", "--no-run", "--quiet"])?;
+    if target().join("debug/hzn").exists() {
+        return Ok(());
+    }
+    // Only a package's own tests bring its binary along.
+    run_cargo(&["build", "--profile", "test", "--workspace", "--bins"])
 }
 
 /// Where the demo's files go.
