@@ -91,8 +91,8 @@ pub struct Level<T> {
 
 /// Bins of the histogram: the sample's upper eight bits.
 const BINS: usize = 256;
-/// Cells along each side of the first sample, and of the second.
-const SIDES: [u32; 2] = [16, 64];
+/// Cells along each side of the first sample and of the second, as powers of two.
+const SIDES_LOG2: [u32; 2] = [4, 6];
 
 struct Histogram {
     bins: [u16; BINS],
@@ -114,8 +114,8 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     observer: &O,
 ) -> Result<Level<T>, Status> {
     let full = u32::from(picture.full_scale());
-    for side in SIDES {
-        let sample = draw(picture, region, side, seed, observer);
+    for side_log2 in SIDES_LOG2 {
+        let sample = draw(picture, region, side_log2, seed, observer);
         let Some(mean) = sample.mean::<T>() else { continue };
         let fraction = mean / T::of(f64::from(full));
         if fraction < T::of(gate.min_mean) {
@@ -141,7 +141,7 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
 fn draw<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
     region: &Region<T>,
-    side: u32,
+    side_log2: u32,
     seed: u32,
     observer: &O,
 ) -> Histogram {
@@ -149,12 +149,12 @@ fn draw<T: Real, P: Pixels, O: Observer<T>>(
     let mut h = Histogram { bins: [0; BINS], sum: 0, count: 0, shift };
     let mut rng = Rng::new(seed);
     let (w, height) = (u32::from(region.width()), u32::from(region.height()));
-    for j in 0..side {
-        for i in 0..side {
+    for j in 0..1u32 << side_log2 {
+        for i in 0..1u32 << side_log2 {
             // Both draws are made for every cell, so that the sample does not depend on the mask.
             let (rx, ry) = (rng.below(65536), rng.below(65536));
-            let x = ((i * w) + ((w * rx) >> 16)) / side;
-            let y = ((j * height) + ((height * ry) >> 16)) / side;
+            let x = ((i * w) + ((w * rx) >> 16)) >> side_log2;
+            let y = ((j * height) + ((height * ry) >> 16)) >> side_log2;
             let (x, y) = (x as u16, y as u16);
             if !region.contains(x, y) || region.masked(x, y) {
                 continue;
@@ -190,9 +190,11 @@ impl Histogram {
             if below == 0 || above == 0 {
                 continue;
             }
-            if n == 0 && last + 1 == v && best > T::zero() {
-                // An empty bin changes nothing: the run of equal levels goes on.
-                last = v;
+            if n == 0 {
+                // An empty bin changes nothing: a run of equal levels goes on.
+                if last + 1 == v {
+                    last = v;
+                }
                 continue;
             }
             let m0 = T::of(f64::from(below_sum)) / T::of(f64::from(below));

@@ -61,7 +61,8 @@ const REACH: i32 = 10;
 /// Widest step of a profile in pixels.
 const WIDEST: i32 = 6;
 /// Room for a profile: `REACH` and two more on each side.
-const PROFILE: usize = 2 * (REACH as usize + 2) + 1;
+const PROFILE: usize = 32;
+const _: () = assert!(2 * (REACH + 2) < PROFILE as i32);
 
 /// What came of a candidate's border.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -86,11 +87,19 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         n => n.min(room),
     };
     let every = border.len().div_ceil(keep).max(1);
+    let margin = ((REACH + 3) * WIDEST) as u16;
+    let unmasked = !scene.region.has_mask();
     let mut made = Points::default();
     let mut place = 0;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
         let found = match config.subpixel {
-            SubPixel::Linear => linear(scene, pixel),
+            SubPixel::Linear => {
+                if unmasked && scene.region.is_inside_by(pixel.x, pixel.y, margin) {
+                    linear::<T, P, O, true>(scene, pixel)
+                } else {
+                    linear::<T, P, O, false>(scene, pixel)
+                }
+            }
             SubPixel::None => half_pixel(scene, pixel),
         };
         let Some((point, lit, fallback)) = found else { continue };
@@ -107,38 +116,33 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
     made
 }
 
-/// Reads around one border pixel; `None` beyond the region and under the mask.
-struct Around<'a, 'b, T, P, O> {
+/// Reads around one border pixel; `None` beyond the region and under the mask. `FREE`: no read within reach needs a
+/// check.
+struct Around<'a, 'b, T, P, O, const FREE: bool> {
     scene: &'a Scene<'b, T, P, O>,
     x: i32,
     y: i32,
     index: usize,
     across: isize,
     down: isize,
-    /// No read within reach needs a check.
-    free: bool,
 }
 
-impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>> Around<'a, 'b, T, P, O> {
+impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b, T, P, O, FREE> {
     fn new(scene: &'a Scene<'b, T, P, O>, p: Pixel) -> Self {
-        let (x, y) = (i32::from(p.x), i32::from(p.y));
-        let margin = (REACH + 3) * WIDEST;
-        let (w, h) = (i32::from(scene.region.width()), i32::from(scene.region.height()));
         Self {
             scene,
-            x,
-            y,
+            x: i32::from(p.x),
+            y: i32::from(p.y),
             index: scene.picture.index(p.x, p.y),
             across: scene.picture.across() as isize,
             down: scene.picture.down() as isize,
-            free: scene.region.is_plain() && x >= margin && y >= margin && x < w - margin && y < h - margin,
         }
     }
 
     #[inline(always)]
     fn at(&self, dx: i32, dy: i32) -> Option<i32> {
         let (x, y) = (self.x + dx, self.y + dy);
-        if !self.free {
+        if !FREE {
             let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
             if !self.scene.region.contains(x, y) || self.scene.region.masked(x, y) {
                 return None;
@@ -173,8 +177,11 @@ fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
     })
 }
 
-fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<(ImagePoint<T>, Lit, bool)> {
-    let around = Around::new(scene, p);
+fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+) -> Option<(ImagePoint<T>, Lit, bool)> {
+    let around = Around::<T, P, O, false>::new(scene, p);
     let (lit, dx, dy) = orientation(around.gradient()?)?;
     Some((place(p, dx, dy, T::of(0.5)), lit, false))
 }
@@ -186,7 +193,8 @@ fn place<T: Real>(p: Pixel, dx: i32, dy: i32, towards_dark: T) -> ImagePoint<T> 
     }
 }
 
-/// Four times the smoothed brightness across the edge: offset k towards the dark stands at `CENTRE + k`.
+/// Four times the smoothed brightness across the edge: offset k towards the dark stands at `CENTRE + k`. A power of
+/// two long, so that an index needs a mask instead of a check.
 struct Profile {
     values: [i32; PROFILE],
 }
@@ -195,13 +203,11 @@ const CENTRE: i32 = REACH + 2;
 impl Profile {
     #[inline(always)]
     fn get(&self, k: i32) -> i32 {
-        self.values.get((CENTRE + k) as usize).copied().unwrap_or(0)
+        self.values[(CENTRE + k) as usize % PROFILE]
     }
     #[inline(always)]
     fn set(&mut self, k: i32, v: i32) {
-        if let Some(slot) = self.values.get_mut((CENTRE + k) as usize) {
-            *slot = v;
-        }
+        self.values[(CENTRE + k) as usize % PROFILE] = v;
     }
 }
 
@@ -239,19 +245,29 @@ fn plateau(f: &mut Profile, side: Side, other: i32, read: impl Fn(i32) -> Option
             }
         }
         if !moved || (k - from).abs() >= REACH {
-            return if moved { (v, k) } else { ((v + tail) / (1 + tails), k) };
+            // Divisions by constants only: these are the innermost instructions.
+            let level = match tails {
+                1 => (v + tail) / 2,
+                2 => (v + tail) / 3,
+                _ => v,
+            };
+            return (if moved { v } else { level }, k);
         }
     }
 }
 
-fn linear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<(ImagePoint<T>, Lit, bool)> {
-    let around = Around::new(scene, p);
+fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+) -> Option<(ImagePoint<T>, Lit, bool)> {
+    let around = Around::<T, P, O, FREE>::new(scene, p);
     let gradient = around.gradient()?;
     let (lit, dx, dy) = orientation(gradient)?;
     // A wide edge is read in wider steps: from dark to the level in about four of them. The gradient sums eight times
     // the brightness change a pixel.
     let steep = gradient.0.abs().max(gradient.1.abs());
-    let step = (3 * i32::from(scene.level) / (2 * steep)).clamp(1, WIDEST);
+    let wide = 3 * i32::from(scene.level);
+    let step = if wide < 4 * steep { 1 } else { (wide / (2 * steep)).min(WIDEST) };
     let read = |k: i32| -> Option<i32> {
         let (x, y) = (k * dx * step, k * dy * step);
         // The rows to both sides run along the edge.

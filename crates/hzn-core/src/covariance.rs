@@ -55,24 +55,21 @@ pub(crate) struct Fused<T> {
 /// Covariance of the fit, raised when the residuals are larger than the noise model says, and never lowered; then
 /// the expected half-angle is fused.
 pub(crate) fn fuse<T: Real>(
-    blocks: &mut [Block<T>],
+    blocks: &[Block<T>],
     fit: &Fit<T>,
     expected: &Expected<T>,
     config: &Config,
     estimate: &estimate::Config,
 ) -> Option<Fused<T>> {
-    let azimuth = estimate::azimuth(expected);
     let (b1, b2) = basis(&fit.e);
-    let sums = estimate::pass(blocks, &fit.e, &b1, &b2, fit.c, [T::ZERO; 2], None, azimuth.as_ref(), false);
-    let mean = sums.means([T::ZERO; 2]);
-    let sums = estimate::pass(blocks, &fit.e, &b1, &b2, fit.c, mean, None, azimuth.as_ref(), false);
+    let (sums, mean) = (&fit.sums, fit.mean);
     let x = correlated(blocks, &fit.e, &b1, &b2, mean, T::of(config.correlation_px));
     let sigma = T::of(config.sigma_px);
     let variance = (sigma * sigma).most(fit.rms_px * fit.rms_px);
     let var_c = expected.sigma_cos * expected.sigma_cos;
     if !fit.free {
         // Half-angle held at the expected one: what it is wrong by, the axis is wrong by in proportion.
-        let p = sandwich_known(&sums, &x, mean, variance)?;
+        let p = sandwich_known(sums, &x, mean, variance)?;
         let n = invert_spd2(sums.known(mean))?;
         // Σ w Bᵀs · 1: the right-hand side of δe for δc = 1.
         let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);
@@ -81,7 +78,7 @@ pub(crate) fn fuse<T: Real>(
         let p = [p[0] + d1 * d1 * var_c, p[1] + d1 * d2 * var_c, p[2] + d2 * d2 * var_c];
         return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: None, chi2: T::ZERO });
     }
-    let p = sandwich_free(&sums, &x, mean, variance)?;
+    let p = sandwich_free(sums, &x, mean, variance)?;
     let var_free = p.m33;
     if estimate.half_angle == estimate::HalfAngle::Free || expected.free {
         return Some(Fused { e: fit.e, c: fit.c, p: [p.m11, p.m12, p.m22], var_free_cos: Some(var_free), chi2: T::ZERO });

@@ -55,13 +55,17 @@ pub(crate) struct Fit<T> {
     pub(crate) arc_px: T,
     /// Points that the weights' cut-off leaves out although they lie within three times it.
     pub(crate) nearby: u32,
+    /// The normal equations at the cone, about `mean`.
+    pub(crate) sums: Sums<T>,
+    /// Means of Bᵀs.
+    pub(crate) mean: [T; 2],
 }
 
 /// Tukey's constant: 95 % efficiency on Gaussian errors.
 const TUKEY: f64 = 4.685;
-/// Most robust iterations, and most free ones.
+/// Most robust iterations, and most with the weights kept.
 const ROBUST: usize = 8;
-const FREE: usize = 5;
+const SETTLE: usize = 5;
 
 /// The correction by azimuth of an ellipsoid seen with a known attitude.
 pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
@@ -81,85 +85,17 @@ pub(crate) fn fit<T: Real>(
 ) -> Option<Fit<T>> {
     let azimuth = azimuth(expected);
     let azimuth = azimuth.as_ref();
-    let (mut e, mut c) = (unit(&start.e)?, start.c);
     let known = config.half_angle == HalfAngle::Known && !expected.free;
-    if known {
-        c = expected.cos;
-    }
-    // Cut-offs shrink from three thresholds to what the residuals ask for.
-    let (widest, narrowest) = (threshold_px * T::of(2.0), threshold_px * T::of(0.5));
-    let mut cutoff = threshold_px * T::of(3.0);
-    let mut mean = [T::ZERO; 2];
-    let prior = Prior::new(blocks, expected, config, noise);
-    for round in 0..ROBUST {
-        let (b1, b2) = basis(&e);
-        if round == 0 {
-            mean = means(blocks, &b1, &b2);
-        }
-        let s = pass(blocks, &e, &b1, &b2, c, mean, Some(cutoff * cutoff), azimuth, false);
-        let (d, dc) = if known { s.step_known(mean)? } else { s.step(mean, prior.as_ref(), c).or_else(|| s.step_known(mean))? };
-        e = unit(&(e + b1 * d[0] + b2 * d[1]))?;
-        c = clamp(c + dc);
-        if known {
-            c = expected.cos;
-        }
-        let size = d[0].abs() + d[1].abs() + dc.abs();
-        mean = s.means(mean);
-        let spread = (s.cost / s.weight.most(T::of(1e-20))).sqrt() * T::of(1.2);
-        let next = (spread * T::of(TUKEY)).most(narrowest).least(widest);
-        let settled = (next - cutoff).abs() < cutoff * T::of(0.05);
-        cutoff = next;
-        if settled && size < T::of(1e-6) {
-            break;
-        }
-    }
-    // Weights are kept from here on.
-    let nearby = within(blocks, &e, c, cutoff * T::of(3.0)) - within(blocks, &e, c, cutoff);
-    let (b1, b2) = basis(&e);
-    let last = pass(blocks, &e, &b1, &b2, c, mean, Some(cutoff * cutoff), azimuth, true);
-    if last.weight <= T::of(3.0) {
-        return None;
-    }
-    let (e0, mean0) = (e, mean);
-    let mut free = !known;
-    if free {
-        for _ in 0..FREE {
-            let (b1, b2) = basis(&e);
-            let s = pass(blocks, &e, &b1, &b2, c, mean, None, azimuth, false);
-            let Some((d, dc)) = s.step(mean, None, c) else {
-                free = false;
-                break;
-            };
-            e = unit(&(e + b1 * d[0] + b2 * d[1]))?;
-            c += dc;
-            mean = s.means(mean);
-            // Too short an arc: the half-angle is not to be had from it.
-            if !(c.abs() < T::one()) || e.dot(&e0) < T::of(0.94) {
-                free = false;
-                break;
-            }
-            if d[0].abs() + d[1].abs() + dc.abs() < T::of(1e-7) {
-                break;
-            }
-        }
-    }
-    if !free {
-        // Settle at the expected half-angle with the weights found, unless it is free by nature.
-        if expected.free {
-            return None;
-        }
-        (e, c, mean) = (e0, expected.cos, mean0);
-        for _ in 0..FREE {
-            let (b1, b2) = basis(&e);
-            let (d, _) = pass(blocks, &e, &b1, &b2, c, mean, None, azimuth, false).step_known(mean)?;
-            e = unit(&(e + b1 * d[0] + b2 * d[1]))?;
-            if d[0].abs() + d[1].abs() < T::of(1e-7) {
-                break;
-            }
-        }
-    }
-    let (b1, b2) = basis(&e);
-    let end = pass(blocks, &e, &b1, &b2, c, mean, None, azimuth, false);
+    let robust = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
+    let freely = if known { None } else { settle(blocks, robust, true, azimuth) };
+    let (at, free) = match freely {
+        Some(at) => (at, true),
+        // Sun and Moon have no other half-angle to fall back on.
+        None if expected.free => return None,
+        None => (settle(blocks, State { c: expected.cos, ..robust }, false, azimuth)?, false),
+    };
+    let (b1, b2) = basis(&at.e);
+    let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, None, azimuth, false);
     let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
     for block in blocks.iter() {
         for lane in 0..LANES {
@@ -173,7 +109,98 @@ pub(crate) fn fit<T: Real>(
             before = inlier;
         }
     }
-    Some(Fit { e, c, free, rms_px: (end.cost / end.weight).sqrt(), inliers, arc_px: arc, nearby })
+    let rms_px = (sums.cost / sums.weight).sqrt();
+    Some(Fit { e: at.e, c: at.c, free, rms_px, inliers, arc_px: arc, nearby: robust.nearby, sums, mean: at.mean })
+}
+
+/// Where the iterations stand.
+#[derive(Clone, Copy)]
+struct State<T> {
+    e: V3<T>,
+    c: T,
+    /// Means of Bᵀs.
+    mean: [T; 2],
+    nearby: u32,
+}
+
+impl<T: Real> State<T> {
+    /// Takes the step and gives its size in radians; `None` when it leads nowhere.
+    fn step(&mut self, b1: &V3<T>, b2: &V3<T>, ([d1, d2], dc): ([T; 2], T), sums: &Sums<T>) -> Option<T> {
+        self.e = unit(&(self.e + b1 * d1 + b2 * d2))?;
+        self.c += dc;
+        self.mean = sums.means(self.mean);
+        Some(d1.abs() + d2.abs() + dc.abs())
+    }
+}
+
+/// Iterations with Tukey's weights, whose cut-off shrinks from three thresholds to what the residuals ask for; writes
+/// the last weights into the points.
+fn robust<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    expected: &Expected<T>,
+    threshold_px: T,
+    known: bool,
+    config: &Config,
+    noise: &covariance::Config,
+    azimuth: Option<&Azimuth<T>>,
+) -> Option<State<T>> {
+    let (widest, narrowest) = (threshold_px * T::of(2.0), threshold_px * T::of(0.5));
+    let mut cutoff = threshold_px * T::of(3.0);
+    let prior = Prior::new(blocks, expected, config, noise);
+    let e = unit(&start.e)?;
+    let (b1, b2) = basis(&e);
+    let c = if known { expected.cos } else { start.c };
+    let mut at = State { e, c, mean: means(blocks, &b1, &b2), nearby: 0 };
+    for _ in 0..ROBUST {
+        let (b1, b2) = basis(&at.e);
+        let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, Some(cutoff * cutoff), azimuth, false);
+        let free = if known { None } else { sums.step(at.mean, prior.as_ref(), at.c) };
+        let step = match free {
+            Some(step) => step,
+            None => sums.step_known(at.mean)?,
+        };
+        let size = at.step(&b1, &b2, step, &sums)?;
+        at.c = clamp(at.c);
+        let spread = (sums.cost / sums.weight.most(T::of(1e-20))).sqrt() * T::of(1.2);
+        let next = (spread * T::of(TUKEY)).most(narrowest).least(widest);
+        let settled = (next - cutoff).abs() < cutoff * T::of(0.05);
+        cutoff = next;
+        // The last digits come with the weights kept.
+        if settled && size < T::of(1e-4) {
+            break;
+        }
+    }
+    at.nearby = beside(blocks, &at.e, at.c, cutoff);
+    let (b1, b2) = basis(&at.e);
+    let last = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, Some(cutoff * cutoff), azimuth, true);
+    (last.weight > T::of(3.0)).then_some(at)
+}
+
+/// Iterations with the weights kept, to the end. `None` when the points do not determine the cone: for a free
+/// half-angle, when the arc is too short.
+fn settle<T: Real>(
+    blocks: &mut [Block<T>],
+    start: State<T>,
+    free: bool,
+    azimuth: Option<&Azimuth<T>>,
+) -> Option<State<T>> {
+    let mut at = start;
+    for _ in 0..SETTLE {
+        let (b1, b2) = basis(&at.e);
+        let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, None, azimuth, false);
+        let step = if free { sums.step(at.mean, None, at.c)? } else { sums.step_known(at.mean)? };
+        let size = at.step(&b1, &b2, step, &sums)?;
+        // 20° from the robust solution is another cone.
+        if !(at.c.abs() < T::one()) || at.e.dot(&start.e) < T::of(0.94) {
+            return None;
+        }
+        // Convergence is quadratic: after a step this small nothing is left.
+        if size < T::EPSILON * T::of(64.0) {
+            break;
+        }
+    }
+    Some(at)
 }
 
 fn clamp<T: Real>(c: T) -> T {
@@ -208,6 +235,7 @@ impl<T: Real> Prior<T> {
 }
 
 /// Sums of one pass over the points.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
     pub(crate) n: [T; 6],
@@ -340,15 +368,17 @@ pub(crate) fn pass<T: Real>(
     Sums { n: n.map(|x| sum(&x)), g: g.map(|x| sum(&x)), weight: sum(&weight), cost: sum(&cost) }
 }
 
-/// Points that may count within `limit` pixels of the cone.
-fn within<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit: T) -> u32 {
+/// Points that may count between one and three times `limit` pixels from the cone.
+fn beside<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit: T) -> u32 {
+    let (near, far) = (limit * limit, limit * limit * T::of(9.0));
     let mut n = [T::ZERO; LANES];
     for b in blocks {
         let g = b.gradient(e);
         for l in 0..LANES {
             let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
-            let close = r * r <= limit * limit * (g[0][l] * g[0][l] + g[1][l] * g[1][l]);
-            n[l] += if close { b.weight[l] } else { T::ZERO };
+            let g2 = g[0][l] * g[0][l] + g[1][l] * g[1][l];
+            let d2 = r * r;
+            n[l] += if d2 > near * g2 && d2 <= far * g2 { b.weight[l] } else { T::ZERO };
         }
     }
     sum(&n).to_i32() as u32

@@ -55,7 +55,8 @@ struct Circle<T> {
     cx: T,
     cy: T,
     semi_x: T,
-    semi_y: T,
+    inv_x: T,
+    inv_y: T,
 }
 
 #[derive(Debug, Clone)]
@@ -70,8 +71,9 @@ impl<T: Real> Region<T> {
     pub fn new(config: &Config, camera: &Camera<T>) -> Self {
         let circle = camera
             .image_circle_px()
-            .map(|(c, x, y)| Circle { cx: c.u, cy: c.v, semi_x: x - T::of(RIM_PX), semi_y: y - T::of(RIM_PX) })
-            .filter(|c| c.semi_x > T::one() && c.semi_y > T::one());
+            .map(|(c, x, y)| (c, x - T::of(RIM_PX), y - T::of(RIM_PX)))
+            .filter(|(_, x, y)| *x > T::one() && *y > T::one())
+            .map(|(c, x, y)| Circle { cx: c.u, cy: c.v, semi_x: x, inv_x: T::one() / x, inv_y: T::one() / y });
         let polygons = config
             .polygons_px
             .iter()
@@ -111,16 +113,22 @@ impl<T: Real> Region<T> {
         x < self.width && y < self.height && self.circle.as_ref().is_none_or(|c| c.contains(x, y))
     }
 
-    /// Whether the image circle cuts the picture.
+    /// Whether every pixel up to `margin` away in x and y is in the region. (Polygons are not looked at.)
     #[inline(always)]
-    pub(crate) fn has_circle(&self) -> bool {
-        self.circle.is_some()
+    pub(crate) fn is_inside_by(&self, x: u16, y: u16, margin: u16) -> bool {
+        let (w, h) = (u32::from(self.width), u32::from(self.height));
+        let (x32, y32, m) = (u32::from(x), u32::from(y), u32::from(margin));
+        x32 >= m
+            && y32 >= m
+            && x32 + m < w
+            && y32 + m < h
+            && self.circle.as_ref().is_none_or(|c| c.clear(x, y, T::of_i32(i32::from(margin))))
     }
 
-    /// Neither circle nor polygons.
+    /// Whether there are polygons.
     #[inline(always)]
-    pub(crate) fn is_plain(&self) -> bool {
-        self.circle.is_none() && self.polygons.is_empty()
+    pub(crate) fn has_mask(&self) -> bool {
+        !self.polygons.is_empty()
     }
 
     /// Whether a polygon covers the pixel.
@@ -138,7 +146,7 @@ impl<T: Real> Region<T> {
     /// First and last column of a row; `None` when the circle leaves nothing of it.
     pub fn span(&self, y: u16) -> Option<(u16, u16)> {
         let Some(c) = &self.circle else { return Some((0, self.width - 1)) };
-        let dy = (T::of_i32(i32::from(y)) - c.cy) / c.semi_y;
+        let dy = (T::of_i32(i32::from(y)) - c.cy) * c.inv_y;
         let left = T::one() - dy * dy;
         if !(left > T::zero()) {
             return None;
@@ -166,78 +174,142 @@ impl<T: Real> Region<T> {
         (self.contains(x0 as u16, y) && self.contains(x1 as u16, y)).then_some((x0 as u16, x1 as u16))
     }
 
-    /// Walks the outermost pixels of the region once around, clockwise as seen on the screen, from the left end of
-    /// the top row. `visit` says whether to go on.
-    #[inline(always)]
-    pub fn walk_ring(&self, mut visit: impl FnMut(u16, u16) -> bool) {
-        let mut rows = (0..self.height).filter_map(|y| self.span(y).map(|s| (y, s)));
-        let Some((top, (left, right))) = rows.next() else { return };
+    /// Gives the outermost pixels of the region once around as straight runs, clockwise as seen on the screen, from
+    /// the left end of the top row, until `visit` says to stop. They are the pixels with an outer 4-neighbour.
+    pub(crate) fn each_run(&self, mut visit: impl FnMut(Run) -> bool) {
+        let run = |x: u16, y: u16, dx: i32, dy: i32, len: u16| Run { x, y, dx, dy, len };
+        let (w, h) = (self.width, self.height);
+        if self.circle.is_none() {
+            let sides = [
+                run(0, 0, 1, 0, w),
+                run(w - 1, 1, 0, 1, h - 1),
+                run(w.saturating_sub(2), h - 1, -1, 0, w - 1),
+                run(0, h.saturating_sub(2), 0, -1, h.saturating_sub(2)),
+            ];
+            for side in sides {
+                if side.len > 0 && !visit(side) {
+                    return;
+                }
+            }
+            return;
+        }
+        let Some((top, (left, right))) = (0..h).find_map(|y| self.span(y).map(|s| (y, s))) else { return };
         // The rows of a convex region follow each other.
-        let bottom = rows.last().map_or(top, |(y, _)| y);
-        for x in left..=right {
-            if !visit(x, top) {
+        let Some((bottom, (low, _))) = (top..h).rev().find_map(|y| self.span(y).map(|s| (y, s))) else { return };
+        if !visit(run(left, top, 1, 0, right - left + 1)) {
+            return;
+        }
+        // Down the right side: the end of each row is found from that of the row above.
+        let mut x = right;
+        let mut y = top + 1;
+        while y <= bottom {
+            let mut end = x;
+            if self.contains(x, y) {
+                while end + 1 < w && self.contains(end + 1, y) {
+                    end += 1;
+                }
+            } else {
+                while end > 0 && !self.contains(end, y) {
+                    end -= 1;
+                }
+            }
+            if end == x {
+                // As far down as the column goes on as it is.
+                let from = y;
+                while y <= bottom && self.contains(x, y) && (x + 1 == w || !self.contains(x + 1, y)) {
+                    y += 1;
+                }
+                if !visit(run(x, from, 0, 1, y - from)) {
+                    return;
+                }
+                continue;
+            }
+            // Inwards along the row above, then outwards along this one.
+            if x > end + 1 && !visit(run(x - 1, y - 1, -1, 0, x - end - 1)) {
                 return;
             }
-        }
-        let mut x = right;
-        for y in top + 1..=bottom {
-            let Some((_, end)) = self.span(y) else { continue };
-            while x > end + 1 {
-                x -= 1;
-                if !visit(x, y - 1) {
-                    return;
-                }
-            }
             let from = if end > x { x + 1 } else { end };
-            for at in from..=end {
-                if !visit(at, y) {
-                    return;
-                }
+            if !visit(run(from, y, 1, 0, end - from + 1)) {
+                return;
             }
             x = end;
+            y += 1;
         }
-        let Some((low, _)) = self.span(bottom) else { return };
-        if bottom > top {
-            for at in (low..x).rev() {
-                if !visit(at, bottom) {
-                    return;
+        if bottom == top {
+            return;
+        }
+        if x > low && !visit(run(x - 1, bottom, -1, 0, x - low)) {
+            return;
+        }
+        // Up the left side, in the same way.
+        x = low;
+        y = bottom - 1;
+        while y > top {
+            let mut start = x;
+            if self.contains(x, y) {
+                while start > 0 && self.contains(start - 1, y) {
+                    start -= 1;
+                }
+            } else {
+                while start + 1 < w && !self.contains(start, y) {
+                    start += 1;
                 }
             }
-            x = low;
-        }
-        for y in (top + 1..bottom).rev() {
-            let Some((start, _)) = self.span(y) else { continue };
-            while x + 1 < start {
-                x += 1;
-                if !visit(x, y + 1) {
+            if start == x {
+                let from = y;
+                while y > top && self.contains(x, y) && (x == 0 || !self.contains(x - 1, y)) {
+                    y -= 1;
+                }
+                if !visit(run(x, from, 0, -1, from - y)) {
                     return;
                 }
+                continue;
+            }
+            if x + 1 < start && !visit(run(x + 1, y + 1, 1, 0, start - x - 1)) {
+                return;
             }
             let from = if start < x { x - 1 } else { start };
-            for at in (start..=from).rev() {
-                if !visit(at, y) {
-                    return;
-                }
+            if !visit(run(from, y, -1, 0, from - start + 1)) {
+                return;
             }
             x = start;
+            y -= 1;
         }
         // Up to the left end of the top row, along the second row where the top row is shorter.
-        if bottom > top {
-            while x + 1 < left {
-                x += 1;
-                if !visit(x, top + 1) {
-                    return;
-                }
-            }
+        if x + 1 < left {
+            visit(run(x + 1, top + 1, 1, 0, left - x - 1));
         }
+    }
+}
+
+/// A straight piece of the ring: `len` pixels from (x, y) on, each (dx, dy) further.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Run {
+    x: u16,
+    y: u16,
+    dx: i32,
+    dy: i32,
+    pub(crate) len: u16,
+}
+
+impl Run {
+    #[inline(always)]
+    pub(crate) fn at(&self, i: u16) -> (u16, u16) {
+        let i = i32::from(i);
+        ((i32::from(self.x) + self.dx * i) as u16, (i32::from(self.y) + self.dy * i) as u16)
     }
 }
 
 impl<T: Real> Circle<T> {
     #[inline(always)]
     fn contains(&self, x: u16, y: u16) -> bool {
-        let dx = (T::of_i32(i32::from(x)) - self.cx) / self.semi_x;
-        let dy = (T::of_i32(i32::from(y)) - self.cy) / self.semi_y;
+        self.clear(x, y, T::ZERO)
+    }
+    /// The square of `margin` pixels to each side lies within.
+    #[inline(always)]
+    fn clear(&self, x: u16, y: u16, margin: T) -> bool {
+        let dx = ((T::of_i32(i32::from(x)) - self.cx).abs() + margin) * self.inv_x;
+        let dy = ((T::of_i32(i32::from(y)) - self.cy).abs() + margin) * self.inv_y;
         dx * dx + dy * dy <= T::one()
     }
 }
@@ -269,8 +341,8 @@ mod tests {
 
     fn ring(region: &Region<f64>) -> Vec<(u16, u16)> {
         let mut ring = Vec::new();
-        region.walk_ring(|x, y| {
-            ring.push((x, y));
+        region.each_run(|run| {
+            ring.extend((0..run.len).map(|i| run.at(i)));
             true
         });
         ring

@@ -19,10 +19,7 @@ pub(crate) fn to_rays<T: Real>(camera: &Camera<T>, blocks: &mut [Block<T>]) {
                 block.step_px[lane] = (du * du + dv * dv).sqrt();
             }
             before = Some(p);
-            match camera.ray(p) {
-                Some(ray) => block.set_ray(lane, &ray),
-                None => block.clear(lane),
-            }
         }
+        camera.rays(block);
     }
 }

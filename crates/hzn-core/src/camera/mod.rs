@@ -9,6 +9,7 @@ mod radial;
 
 pub use config::{Config, Model};
 
+use crate::block::{Block, LANES};
 use crate::error::{ConfigError, Limit, require};
 use crate::frames::{Cam, UnitVec3};
 use crate::linalg::V3;
@@ -166,6 +167,39 @@ impl<T: Real> Camera<T> {
             Lens::Brown(lens) => lens.ray(x, y)?,
         };
         Some(Ray { s, m: [a * self.inv_fx, b * self.inv_fy, c * self.inv_fx, d * self.inv_fy] })
+    }
+
+    /// Rays of a block of image points in place, as [`Self::ray`]; a point beyond the image circle is cleared.
+    #[inline(always)]
+    pub(crate) fn rays(&self, block: &mut Block<T>) {
+        if let Lens::Radial(lens) = &self.lens {
+            let (mut x, mut y) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+            for l in 0..LANES {
+                x[l] = (block.s[0][l] - self.cx) * self.inv_fx;
+                y[l] = (block.s[1][l] - self.cy) * self.inv_fy;
+            }
+            if let Some((s, [a, b, c, d])) = lens.rays(&x, &y) {
+                for l in 0..LANES {
+                    let beyond = !(x[l] * x[l] + y[l] * y[l] <= self.rho_max * self.rho_max);
+                    block.m[0][l] = a[l] * self.inv_fx;
+                    block.m[1][l] = b[l] * self.inv_fy;
+                    block.m[2][l] = c[l] * self.inv_fx;
+                    block.m[3][l] = d[l] * self.inv_fy;
+                    if beyond || block.weight[l] == T::ZERO {
+                        block.clear(l);
+                    } else {
+                        (block.s[0][l], block.s[1][l], block.s[2][l]) = (s[0][l], s[1][l], s[2][l]);
+                    }
+                }
+                return;
+            }
+        }
+        for l in 0..LANES {
+            match self.ray(block.point(l)).filter(|_| block.weight[l] > T::ZERO) {
+                Some(ray) => block.set_ray(l, &ray),
+                None => block.clear(l),
+            }
+        }
     }
 
     /// The direction of an image point; `None` beyond the image circle.

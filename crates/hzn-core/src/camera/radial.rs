@@ -7,12 +7,13 @@
 
 use super::config::Config;
 use super::radial_ray;
+use crate::block::LANES;
 use crate::error::{ConfigError, Limit, require};
 use crate::linalg::V3;
 use crate::real::Real;
 
-/// Terms of each series.
-const TERMS: usize = 14;
+/// Most terms of each series; as many are used as the precision of `T` asks for.
+const TERMS: usize = 24;
 
 #[derive(Debug, Clone)]
 pub(super) struct Radial<T> {
@@ -25,9 +26,9 @@ pub(super) struct Radial<T> {
 #[derive(Debug, Clone)]
 enum Inverse<T> {
     Newton,
-    /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds one power's coefficient of the three series
-    /// (sin θ/ρ, cos θ, dθ/dρ), highest first, for Clenshaw's recurrence.
-    Series { scale: T, terms: [[T; 3]; TERMS] },
+    /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds one order's coefficients of the three series
+    /// (sin θ/ρ, cos θ, dθ/dρ), lowest first; the first `used` are summed by Clenshaw's recurrence.
+    Series { scale: T, used: usize, terms: [[T; 3]; TERMS] },
 }
 
 /// r(θ) and r'(θ).
@@ -113,7 +114,7 @@ impl<T: Real> Radial<T> {
         for node in 0..TERMS {
             let angle = core::f64::consts::PI * (node as f64 + 0.5) / n;
             let v = values(rho_of(libm::cos(angle)));
-            for (order, term) in terms.iter_mut().rev().enumerate() {
+            for (order, term) in terms.iter_mut().enumerate() {
                 let weight = libm::cos(order as f64 * angle) * if order == 0 { 1.0 } else { 2.0 } / n;
                 for (c, v) in term.iter_mut().zip(v) {
                     *c += weight * v;
@@ -122,24 +123,65 @@ impl<T: Real> Radial<T> {
         }
         let scale = 2.0 / (r_max * r_max);
         // Direction to the working precision; the derivative only weighs points, so 1e-6 is ample.
-        let tolerance = T::EPSILON.f64() * 2.0;
-        for i in 0..=64 {
-            let rho = r_max * f64::from(i) / 64.0;
-            let (got, want) = (clenshaw(&terms, scale * rho * rho - 1.0), values(rho));
-            let direction = ((got[0] - want[0]).abs() * rho).most((got[1] - want[1]).abs());
-            if !(direction <= tolerance && (got[2] - want[2]).abs() <= (1e-6 * want[2]).most(tolerance)) {
-                return Inverse::Newton;
+        let tolerance = (T::EPSILON.f64() * 2.0).most(1e-14);
+        let good = |used: usize| {
+            (0..=64).all(|i| {
+                let rho = r_max * f64::from(i) / 64.0;
+                let (got, want) = (clenshaw(terms.get(..used).unwrap_or_default(), scale * rho * rho - 1.0), values(rho));
+                let direction = ((got[0] - want[0]).abs() * rho).most((got[1] - want[1]).abs());
+                direction <= tolerance && (got[2] - want[2]).abs() <= (1e-6 * want[2]).most(tolerance)
+            })
+        };
+        match (4..=TERMS).find(|&used| good(used)) {
+            Some(used) => Inverse::Series { scale: T::of(scale), used, terms: terms.map(|row| row.map(T::of)) },
+            None => Inverse::Newton,
+        }
+    }
+
+    /// Rays of eight points (x, y) at once, where there are series: unit vectors and derivatives in the tangent basis.
+    #[inline(always)]
+    pub(super) fn rays(&self, x: &[T; LANES], y: &[T; LANES]) -> Option<([[T; LANES]; 3], [[T; LANES]; 4])> {
+        let Inverse::Series { scale, used, terms } = &self.inverse else { return None };
+        let terms = terms.get(..*used)?;
+        let (first, rest) = terms.split_first()?;
+        let zero = [T::ZERO; LANES];
+        let mut t = zero;
+        for l in 0..LANES {
+            t[l] = *scale * (x[l] * x[l] + y[l] * y[l]) - T::one();
+        }
+        let (mut b1, mut b2) = ([zero; 3], [zero; 3]);
+        for term in rest.iter().rev() {
+            for k in 0..3 {
+                for l in 0..LANES {
+                    let next = (t[l] + t[l]) * b1[k][l] - b2[k][l] + term[k];
+                    b2[k][l] = b1[k][l];
+                    b1[k][l] = next;
+                }
             }
         }
-        Inverse::Series { scale: T::of(scale), terms: terms.map(|row| row.map(T::of)) }
+        let (mut s, mut m) = ([zero; 3], [zero; 4]);
+        for l in 0..LANES {
+            let [sin, cos, dtheta]: [T; 3] = core::array::from_fn(|k| t[l] * b1[k][l] - b2[k][l] + first[k]);
+            let rho2 = (x[l] * x[l] + y[l] * y[l]).most(T::of(1e-24));
+            let k = (dtheta - sin) / rho2;
+            let xy = k * x[l] * y[l];
+            s[0][l] = x[l] * sin;
+            s[1][l] = y[l] * sin;
+            s[2][l] = cos;
+            m[0][l] = sin + k * x[l] * x[l];
+            m[1][l] = xy;
+            m[2][l] = xy;
+            m[3][l] = sin + k * y[l] * y[l];
+        }
+        Some((s, m))
     }
 
     /// The ray of (x, y) in units of the focal length and its derivative in the tangent basis.
     #[inline(always)]
     pub(super) fn ray(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
         match &self.inverse {
-            Inverse::Series { scale, terms } => {
-                let [s, c, d] = clenshaw(terms, *scale * rho2 - T::one());
+            Inverse::Series { scale, used, terms } => {
+                let [s, c, d] = clenshaw(terms.get(..*used).unwrap_or_default(), *scale * rho2 - T::one());
                 radial_ray(x, y, s, c, d)
             }
             Inverse::Newton => {
@@ -160,19 +202,16 @@ impl<T: Real> Radial<T> {
 
 /// The three series at t in −1…1.
 #[inline(always)]
-fn clenshaw<T: Real>(terms: &[[T; 3]; TERMS], t: T) -> [T; 3] {
+fn clenshaw<T: Real>(terms: &[[T; 3]], t: T) -> [T; 3] {
     let two_t = t + t;
     let (mut b1, mut b2) = ([T::zero(); 3], [T::zero(); 3]);
-    let (last, rest) = match terms.split_last() {
-        Some(parts) => parts,
-        None => return b1,
-    };
-    for term in rest {
+    let Some((first, rest)) = terms.split_first() else { return b1 };
+    for term in rest.iter().rev() {
         for i in 0..3 {
             let next = two_t * b1[i] - b2[i] + term[i];
             b2[i] = b1[i];
             b1[i] = next;
         }
     }
-    core::array::from_fn(|i| t * b1[i] - b2[i] + last[i])
+    core::array::from_fn(|i| t * b1[i] - b2[i] + first[i])
 }

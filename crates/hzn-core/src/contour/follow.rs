@@ -50,7 +50,6 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
     /// Stores it in `edge`, marks the crossings of search lines, and counts `steps` down.
     pub(crate) fn follow(&self, start: Pixel, dark: u8, edge: &mut Thinned<'_>, marks: &mut Marks<'_>, steps: &mut u32) -> End {
         let (mut x, mut y) = (i32::from(start.x), i32::from(start.y));
-        let (w, h) = (i32::from(self.region.width()), i32::from(self.region.height()));
         let (across, down) = (self.picture.across() as isize, self.picture.down() as isize);
         let offsets = STEPS.map(|(dx, dy)| dx as isize * across + dy as isize * down);
         let mut index = self.picture.index(start.x, start.y);
@@ -64,15 +63,15 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
             *steps -= 1;
             let home = !first && x == i32::from(start.x) && y == i32::from(start.y);
             let marked_row = marks.has_row(y as u16);
-            // Away from the picture's border no neighbour needs a check, unless there is a circle.
-            let inside = x > 0 && y > 0 && x < w - 1 && y < h - 1;
+            // Away from the border no neighbour needs a check.
+            let inside = self.region.is_inside_by(x as u16, y as u16, 1);
             let mut cut = false;
             let mut next = None;
             for turn in 1..=8u8 {
                 let d = (back + turn) & 7;
                 let (dx, dy) = STEPS[usize::from(d)];
                 let (nx, ny) = (x + dx, y + dy);
-                if !(inside && !self.region.has_circle()) {
+                if !inside {
                     let beyond = nx < 0 || ny < 0 || !self.region.contains(nx as u16, ny as u16);
                     // The ring is made of the pixels with an outer 4-neighbour: an outer corner is merely dark.
                     if beyond && d % 2 == 1 {

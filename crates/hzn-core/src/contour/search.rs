@@ -25,51 +25,75 @@ pub(crate) type Ranked = heapless::Vec<Start, RANKED>;
 
 impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
     /// Calls `found` with every start along the ring, clockwise, until it says to stop. Each open edge has exactly
-    /// one start. The first start's stretch does not count what lies beyond the place where the walk begins; the
-    /// return value does: the stretch that ends the walk.
-    pub(crate) fn each_start(&self, mut found: impl FnMut(Start) -> bool) -> u32 {
+    /// one start. The ring is read at every `stride`-th pixel, and at all of them where it changes in between.
+    ///
+    /// The first start's stretch does not count what lies beyond the place where the walk begins; the return value
+    /// does: the stretch that ends the walk.
+    pub(crate) fn each_start(&self, stride: u16, mut found: impl FnMut(Start) -> bool) -> u32 {
+        let stride = stride.max(1);
         let mut stretch = 0u32;
         let mut before: Option<(Pixel, bool)> = None;
         let mut first: Option<(Pixel, bool)> = None;
-        let mut stopped = false;
-        let mut step = |pixel: Pixel, lit: bool, masked: bool| -> bool {
-            let go_on = match before {
-                Some((dark, false)) if lit => {
-                    let start = Start { pixel, dark: direction(pixel, dark), stretch };
-                    found(start)
-                }
+        let mut go_on = true;
+        // One pixel after another.
+        let mut step = |before: &mut Option<(Pixel, bool)>, stretch: &mut u32, pixel: Pixel, lit: bool| -> bool {
+            let go_on = match *before {
+                Some((dark, false)) if lit => found(Start { pixel, dark: direction(pixel, dark), stretch: *stretch }),
                 _ => true,
             };
             if lit {
-                stretch = 0;
-            } else if !masked {
-                stretch += 1;
+                *stretch = 0;
+            } else if !self.region.masked(pixel.x, pixel.y) {
+                *stretch += 1;
             }
-            before = Some((pixel, lit));
+            *before = Some((pixel, lit));
             go_on
         };
-        self.region.walk_ring(|x, y| {
-            let pixel = Pixel { x, y };
-            let lit = self.lit(x, y);
-            if first.is_none() {
-                first = Some((pixel, lit));
+        self.region.each_run(|run| {
+            let mut k = 0;
+            while k < run.len {
+                let next = (k + stride).min(run.len) - 1;
+                let (x, y) = run.at(next);
+                let lit = self.lit(x, y);
+                match before {
+                    Some((_, same)) if same == lit => {
+                        if !lit && !self.region.masked(x, y) {
+                            stretch += u32::from(next + 1 - k);
+                        }
+                        before = Some((Pixel { x, y }, lit));
+                    }
+                    _ => {
+                        for i in k..=next {
+                            let (x, y) = run.at(i);
+                            let pixel = Pixel { x, y };
+                            let lit = if i == next { lit } else { self.lit(x, y) };
+                            if first.is_none() {
+                                first = Some((pixel, lit));
+                            }
+                            if !step(&mut before, &mut stretch, pixel, lit) {
+                                go_on = false;
+                                return false;
+                            }
+                        }
+                    }
+                }
+                k = next + 1;
             }
-            stopped = !step(pixel, lit, !lit && self.region.masked(x, y));
-            !stopped
+            true
         });
         // Close the ring: the last pixel and the first may make a start.
-        if let (false, Some((pixel, true))) = (stopped, first) {
-            step(pixel, true, false);
+        if let (true, Some((pixel, true))) = (go_on, first) {
+            step(&mut before, &mut stretch, pixel, true);
             return 0;
         }
         stretch
     }
 
     /// The ranked starts.
-    pub(crate) fn ranked_starts(&self) -> Ranked {
+    pub(crate) fn ranked_starts(&self, stride: u16) -> Ranked {
         let mut ranked = Ranked::new();
         let mut first: Option<Start> = None;
-        let tail = self.each_start(|start| {
+        let tail = self.each_start(stride, |start| {
             if first.is_none() {
                 first = Some(start);
             } else {

@@ -61,7 +61,7 @@ impl Bitmap {
         let mut marks = Marks::new(&mut bits, self.w, self.h, 1);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
-        scene.each_start(|start| {
+        scene.each_start(1, |start| {
             let mut edge = Thinned::new(&mut buffer);
             let end = scene.follow(start.pixel, start.dark, &mut edge, &mut marks, &mut steps);
             assert_eq!(end, End::Open);

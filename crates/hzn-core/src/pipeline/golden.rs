@@ -222,7 +222,7 @@ fn solve<T: Real>(
     let estimate = estimate::Config { half_angle };
     let noise = covariance::Config { sigma_px, correlation_px };
     let fit = estimate::fit(&mut blocks, &start, expected, T::of(config.threshold_px), &estimate, &noise)?;
-    let fused = covariance::fuse(&mut blocks, &fit, expected, &noise, &estimate)?;
+    let fused = covariance::fuse(&blocks, &fit, expected, &noise, &estimate)?;
     let (b1, b2) = basis(&fused.e);
     Some(Answer {
         axis: UnitVec3::assume_unit(fused.e),

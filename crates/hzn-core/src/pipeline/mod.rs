@@ -141,6 +141,8 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         let scene = Scene { picture, region: &self.region, level, observer };
         let spacing = config.contour.line_spacing_px.unwrap_or_else(|| line_spacing(expected, &self.camera));
         let mut marks = Marks::new(&mut self.marks, self.region.width(), self.region.height(), spacing);
+        // What is narrower on the border than a search line is apart from the next is no limb.
+        let stride = spacing.min(BORDER_STRIDE_PX);
         let mut judge = Judge {
             config,
             camera: &self.camera,
@@ -155,7 +157,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         };
         let border = &mut self.border;
 
-        let ranked = scene.ranked_starts();
+        let ranked = scene.ranked_starts(stride);
         for start in &ranked {
             if judge.done() {
                 break;
@@ -163,7 +165,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
         }
         if !judge.done() {
-            scene.each_start(|start| {
+            scene.each_start(stride, |start| {
                 if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
                     judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
                 }
@@ -179,6 +181,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         judge.conclude();
     }
 }
+
+/// The border is read at every fourth pixel: a limb's dark and lit stretches are longer.
+const BORDER_STRIDE_PX: u16 = 4;
 
 /// Rows between search lines: a quarter of the least extent of the body's disc, so that a crescent is crossed too.
 ///
