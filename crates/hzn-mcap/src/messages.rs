@@ -57,31 +57,47 @@ pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>), ser
     Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?))
 }
 
-/// A picture as a message, with the topic it belongs to.
+/// Appends a picture as a message. The bytes are copied once, straight into the buffer: pictures are nearly all of a
+/// recording.
 pub(crate) fn image(image: &EncodedImage, ns: u64, buffer: &mut Vec<u8>) {
-    let raw = |width: u32, height: u32, encoding: &str, bytes_per_pixel: u32| RawImage {
-        timestamp: stamp(ns),
-        frame_id: CAMERA.into(),
-        width,
-        height,
-        encoding: encoding.into(),
-        step: width.saturating_mul(bytes_per_pixel),
-        data: image.bytes.clone().into(),
+    /// Field numbers of `data` in `foxglove.CompressedImage` and `foxglove.RawImage`.
+    const COMPRESSED_DATA: u32 = 2;
+    const RAW_DATA: u32 = 6;
+    buffer.reserve(image.bytes.len() + 128);
+    let raw = |buffer: &mut Vec<u8>, width: u32, height: u32, encoding: &str, bytes_per_pixel: u32| {
+        let message = RawImage {
+            timestamp: stamp(ns),
+            frame_id: CAMERA.into(),
+            width,
+            height,
+            encoding: encoding.into(),
+            step: width.saturating_mul(bytes_per_pixel),
+            ..RawImage::default()
+        };
+        append(&message, buffer);
+        RAW_DATA
     };
-    let compressed = |format: &str| CompressedImage {
-        timestamp: stamp(ns),
-        frame_id: CAMERA.into(),
-        data: image.bytes.clone().into(),
-        format: format.into(),
+    let compressed = |buffer: &mut Vec<u8>, format: &str| {
+        let message = CompressedImage {
+            timestamp: stamp(ns),
+            frame_id: CAMERA.into(),
+            format: format.into(),
+            ..CompressedImage::default()
+        };
+        append(&message, buffer);
+        COMPRESSED_DATA
     };
-    match &image.format {
-        ImageFormat::Png => append(&compressed("png"), buffer),
-        ImageFormat::Jpeg => append(&compressed("jpeg"), buffer),
-        ImageFormat::Other(name) => append(&compressed(name), buffer),
-        ImageFormat::Mono8 { width, height } => append(&raw(*width, *height, "mono8", 1), buffer),
-        ImageFormat::Mono16 { width, height } => append(&raw(*width, *height, "mono16", 2), buffer),
-        ImageFormat::Rgb8 { width, height } => append(&raw(*width, *height, "rgb8", 3), buffer),
-    }
+    let field = match &image.format {
+        ImageFormat::Png => compressed(buffer, "png"),
+        ImageFormat::Jpeg => compressed(buffer, "jpeg"),
+        ImageFormat::Other(name) => compressed(buffer, name),
+        ImageFormat::Mono8 { width, height } => raw(buffer, *width, *height, "mono8", 1),
+        ImageFormat::Mono16 { width, height } => raw(buffer, *width, *height, "mono16", 2),
+        ImageFormat::Rgb8 { width, height } => raw(buffer, *width, *height, "rgb8", 3),
+    };
+    prost::encoding::encode_key(field, prost::encoding::WireType::LengthDelimited, buffer);
+    prost::encoding::encode_varint(image.bytes.len() as u64, buffer);
+    buffer.extend_from_slice(&image.bytes);
 }
 
 /// The topic that a picture of this format goes to.

@@ -186,7 +186,9 @@ impl Writer {
         let mut write = || -> std::io::Result<()> {
             // Pictures first: a frame with a report is a whole frame.
             if !images.is_empty() {
-                container.chunk(&images.take(false)?)?;
+                let chunk = images.take(false)?;
+                container.chunk(&chunk)?;
+                images.recycle(chunk);
             }
             if !data.is_empty() {
                 container.chunk(&data.take(true)?)?;

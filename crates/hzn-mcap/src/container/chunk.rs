@@ -50,6 +50,13 @@ impl ChunkBuilder {
             field.copy_from_slice(&length.to_le_bytes());
         }
     }
+    /// Gives the memory of a written chunk back for the next one.
+    pub(crate) fn recycle(&mut self, chunk: Chunk) {
+        if self.bytes.is_empty() && self.bytes.capacity() < chunk.records.capacity() {
+            self.bytes = chunk.records;
+            self.bytes.clear();
+        }
+    }
     /// Takes the chunk out and begins a new one.
     pub(crate) fn take(&mut self, compress: bool) -> std::io::Result<Chunk> {
         let plain = std::mem::take(&mut self.bytes);
