@@ -279,9 +279,8 @@ mod tests {
         let preset = parse(&format!("preset = \"hznn\"\n{CAMERA}"), Path::new("s.toml")).unwrap_err();
         assert_eq!(preset.to_string(), "s.toml:1: preset: no preset \"hznn\"; did you mean hzn?");
         assert_eq!(
-            error("[select]\ncolour = 1\n"),
-            "sensor.toml:10: [select] colour: unknown key; valid here: min_inliers, min_arc_px, max_rms_px, \
-             max_half_angle_sigma, max_sigma_deg"
+            error("[gate]\ncolour = 1\n"),
+            "sensor.toml:10: [gate] colour: unknown key; valid here: min_mean, max_mean"
         );
     }
 

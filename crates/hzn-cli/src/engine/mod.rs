@@ -168,8 +168,12 @@ pub fn run(
         drop((result_out, ticket_in));
         let read = source_end.join().unwrap_or_else(|_| Err(anyhow::anyhow!("reading the input failed")));
         written?;
+        if stop.load(Ordering::Relaxed) {
+            // A decoder that runs beside us gets the same Ctrl-C; that it broke off is no error then.
+            return Ok(End::Interrupted);
+        }
         read?;
-        Ok(if stop.load(Ordering::Relaxed) { End::Interrupted } else { End::Complete })
+        Ok(End::Complete)
     })
 }
 

@@ -1,0 +1,149 @@
+//! Whatever is wrong gets a message that says what to do, and loses no frame.
+
+mod common;
+
+use common::{Place, cell, limb, without_time};
+use image::{DynamicImage, ImageFormat};
+
+#[test]
+fn wrong_keys_and_values_of_the_sensor() {
+    let place = Place::with_pictures(1);
+    let with = |rest: &str| {
+        place.write("in/sensor.toml", format!("{}{rest}", common::SENSOR).as_bytes());
+        place.run(&["run", "in"]).expect(2).err
+    };
+    insta::assert_snapshot!(with("[reject]\nthreshold_pxx = 3.0\n"), @"error: in/sensor.toml:16: [reject] threshold_pxx: unknown key; did you mean threshold_px?");
+    insta::assert_snapshot!(with("[reject]\nthreshold_px = -1\n"), @"error: in/sensor.toml:16: [reject] threshold_px: -1 is refused: must be above 0");
+    insta::assert_snapshot!(with("[binarize]\nmethod = \"otzu\"\n"), @r#"error: in/sensor.toml:16: [binarize] method: "otzu" is not a valid value; did you mean otsu?"#);
+    place.write("in/sensor.toml", common::SENSOR.replace("\"pinhole\"", "\"kannala-brandt\"\nk = [-0.9]").as_bytes());
+    place.run(&["run", "in"]).expect(2).says("monotone");
+    place.write("in/sensor.toml", common::SENSOR.replace("altitude_km = 400.0", "").as_bytes());
+    place.run(&["run", "in"]).expect(2).says("give --altitude-km");
+    place.run(&["run", "in", "--altitude-km", "400"]).expect(0);
+    place.run(&["run", "in", "--altitude-km", "NaN"]).expect(2).says("must be a finite number");
+    std::fs::remove_file(place.path("in/sensor.toml")).unwrap();
+    place.run(&["run", "in"]).expect(2).says("hzn init");
+}
+
+#[test]
+fn wrong_rows_of_frames_csv() {
+    let place = Place::with_pictures(2);
+    let with = |text: &str| {
+        place.write("in/frames.csv", text.as_bytes());
+        place.run(&["run", "in"])
+    };
+    let err = with("file,altitude_km\n0000.png,NaN\n").expect(2).err;
+    insta::assert_snapshot!(err, @r#"error: in/frames.csv:2: 0000.png altitude_km: "NaN" is not a finite number; leave the cell empty if it is not known"#);
+    let err = with("file,altitude_km\n0000.png,400\n0001.png,-3\n").expect(2).err;
+    insta::assert_snapshot!(err, @"error: in/frames.csv:3: 0001.png: altitude_km must be a finite number above 0");
+    with("file,x_km,y_km,z_km\n0000.png,6000,0,0\n").expect(2).says("frames.csv:2: 0000.png: x_km, y_km, z_km must be");
+    with("name,altitude_km\n0000.png,400\n").expect(2).says("the column `file` is missing");
+    let ran = with("file,altitude_km\n0000.png,400\n0001.png,400\n0009.png,400\n").expect(0);
+    assert_eq!(without_time(&ran.out).len(), 2);
+    ran.says("warning: in/frames.csv:4: 0009.png: no such picture in the folder");
+}
+
+/// A PNG that only claims a size, as an attacker or a flipped bit would write it.
+fn png_of_size(width: u32, height: u32) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    limb(2, 2, 0.0).write_to(&mut std::io::Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
+    bytes[16..20].copy_from_slice(&width.to_be_bytes());
+    bytes[20..24].copy_from_slice(&height.to_be_bytes());
+    let crc = crc32(&bytes[12..29]).to_be_bytes();
+    bytes[29..33].copy_from_slice(&crc);
+    bytes
+}
+
+fn crc32(data: &[u8]) -> u32 {
+    let step = |crc: u32, byte: &u8| {
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xedb8_8320 } else { c >> 1 })
+    };
+    !data.iter().fold(!0u32, step)
+}
+
+#[test]
+fn broken_pictures_are_records_and_the_run_goes_on() {
+    let place = Place::with_pictures(1);
+    let whole = std::fs::read(place.path("in/0000.png")).unwrap();
+    let mut jpeg = Vec::new();
+    limb(320, 240, 1.0).write_to(&mut std::io::Cursor::new(&mut jpeg), ImageFormat::Jpeg).unwrap();
+    place.write("in/b-empty.png", b"");
+    place.write("in/c-cut.png", &whole[..whole.len() / 2]);
+    place.write("in/d-cut.jpg", &jpeg[..jpeg.len() / 2]);
+    place.write("in/e-text.png", b"this is no picture");
+    place.write("in/f-huge.png", &png_of_size(60_000, 60_000));
+    place.write("in/g-none.png", &png_of_size(0, 7));
+    limb(100, 50, 0.0).save(place.path("in/h-small.png")).unwrap();
+    DynamicImage::ImageLuma8(limb(320, 240, 0.0)).into_rgba16().save(place.path("in/i-sixteen.png")).unwrap();
+    place.write("in/j-good.jpg", &jpeg);
+    let ran = place.run(&["run", "in", "-o", "out.csv"]).expect(3).says("7 unreadable");
+    assert!(ran.err.contains("unreadable: h-small.png: picture is 100x50 but the camera is 320x240"), "{}", ran.err);
+    let rows = place.rows("out.csv");
+    let shown: Vec<String> =
+        rows.iter().map(|r| format!("{} {}: {}", cell(r, "file"), cell(r, "status"), cell(r, "detail"))).collect();
+    let has = |i: usize, text: &str| assert!(shown[i].contains(text), "{} lacks {text:?}", shown[i]);
+    has(0, "0000.png ok");
+    has(1, "unreadable: file is empty");
+    has(2, "unreadable: PNG");
+    has(3, "the file is truncated");
+    has(4, "is no picture that is known here");
+    has(5, "picture of 60000x60000 is larger than the limit of 20000 px a side");
+    has(6, "unreadable: ");
+    has(7, "but the camera is 320x240");
+    has(8, "i-sixteen.png ok");
+    has(9, "j-good.jpg ok");
+}
+
+/// A PNG with a palette, written by hand: stored blocks of deflate.
+fn palette_png(image: &image::GrayImage) -> Vec<u8> {
+    let chunk = |kind: &[u8], data: &[u8]| {
+        let body = [kind, data].concat();
+        [&(data.len() as u32).to_be_bytes()[..], &body, &crc32(&body).to_be_bytes()].concat()
+    };
+    let rows: Vec<u8> = image.as_raw().chunks(image.width() as usize).flat_map(|r| [&[0u8][..], r].concat()).collect();
+    let mut zlib = vec![0x78, 0x01];
+    let mut blocks = rows.chunks(60_000).peekable();
+    while let Some(block) = blocks.next() {
+        zlib.push(u8::from(blocks.peek().is_none()));
+        zlib.extend((block.len() as u16).to_le_bytes());
+        zlib.extend((!(block.len() as u16)).to_le_bytes());
+        zlib.extend(block);
+    }
+    let (a, b) = rows.iter().fold((1u32, 0u32), |(a, b), &v| {
+        let a = (a + u32::from(v)) % 65521;
+        (a, (b + a) % 65521)
+    });
+    zlib.extend((b << 16 | a).to_be_bytes());
+    let mut header = Vec::new();
+    header.extend(image.width().to_be_bytes());
+    header.extend(image.height().to_be_bytes());
+    header.extend([8, 3, 0, 0, 0]);
+    let palette: Vec<u8> = (0..=255u8).flat_map(|v| [v, v, v]).collect();
+    let parts = [chunk(b"IHDR", &header), chunk(b"PLTE", &palette), chunk(b"IDAT", &zlib), chunk(b"IEND", b"")];
+    [b"\x89PNG\r\n\x1a\n".to_vec(), parts.concat()].concat()
+}
+
+#[test]
+fn palettes_are_read_and_animations_refused_by_name() {
+    let place = Place::with_pictures(1);
+    place.write("in/palette.png", &palette_png(&limb(320, 240, 0.0)));
+    place.write("in/film.gif", b"GIF89a\x01\x00\x01\x00");
+    place.write("in/zgif.png", b"GIF89a\x01\x00\x01\x00\x00\x00\x00;");
+    let ran = place.run(&["run", "in"]).expect(3).says("1 file ending in .gif left out");
+    let rows = without_time(&ran.out);
+    assert_eq!(cell(&rows[0], "axis_y"), cell(&rows[1], "axis_y"));
+    assert_eq!(cell(&rows[2], "status"), "unreadable");
+}
+
+#[cfg(unix)]
+#[test]
+fn unwritable_folders_are_said() {
+    let place = Place::with_pictures(1);
+    // A file in the way of the folder; permissions would not stop a test that runs as root.
+    place.write("file", b"");
+    for out in ["file/out.csv", "file/out.mcap"] {
+        let ran = place.run(&["run", "in", "-o", out]);
+        assert!(ran.code == 1 && ran.err.contains("file"), "{}", ran.err);
+    }
+    place.run(&["run", "in", "--overlay", "file"]).expect(1);
+}

@@ -1,0 +1,71 @@
+//! The smaller commands.
+
+mod common;
+
+use common::Place;
+
+#[test]
+fn init_writes_what_run_takes() {
+    let place = Place::new();
+    place.run(&["init", "new.toml"]).expect(0);
+    place.run(&["init", "new.toml"]).expect(2).says("exists already");
+    let shown = place.run(&["camera", "show", "new.toml"]).expect(0).out;
+    assert!(shown.contains("1920 x 1080 px") && shown.contains("field of view"), "{shown}");
+    assert!(shown.contains("half-angle 70.459"), "{shown}");
+}
+
+#[test]
+fn explain_tells_every_stage() {
+    let place = Place::with_pictures(2);
+    let out = place.run(&["explain", "in/0001.png", "--overlay", "o.png"]).expect(0).out;
+    for word in
+        ["picture", "expected", "binarize", "contour", "candidates", "chosen", "status      ok", "sigma", "time"]
+    {
+        assert!(out.contains(word), "{word} in {out}");
+    }
+    let overlay = image::open(place.path("o.png")).unwrap();
+    assert_eq!((overlay.width(), overlay.height()), (320, 240));
+    image::GrayImage::from_pixel(320, 240, image::Luma([9])).save(place.path("in/black.png")).unwrap();
+    let out = place.run(&["explain", "in/black.png"]).expect(0).out;
+    assert!(out.contains("try         "), "{out}");
+    place.run(&["explain", "in", "--index", "9"]).expect(2).says("numbered from 0");
+}
+
+#[test]
+fn overlays_of_a_run() {
+    let place = Place::with_pictures(2);
+    place.run(&["run", "in", "--overlay", "drawn", "-q"]).expect(0);
+    let drawn = image::open(place.path("drawn/0000.png")).unwrap().into_rgb8();
+    // The fitted limb's colour, somewhere.
+    assert!(drawn.pixels().any(|p| p.0 == [240, 228, 66]));
+}
+
+#[test]
+fn completions_for_every_shell() {
+    let place = Place::new();
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(place.run(&["completions", shell]).expect(0).out.contains("explain"));
+    }
+}
+
+#[test]
+fn wrong_usage_is_2() {
+    let place = Place::new();
+    place.run(&["frobnicate"]).expect(2);
+    place.run(&["run"]).expect(2);
+    place.run(&["export", "in/sensor.toml"]).expect(2).says("nothing to export");
+    place.run(&["run", "in"]).expect(2).says("no pictures");
+}
+
+#[test]
+fn demo_compares_with_the_truth() {
+    let place = Place::new();
+    let out = place.run(&["demo", "d", "--count", "3"]).expect(0).out;
+    assert!(out.contains("3 of 3 frames with a limb in view (100.0 %)"), "{out}");
+    assert!(out.contains("Photograph from the ISS") && out.contains("altitude from the limb"), "{out}");
+    for file in ["flight/sensor.toml", "flight/frames.csv", "flight/truth.csv", "flight.mcap", "flight.csv", "iss.mcap"]
+    {
+        assert!(place.path("d").join(file).exists(), "{file}");
+    }
+    place.run(&["demo", "d"]).expect(2).says("exists already");
+}

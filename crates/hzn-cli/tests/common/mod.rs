@@ -1,0 +1,118 @@
+//! A folder with a few small pictures of a limb, and the command run on it.
+#![allow(dead_code, reason = "each test file takes what it needs")]
+#![allow(unreachable_pub, reason = "shared between test files")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use image::{ImageFormat, Luma};
+
+pub struct Place {
+    dir: tempfile::TempDir,
+}
+
+/// What a run of the command gave.
+pub struct Ran {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+pub const SENSOR: &str = "preset = \"hzn\"\n\n[camera]\nwidth = 320\nheight = 240\nmodel = \"pinhole\"\nfx_px = 300.0\n\
+                          fy_px = 300.0\ncx_px = 159.5\ncy_px = 119.5\n\n[body]\nkind = \"earth-sphere\"\naltitude_km = 400.0\n";
+
+/// A smooth bright body below a limb; `shift` moves it, so that pictures differ.
+pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {
+    image::GrayImage::from_fn(width, height, |x, y| {
+        // The limb of a body with a half-angle of 70 degrees whose centre is 68 degrees below the axis.
+        let (f, s) = (300.0f64, (68.0 + 0.05 * shift).to_radians());
+        let (u, v) = ((f64::from(x) - 159.5) / f, (f64::from(y) - 119.5) / f);
+        let cos = (v * s.sin() + s.cos()) / (1.0 + u * u + v * v).sqrt();
+        let px = (70.38f64.to_radians() - cos.clamp(-1.0, 1.0).acos()) * f;
+        Luma([(20.0 + 180.0 * (0.5 + px / 2.0).clamp(0.0, 1.0)) as u8])
+    })
+}
+
+impl Place {
+    /// An empty folder with a sensor.toml.
+    pub fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir(dir.path().join("in")).unwrap();
+        let place = Self { dir };
+        place.write("in/sensor.toml", SENSOR.as_bytes());
+        place
+    }
+    /// With pictures 0000.png to (n-1).png.
+    pub fn with_pictures(n: usize) -> Self {
+        let place = Self::new();
+        for i in 0..n {
+            let path = place.path(&format!("in/{i:04}.png"));
+            if i < 40 {
+                limb(320, 240, i as f64).save_with_format(path, ImageFormat::Png).unwrap();
+            } else {
+                std::fs::hard_link(place.path(&format!("in/{:04}.png", i % 40)), path).unwrap();
+            }
+        }
+        place
+    }
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+    pub fn write(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.path(name), bytes).unwrap();
+    }
+    pub fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap()
+    }
+    /// The command, to be run in the folder.
+    pub fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("hzn"));
+        command.current_dir(self.dir.path()).args(args);
+        command
+    }
+    pub fn run(&self, args: &[&str]) -> Ran {
+        Ran::of(&self.command(args).output().unwrap(), self.dir.path())
+    }
+    /// The row of a picture in a CSV, as columns by name.
+    pub fn rows(&self, name: &str) -> Vec<Vec<(String, String)>> {
+        let text = self.read(name);
+        rows(&text)
+    }
+}
+
+/// Rows of a CSV text.
+pub fn rows(text: &str) -> Vec<Vec<(String, String)>> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let header = reader.headers().unwrap().clone();
+    let named = |r: csv::StringRecord| header.iter().map(str::to_owned).zip(r.iter().map(str::to_owned)).collect();
+    reader.records().map(|r| named(r.unwrap())).collect()
+}
+
+/// A cell of a row.
+pub fn cell<'a>(row: &'a [(String, String)], name: &str) -> &'a str {
+    &row.iter().find(|(n, _)| n == name).unwrap().1
+}
+
+/// A table without the time that processing took.
+pub fn without_time(text: &str) -> Vec<Vec<(String, String)>> {
+    let mut rows = rows(text);
+    rows.iter_mut().for_each(|r| r.retain(|(n, _)| n != "elapsed_us"));
+    rows
+}
+
+impl Ran {
+    pub fn of(output: &Output, folder: &Path) -> Self {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).replace(&format!("{}/", folder.display()), "");
+        Self { code: output.status.code().unwrap_or(-1), out: text(&output.stdout), err: text(&output.stderr) }
+    }
+    #[track_caller]
+    pub fn expect(self, code: i32) -> Self {
+        assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
+        self
+    }
+    #[track_caller]
+    pub fn says(self, text: &str) -> Self {
+        assert!(self.err.contains(text), "expected {text:?} in: {}", self.err);
+        self
+    }
+}

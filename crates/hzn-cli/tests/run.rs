@@ -1,0 +1,219 @@
+//! `hzn run`: inputs, outputs, order, going on after an end of any kind.
+
+mod common;
+
+use common::{Place, cell, without_time};
+use std::time::{Duration, Instant};
+
+#[test]
+fn a_folder_gives_a_table_in_order_with_every_number_of_threads() {
+    let place = Place::with_pictures(30);
+    let one = place.run(&["run", "in", "-j", "1", "-q"]).expect(0);
+    let many = place.run(&["run", "in", "-j", "7", "-q"]).expect(0);
+    assert_eq!(without_time(&one.out), without_time(&many.out));
+    let rows = without_time(&one.out);
+    assert_eq!(rows.len(), 30);
+    for (i, row) in rows.iter().enumerate() {
+        assert_eq!(cell(row, "index"), i.to_string());
+        assert_eq!(cell(row, "file"), format!("{i:04}.png"));
+        assert_eq!((cell(row, "status"), cell(row, "time_s")), ("ok", format!("{i}.0").as_str()));
+    }
+}
+
+#[test]
+fn all_outputs_hold_the_same_rows() {
+    let place = Place::with_pictures(6);
+    for name in ["a.csv", "a.jsonl", "a.mcap"] {
+        place.run(&["run", "in", "-o", name]).expect(0).says("6 frames: 6 ok");
+        assert!(!place.path(&format!("{name}.part")).exists());
+    }
+    place.run(&["export", "a.mcap", "-o", "b.csv"]).expect(0);
+    place.run(&["export", "a.jsonl", "-o", "c.csv"]).expect(0);
+    let rows = without_time(&place.read("a.csv"));
+    assert_eq!(rows.len(), 6);
+    assert_eq!(without_time(&place.read("b.csv")), rows);
+    assert_eq!(without_time(&place.read("c.csv")), rows);
+    place.run(&["export", "a.mcap", "--images", "pics", "--overlay", "drawn"]).expect(0).says("6 pictures");
+    assert_eq!(std::fs::read(place.path("pics/0000.png")).unwrap(), std::fs::read(place.path("in/0000.png")).unwrap());
+    assert!(place.path("drawn/0005.png").exists());
+    let info = place.run(&["info", "a.mcap"]).expect(0).out;
+    assert!(info.contains("frames           6") && info.contains("ok               6 (100.0 %)"), "{info}");
+    // A recording is an input again.
+    let again = place.run(&["run", "a.mcap", "-s", "in/sensor.toml"]).expect(0);
+    let axis = |r: &Vec<(String, String)>| cell(r, "axis_y").to_owned();
+    let again = without_time(&again.out);
+    assert_eq!(again.iter().map(axis).collect::<Vec<_>>(), rows.iter().map(axis).collect::<Vec<_>>());
+}
+
+#[test]
+fn times_and_altitudes_come_from_frames_csv() {
+    let place = Place::with_pictures(3);
+    place.write("in/frames.csv", b"file,time_s,altitude_km\n0001.png,77.5,390\n");
+    let ran = place.run(&["run", "in", "--fps", "4"]).expect(0).says("2 pictures have no row here");
+    let rows = without_time(&ran.out);
+    assert_eq!((cell(&rows[1], "time_s"), cell(&rows[1], "altitude_km")), ("77.5", "390.0"));
+    assert_eq!((cell(&rows[2], "time_s"), cell(&rows[2], "altitude_km")), ("0.5", "400.0"));
+}
+
+#[test]
+fn flight_precision_agrees() {
+    let place = Place::with_pictures(2);
+    let host = without_time(&place.run(&["run", "in"]).expect(0).out);
+    let flight = without_time(&place.run(&["run", "in", "--flight"]).expect(0).out);
+    for (a, b) in host.iter().zip(&flight) {
+        let z = |r: &[(String, String)]| cell(r, "axis_y").parse::<f64>().unwrap();
+        assert!((z(a) - z(b)).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn patterns_and_single_pictures() {
+    let place = Place::with_pictures(12);
+    assert_eq!(without_time(&place.run(&["run", "in/000*.png"]).expect(0).out).len(), 10);
+    assert_eq!(without_time(&place.run(&["run", "in/0003.png", "in/0001.png"]).expect(0).out).len(), 2);
+    place.run(&["run", "in/9*.png"]).expect(2).says("in/9*.png: no file matches");
+    place.run(&["run", "nowhere"]).expect(2).says("nowhere: no such file or folder");
+}
+
+#[test]
+fn headerless_pictures() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("raw")).unwrap();
+    let image = common::limb(320, 240, 0.0);
+    place.write("raw/a.raw", image.as_raw());
+    let words: Vec<u8> = image.as_raw().iter().flat_map(|&v| (u16::from(v) << 4).to_le_bytes()).collect();
+    place.write("raw/b.raw", &words);
+    let ran = place.run(&["run", "raw", "--raw", "320x240:mono8", "-s", "in/sensor.toml"]).expect(3);
+    let rows = without_time(&ran.out);
+    assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("ok", "unreadable"));
+    assert_eq!(cell(&rows[1], "detail"), "153600 bytes, but 320x240:mono8 has 76800");
+    let ran = place.run(&["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml"]).expect(0);
+    assert_eq!(cell(&without_time(&ran.out)[0], "axis_y")[..4], cell(&rows[0], "axis_y")[..4]);
+}
+
+/// `ffmpeg` and `ffprobe` that give two frames of 320x240, written as shell scripts: what is tested is how they are
+/// called and read, not the decoding.
+#[cfg(unix)]
+#[test]
+fn video_through_ffmpeg_on_the_path() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = Place::new();
+    let frames: Vec<u8> = [0.0, 5.0].iter().flat_map(|&s| common::limb(320, 240, s).into_raw()).collect();
+    place.write("frames.gray", &frames);
+    place.write("in/film.mp4", b"not looked at");
+    std::fs::create_dir(place.path("bin")).unwrap();
+    let probe = "#!/bin/sh\ncase \"$*\" in *best_effort*) printf '0.04\\n0.12\\n';; \
+                 *) printf 'width=320\\nheight=240\\npix_fmt=yuv420p\\nnb_frames=2\\n';; esac\n";
+    let ffmpeg = "#!/bin/sh\ncase \"$*\" in *extractplanes=y*passthrough*|*passthrough*extractplanes=y*) \
+                  /bin/cat frames.gray;; *) exit 1;; esac\n";
+    for (name, script) in [("bin/ffprobe", probe), ("bin/ffmpeg", ffmpeg)] {
+        place.write(name, script.as_bytes());
+        std::fs::set_permissions(place.path(name), std::fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    let output = place.command(&["run", "in/film.mp4"]).env("PATH", place.path("bin")).output().unwrap();
+    let ran = common::Ran::of(&output, &place.path("")).expect(0);
+    let rows = without_time(&ran.out);
+    assert_eq!(rows.len(), 2);
+    assert_eq!((cell(&rows[1], "file"), cell(&rows[1], "time_s")), ("film.mp4#000001", "0.12"));
+    assert_eq!(cell(&rows[1], "status"), "ok");
+    let output = place.command(&["run", "in/film.mp4"]).env("PATH", place.path("in")).output().unwrap();
+    common::Ran::of(&output, &place.path("")).expect(2).says("install ffmpeg");
+}
+
+#[test]
+fn outputs_that_exist_are_kept() {
+    let place = Place::with_pictures(2);
+    for name in ["a.csv", "a.mcap"] {
+        place.write(name, b"precious");
+        place.run(&["run", "in", "-o", name]).expect(2).says("--force replaces it");
+        assert_eq!(place.read(name), "precious");
+        place.run(&["run", "in", "-o", name, "--force"]).expect(0);
+    }
+    place.run(&["run", "in", "-o", "out.txt"]).expect(2).says("must be .mcap, .csv or .jsonl");
+    place.run(&["run", "in", "-o", "no/such/out.csv"]).expect(1).says("the folder does not exist");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_said_and_finished_frames_stay() {
+    let place = Place::with_pictures(3);
+    // /dev/full takes the place of the unfinished file: every write to it says that the disk is full.
+    std::os::unix::fs::symlink("/dev/full", place.path("a.csv.part")).unwrap();
+    place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(1).says("the disk is full").says("--resume");
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = place.command(&["run", "in"]).stdout(full).output().unwrap();
+    common::Ran::of(&output, &place.path("")).expect(1).says("cannot be written to stdout");
+}
+
+/// Starts a run of many frames, waits until some are finished, and ends it with `end`.
+#[cfg(unix)]
+fn cut_short(place: &Place, out: &str, end: &str) -> Option<i32> {
+    let mut child =
+        place.command(&["run", "in", "-o", out, "-j", "1"]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let part = place.path(&format!("{out}.part"));
+    let begin = Instant::now();
+    // Larger than what stands before the first frame.
+    let grown = |part: &std::path::Path| std::fs::metadata(part).is_ok_and(|m| m.len() > 100_000);
+    while !grown(&part) && begin.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // Pictures come before results in a recording: give those time to follow.
+    std::thread::sleep(Duration::from_millis(60));
+    let id = child.id().to_string();
+    std::process::Command::new("kill").args([end, &id]).status().unwrap();
+    child.wait().unwrap().code()
+}
+
+#[cfg(unix)]
+#[test]
+fn killed_and_continued_gives_the_same() {
+    let place = Place::with_pictures(2000);
+    place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
+    let whole = without_time(&place.read("whole.csv"));
+    for out in ["a.csv", "a.jsonl", "a.mcap"] {
+        let code = cut_short(&place, out, "-9");
+        assert_eq!(code, None, "{out}: ended before it was killed");
+        assert!(!place.path(out).exists());
+        place.run(&["run", "in", "-o", out]).expect(2).says("--resume");
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
+        assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn recover_closes_what_a_crash_left() {
+    let place = Place::with_pictures(2000);
+    for out in ["a.csv", "a.mcap"] {
+        cut_short(&place, out, "-9");
+        place.run(&["recover", &format!("{out}.part")]).expect(0).says("frames");
+        place.run(&["info", out]).expect(0);
+        assert!(!place.path(&format!("{out}.part")).exists());
+        // Even that can be continued.
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_leaves_a_valid_file() {
+    let place = Place::with_pictures(2000);
+    for out in ["a.csv", "a.mcap"] {
+        assert_eq!(cut_short(&place, out, "-INT"), Some(130), "{out}");
+        assert!(place.path(out).exists());
+        place.run(&["info", out]).expect(0);
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
+    }
+}
+
+#[test]
+fn another_input_is_not_appended() {
+    let place = Place::with_pictures(4);
+    place.run(&["run", "in/0000.png", "in/0002.png", "-o", "a.csv"]).expect(0);
+    let before = place.read("a.csv");
+    place.run(&["run", "in", "-o", "a.csv", "--resume"]).expect(2).says("another input?");
+    assert_eq!(place.read("a.csv"), before);
+}
