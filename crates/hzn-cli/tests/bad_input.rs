@@ -43,6 +43,17 @@ fn wrong_rows_of_frames_csv() {
     ran.says("warning: in/frames.csv:4: 0009.png: no such picture in the folder");
 }
 
+#[test]
+fn a_picture_without_an_altitude_does_not_end_the_run() {
+    let place = Place::with_pictures(2);
+    place.write("in/sensor.toml", common::SENSOR.replace("altitude_km = 400.0", "").as_bytes());
+    place.write("in/frames.csv", b"file,altitude_km\n0001.png,400\n");
+    let ran = place.run(&["run", "in"]).expect(3);
+    let rows = without_time(&ran.out);
+    assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("unreadable", "ok"));
+    assert!(cell(&rows[0], "detail").starts_with("no altitude: set body.altitude_km"));
+}
+
 /// A PNG that only claims a size, as an attacker or a flipped bit would write it.
 fn png_of_size(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = Vec::new();

@@ -46,12 +46,7 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
     let camera = Camera::<f64>::try_new(c).map_err(usage)?;
     let mut out = String::new();
     let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
-    let model = match c.model {
-        Model::KannalaBrandt => "kannala-brandt",
-        Model::Equidistant => "equidistant",
-        Model::Pinhole => "pinhole",
-        Model::BrownConrady => "brown-conrady",
-    };
+    let model = model_name(c.model);
     line("picture", format!("{} x {} px", c.width, c.height));
     line("lens", format!("{model}, f = {} x {} px, centre at ({}, {})", c.fx_px, c.fy_px, c.cx_px, c.cy_px));
     if !c.k.is_empty() {
@@ -80,7 +75,7 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
     match Expected::<f64>::of(config) {
         Some(half_angle) => {
             let deg = half_angle.to_degrees();
-            line("expected body", format!("{:?}, half-angle {deg:.3} deg", config.body.kind));
+            line("expected body", format!("{}, half-angle {deg:.3} deg", hzn_mcap::body_name(config.body.kind)));
             line("expected limb", limb_size(half_angle, &camera, c));
         }
         None => line("expected limb", "unknown: set altitude_km in [body]".into()),
@@ -97,6 +92,16 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
         out.push_str(&format!("{:>15.2} {:>27.2} {slope:>13.3}\n", theta.to_degrees(), r(theta)));
     }
     Ok(out)
+}
+
+/// The lens model's name in sensor.toml.
+pub(super) fn model_name(model: Model) -> &'static str {
+    match model {
+        Model::KannalaBrandt => "kannala-brandt",
+        Model::Equidistant => "equidistant",
+        Model::Pinhole => "pinhole",
+        Model::BrownConrady => "brown-conrady",
+    }
 }
 
 /// The half-angle that a configuration alone expects.

@@ -251,8 +251,9 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     let start = Instant::now();
     finished.report = match sensor.process(&view, data, trace.as_ref()) {
         Ok(report) => Ok(report),
-        // Rows of frames.csv were checked before the run: only a missing altitude comes this far.
-        Err(why) => return Err(anyhow::anyhow!("{}: {why}", finished.name)),
+        // Rows of frames.csv were checked before the run: only a picture without a row, where the sensor has no
+        // altitude either, comes this far. The others go on.
+        Err(why) => Err(why.to_string()),
     };
     finished.elapsed = start.elapsed();
     if let (Some(folder), Some(trace), Ok(report)) = (&plan.overlay, &trace, &finished.report) {

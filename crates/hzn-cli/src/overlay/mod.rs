@@ -67,7 +67,7 @@ pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title:
 
 fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, title: &str) {
     let (w, h) = (canvas.image.width(), canvas.image.height());
-    let scale = (w.max(h) / 800).max(1);
+    let scale = (w.max(h) / 600).max(1);
     let line = 11 * scale;
     let mut entries = vec![(title.to_owned(), [255, 255, 255])];
     let mut add = |there: bool, text: String, colour: Colour| {
