@@ -101,19 +101,19 @@ fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<table::Cas
             if round == 0 {
                 result.answers(frame, &f32_run, &f64_run, &theirs);
             }
-            result.f32.total(f32_run.elapsed_us);
-            result.f64.total(f64_run.elapsed_us);
-            result.opencv.total(theirs.total_us);
+            result.f32.total(i, f32_run.elapsed_us);
+            result.f64.total(i, f64_run.elapsed_us);
+            result.opencv.total(i, theirs.total_us);
             for (name, us) in theirs.stages_us {
-                result.opencv.stage(&name, us);
+                result.opencv.stage(&name, i, us);
             }
             for (stage, us) in single.stages(case, frame)? {
-                result.f32.stage(stage, us);
+                result.f32.stage(stage, i, us);
             }
             for (stage, us) in double.stages(case, frame)? {
-                result.f64.stage(stage, us);
+                result.f64.stage(stage, i, us);
             }
-            result.warm.total(single.warm(case, frame)?);
+            result.warm.total(i, single.warm(case, frame)?);
         }
     }
     let mut every = sensors::every_point(&case.sensor)?;

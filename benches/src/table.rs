@@ -14,6 +14,8 @@ use crate::sensors::Timed;
 pub(crate) struct Results {
     machine: String,
     versions: String,
+    /// Processes that wanted to run, over the last minute.
+    load: String,
     frames: usize,
     rounds: usize,
     cases: Vec<CaseResult>,
@@ -35,7 +37,8 @@ pub(crate) struct CaseResult {
     pub(crate) ns_a_point: Vec<f64>,
 }
 
-/// Times of one program, microseconds.
+/// Times of one program, microseconds: of each frame the best of its rounds. On a busy machine a longer run is
+/// interrupted more often, so that a median over rounds would flatter the faster program.
 #[derive(Serialize, Default)]
 pub(crate) struct Times {
     total_us: Vec<f64>,
@@ -44,27 +47,41 @@ pub(crate) struct Times {
 }
 
 impl Times {
-    pub(crate) fn total(&mut self, us: f64) {
-        self.total_us.push(us);
+    pub(crate) fn total(&mut self, frame: usize, us: f64) {
+        keep_best(&mut self.total_us, frame, us);
     }
-    pub(crate) fn stage(&mut self, name: &str, us: f64) {
+    pub(crate) fn stage(&mut self, name: &str, frame: usize, us: f64) {
         match self.stages_us.iter_mut().find(|(n, _)| n == name) {
-            Some((_, list)) => list.push(us),
-            None => self.stages_us.push((name.to_owned(), vec![us])),
+            Some((_, list)) => keep_best(list, frame, us),
+            None => {
+                let mut list = Vec::new();
+                keep_best(&mut list, frame, us);
+                self.stages_us.push((name.to_owned(), list));
+            }
         }
     }
     fn median(&self) -> f64 {
         median(&self.total_us)
     }
     fn stages(&self) -> String {
-        let runs = self.total_us.len();
+        let frames = self.total_us.len();
         let one = |(name, us): &(String, Vec<f64>)| {
-            // A stage that some frames do not reach took no time there.
-            let mut all = us.clone();
-            all.resize(runs.max(us.len()), 0.0);
+            // A stage that a frame does not reach took no time there.
+            let mut all: Vec<f64> = us.iter().map(|us| if us.is_finite() { *us } else { 0.0 }).collect();
+            all.resize(frames.max(us.len()), 0.0);
             format!("{name} {:.1}", median(&all))
         };
         self.stages_us.iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Keeps the smallest time of each frame.
+fn keep_best(list: &mut Vec<f64>, frame: usize, us: f64) {
+    if list.len() <= frame {
+        list.resize(frame + 1, f64::INFINITY);
+    }
+    if let Some(best) = list.get_mut(frame) {
+        *best = best.min(us);
     }
 }
 
@@ -130,9 +147,11 @@ impl Results {
         let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let model =
             cpu.lines().find_map(|l| l.strip_prefix("model name")).map(|l| l.trim_start_matches(['\t', ':', ' ']));
+        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
         Self {
             machine: model.unwrap_or("unknown processor").to_owned(),
             versions: recipe.versions.clone(),
+            load: load.split_whitespace().next().unwrap_or("unknown").to_owned(),
             frames,
             rounds,
             cases: Vec::new(),
@@ -149,8 +168,9 @@ impl Results {
         let _ = writeln!(
             s,
             "Written by `cargo xtask bench`. One thread of {}; {}. Each case has {} distinct frames, each measured {} times \
-             with flushed caches, hzn and the recipe taking turns with the same level. Medians.\n",
-            self.machine, self.versions, self.frames, self.rounds
+             with flushed caches, hzn and the recipe taking turns with the same level; of each frame the best time, of \
+             these the median. Load of the machine at the start: {}.\n",
+            self.machine, self.versions, self.frames, self.rounds, self.load
         );
         s.push_str(
             "| case | hzn f32, µs | hzn f64, µs | recipe, µs | ratio f32 | ratio f64 | f32 warm, µs | pixels read, % | \
