@@ -38,7 +38,7 @@ pub struct Plan {
     pub frames: Option<Frames>,
     /// Frames a second, where nothing else gives a time.
     pub fps: f64,
-    /// Collect edges and points of every candidate.
+    /// Collect what is to be drawn over the picture.
     pub trace: bool,
     /// Hand the picture to the sink.
     pub keep_picture: bool,
@@ -65,19 +65,19 @@ pub struct Finished {
     pub report: Result<Report<f64>, String>,
     /// Time of processing, decoding not included.
     pub elapsed: Duration,
-    /// Edges and points, when they were asked for.
-    pub trace: Option<Trace>,
+    /// What is drawn over the picture, when it was asked for.
+    pub drawing: hzn_mcap::Annotations,
     /// The picture as PNG or JPEG, when it was asked for.
     pub picture: Option<Vec<u8>>,
 }
 
 /// Where finished frames go, in order.
 pub trait Sink {
-    /// Takes one frame.
+    /// Takes one frame; its picture and drawing may be moved out of it.
     ///
     /// # Errors
     /// It could not be written; the run ends.
-    fn write(&mut self, frame: &Finished) -> anyhow::Result<()>;
+    fn write(&mut self, frame: &mut Finished) -> anyhow::Result<()>;
     /// Makes everything written so far safe from a crash of this program.
     ///
     /// # Errors
@@ -199,8 +199,8 @@ fn write_in_order(
                     let _ = sink.flush();
                 })?;
                 waiting.insert(frame.index, frame);
-                while let Some(frame) = waiting.remove(&next) {
-                    sink.write(&frame)?;
+                while let Some(mut frame) = waiting.remove(&next) {
+                    sink.write(&mut frame)?;
                     seen(&frame);
                     next += 1;
                     flush_at.get_or_insert_with(|| Instant::now() + FLUSH_EVERY);
@@ -236,7 +236,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         camera_to_ecef_wxyz: data.and_then(|d| d.camera_to_ecef_wxyz),
         report: Err(String::new()),
         elapsed: Duration::ZERO,
-        trace: None,
+        drawing: hzn_mcap::Annotations::default(),
         picture: None,
     };
     let (picture, original) = match decoded {
@@ -259,7 +259,10 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     if let (Some(folder), Some(trace), Ok(report)) = (&plan.overlay, &trace, &finished.report) {
         draw(folder, &finished.name, &picture, sensor, trace, report)?;
     }
-    finished.trace = trace.filter(|_| plan.trace);
+    if let (true, Some(trace), Ok(report)) = (plan.trace, &trace, &finished.report) {
+        // Here and not in the one thread that writes, which would hold up all the others.
+        finished.drawing = crate::output::annotations(trace, report.solution.as_ref(), sensor.camera());
+    }
     if plan.keep_picture {
         finished.picture = match original {
             Some(bytes) => Some(bytes),

@@ -207,7 +207,7 @@ impl Output {
 }
 
 impl Sink for Output {
-    fn write(&mut self, frame: &Finished) -> anyhow::Result<()> {
+    fn write(&mut self, frame: &mut Finished) -> anyhow::Result<()> {
         match &mut self.kind {
             Kind::Mcap(writer) => Ok(writer.write(&record(frame, &self.config))?),
             Kind::Text(text) => text.write(&row(frame, &self.config)),

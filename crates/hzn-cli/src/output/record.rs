@@ -25,23 +25,21 @@ pub fn row(frame: &Finished, config: &Config) -> Row {
     }
 }
 
-/// The record of a frame, with picture and drawing where the run collected them.
-pub fn record(frame: &Finished, config: &Config) -> FrameRecord {
+/// The record of a frame, with the picture and the drawing that the run collected; both are moved out of it.
+pub fn record(frame: &mut Finished, config: &Config) -> FrameRecord {
     let mut record = FrameRecord::new(row(frame, config));
     record.attitude = frame.camera_to_ecef_wxyz.map(|q| Attitude {
         q_ecef_from_camera_wxyz: q,
         position_m: frame.position_km.unwrap_or_default().map(|km| km * 1e3),
     });
-    record.image = frame.picture.as_ref().map(|bytes| {
-        let png = matches!(crate::input::picture::format_of(bytes), Some(image::ImageFormat::Png));
-        EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes: bytes.clone() }
+    record.image = frame.picture.take().map(|bytes| {
+        let png = matches!(crate::input::picture::format_of(&bytes), Some(image::ImageFormat::Png));
+        EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes }
     });
     match &frame.report {
         Ok(report) => {
             record.candidates = CandidateEdge::from_report(report);
-            if let (Some(trace), Ok(camera)) = (&frame.trace, Camera::try_new(&config.camera)) {
-                record.annotations = annotations(trace, report.solution.as_ref(), &camera);
-            }
+            record.annotations = std::mem::take(&mut frame.drawing);
         }
         Err(why) => record.log.push(LogLine { level: LogLevel::Error, message: why.clone() }),
     }
