@@ -150,12 +150,10 @@ fn draw<T: Real, P: Pixels, O: Observer<T>>(
     let mut rng = Rng::new(seed);
     let (w, height) = (u32::from(region.width()), u32::from(region.height()));
     for j in 0..1u32 << side_log2 {
+        // The cells of a row share theirs: each row of a picture is a page of memory away from the next.
+        let y = (((j * height) + ((height * rng.below(65536)) >> 16)) >> side_log2) as u16;
         for i in 0..1u32 << side_log2 {
-            // Both draws are made for every cell, so that the sample does not depend on the mask.
-            let (rx, ry) = (rng.below(65536), rng.below(65536));
-            let x = ((i * w) + ((w * rx) >> 16)) >> side_log2;
-            let y = ((j * height) + ((height * ry) >> 16)) >> side_log2;
-            let (x, y) = (x as u16, y as u16);
+            let x = (((i * w) + ((w * rng.below(65536)) >> 16)) >> side_log2) as u16;
             if !region.contains(x, y) || region.masked(x, y) {
                 continue;
             }

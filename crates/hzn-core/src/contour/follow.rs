@@ -48,12 +48,26 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
 
     /// Follows the edge that passes between the lit pixel `start` and its dark neighbour in direction `dark`.
     /// Stores it in `edge`, marks the crossings of search lines, and counts `steps` down.
-    pub(crate) fn follow(&self, start: Pixel, dark: u8, edge: &mut Thinned<'_>, marks: &mut Marks<'_>, steps: &mut u32) -> End {
-        let (mut x, mut y) = (i32::from(start.x), i32::from(start.y));
+    pub(crate) fn follow(
+        &self,
+        start: Pixel,
+        dark: u8,
+        edge: &mut Thinned<'_>,
+        marks: &mut Marks<'_>,
+        steps: &mut u32,
+    ) -> End {
+        let home = (i32::from(start.x), i32::from(start.y));
+        let (mut x, mut y) = home;
         let (across, down) = (self.picture.across() as isize, self.picture.down() as isize);
         let offsets = STEPS.map(|(dx, dy)| dx as isize * across + dy as isize * down);
+        let masked = self.region.has_mask();
         let mut index = self.picture.index(start.x, start.y);
+        // The direction back to where the follower came from.
         let mut back = dark;
+        // The first turn whose neighbour is not known yet.
+        let mut turn = 1u8;
+        // Steps that certainly stay away from the border of the region.
+        let mut away = 0u16;
         let mut twice_area = 0i64;
         let mut first = true;
         loop {
@@ -61,14 +75,22 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
                 return End::OutOfSteps;
             }
             *steps -= 1;
-            let home = !first && x == i32::from(start.x) && y == i32::from(start.y);
+            let at_home = !first && (x, y) == home;
             let marked_row = marks.has_row(y as u16);
-            // Away from the border no neighbour needs a check.
-            let inside = self.region.is_inside_by(x as u16, y as u16, 1);
+            if away == 0 && self.region.is_inside_by(x as u16, y as u16, AWAY + 1) {
+                away = AWAY;
+            }
+            let inside = away > 0 || self.region.is_inside_by(x as u16, y as u16, 1);
+            away = away.saturating_sub(1);
+            if at_home || marked_row || masked {
+                // Here the known dark ones count, too.
+                turn = 1;
+            }
             let mut cut = false;
             let mut next = None;
-            for turn in 1..=8u8 {
+            while turn <= 8 {
                 let d = (back + turn) & 7;
+                turn += 1;
                 let (dx, dy) = STEPS[usize::from(d)];
                 let (nx, ny) = (x + dx, y + dy);
                 if !inside {
@@ -87,7 +109,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
                 self.observer.pixel(nx as u16, ny as u16);
                 let at = index.wrapping_add_signed(offsets[usize::from(d)]);
                 if self.picture.read(at) >= self.level {
-                    if !self.region.masked(nx as u16, ny as u16) {
+                    if !masked || !self.region.masked(nx as u16, ny as u16) {
                         next = Some((nx, ny, at, d));
                         break;
                     }
@@ -96,7 +118,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
                 if marked_row && d == WEST {
                     marks.set(x as u16, y as u16);
                 }
-                if home && d == dark {
+                if at_home && d == dark {
                     return End::Closed { twice_area };
                 }
             }
@@ -110,7 +132,13 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
             twice_area += i64::from(x) * i64::from(ny) - i64::from(nx) * i64::from(y);
             (x, y, index) = (nx, ny, at);
             back = (d + 4) & 7;
+            // The dark neighbour passed over last is a neighbour of the new pixel, too: after a straight step it
+            // stands at the second turn, after a diagonal one at the first.
+            turn = if inside && !first { 3 - d % 2 } else { 1 };
             first = false;
         }
     }
 }
+
+/// A look this far ahead spares the check of as many steps.
+const AWAY: u16 = 31;

@@ -142,7 +142,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         let spacing = config.contour.line_spacing_px.unwrap_or_else(|| line_spacing(expected, &self.camera));
         let mut marks = Marks::new(&mut self.marks, self.region.width(), self.region.height(), spacing);
         // What is narrower on the border than a search line is apart from the next is no limb.
-        let stride = spacing.min(BORDER_STRIDE_PX);
+        let stride = spacing.min(self.region.width().min(self.region.height()) / BORDER_LOOKS).max(1);
         let mut judge = Judge {
             config,
             camera: &self.camera,
@@ -182,8 +182,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     }
 }
 
-/// The border is read at every fourth pixel: a limb's dark and lit stretches are longer.
-const BORDER_STRIDE_PX: u16 = 4;
+/// The shorter side of the border is looked at in about this many places: a limb's dark and lit stretches are longer
+/// than what lies between, and each look at a column is a page of memory.
+const BORDER_LOOKS: u16 = 128;
 
 /// Rows between search lines: a quarter of the least extent of the body's disc, so that a crescent is crossed too.
 ///
