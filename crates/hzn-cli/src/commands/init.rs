@@ -7,7 +7,7 @@ use crate::output;
 
 /// Write a commented sensor.toml to start from
 ///
-/// Every key stands in it with its default, so that only [camera] must be filled in.
+/// Every key stands in it with its default, so that only the camera must be filled in.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file to write
