@@ -69,8 +69,12 @@ impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         match (self.kind, self.radius_km) {
             (Kind::Sphere, Some(r)) => above("body.radius_km", r, 0.0)?,
-            (Kind::Sphere, None) => require(false, "body.radius_km", f64::NAN, Limit::Rule("a sphere needs its radius in km"))?,
-            (_, Some(r)) => require(false, "body.radius_km", r, Limit::Rule("only body.kind = \"sphere\" takes a radius"))?,
+            (Kind::Sphere, None) => {
+                require(false, "body.radius_km", f64::NAN, Limit::Rule("a sphere needs its radius in km"))?
+            }
+            (_, Some(r)) => {
+                require(false, "body.radius_km", r, Limit::Rule("only body.kind = \"sphere\" takes a radius"))?
+            }
             (_, None) => {}
         }
         if let Some(h) = self.altitude_km {
@@ -124,7 +128,9 @@ impl core::fmt::Display for FrameError {
         f.write_str(match self {
             Self::Altitude => "altitude_km must be a finite number above 0",
             Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
-            Self::NoAltitude => "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame",
+            Self::NoAltitude => {
+                "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
+            }
         })
     }
 }

@@ -81,7 +81,13 @@ pub(crate) fn fuse<T: Real>(
     let p = sandwich_free(sums, &x, mean, variance)?;
     let var_free = p.m33;
     if estimate.half_angle == estimate::HalfAngle::Free || expected.free {
-        return Some(Fused { e: fit.e, c: fit.c, p: [p.m11, p.m12, p.m22], var_free_cos: Some(var_free), chi2: T::ZERO });
+        return Some(Fused {
+            e: fit.e,
+            c: fit.c,
+            p: [p.m11, p.m12, p.m22],
+            var_free_cos: Some(var_free),
+            chi2: T::ZERO,
+        });
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
@@ -93,9 +99,8 @@ pub(crate) fn fuse<T: Real>(
     let (n1, n2) = basis(&e);
     let turn = |n: &V3<T>| [n.dot(&b1), n.dot(&b2)];
     let (r1, r2) = (turn(&n1), turn(&n2));
-    let form = |a: [T; 2], b: [T; 2]| {
-        a[0] * (fused[0] * b[0] + fused[1] * b[1]) + a[1] * (fused[1] * b[0] + fused[2] * b[1])
-    };
+    let form =
+        |a: [T; 2], b: [T; 2]| a[0] * (fused[0] * b[0] + fused[1] * b[1]) + a[1] * (fused[1] * b[0] + fused[2] * b[1]);
     Some(Fused {
         e,
         c: fit.c + k.z * difference,
@@ -141,11 +146,8 @@ pub(crate) fn correlated<T: Real>(
                 x[3] += gap * c2 * c2;
                 x[4] += gap * c2 * c3;
                 x[5] += gap * c3 * c3;
-                *c = [
-                    rho[l] * c1 + q[0][l] * g[k][l],
-                    rho[l] * c2 + q[1][l] * g[k][l],
-                    rho[l] * c3 + q[2][l] * g[k][l],
-                ];
+                *c =
+                    [rho[l] * c1 + q[0][l] * g[k][l], rho[l] * c2 + q[1][l] * g[k][l], rho[l] * c3 + q[2][l] * g[k][l]];
             }
         }
     }
@@ -161,7 +163,12 @@ pub(crate) fn correlated<T: Real>(
 }
 
 /// Covariance of (δ₁₂, δc): N⁻¹ (R X) N⁻¹ about the means, then moved back by T = [[I, 0], [mᵀ, 1]].
-pub(crate) fn sandwich_free<T: Real>(sums: &estimate::Sums<T>, x: &[T; 6], [m1, m2]: [T; 2], variance: T) -> Option<M3<T>> {
+pub(crate) fn sandwich_free<T: Real>(
+    sums: &estimate::Sums<T>,
+    x: &[T; 6],
+    [m1, m2]: [T; 2],
+    variance: T,
+) -> Option<M3<T>> {
     let n = estimate::inverse(sums)?;
     let x = M3::new(x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]);
     let p = n * x * n * variance;
@@ -171,7 +178,12 @@ pub(crate) fn sandwich_free<T: Real>(sums: &estimate::Sums<T>, x: &[T; 6], [m1, 
 }
 
 /// Covariance of δ₁₂ with the half-angle held.
-pub(crate) fn sandwich_known<T: Real>(sums: &estimate::Sums<T>, x: &[T; 6], [m1, m2]: [T; 2], variance: T) -> Option<[T; 3]> {
+pub(crate) fn sandwich_known<T: Real>(
+    sums: &estimate::Sums<T>,
+    x: &[T; 6],
+    [m1, m2]: [T; 2],
+    variance: T,
+) -> Option<[T; 3]> {
     let [a, b, d] = invert_spd2(sums.known([m1, m2]))?;
     // X of Bᵀs itself: rows h₁₂ − m h₃.
     let x11 = x[0] - m1 * x[2] - m1 * x[2] + m1 * m1 * x[5];
@@ -180,4 +192,3 @@ pub(crate) fn sandwich_known<T: Real>(sums: &estimate::Sums<T>, x: &[T; 6], [m1,
     let (y11, y12, y21, y22) = (a * x11 + b * x12, a * x12 + b * x22, b * x11 + d * x12, b * x12 + d * x22);
     Some([(y11 * a + y12 * b) * variance, (y11 * b + y12 * d) * variance, (y21 * b + y22 * d) * variance])
 }
-

@@ -71,7 +71,12 @@ const SETTLE: usize = 5;
 pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
     let cone = expected.ellipsoid.as_ref()?;
     let east = expected.cam_to_ecef?.inverse().apply(&cone.east);
-    Some(Azimuth { east: *east.v(), cot2_east: cone.cot2_east, cot2_meridian: cone.cot2_meridian, mean_cos: expected.cos })
+    Some(Azimuth {
+        east: *east.v(),
+        cot2_east: cone.cot2_east,
+        cot2_meridian: cone.cot2_meridian,
+        mean_cos: expected.cos,
+    })
 }
 
 /// Fits the cone; leaves in each point the weight that it had. `None` when the points do not determine one.
@@ -226,7 +231,11 @@ impl<T: Real> Prior<T> {
             arc += sum(&block.step_px);
         }
         let correlation = T::of(2.0 * noise.correlation_px);
-        let each = if correlation > T::ZERO { (points * correlation / arc.most(correlation)).most(T::one()) } else { T::one() };
+        let each = if correlation > T::ZERO {
+            (points * correlation / arc.most(correlation)).most(T::one())
+        } else {
+            T::one()
+        };
         let sigma = T::of(noise.sigma_px);
         let floor = expected.sin * T::of(1e-6);
         let sigma_c = expected.sigma_cos.most(floor);

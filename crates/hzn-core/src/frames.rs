@@ -100,9 +100,7 @@ impl<F, T: Real> Cov3<F, T> {
     }
     /// From a 2×2 covariance (xx, xy, yy) on the tangent plane spanned by `b1`, `b2`.
     pub(crate) fn from_tangent(b1: &V3<T>, b2: &V3<T>, [p11, p12, p22]: [T; 3]) -> Self {
-        let at = |i: usize, j: usize| {
-            b1[i] * b1[j] * p11 + (b1[i] * b2[j] + b2[i] * b1[j]) * p12 + b2[i] * b2[j] * p22
-        };
+        let at = |i: usize, j: usize| b1[i] * b1[j] * p11 + (b1[i] * b2[j] + b2[i] * b1[j]) * p12 + b2[i] * b2[j] * p22;
         Self::from_upper([at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)])
     }
     /// Rows of the full matrix in rad².
@@ -173,10 +171,7 @@ impl<A, B, T: Real> Rotation<A, B, T> {
     /// The rotation back.
     pub fn inverse(&self) -> Rotation<B, A, T> {
         let [a, b, c] = &self.rows;
-        Rotation {
-            rows: [V3::new(a.x, b.x, c.x), V3::new(a.y, b.y, c.y), V3::new(a.z, b.z, c.z)],
-            frames: PhantomData,
-        }
+        Rotation { rows: [V3::new(a.x, b.x, c.x), V3::new(a.y, b.y, c.y), V3::new(a.z, b.z, c.z)], frames: PhantomData }
     }
 }
 

@@ -1,6 +1,58 @@
-//! hzn-core
+//! The horizon sensor's core: from a picture of a limb to the direction of the body, with a covariance that a
+//! navigation filter can trust.
+//!
+//! No heap, fixed memory, no panic, no unsafe code; the same bits on a desktop and on a Cortex-M in the same
+//! precision. A picture goes one way, one module a stage, and nothing runs back:
+//!
+//! ```text
+//! image → binarize → contour → candidates → undistort → reject → estimate → covariance → select → Report
+//! ```
+//!
+//! | stage | from | to |
+//! |---|---|---|
+//! | [`binarize`] | a sparse sample of the picture | the level between dark and lit |
+//! | [`contour`] | pixels at the border, then along the edges | border pixels of one edge after another |
+//! | [`candidates`] | border pixels | sub-pixel points at the local mid-level |
+//! | undistort | points | unit rays with their derivatives |
+//! | [`reject`] | rays | the cone that most agree on |
+//! | [`estimate`] | that cone and the rays | the fitted cone, half-angle free, and weights |
+//! | [`covariance`] | the fit and the noise model | covariance, and the expected half-angle fused |
+//! | [`select`] | the answer | a verdict; the best of all candidates |
+//!
+//! [`pipeline`] knows them all. Frames and units: [`frames`] (camera x right, y down, z forward), [`pixel`] (pixel
+//! centres at integers); metres, radians and pixels inside, kilometres and degrees in [`Config`].
+//!
+//! ```
+//! use hzn_core::camera::{self, Model};
+//! use hzn_core::image::{Grey, Layout};
+//! use hzn_core::{Config, FlightHorizon, Frame};
+//!
+//! let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+//! config.body.altitude_km = Some(230.0);
+//! let mut horizon = FlightHorizon::new(&config)?;
+//! // Sky above, ground below, of a body as wide as the Earth.
+//! let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
+//! let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
+//! let expected = horizon.expect(&Frame::default())?;
+//! let report = horizon.process(&picture, &expected);
+//! println!("{} at stage {}", report.status, report.stage.name());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Memory
+//!
+//! | workspace | scalar | border pixels | points fitted | bytes |
+//! |---|---|---|---|---|
+//! | [`FlightHorizon`] | f32 | 2048 | 2048 | below 96 KiB |
+//! | [`HostHorizon`] | f64 | 16384 | 16384 | 1.4 MiB |
+//!
+//! # Features
+//!
+//! `std`: the square root from the standard library (the same bits, vectorised). `serde`: [`Config`] to and from files.
+
 #![no_std]
 #![forbid(unsafe_code)]
+
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
@@ -19,15 +71,17 @@ pub mod real;
 pub mod region;
 mod rng;
 pub mod status;
+
 // Stages, in the order of the data's way.
 pub mod binarize;
-pub mod contour;
 pub mod candidates;
-mod undistort;
-pub mod reject;
-pub mod estimate;
+pub mod contour;
 pub mod covariance;
+pub mod estimate;
+pub mod reject;
 pub mod select;
+mod undistort;
+
 // The whole.
 pub mod pipeline;
 

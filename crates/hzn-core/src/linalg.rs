@@ -15,10 +15,7 @@ pub(crate) fn basis<T: Real>(e: &V3<T>) -> (V3<T>, V3<T>) {
     let sign = if e.z < T::zero() { -one } else { one };
     let a = -one / (sign + e.z);
     let b = e.x * e.y * a;
-    (
-        V3::new(one + sign * e.x * e.x * a, sign * b, -sign * e.x),
-        V3::new(b, sign + e.y * e.y * a, -e.y),
-    )
+    (V3::new(one + sign * e.x * e.x * a, sign * b, -sign * e.x), V3::new(b, sign + e.y * e.y * a, -e.y))
 }
 
 /// `v` scaled to unit length, or `None` when it has none.

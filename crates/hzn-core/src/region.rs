@@ -363,7 +363,8 @@ mod tests {
                     let (x, y) = (i32::from(x) + dx, i32::from(y) + dy);
                     x < 0 || y < 0 || !region.contains(x as u16, y as u16)
                 };
-                let border = region.contains(x, y) && (outside(1, 0) || outside(-1, 0) || outside(0, 1) || outside(0, -1));
+                let border =
+                    region.contains(x, y) && (outside(1, 0) || outside(-1, 0) || outside(0, 1) || outside(0, -1));
                 assert_eq!(border, set.contains(&(x, y)), "{x} {y}");
             }
         }

@@ -40,7 +40,15 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { min_inliers: 24, min_arc_px: None, max_rms_px: 2.0, max_half_angle_sigma: 4.0, max_sigma_deg: 10.0, min_support: 0.4, max_lit_sky: 0.15 }
+        Self {
+            min_inliers: 24,
+            min_arc_px: None,
+            max_rms_px: 2.0,
+            max_half_angle_sigma: 4.0,
+            max_sigma_deg: 10.0,
+            min_support: 0.4,
+            max_lit_sky: 0.15,
+        }
     }
 }
 
@@ -171,7 +179,8 @@ fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Camera<T>, regi
     let (fx, fy) = camera.focal_px();
     // A step of about a sixteenth of the picture, and at least eight around.
     let wide = T::of_i32(i32::from(region.width().max(region.height())));
-    let step = (wide / (T::of(16.0) * (fx + fy) * T::of(0.5) * sin.most(T::of(1e-6)))).least(T::of(0.785)).most(T::of(0.02));
+    let step =
+        (wide / (T::of(16.0) * (fx + fy) * T::of(0.5) * sin.most(T::of(1e-6)))).least(T::of(0.785)).most(T::of(0.02));
     let (ss, cs) = step.sin_cos();
     let radial = (seen.dot(&b1), seen.dot(&b2));
     let norm = (radial.0 * radial.0 + radial.1 * radial.1).sqrt().most(T::of(1e-12));

@@ -120,7 +120,14 @@ mod tests {
     #[test]
     fn numbers_and_names_are_frozen() {
         let names = [
-            "ok", "no-limb", "too-dark", "too-bright", "too-few-points", "ambiguous", "rejected", "truncated",
+            "ok",
+            "no-limb",
+            "too-dark",
+            "too-bright",
+            "too-few-points",
+            "ambiguous",
+            "rejected",
+            "truncated",
             "unreadable",
         ];
         for (n, (status, name)) in Status::ALL.iter().zip(names).enumerate() {

@@ -32,7 +32,9 @@ impl<T: Real> Brown<T> {
             if slope(libm::tan(theta + 2f64.to_radians())) <= 0.0 {
                 let limit = theta.to_degrees() + 2.0;
                 return Err(match config.theta_max_deg {
-                    Some(deg) => ConfigError { field: "camera.theta_max_deg", value: deg, limit: Limit::Monotone(limit) },
+                    Some(deg) => {
+                        ConfigError { field: "camera.theta_max_deg", value: deg, limit: Limit::Monotone(limit) }
+                    }
                     None => ConfigError { field: "camera.k", value: k(0), limit: Limit::Monotone(limit) },
                 });
             }

@@ -1,7 +1,7 @@
 //! Lens models: from a pixel to a unit ray with its derivative, and back.
 //!
 //! Unit rays, never the plane z = f: the plane cannot represent 90° and more off axis, and is badly conditioned in
-//! single precision. Radial lenses share one code path ([`radial`]); Brown-Conrady has its own ([`brown`]).
+//! single precision. Radial lenses share one code path; Brown-Conrady has its own.
 
 mod brown;
 mod config;
@@ -86,7 +86,8 @@ impl<T: Real> Camera<T> {
         let c = config;
         let corner = |x: f64, y: f64| ((x - c.cx_px) / c.fx_px).hypot_((y - c.cy_px) / c.fy_px);
         let (right, bottom) = (f64::from(c.width) - 0.5, f64::from(c.height) - 0.5);
-        let rho_corner = corner(-0.5, -0.5).most(corner(right, -0.5)).most(corner(-0.5, bottom)).most(corner(right, bottom));
+        let rho_corner =
+            corner(-0.5, -0.5).most(corner(right, -0.5)).most(corner(-0.5, bottom)).most(corner(right, bottom));
         let (lens, rho_max, theta_max) = match c.model {
             Model::KannalaBrandt | Model::Equidistant => {
                 let (lens, rho, theta) = radial::Radial::try_new(c, rho_corner)?;
@@ -95,7 +96,12 @@ impl<T: Real> Camera<T> {
             Model::Pinhole => {
                 let theta = match c.theta_max_deg {
                     Some(deg) => {
-                        require(deg < 89.0, "camera.theta_max_deg", deg, Limit::Rule("a pinhole ends before 89 degrees"))?;
+                        require(
+                            deg < 89.0,
+                            "camera.theta_max_deg",
+                            deg,
+                            Limit::Rule("a pinhole ends before 89 degrees"),
+                        )?;
                         deg.to_radians().least(libm::atan(rho_corner))
                     }
                     None => libm::atan(rho_corner),
@@ -137,8 +143,7 @@ impl<T: Real> Camera<T> {
     }
     /// The image circle when it cuts the picture: centre (u, v) and semi-axes along x and y, in pixels.
     pub fn image_circle_px(&self) -> Option<(ImagePoint<T>, T, T)> {
-        self.circle
-            .then(|| (ImagePoint { u: self.cx, v: self.cy }, self.rho_max * self.fx, self.rho_max * self.fy))
+        self.circle.then(|| (ImagePoint { u: self.cx, v: self.cy }, self.rho_max * self.fx, self.rho_max * self.fy))
     }
     /// Focal lengths (fx, fy) in pixels.
     pub fn focal_px(&self) -> (T, T) {

@@ -28,8 +28,15 @@ enum Inverse<T> {
     Newton,
     /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds one order's coefficients of the three series
     /// (sin θ/ρ, cos θ, dθ/dρ), lowest first; the first `used` are summed by Clenshaw's recurrence.
-    Series { scale: T, used: usize, terms: [[T; 3]; TERMS] },
+    Series {
+        scale: T,
+        used: usize,
+        terms: [[T; 3]; TERMS],
+    },
 }
+
+/// Eight unit vectors, and eight derivatives in the tangent basis.
+pub(super) type Lanes<T> = ([[T; LANES]; 3], [[T; LANES]; 4]);
 
 /// r(θ) and r'(θ).
 fn forward<T: Real>(k: &[T; 4], theta: T) -> (T, T) {
@@ -75,7 +82,8 @@ impl<T: Real> Radial<T> {
         let margin = 2f64.to_radians();
         let usable = limit - margin;
         // Where the corner is reached, if it is reached before the lens folds back.
-        let corner = (forward(&k, usable).0 >= rho_corner).then(|| invert(&k, rho_corner, usable, forward(&k, usable).0));
+        let corner =
+            (forward(&k, usable).0 >= rho_corner).then(|| invert(&k, rho_corner, usable, forward(&k, usable).0));
         let theta_max = match (config.theta_max_deg.map(f64::to_radians), corner) {
             (Some(circle), Some(corner)) => circle.least(corner),
             (None, Some(corner)) => corner,
@@ -127,7 +135,8 @@ impl<T: Real> Radial<T> {
         let good = |used: usize| {
             (0..=64).all(|i| {
                 let rho = r_max * f64::from(i) / 64.0;
-                let (got, want) = (clenshaw(terms.get(..used).unwrap_or_default(), scale * rho * rho - 1.0), values(rho));
+                let (got, want) =
+                    (clenshaw(terms.get(..used).unwrap_or_default(), scale * rho * rho - 1.0), values(rho));
                 let direction = ((got[0] - want[0]).abs() * rho).most((got[1] - want[1]).abs());
                 direction <= tolerance && (got[2] - want[2]).abs() <= (1e-6 * want[2]).most(tolerance)
             })
@@ -140,7 +149,7 @@ impl<T: Real> Radial<T> {
 
     /// Rays of eight points (x, y) at once, where there are series: unit vectors and derivatives in the tangent basis.
     #[inline(always)]
-    pub(super) fn rays(&self, x: &[T; LANES], y: &[T; LANES]) -> Option<([[T; LANES]; 3], [[T; LANES]; 4])> {
+    pub(super) fn rays(&self, x: &[T; LANES], y: &[T; LANES]) -> Option<Lanes<T>> {
         let Inverse::Series { scale, used, terms } = &self.inverse else { return None };
         let terms = terms.get(..*used)?;
         let (first, rest) = terms.split_first()?;

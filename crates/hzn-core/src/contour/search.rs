@@ -109,7 +109,11 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
 
     /// Calls `found` with every unmarked lit pixel of the search lines whose western neighbour is dark, until it
     /// says to stop. `found` gets the marks back, for the follower.
-    pub(crate) fn each_crossing<'m>(&self, marks: &mut Marks<'m>, mut found: impl FnMut(Pixel, u8, &mut Marks<'m>) -> bool) {
+    pub(crate) fn each_crossing<'m>(
+        &self,
+        marks: &mut Marks<'m>,
+        mut found: impl FnMut(Pixel, u8, &mut Marks<'m>) -> bool,
+    ) {
         for y in marks.rows(self.region.height()) {
             let Some((x0, x1)) = self.region.span(y) else { continue };
             let mut lit = self.lit(x0, y);

@@ -84,8 +84,11 @@ fn outer_borders_equal_opencv_point_for_point() {
             .unwrap()
             .iter()
             .map(|c| {
-                let points: Points =
-                    serde_json::from_value::<Vec<(u16, u16)>>(c.clone()).unwrap().into_iter().map(|(x, y)| (x + 1, y + 1)).collect();
+                let points: Points = serde_json::from_value::<Vec<(u16, u16)>>(c.clone())
+                    .unwrap()
+                    .into_iter()
+                    .map(|(x, y)| (x + 1, y + 1))
+                    .collect();
                 (points[0], points)
             })
             .collect();
@@ -110,7 +113,8 @@ fn an_open_edge_ends_at_the_border() {
 
 fn random_bitmap(w: u16, h: u16, density: u8, seed: u32) -> Bitmap {
     let mut rng = crate::rng::Rng::new(seed);
-    let data = (0..u32::from(w) * u32::from(h)).map(|_| if rng.below(100) < u32::from(density) { 255 } else { 0 }).collect();
+    let data =
+        (0..u32::from(w) * u32::from(h)).map(|_| if rng.below(100) < u32::from(density) { 255 } else { 0 }).collect();
     Bitmap { w, h, data }
 }
 

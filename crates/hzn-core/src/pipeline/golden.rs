@@ -104,7 +104,8 @@ fn lens<T: Real>(tolerance_rad: f64, tolerance_px: f64) {
         }
         assert!(compared >= 15, "{} only {compared}", case["name"]);
         if let Some(limit) = limit {
-            let error = Camera::<T>::try_new(&CameraConfig { theta_max_deg: Some((limit - 1.0).min(175.0)), ..config }).unwrap_err();
+            let error = Camera::<T>::try_new(&CameraConfig { theta_max_deg: Some((limit - 1.0).min(175.0)), ..config })
+                .unwrap_err();
             let crate::error::Limit::Monotone(got) = error.limit else { panic!("{error}") };
             assert!((got - limit).abs() < 1e-3, "{}: {got} {limit}", case["name"]);
         }
@@ -133,7 +134,9 @@ fn limb_cone<T: Real>(tolerance_deg: f64) {
         let off = cone.axis.angle_rad(&want).f64().to_degrees();
         assert!(off < tolerance_deg, "{}: axis {off:e}", case["id"]);
         let (east, meridian) = cone.half_angles_rad();
-        for (got, want) in [(east, &case["cone_half_angle_east_deg"]), (meridian, &case["cone_half_angle_meridian_deg"])] {
+        for (got, want) in
+            [(east, &case["cone_half_angle_east_deg"]), (meridian, &case["cone_half_angle_meridian_deg"])]
+        {
             let off = (got.f64().to_degrees() - num(want)).abs();
             assert!(off < tolerance_deg, "{}: half-angle {off:e}", case["id"]);
         }
@@ -253,7 +256,12 @@ fn nadir<T: Real>(noise_free_deg: f64) {
     let (mut noisy, mut clean) = (0, 0);
     for case in load(include_str!("../../tests/golden/nadir_cases.json")) {
         let camera = Camera::<T>::try_new(&camera_config(&case["camera"])).unwrap();
-        let outlier: Vec<bool> = case["is_outlier"].as_array().unwrap().iter().map(|v| v.as_i64() == Some(1) || v.as_bool() == Some(true)).collect();
+        let outlier: Vec<bool> = case["is_outlier"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|v| v.as_i64() == Some(1) || v.as_bool() == Some(true))
+            .collect();
         let points: Vec<(f64, f64)> =
             case["pixels"].as_array().unwrap().iter().map(|p| (num(&p[0]), num(&p[1]))).collect();
         let truth = direction::<T>(triple(&case["true_nadir_c"]));
@@ -305,7 +313,8 @@ fn plain<T: Real>(
     let start = reject::Consensus { e: unit(&(truth.v() + b1 * T::of(0.03))).unwrap(), c: expected.cos, draws: 0 };
     let estimate = estimate::Config { half_angle: which };
     // A threshold so wide that Tukey's weights are one.
-    let fit = estimate::fit(&mut blocks, &start, expected, T::of(1e5), &estimate, &covariance::Config::default()).unwrap();
+    let fit =
+        estimate::fit(&mut blocks, &start, expected, T::of(1e5), &estimate, &covariance::Config::default()).unwrap();
     UnitVec3::assume_unit(fit.e)
 }
 
@@ -519,4 +528,11 @@ fn eighty_percent_outliers() {
         found += u32::from(answer.is_some_and(|a| a.axis.angle_rad(&e).to_degrees() < 0.3));
     }
     assert!(found * 100 >= runs * 99, "{found} of {runs}");
+}
+
+#[test]
+fn workspaces_fit_their_budgets() {
+    // 96 KiB beside the frame, with room for the stack.
+    assert!(size_of::<crate::FlightHorizon>() < 92 * 1024, "{}", size_of::<crate::FlightHorizon>());
+    assert!(size_of::<crate::HostHorizon>() < 1536 * 1024, "{}", size_of::<crate::HostHorizon>());
 }

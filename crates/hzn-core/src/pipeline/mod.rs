@@ -127,14 +127,20 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     ) {
         observer.enter(Stage::Binarize);
         let config = &self.config;
-        let level =
-            match binarize::split(picture, &self.region, &config.gate, &config.binarize, config.reject.seed, observer) {
-                Ok(level) => level.level,
-                Err(status) => {
-                    report.status = status;
-                    return;
-                }
-            };
+        let level = match binarize::split(
+            picture,
+            &self.region,
+            &config.gate,
+            &config.binarize,
+            config.reject.seed,
+            observer,
+        ) {
+            Ok(level) => level.level,
+            Err(status) => {
+                report.status = status;
+                return;
+            }
+        };
         report.level = level;
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
@@ -271,8 +277,13 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         border: &[Pixel],
     ) -> (Candidate<T>, Option<Best<T>>) {
         let config = self.config;
-        let mut outcome =
-            Candidate { length_px: length, points: 0, inliers: 0, rms_px: T::of(f64::NAN), verdict: Verdict::NoConsensus };
+        let mut outcome = Candidate {
+            length_px: length,
+            points: 0,
+            inliers: 0,
+            rms_px: T::of(f64::NAN),
+            verdict: Verdict::NoConsensus,
+        };
 
         self.enter(Stage::Candidates);
         let points = candidates::pick(scene, &config.candidates, border, number, self.blocks);
@@ -296,8 +307,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         enter(self.report, self.observer, Stage::Estimate);
         outcome.verdict = Verdict::NoFit;
         let threshold = T::of(config.reject.threshold_px);
-        let fit =
-            estimate::fit(blocks, &consensus, self.expected, threshold, &config.estimate, &config.covariance);
+        let fit = estimate::fit(blocks, &consensus, self.expected, threshold, &config.estimate, &config.covariance);
         let Some(fit) = fit else { return (outcome, None) };
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;
@@ -336,8 +346,8 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
             arc_px: fit.arc_px,
             candidate: number,
         };
-        let certain = judged.support > T::of(0.5)
-            && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
+        let certain =
+            judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
         (outcome, Some(Best { solution, score: judged.score, certain }))
     }
 

@@ -1,7 +1,7 @@
 //! A window into the pipeline for clocks, counters and pictures; without one, nothing of it is compiled.
 
-use crate::pixel::{ImagePoint, Pixel};
 use crate::pipeline::report::{Candidate, Solution};
+use crate::pixel::{ImagePoint, Pixel};
 use crate::status::Stage;
 
 /// Called at stage boundaries and on pixel reads. Every method does nothing by default; implement what you need.
