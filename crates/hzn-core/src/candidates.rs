@@ -60,10 +60,6 @@ impl Config {
 const REACH: i32 = 10;
 /// Widest step of a profile in pixels.
 const WIDEST: i32 = 6;
-/// Room for a profile: `REACH` and two more on each side.
-const PROFILE: usize = 32;
-const _: () = assert!(2 * (REACH + 2) < PROFILE as i32);
-
 /// What came of a candidate's border.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Points {
@@ -193,39 +189,22 @@ fn place<T: Real>(p: Pixel, dx: i32, dy: i32, towards_dark: T) -> ImagePoint<T> 
     }
 }
 
-/// Four times the smoothed brightness across the edge: offset k towards the dark stands at `CENTRE + k`. A power of
-/// two long, so that an index needs a mask instead of a check.
-struct Profile {
-    values: [i32; PROFILE],
-}
-const CENTRE: i32 = REACH + 2;
-
-impl Profile {
-    #[inline(always)]
-    fn get(&self, k: i32) -> i32 {
-        self.values[(CENTRE + k) as usize % PROFILE]
-    }
-    #[inline(always)]
-    fn set(&mut self, k: i32, v: i32) {
-        self.values[(CENTRE + k) as usize % PROFILE] = v;
-    }
-}
-
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Side {
     Lit,
     Dark,
 }
 
-/// Reads on from the border pixel (or its dark neighbour) until the side has levelled off: two more pixels change it
-/// by less than a twelfth of the contrast to `other`. Gives the plateau's level and the offset where it begins.
+/// Reads on from the border pixel (or its dark neighbour), whose brightness is `v`, until the side has levelled off:
+/// two more pixels change it by less than a twelfth of the contrast to `other`. Gives the plateau's level and the offset
+/// where it begins.
 #[inline(always)]
-fn plateau(f: &mut Profile, side: Side, other: i32, read: impl Fn(i32) -> Option<i32>) -> (i32, i32) {
+fn plateau(side: Side, mut v: i32, other: i32, read: impl Fn(i32) -> Option<i32>) -> (i32, i32) {
     let (from, out, sign) = match side {
         Side::Lit => (0, -1, 1),
         Side::Dark => (1, 1, -1),
     };
-    let (mut k, mut v) = (from, f.get(from));
+    let mut k = from;
     loop {
         // What lies beyond on the same level counts towards it.
         let (mut tail, mut tails, mut moved) = (0, 0, false);
@@ -233,7 +212,6 @@ fn plateau(f: &mut Profile, side: Side, other: i32, read: impl Fn(i32) -> Option
         for far in 1..=2 {
             let at = k + out * far;
             let Some(next) = read(at) else { break };
-            f.set(at, next);
             let rise = (next - v) * sign;
             if rise > slack * far {
                 (k, v, moved) = (at, next, true);
@@ -244,14 +222,17 @@ fn plateau(f: &mut Profile, side: Side, other: i32, read: impl Fn(i32) -> Option
                 tails += 1;
             }
         }
-        if !moved || (k - from).abs() >= REACH {
+        if !moved {
             // Divisions by constants only: these are the innermost instructions.
             let level = match tails {
                 1 => (v + tail) / 2,
                 2 => (v + tail) / 3,
                 _ => v,
             };
-            return (if moved { v } else { level }, k);
+            return (level, k);
+        }
+        if (k - from).abs() >= REACH {
+            return (v, k);
         }
     }
 }
@@ -268,17 +249,16 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let steep = gradient.0.abs().max(gradient.1.abs());
     let wide = 3 * i32::from(scene.level);
     let step = if wide < 4 * steep { 1 } else { (wide / (2 * steep)).min(WIDEST) };
-    let read = |k: i32| -> Option<i32> {
+    // Four times the brightness at offset k towards the dark: in one row for the plateaus, of which the mean of several
+    // is taken, and over three rows, smoothed along the edge, for the crossing.
+    let one = |k: i32| -> Option<i32> { Some(4 * around.at(k * dx * step, k * dy * step)?) };
+    let three = |k: i32| -> Option<i32> {
         let (x, y) = (k * dx * step, k * dy * step);
-        // The rows to both sides run along the edge.
         Some(around.at(x - dy, y - dx)? + 2 * around.at(x, y)? + around.at(x + dy, y + dx)?)
     };
-    let mut f = Profile { values: [0; PROFILE] };
-    f.set(0, read(0)?);
-    f.set(1, read(1)?);
-    let (first_lit, first_dark) = (f.get(0), f.get(1));
-    let (bright, inner) = plateau(&mut f, Side::Lit, first_dark, read);
-    let (dim, outer) = plateau(&mut f, Side::Dark, bright, read);
+    let (first_lit, first_dark) = (three(0)?, three(1)?);
+    let (bright, inner) = plateau(Side::Lit, first_lit, first_dark, one);
+    let (dim, outer) = plateau(Side::Dark, first_dark, bright, one);
     let contrast = bright - dim;
     let level4 = i32::from(scene.level) * 4;
     let least = 4 * (i32::from(scene.picture.full_scale()) / 64).max(2);
@@ -289,25 +269,22 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     } else {
         return None;
     };
-    // The crossing next to the border pixel: outwards from it while lit, else inwards.
-    let mut k = 0;
-    if 2 * f.get(0) >= mid2 {
-        while k < outer && 2 * f.get(k + 1) >= mid2 {
-            k += 1;
-        }
-        if k >= outer {
+    // The crossing next to the border pixel: outwards from it while lit, else inwards. `a` at k is lit, `b` at k + 1 not.
+    let (mut k, mut a, mut b) = (0, first_lit, first_dark);
+    while 2 * b >= mid2 {
+        (k, a) = (k + 1, b);
+        if k >= outer.max(1) {
             return None;
         }
-    } else {
-        k = -1;
-        while k >= inner && 2 * f.get(k) < mid2 {
-            k -= 1;
-        }
-        if k < inner {
-            return None;
-        }
+        b = three(k + 1)?;
     }
-    let (a, b) = (f.get(k), f.get(k + 1));
+    while 2 * a < mid2 {
+        (k, b) = (k - 1, a);
+        if k < inner.min(-1) {
+            return None;
+        }
+        a = three(k)?;
+    }
     if a <= b {
         return None;
     }

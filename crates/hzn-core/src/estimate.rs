@@ -93,14 +93,12 @@ pub(crate) fn fit<T: Real>(
     let known = config.half_angle == HalfAngle::Known && !expected.free;
     let robust = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
     let freely = if known { None } else { settle(blocks, robust, true, azimuth) };
-    let (at, free) = match freely {
-        Some(at) => (at, true),
+    let ((at, mean, sums), free) = match freely {
+        Some(settled) => (settled, true),
         // Sun and Moon have no other half-angle to fall back on.
         None if expected.free => return None,
         None => (settle(blocks, State { c: expected.cos, ..robust }, false, azimuth)?, false),
     };
-    let (b1, b2) = basis(&at.e);
-    let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, None, azimuth, false);
     let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
     for block in blocks.iter() {
         for lane in 0..LANES {
@@ -115,7 +113,7 @@ pub(crate) fn fit<T: Real>(
         }
     }
     let rms_px = (sums.cost / sums.weight).sqrt();
-    Some(Fit { e: at.e, c: at.c, free, rms_px, inliers, arc_px: arc, nearby: robust.nearby, sums, mean: at.mean })
+    Some(Fit { e: at.e, c: at.c, free, rms_px, inliers, arc_px: arc, nearby: robust.nearby, sums, mean })
 }
 
 /// Where the iterations stand.
@@ -182,30 +180,33 @@ fn robust<T: Real>(
     (last.weight > T::of(3.0)).then_some(at)
 }
 
-/// Iterations with the weights kept, to the end. `None` when the points do not determine the cone: for a free
-/// half-angle, when the arc is too short.
+/// Iterations with the weights kept, to the end, and the normal equations there with the means they are about. `None`
+/// when the points do not determine the cone: for a free half-angle, when the arc is too short.
 fn settle<T: Real>(
     blocks: &mut [Block<T>],
     start: State<T>,
     free: bool,
     azimuth: Option<&Azimuth<T>>,
-) -> Option<State<T>> {
+) -> Option<(State<T>, [T; 2], Sums<T>)> {
     let mut at = start;
+    let mut end = None;
     for _ in 0..SETTLE {
         let (b1, b2) = basis(&at.e);
-        let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, None, azimuth, false);
-        let step = if free { sums.step(at.mean, None, at.c)? } else { sums.step_known(at.mean)? };
+        let mean = at.mean;
+        let sums = pass(blocks, &at.e, &b1, &b2, at.c, mean, None, azimuth, false);
+        let step = if free { sums.step(mean, None, at.c)? } else { sums.step_known(mean)? };
         let size = at.step(&b1, &b2, step, &sums)?;
         // 20° from the robust solution is another cone.
         if !(at.c.abs() < T::one()) || at.e.dot(&start.e) < T::of(0.94) {
             return None;
         }
-        // Convergence is quadratic: after a step this small nothing is left.
+        end = Some((at, mean, sums));
+        // Convergence is quadratic: after a step this small nothing is left, and the sums are those of the end.
         if size < T::EPSILON * T::of(64.0) {
             break;
         }
     }
-    Some(at)
+    end
 }
 
 fn clamp<T: Real>(c: T) -> T {

@@ -12,6 +12,9 @@ pub const MAX_POLYGONS: usize = 8;
 /// Rim of the image circle that does not count, in pixels: blur makes it neither lit nor dark.
 const RIM_PX: f64 = 3.0;
 
+/// Rows of the ring taken at once along the picture's sides.
+const LEAP: u16 = 64;
+
 /// Corners (x, y) of a polygon in pixels; the last is joined to the first.
 pub type Polygon = heapless::Vec<[f64; 2], MAX_CORNERS>;
 
@@ -216,6 +219,10 @@ impl<T: Real> Region<T> {
             if end == x {
                 // As far down as the column goes on as it is.
                 let from = y;
+                // Along the picture's side the region is convex: what holds at both ends holds between.
+                while x + 1 == w && y + LEAP <= bottom && self.contains(x, y + LEAP) {
+                    y += LEAP;
+                }
                 while y <= bottom && self.contains(x, y) && (x + 1 == w || !self.contains(x + 1, y)) {
                     y += 1;
                 }
@@ -257,6 +264,9 @@ impl<T: Real> Region<T> {
             }
             if start == x {
                 let from = y;
+                while x == 0 && y > top + LEAP && self.contains(x, y - LEAP) {
+                    y -= LEAP;
+                }
                 while y > top && self.contains(x, y) && (x == 0 || !self.contains(x - 1, y)) {
                     y -= 1;
                 }
