@@ -212,3 +212,59 @@ impl Histogram {
         Some((T::of(f64::from(first + last)) * T::of(0.5) + T::one()) * scale)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Grey, Layout};
+    use crate::pipeline::Unobserved;
+    use std::vec::Vec;
+
+    fn level(data: &[u16], bits: u8, gate: Gate, config: Config) -> Result<Level<f64>, Status> {
+        let picture = Grey::try_new(data, Layout::packed(64, 64, 1, bits)).unwrap();
+        split(&picture, &Region::whole(64, 64), &gate, &config, 1, &Unobserved)
+    }
+
+    /// The upper part dark, the lower lit.
+    fn halves(dark: u16, lit: u16) -> Vec<u16> {
+        (0..64 * 64).map(|i| if i < 64 * 24 { dark } else { lit }).collect()
+    }
+
+    #[test]
+    fn otsu_stands_half_way_between_two_values() {
+        let found = level(&halves(10, 210), 8, Gate::default(), Config::default()).unwrap();
+        assert_eq!((found.level, found.samples), (110, 256));
+        // 12 bits: the level is in the picture's own counts.
+        let found = level(&halves(100, 3900), 12, Gate::default(), Config::default()).unwrap();
+        assert!(found.level.abs_diff(2000) <= 16, "{}", found.level);
+    }
+
+    #[test]
+    fn fixed_and_dynamic_do_as_told() {
+        let data = halves(10, 210);
+        let fixed = Config { method: Method::Fixed, level: 77.0, ..Config::default() };
+        assert_eq!(level(&data, 8, Gate::default(), fixed).unwrap().level, 77);
+        let dynamic = Config { method: Method::Dynamic, factor: 0.5, ..Config::default() };
+        let found = level(&data, 8, Gate::default(), dynamic).unwrap();
+        assert_eq!(f64::from(found.level), (found.mean * 0.5).floor());
+        assert!((found.mean - 135.0).abs() < 10.0);
+    }
+
+    #[test]
+    fn gates_and_flat_pictures_have_their_status() {
+        let gate = Gate { min_mean: 0.1, max_mean: 0.9 };
+        assert_eq!(level(&halves(1, 2), 8, gate, Config::default()).unwrap_err(), Status::TooDark);
+        assert_eq!(level(&halves(250, 255), 8, gate, Config::default()).unwrap_err(), Status::TooBright);
+        assert_eq!(level(&halves(100, 100), 8, gate, Config::default()).unwrap_err(), Status::NoLimb);
+    }
+
+    #[test]
+    fn a_small_body_is_found_by_the_finer_sample() {
+        // 5×5 of 4096 pixels: the first sample expects 1.6 of them, the second all.
+        let data: Vec<u16> = (0..64 * 64)
+            .map(|i| if (29..34).contains(&(i % 64)) && (29..34).contains(&(i / 64)) { 200 } else { 0 })
+            .collect();
+        let found = level(&data, 8, Gate::default(), Config::default()).unwrap();
+        assert!((90..=110).contains(&found.level), "{}", found.level);
+    }
+}

@@ -291,3 +291,87 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let part = T::of_i32(2 * a - mid2) / T::of_i32(2 * (a - b));
     Some((place(p, dx, dy, (T::of_i32(k) + part) * T::of_i32(step)), lit, fallback))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Grey, Layout};
+    use crate::pipeline::Unobserved;
+    use crate::region::Region;
+    use std::vec::Vec;
+
+    /// A straight edge blurred over `width_px`, lit where (x, y)·n > offset, between two plateaus.
+    fn picture(n: [f64; 2], offset: f64, width_px: f64, dim: f64, bright: f64) -> Vec<u8> {
+        (0..100 * 100)
+            .map(|i| {
+                let d = f64::from(i % 100) * n[0] + f64::from(i / 100) * n[1] - offset;
+                let part = 0.5 + 0.5 * (d / width_px).clamp(-1.0, 1.0);
+                (dim + (bright - dim) * part + 0.5) as u8
+            })
+            .collect()
+    }
+
+    fn points(data: &[u8], config: &Config, level: u16) -> Vec<(f64, f64)> {
+        let grey = Grey::try_new(data, Layout::packed(100, 100, 1, 8)).unwrap();
+        let region = Region::<f64>::whole(100, 100);
+        let scene = Scene { picture: &grey, region: &region, level, observer: &Unobserved };
+        let border: Vec<Pixel> = (0..100u16)
+            .flat_map(|y| (0..100u16).map(move |x| Pixel { x, y }))
+            .filter(|p| (20..80).contains(&p.x) && (20..80).contains(&p.y))
+            .filter(|p| scene.lit(p.x, p.y))
+            .filter(|p| {
+                [(1, 0), (-1, 0), (0, 1), (0, -1)]
+                    .iter()
+                    .any(|(dx, dy)| !scene.lit((i32::from(p.x) + dx) as u16, (i32::from(p.y) + dy) as u16))
+            })
+            .collect();
+        let mut blocks = [Block::default(); 64];
+        let made = pick(&scene, config, &border, 0, &mut blocks);
+        assert!(made.count > 30, "{made:?}");
+        blocks
+            .iter()
+            .flat_map(|b| (0..LANES).filter(|&l| b.weight[l] > 0.0).map(|l| (b.point(l).u, b.point(l).v)))
+            .collect()
+    }
+
+    #[test]
+    fn linear_finds_the_local_mid_level_whatever_the_level() {
+        // Edges in four directions and at angles, narrow and wide.
+        for (nx, ny) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.8, 0.6), (-0.6, 0.8)] {
+            for width in [1.0, 2.5, 5.0] {
+                let offset = 50.3 * nx + 49.8 * ny;
+                let data = picture([nx, ny], offset, width, 20.0, 220.0);
+                for level in [70, 120, 170] {
+                    for (u, v) in points(&data, &Config::default(), level) {
+                        let off = u * nx + v * ny - offset;
+                        assert!(off.abs() < 0.12, "normal {nx} {ny} width {width} level {level}: {off}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_sub_pixel_points_stand_half_a_pixel_out() {
+        let data = picture([0.0, 1.0], 49.8, 0.1, 20.0, 220.0);
+        let config = Config { subpixel: SubPixel::None, ..Config::default() };
+        for (_, v) in points(&data, &config, 120) {
+            // Row 50 is the first lit one.
+            assert_eq!(v, 49.5);
+        }
+    }
+
+    #[test]
+    fn thinning_keeps_the_whole_edge() {
+        let data = picture([0.0, 1.0], 49.8, 1.0, 20.0, 220.0);
+        let config = Config { keep_points: 16, ..Config::default() };
+        let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
+        let region = Region::<f32>::whole(100, 100);
+        let scene = Scene { picture: &grey, region: &region, level: 120, observer: &Unobserved };
+        let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
+        let mut blocks = [Block::default(); 2];
+        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks), Points { count: 15, fallback: 0 });
+        let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
+        assert_eq!((first, last), (22.0, 78.0));
+    }
+}

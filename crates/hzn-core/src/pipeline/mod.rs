@@ -72,6 +72,24 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             marks: [0; WORDS],
         })
     }
+    /// As [`Self::new`], in a box, without the sensor ever standing on the caller's stack: the host's is larger than what
+    /// a thread has left at times.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    #[cfg(feature = "std")]
+    pub fn boxed(config: &Config) -> Result<std::boxed::Box<Self>, ConfigError> {
+        const STACK_BYTES: usize = 16 << 20;
+        // Called through a pointer that the compiler cannot see through, so that its frame does not become this one's.
+        let build: fn(&Config) -> Result<std::boxed::Box<Self>, ConfigError> =
+            core::hint::black_box(|config: &Config| Self::new(config).map(std::boxed::Box::new));
+        std::thread::scope(|scope| {
+            let builder = std::thread::Builder::new().stack_size(STACK_BYTES);
+            // Without another thread, on this one.
+            builder.spawn_scoped(scope, move || build(config)).ok().and_then(|thread| thread.join().ok())
+        })
+        .unwrap_or_else(|| build(config))
+    }
     /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
@@ -158,6 +176,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             blocks: &mut self.blocks,
             steps: config.contour.max_steps,
             best: None,
+            rival: None,
             short: 0,
             report,
         };
@@ -202,6 +221,11 @@ fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> u16 {
     rows.to_i32().clamp(1, 64) as u16
 }
 
+/// Answers more than five degrees apart contradict each other, and one is not better than the other unless its score
+/// is half as large.
+const RIVAL_COS: f64 = 0.9962;
+const RIVAL_SCORE: f64 = 2.0;
+
 /// The edges of one picture, judged one by one.
 struct Judge<'a, T, O> {
     config: &'a Config,
@@ -212,6 +236,8 @@ struct Judge<'a, T, O> {
     blocks: &'a mut [Block<T>],
     steps: u32,
     best: Option<Best<T>>,
+    /// The best score of an answer that points elsewhere.
+    rival: Option<T>,
     /// Edges with too few points.
     short: u32,
     report: &'a mut Report<T>,
@@ -261,10 +287,8 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
         // Full: only counted.
         let _ = self.report.candidates.push(outcome);
-        if let Some(new) = solution
-            && self.best.as_ref().is_none_or(|b| new.score < b.score)
-        {
-            self.best = Some(new);
+        if let Some(new) = solution {
+            self.weigh(new);
         }
         self.observer.enter(Stage::Contour);
     }
@@ -351,6 +375,20 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         (outcome, Some(Best { solution, score: judged.score, certain }))
     }
 
+    /// Keeps the better of two answers, and remembers how good the other was if it says something else.
+    fn weigh(&mut self, new: Best<T>) {
+        let Some(old) = self.best.take() else {
+            self.best = Some(new);
+            return;
+        };
+        let apart = new.solution.axis.dot(&old.solution.axis) < T::of(RIVAL_COS);
+        let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
+        if apart {
+            self.rival = Some(self.rival.map_or(other.score, |r| r.least(other.score)));
+        }
+        self.best = Some(better);
+    }
+
     fn enter(&mut self, stage: Stage) {
         enter(self.report, self.observer, stage);
     }
@@ -359,6 +397,10 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
     fn conclude(self) {
         let report = self.report;
         if let Some(best) = self.best {
+            if !best.certain && self.rival.is_some_and(|r| r < best.score * T::of(RIVAL_SCORE)) {
+                report.status = Status::Ambiguous;
+                return;
+            }
             let chosen = best.solution.candidate;
             if let Some(candidate) = report.candidates.get_mut(chosen as usize) {
                 candidate.verdict = Verdict::Chosen;

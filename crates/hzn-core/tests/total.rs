@@ -1,0 +1,135 @@
+//! `process` answers any picture, and never with a number that is none.
+
+use hzn_core::body::{Frame, Kind};
+use hzn_core::camera::{self, Model};
+use hzn_core::image::{Channel, Grey, ImageView, Layout};
+use hzn_core::status::Status;
+use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Report};
+use proptest::prelude::*;
+
+fn config(model: Model, circle: bool, mask: bool, kind: Kind) -> Config {
+    let mut config = Config::new(camera::Config::ideal(model, 96, 64, 60.0));
+    config.camera.theta_max_deg = circle.then_some(30.0);
+    config.body.kind = kind;
+    config.body.altitude_km = Some(300.0);
+    config.candidates.min_points = 8;
+    config.select.min_inliers = 8;
+    if mask {
+        let triangle = [[10.0, 10.0], [50.0, 5.0], [30.0, 60.0]];
+        config.mask.polygons_px.push(triangle.into_iter().collect()).unwrap();
+    }
+    config
+}
+
+fn sound(report: &Report<f64>) {
+    assert_eq!(report.status == Status::Ok, report.solution.is_some());
+    if let Some(s) = &report.solution {
+        let [x, y, z] = s.axis.xyz();
+        assert!((x * x + y * y + z * z - 1.0).abs() < 1e-9);
+        assert!(s.covariance.upper_rad2.iter().all(|v| v.is_finite()));
+        assert!(s.covariance.sigma_max_rad() > 0.0);
+        assert!(s.half_angle_rad.is_finite() && s.rms_px.is_finite() && s.arc_px.is_finite());
+    }
+}
+
+/// Garbage of several kinds: noise, stripes, blocks, checkerboards, one lit pixel.
+fn garbage(kind: u8, seed: u64, level: u8) -> Vec<u8> {
+    let mut state = seed | 1;
+    (0..96u32 * 64)
+        .map(|i| {
+            let (x, y) = (i % 96, i / 96);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let random = (state >> 56) as u8;
+            let on = match kind {
+                0 => random > level,
+                1 => (x + y) % 2 == 0,
+                2 => x % (2 + u32::from(level % 7)) == 0,
+                3 => y % (2 + u32::from(level % 7)) == 0,
+                4 => (x / 8 + y / 8) % 2 == 0,
+                5 => i == u32::from(level) * 20,
+                6 => y > 30 + (x * u32::from(level)) / 800,
+                7 => (x as i32 - 48).pow(2) + (y as i32 - 32).pow(2) < i32::from(level) * 4,
+                8 => x * 2 > y + u32::from(level),
+                _ => random > 127 && y > 20,
+            };
+            if on { 200 } else { random / 16 }
+        })
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    #[test]
+    fn any_picture_gets_a_sound_report(
+        kind in 0u8..10, seed in any::<u64>(), level in any::<u8>(), lens in 0usize..4, circle: bool, mask: bool,
+        body in 0usize..4,
+    ) {
+        let model = [Model::Pinhole, Model::Equidistant, Model::KannalaBrandt, Model::BrownConrady][lens];
+        let body = [Kind::Earth, Kind::EarthSphere, Kind::Sun, Kind::Moon][body];
+        let config = config(model, circle, mask, body);
+        let data = garbage(kind, seed, level);
+        let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
+        let mut host = HostHorizon::boxed(&config).unwrap();
+        let expected = host.expect(&Frame::default()).unwrap();
+        let first = host.process(&picture, &expected);
+        sound(&first);
+        // The same picture gives the same answer, whatever came between.
+        let _ = host.process(&Grey::try_new(&garbage(0, seed ^ 7, 128), Layout::packed(96, 64, 1, 8)).unwrap(), &expected);
+        let again = host.process(&picture, &expected);
+        prop_assert_eq!(first.counters, again.counters);
+        prop_assert_eq!(first.solution.map(|s| s.axis.xyz()), again.solution.map(|s| s.axis.xyz()));
+        let mut flight = FlightHorizon::boxed(&config).unwrap();
+        let expected: Expected<f32> = flight.expect(&Frame::default()).unwrap();
+        let report = flight.process(&picture, &expected);
+        if let Some(s) = report.solution {
+            prop_assert!(s.axis.xyz().iter().all(|v| v.is_finite()));
+            prop_assert!(s.covariance.upper_rad2.iter().all(|v| v.is_finite()));
+        }
+    }
+}
+
+#[test]
+fn a_picture_of_another_size_is_rejected() {
+    let mut host = HostHorizon::boxed(&config(Model::Pinhole, false, false, Kind::Earth)).unwrap();
+    let expected = host.expect(&Frame::default()).unwrap();
+    let data = vec![0u8; 50 * 50];
+    let report = host.process(&Grey::try_new(&data, Layout::packed(50, 50, 1, 8)).unwrap(), &expected);
+    assert_eq!(report.status, Status::Rejected);
+}
+
+#[test]
+fn grey_colour_and_sixteen_bits_agree() {
+    let data = garbage(6, 3, 40);
+    let colour: Vec<u8> = data.iter().flat_map(|&v| [v, v, v]).collect();
+    let words: Vec<u16> = data.iter().map(|&v| u16::from(v) * 256).collect();
+    let mut host = HostHorizon::boxed(&config(Model::Pinhole, false, false, Kind::EarthSphere)).unwrap();
+    let expected = host.expect(&Frame::default()).unwrap();
+    let views = [
+        ImageView::from_bytes(&data, Layout::packed(96, 64, 1, 8), Channel::Mean).unwrap(),
+        ImageView::from_bytes(&colour, Layout::packed(96, 64, 3, 8), Channel::Mean).unwrap(),
+        ImageView::from_words(&words, Layout::packed(96, 64, 1, 16), Channel::Mean).unwrap(),
+    ];
+    let answers: Vec<_> = views.iter().map(|v| host.process(v, &expected)).collect();
+    for other in &answers[1..] {
+        assert_eq!(answers[0].status, other.status);
+        assert_eq!(answers[0].counters.followed, other.counters.followed);
+    }
+}
+
+#[test]
+fn impossible_frames_are_refused_by_name() {
+    use hzn_core::body::FrameError;
+    let mut c = config(Model::Pinhole, false, false, Kind::Earth);
+    c.body.altitude_km = None;
+    let host = HostHorizon::boxed(&c).unwrap();
+    let refused = |frame: Frame<f64>| host.expect(&frame).unwrap_err();
+    assert_eq!(refused(Frame::default()), FrameError::NoAltitude);
+    assert_eq!(refused(Frame { altitude_m: Some(f64::NAN), ..Frame::default() }), FrameError::Altitude);
+    assert_eq!(refused(Frame { altitude_m: Some(-5.0), ..Frame::default() }), FrameError::Altitude);
+    assert_eq!(refused(Frame { position_m: Some([6.3e6, 0.0, 0.0]), ..Frame::default() }), FrameError::Position);
+    assert_eq!(
+        refused(Frame { position_m: Some([f64::INFINITY, 0.0, 0.0]), ..Frame::default() }),
+        FrameError::Position
+    );
+    assert!(host.expect(&Frame { position_m: Some([6.7e6, 0.0, 0.0]), ..Frame::default() }).is_ok());
+}
