@@ -1,0 +1,5 @@
+//! Prints the table of accuracy: altitude × noise × visible arc × lens.
+
+fn main() {
+    print!("{}", hzn_tests::table::markdown());
+}

@@ -1,0 +1,17 @@
+//! What the tests of the whole chain share: sensors in both precisions, answers beside their truth, tallies, the
+//! table of accuracy, and real pictures.
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`sensors`] | both precisions of the sensor behind one call |
+//! | [`tally`] | errors, sigmas and NEES of many answers |
+//! | [`table`] | accuracy by altitude, noise, visible arc and lens |
+//! | [`real`] | photographs with their sensor.toml, and the fitted limb drawn over them |
+
+pub mod real;
+pub mod sensors;
+pub mod table;
+pub mod tally;
+
+pub use sensors::{Answer, Sensors, known};
+pub use tally::Tally;

@@ -1,0 +1,193 @@
+//! Photographs with their sensor.toml, and the fitted limb drawn over them.
+
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+use hzn_core::Config;
+use hzn_core::camera::Camera;
+use hzn_core::frames::UnitVec3;
+use hzn_core::image::{Channel, ImageView, Layout};
+use hzn_core::pipeline::Observer;
+use hzn_core::pixel::ImagePoint;
+use hzn_core::real::Real;
+use image::RgbImage;
+use nalgebra::Vector3;
+
+use crate::Answer;
+
+/// A photograph and the sensor that is said to have taken it.
+#[derive(Debug, Clone)]
+pub struct Photograph {
+    /// Name of the picture without its ending.
+    pub name: String,
+    /// What sensor.toml says.
+    pub sensor: Config,
+    /// The picture.
+    pub rgb: RgbImage,
+}
+
+impl Photograph {
+    /// The picture `file` of the folder `tests/data/real`, and the `.toml` of the same name beside it.
+    ///
+    /// # Panics
+    /// Either cannot be read.
+    pub fn load(file: &str) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/real").join(file);
+        let sensor = hzn_calib::sensor::load(&path.with_extension("toml")).unwrap_or_else(|e| panic!("{e}"));
+        let rgb = image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).into_rgb8();
+        Self { name: file.replace('/', "-").replace(['.'], "-"), sensor: sensor.config, rgb }
+    }
+
+    /// As hzn-core reads it.
+    ///
+    /// # Panics
+    /// Never: a decoded picture is as large as it says.
+    pub fn view(&self) -> ImageView<'_> {
+        let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);
+        ImageView::from_bytes(self.rgb.as_raw(), layout, Channel::Mean).expect("a decoded picture is whole")
+    }
+
+    /// Mean of the colours at a pixel.
+    pub fn brightness(&self, x: u32, y: u32) -> f64 {
+        self.rgb.get_pixel(x, y).0.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
+    }
+
+    /// Writes the picture with the fitted limb (red) and the edge points (inliers green, rejected yellow) drawn over
+    /// it to `target/overlays`, for the eye.
+    ///
+    /// # Panics
+    /// The folder cannot be written.
+    pub fn overlay(&self, answer: Option<&Answer>, points: &Points) {
+        let dir = overlays();
+        std::fs::create_dir_all(&dir).expect("the target folder is writable");
+        let mut out = self.rgb.clone();
+        let size = i64::from(self.rgb.width() / 1600);
+        let mut dot = |p: [f64; 2], r: i64, colour: [u8; 3]| {
+            for (dx, dy) in (-r..=r).flat_map(|dx| (-r..=r).map(move |dy| (dx, dy))) {
+                let (x, y) = (p[0].round() as i64 + dx, p[1].round() as i64 + dy);
+                if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
+                    && let Some(pixel) = out.get_pixel_mut_checked(x, y)
+                {
+                    pixel.0 = colour;
+                }
+            }
+        };
+        if let Some(a) = answer {
+            for &(p, weight) in &points.chosen {
+                dot(p, 1 + size, if weight > 0.0 { [0, 255, 0] } else { [255, 255, 0] });
+            }
+            for p in limb(&self.sensor, a) {
+                dot(p, size / 2, [255, 0, 0]);
+            }
+        }
+        out.save(dir.join(format!("{}.png", self.name))).expect("the target folder is writable");
+    }
+}
+
+/// How far above (negative) or below the fitted limb the picture is steepest, pixels: the median over each eighth of
+/// the width, NaN where there is no limb. It knows nothing of levels, candidates or inliers.
+pub fn steepest(photograph: &Photograph, answer: &Answer, reach: u32) -> [f64; 8] {
+    let mut found: [Vec<f64>; 8] = Default::default();
+    let (w, h) = photograph.rgb.dimensions();
+    for [x, y] in limb(&photograph.sensor, answer) {
+        let (column, row) = (x as u32, y.round() as u32);
+        if row < reach + 6 || row + reach + 6 >= h || column < 3 || column + 4 > w {
+            continue;
+        }
+        // Five columns and five rows on each side, so that noise and grain do not count.
+        let mean = |y: u32| (column - 2..=column + 2).map(|x| photograph.brightness(x, y)).sum::<f64>();
+        let step = |y: u32| (1..=5).map(|d| mean(y + d) - mean(y - d)).sum::<f64>();
+        let best = (row - reach..=row + reach).max_by(|&a, &b| step(a).total_cmp(&step(b))).unwrap_or(row);
+        found[(column * 8 / w) as usize].push(f64::from(best) - y);
+    }
+    found.map(|mut eighth| {
+        eighth.sort_by(f64::total_cmp);
+        eighth.get(eighth.len() / 2).copied().unwrap_or(f64::NAN)
+    })
+}
+
+/// Where overlays are written.
+pub fn overlays() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/overlays")
+}
+
+/// Points (x, y) of the fitted limb in the picture, less than a pixel apart.
+///
+/// # Panics
+/// The lens is refused.
+pub fn limb(sensor: &Config, answer: &Answer) -> Vec<[f64; 2]> {
+    let camera = Camera::<f64>::try_new(&sensor.camera).expect("the lens is valid");
+    let e = Vector3::from(answer.axis);
+    let b1 = e.cross(&e.map(|v| if v.abs() < 0.6 { 1.0 } else { 0.0 })).normalize();
+    let b2 = e.cross(&b1);
+    let (sin, cos) = answer.half_angle_rad.sin_cos();
+    let steps = (8.0 * camera.focal_px().0 * sin) as usize;
+    (0..steps)
+        .filter_map(|i| {
+            let (s, c) = (std::f64::consts::TAU * i as f64 / steps as f64).sin_cos();
+            let ray = e * cos + (b1 * c + b2 * s) * sin;
+            let p = camera.project(&UnitVec3::try_new(ray.into())?)?;
+            let inside =
+                p.u >= 0.0 && p.v >= 0.0 && p.u < f64::from(camera.width()) && p.v < f64::from(camera.height());
+            inside.then_some([p.u, p.v])
+        })
+        .collect()
+}
+
+/// The edge points of the last candidate that passed every gate, with their weights.
+#[derive(Debug, Clone, Default)]
+pub struct Points {
+    /// (x, y) and weight.
+    pub chosen: Vec<([f64; 2], f64)>,
+}
+
+impl Points {
+    /// The share of the picture's width along which there are inliers: in strips of 16 pixels.
+    pub fn along(&self, width: u32) -> f64 {
+        let mut held = vec![false; (width as usize).div_ceil(16)];
+        for &([x, _], weight) in &self.chosen {
+            if let Some(strip) = held.get_mut((x.max(0.0) / 16.0) as usize) {
+                *strip |= weight > 0.0;
+            }
+        }
+        held.iter().filter(|&&h| h).count() as f64 / held.len() as f64
+    }
+}
+
+/// Collects the points of candidates.
+#[derive(Debug, Default)]
+pub struct Watch {
+    all: RefCell<Vec<([f64; 2], f64)>>,
+    best: RefCell<Points>,
+}
+
+impl Watch {
+    /// What was collected.
+    pub fn points(self) -> Points {
+        self.best.into_inner()
+    }
+}
+
+impl<T: Real> Observer<T> for Watch {
+    fn edge(&self, _: u32, _: &[hzn_core::pixel::Pixel], _: u32) {
+        self.all.borrow_mut().clear();
+    }
+    fn point(&self, _: u32, p: ImagePoint<T>) {
+        self.all.borrow_mut().push(([p.u.f64(), p.v.f64()], 0.0));
+    }
+    fn weight(&self, _: u32, point: u32, weight: T) {
+        if let Some(p) = self.all.borrow_mut().get_mut(point as usize) {
+            p.1 = weight.f64();
+        }
+    }
+    fn verdict(
+        &self,
+        _: u32,
+        _: &hzn_core::pipeline::Candidate<T>,
+        solution: Option<&hzn_core::pipeline::Solution<T>>,
+    ) {
+        if solution.is_some() {
+            self.best.borrow_mut().chosen.clone_from(&self.all.borrow());
+        }
+    }
+}
