@@ -137,6 +137,12 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
 
     #[inline(always)]
     fn at(&self, dx: i32, dy: i32) -> Option<i32> {
+        self.read(dx, dy, dx as isize * self.across + dy as isize * self.down)
+    }
+
+    /// The pixel (dx, dy) further, which stands `offset` further in memory.
+    #[inline(always)]
+    fn read(&self, dx: i32, dy: i32, offset: isize) -> Option<i32> {
         let (x, y) = (self.x + dx, self.y + dy);
         if !FREE {
             let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
@@ -145,8 +151,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
             }
         }
         self.scene.observer.pixel(x as u16, y as u16);
-        let index = self.index.wrapping_add_signed(dx as isize * self.across + dy as isize * self.down);
-        Some(i32::from(self.scene.picture.read(index)))
+        Some(i32::from(self.scene.picture.read(self.index.wrapping_add_signed(offset))))
     }
 
     /// Brightness gradient (to the right, down) over the 3×3 neighbourhood.
@@ -251,10 +256,18 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let step = if wide < 4 * steep { 1 } else { (wide / (2 * steep)).min(WIDEST) };
     // Four times the brightness at offset k towards the dark: in one row for the plateaus, of which the mean of several
     // is taken, and over three rows, smoothed along the edge, for the crossing.
-    let one = |k: i32| -> Option<i32> { Some(4 * around.at(k * dx * step, k * dy * step)?) };
+    let (dark, side) = (
+        (dx as isize * around.across + dy as isize * around.down) * step as isize,
+        dy as isize * around.across + dx as isize * around.down,
+    );
+    let one = |k: i32| -> Option<i32> { Some(4 * around.read(k * dx * step, k * dy * step, k as isize * dark)?) };
     let three = |k: i32| -> Option<i32> {
-        let (x, y) = (k * dx * step, k * dy * step);
-        Some(around.at(x - dy, y - dx)? + 2 * around.at(x, y)? + around.at(x + dy, y + dx)?)
+        let (x, y, o) = (k * dx * step, k * dy * step, k as isize * dark);
+        Some(
+            around.read(x - dy, y - dx, o - side)?
+                + 2 * around.read(x, y, o)?
+                + around.read(x + dy, y + dx, o + side)?,
+        )
     };
     let (first_lit, first_dark) = (three(0)?, three(1)?);
     let (bright, inner) = plateau(Side::Lit, first_lit, first_dark, one);
