@@ -106,7 +106,11 @@ impl<T: Real> Block<T> {
     /// Whether the lit side lies towards `e`, as it does on the limb of a body.
     #[inline]
     pub(crate) fn faces(&self, l: usize, e: &V3<T>) -> bool {
-        let [gu, gv] = self.gradient_at(l, e);
+        self.faces_along(l, self.gradient_at(l, e))
+    }
+    /// As [`Self::faces`], from the gradient.
+    #[inline(always)]
+    pub(crate) fn faces_along(&self, l: usize, [gu, gv]: [T; 2]) -> bool {
         match (self.lit >> (2 * (l & 7))) & 3 {
             0 => gu > T::ZERO,
             1 => gu < T::ZERO,

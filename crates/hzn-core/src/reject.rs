@@ -89,8 +89,9 @@ pub(crate) fn keep<T: Real>(
         }
     };
     for block in blocks {
+        let g = block.gradient(&best.e);
         for lane in 0..LANES {
-            if !block.faces(lane, &best.e) {
+            if !block.faces_along(lane, [g[0][lane], g[1][lane]]) {
                 block.weight[lane] = T::ZERO;
             }
         }
