@@ -14,6 +14,9 @@ pub const AU_KM: f64 = 149_597_870.7;
 /// Mean distance of the Moon in kilometres.
 pub const MOON_DISTANCE_KM: f64 = 384_400.0;
 
+/// The part of the difference of an ellipsoid's half-angles that an axis fitted without an attitude is wrong by.
+const SHAPE_PART: f64 = 0.3;
+
 /// Which body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
@@ -254,6 +257,19 @@ impl<T: Real> Expected<T> {
         let by_limb = T::one() / sin;
         let variance = by_cos * by_cos * var_cos + by_limb * by_limb * self.limb_sigma_m * self.limb_sigma_m;
         Some((distance - self.radius_m, variance.sqrt()))
+    }
+
+    /// 1-sigma in radians of what the ellipsoid's unknown orientation adds to the axis: with a position but without an
+    /// attitude the limb is fitted by its mean cone. A part of the difference of the two half-angles, measured over
+    /// latitudes and azimuths of short arcs; 0 when nothing is left out.
+    pub(crate) fn shape_sigma_rad(&self) -> T {
+        match (&self.ellipsoid, &self.cam_to_ecef) {
+            (Some(cone), None) => {
+                let (east, meridian) = cone.half_angles_rad();
+                (east - meridian).abs() * T::of(SHAPE_PART)
+            }
+            _ => T::ZERO,
+        }
     }
 
     /// The axis in ECEF, when the position is known.

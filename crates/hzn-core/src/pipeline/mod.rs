@@ -347,7 +347,11 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
 
         enter(self.report, self.observer, Stage::Select);
         let (b1, b2) = basis(&fused.e);
-        let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
+        // Around the whole limb the ellipsoid's shape cancels.
+        let around = (fit.arc_px / (focal * self.expected.sin * T::of(core::f64::consts::TAU))).least(T::one());
+        let shape = self.expected.shape_sigma_rad() * (T::one() - around);
+        let [p11, p12, p22] = fused.p;
+        let covariance = Cov3::from_tangent(&b1, &b2, [p11 + shape * shape, p12, p22 + shape * shape]);
         let sigma = covariance.sigma_max_rad();
         let judged = select::judge(&fit, &fused, sigma, blocks, scene, self.camera, &config.select);
         outcome.verdict = judged.verdict;
