@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Place, cell, limb, without_time};
+use common::{Place, cell, crc32, limb, without_time};
 use image::{DynamicImage, ImageFormat};
 
 #[test]
@@ -63,13 +63,6 @@ fn png_of_size(width: u32, height: u32) -> Vec<u8> {
     let crc = crc32(&bytes[12..29]).to_be_bytes();
     bytes[29..33].copy_from_slice(&crc);
     bytes
-}
-
-fn crc32(data: &[u8]) -> u32 {
-    let step = |crc: u32, byte: &u8| {
-        (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xedb8_8320 } else { c >> 1 })
-    };
-    !data.iter().fold(!0u32, step)
 }
 
 #[test]

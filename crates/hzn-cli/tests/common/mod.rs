@@ -33,6 +33,14 @@ pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {
     })
 }
 
+/// The checksum of PNG.
+pub fn crc32(data: &[u8]) -> u32 {
+    let step = |crc: u32, byte: &u8| {
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xedb8_8320 } else { c >> 1 })
+    };
+    !data.iter().fold(!0u32, step)
+}
+
 impl Place {
     /// An empty folder with a sensor.toml.
     pub fn new() -> Self {

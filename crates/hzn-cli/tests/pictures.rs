@@ -1,0 +1,196 @@
+//! Kinds of pictures: whatever their coding, the same scene gives the same direction.
+
+mod common;
+
+use common::{Place, cell, limb, without_time};
+use image::{DynamicImage, GrayImage, ImageFormat};
+
+/// The axis of each row; every frame must have been answered.
+#[track_caller]
+fn axes(place: &Place, args: &[&str]) -> Vec<[f64; 3]> {
+    let rows = without_time(&place.run(args).expect(0).out);
+    let number = |r: &[(String, String)], name: &str| cell(r, name).parse::<f64>().unwrap();
+    rows.iter()
+        .map(|r| {
+            assert_eq!(cell(r, "status"), "ok", "{r:?}");
+            ["axis_x", "axis_y", "axis_z"].map(|name| number(r, name))
+        })
+        .collect()
+}
+
+fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let cross =
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]].map(|v| v * v).iter().sum();
+    f64::sqrt(cross).asin().to_degrees()
+}
+
+/// The direction that the limb of `shift` is seen in, from a plain 8-bit PNG.
+fn plain(shift: f64) -> [f64; 3] {
+    let place = Place::new();
+    limb(320, 240, shift).save(place.path("in/plain.png")).unwrap();
+    axes(&place, &["run", "in"])[0]
+}
+
+#[test]
+fn every_lossless_kind_gives_the_same_answer() {
+    let place = Place::new();
+    let grey = DynamicImage::ImageLuma8(limb(320, 240, 0.0));
+    // What stands in an alpha channel is no brightness.
+    let mut clear = grey.to_rgba8();
+    clear.pixels_mut().enumerate().for_each(|(i, p)| p.0[3] = (i % 251) as u8);
+    for (name, picture) in [
+        ("grey.png", grey.clone()),
+        ("grey-alpha.png", DynamicImage::ImageLumaA8(grey.to_luma_alpha8())),
+        ("colour.png", DynamicImage::ImageRgb8(grey.to_rgb8())),
+        ("clear.png", DynamicImage::ImageRgba8(clear)),
+        ("grey16.png", DynamicImage::ImageLuma16(grey.to_luma16())),
+        ("colour16.png", DynamicImage::ImageRgb16(grey.to_rgb16())),
+        ("grey.tif", grey.clone()),
+        ("grey16.tif", DynamicImage::ImageLuma16(grey.to_luma16())),
+        ("grey.bmp", grey.clone()),
+        ("grey.pgm", grey.clone()),
+    ] {
+        picture.save(place.path(&format!("in/{name}"))).unwrap();
+    }
+    let found = axes(&place, &["run", "in"]);
+    assert_eq!(found.len(), 10);
+    let expected = plain(0.0);
+    for axis in found {
+        assert!(angle_deg(axis, expected) < 1e-3, "{axis:?} is not {expected:?}");
+    }
+}
+
+#[test]
+fn sixteen_bits_are_not_cut_to_eight() {
+    let place = Place::new();
+    // All brightness lies within one step of 8 bits, and so does the level.
+    place.write(
+        "in/sensor.toml",
+        format!("{}[binarize]\nmethod = \"fixed\"\nlevel = 622.0\n", common::SENSOR).as_bytes(),
+    );
+    let faint: Vec<u16> = limb(320, 240, 0.0).into_raw().into_iter().map(|v| 0x0200 + u16::from(v)).collect();
+    let faint = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(320, 240, faint).unwrap();
+    faint.save(place.path("in/faint.png")).unwrap();
+    let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
+    // So faint an edge stands at the global level instead of the local one; cut to 8 bits there would be no edge.
+    assert!(off < 0.05, "{off}");
+}
+
+#[test]
+fn inks_become_brightness() {
+    let place = Place::new();
+    place.write("in/cmyk.jpg", include_bytes!("data/cmyk.jpg"));
+    // Lossy, and a picture of inverted inks would be bright where the sky is: the axis would point to the other side.
+    let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
+    assert!(off < 0.05, "{off}");
+}
+
+/// The chunks of a PNG: kind and data.
+fn chunks(png: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
+    let mut rest = &png[8..];
+    let mut out = Vec::new();
+    while let [a, b, c, d, after @ ..] = rest {
+        let n = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
+        out.push((after[..4].to_vec(), after[4..4 + n].to_vec()));
+        rest = &after[8 + n..];
+    }
+    out
+}
+
+/// A PNG that shows `first` and then `second`.
+fn animated_png(first: &GrayImage, second: &GrayImage) -> Vec<u8> {
+    let encoded = |image: &GrayImage| {
+        let mut bytes = Vec::new();
+        image.write_to(&mut std::io::Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
+        bytes
+    };
+    let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut push = |kind: &[u8], data: &[u8]| {
+        let body = [kind, data].concat();
+        out.extend((data.len() as u32).to_be_bytes());
+        out.extend(&body);
+        out.extend(common::crc32(&body).to_be_bytes());
+    };
+    let control = |sequence: u32| {
+        let numbers = [sequence, first.width(), first.height(), 0, 0].map(u32::to_be_bytes).concat();
+        // A tenth of a second; nothing disposed of, nothing blended.
+        [numbers, vec![0, 1, 0, 10, 0, 0]].concat()
+    };
+    let data = |png: &[u8]| chunks(png).into_iter().filter(|(k, _)| k == b"IDAT").flat_map(|(_, d)| d).collect();
+    let (a, b) = (encoded(first), encoded(second));
+    let (first_data, second_data): (Vec<u8>, Vec<u8>) = (data(&a), data(&b));
+    push(b"IHDR", &chunks(&a)[0].1);
+    push(b"acTL", &[2u32, 0].map(u32::to_be_bytes).concat());
+    push(b"fcTL", &control(0));
+    push(b"IDAT", &first_data);
+    push(b"fcTL", &control(1));
+    push(b"fdAT", &[2u32.to_be_bytes().to_vec(), second_data].concat());
+    push(b"IEND", b"");
+    out
+}
+
+#[test]
+fn of_an_animation_the_first_picture_is_taken() {
+    let place = Place::new();
+    place.write("in/film.png", &animated_png(&limb(320, 240, 0.0), &limb(320, 240, 40.0)));
+    let axis = axes(&place, &["run", "in"])[0];
+    assert_eq!(axis, plain(0.0));
+    assert!(angle_deg(axis, plain(40.0)) > 1.0);
+}
+
+/// The decoders of videos, found on PATH; without them the test named `what` is passed over, but never in CI.
+fn decoder(what: &str) -> bool {
+    let there = ["ffmpeg", "ffprobe"].iter().all(|tool| {
+        let started = std::process::Command::new(tool).arg("-version").stdout(std::process::Stdio::null()).status();
+        started.is_ok_and(|s| s.success())
+    });
+    if !there {
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "{what} needs ffmpeg and ffprobe on PATH");
+        eprintln!("{what} left out: no ffmpeg and ffprobe on PATH");
+    }
+    there
+}
+
+#[test]
+fn videos_made_and_read_by_the_real_ffmpeg() {
+    if !decoder("videos_made_and_read_by_the_real_ffmpeg") {
+        return;
+    }
+    let place = Place::with_pictures(6);
+    let pictures = axes(&place, &["run", "in"]);
+    let make = |name: &str, coding: &[&str]| {
+        let made = std::process::Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-framerate", "4", "-i"])
+            .arg(place.path("in/%04d.png"))
+            .args(coding)
+            .arg(place.path(name))
+            .status();
+        assert!(made.unwrap().success(), "{name}");
+    };
+    // Lossless, 10 bits of luma; lossy, 8 bits of limited range; lossless, without a luma plane.
+    make("deep.mkv", &["-c:v", "ffv1", "-pix_fmt", "yuv420p10le"]);
+    make("lossy.mp4", &["-c:v", "mpeg4", "-q:v", "2", "-pix_fmt", "yuv420p"]);
+    make("colour.avi", &["-c:v", "rawvideo", "-pix_fmt", "bgr24"]);
+    for (name, within_deg) in [("deep.mkv", 0.01), ("lossy.mp4", 0.05), ("colour.avi", 0.01)] {
+        let ran = place.run(&["run", name, "-s", "in/sensor.toml"]).expect(0);
+        let rows = without_time(&ran.out);
+        let named: Vec<_> = rows.iter().map(|r| (cell(r, "file").to_owned(), cell(r, "time_s").to_owned())).collect();
+        let expected: Vec<_> = ["0.0", "0.25", "0.5", "0.75", "1.0", "1.25"]
+            .iter()
+            .zip(0..)
+            .map(|(t, i)| (format!("{name}#{i:06}"), (*t).to_owned()))
+            .collect();
+        assert_eq!(named, expected);
+        for (found, of_picture) in axes(&place, &["run", name, "-s", "in/sensor.toml"]).iter().zip(&pictures) {
+            let off = angle_deg(*found, *of_picture);
+            assert!(off < within_deg, "{name}: {off}");
+        }
+    }
+    // A file that only has the ending of a video, and one that breaks off.
+    place.write("text.mp4", b"this is no video");
+    place.run(&["run", "text.mp4", "-s", "in/sensor.toml"]).expect(2).says("ffprobe cannot read it");
+    let whole = std::fs::read(place.path("colour.avi")).unwrap();
+    place.write("cut.avi", &whole[..whole.len() / 2]);
+    let ran = place.run(&["run", "cut.avi", "-s", "in/sensor.toml"]);
+    assert!(ran.code != 0 || without_time(&ran.out).len() < 6, "{}", ran.err);
+}
