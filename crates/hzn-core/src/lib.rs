@@ -1,8 +1,9 @@
-//! The horizon sensor's core: from a picture of a limb to the direction of the body, with a covariance that a
-//! navigation filter can trust.
+//! The horizon sensor's core: from a picture of a limb to the direction of the body, with a covariance for a
+//! navigation filter.
 //!
-//! No heap, fixed memory, no panic, no unsafe code; the same bits on a desktop and on a Cortex-M in the same
-//! precision. A picture goes one way, one module a stage, and nothing runs back:
+//! No heap, fixed memory, no unsafe code; `process` answers any picture with a report. Functions that IEEE 754 does not
+//! round correctly come from one library and sums have one order, so that the answer does not depend on the machine. A
+//! picture goes one way, one module a stage, and nothing runs back:
 //!
 //! ```text
 //! image → binarize → contour → candidates → undistort → reject → estimate → covariance → select → Report

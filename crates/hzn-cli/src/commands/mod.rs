@@ -14,7 +14,7 @@ use clap::{Parser, Subcommand};
 
 use crate::exit::Outcome;
 
-/// Finds the limb of a planet in pictures: the direction to the body, with an honest covariance.
+/// Finds the limb of a planet in pictures: the direction to the body, with its covariance.
 ///
 /// Exit codes: 0 every frame was read and processed; 1 failed; 2 wrong usage or configuration; 3 finished, but some
 /// frames could not be read; 130 interrupted (the output is valid and can be continued with --resume).
