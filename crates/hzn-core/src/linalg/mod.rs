@@ -1,5 +1,13 @@
 //! Private names for nalgebra's types, and the small decompositions that nalgebra only has with panic paths.
 
+#[cfg(any(feature = "dlr", feature = "zju"))]
+#[allow(dead_code, reason = "each method takes what it needs")]
+mod decompose;
+
+#[cfg(any(feature = "dlr", feature = "zju"))]
+#[allow(unused_imports, reason = "each method takes what it needs")]
+pub(crate) use decompose::{Triangle, dot, symmetric_eigen};
+
 use crate::real::Real;
 
 /// Three components.
