@@ -16,10 +16,13 @@
 //! | [`picture`] | the result, and its file |
 //! | [`limb`] | the limb as a line in the picture, edge points on it |
 //! | [`truth`] | what is true of a scene |
+//! | [`ephemeris`] | where Sun and Moon stand |
+//! | [`utc`] | dates, seconds, terrestrial time |
 //! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
 
 mod counter;
 pub mod detector;
+pub mod ephemeris;
 pub mod error;
 pub mod flight;
 pub mod foreground;
@@ -32,6 +35,7 @@ mod render;
 pub mod scene;
 pub mod texture;
 pub mod truth;
+pub mod utc;
 
 pub use detector::Detector;
 pub use error::SceneError;
