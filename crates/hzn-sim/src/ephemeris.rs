@@ -62,13 +62,13 @@ struct Time {
 
 impl Time {
     fn at(unix_s: f64) -> Self {
-        let t = tt_days_since_j2000(unix_s) / 36_525.0;
+        let t = tt_days_since_j2000(unix_s) / 36525.0;
         let node_deg = 125.04 - 1934.136 * t;
         let nutation_deg = -0.00478 * sin(node_deg);
-        let obliquity_deg = 23.439_291_1 - 0.013_004_2 * t + 0.002_56 * cos(node_deg);
-        let sidereal_deg = 280.460_618_37
-            + 360.985_647_366_29 * ut_days_since_j2000(unix_s)
-            + 0.000_387_933 * t * t
+        let obliquity_deg = 23.4392911 - 0.0130042 * t + 0.00256 * cos(node_deg);
+        let sidereal_deg = 280.46061837
+            + 360.98564736629 * ut_days_since_j2000(unix_s)
+            + 0.000387933 * t * t
             + nutation_deg * cos(obliquity_deg);
         Self { t, obliquity_deg, nutation_deg, sidereal_deg }
     }
@@ -94,18 +94,17 @@ pub fn sidereal_rad(unix_s: f64) -> f64 {
 pub fn sun(unix_s: f64) -> Place {
     let time = Time::at(unix_s);
     let t = time.t;
-    let mean_longitude = 280.46646 + 36_000.76983 * t + 0.000_303_2 * t * t;
-    let anomaly = 357.52911 + 35_999.05029 * t - 0.000_153_7 * t * t;
-    let centre = (1.914_602 - 0.004_817 * t - 0.000_014 * t * t) * sin(anomaly)
-        + (0.019_993 - 0.000_101 * t) * sin(2.0 * anomaly)
-        + 0.000_289 * sin(3.0 * anomaly);
-    let elongation = 297.85 + 445_267.1115 * t;
+    let mean_longitude = 280.46646 + 36000.76983 * t + 0.0003032 * t * t;
+    let anomaly = 357.52911 + 35999.05029 * t - 0.0001537 * t * t;
+    let centre = (1.914602 - 0.004817 * t - 0.000014 * t * t) * sin(anomaly)
+        + (0.019993 - 0.000101 * t) * sin(2.0 * anomaly)
+        + 0.000289 * sin(3.0 * anomaly);
+    let elongation = 297.85 + 445267.1115 * t;
     // Aberration; and what was fitted to an ephemeris for 2000 to 2040, the Earth's path about the common centre of
     // mass with the Moon above all.
-    let longitude = mean_longitude + centre - 0.005_69 + time.nutation_deg - 0.0025 + 0.001_79 * sin(elongation);
-    let eccentricity = 0.016_708_634 - 0.000_042_037 * t;
-    let distance_au =
-        1.000_001_018 * (1.0 - eccentricity * eccentricity) / (1.0 + eccentricity * cos(anomaly + centre));
+    let longitude = mean_longitude + centre - 0.00569 + time.nutation_deg - 0.0025 + 0.00179 * sin(elongation);
+    let eccentricity = 0.016708634 - 0.000042037 * t;
+    let distance_au = 1.000001018 * (1.0 - eccentricity * eccentricity) / (1.0 + eccentricity * cos(anomaly + centre));
     Place::new(time.ecef(longitude, 0.0), distance_au * AU_KM * 1e3)
 }
 
@@ -114,11 +113,11 @@ pub fn moon(unix_s: f64) -> Place {
     let time = Time::at(unix_s);
     let t = time.t;
     // Mean longitude of date, anomalies of Moon and Sun, argument of latitude, elongation.
-    let mean = 218.31617 + 481_267.88088 * t;
-    let l = 134.96292 + 477_198.86753 * t;
-    let s = 357.52543 + 35_999.04944 * t;
-    let f = 93.27283 + 483_202.01873 * t;
-    let d = 297.85027 + 445_267.11135 * t;
+    let mean = 218.31617 + 481267.88088 * t;
+    let l = 134.96292 + 477198.86753 * t;
+    let s = 357.52543 + 35999.04944 * t;
+    let f = 93.27283 + 483202.01873 * t;
+    let d = 297.85027 + 445267.11135 * t;
     // (arcseconds, argument)
     let of_longitude = [
         (22640.0, l),
@@ -150,7 +149,7 @@ pub fn moon(unix_s: f64) -> Place {
         (11.0, -s + f - 2.0 * d),
     ]);
     let distance_km =
-        385_000.0 - 20_905.0 * cos(l) - 3699.0 * cos(2.0 * d - l) - 2956.0 * cos(2.0 * d) - 570.0 * cos(2.0 * l)
+        385000.0 - 20905.0 * cos(l) - 3699.0 * cos(2.0 * d - l) - 2956.0 * cos(2.0 * d) - 570.0 * cos(2.0 * l)
             + 246.0 * cos(2.0 * l - 2.0 * d)
             - 205.0 * cos(s - 2.0 * d)
             - 171.0 * cos(l + 2.0 * d)
