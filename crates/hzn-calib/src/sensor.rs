@@ -7,17 +7,15 @@
 use std::ops::Range;
 use std::path::Path;
 
-use hzn_core::Config;
-use hzn_core::camera::Camera;
+use hzn_core::camera::{self, Camera, Model};
 use hzn_core::error::ConfigError;
+use hzn_core::pipeline::lacking;
+use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
 use crate::nearest::suggestion;
 use crate::{Problem, camera_file};
-
-/// Presets that exist.
-pub const PRESETS: &[&str] = &["hzn"];
 
 /// A sensor.toml that was read and checked.
 #[derive(Debug, Clone)]
@@ -51,14 +49,12 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     let mut table = DeTable::parse(text).map_err(|e| syntax(&e, text, path))?;
     // Places of every key, for errors found after the text is gone.
     let places = places(table.get_ref());
-    let preset = take(table.get_mut(), "preset");
-    if let Some((value, span)) = preset {
-        let name = value.as_str().unwrap_or_default();
-        if !PRESETS.contains(&name) {
-            let what = format!("no preset {name:?}{}", suggestion(name, PRESETS));
-            return Err(Problem::new(path, what).at_offset(text, span.start).in_field("preset"));
-        }
-    }
+    let preset = match take(table.get_mut(), "preset") {
+        None => Preset::default(),
+        Some((value, span)) => preset_named(value.as_str().unwrap_or_default())
+            .map_err(|what| Problem::new(path, what).at_offset(text, span.start).in_field("preset"))?,
+    };
+    let starting_values = starting_values(preset);
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
         // `Config` wants a camera; this one stands in until the file's own is put in below.
@@ -69,6 +65,9 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
             table.get_mut().insert(key, toml::Spanned::new(span, DeValue::Table(stand_in.into_inner())));
         }
     }
+    if let Ok(values) = DeTable::parse(&starting_values) {
+        fill(table.get_mut(), values.into_inner());
+    }
     let mut config =
         Config::deserialize(toml::Deserializer::from(table)).map_err(|e| meaning(&e, text, path, &places))?;
     if let Some(camera) = from_file {
@@ -76,6 +75,55 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     }
     check(&config).map_err(|e| refused(&e, text, path, &places))?;
     Ok(Sensor { config, text: text.to_owned() })
+}
+
+/// The preset of that name, or what is wrong with it.
+fn preset_named(name: &str) -> Result<Preset, String> {
+    Preset::named(name).ok_or_else(|| {
+        let names: Vec<&str> = Preset::ALL.iter().map(|p| p.name()).collect();
+        unbuilt("preset", name).unwrap_or_else(|| format!("no preset {name:?}{}", suggestion(name, &names)))
+    })
+}
+
+/// That a value exists, but not in this build.
+fn unbuilt(key: &str, value: &str) -> Option<String> {
+    let feature = lacking(key, value)?;
+    Some(format!("{value:?} is not in this build: it needs hzn-core with the feature {feature:?}"))
+}
+
+/// A preset as the text of a sensor.toml without camera.
+fn starting_values(preset: Preset) -> String {
+    let mut table =
+        match toml::Table::try_from(Config::preset(preset, camera::Config::ideal(Model::Pinhole, 2, 2, 1.0))) {
+            Ok(table) => table,
+            Err(e) => unreachable!("plain numbers, texts and lists are TOML: {e}"),
+        };
+    table.remove("camera");
+    table.to_string()
+}
+
+/// Puts in from `values` what `table` does not have. Nothing put in has a place in the file.
+fn fill<'i>(table: &mut DeTable<'i>, values: DeTable<'i>) {
+    for (key, value) in values {
+        match (table.get_mut(key.get_ref().as_ref()), value.into_inner()) {
+            (Some(own), value) => {
+                if let (DeValue::Table(own), DeValue::Table(values)) = (own.get_mut(), value) {
+                    fill(own, values);
+                }
+            }
+            (None, value) => {
+                let value = match value {
+                    DeValue::Table(values) => {
+                        let mut inner = DeTable::new();
+                        fill(&mut inner, values);
+                        DeValue::Table(inner)
+                    }
+                    other => other,
+                };
+                table.insert(toml::Spanned::new(0..0, key.into_inner()), toml::Spanned::new(0..0, value));
+            }
+        }
+    }
 }
 
 /// Everything that `Horizon::new` would refuse.
@@ -208,7 +256,10 @@ fn meaning(error: &toml::de::Error, text: &str, path: &Path, places: &[Place]) -
         let what = if own.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
         Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(own)
     } else if message.starts_with("unknown variant") {
-        Problem::new(path, format!("{first:?} is not a valid value{}", suggestion(first, &valid))).in_field(own)
+        let key = place.map(|p| p.path.join(".")).unwrap_or_default();
+        let what = unbuilt(&key, first)
+            .unwrap_or_else(|| format!("{first:?} is not a valid value{}", suggestion(first, &valid)));
+        Problem::new(path, what).in_field(own)
     } else if message.starts_with("missing field") {
         let mut p: Vec<String> = place.map(|p| p.path.clone()).unwrap_or_default();
         p.push(first.to_owned());
@@ -263,6 +314,37 @@ mod tests {
         let sensor = parse(CAMERA, Path::new("sensor.toml")).unwrap();
         assert_eq!(sensor.config, Config::new(sensor.config.camera.clone()));
         assert!(parse(&format!("preset = \"hzn\"\n{CAMERA}"), Path::new("s.toml")).is_ok());
+    }
+
+    #[test]
+    fn what_is_written_beats_the_preset() {
+        let sun = parse(&format!("preset = \"sun\"\n{CAMERA}"), Path::new("s.toml")).unwrap().config;
+        assert_eq!(sun, Config::preset(Preset::Sun, sun.camera.clone()));
+        assert_ne!(sun, Config::new(sun.camera.clone()));
+        let text = format!("preset = \"sun\"\n{CAMERA}[covariance]\nsigma_px = 0.5\n");
+        let own = parse(&text, Path::new("s.toml")).unwrap().config;
+        let mut want = sun;
+        want.covariance.sigma_px = 0.5;
+        assert_eq!(own, want);
+        // Errors still name the right line.
+        let message = parse(&text.replace("0.5", "-1"), Path::new("s.toml")).unwrap_err().to_string();
+        assert_eq!(message, "s.toml:11: [covariance] sigma_px: -1 is refused: must be above 0");
+    }
+
+    #[test]
+    fn methods_behind_features_are_taken_or_the_feature_is_named() {
+        for o in hzn_core::pipeline::OPTIONAL {
+            let line = match o.key.split_once('.') {
+                Some((section, key)) => format!("{CAMERA}[{section}]\n{key} = {:?}\n", o.value),
+                None => format!("{} = {:?}\n{CAMERA}", o.key, o.value),
+            };
+            match parse(&line, Path::new("s.toml")) {
+                Ok(_) => assert!(o.built, "{o:?}"),
+                Err(e) => {
+                    assert!(!o.built && e.to_string().contains(&format!("feature {:?}", o.feature)), "{o:?}: {e}")
+                }
+            }
+        }
     }
 
     #[test]

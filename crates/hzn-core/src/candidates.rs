@@ -34,12 +34,12 @@ pub struct Config {
     /// Points kept of each candidate, evenly along the edge, 16 or more; 0 keeps all that fit.
     pub keep_points: u16,
     /// How a border pixel becomes an edge point.
-    pub subpixel: SubPixel,
+    pub sub_pixel: SubPixel,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { min_points: 40, keep_points: 600, subpixel: SubPixel::Linear }
+        Self { min_points: 40, keep_points: 600, sub_pixel: SubPixel::Linear }
     }
 }
 
@@ -88,7 +88,7 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
     let mut made = Points::default();
     let mut place = 0;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
-        let found = match config.subpixel {
+        let found = match config.sub_pixel {
             SubPixel::Linear => {
                 if unmasked && scene.region.is_inside_by(pixel.x, pixel.y, margin) {
                     linear::<T, P, O, true>(scene, pixel)
@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn without_sub_pixel_points_stand_half_a_pixel_out() {
         let data = picture([0.0, 1.0], 49.8, 0.1, 20.0, 220.0);
-        let config = Config { subpixel: SubPixel::None, ..Config::default() };
+        let config = Config { sub_pixel: SubPixel::None, ..Config::default() };
         for (_, v) in points(&data, &config, 120) {
             // Row 50 is the first lit one.
             assert_eq!(v, 49.5);

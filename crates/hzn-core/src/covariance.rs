@@ -13,10 +13,21 @@ use crate::estimate::{self, Fit};
 use crate::linalg::{M3, V3, basis, invert_spd2, unit};
 use crate::real::Real;
 
+/// How the covariance is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Method {
+    /// N⁻¹ X N⁻¹ of the fit, X with the correlated errors of the edge, and the expected half-angle fused.
+    #[default]
+    Sandwich,
+}
+
 /// `[covariance]` of sensor.toml: edge errors as a Gauss-Markov process along the limb.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
+    /// How the covariance is found.
+    pub method: Method,
     /// 1-sigma of an edge point in pixels, above 0.
     pub sigma_px: f64,
     /// Length along the edge over which errors stay alike, in pixels; 0 for white errors.
@@ -25,7 +36,7 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { sigma_px: 1.0, correlation_px: 300.0 }
+        Self { method: Method::Sandwich, sigma_px: 1.0, correlation_px: 300.0 }
     }
 }
 

@@ -30,10 +30,21 @@ pub enum HalfAngle {
     Free,
 }
 
+/// How the cone is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Method {
+    /// Gauss-Newton on the sphere with Tukey's weights and the expected half-angle.
+    #[default]
+    Sphere,
+}
+
 /// `[estimate]` of sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
+    /// How the cone is fitted.
+    pub method: Method,
     /// What the fit takes for the half-angle.
     pub half_angle: HalfAngle,
 }
@@ -88,16 +99,8 @@ pub(crate) fn fit<T: Real>(
     config: &Config,
     noise: &covariance::Config,
 ) -> Option<Fit<T>> {
-    let azimuth = azimuth(expected);
-    let azimuth = azimuth.as_ref();
-    let known = config.half_angle == HalfAngle::Known && !expected.free;
-    let robust = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
-    let freely = if known { None } else { settle(blocks, robust, true, azimuth) };
-    let ((at, mean, sums), free) = match freely {
-        Some(settled) => (settled, true),
-        // Sun and Moon have no other half-angle to fall back on.
-        None if expected.free => return None,
-        None => (settle(blocks, State { c: expected.cos, ..robust }, false, azimuth)?, false),
+    let Cone { at, mean, sums, free } = match config.method {
+        Method::Sphere => sphere(blocks, start, expected, threshold_px, config, noise)?,
     };
     let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
     for block in blocks.iter() {
@@ -113,7 +116,79 @@ pub(crate) fn fit<T: Real>(
         }
     }
     let rms_px = (sums.cost / sums.weight).sqrt();
-    Some(Fit { e: at.e, c: at.c, free, rms_px, inliers, arc_px: arc, nearby: robust.nearby, sums, mean })
+    Some(Fit { e: at.e, c: at.c, free, rms_px, inliers, arc_px: arc, nearby: at.nearby, sums, mean })
+}
+
+/// What every method ends with.
+struct Cone<T> {
+    at: State<T>,
+    /// The means that `sums` are about.
+    mean: [T; 2],
+    sums: Sums<T>,
+    free: bool,
+}
+
+/// Robust iterations under the expected half-angle, then the half-angle freely with the weights so found.
+fn sphere<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    expected: &Expected<T>,
+    threshold_px: T,
+    config: &Config,
+    noise: &covariance::Config,
+) -> Option<Cone<T>> {
+    let azimuth = azimuth(expected);
+    let azimuth = azimuth.as_ref();
+    let known = config.half_angle == HalfAngle::Known && !expected.free;
+    let robust = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
+    let freely = if known { None } else { settle(blocks, robust, true, azimuth) };
+    let ((at, mean, sums), free) = match freely {
+        Some(settled) => (settled, true),
+        // Sun and Moon have no other half-angle to fall back on.
+        None if expected.free => return None,
+        None => (settle(blocks, State { c: expected.cos, ..robust }, false, azimuth)?, false),
+    };
+    Some(Cone { at, mean, sums, free })
+}
+
+/// The cone that another method finds through the points within `threshold_px` of the consensus (all of them, when
+/// none was to be left out), with the normal equations there, so that it is weighed, judged and given a covariance
+/// as every other. `find` gets the blocks with weights 0 and 1 and gives axis and cos of the half-angle.
+#[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
+#[allow(dead_code, reason = "for the estimators behind features")]
+fn held<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    threshold_px: T,
+    find: impl FnOnce(&[Block<T>]) -> Option<(V3<T>, T)>,
+) -> Option<Cone<T>> {
+    if !start.all {
+        let limit2 = threshold_px * threshold_px;
+        for b in blocks.iter_mut() {
+            let g = b.gradient(&start.e);
+            for l in 0..LANES {
+                let r = start.c - b.ray(l).dot(&start.e);
+                if !(r * r <= limit2 * (g[0][l] * g[0][l] + g[1][l] * g[1][l])) {
+                    b.weight[l] = T::ZERO;
+                }
+            }
+        }
+    }
+    let (e, c) = find(blocks)?;
+    let e = unit(&e)?;
+    if !(c.abs() < T::one()) {
+        return None;
+    }
+    let (b1, b2) = basis(&e);
+    let mean = means(blocks, &b1, &b2);
+    let sums = pass(blocks, &e, &b1, &b2, c, mean, None, None, false);
+    // NaN is refused with the rest.
+    (sums.weight > T::of(2.5) && sums.cost >= T::ZERO).then_some(Cone {
+        at: State { e, c, mean, nearby: 0 },
+        mean,
+        sums,
+        free: true,
+    })
 }
 
 /// Where the iterations stand.

@@ -50,6 +50,7 @@
 //! # Features
 //!
 //! `std`: the square root from the standard library (the same bits, vectorised). `serde`: [`Config`] to and from files.
+//! `dlr`, `zju`, `horace`: the methods of Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`].
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -79,6 +80,7 @@ pub mod candidates;
 pub mod contour;
 pub mod covariance;
 pub mod estimate;
+pub mod recover;
 pub mod reject;
 pub mod select;
 mod undistort;
@@ -87,4 +89,4 @@ mod undistort;
 pub mod pipeline;
 
 pub use body::{Expected, Frame};
-pub use pipeline::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Report, Solution};
+pub use pipeline::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Preset, Report, Solution};

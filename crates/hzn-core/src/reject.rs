@@ -63,6 +63,9 @@ pub(crate) struct Consensus<T> {
     pub(crate) c: T,
     /// Draws made.
     pub(crate) draws: u32,
+    /// No point is to be left out.
+    #[allow(dead_code, reason = "for the estimators behind features")]
+    pub(crate) all: bool,
 }
 
 /// Blocks that are scored.
@@ -85,7 +88,7 @@ pub(crate) fn keep<T: Real>(
             let (a, b) = (ray(blocks, 0)?, ray(blocks, count.saturating_sub(1))?);
             let mid = ray(blocks, count / 2)?;
             let (e, c) = through_three(&a, &mid, &b)?;
-            return Some(Consensus { e, c, draws: 1 });
+            return Some(Consensus { e, c, draws: 1, all: true });
         }
     };
     for block in blocks {
@@ -166,7 +169,7 @@ fn search<T: Real>(
     }
     let (e, c) = best?;
     let share = T::one() - best_cost / nothing;
-    (share > T::of(0.06)).then_some(Consensus { e, c, draws })
+    (share > T::of(0.06)).then_some(Consensus { e, c, draws, all: false })
 }
 
 /// Squared distance of a point from the limb in pixels.

@@ -23,7 +23,7 @@ const VOCABULARY: &[&str] = &[
     "status",
 ];
 const STAGES: &[&str] =
-    &["binarize", "contour", "candidates", "undistort", "reject", "estimate", "covariance", "select"];
+    &["binarize", "contour", "candidates", "undistort", "reject", "estimate", "covariance", "select", "recover"];
 
 /// What a stage may import besides: (stage, import, reason).
 const EXCEPTIONS: &[(&str, &str, &str)] = &[

@@ -162,7 +162,7 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     sensor.body = body::Config { altitude_sigma_km: 0.1, limb_height_sigma_km: 1.0, ..body::Config::default() };
     // Chosen so that errors are as large as they are said to be: squared errors over their covariance are 1.5 to 2.7
     // (two degrees of freedom) on pictures 960 to 1920 pixels wide. Clouds seen through the band correlate them.
-    sensor.covariance = covariance::Config { sigma_px: 0.1, correlation_px: 30.0 };
+    sensor.covariance = covariance::Config { sigma_px: 0.1, correlation_px: 30.0, ..Default::default() };
     let half_s = 190.0;
     let frames = places(count)
         .map(|(index, place)| {
@@ -205,7 +205,7 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
     sensor.body =
         body::Config { limb_height_km: 25.0, limb_height_sigma_km: 1.0, altitude_sigma_km: 0.1, ..sensor.body };
     // Noise and little else: errors of neighbouring points are unrelated beyond the blur.
-    sensor.covariance = covariance::Config { sigma_px: 0.07, correlation_px: 5.0 };
+    sensor.covariance = covariance::Config { sigma_px: 0.07, correlation_px: 5.0, ..Default::default() };
     let frames = places(count)
         .map(|(index, place)| {
             let time_s = 5800.0 * place;

@@ -14,10 +14,21 @@ pub(crate) use thinned::Thinned;
 
 use crate::error::{ConfigError, Limit, require};
 
+/// How edges are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Method {
+    /// From the border of the picture and from search lines along the edges; no pixel is looked at without need.
+    #[default]
+    BorderFollowing,
+}
+
 /// `[contour]` of sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
+    /// How edges are found.
+    pub method: Method,
     /// Rows between two search lines for closed edges, 1 or more. Left out: from the body's expected size.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub line_spacing_px: Option<u16>,
@@ -28,7 +39,7 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { line_spacing_px: None, max_steps: 250_000 }
+        Self { method: Method::BorderFollowing, line_spacing_px: None, max_steps: 250_000 }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::{ConfigError, Limit, require};
 use crate::image::Channel;
-use crate::{binarize, body, camera, candidates, contour, covariance, estimate, region, reject, select};
+use crate::{binarize, body, camera, candidates, contour, covariance, estimate, recover, region, reject, select};
 
 /// A sensor: the camera, the body it looks for, and every stage's parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +46,9 @@ pub struct Config {
     /// Gates of an answer.
     #[cfg_attr(feature = "serde", serde(default))]
     pub select: select::Config,
+    /// When the whole picture gives no answer.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub recover: recover::Config,
 }
 
 /// `[mount]`: camera to vehicle body.
@@ -81,6 +84,7 @@ impl Config {
             estimate: estimate::Config::default(),
             covariance: covariance::Config::default(),
             select: select::Config::default(),
+            recover: recover::Config::default(),
         }
     }
 

@@ -222,8 +222,8 @@ fn solve<T: Real>(
     let config = reject::Config::default();
     let (fx, _) = camera.focal_px();
     let start = reject::keep(&mut blocks, points.len() as u32, expected, fx, &config)?;
-    let estimate = estimate::Config { half_angle };
-    let noise = covariance::Config { sigma_px, correlation_px };
+    let estimate = estimate::Config { half_angle, ..Default::default() };
+    let noise = covariance::Config { sigma_px, correlation_px, ..Default::default() };
     let fit = estimate::fit(&mut blocks, &start, expected, T::of(config.threshold_px), &estimate, &noise)?;
     let fused = covariance::fuse(&blocks, &fit, expected, &noise, &estimate)?;
     let (b1, b2) = basis(&fused.e);
@@ -310,8 +310,9 @@ fn plain<T: Real>(
 ) -> UnitVec3<Cam, T> {
     let mut blocks = blocks(camera, points, truth);
     let (b1, _) = basis(truth.v());
-    let start = reject::Consensus { e: unit(&(truth.v() + b1 * T::of(0.03))).unwrap(), c: expected.cos, draws: 0 };
-    let estimate = estimate::Config { half_angle: which };
+    let start =
+        reject::Consensus { e: unit(&(truth.v() + b1 * T::of(0.03))).unwrap(), c: expected.cos, draws: 0, all: false };
+    let estimate = estimate::Config { half_angle: which, ..Default::default() };
     // A threshold so wide that Tukey's weights are one.
     let fit =
         estimate::fit(&mut blocks, &start, expected, T::of(1e5), &estimate, &covariance::Config::default()).unwrap();

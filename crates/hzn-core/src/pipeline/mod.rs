@@ -7,6 +7,8 @@
 
 mod config;
 mod observer;
+mod optional;
+mod preset;
 mod report;
 
 #[cfg(test)]
@@ -14,6 +16,8 @@ mod golden;
 
 pub use config::{Config, Input, Mount};
 pub use observer::{Observer, Unobserved};
+pub use optional::{OPTIONAL, Optional, lacking};
+pub use preset::Preset;
 pub use report::{Candidate, Counters, MAX_LISTED, Report, Solution, Verdict};
 
 use crate::block::{Block, LANES};
