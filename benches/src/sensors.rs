@@ -58,6 +58,7 @@ fn known<T: Real>(frame: &Picture) -> Frame<T> {
         altitude_m: frame.known.altitude_m.map(T::of),
         position_m: frame.known.position_m.map(|p| p.map(T::of)),
         cam_to_ecef: None,
+        attitude_sigma_rad: None,
     }
 }
 

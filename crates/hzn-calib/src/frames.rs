@@ -10,7 +10,7 @@
 //! | `altitude_km` | geodetic above WGS-84 for `earth`, else above the radius |
 //! | `x_km`, `y_km`, `z_km` | position in ECEF; beats the altitude |
 //! | `qw`, `qx`, `qy`, `qz` | prior attitude, camera to ECEF |
-//! | `attitude_sigma_deg` | 1-sigma of the prior attitude |
+//! | `attitude_sigma_deg` | 1-sigma of that attitude, 5 where it is empty; it widens the covariance, and above 30 the attitude is not used |
 //! | `sun_x`, `sun_y`, `sun_z` | direction to the Sun in the camera |
 
 use std::collections::HashMap;
@@ -74,6 +74,7 @@ impl FrameData {
             altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::of(km * 1e3)),
             position_m: self.position_km.map(|p| p.map(|km| T::of(km * 1e3))),
             cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::of))),
+            attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::of(deg.to_radians())),
         }
     }
 }

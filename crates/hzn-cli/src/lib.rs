@@ -4,6 +4,8 @@
 //! together from [`input`] (where pictures come from), [`engine`] (all cores, results in order), [`output`] (where
 //! results go) and [`overlay`] (what is drawn).
 
+#![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when nobody reads; `tell` does not")]
+
 pub mod commands;
 pub mod engine;
 pub mod exit;
@@ -12,6 +14,7 @@ pub mod output;
 pub mod overlay;
 mod progress;
 mod setup;
+mod tell;
 
 use clap::Parser;
 
@@ -26,7 +29,7 @@ pub fn main() -> Exit {
         Err(stop) => {
             // A reader that has seen enough (`hzn run ... | head`) is no error worth a message.
             if !is_broken_pipe(&stop.error) {
-                eprintln!("error: {:#}", stop.error);
+                tell::line(format_args!("error: {:#}", stop.error));
             }
             stop.exit
         }

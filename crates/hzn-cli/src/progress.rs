@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use hzn_core::status::Status;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::tell;
+
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
@@ -54,15 +56,15 @@ impl Progress {
             self.last_line = Instant::now();
             let done = self.before + self.frames();
             let of = self.total.map(|n| format!(" of {n}")).unwrap_or_default();
-            eprintln!("{done}{of} frames, {:.1} a second", self.rate());
+            tell::line(format_args!("{done}{of} frames, {:.1} a second", self.rate()));
         }
     }
 
     /// A message above the bar.
     pub(crate) fn say(&self, message: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{message}")),
-            None => eprintln!("{message}"),
+            Some(bar) => bar.suspend(|| tell::line(message)),
+            None => tell::line(message),
         }
     }
 

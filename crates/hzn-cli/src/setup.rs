@@ -10,6 +10,7 @@ use hzn_calib::{Frames, Sensor};
 use crate::engine;
 use crate::exit::{Exit, Stop, usage};
 use crate::input::{self, Raw, Source};
+use crate::tell;
 
 /// Which sensor.
 #[derive(Debug, Clone, Args)]
@@ -84,11 +85,31 @@ impl InputArgs {
         let frames = hzn_calib::frames::load(&path)?;
         let body = &sensor.config.body;
         for warning in frames.warnings.iter().chain(&frames.check_altitudes(body.kind, body.mean_radius_km())) {
-            eprintln!("warning: {warning}");
+            tell::warning(warning);
         }
         engine::prepare(&sensor.config, flight, Some(&frames))?;
         Ok(Some(frames))
     }
+}
+
+/// A sensor whose pictures have another size than all that are there is the wrong sensor, and that is said once and
+/// early. Single pictures of another size are records.
+pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Stop> {
+    let camera = &sensor.config.camera;
+    let own = (u32::from(camera.width), u32::from(camera.height));
+    let mut first = None;
+    for (name, size) in source.sizes() {
+        if size == own {
+            return Ok(());
+        }
+        first.get_or_insert((name, size));
+    }
+    let Some((name, (width, height))) = first else { return Ok(()) };
+    Err(usage(format!(
+        "the sensor is for pictures of {} x {} px, but those here are not: {name} is {width} x {height}; give the sensor \
+         of this camera with --sensor, or set camera.width and height and scale focal lengths and centre with them",
+        own.0, own.1
+    )))
 }
 
 /// Without an altitude from anywhere, every frame would fail.
@@ -115,7 +136,7 @@ pub(crate) fn stop_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::SeqCst) {
             std::process::exit(i32::from(Exit::Interrupted as u8));
         }
-        eprintln!("\nfinishing the frames that were begun; press Ctrl-C again to leave at once");
+        tell::line(format_args!("\nfinishing the frames that were begun; press Ctrl-C again to leave at once"));
     });
     // Without a handler Ctrl-C ends the program at once, and the output can still be continued.
     drop(handler);

@@ -54,6 +54,23 @@ fn a_picture_without_an_altitude_does_not_end_the_run() {
     assert!(cell(&rows[0], "detail").starts_with("no altitude: set body.altitude_km"));
 }
 
+#[test]
+fn the_sensor_of_another_camera_is_said_once() {
+    let place = Place::with_pictures(5);
+    let other = common::SENSOR.replace("width = 320", "width = 640").replace("height = 240", "height = 480");
+    place.write("other.toml", other.as_bytes());
+    place.write("p.raw", &[0; 100]);
+    place.run(&["run", "in", "-o", "a.mcap"]).expect(0);
+    let err = place.run(&["run", "in", "-s", "other.toml", "-o", "b.csv"]).expect(2).err;
+    insta::assert_snapshot!(err, @"error: the sensor is for pictures of 640 x 480 px, but those here are not: 0000.png is 320 x 240; give the sensor of this camera with --sensor, or set camera.width and height and scale focal lengths and centre with them");
+    assert!(!place.path("b.csv.part").exists());
+    place.run(&["run", "a.mcap", "-s", "other.toml"]).expect(2).says("a.mcap#000000 is 320 x 240");
+    place.run(&["run", "p.raw", "-s", "other.toml", "--raw", "320x240:mono8"]).expect(2).says("p.raw is 320 x 240");
+    // One that fits is enough: the others are records.
+    limb(640, 480, 0.0).save(place.path("in/0003.png")).unwrap();
+    place.run(&["run", "in", "-s", "other.toml"]).expect(3).says("4 unreadable");
+}
+
 /// A PNG that only claims a size, as an attacker or a flipped bit would write it.
 fn png_of_size(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = Vec::new();

@@ -32,6 +32,20 @@ fn explain_tells_every_stage() {
 }
 
 #[test]
+fn info_claims_no_more_than_it_knows() {
+    let place = Place::with_pictures(4);
+    place.run(&["run", "in", "-o", "a.csv"]).expect(0);
+    let out = place.run(&["info", "a.csv"]).expect(0).out;
+    let digits = |word: &str| word.chars().filter(char::is_ascii_digit).collect::<String>();
+    for line in out.lines().filter(|l| l.contains("for 90 %")) {
+        for number in line.split_whitespace().filter(|w| w.contains('.')) {
+            assert!(digits(number).trim_start_matches('0').len() <= 3, "{line}");
+        }
+    }
+    assert!(out.contains("for 90 %"), "{out}");
+}
+
+#[test]
 fn overlays_of_a_run() {
     let place = Place::with_pictures(2);
     place.run(&["run", "in", "--overlay", "drawn", "-q"]).expect(0);

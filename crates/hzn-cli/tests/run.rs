@@ -214,6 +214,52 @@ fn another_input_is_not_appended() {
     let place = Place::with_pictures(4);
     place.run(&["run", "in/0000.png", "in/0002.png", "-o", "a.csv"]).expect(0);
     let before = place.read("a.csv");
-    place.run(&["run", "in", "-o", "a.csv", "--resume"]).expect(2).says("another input?");
+    let err = place.run(&["run", "in", "-o", "a.csv", "--resume"]).expect(2).err;
+    insta::assert_snapshot!(err, @"error: a.csv: its last frame is 0002.png, but the input has 0001.png in that place; give the input that it was begun with, or start over with --force");
+    let err = place.run(&["run", "in/0000.png", "-o", "a.csv", "--resume"]).expect(2).err;
+    insta::assert_snapshot!(err, @"error: a.csv: holds 2 frames, but the input has only 1; give the input that it was begun with, or start over with --force");
     assert_eq!(place.read("a.csv"), before);
+}
+
+#[test]
+fn another_sensor_is_not_appended() {
+    let place = Place::with_pictures(4);
+    for out in ["a.csv", "a.jsonl", "a.mcap"] {
+        place.run(&["run", "in/0000.png", "in/0001.png", "-o", out]).expect(0);
+        let before = std::fs::read(place.path(out)).unwrap();
+        place
+            .run(&["run", "in", "-o", out, "--resume", "--altitude-km", "410"])
+            .expect(2)
+            .says("now comes out differently");
+        assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
+        place.write("other.toml", format!("{}[reject]\nseed = 2\n", common::SENSOR).as_bytes());
+        let ran = place.run(&["run", "in", "-o", out, "--resume", "-s", "other.toml"]);
+        assert!(ran.code == 2 && ran.err.contains("--force"), "{out}: {}", ran.err);
+        assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("2 frames: 2 ok");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn nobody_listening_is_no_crash() {
+    let place = Place::with_pictures(3);
+    // A pipe whose other end is closed.
+    let closed = || std::io::pipe().unwrap().1;
+    for args in [&["run", "in"][..], &["info", "in/0000.png"], &["explain", "in/0000.png"], &["completions", "bash"]] {
+        let output = place.command(args).stdout(closed()).output().unwrap();
+        let ran = common::Ran::of(&output, &place.path("")).expect(1);
+        assert!(!ran.err.contains("panicked") && !ran.err.contains("error"), "{}", ran.err);
+    }
+    for (args, code) in [
+        (&["run", "in", "-o", "a.csv"][..], 0),
+        (&["run", "in", "-o", "a.csv"], 2),
+        (&["init", "s.toml"], 0),
+        (&["export", "a.csv", "-o", "b.jsonl"], 0),
+        (&["frobnicate"], 2),
+    ] {
+        let status = place.command(args).stderr(closed()).stdout(std::process::Stdio::null()).status().unwrap();
+        assert_eq!(status.code(), Some(code), "{args:?}");
+    }
+    assert_eq!(without_time(&place.read("a.csv")).len(), 3);
 }

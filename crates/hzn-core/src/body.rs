@@ -16,6 +16,10 @@ pub const MOON_DISTANCE_KM: f64 = 384_400.0;
 
 /// The part of the difference of an ellipsoid's half-angles that an axis fitted without an attitude is wrong by.
 const SHAPE_PART: f64 = 0.3;
+/// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
+const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
+/// 1-sigma of an attitude that comes without one: 5 degrees.
+const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
 
 /// Which body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -113,6 +117,9 @@ pub struct Frame<T> {
     pub position_m: Option<[T; 3]>,
     /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction.
     pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// 1-sigma of that attitude about the axis in radians, 0 or more; 5 degrees when it is left out. It widens the
+    /// covariance by what the ellipsoid's shape then leaves open; above 30 degrees the attitude is not used.
+    pub attitude_sigma_rad: Option<T>,
 }
 
 /// Why a frame's own data were refused.
@@ -124,6 +131,8 @@ pub enum FrameError {
     Position,
     /// Neither the frame nor the configuration gives an altitude.
     NoAltitude,
+    /// The sigma of the attitude is not a finite number of 0 or more.
+    AttitudeSigma,
 }
 
 impl core::fmt::Display for FrameError {
@@ -131,6 +140,7 @@ impl core::fmt::Display for FrameError {
         f.write_str(match self {
             Self::Altitude => "altitude_km must be a finite number above 0",
             Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
+            Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
             Self::NoAltitude => {
                 "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
             }
@@ -152,6 +162,8 @@ pub struct Expected<T> {
     pub(crate) ellipsoid: Option<LimbCone<T>>,
     /// Prior attitude, camera to ECEF.
     pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// 1-sigma of that attitude about the axis, radians.
+    pub(crate) attitude_sigma_rad: T,
     /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
     pub(crate) radius_m: T,
     /// Limb height in metres and its sigma.
@@ -182,6 +194,10 @@ impl<T: Real> Expected<T> {
             Some(p) if !p.iter().all(|x| x.is_finite()) => return Err(FrameError::Position),
             other => other,
         };
+        let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(T::of(ATTITUDE_SIGMA_RAD));
+        if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
+            return Err(FrameError::AttitudeSigma);
+        }
         let mut ellipsoid = None;
         let (radius, altitude, sin) = match (body.kind, position) {
             (Kind::Earth, Some(p)) => {
@@ -236,7 +252,8 @@ impl<T: Real> Expected<T> {
             sin,
             sigma_cos: scale * variance.sqrt(),
             ellipsoid,
-            cam_to_ecef: frame.cam_to_ecef,
+            cam_to_ecef: frame.cam_to_ecef.filter(|_| attitude_sigma < T::of(USELESS_ATTITUDE_RAD)),
+            attitude_sigma_rad: attitude_sigma,
             radius_m: radius,
             limb_m: limb,
             limb_sigma_m: limb_sigma,
@@ -259,21 +276,52 @@ impl<T: Real> Expected<T> {
         Some((distance - self.radius_m, variance.sqrt()))
     }
 
-    /// 1-sigma in radians of what the ellipsoid's unknown orientation adds to the axis: with a position but without an
-    /// attitude the limb is fitted by its mean cone. A part of the difference of the two half-angles, measured over
-    /// latitudes and azimuths of short arcs; 0 when nothing is left out.
+    /// 1-sigma in radians of what the ellipsoid's orientation leaves open in the axis. With a position but without an
+    /// attitude the limb is fitted by its mean cone, which errs by a part of the difference of the two half-angles,
+    /// measured over latitudes and azimuths of short arcs. With an attitude the error grows in proportion to that of the
+    /// attitude, until it is that of none.
     pub(crate) fn shape_sigma_rad(&self) -> T {
-        match (&self.ellipsoid, &self.cam_to_ecef) {
-            (Some(cone), None) => {
-                let (east, meridian) = cone.half_angles_rad();
-                (east - meridian).abs() * T::of(SHAPE_PART)
-            }
-            _ => T::ZERO,
+        let Some(cone) = &self.ellipsoid else { return T::ZERO };
+        let (east, meridian) = cone.half_angles_rad();
+        let unknown = (east - meridian).abs() * T::of(SHAPE_PART);
+        match self.cam_to_ecef {
+            Some(_) => unknown * self.attitude_sigma_rad * T::of(1.0 / USELESS_ATTITUDE_RAD),
+            None => unknown,
         }
     }
 
     /// The axis in ECEF, when the position is known.
     pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
         self.ellipsoid.as_ref().map(|c| c.axis)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_better_attitude_leaves_less_of_the_shape_open() {
+        let body = Config::default();
+        let frame = Frame {
+            position_m: Some([4.9e6, 0.0, 4.9e6]),
+            cam_to_ecef: Rotation::assume_from_quaternion([1.0, 0.0, 0.0, 0.0]),
+            ..Frame::default()
+        };
+        let sigma = |deg: f64| {
+            let frame = Frame { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
+            Expected::<f64>::new(&body, &frame).unwrap().shape_sigma_rad()
+        };
+        let none = Expected::new(&body, &Frame { cam_to_ecef: None, ..frame }).unwrap().shape_sigma_rad();
+        assert!(none > 1e-5);
+        assert_eq!(sigma(0.0), 0.0);
+        assert!((sigma(10.0) / none - 1.0 / 3.0).abs() < 1e-12);
+        // No better than none, and then it is not used.
+        assert_eq!(sigma(40.0), none);
+        assert_eq!(Expected::new(&body, &frame).unwrap().shape_sigma_rad(), sigma(5.0));
+        for deg in [f64::NAN, -1.0, f64::INFINITY] {
+            let frame = Frame { attitude_sigma_rad: Some(deg), ..frame };
+            assert_eq!(Expected::new(&body, &frame).unwrap_err(), FrameError::AttitudeSigma);
+        }
     }
 }

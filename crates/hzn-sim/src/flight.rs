@@ -83,13 +83,18 @@ impl FlightFrame {
             altitude_m: Some(Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m)),
             position_m: Some(self.scene.pose.position_m),
             cam_to_ecef: None,
+            attitude_sigma_rad: None,
         }
     }
     /// As [`FlightFrame::known`], with an attitude that is wrong by `sigma_rad` (1-sigma, about each axis).
     pub fn known_with_attitude(&self, sigma_rad: f64) -> hzn_core::Frame<f64> {
         let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
         let error_rad = [0, 1, 2].map(|i| sigma_rad * draws.normal(i));
-        hzn_core::Frame { cam_to_ecef: self.scene.pose.disturbed(error_rad).cam_to_ecef(), ..self.known() }
+        hzn_core::Frame {
+            cam_to_ecef: self.scene.pose.disturbed(error_rad).cam_to_ecef(),
+            attitude_sigma_rad: Some(sigma_rad),
+            ..self.known()
+        }
     }
 }
 

@@ -10,6 +10,7 @@ use hzn_core::pixel::ImagePoint;
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::input::ending;
+use crate::tell;
 
 /// Look at a camera calibration
 #[derive(Debug, clap::Args)]
@@ -29,7 +30,7 @@ enum Command {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let Command::Show { file } = &args.command;
-    print!("{}", describe(&load(file)?)?);
+    tell::result(describe(&load(file)?)?)?;
     Ok(Exit::Done)
 }
 
@@ -110,8 +111,7 @@ trait FromConfig {
 }
 impl FromConfig for Expected<f64> {
     fn of(config: &Config) -> Option<f64> {
-        let sensor = || crate::engine::AnySensor::new(config, false).ok()?.expected_half_angle_rad(None).ok();
-        crate::engine::on_large_stack(sensor).ok().flatten()
+        crate::engine::AnySensor::new(config, false).ok()?.expected_half_angle_rad(None).ok()
     }
 }
 

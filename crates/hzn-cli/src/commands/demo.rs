@@ -10,6 +10,7 @@ use super::run as sequence;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::output;
 use crate::overlay;
+use crate::tell;
 
 const ISS_PICTURE: &[u8] = include_bytes!("../../assets/iss-limb-2020-11-20.jpg");
 const ISS_SENSOR: &str = include_str!("../../assets/iss.toml");
@@ -46,11 +47,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     for dir in [&flight_dir, &iss_dir] {
         std::fs::create_dir_all(dir).map_err(|e| output::cannot(dir, &e))?;
     }
-    eprintln!("rendering {} pictures of a rocket flight ...", args.count);
+    tell::line(format_args!("rendering {} pictures of a rocket flight ...", args.count));
     let flight = hzn_sim::flight::rocket(1280, 720, usize::from(args.count), 1);
     let truth = write_flight(&flight, &flight_dir)?;
 
-    eprintln!("looking for the limb ...");
+    tell::line(format_args!("looking for the limb ..."));
     let (flight_mcap, flight_csv) = (folder.join("flight.mcap"), folder.join("flight.csv"));
     process(&flight_dir, &flight_mcap)?;
     let rows = rows(&flight_mcap)?;
@@ -74,10 +75,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     std::fs::create_dir_all(&overlays).map_err(|e| output::cannot(&overlays, &e))?;
     let shown = draw(&flight_mcap, &overlays, 5)? + draw(&iss_mcap, &overlays, 1)?;
 
-    println!("{}", Accuracy::of(&rows, &truth).text());
-    println!("{}", iss_text(iss.first()));
+    let mut out = format!("{}\n{}\n", Accuracy::of(&rows, &truth).text(), iss_text(iss.first()));
     let place = |p: &Path| p.display().to_string();
-    println!("Files, after {:.1} s:", begin.elapsed().as_secs_f64());
+    out.push_str(&format!("Files, after {:.1} s:\n", begin.elapsed().as_secs_f64()));
     for (name, what) in [
         (place(&flight_dir), "rendered pictures with sensor.toml, frames.csv (positions) and truth.csv"),
         (place(&flight_mcap), "results with pictures, for Foxglove"),
@@ -86,10 +86,12 @@ pub(super) fn run(args: &Args) -> Outcome {
         (place(&iss_mcap), "its result"),
         (place(&overlays), &format!("{shown} pictures with everything drawn over them")),
     ] {
-        println!("  {name:<24} {what}");
+        out.push_str(&format!("  {name:<24} {what}\n"));
     }
-    println!("\nNext:  hzn explain {} --overlay out.png", place(&iss_dir.join("iss-limb-2020-11-20.jpg")));
-    println!("       hzn run {} -o mine.csv", place(&flight_dir));
+    let picture = place(&iss_dir.join("iss-limb-2020-11-20.jpg"));
+    out.push_str(&format!("\nNext:  hzn explain {picture} --overlay out.png\n"));
+    out.push_str(&format!("       hzn run {} -o mine.csv\n", place(&flight_dir)));
+    tell::result(out)?;
     Ok(Exit::Done)
 }
 

@@ -8,11 +8,12 @@ use hzn_core::pipeline::Verdict;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution};
 
-use crate::engine::{AnySensor, Trace, on_large_stack};
-use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::engine::{AnySensor, Trace};
+use crate::exit::{Exit, Outcome, usage};
 use crate::input::Picture;
 use crate::overlay;
 use crate::setup::{InputArgs, SensorArgs, need_altitude};
+use crate::tell;
 
 /// Show what happens to one frame: what was kept, what was dropped, and why
 #[derive(Debug, clap::Args)]
@@ -52,33 +53,28 @@ pub(super) fn run(args: &Args) -> Outcome {
     let picture = match item.payload.decode(Some(size)) {
         Ok((picture, _)) => picture,
         Err(why) => {
-            println!("{}: unreadable: {why}", item.name);
+            tell::result(format_args!("{}: unreadable: {why}\n", item.name))?;
             return Ok(Exit::SomeUnreadable);
         }
     };
     let decoding = decoding.elapsed();
     let flight = args.sensor.flight;
-    let work = || -> Result<(), Stop> {
-        let mut sensor = AnySensor::new(config, flight).map_err(usage)?;
-        let half_angle = sensor.expected_half_angle_rad(data).map_err(usage)?;
-        let view = picture.view(config.input.channel).map_err(|e| usage(format!("input.channel: {e}")))?;
-        // Once to warm up: the first picture of a process pays for memory that is touched for the first time.
-        sensor.process(&view, data, None).map_err(usage)?;
-        let start = Instant::now();
-        sensor.process(&view, data, None).map_err(usage)?;
-        let elapsed = start.elapsed();
-        let trace = Trace::default();
-        let report = sensor.process(&view, data, Some(&trace)).map_err(usage)?;
-        let told =
-            Told { name: &item.name, config, data, picture: &picture, trace: &trace, report: &report, half_angle };
-        print!("{}", told.text(decoding, elapsed));
-        if let Some(path) = &args.overlay {
-            overlay::save(&overlay::draw(&picture, sensor.camera(), &trace, &report), path)?;
-            eprintln!("overlay: {}", path.display());
-        }
-        Ok(())
-    };
-    on_large_stack(work).map_err(failed)??;
+    let mut sensor = AnySensor::new(config, flight).map_err(usage)?;
+    let half_angle = sensor.expected_half_angle_rad(data).map_err(usage)?;
+    let view = picture.view(config.input.channel).map_err(|e| usage(format!("input.channel: {e}")))?;
+    // Once to warm up: the first picture of a process pays for memory that is touched for the first time.
+    sensor.process(&view, data, None).map_err(usage)?;
+    let start = Instant::now();
+    sensor.process(&view, data, None).map_err(usage)?;
+    let elapsed = start.elapsed();
+    let trace = Trace::default();
+    let report = sensor.process(&view, data, Some(&trace)).map_err(usage)?;
+    let told = Told { name: &item.name, config, data, picture: &picture, trace: &trace, report: &report, half_angle };
+    tell::result(told.text(decoding, elapsed))?;
+    if let Some(path) = &args.overlay {
+        overlay::save(&overlay::draw(&picture, sensor.camera(), &trace, &report), path)?;
+        tell::line(format_args!("overlay: {}", path.display()));
+    }
     Ok(Exit::Done)
 }
 

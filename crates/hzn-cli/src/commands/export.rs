@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader, Row};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::input::ending;
+use crate::input::{self, ending};
 use crate::output::{self, Existing, Rows};
 use crate::overlay;
+use crate::tell;
 
 /// Turn a recording into a table, pictures, or pictures with overlay
 #[derive(Debug, clap::Args)]
@@ -31,9 +32,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    if !file.is_file() {
-        return Err(usage(format!("{}: no such file", file.display())));
-    }
+    let (kind, _) = input::existing(file)?;
     let pictures = args.images.is_some() || args.overlay.is_some();
     if args.output.is_none() && !pictures {
         return Err(usage("nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR"));
@@ -43,7 +42,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     {
         return Err(usage(format!("{}: a table is written here: .csv or .jsonl", path.display())));
     }
-    let kind = if ending(file) == "part" { ending(&file.with_extension("")) } else { ending(file) };
     if kind != "mcap" && pictures {
         return Err(usage(format!("{}: only a recording (.mcap) holds pictures", file.display())));
     }
@@ -66,7 +64,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             }
         }
         if pictures && images == 0 {
-            eprintln!("warning: {}: holds no pictures (was it recorded with --no-images?)", file.display());
+            tell::warning(format_args!("{}: holds no pictures (was it recorded with --no-images?)", file.display()));
         }
     } else {
         for row in self::rows(file, &kind)? {
@@ -80,7 +78,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         table.finish()?;
     }
     let with = if pictures { format!(", {images} pictures") } else { String::new() };
-    eprintln!("{rows} rows{with}");
+    tell::line(format_args!("{rows} rows{with}"));
     Ok(Exit::Done)
 }
 

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use hzn_core::status::Status;
 use hzn_mcap::{Contents, Reader, Row};
 
-use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::input::{ending, picture};
+use crate::exit::{Exit, Outcome, Stop, failed};
+use crate::input::{self, picture};
+use crate::tell;
 
 /// Summarise a file: results (.mcap, .csv, .jsonl), a sensor.toml, a frames.csv, a picture
 #[derive(Debug, clap::Args)]
@@ -18,18 +19,14 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    if !file.is_file() {
-        return Err(usage(format!("{}: no such file", file.display())));
-    }
-    // An unfinished file has the ending of its kind before `.part`.
-    let kind = if ending(file) == "part" { ending(&file.with_extension("")) } else { ending(file) };
+    let (kind, _) = input::existing(file)?;
     let text = match kind.as_str() {
         "mcap" => recording(file)?,
         "csv" | "jsonl" => table(file, &kind)?,
         "toml" | "yaml" | "yml" => sensor(file, &kind)?,
         _ => one_picture(file)?,
     };
-    print!("{text}");
+    tell::result(text)?;
     Ok(Exit::Done)
 }
 
@@ -173,11 +170,18 @@ impl Summary {
             ("processing", "us", self.elapsed_us),
         ] {
             if let Some([low, middle, high]) = percentiles(values) {
-                line(name, format!("{middle:.4} {unit} in the middle, {low:.4} to {high:.4} for 90 %"));
+                let [low, middle, high] = [low, middle, high].map(three_digits);
+                line(name, format!("{middle} {unit} in the middle, {low} to {high} for 90 %"));
             }
         }
         out
     }
+}
+
+/// A number as three digits show it, whole from 100 on: what statistics over frames can claim.
+fn three_digits(x: f64) -> String {
+    let before = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
+    format!("{x:.*}", (2 - before).clamp(0, 9) as usize)
 }
 
 fn percentiles(mut values: Vec<f64>) -> Option<[f64; 3]> {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::exit::{Exit, Outcome, usage};
 use crate::output;
+use crate::tell;
 
 /// Write a commented sensor.toml to start from
 ///
@@ -24,6 +25,6 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{name}: exists already; choose another name, or --force replaces it")));
     }
     std::fs::write(&args.file, hzn_calib::template::SENSOR_TOML).map_err(|e| output::cannot(&args.file, &e))?;
-    eprintln!("{name} written; fill in [camera], then look at it with  hzn camera show {name}");
+    tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
     Ok(Exit::Done)
 }

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::exit::{Exit, Outcome, failed, usage};
-use crate::input::ending;
+use crate::input;
 use crate::output;
+use crate::tell;
 
 /// Close a file that a crash left unfinished
 ///
@@ -23,16 +24,13 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    if !file.is_file() {
-        return Err(usage(format!("{}: no such file", file.display())));
-    }
-    let unfinished = ending(file) == "part";
+    let (kind, unfinished) = input::existing(file)?;
     let path = match &args.output {
         Some(path) => path.clone(),
         None if unfinished => file.with_extension(""),
         None => {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-            file.with_file_name(format!("{stem}.recovered.{}", ending(file)))
+            file.with_file_name(format!("{stem}.recovered.{kind}"))
         }
     };
     let target = output::target(&path)?;
@@ -49,7 +47,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         target => output::recover_text(file, &path, target).map_err(|e| output::cannot(&path, &e))?,
     };
     let dropped = if lost > 0 { format!(", {lost} bytes of a frame that was cut off dropped") } else { String::new() };
-    eprintln!("{}: {frames} frames{dropped}", path.display());
+    tell::line(format_args!("{}: {frames} frames{dropped}", path.display()));
     if unfinished && args.output.is_none() && file.exists() {
         // Its frames are in the new file, and beside that it would look like another unfinished run.
         std::fs::remove_file(file)?;
@@ -66,7 +64,7 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
     let found = hzn_mcap::recover(file, &beside).map_err(failed)?;
     std::fs::rename(&beside, path)?;
     if found.broken_chunks > 0 {
-        eprintln!("warning: {} damaged parts were left out; their frames are missing", found.broken_chunks);
+        tell::warning(format_args!("{} damaged parts were left out; their frames are missing", found.broken_chunks));
     }
     Ok((found.frames, found.dropped_bytes))
 }

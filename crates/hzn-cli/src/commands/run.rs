@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::Frames;
 use hzn_core::status::Status;
+use hzn_mcap::Row;
 
 use crate::engine::{self, End, Finished, Plan};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::input::Source;
 use crate::output::{self, Existing, Held, Output};
 use crate::progress::Progress;
-use crate::setup::{InputArgs, SensorArgs, need_altitude, stop_flag};
+use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, stop_flag};
+use crate::tell;
 
 /// Process a sequence of pictures
 ///
@@ -74,6 +76,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut source = args.source.open(&args.input)?;
     let folder = source.folder();
     let sensor = args.sensor.load(&folder)?;
+    check_size(source.as_ref(), &sensor)?;
     let frames = args.source.frames(&folder, &sensor, args.sensor.flight)?;
     need_altitude(&sensor, frames.as_ref())?;
     // Not for one picture of many, whose table names all the others.
@@ -89,7 +92,6 @@ pub(super) fn run(args: &Args) -> Outcome {
         _ => Existing::Refuse,
     };
     let path = args.output.as_deref();
-    let (mut output, held) = output::open(path, existing, &sensor.config, &sensor.text)?;
     let trace = Output::wants_trace(path);
     let plan = Plan {
         config: sensor.config,
@@ -101,11 +103,12 @@ pub(super) fn run(args: &Args) -> Outcome {
         keep_picture: trace && !args.no_images,
         overlay: args.overlay.clone(),
     };
+    let (mut output, held) = output::open(path, existing, &plan.config, &sensor.text)?;
     if !args.quiet {
-        source.notes().iter().for_each(|note| eprintln!("note: {note}"));
+        source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }
     let total = source.total();
-    if let Err(stop) = skip(source.as_mut(), &held, path) {
+    if let Err(stop) = skip(source.as_mut(), &held, &plan, path) {
         // The output keeps what it has, under its name.
         output.finish()?;
         return Err(stop);
@@ -128,7 +131,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             0 => String::new(),
             n => format!(" (after {n} that were finished before)"),
         };
-        eprintln!("{summary}{before}");
+        tell::line(format_args!("{summary}{before}"));
     }
     let done = held.frames + progress.frames();
     if end == End::Interrupted && total.is_none_or(|n| done < n) {
@@ -137,7 +140,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             Some(path) => format!("; {} is valid, and --resume continues it", path.display()),
             None => String::new(),
         };
-        eprintln!("interrupted after {done}{of} frames{next}");
+        tell::line(format_args!("interrupted after {done}{of} frames{next}"));
         return Ok(Exit::Interrupted);
     }
     Ok(if progress.of(Status::Unreadable) > 0 { Exit::SomeUnreadable } else { Exit::Done })
@@ -147,31 +150,40 @@ pub(super) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, Into::into)
 }
 
-/// Passes over the frames that the output holds already.
-fn skip(source: &mut dyn Source, held: &Held, path: Option<&Path>) -> Result<(), Stop> {
-    let mut last = None;
+/// Passes over the frames that the output holds already, and sees that this run would have come to them: the last one,
+/// processed again, must give the row that is there.
+fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) -> Result<(), Stop> {
     let name = path.map(|p| p.display().to_string()).unwrap_or_default();
+    let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
+    let mut last = None;
     for n in 0..held.frames {
         match source.next() {
-            Some(item) => last = Some(item?.name),
+            Some(item) => last = Some(item?),
             None => {
-                let what = format!("holds {} frames, but the input has only {n}: another input?", held.frames);
-                return Err(usage(format!("{name}: {what}")));
+                let what = format!("holds {} frames, but the input has only {n}", held.frames);
+                return other(format!("{what}; give the input that it was begun with"));
             }
         }
     }
-    match (&last, &held.last) {
-        (Some(here), Some(there)) if here != there => {
-            let what = format!("its last frame is {there}, but the input has {here} in that place");
-            Err(usage(format!("{name}: {what}: another input? --force starts over")))
-        }
-        _ => Ok(()),
+    let (Some(item), Some(there)) = (last, &held.last) else { return Ok(()) };
+    if item.name != there.file {
+        let what = format!("its last frame is {}, but the input has {} in that place", there.file, item.name);
+        return other(format!("{what}; give the input that it was begun with"));
     }
+    let here = engine::one(&Plan { overlay: None, ..plan.clone() }, there.index, item)?;
+    let here = Row { elapsed_us: there.elapsed_us, ..output::row(&here, &plan.config) };
+    if here != *there {
+        let what = format!("its last frame, {}, now comes out differently", there.file);
+        return other(format!(
+            "{what}; give the sensor.toml, frames.csv and options (--altitude-km, --fps, --flight) that it was begun with"
+        ));
+    }
+    Ok(())
 }
 
 fn warn_of_missing(frames: &Frames, folder: &Path, raw: bool) {
     for row in frames.rows.iter().filter(|r| !folder.join(&r.file).exists()) {
-        eprintln!("warning: {}", frames.problem(row, "no such picture in the folder; the row is not used"));
+        tell::warning(frames.problem(row, "no such picture in the folder; the row is not used"));
     }
     let Ok(list) = std::fs::read_dir(folder) else { return };
     let names: Vec<String> = list.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
@@ -179,6 +191,6 @@ fn warn_of_missing(frames: &Frames, folder: &Path, raw: bool) {
     let without = names.iter().filter(picture).count();
     if without > 0 {
         let what = format!("{without} pictures have no row here; the defaults of sensor.toml are used");
-        eprintln!("warning: {}: {what}", frames.path.display());
+        tell::warning(format_args!("{}: {what}", frames.path.display()));
     }
 }

@@ -20,7 +20,7 @@ use crossbeam_channel::{RecvTimeoutError, bounded};
 use hzn_calib::Frames;
 use hzn_core::{Config, Report};
 
-pub use sensor::{AnySensor, on_large_stack, prepare};
+pub use sensor::{AnySensor, prepare};
 pub use trace::Trace;
 
 use crate::input::{Item, Picture, Source};
@@ -145,9 +145,7 @@ pub fn run(
         });
         for _ in 0..threads {
             let (jobs, results) = (job_out.clone(), result_in.clone());
-            // The sensor's lists are large and are made on the stack before they are boxed.
-            let thread = std::thread::Builder::new().stack_size(sensor::STACK_BYTES);
-            thread.spawn_scoped(scope, move || {
+            scope.spawn(move || {
                 let mut sensor = match AnySensor::new(&plan.config, plan.flight) {
                     Ok(sensor) => sensor,
                     Err(e) => return drop(results.send(Err(e.into()))),
@@ -157,7 +155,7 @@ pub fn run(
                         return;
                     }
                 }
-            })?;
+            });
         }
         drop((job_out, result_in));
         let written = write_in_order(first, &result_out, &ticket_in, sink, seen);
@@ -175,6 +173,14 @@ pub fn run(
         read?;
         Ok(End::Complete)
     })
+}
+
+/// Processes one frame by itself, as [`run`] would.
+///
+/// # Errors
+/// The sensor's configuration is refused, or an overlay cannot be written.
+pub fn one(plan: &Plan, index: u64, item: Item) -> anyhow::Result<Finished> {
+    process(plan, &mut AnySensor::new(&plan.config, plan.flight)?, Job { index, item })
 }
 
 fn write_in_order(

@@ -12,9 +12,6 @@ use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report, Solut
 
 use super::Trace;
 
-/// Stack of a thread that makes a sensor: its lists pass over the stack on their way to the heap.
-pub(super) const STACK_BYTES: usize = 64 << 20;
-
 enum Kind {
     Host(Box<HostHorizon>),
     Flight(Box<FlightHorizon>),
@@ -28,7 +25,7 @@ pub struct AnySensor {
 }
 
 impl AnySensor {
-    /// Makes the sensor. Call it on a large stack ([`on_large_stack`]).
+    /// Makes the sensor.
     ///
     /// # Errors
     /// The first field out of its limits.
@@ -37,7 +34,7 @@ impl AnySensor {
         let kind = if flight {
             Kind::Flight(Box::new(FlightHorizon::new(config)?))
         } else {
-            Kind::Host(Box::new(HostHorizon::new(config)?))
+            Kind::Host(HostHorizon::boxed(config)?)
         };
         Ok(Self { kind, camera })
     }
@@ -144,29 +141,15 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Sol
     })
 }
 
-/// Runs `work` on a stack that is large enough to make a sensor.
-///
-/// # Errors
-/// The thread could not be started.
-pub fn on_large_stack<R: Send>(work: impl FnOnce() -> R + Send) -> std::io::Result<R> {
-    std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work)?;
-        thread.join().map_err(|_| std::io::Error::other("a thread ended unexpectedly"))
-    })
-}
-
 /// Checks a sensor, and every row of frames.csv against it, before the first frame is processed.
 ///
 /// # Errors
 /// The row, the picture and the column that cannot be.
 pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result<(), Problem> {
     let Some(frames) = frames else { return Ok(()) };
-    let check = || {
-        let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
-        for row in &frames.rows {
-            sensor.expected_half_angle_rad(Some(row)).map_err(|why| frames.problem(row, why))?;
-        }
-        Ok(())
-    };
-    on_large_stack(check).unwrap_or(Ok(()))
+    let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
+    for row in &frames.rows {
+        sensor.expected_half_angle_rad(Some(row)).map_err(|why| frames.problem(row, why))?;
+    }
+    Ok(())
 }

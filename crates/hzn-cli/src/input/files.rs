@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Item, Payload, Raw, Source, ending, video};
+use super::{Item, Payload, Raw, SIZES, Source, ending, picture, video};
 use crate::exit::{Stop, usage};
 
 /// Endings of pictures that are read.
@@ -12,8 +12,9 @@ const PICTURES: &[&str] = &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "
 const COMPANIONS: &[&str] = &["csv", "toml", "txt", "md", "json", "jsonl", "yaml", "yml", "xml", "log", "mcap", "part"];
 
 pub(super) struct Files {
-    paths: std::vec::IntoIter<PathBuf>,
-    total: u64,
+    paths: Vec<PathBuf>,
+    /// Files that were handed out.
+    given: usize,
     folder: PathBuf,
     raw: Option<Raw>,
     /// Names are given with their folder, because the files lie in several.
@@ -68,7 +69,7 @@ impl Files {
         let first = paths.first().map(parent).unwrap_or_default();
         let with_folder = paths.iter().any(|p| parent(p) != first);
         let folder = folder.unwrap_or(first);
-        Ok(Self { total: paths.len() as u64, paths: paths.into_iter(), folder, raw, with_folder, left_out })
+        Ok(Self { paths, given: 0, folder, raw, with_folder, left_out })
     }
 }
 
@@ -90,13 +91,20 @@ fn in_folder(folder: &Path, raw: bool, left_out: &mut BTreeMap<String, usize>) -
     Ok(paths)
 }
 
-impl Source for Files {
-    fn next(&mut self) -> Option<anyhow::Result<Item>> {
-        let path = self.paths.next()?;
-        let name = match path.file_name() {
+impl Files {
+    fn name(&self, path: &Path) -> String {
+        match path.file_name() {
             Some(name) if !self.with_folder => name.to_string_lossy().into_owned(),
             _ => path.to_string_lossy().into_owned(),
-        };
+        }
+    }
+}
+
+impl Source for Files {
+    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+        let path = self.paths.get(self.given)?.clone();
+        self.given += 1;
+        let name = self.name(&path);
         let payload = match self.raw {
             Some(raw) => Payload::RawFile(path, raw),
             None => Payload::File(path),
@@ -104,7 +112,16 @@ impl Source for Files {
         Some(Ok(Item { name, time_s: None, payload }))
     }
     fn total(&self) -> Option<u64> {
-        Some(self.total)
+        Some(self.paths.len() as u64)
+    }
+    fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
+        // Evenly from the whole sequence: its beginning may be of another camera.
+        let step = self.paths.len().div_ceil(SIZES).max(1);
+        let size = |path: &PathBuf| match self.raw {
+            Some(raw) => Some(raw.size()),
+            None => picture::size_of(path),
+        };
+        Box::new(self.paths.iter().step_by(step).filter_map(move |p| Some((self.name(p), size(p)?))))
     }
     fn folder(&self) -> PathBuf {
         self.folder.clone()

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub use picture::Picture;
 pub use raw::Raw;
 
-use crate::exit::Stop;
+use crate::exit::{Stop, usage};
 
 /// One frame before it is decoded.
 #[derive(Debug)]
@@ -26,6 +26,9 @@ pub struct Item {
     /// The picture.
     pub payload: Payload,
 }
+
+/// Pictures whose headers [`Source::sizes`] reads at most.
+const SIZES: usize = 32;
 
 /// A picture on its way to a thread.
 #[derive(Debug)]
@@ -48,6 +51,9 @@ pub trait Source: Send {
     fn next(&mut self) -> Option<anyhow::Result<Item>>;
     /// Number of frames, when it is known before.
     fn total(&self) -> Option<u64>;
+    /// Names and sizes (width, height in pixels) of some of the pictures, from their headers alone; those that cannot
+    /// be read are left out.
+    fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_>;
     /// Folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
     /// Things that the user should know, such as files left out.
@@ -103,6 +109,17 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
 /// The picture of a recorded message.
 pub fn recorded(image: hzn_mcap::EncodedImage) -> Payload {
     recording::payload(image)
+}
+
+/// A file that a command reads: it must be there. Gives the ending of its kind, and whether it is what an unfinished
+/// run left: such a file has the ending of its kind before `.part`.
+pub(crate) fn existing(file: &Path) -> Result<(String, bool), Stop> {
+    if !file.is_file() {
+        let what = if file.is_dir() { "is a folder; a file is expected here" } else { "no such file" };
+        return Err(usage(format!("{}: {what}", file.display())));
+    }
+    let unfinished = ending(file) == "part";
+    Ok((if unfinished { ending(&file.with_extension("")) } else { ending(file) }, unfinished))
 }
 
 /// The file's ending in small letters.

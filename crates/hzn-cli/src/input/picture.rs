@@ -95,6 +95,16 @@ pub fn format_of(bytes: &[u8]) -> Option<ImageFormat> {
     image::guess_format(bytes).ok()
 }
 
+/// Width and height in pixels that a picture file's header gives.
+pub(super) fn size_of(path: &Path) -> Option<(u32, u32)> {
+    size_in(std::io::BufReader::new(std::fs::File::open(path).ok()?))
+}
+
+/// As [`size_of`], from the file's contents.
+pub(super) fn size_in(contents: impl std::io::BufRead + std::io::Seek) -> Option<(u32, u32)> {
+    ImageReader::new(contents).with_guessed_format().ok()?.into_dimensions().ok()
+}
+
 /// Reads a whole file, unless it is far too large for a picture.
 ///
 /// # Errors

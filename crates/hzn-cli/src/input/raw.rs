@@ -86,6 +86,12 @@ impl Raw {
         }
     }
 
+    /// Width and height of the decoded picture in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        let cell = if self.format == Format::Bayer8 { 2 } else { 1 };
+        (self.width / cell, self.height / cell)
+    }
+
     /// The picture in these bytes, of which there must be exactly as many as it has.
     ///
     /// # Errors
@@ -119,7 +125,8 @@ impl Raw {
                 out.push((sum / 4) as u8);
             }
         }
-        let layout = Layout::packed(self.width / 2, self.height / 2, 1, 8);
+        let (width, height) = self.size();
+        let layout = Layout::packed(width, height, 1, 8);
         Picture { samples: Samples::Bytes(out), layout, exif_time_s: None }
     }
 }

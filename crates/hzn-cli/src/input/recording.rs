@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use hzn_core::image::Layout;
 use hzn_mcap::{EncodedImage, ImageFormat, ImageReader};
 
-use super::picture::{Picture, Samples};
-use super::{Item, Payload, Source};
+use super::picture::{self, Picture, Samples};
+use super::{Item, Payload, SIZES, Source};
 use crate::exit::{Stop, usage};
 
 /// Frames of one topic. They are named after the recording: `flight.mcap#000012`.
@@ -44,18 +44,32 @@ impl Recording {
         Ok(recording)
     }
 
+    fn frame_name(&self, index: u64) -> String {
+        format!("{}#{index:06}", self.name)
+    }
+
     fn read(&mut self) -> Option<anyhow::Result<Item>> {
         let image = match self.reader.next()? {
             Ok(image) => image,
             Err(e) => return Some(Err(e.into())),
         };
-        let name = format!("{}#{:06}", self.name, self.index);
+        let name = self.frame_name(self.index);
         self.index += 1;
         let payload = match image.image {
             Ok(image) => payload(image),
             Err(why) => Payload::Broken(why),
         };
         Some(Ok(Item { name, time_s: Some(image.time_s), payload }))
+    }
+}
+
+fn size_of(image: &EncodedImage) -> Option<(u32, u32)> {
+    match image.format {
+        ImageFormat::Png | ImageFormat::Jpeg => picture::size_in(std::io::Cursor::new(&image.bytes)),
+        ImageFormat::Other(_) => None,
+        ImageFormat::Mono8 { width, height }
+        | ImageFormat::Rgb8 { width, height }
+        | ImageFormat::Mono16 { width, height } => Some((width, height)),
     }
 }
 
@@ -89,6 +103,13 @@ impl Source for Recording {
     }
     fn total(&self) -> Option<u64> {
         None
+    }
+    fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
+        let Ok(reader) = ImageReader::open(&self.path, self.reader.topic()) else {
+            return Box::new(std::iter::empty());
+        };
+        let images = reader.map_while(Result::ok).take(SIZES);
+        Box::new(images.enumerate().filter_map(|(i, m)| Some((self.frame_name(i as u64), size_of(&m.image.ok()?)?))))
     }
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()

@@ -173,6 +173,9 @@ impl Source for Video {
     fn total(&self) -> Option<u64> {
         self.count
     }
+    fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
+        Box::new(std::iter::once((self.stem.clone(), (self.width, self.height))))
+    }
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
     }

@@ -42,12 +42,12 @@ enum Kind {
 }
 
 /// Frames that an output holds already.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Held {
     /// How many.
     pub frames: u64,
-    /// Name of the last one's picture.
-    pub last: Option<String>,
+    /// The last one's row.
+    pub last: Option<hzn_mcap::Row>,
 }
 
 /// Kinds of output, by ending.
@@ -156,15 +156,18 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
         }
         None => {
             let last = last_frame(part);
-            let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(failed)?;
+            let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(|e| match e {
+                hzn_mcap::Error::OtherSensor { .. } => usage(e),
+                e => failed(e),
+            })?;
             let held = Held { frames: resumed.frames, last: last.filter(|_| resumed.frames > 0) };
             Ok((Kind::Mcap(Box::new(resumed.writer)), held))
         }
     }
 }
 
-fn last_frame(part: &Path) -> Option<String> {
-    Reader::open(part, Contents::WithoutImages).ok()?.filter_map(Result::ok).last().map(|f| f.row.file)
+fn last_frame(part: &Path) -> Option<hzn_mcap::Row> {
+    Reader::open(part, Contents::WithoutImages).ok()?.filter_map(Result::ok).last().map(|f| f.row)
 }
 
 /// A file that cannot be written, and what to do.

@@ -132,7 +132,7 @@ fn whole_csv(bytes: &[u8]) -> io::Result<(Held, usize)> {
         if !whole {
             break;
         }
-        held = Held { frames: held.frames + 1, last: Some(row.file) };
+        held = Held { frames: held.frames + 1, last: Some(row) };
         end = to;
     }
     Ok((held, end))
@@ -145,7 +145,7 @@ fn whole_jsonl(bytes: &[u8]) -> (Held, usize) {
             break;
         }
         let Ok(row) = serde_json::from_slice::<Row>(line) else { break };
-        held = Held { frames: held.frames + 1, last: Some(row.file) };
+        held = Held { frames: held.frames + 1, last: Some(row) };
         end += line.len();
     }
     (held, end)
