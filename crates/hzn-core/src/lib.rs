@@ -50,7 +50,8 @@
 //! # Features
 //!
 //! `std`: the square root from the standard library (the same bits, vectorised). `serde`: [`Config`] to and from files.
-//! `dlr`, `zju`, `horace`: the methods of Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`].
+//! `dlr`, `zju`, `horace`: the methods of Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`]. `erf`: the most accurate
+//! sub-pixel points.
 
 #![no_std]
 #![forbid(unsafe_code)]

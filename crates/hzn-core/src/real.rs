@@ -49,6 +49,8 @@ pub trait Real:
     fn exp(self) -> Self;
     /// Natural logarithm.
     fn ln(self) -> Self;
+    /// Error function.
+    fn erf(self) -> Self;
     /// Largest integer not above.
     fn floor(self) -> Self;
     /// Absolute value.
@@ -91,7 +93,7 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($t:ty, $sqrt:ident, $sincos:ident, $atan2:ident, $asin:ident, $acos:ident, $tan:ident, $exp:ident, $ln:ident, $floor:ident, $series:literal) => {
+    ($t:ty, $sqrt:ident, $sincos:ident, $atan2:ident, $asin:ident, $acos:ident, $tan:ident, $exp:ident, $ln:ident, $erf:ident, $floor:ident, $series:literal) => {
         impl Real for $t {
             const EPSILON: Self = <$t>::EPSILON;
             const ZERO: Self = 0.0;
@@ -140,6 +142,9 @@ macro_rules! real {
             fn ln(self) -> Self {
                 libm::$ln(self)
             }
+            fn erf(self) -> Self {
+                libm::$erf(self)
+            }
             #[inline(always)]
             fn floor(self) -> Self {
                 libm::$floor(self)
@@ -159,8 +164,8 @@ macro_rules! real {
         }
     };
 }
-real!(f32, sqrtf, sincosf, atan2f, asinf, acosf, tanf, expf, logf, floorf, 0.75);
-real!(f64, sqrt, sincos, atan2, asin, acos, tan, exp, log, floor, 0.125);
+real!(f32, sqrtf, sincosf, atan2f, asinf, acosf, tanf, expf, logf, erff, floorf, 0.75);
+real!(f64, sqrt, sincos, atan2, asin, acos, tan, exp, log, erf, floor, 0.125);
 
 #[cfg(test)]
 mod tests {

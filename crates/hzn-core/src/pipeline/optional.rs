@@ -21,7 +21,10 @@ macro_rules! optional {
 }
 
 /// Every value that needs a feature, as lines `"dlr": "estimate.method" = "direct";`.
-pub const OPTIONAL: &[Optional] = optional! {};
+pub const OPTIONAL: &[Optional] = optional! {
+    "erf": "candidates.sub_pixel" = "erf";
+    "zju": "candidates.sub_pixel" = "zernike";
+};
 
 /// The feature that a value of a key needs and this build lacks.
 pub fn lacking(key: &str, value: &str) -> Option<&'static str> {

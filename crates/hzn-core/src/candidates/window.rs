@@ -1,0 +1,61 @@
+//! The 7×7 pixels about an edge, for the methods that look at all of them at once.
+
+use crate::contour::Scene;
+use crate::image::Pixels;
+use crate::pipeline::Observer;
+use crate::real::Real;
+
+/// Pixels from the centre to each side.
+pub(super) const HALF: i32 = 3;
+/// Pixels across.
+pub(super) const SIDE: usize = 7;
+
+/// Brightness about a pixel.
+pub(super) struct Window<T> {
+    /// Rows from the top, each from the left.
+    pub(super) rows: [[T; SIDE]; SIDE],
+}
+
+impl<T: Real> Window<T> {
+    /// Reads the picture; `None` where the window leaves the region or touches a mask.
+    pub(super) fn read<P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> Option<Self> {
+        let mut rows = [[T::ZERO; SIDE]; SIDE];
+        for (row, dy) in rows.iter_mut().zip(-HALF..) {
+            for (value, dx) in row.iter_mut().zip(-HALF..) {
+                *value = T::of_i32(brightness(scene, x + dx, y + dy)?);
+            }
+        }
+        Some(Self { rows })
+    }
+
+    /// Calls `visit` with each pixel's place from the centre and its brightness.
+    #[inline(always)]
+    pub(super) fn each(&self, mut visit: impl FnMut(T, T, T)) {
+        for (row, dy) in self.rows.iter().zip(-HALF..) {
+            for (value, dx) in row.iter().zip(-HALF..) {
+                visit(T::of_i32(dx), T::of_i32(dy), *value);
+            }
+        }
+    }
+}
+
+/// Whole pixels from the centre of a window to the edge at `offset` along the unit normal, along the axis of the larger
+/// component: so the edge comes closer than half a pixel.
+pub(super) fn towards<T: Real>(offset: T, [x, y]: [T; 2]) -> (i32, i32) {
+    let whole = |v: T| (v + T::of(0.5)).floor().to_i32();
+    if x.abs() >= y.abs() { (whole(offset / x), 0) } else { (0, whole(offset / y)) }
+}
+
+/// Brightness of a pixel; `None` beyond the region and under the mask.
+pub(super) fn brightness<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    x: i32,
+    y: i32,
+) -> Option<i32> {
+    let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
+    if !scene.region.contains(x, y) || scene.region.masked(x, y) {
+        return None;
+    }
+    scene.observer.pixel(x, y);
+    Some(i32::from(scene.picture.at(x, y)))
+}
