@@ -5,7 +5,7 @@
 //! Cramér-Rao bound of the window; the levels are means over the plateaus on both sides, and the width σ is fitted
 //! along: its derivative is odd about the edge and that of the offset even, so that it costs no accuracy.
 
-use super::window::{Window, brightness, towards};
+use super::window::{HALF, Window, brightness};
 use crate::contour::Scene;
 use crate::image::Pixels;
 use crate::linalg::{V3, invert_spd3};
@@ -81,7 +81,7 @@ pub(super) fn start<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, 
 /// Direction towards the light: the first moments over the disc of the window.
 fn direction<T: Real>(window: &Window<T>) -> Option<[T; 2]> {
     let (mut gx, mut gy) = (T::ZERO, T::ZERO);
-    window.each(|x, y, value| {
+    each(window, |x, y, value| {
         if x * x + y * y < T::of(10.5) {
             gx += x * value;
             gy += y * value;
@@ -129,7 +129,7 @@ pub(super) fn fit<T: Real>(window: &Window<T>, start: Edge<T>, levels: &Levels<T
     for _ in 0..STEPS {
         // Unknowns: offset, angle, ln σ.
         let (mut m, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
-        window.each(|x, y, value| {
+        each(window, |x, y, value| {
             let (d, along) = (x * n[0] + y * n[1], y * n[0] - x * n[1]);
             let z = (d - offset) / sigma;
             let density = (z * z * T::of(-0.5)).exp() * T::of(0.398_942_280_401_432_7);
@@ -161,4 +161,21 @@ pub(super) fn fit<T: Real>(window: &Window<T>, start: Edge<T>, levels: &Levels<T
         }
     }
     Some(Edge { offset, n, sigma })
+}
+
+/// Whole pixels from the centre of a window to the edge at `offset` along the unit normal, along the axis of the larger
+/// component: so the edge comes closer than half a pixel.
+fn towards<T: Real>(offset: T, [x, y]: [T; 2]) -> (i32, i32) {
+    let whole = |v: T| (v + T::of(0.5)).floor().to_i32();
+    if x.abs() >= y.abs() { (whole(offset / x), 0) } else { (0, whole(offset / y)) }
+}
+
+/// Calls `visit` with each pixel's place from the centre and its brightness.
+#[inline(always)]
+fn each<T: Real>(window: &Window<T>, mut visit: impl FnMut(T, T, T)) {
+    for (row, dy) in window.rows.iter().zip(-HALF..) {
+        for (value, dx) in row.iter().zip(-HALF..) {
+            visit(T::of_i32(dx), T::of_i32(dy), *value);
+        }
+    }
 }

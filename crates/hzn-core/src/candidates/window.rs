@@ -27,23 +27,6 @@ impl<T: Real> Window<T> {
         }
         Some(Self { rows })
     }
-
-    /// Calls `visit` with each pixel's place from the centre and its brightness.
-    #[inline(always)]
-    pub(super) fn each(&self, mut visit: impl FnMut(T, T, T)) {
-        for (row, dy) in self.rows.iter().zip(-HALF..) {
-            for (value, dx) in row.iter().zip(-HALF..) {
-                visit(T::of_i32(dx), T::of_i32(dy), *value);
-            }
-        }
-    }
-}
-
-/// Whole pixels from the centre of a window to the edge at `offset` along the unit normal, along the axis of the larger
-/// component: so the edge comes closer than half a pixel.
-pub(super) fn towards<T: Real>(offset: T, [x, y]: [T; 2]) -> (i32, i32) {
-    let whole = |v: T| (v + T::of(0.5)).floor().to_i32();
-    if x.abs() >= y.abs() { (whole(offset / x), 0) } else { (0, whole(offset / y)) }
 }
 
 /// Brightness of a pixel; `None` beyond the region and under the mask.
