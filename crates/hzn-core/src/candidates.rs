@@ -9,7 +9,7 @@
 #[cfg(feature = "erf")]
 mod erf;
 #[cfg(test)]
-mod table;
+mod golden;
 #[cfg(any(feature = "erf", feature = "zju"))]
 mod window;
 #[cfg(feature = "zju")]
