@@ -9,7 +9,7 @@ use std::path::Path;
 
 use hzn_core::camera::{self, Camera, Model};
 use hzn_core::error::ConfigError;
-use hzn_core::pipeline::lacking;
+use hzn_core::pipeline::{MAX_BODIES, lacking};
 use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
@@ -55,6 +55,17 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
             .map_err(|what| Problem::new(path, what).at_offset(text, span.start).in_field("preset"))?,
     };
     let starting_values = starting_values(preset);
+    if let Some((key, several)) = table.get_ref().get_key_value("bodies") {
+        let wrong = |what: &str| Problem::new(path, what).at_offset(text, key.span().start).in_field("[[bodies]]");
+        let count = several.get_ref().as_array().map_or(0, |a| a.len());
+        if table.get_ref().contains_key("body") {
+            return Err(wrong("stands beside [body]; one body is a [body], several are all [[bodies]]"));
+        }
+        if count > MAX_BODIES {
+            let what = format!("{count} are too many; at most {MAX_BODIES} are looked for in one picture");
+            return Err(wrong(&what));
+        }
+    }
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
         // `Config` wants a camera; this one stands in until the file's own is put in below.
@@ -148,11 +159,16 @@ impl Place {
     }
 }
 
-/// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`.
+/// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`; of the second of several tables
+/// `[[bodies]] 2 radius_km`.
 fn field_name(path: &[String]) -> String {
     match path {
         [] => String::new(),
         [one] => one.clone(),
+        [section, place, rest @ ..] if place.parse::<usize>().is_ok() => {
+            let nth = place.parse::<usize>().map_or(0, |n| n + 1);
+            format!("[[{section}]] {nth} {}", rest.join(".")).trim_end().to_owned()
+        }
         [section, rest @ ..] => format!("[{section}] {}", rest.join(".")),
     }
 }
@@ -162,8 +178,18 @@ fn places(table: &DeTable<'_>) -> Vec<Place> {
         for (key, value) in table {
             path.push(key.get_ref().to_string());
             out.push(Place { path: path.clone(), key: key.span(), value: value.span() });
-            if let DeValue::Table(inner) = value.get_ref() {
-                walk(inner, path, out);
+            match value.get_ref() {
+                DeValue::Table(inner) => walk(inner, path, out),
+                DeValue::Array(items) => {
+                    for (i, item) in items.iter().enumerate() {
+                        let DeValue::Table(inner) = item.get_ref() else { continue };
+                        path.push(i.to_string());
+                        out.push(Place { path: path.clone(), key: item.span(), value: item.span() });
+                        walk(inner, path, out);
+                        path.pop();
+                    }
+                }
+                _ => {}
             }
             path.pop();
         }
@@ -286,10 +312,14 @@ fn meaning(error: &toml::de::Error, text: &str, path: &Path, places: &[Place]) -
 
 /// A value that hzn-core refused, with the place where it was given.
 fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Place]) -> Problem {
-    let shown = error.to_string();
-    let rule = shown.split_once(": ").map_or(shown.as_str(), |(_, rule)| rule);
-    let what = if error.value.is_nan() { rule.to_owned() } else { format!("{} is refused: {rule}", error.value) };
-    let parts: Vec<String> = error.field.split('.').map(str::to_owned).collect();
+    let rule = error.limit;
+    let what = if error.value.is_nan() { rule.to_string() } else { format!("{} is refused: {rule}", error.value) };
+    let mut parts: Vec<String> = error.field.split('.').map(str::to_owned).collect();
+    if let Some(which) = error.body {
+        // Core says `body.` for the body's own keys, and no more for its level and its edge errors.
+        parts.retain(|p| p != "body");
+        parts.splice(0..0, ["bodies".to_owned(), which.to_string()]);
+    }
     let problem = Problem::new(path, what).in_field(field_name(&parts));
     // The field itself, or the section that it is missing from.
     let place = (1..=parts.len()).rev().find_map(|n| places.iter().find(|p| p.path == parts[..n]));
@@ -345,6 +375,36 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn several_bodies_have_their_own_levels() {
+        let two = "[[bodies]]\nkind = \"earth\"\naltitude_km = 400\n[[bodies]]\nkind = \"sun\"\n[bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n";
+        let config = parse(&format!("{CAMERA}{two}"), Path::new("s.toml")).unwrap().config;
+        assert_eq!((config.each_body().len(), config.each_body()[0].altitude_km), (2, Some(400.0)));
+        assert_eq!(config.each_body()[1].binarize.unwrap().level, 0.9);
+        assert_eq!(
+            error(&two.replace("0.9", "-1")),
+            "sensor.toml:16: [[bodies]] 2 binarize.level: -1 is refused: must be above 0"
+        );
+        assert_eq!(
+            error(&two.replace("400", "-400")),
+            "sensor.toml:11: [[bodies]] 1 altitude_km: -400 is refused: must be above 0"
+        );
+        assert_eq!(
+            error(&two.replace("altitude_km", "altitude")),
+            "sensor.toml:11: [[bodies]] 1 altitude: unknown key; did you mean altitude_km?"
+        );
+        assert_eq!(
+            error(&two.replace("level =", "levels =")),
+            "sensor.toml:16: [[bodies]] 2 binarize.levels: unknown key; did you mean level?"
+        );
+        assert_eq!(
+            error(&format!("[body]\nkind = \"earth\"\n{two}")),
+            "sensor.toml:11: [[bodies]]: stands beside [body]; one body is a [body], several are all [[bodies]]"
+        );
+        let four = "[[bodies]]\nkind = \"earth\"\n".repeat(4);
+        assert_eq!(error(&four), "sensor.toml:9: [[bodies]]: 4 are too many; at most 3 are looked for in one picture");
     }
 
     #[test]

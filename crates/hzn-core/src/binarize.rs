@@ -31,7 +31,8 @@ pub enum Method {
 pub struct Config {
     /// How the level is found.
     pub method: Method,
-    /// For `fixed`: a pixel is lit at this value or above, in the picture's own counts (0 to 65535).
+    /// For `fixed`: a pixel is lit at this value or above. In the picture's own counts, 1 to 65535; below 1 it is a
+    /// fraction of full scale, whatever the bits.
     pub level: f64,
     /// For `dynamic`: level = factor × mean, above 0 to 100.
     pub factor: f64,
@@ -71,7 +72,8 @@ impl Gate {
 impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         require(self.level.is_finite(), "binarize.level", self.level, Limit::Finite)?;
-        between("binarize.level", self.level, 1.0, 65535.0)?;
+        above("binarize.level", self.level, 0.0)?;
+        between("binarize.level", self.level, 0.0, 65535.0)?;
         above("binarize.factor", self.factor, 0.0)?;
         between("binarize.factor", self.factor, 0.0, 100.0)?;
         between("binarize.scale", self.scale, 0.1, 10.0)
@@ -125,6 +127,7 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
             return Err(Status::TooBright);
         }
         let level = match config.method {
+            Method::Fixed if config.level < 1.0 => Some(T::of(config.level * f64::from(full))),
             Method::Fixed => Some(T::of(config.level)),
             Method::Dynamic => Some(mean * T::of(config.factor)),
             Method::Otsu => sample.otsu::<T>(full).map(|l| l * T::of(config.scale)),
@@ -244,6 +247,9 @@ mod tests {
         let data = halves(10, 210);
         let fixed = Config { method: Method::Fixed, level: 77.0, ..Config::default() };
         assert_eq!(level(&data, 8, Gate::default(), fixed).unwrap().level, 77);
+        let part = Config { level: 0.9, ..fixed };
+        assert_eq!(level(&data, 8, Gate::default(), part).unwrap().level, 229);
+        assert_eq!(level(&data, 12, Gate::default(), part).unwrap().level, 3685);
         let dynamic = Config { method: Method::Dynamic, factor: 0.5, ..Config::default() };
         let found = level(&data, 8, Gate::default(), dynamic).unwrap();
         assert_eq!(f64::from(found.level), (found.mean * 0.5).floor());

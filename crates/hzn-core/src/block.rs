@@ -72,10 +72,11 @@ impl<T: Real> Block<T> {
             self.m[k][l] = ray.m[k];
         }
     }
-    /// A point that cannot count: weight 0 and a ray along the axis.
+    /// A point that cannot count: weight 0, and no distance from any limb that is finite.
     pub(crate) fn clear(&mut self, lane: usize) {
         let l = lane & 7;
         (self.s[0][l], self.s[1][l], self.s[2][l]) = (T::ZERO, T::ZERO, T::one());
+        self.m.iter_mut().for_each(|m| m[l] = T::ZERO);
         self.weight[l] = T::ZERO;
     }
     pub(crate) fn ray(&self, lane: usize) -> V3<T> {

@@ -4,6 +4,7 @@ use crate::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone, WGS84_A_M, WGS84_B_M, geod
 use crate::error::{ConfigError, Limit, above, between, require};
 use crate::frames::{Cam, Ecef, Rotation, UnitVec3};
 use crate::real::Real;
+use crate::{binarize, covariance};
 
 /// Radius of the Sun's photosphere in kilometres (IAU 2015).
 pub const SUN_RADIUS_KM: f64 = 695_700.0;
@@ -38,7 +39,7 @@ pub enum Kind {
     Sphere,
 }
 
-/// `[body]` of sensor.toml.
+/// `[body]` of sensor.toml, or one of several `[[bodies]]`.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
@@ -57,6 +58,12 @@ pub struct Config {
     pub limb_height_km: f64,
     /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts.
     pub limb_height_sigma_km: f64,
+    /// Its own level between dark and lit, where it differs from the sensor's: the Sun's is far above the Earth's.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub binarize: Option<binarize::Config>,
+    /// Its own edge errors, where they differ from the sensor's.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub covariance: Option<covariance::Config>,
 }
 
 impl Default for Config {
@@ -68,6 +75,8 @@ impl Default for Config {
             altitude_sigma_km: 0.5,
             limb_height_km: 10.0,
             limb_height_sigma_km: 2.0,
+            binarize: None,
+            covariance: None,
         }
     }
 }
@@ -89,7 +98,9 @@ impl Config {
         }
         between("body.altitude_sigma_km", self.altitude_sigma_km, 0.0, 1e6)?;
         between("body.limb_height_km", self.limb_height_km, -50.0, 500.0)?;
-        between("body.limb_height_sigma_km", self.limb_height_sigma_km, 0.0, 1e4)
+        between("body.limb_height_sigma_km", self.limb_height_sigma_km, 0.0, 1e4)?;
+        self.binarize.map_or(Ok(()), |b| b.check())?;
+        self.covariance.map_or(Ok(()), |c| c.check())
     }
 
     /// Radius of the sphere that stands for the body where no position is known, kilometres.
@@ -133,6 +144,8 @@ pub enum FrameError {
     NoAltitude,
     /// The sigma of the attitude is not a finite number of 0 or more.
     AttitudeSigma,
+    /// The sensor has no body of that number.
+    NoBody,
 }
 
 impl core::fmt::Display for FrameError {
@@ -144,6 +157,7 @@ impl core::fmt::Display for FrameError {
             Self::NoAltitude => {
                 "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
             }
+            Self::NoBody => "the sensor has fewer bodies",
         })
     }
 }
@@ -171,6 +185,10 @@ pub struct Expected<T> {
     pub(crate) limb_sigma_m: T,
     /// The half-angle says nothing about the distance (Sun, Moon).
     pub(crate) free: bool,
+    /// It may be seen as a crescent.
+    pub(crate) phases: bool,
+    /// Which of the sensor's bodies it is, from 0.
+    pub(crate) which: u8,
 }
 
 impl<T: Real> Expected<T> {
@@ -258,6 +276,8 @@ impl<T: Real> Expected<T> {
             limb_m: limb,
             limb_sigma_m: limb_sigma,
             free: body.half_angle_is_free(),
+            phases: body.kind != Kind::Sun,
+            which: 0,
         })
     }
 

@@ -45,7 +45,7 @@ pub enum SubPixel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
-    /// Edges with fewer border pixels are left out, 8 or more.
+    /// Edges with fewer border pixels are left out, 8 or more; half of what a small body has around it is enough of it.
     pub min_points: u16,
     /// Points kept of each candidate, evenly along the edge, 16 or more; 0 keeps all that fit.
     pub keep_points: u16,

@@ -11,6 +11,8 @@ pub struct ConfigError {
     pub value: f64,
     /// What the value must be.
     pub limit: Limit,
+    /// Which of several `[[bodies]]` the field belongs to, from 0.
+    pub body: Option<u8>,
 }
 
 /// The rule that a value broke.
@@ -32,23 +34,31 @@ pub enum Limit {
     Rule(&'static str),
 }
 
-impl fmt::Display for ConfigError {
+impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {}: ", self.field, self.value)?;
-        match self.limit {
-            Limit::Finite => write!(f, "must be a finite number"),
-            Limit::Above(x) => write!(f, "must be above {x}"),
-            Limit::AtLeast(x) => write!(f, "must be at least {x}"),
-            Limit::AtMost(x) => write!(f, "must be at most {x}"),
-            Limit::Between(a, b) => write!(f, "must be between {a} and {b}"),
-            Limit::Monotone(deg) => write!(
+        match self {
+            Self::Finite => write!(f, "must be a finite number"),
+            Self::Above(x) => write!(f, "must be above {x}"),
+            Self::AtLeast(x) => write!(f, "must be at least {x}"),
+            Self::AtMost(x) => write!(f, "must be at most {x}"),
+            Self::Between(a, b) => write!(f, "must be between {a} and {b}"),
+            Self::Monotone(deg) => write!(
                 f,
                 "the lens is monotone only up to {deg:.2} degrees off axis, so that pixels beyond have no single ray; \
                  set camera.theta_max_deg to {:.2} or less, or correct camera.k",
                 deg - 2.0
             ),
-            Limit::Rule(text) => f.write_str(text),
+            Self::Rule(text) => f.write_str(text),
         }
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(which) = self.body {
+            write!(f, "bodies[{which}]: ")?;
+        }
+        write!(f, "{} = {}: {}", self.field, self.value, self.limit)
     }
 }
 
@@ -56,7 +66,7 @@ impl core::error::Error for ConfigError {}
 
 /// Checks of one field, used by every stage's `check`.
 pub(crate) fn require(ok: bool, field: &'static str, value: f64, limit: Limit) -> Result<(), ConfigError> {
-    if ok { Ok(()) } else { Err(ConfigError { field, value, limit }) }
+    if ok { Ok(()) } else { Err(ConfigError { field, value, limit, body: None }) }
 }
 
 /// A finite number within `[low, high]`.

@@ -1,6 +1,7 @@
 //! Gates and choice: whether a fitted cone is the body's limb, and which of several is.
 
 use crate::block::{Block, LANES};
+use crate::body::Expected;
 use crate::camera::Camera;
 use crate::contour::Scene;
 use crate::covariance::Fused;
@@ -18,7 +19,7 @@ use crate::region::Region;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
-    /// Fewest inliers, 8 or more.
+    /// Fewest inliers, 8 or more; a third of what a small body has around it is enough of it.
     pub min_inliers: u16,
     /// Shortest edge that inliers must cover, in pixels, 0 or more. Left out: a tenth of the picture's diagonal, or a
     /// third of the body's circumference where that is less. Shorter edges fit many curves.
@@ -83,6 +84,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
     sigma_max_rad: T,
+    expected: &Expected<T>,
     blocks: &[Block<T>],
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
@@ -94,13 +96,14 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let support = (fit.arc_px / limb_px.most(T::one())).least(T::one());
     let sigma_limit = T::of(config.max_sigma_deg.to_radians());
     let chi = T::of(config.max_half_angle_sigma);
-    let verdict = if fit.inliers < u32::from(config.min_inliers) {
+    let least = config.min_inliers.min(small(expected.sin, camera, 3));
+    let verdict = if fit.inliers < u32::from(least) {
         Verdict::FewInliers
     } else if fit.arc_px < min_arc(&fused.c, camera, config) {
         Verdict::ShortArc
     } else if !(fit.rms_px <= T::of(config.max_rms_px)) {
         Verdict::Residuals
-    } else if !(fused.chi2 <= chi * chi) {
+    } else if !(fused.chi2 <= chi * chi) || !blooms_to(&fit.c, expected) {
         Verdict::HalfAngle
     } else if !(sigma_max_rad <= sigma_limit) {
         Verdict::Uncertain
@@ -115,6 +118,23 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::Passed
     };
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
+}
+
+/// Of a blooming body, the half-angles that it may be seen under: from half of its own to twelve times.
+const BLOOM: [f64; 2] = [0.5, 12.0];
+
+/// Whether a body that blooms can be seen under the half-angle of cosine `c`; others are weighed against the expected.
+fn blooms_to<T: Real>(c: &T, expected: &Expected<T>) -> bool {
+    let sin = (T::one() - *c * *c).most(T::ZERO).sqrt();
+    let [least, most] = BLOOM.map(|n| expected.sin * T::of(n));
+    !expected.free || (sin >= least && sin <= most.least(T::one()) && *c > T::ZERO)
+}
+
+/// A part of the border pixels of a body's disc, one in `part`, 8 or more: less is not asked of a small body.
+pub(crate) fn small<T: Real>(sin: T, camera: &Camera<T>, part: i32) -> u16 {
+    let (fx, fy) = camera.focal_px();
+    let around = T::of(core::f64::consts::PI) * (fx + fy) * sin;
+    (around / T::of_i32(part)).to_i32().clamp(8, i32::from(u16::MAX)) as u16
 }
 
 fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {

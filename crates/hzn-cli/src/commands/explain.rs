@@ -280,6 +280,7 @@ impl Told<'_> {
                 "many of its points lie close beside the fitted limb: a curve through clutter".into()
             }
             Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
+            Verdict::Taken => "it is the limb of another body, found before".into(),
             Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
         }
     }

@@ -31,12 +31,9 @@ impl<T: Real> Brown<T> {
         while theta < end && radius(libm::tan(theta)) < rho_corner * 1.01 {
             if slope(libm::tan(theta + 2f64.to_radians())) <= 0.0 {
                 let limit = theta.to_degrees() + 2.0;
-                return Err(match config.theta_max_deg {
-                    Some(deg) => {
-                        ConfigError { field: "camera.theta_max_deg", value: deg, limit: Limit::Monotone(limit) }
-                    }
-                    None => ConfigError { field: "camera.k", value: k(0), limit: Limit::Monotone(limit) },
-                });
+                let (field, value) =
+                    config.theta_max_deg.map_or(("camera.k", k(0)), |deg| ("camera.theta_max_deg", deg));
+                return Err(ConfigError { field, value, limit: Limit::Monotone(limit), body: None });
             }
             theta += 1e-3;
         }

@@ -97,6 +97,7 @@ impl<T: Real> Radial<T> {
                     field: "camera.k",
                     value: config.coefficient(0),
                     limit: Limit::Monotone(limit.to_degrees()),
+                    body: None,
                 });
             }
         };

@@ -1,31 +1,41 @@
-//! One bit for each pixel of the search lines: its edge to the dark western neighbour has been followed.
+//! The crossings of search lines that have been followed: lit pixels on them whose western neighbour is dark.
 //!
-//! Every closed edge that crosses a line has such a crossing on it, so a line's edges are followed once each.
+//! Every closed edge that crosses a line has such a crossing on it, so a line's edges are followed once each. There is
+//! one bit for each pixel of the lines where memory suffices; for the narrow lines that small bodies need in large
+//! pictures, a table of the crossings themselves. When that is full, edges are followed again, which the picture's
+//! steps bound.
 
 /// Search lines at rows y with y mod spacing = offset; the spacing is a power of two.
 #[derive(Debug)]
 pub(crate) struct Marks<'a> {
-    bits: &'a mut [u32],
+    words: &'a mut [u32],
     width: u32,
     spacing: u16,
     offset: u16,
+    bits: bool,
+}
+
+/// Places of the table that are tried for a crossing.
+const TRIES: usize = 16;
+
+/// A power of two, `spacing` or less.
+fn rounded(spacing: u16) -> u16 {
+    1 << (15 - spacing.clamp(1, 1 << 14).leading_zeros())
 }
 
 impl<'a> Marks<'a> {
-    /// Lines at most `spacing` rows apart, rounded down to a power of two; further apart when the bits do not
-    /// suffice. All clear.
-    pub(crate) fn new(bits: &'a mut [u32], width: u16, height: u16, spacing: u16) -> Self {
-        let room = bits.len() as u32 * 32;
-        let mut spacing = if spacing < 2 { 1u16 } else { 1 << (15 - spacing.min(1 << 14).leading_zeros()) };
-        let lines = |spacing: u16| u32::from(height).div_ceil(u32::from(spacing));
-        while lines(spacing) * u32::from(width) > room && spacing < 1 << 14 {
-            spacing *= 2;
+    /// Lines at most `spacing` rows apart, rounded down to a power of two; up to `widest` when the bits do not suffice
+    /// for more. All clear.
+    pub(crate) fn new(words: &'a mut [u32], width: u16, height: u16, spacing: u16, widest: u16) -> Self {
+        let needed = |spacing: u16| (u32::from(height).div_ceil(u32::from(spacing)) * u32::from(width)).div_ceil(32);
+        let fit = |spacing: u16| needed(spacing) as usize <= words.len();
+        let (narrow, widest) = (rounded(spacing), rounded(widest.max(spacing)));
+        let found = (0..15).map(|k| 1u16 << k).find(|&s| s >= narrow && s <= widest && fit(s));
+        let (spacing, used) = found.map_or((narrow, words.len()), |s| (s, needed(s) as usize));
+        if let Some(words) = words.get_mut(..used) {
+            words.fill(0);
         }
-        let used = (lines(spacing) * u32::from(width)).div_ceil(32) as usize;
-        if let Some(bits) = bits.get_mut(..used) {
-            bits.fill(0);
-        }
-        Self { bits, width: u32::from(width), spacing, offset: spacing / 2 }
+        Self { words, width: u32::from(width), spacing, offset: spacing / 2, bits: found.is_some() }
     }
 
     /// Whether row `y` is a search line.
@@ -38,19 +48,76 @@ impl<'a> Marks<'a> {
         let bit = u32::from(y / self.spacing) * self.width + u32::from(x);
         ((bit / 32) as usize, 1 << (bit % 32))
     }
+    /// The crossing as it stands in the table, where 0 is an empty place, and the places that it may have.
+    fn key(&self, x: u16, y: u16) -> (u32, impl Iterator<Item = usize> + use<>) {
+        let key = (u32::from(y) << 16 | u32::from(x)) + 1;
+        let (n, first) = (self.words.len().max(1), key.wrapping_mul(0x9e37_79b1) >> 7);
+        (key, (0..TRIES).map(move |k| (first as usize + k) % n))
+    }
+
     #[inline]
     pub(crate) fn set(&mut self, x: u16, y: u16) {
-        let (word, bit) = self.place(x, y);
-        if let Some(word) = self.bits.get_mut(word) {
-            *word |= bit;
+        if self.bits {
+            let (word, bit) = self.place(x, y);
+            if let Some(word) = self.words.get_mut(word) {
+                *word |= bit;
+            }
+            return;
+        }
+        let (key, mut places) = self.key(x, y);
+        if let Some(place) = places.find(|&p| self.words.get(p).is_some_and(|&w| w == 0 || w == key))
+            && let Some(word) = self.words.get_mut(place)
+        {
+            *word = key;
         }
     }
     pub(crate) fn get(&self, x: u16, y: u16) -> bool {
-        let (word, bit) = self.place(x, y);
-        self.bits.get(word).is_some_and(|w| w & bit != 0)
+        if self.bits {
+            let (word, bit) = self.place(x, y);
+            return self.words.get(word).is_some_and(|w| w & bit != 0);
+        }
+        let (key, mut places) = self.key(x, y);
+        places.any(|p| self.words.get(p) == Some(&key))
     }
     /// The rows of the lines within `height`.
     pub(crate) fn rows(&self, height: u16) -> impl Iterator<Item = u16> + use<> {
         (self.offset..height).step_by(usize::from(self.spacing))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec;
+
+    #[test]
+    fn lines_are_as_narrow_as_memory_allows() {
+        let spacing = |words: usize, spacing, widest| {
+            let mut words = vec![7u32; words];
+            let marks = Marks::new(&mut words, 1920, 1080, spacing, widest);
+            (marks.spacing, marks.bits)
+        };
+        assert_eq!(spacing(16384, 5, 5), (4, true));
+        // 9 lines of 1920 bits are still more than 512 words: further apart, as far as the body allows.
+        assert_eq!(spacing(512, 32, 256), (256, true));
+        assert_eq!(spacing(512, 4, 16), (4, false));
+        assert_eq!(spacing(1, 1, 1), (1, false));
+    }
+
+    #[test]
+    fn both_kinds_of_memory_keep_what_was_set() {
+        for (words, spacing) in [(16384, 64), (512, 1)] {
+            let mut words = vec![u32::MAX; words];
+            let mut marks = Marks::new(&mut words, 1920, 1080, spacing, spacing);
+            let row = marks.rows(1080).nth(3).unwrap();
+            assert!(marks.has_row(row));
+            let columns = || (0..1920u16).step_by(7);
+            assert!(columns().all(|x| !marks.get(x, row)));
+            for x in columns() {
+                marks.set(x, row);
+            }
+            let kept = columns().filter(|&x| marks.get(x, row)).count();
+            assert!(kept * 10 > columns().count() * 9 && !marks.get(1, row), "{kept}");
+        }
     }
 }

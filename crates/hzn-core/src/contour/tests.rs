@@ -38,7 +38,7 @@ impl Bitmap {
         let region = Region::<f64>::whole(self.w, self.h);
         let scene = Scene { picture: &self.grey(), region: &region, level: 128, observer: &Unobserved };
         let mut bits = vec![0u32; 4096];
-        let mut marks = Marks::new(&mut bits, self.w, self.h, 1);
+        let mut marks = Marks::new(&mut bits, self.w, self.h, 1, 1);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
         scene.each_crossing(&mut marks, |start, dark, marks| {
@@ -58,7 +58,7 @@ impl Bitmap {
         let region = Region::<f64>::whole(self.w, self.h);
         let scene = Scene { picture: &self.grey(), region: &region, level: 128, observer: &Unobserved };
         let mut bits = vec![0u32; 4096];
-        let mut marks = Marks::new(&mut bits, self.w, self.h, 1);
+        let mut marks = Marks::new(&mut bits, self.w, self.h, 1, 1);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
         scene.each_start(1, |start| {

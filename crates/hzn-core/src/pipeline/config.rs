@@ -4,6 +4,9 @@ use crate::error::{ConfigError, Limit, require};
 use crate::image::Channel;
 use crate::{binarize, body, camera, candidates, contour, covariance, estimate, recover, region, reject, select};
 
+/// Most bodies in one picture.
+pub const MAX_BODIES: usize = 3;
+
 /// A sensor: the camera, the body it looks for, and every stage's parameters.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
@@ -16,6 +19,9 @@ pub struct Config {
     /// The body.
     #[cfg_attr(feature = "serde", serde(default))]
     pub body: body::Config,
+    /// Several bodies in one picture, instead of `body`, in the order in which they are looked for.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "heapless::Vec::is_empty"))]
+    pub bodies: heapless::Vec<body::Config, MAX_BODIES>,
     /// How a pixel becomes one brightness.
     #[cfg_attr(feature = "serde", serde(default))]
     pub input: Input,
@@ -74,6 +80,7 @@ impl Config {
             camera,
             mount: None,
             body: body::Config::default(),
+            bodies: heapless::Vec::new(),
             input: Input::default(),
             gate: binarize::Gate::default(),
             binarize: binarize::Config::default(),
@@ -86,6 +93,15 @@ impl Config {
             select: select::Config::default(),
             recover: recover::Config::default(),
         }
+    }
+
+    /// The bodies that are looked for, one or several.
+    pub fn each_body(&self) -> &[body::Config] {
+        if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
+    }
+    /// As [`Self::each_body`], to be changed.
+    pub fn each_body_mut(&mut self) -> &mut [body::Config] {
+        if self.bodies.is_empty() { core::slice::from_mut(&mut self.body) } else { &mut self.bodies }
     }
 
     /// Checks every field but the lens, which [`camera::Camera::try_new`] checks.
@@ -103,7 +119,9 @@ impl Config {
                 Limit::Rule("the quaternion's squared length must be 1 (scalar first)"),
             )?;
         }
-        self.body.check()?;
+        for (which, body) in self.each_body().iter().enumerate() {
+            body.check().map_err(|e| ConfigError { body: (!self.bodies.is_empty()).then_some(which as u8), ..e })?;
+        }
         self.gate.check()?;
         self.binarize.check()?;
         self.mask.check(&self.camera)?;

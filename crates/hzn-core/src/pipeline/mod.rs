@@ -14,7 +14,7 @@ mod report;
 #[cfg(test)]
 mod golden;
 
-pub use config::{Config, Input, Mount};
+pub use config::{Config, Input, MAX_BODIES, Mount};
 pub use observer::{Observer, Unobserved};
 pub use optional::{OPTIONAL, Optional, lacking};
 pub use preset::Preset;
@@ -27,7 +27,7 @@ use crate::contour::{End, Marks, Scene, Thinned};
 use crate::error::ConfigError;
 use crate::frames::{Body, Cam, Cov3, Rotation, UnitVec3};
 use crate::image::Pixels;
-use crate::linalg::basis;
+use crate::linalg::{V3, basis};
 use crate::pixel::Pixel;
 use crate::real::Real;
 use crate::region::Region;
@@ -106,12 +106,20 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     pub fn region(&self) -> &Region<T> {
         &self.region
     }
-    /// Checks what is known about a picture and works out the cone to expect.
+    /// Checks what is known about a picture and works out the cone to expect: of the body, or of the first of several.
     ///
     /// # Errors
     /// An altitude or a position that cannot be.
     pub fn expect(&self, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
-        Expected::new(&self.config.body, frame)
+        self.expect_body(0, frame)
+    }
+    /// As [`Self::expect`], of the body number `which` of [`Config::each_body`], from 0.
+    ///
+    /// # Errors
+    /// An altitude or a position that cannot be; a number beyond the last.
+    pub fn expect_body(&self, which: usize, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+        let body = self.config.each_body().get(which).ok_or(FrameError::NoBody)?;
+        Ok(Expected { which: which as u8, ..Expected::new(body, frame)? })
     }
     /// Finds the limb. Total: any picture gives a report. One of another size than the camera's is `rejected` at the
     /// first stage.
@@ -125,6 +133,42 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         expected: &Expected<T>,
         observer: &O,
     ) -> Report<T> {
+        self.process_beside(picture, expected, &[], observer)
+    }
+    /// Finds several bodies in one picture, one after the other in the order of `expected`; at most [`MAX_BODIES`].
+    /// An edge on the limb of one that was found is not taken for another's.
+    pub fn process_each<P: Pixels>(&mut self, picture: &P, expected: &[Expected<T>]) -> Reports<T> {
+        self.process_each_observed(picture, expected, &Unobserved)
+    }
+    /// As [`Self::process_each`], watched.
+    pub fn process_each_observed<P: Pixels, O: Observer<T>>(
+        &mut self,
+        picture: &P,
+        expected: &[Expected<T>],
+        observer: &O,
+    ) -> Reports<T> {
+        let mut reports = Reports::new();
+        let mut taken = heapless::Vec::<Taken<T>, MAX_BODIES>::new();
+        for one in expected {
+            observer.body(one.which);
+            let report = self.process_beside(picture, one, &taken, observer);
+            let found = report.solution.as_ref();
+            let found = found.map(|s| Taken { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
+            // There is room for as many as there can be bodies.
+            if reports.push(report).is_err() || found.is_some_and(|f| taken.push(f).is_err()) {
+                break;
+            }
+        }
+        reports
+    }
+
+    fn process_beside<P: Pixels, O: Observer<T>>(
+        &mut self,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+    ) -> Report<T> {
         let mut report = Report {
             status: Status::Rejected,
             stage: Stage::Binarize,
@@ -134,7 +178,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             solution: None,
         };
         if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
-            self.look(picture, expected, observer, &mut report);
+            self.look(picture, expected, taken, observer, &mut report);
         }
         observer.leave();
         report
@@ -144,19 +188,16 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         &mut self,
         picture: &P,
         expected: &Expected<T>,
+        taken: &[Taken<T>],
         observer: &O,
         report: &mut Report<T>,
     ) {
         observer.enter(Stage::Binarize);
         let config = &self.config;
-        let level = match binarize::split(
-            picture,
-            &self.region,
-            &config.gate,
-            &config.binarize,
-            config.reject.seed,
-            observer,
-        ) {
+        let body = config.each_body().get(usize::from(expected.which));
+        let levels = body.and_then(|b| b.binarize.as_ref()).unwrap_or(&config.binarize);
+        let noise = body.and_then(|b| b.covariance.as_ref()).unwrap_or(&config.covariance);
+        let level = match binarize::split(picture, &self.region, &config.gate, levels, config.reject.seed, observer) {
             Ok(level) => level.level,
             Err(status) => {
                 report.status = status;
@@ -167,8 +208,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
         let scene = Scene { picture, region: &self.region, level, observer };
-        let spacing = config.contour.line_spacing_px.unwrap_or_else(|| line_spacing(expected, &self.camera));
-        let mut marks = Marks::new(&mut self.marks, self.region.width(), self.region.height(), spacing);
+        let (narrow, widest) = line_spacing(expected, &self.camera);
+        let (spacing, widest) = config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
+        let mut marks = Marks::new(&mut self.marks, self.region.width(), self.region.height(), spacing, widest);
         // What is narrower on the border than a search line is apart from the next is no limb.
         let stride = spacing.min(self.region.width().min(self.region.height()) / BORDER_LOOKS).max(1);
         let mut judge = Judge {
@@ -176,6 +218,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             camera: &self.camera,
             cam_to_body: self.cam_to_body.as_ref(),
             expected,
+            taken,
+            noise,
+            min_points: config.candidates.min_points.min(select::small(expected.sin, &self.camera, 2)),
             observer,
             blocks: &mut self.blocks,
             steps: config.contour.max_steps,
@@ -215,14 +260,47 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
 /// than what lies between, and each look at a column is a page of memory.
 const BORDER_LOOKS: u16 = 128;
 
-/// Rows between search lines: a quarter of the least extent of the body's disc, so that a crescent is crossed too.
+/// Rows between search lines, and the most where memory is short: the least extent of the body's disc; a quarter of it
+/// where there are crescents, which are to be crossed too.
 ///
 /// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows; the lens's own minimum is taken for half of f,
 /// which every lens in use exceeds.
-fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> u16 {
+fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u16) {
     let (_, fy) = camera.focal_px();
-    let rows = expected.half_angle_rad() * fy * T::of(0.25);
-    rows.to_i32().clamp(1, 64) as u16
+    let disc = expected.half_angle_rad() * fy;
+    let narrow = if expected.phases { disc * T::of(0.25) } else { disc };
+    (narrow.to_i32().clamp(1, 64) as u16, disc.to_i32().clamp(1, 256) as u16)
+}
+
+/// Reports of several bodies, in the order in which they were looked for.
+pub type Reports<T> = heapless::Vec<Report<T>, MAX_BODIES>;
+
+/// The limb of a body that was found in the same picture before.
+struct Taken<T> {
+    e: V3<T>,
+    c: T,
+}
+
+/// Points within this many thresholds of another body's limb are on it: a limb's other levels lie beside it.
+const TAKEN_THRESHOLDS: f64 = 3.0;
+
+impl<T: Real> Taken<T> {
+    /// Takes out the points on this limb, and counts them.
+    fn withdraw(&self, blocks: &mut [Block<T>], threshold_px: T) -> u32 {
+        let limit = threshold_px * T::of(TAKEN_THRESHOLDS);
+        let mut count = 0;
+        for block in blocks {
+            for lane in 0..LANES {
+                let [gu, gv] = block.gradient_at(lane, &self.e);
+                let r = self.c - block.ray(lane).dot(&self.e);
+                if block.weight[lane] > T::ZERO && r * r <= limit * limit * (gu * gu + gv * gv) {
+                    block.clear(lane);
+                    count += 1;
+                }
+            }
+        }
+        count
+    }
 }
 
 /// Answers more than five degrees apart contradict each other, and one is not better than the other unless its score
@@ -236,6 +314,10 @@ struct Judge<'a, T, O> {
     camera: &'a Camera<T>,
     cam_to_body: Option<&'a Rotation<Cam, Body, T>>,
     expected: &'a Expected<T>,
+    taken: &'a [Taken<T>],
+    noise: &'a covariance::Config,
+    /// Shortest edge, border pixels.
+    min_points: u16,
     observer: &'a O,
     blocks: &'a mut [Block<T>],
     steps: u32,
@@ -279,7 +361,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
             return;
         }
         let length = edge.total();
-        if length < u32::from(self.config.candidates.min_points) {
+        if length < u32::from(self.min_points) {
             self.short += 1;
             return;
         }
@@ -325,6 +407,12 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         undistort::to_rays(self.camera, blocks);
 
         enter(self.report, self.observer, Stage::Reject);
+        let threshold = T::of(config.reject.threshold_px);
+        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, threshold)).sum();
+        if on_another * 2 > points.count {
+            outcome.verdict = Verdict::Taken;
+            return (outcome, None);
+        }
         let (fx, fy) = self.camera.focal_px();
         let focal = (fx + fy) * T::of(0.5);
         let Some(consensus) = reject::keep(blocks, points.count, self.expected, focal, &config.reject) else {
@@ -334,8 +422,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
 
         enter(self.report, self.observer, Stage::Estimate);
         outcome.verdict = Verdict::NoFit;
-        let threshold = T::of(config.reject.threshold_px);
-        let fit = estimate::fit(blocks, &consensus, self.expected, threshold, &config.estimate, &config.covariance);
+        let fit = estimate::fit(blocks, &consensus, self.expected, threshold, &config.estimate, self.noise);
         let Some(fit) = fit else { return (outcome, None) };
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;
@@ -346,7 +433,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         }
 
         enter(self.report, self.observer, Stage::Covariance);
-        let fused = covariance::fuse(blocks, &fit, self.expected, &config.covariance, &config.estimate);
+        let fused = covariance::fuse(blocks, &fit, self.expected, self.noise, &config.estimate);
         let Some(fused) = fused else { return (outcome, None) };
 
         enter(self.report, self.observer, Stage::Select);
@@ -357,7 +444,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         let [p11, p12, p22] = fused.p;
         let covariance = Cov3::from_tangent(&b1, &b2, [p11 + shape * shape, p12, p22 + shape * shape]);
         let sigma = covariance.sigma_max_rad();
-        let judged = select::judge(&fit, &fused, sigma, blocks, scene, self.camera, &config.select);
+        let judged = select::judge(&fit, &fused, sigma, self.expected, blocks, scene, self.camera, &config.select);
         outcome.verdict = judged.verdict;
         if judged.verdict != Verdict::Passed || !sigma.is_finite() {
             return (outcome, None);
@@ -418,10 +505,9 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
             report.solution = Some(best.solution);
             return;
         }
-        let fitted = report
-            .candidates
-            .iter()
-            .any(|c| !matches!(c.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers));
+        let fitted = report.candidates.iter().any(|c| {
+            !matches!(c.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken)
+        });
         report.status = if self.steps == 0 {
             Status::Truncated
         } else if fitted {

@@ -7,6 +7,8 @@ use crate::status::Stage;
 /// Called at stage boundaries and on pixel reads. Every method does nothing by default; implement what you need.
 /// Methods take `&self`: an observer that collects uses `Cell` or `RefCell`.
 pub trait Observer<T> {
+    /// The search for body number `which` of several begins, from 0. Not called when there is one.
+    fn body(&self, _which: u8) {}
     /// A stage begins; it may begin several times in a picture, once a candidate.
     fn enter(&self, _stage: Stage) {}
     /// The picture is through.

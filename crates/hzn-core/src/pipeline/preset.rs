@@ -1,8 +1,8 @@
 //! Named starting values.
 
 use crate::body::Kind;
-use crate::camera;
 use crate::pipeline::Config;
+use crate::{binarize, camera, covariance};
 
 /// Starting values of a whole sensor: what is written besides beats them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -41,23 +41,24 @@ impl Config {
         let mut config = Self::new(camera);
         match preset {
             Preset::Hzn => {}
-            Preset::Sun => disc(&mut config, Kind::Sun),
-            Preset::Moon => disc(&mut config, Kind::Moon),
+            // It saturates any camera that was not made for it; the sky beside it does not.
+            Preset::Sun => disc(&mut config, Kind::Sun, 0.9),
+            Preset::Moon => {
+                disc(&mut config, Kind::Moon, 0.25);
+                // Half of its limb is lit at most, and less of it bright.
+                config.select.min_support = 0.25;
+            }
         }
         config
     }
 }
 
-/// Braun & Barf 2022, section 5: the edge of a blooming disc stands within 3 px, alike all around.
-fn disc(config: &mut Config, kind: Kind) {
+/// A disc with a level (fraction of full scale) that it stands above: its histogram is nearly all sky. The edge of a
+/// blooming disc stands within 3 px, alike all around (Braun & Barf 2022, section 5).
+fn disc(config: &mut Config, kind: Kind, level: f64) {
     config.body.kind = kind;
-    config.body.limb_height_km = 0.0;
-    config.body.limb_height_sigma_km = 0.0;
-    config.covariance.sigma_px = 3.0;
-    config.covariance.correlation_px = 300.0;
-    // A disc at arm's length of the whole sky is a few pixels around.
-    config.candidates.min_points = 8;
-    config.select.min_inliers = 8;
+    config.binarize = binarize::Config { method: binarize::Method::Fixed, level, ..config.binarize };
+    config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, ..config.covariance };
 }
 
 #[cfg(test)]

@@ -83,6 +83,8 @@ pub enum Verdict {
     Indistinct = 10,
     /// Too much of what lies beyond the fitted limb is lit.
     NoSky = 11,
+    /// The edge is the limb of another body, which was found in the same picture before.
+    Taken = 12,
 }
 
 impl Verdict {
@@ -101,6 +103,7 @@ impl Verdict {
             Self::Unsupported => "unsupported",
             Self::Indistinct => "indistinct",
             Self::NoSky => "no-sky",
+            Self::Taken => "taken",
         }
     }
 }
