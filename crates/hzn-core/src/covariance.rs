@@ -6,6 +6,9 @@
 //! c₁ = b₁ and c_{j+1} = ρ_j c_j + b_{j+1}, X = Σ (1 − ρ_j²) c_j c_jᵀ, the last ρ being 0. Taking the errors for
 //! independent instead would give a sigma some twenty times too small.
 
+#[cfg(feature = "dlr")]
+pub(crate) mod braun_barf;
+
 use crate::block::{Block, LANES};
 use crate::body::Expected;
 use crate::error::{ConfigError, above, between};
@@ -20,6 +23,10 @@ pub enum Method {
     /// N⁻¹ X N⁻¹ of the fit, X with the correlated errors of the edge, and the expected half-angle fused.
     #[default]
     Sandwich,
+    /// That of the direct nadir, for every estimate; the expected half-angle is not fused, and the residuals raise
+    /// nothing (Braun & Barf 2022, (33)).
+    #[cfg(feature = "dlr")]
+    BraunBarf,
 }
 
 /// `[covariance]` of sensor.toml: edge errors as a Gauss-Markov process along the limb.
@@ -32,11 +39,20 @@ pub struct Config {
     pub sigma_px: f64,
     /// Length along the edge over which errors stay alike, in pixels; 0 for white errors.
     pub correlation_px: f64,
+    /// For `braun-barf`: the largest variance in every direction (Braun & Barf 2022, (37)). Too careful by far.
+    #[cfg(feature = "dlr")]
+    pub overbound: bool,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { method: Method::Sandwich, sigma_px: 1.0, correlation_px: 300.0 }
+        Self {
+            method: Method::Sandwich,
+            sigma_px: 1.0,
+            correlation_px: 300.0,
+            #[cfg(feature = "dlr")]
+            overbound: false,
+        }
     }
 }
 
@@ -72,6 +88,10 @@ pub(crate) fn fuse<T: Real>(
     config: &Config,
     estimate: &estimate::Config,
 ) -> Option<Fused<T>> {
+    #[cfg(feature = "dlr")]
+    if config.method == Method::BraunBarf {
+        return braun_barf::fused(blocks, fit, config);
+    }
     let (b1, b2) = basis(&fit.e);
     let (sums, mean) = (&fit.sums, fit.mean);
     let x = correlated(blocks, &fit.e, &b1, &b2, mean, T::of(config.correlation_px));

@@ -9,6 +9,11 @@
 //! errors. With the weights so found the half-angle is then fitted freely, for the covariance, for the altitude
 //! estimate, and for the test of the candidate; `covariance` fuses the two.
 
+#[cfg(feature = "dlr")]
+pub(crate) mod conic;
+#[cfg(feature = "dlr")]
+pub(crate) mod direct;
+
 use crate::block::{Block, LANES, sum};
 use crate::body::Expected;
 use crate::covariance;
@@ -37,6 +42,12 @@ pub enum Method {
     /// Gauss-Newton on the sphere with Tukey's weights and the expected half-angle.
     #[default]
     Sphere,
+    /// Linear least squares on the plane z = 1, half-angle free (Braun & Barf 2022, (24)).
+    #[cfg(feature = "dlr")]
+    Direct,
+    /// The axis of the ellipse or hyperbola through the points (Braun & Barf 2022, (17), (18) corrected).
+    #[cfg(feature = "dlr")]
+    Conic,
 }
 
 /// `[estimate]` of sensor.toml.
@@ -101,6 +112,10 @@ pub(crate) fn fit<T: Real>(
 ) -> Option<Fit<T>> {
     let Cone { at, mean, sums, free } = match config.method {
         Method::Sphere => sphere(blocks, start, expected, threshold_px, config, noise)?,
+        #[cfg(feature = "dlr")]
+        Method::Direct => held(blocks, start, threshold_px, direct::fit)?,
+        #[cfg(feature = "dlr")]
+        Method::Conic => held(blocks, start, threshold_px, conic::fit)?,
     };
     let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
     for block in blocks.iter() {

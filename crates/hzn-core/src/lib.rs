@@ -73,6 +73,8 @@ pub mod pixel;
 pub mod real;
 pub mod region;
 mod rng;
+#[cfg(feature = "dlr")]
+pub mod section;
 pub mod status;
 
 // Stages, in the order of the data's way.

@@ -5,6 +5,9 @@
 //! wrong ones cost next to nothing, then scored by truncated squares on a part of the points. With 80 % outliers 574
 //! draws find the limb with 99 % probability.
 
+#[cfg(feature = "dlr")]
+mod ransac;
+
 use crate::block::{Block, LANES, sum};
 use crate::body::Expected;
 use crate::error::{ConfigError, Limit, above, between, require};
@@ -23,6 +26,9 @@ pub enum Method {
     TwoPoint,
     /// Every point is taken.
     None,
+    /// RANSAC on three points, every point counted in every draw (Braun & Barf 2022, 3.6).
+    #[cfg(feature = "dlr")]
+    Ransac,
 }
 
 /// `[reject]` of sensor.toml.
@@ -90,6 +96,8 @@ pub(crate) fn keep<T: Real>(
             let (e, c) = through_three(&a, &mid, &b)?;
             return Some(Consensus { e, c, draws: 1, all: true });
         }
+        #[cfg(feature = "dlr")]
+        Method::Ransac => return ransac::keep(blocks, count, config),
     };
     for block in blocks {
         let g = block.gradient(&best.e);

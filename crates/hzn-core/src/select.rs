@@ -1,5 +1,8 @@
 //! Gates and choice: whether a fitted cone is the body's limb, and which of several is.
 
+#[cfg(feature = "dlr")]
+mod published;
+
 use crate::block::{Block, LANES};
 use crate::body::Expected;
 use crate::camera::Camera;
@@ -37,6 +40,14 @@ pub struct Config {
     /// Largest part of what lies beyond the fitted limb that may be lit, 0 to 1. Beyond a limb is the sky, but for
     /// what stands before it; beyond the edge of a cloud are other clouds.
     pub max_lit_sky: f64,
+    /// Whether some of the limb of the expected half-angle about the fitted axis must lie in the picture.
+    #[cfg(feature = "dlr")]
+    pub limb_in_view: bool,
+    /// Largest mean square distance of the points from the conic section of the expected half-angle about the fitted
+    /// axis, along its principal axis, in focal lengths squared; above 0. Left out: any.
+    #[cfg(feature = "dlr")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub max_section_residual: Option<f64>,
 }
 
 impl Default for Config {
@@ -49,6 +60,10 @@ impl Default for Config {
             max_sigma_deg: 10.0,
             min_support: 0.4,
             max_lit_sky: 0.15,
+            #[cfg(feature = "dlr")]
+            limb_in_view: false,
+            #[cfg(feature = "dlr")]
+            max_section_residual: None,
         }
     }
 }
@@ -58,6 +73,10 @@ impl Config {
         require(self.min_inliers >= 8, "select.min_inliers", f64::from(self.min_inliers), Limit::AtLeast(8.0))?;
         if let Some(arc) = self.min_arc_px {
             between("select.min_arc_px", arc, 0.0, 1e6)?;
+        }
+        #[cfg(feature = "dlr")]
+        if let Some(limit) = self.max_section_residual {
+            above("select.max_section_residual", limit, 0.0)?;
         }
         above("select.max_rms_px", self.max_rms_px, 0.0)?;
         above("select.max_half_angle_sigma", self.max_half_angle_sigma, 0.0)?;
@@ -116,6 +135,11 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::NoSky
     } else {
         Verdict::Passed
+    };
+    #[cfg(feature = "dlr")]
+    let verdict = match verdict {
+        Verdict::Passed => published::verdict(fit, expected, blocks, camera, scene.region, config).unwrap_or(verdict),
+        failed => failed,
     };
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
 }

@@ -20,6 +20,7 @@ const VOCABULARY: &[&str] = &[
     "body",
     "error",
     "region",
+    "section",
     "status",
 ];
 const STAGES: &[&str] =

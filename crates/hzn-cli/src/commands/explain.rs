@@ -281,6 +281,9 @@ impl Told<'_> {
             }
             Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
             Verdict::Taken => "it is the limb of another body, found before".into(),
+            Verdict::OutOfView => {
+                "the limb that is expected about the fitted axis is not in the picture (select.limb_in_view)".into()
+            }
             Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
         }
     }

@@ -74,6 +74,11 @@ impl<T: Real, const N: usize> Triangle<T, N> {
         }
     }
 
+    /// Its rows.
+    pub(crate) fn rows(&self) -> &[[T; N]; N] {
+        &self.0
+    }
+
     /// Singular values of the fed rows, smallest first, and the right singular vectors as rows in the same order: one
     /// column of R after another is made orthogonal to the rest (Hestenes 1958), which keeps small values exact.
     pub(crate) fn singular(&self) -> ([T; N], [[T; N]; N]) {

@@ -15,19 +15,19 @@ use serde_json::Value;
 use std::vec;
 use std::vec::Vec;
 
-fn load(text: &str) -> Vec<Value> {
+pub(super) fn load(text: &str) -> Vec<Value> {
     serde_json::from_str::<Value>(text).unwrap()["cases"].as_array().unwrap().clone()
 }
-fn num(v: &Value) -> f64 {
+pub(super) fn num(v: &Value) -> f64 {
     v.as_f64().unwrap()
 }
-fn triple(v: &Value) -> [f64; 3] {
+pub(super) fn triple(v: &Value) -> [f64; 3] {
     core::array::from_fn(|i| num(&v[i]))
 }
-fn rows(v: &Value) -> [[f64; 3]; 3] {
+pub(super) fn rows(v: &Value) -> [[f64; 3]; 3] {
     core::array::from_fn(|i| triple(&v[i]))
 }
-fn camera_config(v: &Value) -> CameraConfig {
+pub(super) fn camera_config(v: &Value) -> CameraConfig {
     let model = match v["model"].as_str().unwrap() {
         "pinhole" => Model::Pinhole,
         _ => Model::Equidistant,
@@ -41,12 +41,12 @@ fn camera_config(v: &Value) -> CameraConfig {
         ..CameraConfig::ideal(model, w, h, 1.0)
     }
 }
-fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
+pub(super) fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
     UnitVec3::try_new(v.map(T::of)).unwrap()
 }
 
 /// Edge points as the candidates stage leaves them; the lit side is where the axis `e` lies.
-fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
+pub(super) fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
     let mut blocks = vec![Block::<T>::default(); points.len().div_ceil(LANES)];
     for (i, &(u, v)) in points.iter().enumerate() {
         let p = ImagePoint { u: T::of(u), v: T::of(v) };
@@ -369,15 +369,15 @@ fn covariance_equals_the_dense_product() {
 }
 
 /// Gaussian numbers for the Monte Carlo, by the sum of twelve.
-struct Gauss(crate::rng::Rng);
+pub(super) struct Gauss(pub(super) crate::rng::Rng);
 impl Gauss {
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         (0..12).map(|_| f64::from(self.0.below(1 << 24)) / f64::from(1 << 24)).sum::<f64>() - 6.0
     }
 }
 
 /// Points of the limb in view, one per `step_px` along it, in order.
-fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> Vec<(f64, f64)> {
+pub(super) fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> Vec<(f64, f64)> {
     let (b1, b2) = basis(e.v());
     let s = libm::sqrt(1.0 - c * c);
     let inside = |p: &ImagePoint<f64>| {

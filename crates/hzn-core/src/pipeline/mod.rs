@@ -13,6 +13,8 @@ mod report;
 
 #[cfg(test)]
 mod golden;
+#[cfg(all(test, feature = "dlr"))]
+mod golden_dlr;
 
 pub use config::{Config, Input, MAX_BODIES, Mount};
 pub use observer::{Observer, Unobserved};

@@ -24,6 +24,11 @@ macro_rules! optional {
 pub const OPTIONAL: &[Optional] = optional! {
     "erf": "candidates.sub_pixel" = "erf";
     "zju": "candidates.sub_pixel" = "zernike";
+    "dlr": "covariance.method" = "braun-barf";
+    "dlr": "estimate.method" = "conic";
+    "dlr": "estimate.method" = "direct";
+    "dlr": "preset" = "dlr-2022";
+    "dlr": "reject.method" = "ransac";
 };
 
 /// The feature that a value of a key needs and this build lacks.

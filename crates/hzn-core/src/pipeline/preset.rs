@@ -14,11 +14,20 @@ pub enum Preset {
     Sun,
     /// The Moon, lit from any side.
     Moon,
+    /// The optical horizon sensor of Braun & Barf 2022.
+    #[cfg(feature = "dlr")]
+    Dlr2022,
 }
 
 impl Preset {
     /// Every preset of this build.
-    pub const ALL: &[Self] = &[Self::Hzn, Self::Sun, Self::Moon];
+    pub const ALL: &[Self] = &[
+        Self::Hzn,
+        Self::Sun,
+        Self::Moon,
+        #[cfg(feature = "dlr")]
+        Self::Dlr2022,
+    ];
 
     /// The name used in files.
     pub const fn name(self) -> &'static str {
@@ -26,6 +35,8 @@ impl Preset {
             Self::Hzn => "hzn",
             Self::Sun => "sun",
             Self::Moon => "moon",
+            #[cfg(feature = "dlr")]
+            Self::Dlr2022 => "dlr-2022",
         }
     }
 
@@ -48,6 +59,8 @@ impl Config {
                 // Half of its limb is lit at most, and less of it bright.
                 config.select.min_support = 0.25;
             }
+            #[cfg(feature = "dlr")]
+            Preset::Dlr2022 => dlr_2022(&mut config),
         }
         config
     }
@@ -59,6 +72,36 @@ fn disc(config: &mut Config, kind: Kind, level: f64) {
     config.body.kind = kind;
     config.binarize = binarize::Config { method: binarize::Method::Fixed, level, ..config.binarize };
     config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, ..config.covariance };
+}
+
+/// Braun & Barf 2022 as flown on ATEK: fixed threshold, whole pixels, RANSAC on three points, the direct nadir, the
+/// overbound of its covariance, and none of the gates that came with `hzn`.
+#[cfg(feature = "dlr")]
+fn dlr_2022(config: &mut Config) {
+    use crate::{candidates, estimate, reject};
+    config.binarize.method = binarize::Method::Fixed;
+    config.candidates.sub_pixel = candidates::SubPixel::None;
+    config.candidates.keep_points = 0;
+    config.reject.method = reject::Method::Ransac;
+    config.estimate.method = estimate::Method::Direct;
+    config.estimate.half_angle = estimate::HalfAngle::Free;
+    config.covariance.method = covariance::Method::BraunBarf;
+    config.covariance.overbound = true;
+    ungated(config);
+    config.select.limb_in_view = true;
+    // Section 7.3, for the Earth. Ours is the mean and not the sum, in focal lengths squared.
+    config.select.max_section_residual = Some(0.025);
+}
+
+/// Only what every fit must have.
+#[cfg(feature = "dlr")]
+fn ungated(config: &mut Config) {
+    config.select.min_arc_px = Some(0.0);
+    config.select.max_rms_px = 1e6;
+    config.select.max_half_angle_sigma = 1e6;
+    config.select.max_sigma_deg = 180.0;
+    config.select.min_support = 0.0;
+    config.select.max_lit_sky = 1.0;
 }
 
 #[cfg(test)]

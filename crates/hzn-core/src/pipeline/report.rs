@@ -85,6 +85,8 @@ pub enum Verdict {
     NoSky = 11,
     /// The edge is the limb of another body, which was found in the same picture before.
     Taken = 12,
+    /// No part of the limb that is expected about the fitted axis lies in the picture.
+    OutOfView = 13,
 }
 
 impl Verdict {
@@ -104,6 +106,7 @@ impl Verdict {
             Self::Indistinct => "indistinct",
             Self::NoSky => "no-sky",
             Self::Taken => "taken",
+            Self::OutOfView => "out-of-view",
         }
     }
 }

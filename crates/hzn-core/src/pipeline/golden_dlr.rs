@@ -1,0 +1,335 @@
+//! The methods of Braun & Barf 2022 against reference data, and each erratum of the paper against its printed form.
+
+use super::golden::{Gauss, blocks, camera_config, direction, limb, load, num, rows, triple};
+use crate::block::LANES;
+use crate::camera::{Camera, Config as CameraConfig, Model};
+use crate::covariance::braun_barf;
+use crate::estimate::{conic, direct};
+use crate::frames::{Cam, UnitVec3};
+use crate::linalg::{M3, V3, symmetric_eigen, unit};
+use crate::real::Real;
+use crate::reject;
+use std::vec::Vec;
+
+/// `nadir_cases.json`: (24) by scipy, inliers only, pinholes only.
+fn directions<T: Real>(tolerance_deg: f64) {
+    let mut compared = 0;
+    for case in load(include_str!("../../tests/golden/nadir_cases.json")) {
+        if case["reference"]["eq24_direction_c"].is_null() {
+            continue;
+        }
+        let camera = Camera::<T>::try_new(&camera_config(&case["camera"])).unwrap();
+        let points: Vec<(f64, f64)> = case["pixels"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip(case["is_outlier"].as_array().unwrap())
+            .filter(|(_, o)| o.as_i64() != Some(1) && o.as_bool() != Some(true))
+            .map(|(p, _)| (num(&p[0]), num(&p[1])))
+            .collect();
+        let truth = direction::<T>(triple(&case["true_nadir_c"]));
+        let (e, c) = direct::fit(&blocks(&camera, &points, &truth)).unwrap();
+        let want = direction::<T>(triple(&case["reference"]["eq24_direction_c"]));
+        let off = UnitVec3::<Cam, T>::assume_unit(e).angle_rad(&want).f64().to_degrees();
+        assert!(off < tolerance_deg, "{}: {off:e}", case["id"]);
+        if num(&case["noise_sigma_px"]) == 0.0 {
+            // Its length is the half-angle, whatever is assumed: the paper's "needs α" does not hold.
+            assert!((c.f64() - num(&case["cos_alpha"])).abs() < 1e-6, "{}: {c}", case["id"]);
+        }
+        compared += 1;
+    }
+    assert!(compared >= 8, "{compared}");
+}
+
+#[test]
+fn direct_nadir_equals_scipy() {
+    directions::<f64>(1e-9);
+    directions::<f32>(1e-4);
+}
+
+/// `covariance.json`: (33) by dense matrices, with the paper's correlation from sample to sample and with ours.
+fn covariances<T: Real>(tolerance: f64) {
+    let mut compared = 0;
+    for case in load(include_str!("../../tests/golden/covariance.json")) {
+        let camera = Camera::<T>::try_new(&camera_config(&case["camera"])).unwrap();
+        let points: Vec<(f64, f64)> =
+            case["pixels"].as_array().unwrap().iter().map(|p| (num(&p[0]), num(&p[1]))).collect();
+        let e = direction::<T>(triple(&case["nadir_c"]));
+        let length = num(&case["L_px"]);
+        for form in ["eq33", "eq33_arc"] {
+            // The paper's form is for pinholes.
+            if case[form].is_null() {
+                continue;
+            }
+            compared += 1;
+            let mut blocks = blocks(&camera, &points, &e);
+            for (i, step) in case["step_px"].as_array().unwrap().iter().enumerate() {
+                let step = match form {
+                    "eq33" => -length * libm::log(1.0 - 1.0 / length),
+                    _ => num(step),
+                };
+                blocks[(i + 1) / LANES].step_px[(i + 1) % LANES] = T::of(step);
+            }
+            let got = braun_barf::of(&blocks, e.v(), T::of(length)).unwrap() * T::of(num(&case["R_px2"]));
+            let want = rows(&case[form]["P_c"]);
+            let scale = want.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+            for i in 0..3 {
+                for j in 0..3 {
+                    let off = (got[(i, j)].f64() - want[i][j]).abs() / scale;
+                    assert!(off < tolerance, "{} {form} [{i}][{j}]: {off:e}", case["id"]);
+                }
+            }
+            let [bound, zero, same] = braun_barf::across(&got, e.v(), true);
+            if form == "eq33" {
+                assert!((bound.f64() / num(&case[form]["lambda_max"]) - 1.0).abs() < tolerance);
+            }
+            assert!(zero == T::ZERO && same == bound);
+            // Across the axis nothing is larger than the overbound.
+            let [a, b, d] = braun_barf::across(&got, e.v(), false);
+            assert!(a > T::ZERO && a * d > b * b && a + d < (bound + bound) * T::of(1.0001));
+        }
+    }
+    assert_eq!(compared, 6);
+}
+
+#[test]
+fn braun_barf_covariance_equals_the_dense_product() {
+    covariances::<f64>(1e-9);
+    covariances::<f32>(1e-4);
+}
+
+/// (35) as printed takes the points for one pixel apart: with the golden cases' 16 px it is wrong by a factor.
+#[test]
+fn correlation_by_sample_is_not_that_by_distance() {
+    let case = &load(include_str!("../../tests/golden/covariance.json"))[0];
+    let (printed, right) = (rows(&case["eq33"]["P_c"]), rows(&case["eq33_arc"]["P_c"]));
+    assert!(right[1][1] / printed[1][1] > 3.0);
+}
+
+/// Camera, nadir, cos α, limb.
+type Rocket = (Camera<f64>, UnitVec3<Cam, f64>, f64, Vec<(f64, f64)>);
+
+/// A pinhole 20° below the horizontal, and its exact limb from 120 km.
+fn rocket() -> Rocket {
+    let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
+    let tilt = 20f64.to_radians();
+    let e = direction([0.1, libm::cos(tilt), libm::sin(tilt)]);
+    let sin: f64 = 6_371_008.8 / (6_371_008.8 + 120e3);
+    let c = libm::sqrt(1.0 - sin * sin);
+    let points = limb(&camera, &e, c, 3.0);
+    (camera, e, c, points)
+}
+
+/// (29): the derivative of an equation's value by its edge point, left as printed and as it must be.
+#[test]
+fn error_of_an_equation_follows_from_that_of_its_point() {
+    let (_, e, c, _) = rocket();
+    let e = V3::from(e.xyz());
+    let p = V3::new(0.3, -0.35, 1.0);
+    let value = |p: &V3<f64>| c * p.norm() - p.dot(&e);
+    let right = p * (c / p.norm()) - e;
+    // As printed the left side is δpᵀ e: its derivative is e itself.
+    let printed = e;
+    for k in 0..2 {
+        let mut step = V3::new(0.0, 0.0, 0.0);
+        step[k] = 1e-6;
+        let central = (value(&(p + step)) - value(&(p - step))) / 2e-6;
+        assert!((central - right[k]).abs() < 1e-8);
+        assert!((central - printed[k]).abs() > 1e-2);
+    }
+}
+
+/// (33) with raw pixels ignores what the lens does: through a fisheye it is not what the errors are.
+#[test]
+fn covariance_goes_through_the_lens() {
+    let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 1200, 900, 500.0)).unwrap();
+    let e = direction::<f64>([0.05, 0.8, 0.6]);
+    let sin: f64 = 6371.0 / (6371.0 + 800.0);
+    let c = libm::sqrt(1.0 - sin * sin);
+    let exact = limb(&camera, &e, c, 3.0);
+    let mut gauss = Gauss(crate::rng::Rng::new(5));
+    let (sigma, runs) = (0.05, 200);
+    let mut measured = M3::zeros();
+    for _ in 0..runs {
+        let points: Vec<(f64, f64)> =
+            exact.iter().map(|p| (p.0 + sigma * gauss.next(), p.1 + sigma * gauss.next())).collect();
+        let (got, got_c) = direct::fit(&blocks(&camera, &points, &e)).unwrap();
+        let off = got * (c / got_c) - V3::from(e.xyz());
+        measured += off * off.transpose() / f64::from(runs);
+    }
+    let mut claimed = braun_barf::of(&blocks(&camera, &exact, &e), e.v(), 0.0).unwrap() * (sigma * sigma);
+    let ratio = measured.trace() / claimed.trace();
+    assert!((0.8..1.25).contains(&ratio), "{ratio}");
+    // The same points through a pinhole of that focal length: the printed form.
+    let flat = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Pinhole, 9000, 9000, 500.0)).unwrap();
+    let printed: Vec<(f64, f64)> = exact
+        .iter()
+        .map(|&(u, v)| {
+            let ray = camera.unproject(crate::pixel::ImagePoint { u, v }).unwrap();
+            flat.project(&ray).map(|p| (p.u, p.v)).unwrap()
+        })
+        .collect();
+    claimed = braun_barf::of(&blocks(&flat, &printed, &e), e.v(), 0.0).unwrap() * (sigma * sigma);
+    let ratio = measured.trace() / claimed.trace();
+    assert!(!(0.8..1.25).contains(&ratio), "the printed form must not hold: {ratio}");
+}
+
+/// The conic as a quadratic form of rays, times any factor.
+fn form(e: &V3<f64>, c: f64, factor: f64) -> [[f64; 3]; 3] {
+    let m = (e * e.transpose() - M3::identity() * (c * c)) * factor;
+    core::array::from_fn(|i| core::array::from_fn(|j| m[(i, j)]))
+}
+
+/// (18): the axis of a conic with all signs, whatever factor its coefficients have.
+#[test]
+fn axis_of_a_conic_keeps_its_signs() {
+    for e in [[-0.57, 0.79, -0.23], [0.1, 0.2, 0.97], [0.9, -0.3, 0.3], [-0.6, -0.6, 0.5]] {
+        let e = unit(&V3::from(e)).unwrap();
+        for factor in [1.0, -1.0, 3e5, -2e-7] {
+            let m = form(&e, 0.25, factor);
+            let (got, c) = conic::cone(&m, &e).unwrap();
+            assert!((got - e).norm() < 1e-12 && (c - 0.25).abs() < 1e-12, "{e:?} {factor}");
+            // As printed: roots of coefficients, the factor taken for 1.
+            let printed = V3::from_fn(|i, _| libm::sqrt((m[i][i] + 0.25 * 0.25).abs()));
+            let cannot = (printed - e).norm() > 0.1 || factor == 1.0 && e.iter().all(|x| *x > 0.0);
+            assert!(cannot, "{e:?} {factor}: {printed:?}");
+        }
+    }
+    // All eigenvalues of one sign: no cone.
+    assert!(conic::cone(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]], &V3::x()).is_none());
+}
+
+/// (20), (21): what ties the coefficients of a conic to cos α, with the last term f² as it must be and f⁴ as printed.
+#[test]
+fn coefficients_of_a_limb_fulfil_the_constraints() {
+    let e = unit(&V3::new(0.3, -0.5, 0.6)).unwrap();
+    let (c, f) = (0.3, 800.0);
+    let m = form(&e, c, 1.0);
+    let (a, cc, ff) = (m[0][0], m[1][1], m[2][2] * f * f);
+    let (d, ee) = (2.0 * m[0][2] * f, 2.0 * m[1][2] * f);
+    let c2 = c * c;
+    for (square, own) in [(d * d, a), (ee * ee, cc)] {
+        let sum = |last: f64, shared: f64| square - 4.0 * own * ff - 4.0 * (shared + ff / (f * f)) * c2 * f * f - last;
+        let right = sum(4.0 * c2 * c2 * f * f, own);
+        let scale = square.abs().max((4.0 * own * ff).abs());
+        assert!(right.abs() / scale < 1e-12, "{right}");
+        assert!(sum(4.0 * c2 * c2 * f.powi(4), own).abs() / scale > 1.0);
+        if own == cc {
+            // (21) prints A where C belongs.
+            assert!(sum(4.0 * c2 * c2 * f * f, a).abs() / scale > 1e-3);
+        }
+    }
+}
+
+/// Both estimators find a noise-free limb, ellipses, hyperbolae and (nearly) parabolae alike, in both precisions.
+fn exact<T: Real>(altitude_km: f64, tilt_deg: f64, tolerance_deg: f64) {
+    let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
+    let tilt = tilt_deg.to_radians();
+    let e = direction::<f64>([0.2, libm::cos(tilt), libm::sin(tilt)]);
+    let sin = 6371.0 / (6371.0 + altitude_km);
+    let c = libm::sqrt(1.0 - sin * sin);
+    let (points, cos) = (limb(&camera, &e, c, 5.0), c);
+    assert!(points.len() > 50, "{altitude_km} {tilt_deg}");
+    let camera = Camera::<T>::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
+    let e = direction::<T>(e.xyz());
+    let blocks = blocks(&camera, &points, &e);
+    for (name, got) in [("conic", conic::fit(&blocks)), ("direct", direct::fit(&blocks))] {
+        let (got, got_c) = got.unwrap_or_else(|| panic!("{name} {altitude_km} {tilt_deg}"));
+        let off = UnitVec3::<Cam, T>::assume_unit(got).angle_rad(&e).f64().to_degrees();
+        assert!(off < tolerance_deg, "{name} {altitude_km} km {tilt_deg}°: {off:e}");
+        assert!((got_c.f64() - cos).abs() < tolerance_deg, "{name} {got_c} {cos}");
+    }
+}
+
+#[test]
+fn conic_and_direct_find_exact_limbs() {
+    for (altitude, tilt) in [(60.0, 20.0), (240.0, 20.0), (800.0, 30.0), (6000.0, 60.0), (36000.0, 80.0)] {
+        exact::<f64>(altitude, tilt, 1e-6);
+    }
+    // A parabola: Δ = sin²α − e_z² = 0.
+    exact::<f64>(3000.0, libm::asin(6371.0 / 9371.0).to_degrees(), 1e-6);
+    exact::<f32>(800.0, 30.0, 0.01);
+    exact::<f32>(36000.0, 80.0, 0.01);
+}
+
+/// Coefficients are fitted in normalised coordinates; the conic's constraint keeps it an ellipse under noise.
+#[test]
+fn conic_bears_noise_on_a_whole_disc() {
+    let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1000, 1000, 500.0)).unwrap();
+    let e = direction::<f64>([0.1, 0.15, 1.0]);
+    let exact = limb(&camera, &e, libm::cos(0.5), 3.0);
+    let mut gauss = Gauss(crate::rng::Rng::new(9));
+    let points: Vec<(f64, f64)> = exact.iter().map(|p| (p.0 + 0.3 * gauss.next(), p.1 + 0.3 * gauss.next())).collect();
+    let (got, c) = conic::fit(&blocks(&camera, &points, &e)).unwrap();
+    assert!(UnitVec3::<Cam, f64>::assume_unit(got).angle_rad(&e).to_degrees() < 0.02);
+    assert!((libm::acos(c) - 0.5).abs() < 1e-3);
+}
+
+/// What does not determine a cone gives none.
+#[test]
+fn degenerate_points_give_no_cone() {
+    let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
+    let e = direction::<f64>([0.0, 0.9, 0.4]);
+    let cases: [Vec<(f64, f64)>; 6] = [
+        Vec::new(),
+        Vec::from([(100.0, 100.0)]),
+        Vec::from([(100.0, 100.0), (200.0, 100.0)]),
+        // All in one place.
+        Vec::from([(700.5, 300.5); 40]),
+        // A straight line: the limb of a body as wide as the hemisphere.
+        (0..200).map(|i| (f64::from(i) * 9.0, 300.0)).collect(),
+        (0..200).map(|i| (f64::from(i) * 9.0, 539.5)).collect(),
+    ];
+    for points in cases {
+        let blocks = blocks(&camera, &points, &e);
+        for (e, c) in [direct::fit(&blocks), conic::fit(&blocks)].into_iter().flatten() {
+            assert!((e.norm() - 1.0).abs() < 1e-9 && c > 0.0 && c < 1.0, "{points:?}: {e:?} {c}");
+        }
+        if points.len() < 3 {
+            assert!(direct::fit(&blocks).is_none());
+        }
+        if points.len() < 5 {
+            assert!(conic::fit(&blocks).is_none());
+        }
+        assert!(braun_barf::of(&blocks, e.v(), 300.0).is_none_or(|p| p.iter().all(|v| v.is_finite())));
+    }
+}
+
+/// Three-point RANSAC: half of the points anywhere, and what is far from the limb has no weight afterwards.
+#[test]
+fn ransac_leaves_outliers_out() {
+    let (camera, e, c, exact) = rocket();
+    let mut rng = crate::rng::Rng::new(3);
+    let points: Vec<(f64, f64)> = exact
+        .iter()
+        .map(|&p| match rng.below(2) {
+            0 => (f64::from(rng.below(1920)), f64::from(rng.below(1080))),
+            _ => p,
+        })
+        .collect();
+    let mut blocks = blocks(&camera, &points, &e);
+    let body = crate::body::Config { altitude_km: Some(120.0), ..Default::default() };
+    let expected = crate::body::Expected::new(&body, &crate::body::Frame::default()).unwrap();
+    let config = reject::Config { method: reject::Method::Ransac, threshold_px: 1.0, ..Default::default() };
+    let found = reject::keep(&mut blocks, points.len() as u32, &expected, 888.97, &config).unwrap();
+    assert!(found.draws < config.max_draws);
+    for (i, p) in points.iter().enumerate() {
+        let near = exact.iter().any(|q| libm::hypot(p.0 - q.0, p.1 - q.1) < 5.0);
+        if blocks[i / LANES].weight[i % LANES] > 0.0 {
+            assert!(near, "{p:?}");
+        }
+    }
+    let (got, got_c) = direct::fit(&blocks).unwrap();
+    assert!(UnitVec3::<Cam, f64>::assume_unit(got).angle_rad(&e).to_degrees() < 0.2 && (got_c - c).abs() < 0.01);
+    let few = reject::keep(&mut blocks[..1], 2, &expected, 888.97, &config);
+    assert!(few.is_none());
+}
+
+/// The eigenvalues of (33) are those of the overbound: (37) is the largest.
+#[test]
+fn overbound_is_the_largest_eigenvalue() {
+    let p = M3::new(2.0, 0.3, 0.1, 0.3, 1.0, -0.2, 0.1, -0.2, 0.5);
+    let e = unit(&V3::new(0.0, 0.6, 0.8)).unwrap();
+    let ([_, _, largest], _) = symmetric_eigen::<f64, 3>(core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)])));
+    assert_eq!(braun_barf::across(&p, &e, true), [largest, 0.0, largest]);
+}

@@ -1,0 +1,70 @@
+//! Gates of the published systems.
+
+use super::Config;
+use crate::block::{Block, LANES};
+use crate::body::Expected;
+use crate::camera::Camera;
+use crate::estimate::Fit;
+use crate::frames::UnitVec3;
+use crate::linalg::{V3, basis};
+use crate::pipeline::Verdict;
+use crate::real::Real;
+use crate::region::Region;
+use crate::section::Section;
+
+/// The gate that a fit fails, if it does.
+pub(super) fn verdict<T: Real>(
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+    blocks: &[Block<T>],
+    camera: &Camera<T>,
+    region: &Region<T>,
+    config: &Config,
+) -> Option<Verdict> {
+    let cos = if expected.free { fit.c } else { expected.cos };
+    if config.limb_in_view && !in_view(&fit.e, cos, camera, region) {
+        return Some(Verdict::OutOfView);
+    }
+    if let Some(limit) = config.max_section_residual
+        && !section_residual(&fit.e, cos, blocks).is_some_and(|r| r <= T::of(limit))
+    {
+        return Some(Verdict::Residuals);
+    }
+    None
+}
+
+/// Places around the limb that are looked at.
+const PLACES: i32 = 128;
+
+/// Whether any of the limb of the cone (e, c) lies in the region: a nadir from the edge of something else puts it
+/// elsewhere (Braun & Barf 2022, 3.5).
+fn in_view<T: Real>(e: &V3<T>, c: T, camera: &Camera<T>, region: &Region<T>) -> bool {
+    let (b1, b2) = basis(e);
+    let sin = (T::one() - c * c).most(T::ZERO).sqrt();
+    (0..PLACES).any(|i| {
+        let (s, cos) = T::of(f64::from(i) * core::f64::consts::TAU / f64::from(PLACES)).sin_cos();
+        let Some(p) = camera.project(&UnitVec3::assume_unit(e * c + (b1 * cos + b2 * s) * sin)) else { return false };
+        let half = T::of(0.5);
+        let inside = p.u > -half && p.v > -half;
+        let (x, y) = ((p.u + half).to_i32(), (p.v + half).to_i32());
+        inside && u16::try_from(x).is_ok_and(|x| u16::try_from(y).is_ok_and(|y| region.contains(x, y)))
+    })
+}
+
+/// Mean square of the points' distances from the conic section of the cone (e, c), along its principal x axis, in
+/// focal lengths squared: (28) as a mean, so that it does not grow with the edge. `None` where there is no section or
+/// no point.
+fn section_residual<T: Real>(e: &V3<T>, c: T, blocks: &[Block<T>]) -> Option<T> {
+    let section = Section::new(&UnitVec3::assume_unit(*e), c)?;
+    let (mut total, mut count) = (T::ZERO, T::ZERO);
+    for b in blocks {
+        for l in 0..LANES {
+            if b.weight[l] > T::ZERO && b.s[2][l] > T::of(0.03) {
+                let d = section.distance([b.s[0][l] / b.s[2][l], b.s[1][l] / b.s[2][l]]);
+                total += d * d;
+                count += T::one();
+            }
+        }
+    }
+    (count > T::ZERO).then(|| total / count)
+}

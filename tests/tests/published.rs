@@ -1,0 +1,36 @@
+//! The presets of published systems on rendered scenes: they answer what they should, as well as their methods can.
+
+use hzn_core::{Config, Preset};
+use hzn_sim::flight::{Flight, rocket};
+use hzn_tests::sensors::look;
+use hzn_tests::{Sensors, Tally};
+
+/// A flight through the f64 sensor of a preset, which is told the flight's camera, body and mask.
+fn fly(flight: &Flight, preset: Preset, change: impl Fn(&mut Config)) -> Tally {
+    let mut config = Config::preset(preset, flight.sensor.camera.clone());
+    config.body = flight.sensor.body.clone();
+    config.mask = flight.sensor.mask.clone();
+    change(&mut config);
+    let mut sensors = Sensors::new(&config);
+    let mut tally = Tally::default();
+    for frame in &flight.frames {
+        let truth = frame.truth().unwrap();
+        let answer = look(&mut sensors.host, &frame.render().unwrap().view(), &frame.known());
+        if let Err(status) = &answer {
+            println!("{}: {status}", frame.file);
+        }
+        tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
+    }
+    println!("{} {}: {tally}", flight.name, preset.name());
+    tally
+}
+
+/// Braun & Barf 2022 on what they built it for. Two thousand points make up for whole pixels and a free half-angle; the
+/// overbound is far too careful.
+#[test]
+fn braun_barf_on_a_rocket_flight() {
+    let tally = fly(&rocket(1920, 1080, 8, 1), Preset::Dlr2022, |_| {});
+    assert_eq!(tally.answered(), tally.frames, "{tally}");
+    assert!(tally.rms_deg() < 0.1 && tally.worst_deg() < 0.5, "{tally}");
+    assert!(tally.mean_nees() < 0.5, "{tally}");
+}
