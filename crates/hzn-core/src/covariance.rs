@@ -8,6 +8,8 @@
 
 #[cfg(feature = "dlr")]
 pub(crate) mod braun_barf;
+#[cfg(feature = "zju")]
+mod elliptic;
 
 use crate::block::{Block, LANES};
 use crate::body::Expected;
@@ -94,9 +96,15 @@ pub(crate) fn fuse<T: Real>(
     }
     let (b1, b2) = basis(&fit.e);
     let (sums, mean) = (&fit.sums, fit.mean);
-    let x = correlated(blocks, &fit.e, &b1, &b2, mean, T::of(config.correlation_px));
+    let length_px = T::of(config.correlation_px);
     let sigma = T::of(config.sigma_px);
     let variance = (sigma * sigma).most(fit.rms_px * fit.rms_px);
+    #[cfg(feature = "zju")]
+    if let Some(quadric) = &fit.quadric {
+        let p = elliptic::covariance(blocks, quadric, length_px) * variance;
+        return fused(fit, &p, expected, estimate);
+    }
+    let x = correlated(blocks, &fit.e, &b1, &b2, mean, length_px);
     let var_c = expected.sigma_cos * expected.sigma_cos;
     if !fit.free {
         // Half-angle held at the expected one: what it is wrong by, the axis is wrong by in proportion.
@@ -109,7 +117,14 @@ pub(crate) fn fuse<T: Real>(
         let p = [p[0] + d1 * d1 * var_c, p[1] + d1 * d2 * var_c, p[2] + d2 * d2 * var_c];
         return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: None, chi2: T::ZERO });
     }
-    let p = sandwich_free(sums, &x, mean, variance)?;
+    fused(fit, &sandwich_free(sums, &x, mean, variance)?, expected, estimate)
+}
+
+/// A fit with its half-angle free and the covariance of (δ₁₂, δc) fused with the expected half-angle, unless that is to
+/// count for nothing.
+fn fused<T: Real>(fit: &Fit<T>, p: &M3<T>, expected: &Expected<T>, estimate: &estimate::Config) -> Option<Fused<T>> {
+    let (b1, b2) = basis(&fit.e);
+    let var_c = expected.sigma_cos * expected.sigma_cos;
     let var_free = p.m33;
     if estimate.half_angle == estimate::HalfAngle::Free || expected.free {
         return Some(Fused {

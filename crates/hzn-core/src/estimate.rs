@@ -13,14 +13,19 @@
 pub(crate) mod conic;
 #[cfg(feature = "dlr")]
 pub(crate) mod direct;
+#[cfg(feature = "zju")]
+mod quadric;
 
 use crate::block::{Block, LANES, sum};
 use crate::body::Expected;
 use crate::covariance;
+use crate::error::ConfigError;
 use crate::limb::Azimuth;
 use crate::linalg::{M3, V3, basis, invert_spd2, invert_spd3, unit};
 use crate::real::Real;
 use crate::reject::Consensus;
+#[cfg(feature = "zju")]
+pub(crate) use quadric::Quadric;
 
 /// What the fit takes for the half-angle of the cone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,16 +53,34 @@ pub enum Method {
     /// The axis of the ellipse or hyperbola through the points (Braun & Barf 2022, (17), (18) corrected).
     #[cfg(feature = "dlr")]
     Conic,
+    /// An elliptic cone by total least squares (Wang et al. 2022, (10) to (17)).
+    #[cfg(feature = "zju")]
+    Tls,
+    /// The same, every point weighed by what a pixel is to it (Wang et al. 2022, (18) to (21)).
+    #[cfg(feature = "zju")]
+    Wtls,
 }
 
 /// `[estimate]` of sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
     /// How the cone is fitted.
     pub method: Method,
     /// What the fit takes for the half-angle.
     pub half_angle: HalfAngle,
+    /// For `wtls`: weights are used when the axis lies further off the optical axis than this, in degrees, 0 to 180; 0
+    /// uses them always. Nearer, the result is that of `tls`.
+    #[cfg(feature = "zju")]
+    pub weigh_above_deg: f64,
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        #[cfg(feature = "zju")]
+        crate::error::between("estimate.weigh_above_deg", self.weigh_above_deg, 0.0, 180.0)?;
+        Ok(())
+    }
 }
 
 /// A fitted cone.
@@ -81,6 +104,9 @@ pub(crate) struct Fit<T> {
     pub(crate) sums: Sums<T>,
     /// Means of Bᵀs.
     pub(crate) mean: [T; 2],
+    /// The elliptic cone, of the methods that fit one: its covariance is not that of the normal equations.
+    #[cfg(feature = "zju")]
+    pub(crate) quadric: Option<Quadric<T>>,
 }
 
 /// Tukey's constant: 95 % efficiency on Gaussian errors.
@@ -110,12 +136,16 @@ pub(crate) fn fit<T: Real>(
     config: &Config,
     noise: &covariance::Config,
 ) -> Option<Fit<T>> {
-    let Cone { at, mean, sums, free } = match config.method {
+    let cone = match config.method {
         Method::Sphere => sphere(blocks, start, expected, threshold_px, config, noise)?,
         #[cfg(feature = "dlr")]
         Method::Direct => held(blocks, start, threshold_px, direct::fit)?,
         #[cfg(feature = "dlr")]
         Method::Conic => held(blocks, start, threshold_px, conic::fit)?,
+        #[cfg(feature = "zju")]
+        Method::Tls => elliptic(blocks, start, threshold_px, HALF_TURN_RAD)?,
+        #[cfg(feature = "zju")]
+        Method::Wtls => elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?,
     };
     let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
     for block in blocks.iter() {
@@ -130,8 +160,20 @@ pub(crate) fn fit<T: Real>(
             before = inlier;
         }
     }
-    let rms_px = (sums.cost / sums.weight).sqrt();
-    Some(Fit { e: at.e, c: at.c, free, rms_px, inliers, arc_px: arc, nearby: at.nearby, sums, mean })
+    let Cone { at, mean, sums, free, .. } = cone;
+    Some(Fit {
+        e: at.e,
+        c: at.c,
+        free,
+        rms_px: (sums.cost / sums.weight).sqrt(),
+        inliers,
+        arc_px: arc,
+        nearby: at.nearby,
+        sums,
+        mean,
+        #[cfg(feature = "zju")]
+        quadric: cone.quadric,
+    })
 }
 
 /// What every method ends with.
@@ -141,6 +183,8 @@ struct Cone<T> {
     mean: [T; 2],
     sums: Sums<T>,
     free: bool,
+    #[cfg(feature = "zju")]
+    quadric: Option<Quadric<T>>,
 }
 
 /// Robust iterations under the expected half-angle, then the half-angle freely with the weights so found.
@@ -163,7 +207,14 @@ fn sphere<T: Real>(
         None if expected.free => return None,
         None => (settle(blocks, State { c: expected.cos, ..robust }, false, azimuth)?, false),
     };
-    Some(Cone { at, mean, sums, free })
+    Some(Cone {
+        at,
+        mean,
+        sums,
+        free,
+        #[cfg(feature = "zju")]
+        quadric: None,
+    })
 }
 
 /// The cone that another method finds through the points within `threshold_px` of the consensus (all of them, when
@@ -203,7 +254,32 @@ fn held<T: Real>(
         mean,
         sums,
         free: true,
+        #[cfg(feature = "zju")]
+        quadric: None,
     })
+}
+
+/// No axis lies further off.
+#[cfg(feature = "zju")]
+const HALF_TURN_RAD: f64 = core::f64::consts::PI;
+
+/// The elliptic cone through the points; its distances are those of `rms_px`, and its covariance is its own.
+#[cfg(feature = "zju")]
+fn elliptic<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    threshold_px: T,
+    weigh_above_rad: f64,
+) -> Option<Cone<T>> {
+    let mut quadric = None;
+    let cone = held(blocks, start, threshold_px, |blocks| {
+        let found = Quadric::fit(blocks, T::of(weigh_above_rad))?;
+        quadric = Some(found);
+        Some((found.e, found.c))
+    })?;
+    let found = quadric?;
+    let sums = Sums { weight: found.weight, cost: found.cost, ..cone.sums };
+    Some(Cone { sums, quadric, ..cone })
 }
 
 /// Where the iterations stand.

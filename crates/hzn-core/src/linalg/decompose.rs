@@ -115,11 +115,34 @@ impl<T: Real, const N: usize> Triangle<T, N> {
         (values, v)
     }
 
+    /// The least-squares solution: x with last component 1 for which the rows' products with it are smallest; `None`
+    /// where the rows do not determine it in this precision.
+    pub(crate) fn kernel(&self) -> Option<[T; N]> {
+        let floor = self.floor(N.saturating_sub(1))?;
+        let mut x = [T::ZERO; N];
+        if let Some(last) = x.last_mut() {
+            *last = T::one();
+        }
+        for i in (0..N.saturating_sub(1)).rev() {
+            if !(self.0[i][i].abs() > floor) {
+                return None;
+            }
+            let sum = dot(&self.0[i], &x);
+            x[i] = -sum / self.0[i][i];
+        }
+        Some(x)
+    }
+
+    /// What an element of the diagonal must exceed among the first `n`; `None` when nothing was fed, or not finite.
+    fn floor(&self, n: usize) -> Option<T> {
+        let largest = (0..n.min(N)).fold(T::ZERO, |l, i| l.most(self.0[i][i].abs()));
+        (largest > T::ZERO && largest.is_finite()).then(|| largest * T::EPSILON * T::of(N as f64))
+    }
+
     /// x with RᵀR x = b; `None` where the rows do not determine it in this precision.
     pub(crate) fn solve(&self, b: [T; N]) -> Option<[T; N]> {
-        let largest = (0..N).fold(T::ZERO, |l, i| l.most(self.0[i][i].abs()));
-        let floor = largest * T::EPSILON * T::of(N as f64);
-        if !(largest > T::ZERO) || !largest.is_finite() || (0..N).any(|i| !(self.0[i][i].abs() > floor)) {
+        let floor = self.floor(N)?;
+        if (0..N).any(|i| !(self.0[i][i].abs() > floor)) {
             return None;
         }
         let mut x = b;

@@ -128,6 +128,7 @@ impl Config {
         self.contour.check()?;
         self.candidates.check()?;
         self.reject.check()?;
+        self.estimate.check()?;
         self.covariance.check()?;
         self.select.check()
     }

@@ -1,6 +1,9 @@
 //! Reference data from independent sources (`tests/golden/`, origin in its README) and Monte Carlo on edge points.
 //! Here, because the stages between an edge point and an answer are not public.
 
+#[cfg(feature = "zju")]
+mod zju;
+
 use crate::block::{Block, LANES, Lit};
 use crate::body::{self, Expected, Frame};
 use crate::camera::{Camera, Config as CameraConfig, Model};

@@ -29,6 +29,8 @@ pub const OPTIONAL: &[Optional] = optional! {
     "dlr": "estimate.method" = "direct";
     "dlr": "preset" = "dlr-2022";
     "dlr": "reject.method" = "ransac";
+    "zju": "estimate.method" = "tls";
+    "zju": "estimate.method" = "wtls";
 };
 
 /// The feature that a value of a key needs and this build lacks.
