@@ -1,8 +1,9 @@
-//! hzn-core beside the OpenCV recipe.
+//! hzn-core beside the OpenCV recipe, and `hzn run` beside decoding alone.
 
 use std::path::Path;
+use std::process::Command;
 
-use crate::machine::root;
+use crate::machine::{root, target};
 use crate::python;
 use crate::steps::{self, Trouble, cargo};
 
@@ -10,9 +11,21 @@ use crate::steps::{self, Trouble, cargo};
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let go = || -> Result<(), Trouble> {
         std::env::set_current_dir(root())?;
+        if let Some((first, rest)) = args.split_first()
+            && first == "run"
+        {
+            return sequence(rest);
+        }
         let python = python::environment("benches", Path::new("benches/requirements.txt"))?;
         let mut harness = cargo(&["run", "--quiet", "--release", "--package", "hzn-benches"]);
         steps::run(harness.args(["--", "--python"]).arg(python).args(args))
     };
     go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
+}
+
+/// `hzn run` on a sequence of PNGs beside nothing but decoding them.
+fn sequence(args: &[String]) -> Result<(), Trouble> {
+    steps::run(&mut cargo(&["build", "--quiet", "--release", "--package", "hzn-cli", "--package", "hzn-benches"]))?;
+    let release = target().join("release");
+    steps::run(Command::new(release.join("sequence")).arg("--hzn").arg(release.join("hzn")).args(args))
 }

@@ -19,7 +19,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench> [OPTION]...
 
   test [STEP]...     all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
-  bench [ARG]...     arguments go to hzn-benches (see --help there)";
+  bench [ARG]...     hzn-core beside the OpenCV recipe; arguments go to hzn-benches (see --help there)
+  bench run [ARG]... `hzn run` on PNGs beside decoding them alone";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

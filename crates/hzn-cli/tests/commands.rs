@@ -83,3 +83,40 @@ fn demo_compares_with_the_truth() {
     }
     place.run(&["demo", "d"]).expect(2).says("exists already");
 }
+
+#[test]
+fn calibrations_of_other_tools_come_and_go() {
+    let place = Place::new();
+    let fisheye = common::SENSOR.replace("\"pinhole\"", "\"kannala-brandt\"\nk = [0.01, 2e-5, -1e-6, 0.0]");
+    place.write("a.toml", fisheye.as_bytes());
+    for (form, word) in
+        [("kalibr", "distortion_model: equidistant"), ("opencv", "fisheye_model: 1"), ("euroc", "sensor_type: camera")]
+    {
+        let file = format!("{form}.yaml");
+        let ran = place.run(&["camera", "convert", "a.toml", "--to", form, "-o", &file]).expect(0);
+        ran.says("hzn camera show");
+        assert!(place.read(&file).contains(word), "{}", place.read(&file));
+        let back = place.run(&["camera", "convert", &file]).expect(0).out;
+        let straight = place.run(&["camera", "convert", "a.toml"]).expect(0).out;
+        assert_eq!(back, straight);
+        let refused = place.run(&["camera", "convert", "a.toml", "--to", form, "-o", &file]);
+        refused.expect(2).says("--force replaces it");
+    }
+    place.run(&["camera", "convert", "kalibr.yaml", "-o", "b.toml"]).expect(0);
+    place.run(&["camera", "show", "b.toml"]).expect(0);
+    place.run(&["camera", "convert", "kalibr.yaml", "-o", "b.yaml"]).expect(2).says("--to kalibr, opencv or euroc");
+    place.run(&["camera", "convert", "kalibr.yaml", "--camera", "cam7"]).expect(2).says("did you mean cam0?");
+    place.run(&["camera", "convert", "nowhere.yaml"]).expect(2).says("cannot be read");
+}
+
+#[test]
+fn the_coefficients_of_braun_and_barf() {
+    let place = Place::new();
+    let lens = ["--size", "1920x1080", "--centre", "963.2,536.7", "--braun-barf"];
+    let convert = |kappa: &str| place.run(&[&["camera", "convert"], &lens[..], &[kappa]].concat());
+    let out = convert("1000,-55,11,-3.5,0.25").expect(0).out;
+    assert!(out.contains("fx_px = 1000.0\n") && out.contains("k = [-0.055, 0.011, -0.0035, 0.00025]"), "{out}");
+    convert("1000,-55").expect(2).says("5 numbers with commas");
+    convert("-1,0,0,0,0").expect(2).says("above 0");
+    convert("1000,-900,0,0,0").expect(2).says("monotone");
+}

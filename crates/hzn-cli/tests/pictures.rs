@@ -85,6 +85,35 @@ fn inks_become_brightness() {
     assert!(off < 5e-3, "{off}");
 }
 
+#[test]
+fn the_sun_has_a_direction_in_ecef() {
+    let place = Place::new();
+    let sensor = common::SENSOR
+        .replace("fx_px = 300.0", "fx_px = 4000.0")
+        .replace("fy_px = 300.0", "fy_px = 4000.0")
+        .replace("earth-sphere", "sun");
+    place.write("in/sensor.toml", sensor.as_bytes());
+    let disc = GrayImage::from_fn(320, 240, |x, y| {
+        let r = (f64::from(x) - 200.0).hypot(f64::from(y) - 100.0);
+        image::Luma([(5.0 + 200.0 * (0.5 + 18.6 - r).clamp(0.0, 1.0)) as u8])
+    });
+    disc.save(place.path("in/0.png")).unwrap();
+    disc.save(place.path("in/1.png")).unwrap();
+    // The equinox of March 2020; the equation of time is -7.5 minutes.
+    place.write(
+        "in/frames.csv",
+        b"file,utc,x_km,y_km,z_km\n0.png,2020-03-20T03:50:00Z,7000,0,0\n1.png,2020-03-20T03:50:00Z,,,\n",
+    );
+    let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
+    let number = |name: &str| cell(&rows[0], name).parse::<f64>().unwrap();
+    let (x, y, z) = (number("axis_e_x"), number("axis_e_y"), number("axis_e_z"));
+    assert!(z.abs() < 2e-4, "{z}");
+    let longitude_deg = y.atan2(x).to_degrees();
+    assert!((longitude_deg - 15.0 * (12.0 - 3.0 - 50.0 / 60.0 + 7.5 / 60.0)).abs() < 0.1, "{longitude_deg}");
+    assert!((number("axis_x") - 40.5 / 4000.0).abs() < 1e-4);
+    assert_eq!(cell(&rows[1], "axis_e_x"), "");
+}
+
 /// The chunks of a PNG: kind and data.
 fn chunks(png: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
     let mut rest = &png[8..];

@@ -52,12 +52,7 @@ fn recording(file: &Path) -> Result<String, Stop> {
     }
     if let Some(Ok(sensor)) = reader.sensor_toml().map(|t| hzn_calib::sensor::parse(t, Path::new("sensor.toml"))) {
         let c = sensor.config.camera;
-        out.push_str(&format!(
-            "camera           {} x {} px, {}\n",
-            c.width,
-            c.height,
-            super::camera::model_name(c.model)
-        ));
+        out.push_str(&format!("camera           {} x {} px, {}\n", c.width, c.height, c.model.name()));
     }
     Ok(out)
 }

@@ -1,14 +1,16 @@
 //! The sensor of the workstation or of the flight computer, behind one face that speaks f64.
 
 use hzn_calib::{FrameData, Frames, Problem};
-use hzn_core::body::FrameError;
+use hzn_core::body::{self, FrameError};
 use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
-use hzn_core::frames::{Cov3, UnitVec3};
+use hzn_core::frames::{Cov3, Ecef, UnitVec3};
 use hzn_core::image::ImageView;
 use hzn_core::pipeline::Candidate;
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report, Solution};
+
+use hzn_sim::ephemeris;
 
 use super::Trace;
 
@@ -22,6 +24,7 @@ pub struct AnySensor {
     kind: Kind,
     /// The lens in f64, for drawing.
     camera: Camera<f64>,
+    body: body::Kind,
 }
 
 impl AnySensor {
@@ -36,7 +39,7 @@ impl AnySensor {
         } else {
             Kind::Host(HostHorizon::boxed(config)?)
         };
-        Ok(Self { kind, camera })
+        Ok(Self { kind, camera, body: config.body.kind })
     }
 
     /// The lens.
@@ -55,7 +58,7 @@ impl AnySensor {
         }
     }
 
-    /// Processes one picture.
+    /// Processes one picture. Of Sun and Moon the direction in ECEF is known too, from the time and the position.
     ///
     /// # Errors
     /// An altitude or position that cannot be.
@@ -65,11 +68,25 @@ impl AnySensor {
         data: Option<&FrameData>,
         trace: Option<&Trace>,
     ) -> Result<Report<f64>, FrameError> {
-        match &mut self.kind {
-            Kind::Host(h) => run(h, view, data, trace),
-            Kind::Flight(h) => run(h, view, data, trace).map(|r| widen(&r)),
+        let mut report = match &mut self.kind {
+            Kind::Host(h) => run(h, view, data, trace)?,
+            Kind::Flight(h) => widen(&run(h, view, data, trace)?),
+        };
+        if let (Some(solution), Some(direction)) = (&mut report.solution, data.and_then(|d| in_the_sky(self.body, d))) {
+            solution.axis_ecef = Some(direction);
         }
+        Ok(report)
     }
+}
+
+/// Where Sun or Moon stand in ECEF, seen from the position at the time of the frame.
+fn in_the_sky(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>> {
+    let place = match body {
+        body::Kind::Sun => ephemeris::sun(data.utc_s?),
+        body::Kind::Moon => ephemeris::moon(data.utc_s?),
+        _ => return None,
+    };
+    UnitVec3::try_new(place.seen_from(data.position_km?.map(|km| km * 1e3)).direction)
 }
 
 fn frame<T: Real>(data: Option<&FrameData>) -> Frame<T> {

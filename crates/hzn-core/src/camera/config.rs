@@ -17,6 +17,18 @@ pub enum Model {
     BrownConrady,
 }
 
+impl Model {
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::KannalaBrandt => "kannala-brandt",
+            Self::Equidistant => "equidistant",
+            Self::Pinhole => "pinhole",
+            Self::BrownConrady => "brown-conrady",
+        }
+    }
+}
+
 /// A camera calibration. Pixel centres at integers, x right, y down, z forward (as OpenCV).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]

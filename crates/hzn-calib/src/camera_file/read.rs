@@ -1,15 +1,4 @@
-//! Camera calibrations of other tools: Kalibr camchains, OpenCV YAML, EuRoC `sensor.yaml`.
-//!
-//! | file | model | becomes |
-//! |---|---|---|
-//! | Kalibr | `pinhole` + `equidistant` | `kannala-brandt` |
-//! | Kalibr, EuRoC | `pinhole` + `radtan`, `radial-tangential`, `plumb_bob` | `brown-conrady` |
-//! | Kalibr | `pinhole` + `none` | `pinhole` |
-//! | OpenCV | `camera_matrix` or `K`, `distortion_coefficients` or `D`, `fisheye_model: 1` | `kannala-brandt` |
-//! | OpenCV | the same without `fisheye_model`, up to five coefficients | `brown-conrady` |
-//!
-//! A file that calls its coefficients `D` and holds four of them is a fisheye when its name or `fisheye_model` says
-//! so; otherwise OpenCV's usual order k1, k2, p1, p2 is taken.
+//! What other tools write.
 
 use std::path::Path;
 

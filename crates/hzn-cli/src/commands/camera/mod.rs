@@ -1,4 +1,6 @@
-//! `hzn camera`: what a calibration means.
+//! `hzn camera`: what a calibration means, and the same in another tool's form.
+
+mod convert;
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +14,7 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::input::ending;
 use crate::tell;
 
-/// Look at a camera calibration
+/// Look at a camera calibration, or convert it
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(subcommand)]
@@ -26,11 +28,14 @@ enum Command {
         /// A sensor.toml, or a camera file of Kalibr, OpenCV or EuRoC (.yaml)
         file: PathBuf,
     },
+    Convert(convert::Args),
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let Command::Show { file } = &args.command;
-    tell::result(describe(&load(file)?)?)?;
+    match &args.command {
+        Command::Show { file } => tell::result(describe(&load(file)?)?)?,
+        Command::Convert(args) => convert::run(args)?,
+    }
     Ok(Exit::Done)
 }
 
@@ -47,7 +52,7 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
     let camera = Camera::<f64>::try_new(c).map_err(usage)?;
     let mut out = String::new();
     let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
-    let model = model_name(c.model);
+    let model = c.model.name();
     line("picture", format!("{} x {} px", c.width, c.height));
     line("lens", format!("{model}, f = {} x {} px, centre at ({}, {})", c.fx_px, c.fy_px, c.cx_px, c.cy_px));
     if !c.k.is_empty() {
@@ -93,16 +98,6 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
         out.push_str(&format!("{:>15.2} {:>27.2} {slope:>13.3}\n", theta.to_degrees(), r(theta)));
     }
     Ok(out)
-}
-
-/// The lens model's name in sensor.toml.
-pub(super) fn model_name(model: Model) -> &'static str {
-    match model {
-        Model::KannalaBrandt => "kannala-brandt",
-        Model::Equidistant => "equidistant",
-        Model::Pinhole => "pinhole",
-        Model::BrownConrady => "brown-conrady",
-    }
 }
 
 /// The half-angle that a configuration alone expects.

@@ -1,0 +1,53 @@
+//! Camera calibrations of other tools: Kalibr camchains, OpenCV YAML, EuRoC `sensor.yaml`.
+//!
+//! | file | lens there | in hzn |
+//! |---|---|---|
+//! | Kalibr, EuRoC | `pinhole` + `equidistant` | `kannala-brandt` |
+//! | Kalibr, EuRoC | `pinhole` + `radtan`, `radial-tangential`, `plumb_bob` | `brown-conrady` |
+//! | Kalibr, EuRoC | `pinhole` + `none` | `pinhole` |
+//! | OpenCV | `camera_matrix` or `K`, `distortion_coefficients` or `D`, `fisheye_model: 1` | `kannala-brandt` |
+//! | OpenCV | the same without `fisheye_model`, up to five coefficients | `brown-conrady` |
+//!
+//! A file that calls its coefficients `D` and holds four of them is a fisheye when its name or `fisheye_model` says
+//! so; otherwise OpenCV's usual order k1, k2, p1, p2 is taken.
+//!
+//! [`load`] reads, [`write()`] writes; [`from_braun_barf`] takes the five coefficients of that paper.
+
+mod read;
+mod write;
+
+use hzn_core::camera::{Config, Model};
+
+pub use read::{load, parse};
+pub use write::{Format, Unfit, write};
+
+/// The lens of Braun & Barf 2022, (13): the distance from the centre in pixels is
+/// r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹. With f = κ₁ and kⱼ = κⱼ₊₁/κ₁ it is `kannala-brandt`. `size_px` is width and
+/// height, `centre_px` the principal point. `None` when κ₁ is not above 0.
+pub fn from_braun_barf(kappa_px: [f64; 5], size_px: [u16; 2], centre_px: [f64; 2]) -> Option<Config> {
+    let [f, higher @ ..] = kappa_px;
+    let mut config = Config::ideal(Model::KannalaBrandt, size_px[0], size_px[1], f);
+    [config.cx_px, config.cy_px] = centre_px;
+    config.k = higher.iter().map(|k| k / f).collect();
+    (f > 0.0 && f.is_finite()).then_some(config)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hzn_core::camera::Camera;
+    use hzn_core::frames::UnitVec3;
+
+    #[test]
+    fn five_coefficients_are_the_same_lens() {
+        let kappa = [1235.0, -67.9, 13.6, -4.3, 0.25];
+        let config = from_braun_barf(kappa, [1920, 1080], [963.2, 536.7]).unwrap();
+        let camera = Camera::<f64>::try_new(&config).unwrap();
+        for theta in [0.1f64, 0.4, 0.8] {
+            let p = camera.project(&UnitVec3::try_new([theta.sin(), 0.0, theta.cos()]).unwrap()).unwrap();
+            let r: f64 = kappa.iter().enumerate().map(|(j, k)| k * theta.powi(2 * j as i32 + 1)).sum();
+            assert!((p.u - 963.2 - r).abs() < 1e-9 && (p.v - 536.7).abs() < 1e-9);
+        }
+        assert!(from_braun_barf([0.0; 5], [1920, 1080], [0.0; 2]).is_none());
+    }
+}

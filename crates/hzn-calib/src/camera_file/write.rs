@@ -1,0 +1,207 @@
+//! Calibrations as other tools read them.
+
+use std::fmt::{self, Write};
+
+use hzn_core::camera::{Config, Model};
+
+/// Whose file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// `[camera]` of a sensor.toml.
+    Sensor,
+    /// A Kalibr camchain with one camera, `cam0`.
+    Kalibr,
+    /// OpenCV's YAML, as its calibration sample writes it.
+    OpenCv,
+    /// A EuRoC `sensor.yaml`, without the camera's place on its vehicle.
+    Euroc,
+}
+
+/// A lens that a format cannot hold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unfit {
+    /// What it is that cannot be held.
+    pub what: &'static str,
+    /// The format.
+    pub format: Format,
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Sensor => "sensor.toml",
+            Self::Kalibr => "Kalibr camchain",
+            Self::OpenCv => "OpenCV YAML",
+            Self::Euroc => "EuRoC sensor.yaml",
+        })
+    }
+}
+
+impl fmt::Display for Unfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} has no place in a {}", self.what, self.format)
+    }
+}
+
+impl std::error::Error for Unfit {}
+
+/// A calibration as text. `theta_max_deg` stands in a sensor.toml only.
+///
+/// # Errors
+/// A lens that the format does not have.
+pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
+    match format {
+        Format::Sensor => Ok(sensor(camera)),
+        Format::Kalibr => {
+            let mut out = String::from("cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n");
+            let k = four(camera, format)?;
+            let model = match camera.model {
+                Model::KannalaBrandt | Model::Equidistant => "equidistant",
+                Model::BrownConrady => "radtan",
+                Model::Pinhole => "none",
+            };
+            let _ = write!(
+                out,
+                "  distortion_coeffs: {}\n  distortion_model: {model}\n  intrinsics: {}\n  resolution: [{}, {}]\n",
+                list(&k),
+                list(&intrinsics(camera)),
+                camera.width,
+                camera.height
+            );
+            Ok(out)
+        }
+        Format::Euroc => {
+            let k = four(camera, format)?;
+            let model = match camera.model {
+                Model::KannalaBrandt | Model::Equidistant => "equidistant",
+                Model::BrownConrady | Model::Pinhole => "radial-tangential",
+            };
+            Ok(format!(
+                "sensor_type: camera\nresolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: {}\n\
+                 distortion_model: {model}\ndistortion_coefficients: {}\n",
+                camera.width,
+                camera.height,
+                list(&intrinsics(camera)),
+                list(&k)
+            ))
+        }
+        Format::OpenCv => Ok(opencv(camera)),
+    }
+}
+
+fn sensor(c: &Config) -> String {
+    let Config { width, height, .. } = c;
+    let mut out = format!("[camera]\nwidth = {width}\nheight = {height}\nmodel = \"{}\"\n", c.model.name());
+    for (key, value) in [("fx_px", c.fx_px), ("fy_px", c.fy_px), ("cx_px", c.cx_px), ("cy_px", c.cy_px)] {
+        let _ = writeln!(out, "{key} = {}", number(value));
+    }
+    if !c.k.is_empty() {
+        let _ = writeln!(out, "k = {}", list(&c.k));
+    }
+    if let Some(deg) = c.theta_max_deg {
+        let _ = writeln!(out, "theta_max_deg = {}", number(deg));
+    }
+    out
+}
+
+fn opencv(c: &Config) -> String {
+    let fisheye = matches!(c.model, Model::KannalaBrandt | Model::Equidistant);
+    let count = if fisheye { 4 } else { 5 };
+    let k: Vec<f64> = (0..count).map(|i| c.coefficient(i)).collect();
+    let [fx, fy, cx, cy] = intrinsics(c);
+    let matrix = |rows: usize, cols: usize, data: &[f64]| {
+        format!("!!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: {}", list(data))
+    };
+    format!(
+        "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\nfisheye_model: {}\ncamera_matrix: {}\n\
+         distortion_coefficients: {}\n",
+        c.width,
+        c.height,
+        u8::from(fisheye),
+        matrix(3, 3, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
+        matrix(count, 1, &k)
+    )
+}
+
+fn intrinsics(c: &Config) -> [f64; 4] {
+    [c.fx_px, c.fy_px, c.cx_px, c.cy_px]
+}
+
+/// The four coefficients that Kalibr and EuRoC know.
+fn four(c: &Config, format: Format) -> Result<Vec<f64>, Unfit> {
+    if c.model == Model::BrownConrady && c.coefficient(4) != 0.0 {
+        return Err(Unfit { what: "k3, the fifth coefficient of brown-conrady,", format });
+    }
+    Ok(match (c.model, format) {
+        (Model::Pinhole, Format::Kalibr) => Vec::new(),
+        _ => (0..4).map(|i| c.coefficient(i)).collect(),
+    })
+}
+
+fn list(numbers: &[f64]) -> String {
+    format!("[{}]", numbers.iter().map(|&x| number(x)).collect::<Vec<_>>().join(", "))
+}
+
+/// A number that comes back to the last bit. YAML 1.1 and OpenCV take `1e-5` for a word: it needs its point.
+fn number(x: f64) -> String {
+    let text = format!("{x:?}");
+    match text.split_once('e') {
+        Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::camera_file::parse;
+
+    fn cameras() -> Vec<Config> {
+        let with = |model, k: &[f64]| Config {
+            k: k.iter().copied().collect(),
+            fy_px: 1231.0 + 1.0 / 3.0,
+            cx_px: 963.2,
+            ..Config::ideal(model, 1920, 1080, 1235.0)
+        };
+        vec![
+            with(Model::KannalaBrandt, &[-0.055, 0.011, -3.5e-3, 2e-5]),
+            with(Model::BrownConrady, &[-0.28, 0.074, 1.9e-4, 1.76187114e-05]),
+            with(Model::Pinhole, &[]),
+        ]
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        for camera in cameras() {
+            for format in [Format::Kalibr, Format::OpenCv, Format::Euroc] {
+                let text = write(&camera, format).unwrap();
+                let back = parse(&text, Path::new("c.yaml"), None).unwrap_or_else(|e| panic!("{e} in\n{text}"));
+                let k = |c: &Config| [0, 1, 2, 3, 4].map(|i| c.coefficient(i));
+                assert_eq!((k(&back), intrinsics(&back)), (k(&camera), intrinsics(&camera)), "{text}");
+                assert_eq!((back.width, back.height), (1920, 1080));
+                // A lens without distortion may come back as one with distortion 0.
+                assert!(back.model == camera.model || k(&camera) == [0.0; 5], "{text}");
+            }
+            let camera = Config { theta_max_deg: Some(54.0), ..camera };
+            let text = write(&camera, Format::Sensor).unwrap();
+            assert_eq!(crate::sensor::parse(&text, Path::new("s.toml")).unwrap().config.camera, camera);
+        }
+    }
+
+    #[test]
+    fn a_fifth_coefficient_is_not_lost() {
+        let mut camera = cameras().remove(1);
+        camera.k.push(0.01).unwrap();
+        let refused = write(&camera, Format::Kalibr).unwrap_err().to_string();
+        assert_eq!(refused, "k3, the fifth coefficient of brown-conrady, has no place in a Kalibr camchain");
+        let text = write(&camera, Format::OpenCv).unwrap();
+        assert_eq!(parse(&text, Path::new("c.yaml"), None).unwrap(), camera);
+    }
+
+    #[test]
+    fn numbers_have_a_point() {
+        assert_eq!((number(1e-7), number(300.0), number(1.5e-9)), ("1.0e-7".into(), "300.0".into(), "1.5e-9".into()));
+    }
+}
