@@ -6,8 +6,10 @@
 //! | [`sensors`] | both precisions of the sensor behind one call |
 //! | [`tally`] | errors, sigmas and NEES of many answers |
 //! | [`table`] | accuracy by altitude, noise, visible arc and lens |
+//! | [`emulated`] | the firmware in QEMU |
 //! | [`real`] | photographs with their sensor.toml, and the fitted limb drawn over them |
 
+pub mod emulated;
 pub mod real;
 pub mod sensors;
 pub mod table;

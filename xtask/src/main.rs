@@ -3,10 +3,12 @@
 //! ```text
 //! cargo xtask test     everything that must hold: format, lints, tests, documents, flight build, files, demo
 //! cargo xtask bench    hzn-core beside the OpenCV recipe, in one run
+//! cargo xtask firmware the images for the flight computer, and what they cost in instructions
 //! ```
 #![forbid(unsafe_code)]
 
 mod bench;
+mod firmware;
 mod flight_build;
 mod machine;
 mod python;
@@ -15,12 +17,13 @@ mod test;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask <test|bench> [OPTION]...
+const USAGE: &str = "usage: cargo xtask <test|bench|firmware> [OPTION]...
 
   test [STEP]...     all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
   bench [ARG]...     hzn-core beside the OpenCV recipe; arguments go to hzn-benches (see --help there)
-  bench run [ARG]... `hzn run` on PNGs beside decoding them alone";
+  bench run [ARG]... `hzn run` on PNGs beside decoding them alone
+  firmware           builds the images for the flight computer and counts their instructions in QEMU";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -31,6 +34,7 @@ fn main() -> ExitCode {
     let result = match command {
         "test" => test::run(rest),
         "bench" => bench::run(rest),
+        "firmware" => firmware::run(rest),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");
             Ok(())

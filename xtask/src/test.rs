@@ -6,7 +6,7 @@ use std::process::Command;
 
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
-use crate::{flight_build, python};
+use crate::{firmware, flight_build, python};
 
 pub(crate) fn run(only: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
@@ -39,6 +39,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
         steps::run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
     });
     all.step("flight build", |_| flight_build::run_step());
+    all.step("firmware", |_| firmware::build());
     all.step("demo", |_| demo());
     all.step("files read by others", |_| files_read_by_others());
     all.conclude()

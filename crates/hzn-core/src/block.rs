@@ -43,18 +43,25 @@ pub(crate) struct Block<T> {
 
 impl<T: Real> Default for Block<T> {
     fn default() -> Self {
-        Self::EMPTY_ZERO
+        Self::EMPTY
     }
 }
 
 impl<T: Real> Block<T> {
-    const EMPTY_ZERO: Self = Self {
+    /// No points.
+    pub(crate) const EMPTY: Self = Self {
         s: [[T::ZERO; LANES]; 3],
         m: [[T::ZERO; LANES]; 4],
         step_px: [T::ZERO; LANES],
         weight: [T::ZERO; LANES],
         lit: 0,
     };
+
+    /// Blocks without points. A function of its own so that they are made where they shall stand, not on the stack.
+    #[inline(never)]
+    pub(crate) fn none<const BLOCKS: usize>() -> [Self; BLOCKS] {
+        [Self::EMPTY; BLOCKS]
+    }
 
     pub(crate) fn set_point(&mut self, lane: usize, p: ImagePoint<T>, lit: Lit) {
         self.s[0][lane & 7] = p.u;

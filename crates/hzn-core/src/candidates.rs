@@ -98,7 +98,7 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         0 => room,
         n => n.min(room),
     };
-    let every = border.len().div_ceil(keep).max(1);
+    let every = border.len().div_ceil(keep.max(1)).max(1);
     let margin = ((REACH + 3) * WIDEST) as u16;
     let unmasked = !scene.region.has_mask();
     let mut made = Points::default();
@@ -282,7 +282,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     // the brightness change a pixel.
     let steep = gradient.0.abs().max(gradient.1.abs());
     let wide = 3 * i32::from(scene.level);
-    let step = if wide < 4 * steep { 1 } else { (wide / (2 * steep)).min(WIDEST) };
+    let step = if wide < 4 * steep { 1 } else { (wide / (2 * steep).max(1)).min(WIDEST) };
     // Four times the brightness at offset k towards the dark: in one row for the plateaus, of which the mean of several
     // is taken, and over three rows, smoothed along the edge, for the crossing.
     let (dark, side) = (
@@ -307,7 +307,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let (mid2, fallback) = if contrast >= least {
         (bright + dim, false)
     } else if first_lit > first_dark {
-        (2 * level4.clamp(first_dark + 1, first_lit), true)
+        (2 * level4.max(first_dark + 1).min(first_lit), true)
     } else {
         return None;
     };

@@ -92,8 +92,14 @@ pub trait Real:
     }
 }
 
+/// The floating-point unit's where there is one: correctly rounded, so the same bits.
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+use hzn_fpu::sqrt_f32;
+#[cfg(not(any(feature = "std", all(target_arch = "arm", target_abi = "eabihf"))))]
+use libm::sqrtf as sqrt_f32;
+
 macro_rules! real {
-    ($t:ty, $sqrt:ident, $sincos:ident, $atan2:ident, $asin:ident, $acos:ident, $tan:ident, $exp:ident, $ln:ident, $erf:ident, $floor:ident, $series:literal) => {
+    ($t:ty, $sqrt:path, $sincos:ident, $atan2:ident, $asin:ident, $acos:ident, $tan:ident, $exp:ident, $ln:ident, $erf:ident, $floor:ident, $series:literal) => {
         impl Real for $t {
             const EPSILON: Self = <$t>::EPSILON;
             const ZERO: Self = 0.0;
@@ -118,7 +124,7 @@ macro_rules! real {
                 }
                 #[cfg(not(feature = "std"))]
                 {
-                    libm::$sqrt(self)
+                    $sqrt(self)
                 }
             }
             fn sin_cos(self) -> (Self, Self) {
@@ -164,8 +170,8 @@ macro_rules! real {
         }
     };
 }
-real!(f32, sqrtf, sincosf, atan2f, asinf, acosf, tanf, expf, logf, erff, floorf, 0.75);
-real!(f64, sqrt, sincos, atan2, asin, acos, tan, exp, log, erf, floor, 0.125);
+real!(f32, sqrt_f32, sincosf, atan2f, asinf, acosf, tanf, expf, logf, erff, floorf, 0.75);
+real!(f64, libm::sqrt, sincos, atan2, asin, acos, tan, exp, log, erf, floor, 0.125);
 
 #[cfg(test)]
 mod tests {

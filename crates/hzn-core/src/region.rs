@@ -77,22 +77,20 @@ impl<T: Real> Region<T> {
             .map(|(c, x, y)| (c, x - T::of(RIM_PX), y - T::of(RIM_PX)))
             .filter(|(_, x, y)| *x > T::one() && *y > T::one())
             .map(|(c, x, y)| Circle { cx: c.u, cy: c.v, semi_x: x, inv_x: T::one() / x, inv_y: T::one() / y });
-        let polygons = config
-            .polygons_px
-            .iter()
-            .map(|polygon| {
-                let corners: heapless::Vec<[T; 2], MAX_CORNERS> =
-                    polygon.iter().map(|&[x, y]| [T::of(x), T::of(y)]).collect();
-                let (mut low, mut high) = ([T::of(1e9); 2], [T::of(-1e9); 2]);
-                for c in &corners {
-                    for k in 0..2 {
-                        low[k] = low[k].least(c[k]);
-                        high[k] = high[k].most(c[k]);
-                    }
+        let mut polygons = heapless::Vec::new();
+        for polygon in &config.polygons_px {
+            // Pushed one by one: both lists are as long as the configuration's, and `collect` could panic.
+            let mut outline = Outline { low: [T::of(1e9); 2], high: [T::of(-1e9); 2], corners: heapless::Vec::new() };
+            for &[x, y] in polygon {
+                let c = [T::of(x), T::of(y)];
+                for k in 0..2 {
+                    outline.low[k] = outline.low[k].least(c[k]);
+                    outline.high[k] = outline.high[k].most(c[k]);
                 }
-                Outline { low, high, corners }
-            })
-            .collect();
+                let _ = outline.corners.push(c);
+            }
+            let _ = polygons.push(outline);
+        }
         Self { width: camera.width(), height: camera.height(), circle, polygons }
     }
 
@@ -155,7 +153,8 @@ impl<T: Real> Region<T> {
             return None;
         }
         let half = c.semi_x * left.sqrt();
-        let last = i32::from(self.width) - 1;
+        // A picture has columns; said once more, so that `clamp` is seen not to fail.
+        let last = i32::from(self.width.max(1)) - 1;
         // Start one pixel inside and grow while the exact test holds: the ring and `contains` must agree.
         let mut x0 = ((c.cx - half).floor().to_i32() + 2).clamp(0, last);
         let mut x1 = ((c.cx + half).floor().to_i32() - 1).clamp(0, last);

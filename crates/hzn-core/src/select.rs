@@ -174,7 +174,7 @@ fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {
 
 /// Up to `count` inliers, evenly along the edge, from the middle of each part.
 fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (&Block<T>, usize)> {
-    let all = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l] > T::ZERO).map(move |l| (b, l)));
+    let all = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l & 7] > T::ZERO).map(move |l| (b, l)));
     let every = (all().count() / count).max(1);
     all().skip(every / 2).step_by(every).take(count)
 }

@@ -45,7 +45,7 @@ impl<'a> Marks<'a> {
     }
 
     fn place(&self, x: u16, y: u16) -> (usize, u32) {
-        let bit = u32::from(y / self.spacing) * self.width + u32::from(x);
+        let bit = u32::from(y >> (self.spacing.trailing_zeros() & 15)) * self.width + u32::from(x);
         ((bit / 32) as usize, 1 << (bit % 32))
     }
     /// The crossing as it stands in the table, where 0 is an empty place, and the places that it may have.
@@ -81,7 +81,7 @@ impl<'a> Marks<'a> {
     }
     /// The rows of the lines within `height`.
     pub(crate) fn rows(&self, height: u16) -> impl Iterator<Item = u16> + use<> {
-        (self.offset..height).step_by(usize::from(self.spacing))
+        (self.offset..height).step_by(usize::from(self.spacing.max(1)))
     }
 }
 

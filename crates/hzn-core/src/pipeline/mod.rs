@@ -22,6 +22,8 @@ pub use optional::{OPTIONAL, Optional, lacking};
 pub use preset::Preset;
 pub use report::{Candidate, Counters, MAX_LISTED, Report, Solution, Verdict};
 
+use core::mem::MaybeUninit;
+
 use crate::block::{Block, LANES};
 use crate::body::{Expected, Frame, FrameError};
 use crate::camera::Camera;
@@ -64,19 +66,30 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     /// # Errors
     /// The first field out of its limits.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
-        config.check()?;
-        let camera = Camera::try_new(&config.camera)?;
-        Ok(Self {
-            region: Region::new(&config.mask, &camera),
-            cam_to_body: config
-                .mount
-                .and_then(|m| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::of))),
-            camera,
-            config: config.clone(),
+        Ok(Self::assemble(Prepared::new(config)?))
+    }
+    /// As [`Self::new`], into memory that is there already, such as a `static`: a flight computer's stack is too small
+    /// for a sensor on its way there.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; then nothing is written.
+    #[inline(never)]
+    pub fn new_in<'a>(place: &'a mut MaybeUninit<Self>, config: &Config) -> Result<&'a mut Self, ConfigError> {
+        let prepared = Prepared::new(config)?;
+        Ok(place.write(Self::assemble(prepared)))
+    }
+    /// Its result is written straight to where the caller wants it: the firmware's test of its stack holds that.
+    #[inline(never)]
+    fn assemble(prepared: Prepared<T>) -> Self {
+        Self {
+            region: prepared.region,
+            cam_to_body: prepared.cam_to_body,
+            camera: prepared.camera,
+            config: prepared.config,
             border: [Pixel { x: 0, y: 0 }; POINTS],
-            blocks: [Block::default(); BLOCKS],
+            blocks: Block::none(),
             marks: [0; WORDS],
-        })
+        }
     }
     /// As [`Self::new`], in a box, without the sensor ever standing on the caller's stack: the host's is larger than what
     /// a thread has left at times.
@@ -258,6 +271,28 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     }
 }
 
+/// A configuration that was accepted, with all that follows from it.
+struct Prepared<T> {
+    config: Config,
+    camera: Camera<T>,
+    region: Region<T>,
+    cam_to_body: Option<Rotation<Cam, Body, T>>,
+}
+
+impl<T: Real> Prepared<T> {
+    fn new(config: &Config) -> Result<Self, ConfigError> {
+        config.check()?;
+        let camera = Camera::try_new(&config.camera)?;
+        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::of));
+        Ok(Self {
+            region: Region::new(&config.mask, &camera),
+            cam_to_body: config.mount.and_then(turn),
+            camera,
+            config: config.clone(),
+        })
+    }
+}
+
 /// The shorter side of the border is looked at in about this many places: a limb's dark and lit stretches are longer
 /// than what lies between, and each look at a column is a page of memory.
 const BORDER_LOOKS: u16 = 128;
@@ -369,7 +404,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         }
         let number = counters.candidates;
         counters.candidates += 1;
-        counters.dropped += length - length.div_ceil(edge.stride());
+        counters.dropped += length - length.div_ceil(edge.stride().max(1));
         self.observer.edge(number, edge.pixels(), edge.stride());
         let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));

@@ -1,0 +1,254 @@
+//! A report as bytes, with every bit of its numbers: what science telemetry carries.
+
+use hzn_core::Report;
+use hzn_core::pipeline::MAX_LISTED;
+
+use crate::bytes::{Reader, Writer};
+
+/// A candidate edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge {
+    /// Border pixels.
+    pub length_px: u32,
+    /// Sub-pixel points.
+    pub points: u32,
+    /// Points that fit the limb.
+    pub inliers: u32,
+    /// RMS distance from the limb in pixels; NaN without a fit.
+    pub rms_px: f32,
+    /// [`hzn_core::pipeline::Verdict`] as a number.
+    pub verdict: u8,
+}
+
+/// A direction; see [`hzn_core::Solution`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Direction {
+    /// Unit vector to the body, camera frame.
+    pub axis: [f32; 3],
+    /// Its covariance (xx, xy, xz, yy, yz, zz), rad².
+    pub cov: [f32; 6],
+    /// The same direction in ECEF; NaN without a position.
+    pub axis_ecef: [f32; 3],
+    /// The same direction in the vehicle's frame; NaN without a mounting.
+    pub axis_body: [f32; 3],
+    /// Half-angle of the free fit, rad.
+    pub half_angle_rad: f32,
+    /// Half-angle of the answer, rad.
+    pub fused_half_angle_rad: f32,
+    /// Altitude from the free fit, m; NaN where the half-angle says nothing.
+    pub altitude_m: f32,
+    /// Its 1-sigma, m.
+    pub altitude_sigma_m: f32,
+    /// RMS distance of the inliers, px.
+    pub rms_px: f32,
+    /// Edge that the inliers cover, px.
+    pub arc_px: f32,
+    /// Edge points that carry the answer.
+    pub inliers: u32,
+    /// The candidate that it is.
+    pub candidate: u32,
+}
+
+/// The answer to one picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answer {
+    /// [`hzn_core::status::Status`] as a number.
+    pub status: u8,
+    /// [`hzn_core::status::Stage`] as a number: the last that was entered.
+    pub stage: u8,
+    /// Level between dark and lit in counts.
+    pub level: u16,
+    /// Border pixels followed.
+    pub followed: u32,
+    /// Edges that were candidates, listed or not.
+    pub candidates: u32,
+    /// Border pixels dropped.
+    pub dropped: u32,
+    /// Points at the global level.
+    pub fallback_points: u32,
+    /// Points of the chosen edge.
+    pub edge_points: u32,
+    /// Draws of the rejection.
+    pub draws: u32,
+    /// The direction, with status `ok`.
+    pub direction: Option<Direction>,
+    /// The first candidates.
+    pub edges: [Option<Edge>; MAX_LISTED],
+}
+
+impl Answer {
+    /// What a report says.
+    pub fn of(report: &Report<f32>) -> Self {
+        let c = &report.counters;
+        let mut edges = [None; MAX_LISTED];
+        for (edge, c) in edges.iter_mut().zip(&report.candidates) {
+            *edge = Some(Edge {
+                length_px: c.length_px,
+                points: c.points,
+                inliers: c.inliers,
+                rms_px: c.rms_px,
+                verdict: c.verdict as u8,
+            });
+        }
+        let direction = report.solution.as_ref().map(|s| {
+            let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = s.covariance.rows();
+            let (altitude_m, altitude_sigma_m) = s.altitude_m.unwrap_or((f32::NAN, f32::NAN));
+            Direction {
+                axis: s.axis.xyz(),
+                cov: [xx, xy, xz, yy, yz, zz],
+                axis_ecef: s.axis_ecef.map_or([f32::NAN; 3], |a| a.xyz()),
+                axis_body: s.axis_body.map_or([f32::NAN; 3], |a| a.xyz()),
+                half_angle_rad: s.half_angle_rad,
+                fused_half_angle_rad: s.fused_half_angle_rad,
+                altitude_m,
+                altitude_sigma_m,
+                rms_px: s.rms_px,
+                arc_px: s.arc_px,
+                inliers: s.inliers,
+                candidate: s.candidate,
+            }
+        });
+        Self {
+            status: report.status as u8,
+            stage: report.stage as u8,
+            level: report.level,
+            followed: c.followed,
+            candidates: c.candidates,
+            dropped: c.dropped,
+            fallback_points: c.fallback_points,
+            edge_points: c.edge_points,
+            draws: c.draws,
+            direction,
+            edges,
+        }
+    }
+
+    /// Appends the answer.
+    pub fn write(&self, out: &mut Writer<'_>) {
+        out.u8(self.status);
+        out.u8(self.stage);
+        out.u16(self.level);
+        for n in [self.followed, self.candidates, self.dropped, self.fallback_points, self.edge_points, self.draws] {
+            out.u32(n);
+        }
+        out.u8(u8::from(self.direction.is_some()));
+        out.u8(self.edges.iter().flatten().count() as u8);
+        if let Some(d) = &self.direction {
+            let numbers =
+                [d.half_angle_rad, d.fused_half_angle_rad, d.altitude_m, d.altitude_sigma_m, d.rms_px, d.arc_px];
+            for &x in d.axis.iter().chain(&d.cov).chain(&d.axis_ecef).chain(&d.axis_body).chain(&numbers) {
+                out.f32(x);
+            }
+            out.u32(d.inliers);
+            out.u32(d.candidate);
+        }
+        for e in self.edges.iter().flatten() {
+            out.u32(e.length_px);
+            out.u32(e.points);
+            out.u32(e.inliers);
+            out.f32(e.rms_px);
+            out.u8(e.verdict);
+        }
+    }
+
+    /// Reads an answer; `None` when it is cut off.
+    pub fn read(from: &mut Reader<'_>) -> Option<Self> {
+        let mut answer = Self {
+            status: from.u8()?,
+            stage: from.u8()?,
+            level: from.u16()?,
+            followed: from.u32()?,
+            candidates: from.u32()?,
+            dropped: from.u32()?,
+            fallback_points: from.u32()?,
+            edge_points: from.u32()?,
+            draws: from.u32()?,
+            direction: None,
+            edges: [None; MAX_LISTED],
+        };
+        let (solved, listed) = (from.u8()?, from.u8()?);
+        if solved != 0 {
+            answer.direction = Some(Direction {
+                axis: floats(from)?,
+                cov: floats(from)?,
+                axis_ecef: floats(from)?,
+                axis_body: floats(from)?,
+                half_angle_rad: from.f32()?,
+                fused_half_angle_rad: from.f32()?,
+                altitude_m: from.f32()?,
+                altitude_sigma_m: from.f32()?,
+                rms_px: from.f32()?,
+                arc_px: from.f32()?,
+                inliers: from.u32()?,
+                candidate: from.u32()?,
+            });
+        }
+        for edge in answer.edges.iter_mut().take(usize::from(listed)) {
+            *edge = Some(Edge {
+                length_px: from.u32()?,
+                points: from.u32()?,
+                inliers: from.u32()?,
+                rms_px: from.f32()?,
+                verdict: from.u8()?,
+            });
+        }
+        Some(answer)
+    }
+}
+
+fn floats<const N: usize>(from: &mut Reader<'_>) -> Option<[f32; N]> {
+    let mut out = [0.0; N];
+    for x in &mut out {
+        *x = from.f32()?;
+    }
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_survives_with_every_bit() {
+        let edge = Edge { length_px: 1900, points: 600, inliers: 590, rms_px: 0.3, verdict: 0 };
+        let direction = Direction {
+            axis: [0.1, 0.2, 0.97],
+            cov: [1e-8, 2e-9, 3e-9, 4e-8, 5e-9, 6e-9],
+            axis_ecef: [0.0, 0.6, 0.8],
+            axis_body: [1.0, 0.0, 0.0],
+            half_angle_rad: 1.2,
+            fused_half_angle_rad: 1.21,
+            altitude_m: 230e3,
+            altitude_sigma_m: 900.0,
+            rms_px: 0.3,
+            arc_px: 1888.0,
+            inliers: 590,
+            candidate: 1,
+        };
+        let mut edges = [None; MAX_LISTED];
+        (edges[0], edges[1]) = (Some(Edge { verdict: 5, ..edge }), Some(edge));
+        let whole = Answer {
+            status: 0,
+            stage: 7,
+            level: 88,
+            followed: 2000,
+            candidates: 2,
+            dropped: 3,
+            fallback_points: 4,
+            edge_points: 600,
+            draws: 20,
+            direction: Some(direction),
+            edges,
+        };
+        for answer in [whole, Answer { status: 1, direction: None, edges: [None; MAX_LISTED], ..whole }] {
+            let mut bytes = [0; 512];
+            let mut out = Writer::new(&mut bytes);
+            answer.write(&mut out);
+            let n = out.finish().unwrap();
+            assert_eq!(Answer::read(&mut Reader::new(&bytes[..n])), Some(answer));
+            for cut in 0..n {
+                assert_eq!(Answer::read(&mut Reader::new(&bytes[..cut])), None);
+            }
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Runs frames from a file of the host and writes what each gave: answers with every bit, and instructions by stage.
+//!
+//! `cases.bin`: for each case eight words (little-endian): "CASE", length of the parameter table, length of the frame,
+//! altitude and ECEF position as singles in metres (NaN: not given), one spare; then the table; then the frame, one byte
+//! a pixel. `results.bin`: for each case "DONE", the ticks of making the sensor, of `expect`, of the whole picture, of
+//! each of the eight stages (from a second, observed run), the stack's high-water mark, the length of the answer; then
+//! the answer.
+
+#![no_std]
+#![no_main]
+
+use core::cell::Cell;
+use core::mem::MaybeUninit;
+
+use cortex_m_rt::entry;
+use hzn_core::image::{Grey, Layout};
+use hzn_core::pipeline::Observer;
+use hzn_core::status::Stage;
+use hzn_core::{FlightHorizon, Frame};
+use hzn_flight::answer::Answer;
+use hzn_flight::bytes::Writer;
+use hzn_flight::table;
+use hzn_mps2::board::{Board, Timer};
+use hzn_mps2::host::{File, exit};
+use hzn_mps2::watermark;
+
+/// Ticks by stage.
+struct Clock {
+    timer: Timer,
+    since: Cell<u32>,
+    stage: Cell<usize>,
+    ticks: [Cell<u32>; 8],
+}
+
+impl Clock {
+    fn lap(&self) {
+        let now = self.timer.ticks();
+        if let Some(cell) = self.ticks.get(self.stage.get()) {
+            cell.set(cell.get().wrapping_add(now.wrapping_sub(self.since.get())));
+        }
+    }
+}
+impl Observer<f32> for Clock {
+    fn enter(&self, stage: Stage) {
+        self.lap();
+        self.stage.set(stage as usize);
+        self.since.set(self.timer.ticks());
+    }
+    fn leave(&self) {
+        self.lap();
+        self.stage.set(usize::MAX);
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    exit(match run() {
+        Some(()) => 0,
+        None => 1,
+    })
+}
+
+fn run() -> Option<()> {
+    let mut board = Board::take()?;
+    let mut cases = File::open(c"cases.bin")?;
+    let mut results = File::create(c"results.bin")?;
+    let [frame_buffer, table_buffer] = &mut board.frames;
+    let place = cortex_m::singleton!(: MaybeUninit<FlightHorizon> = MaybeUninit::uninit())?;
+    let timer = board.timer;
+    loop {
+        let mut header = [0u8; 32];
+        if !cases.read(&mut header) {
+            return Some(());
+        }
+        let words: [u32; 8] = core::array::from_fn(|i| {
+            header.get(4 * i..).and_then(|h| h.first_chunk()).map_or(0, |w| u32::from_le_bytes(*w))
+        });
+        let [magic, table_len, frame_len, altitude, x, y, z, _] = words;
+        if magic != u32::from_le_bytes(*b"CASE") {
+            return None;
+        }
+        let table_bytes = table_buffer.get_mut(..table_len as usize)?;
+        let frame_bytes = frame_buffer.get_mut(..frame_len as usize)?;
+        if !cases.read(table_bytes) || !cases.read(frame_bytes) {
+            return None;
+        }
+        let (parameters, _) = table::read(table_bytes).ok()?;
+        let camera = &parameters.sensor.camera;
+        let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
+        let picture = Grey::try_new(&*frame_bytes, layout).ok()?;
+        let given = |bits: u32| Some(f32::from_bits(bits)).filter(|v| !v.is_nan());
+        let position_m = match (given(x), given(y), given(z)) {
+            (Some(x), Some(y), Some(z)) => Some([x, y, z]),
+            _ => None,
+        };
+        let frame = Frame { altitude_m: given(altitude), position_m, ..Frame::default() };
+
+        let t0 = timer.ticks();
+        let horizon = FlightHorizon::new_in(place, &parameters.sensor).ok()?;
+        let t1 = timer.ticks();
+        let expected = horizon.expect(&frame).ok()?;
+        let t2 = timer.ticks();
+        let report = horizon.process(&picture, &expected);
+        let t3 = timer.ticks();
+        let clock = Clock {
+            timer,
+            since: Cell::new(0),
+            stage: Cell::new(usize::MAX),
+            ticks: core::array::from_fn(|_| Cell::new(0)),
+        };
+        let again = horizon.process_observed(&picture, &expected, &clock);
+        let answer = Answer::of(&report);
+        if Answer::of(&again).status != answer.status {
+            return None;
+        }
+
+        let mut bytes = [0u8; 640];
+        let mut out = Writer::new(&mut bytes);
+        answer.write(&mut out);
+        let len = out.finish()?;
+        let mut head = [0u8; 56];
+        let mut out = Writer::new(&mut head);
+        out.bytes(b"DONE");
+        for ticks in [t1.wrapping_sub(t0), t2.wrapping_sub(t1), t3.wrapping_sub(t2)] {
+            out.u32(ticks);
+        }
+        for ticks in &clock.ticks {
+            out.u32(ticks.get());
+        }
+        out.u32(watermark::stack_bytes());
+        out.u32(len as u32);
+        out.finish()?;
+        if !results.write(&head) || !results.write(bytes.get(..len)?) {
+            return None;
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! What the images for the MPS2 boards share: everything that knows an address of the board.
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`board`] | external memory, timer |
+//! | [`host`] | files of the machine that emulates the board, by semihosting |
+//! | [`watermark`] | how much stack was used |
+
+#![no_std]
+
+pub mod board;
+pub mod host;
+pub mod watermark;
+
+use core::panic::PanicInfo;
+
+unsafe extern "C" {
+    /// Defined nowhere: an image that can panic does not link.
+    safe fn panic_path_is_linked() -> !;
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo<'_>) -> ! {
+    panic_path_is_linked()
+}
+
+/// A fault ends the run with a status of its own: without a handler it would be an endless loop.
+///
+/// # Safety
+/// Called by the processor only.
+#[cortex_m_rt::exception]
+unsafe fn HardFault(_: &cortex_m_rt::ExceptionFrame) -> ! {
+    host::exit(102)
+}

@@ -1,0 +1,182 @@
+//! The firmware in QEMU: frames go in, answers with every bit and instruction counts come out.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use hzn_core::image::{Grey, Layout};
+use hzn_core::{Config, FlightHorizon, Frame};
+use hzn_flight::answer::Answer;
+use hzn_flight::bytes::{Reader, Writer};
+use hzn_flight::{Parameters, table};
+
+/// A board that QEMU emulates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Board {
+    /// Cortex-M4F, single precision.
+    An386,
+    /// Cortex-M7, double precision.
+    An500,
+}
+
+impl Board {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::An386, Self::An500];
+
+    /// The name that QEMU and the images' folders have.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::An386 => "an386",
+            Self::An500 => "an500",
+        }
+    }
+
+    /// The core, for people.
+    pub fn core(self) -> &'static str {
+        match self {
+            Self::An386 => "Cortex-M4F",
+            Self::An500 => "Cortex-M7",
+        }
+    }
+
+    /// An image that `cargo xtask firmware` has built.
+    ///
+    /// # Panics
+    /// It was not built.
+    pub fn image(self, name: &str) -> PathBuf {
+        let target = std::env::var_os("CARGO_TARGET_DIR")
+            .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../target"), PathBuf::from);
+        let path = target.join("firmware").join(self.name()).join("images").join(name);
+        assert!(path.is_file(), "{}: `cargo xtask firmware` builds it", path.display());
+        path
+    }
+
+    /// QEMU for this board, with an exact instruction clock: 1024 ns an instruction.
+    pub fn qemu(self, image: &Path) -> Command {
+        let mut command = Command::new("qemu-system-arm");
+        command
+            .args(["-M", &format!("mps2-{}", self.name()), "-display", "none", "-monitor", "none"])
+            .args(["-semihosting-config", "enable=on,target=native", "-icount", "shift=10", "-kernel"])
+            .arg(image)
+            .stdin(Stdio::null());
+        command
+    }
+}
+
+/// A frame with everything that is known about it.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// For people.
+    pub name: String,
+    /// What the sensor is told.
+    pub sensor: Config,
+    /// What is known about the picture.
+    pub known: Frame<f32>,
+    /// The picture, a byte a pixel, of the size that the sensor expects.
+    pub bytes: Vec<u8>,
+}
+
+/// What one frame gave.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// The answer.
+    pub answer: Answer,
+    /// Instructions of `FlightHorizon::new`, of `expect`, of `process`.
+    pub calls: [u64; 3],
+    /// Instructions by stage; together a few more than `process`, for the looks at the timer.
+    pub stages: [u64; 8],
+    /// Most bytes of stack so far.
+    pub stack_bytes: u32,
+}
+
+impl Case {
+    /// A rendered scene.
+    ///
+    /// # Panics
+    /// It cannot be rendered, or not as bytes.
+    pub fn rendered(name: String, sensor: &Config, frame: &hzn_sim::FlightFrame) -> Self {
+        let picture = frame.render().expect("the scene can be rendered");
+        let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: 8 bits are expected") };
+        let known = frame.known();
+        let known = Frame {
+            altitude_m: known.altitude_m.map(|h| h as f32),
+            position_m: known.position_m.map(|p| p.map(|x| x as f32)),
+            ..Frame::default()
+        };
+        Self { name, sensor: sensor.clone(), known, bytes: bytes.clone() }
+    }
+
+    /// What the same sensor answers here.
+    ///
+    /// # Panics
+    /// The configuration or what is known is refused.
+    pub fn here(&self) -> Answer {
+        let mut horizon = Box::new(FlightHorizon::new(&self.sensor).expect("the configuration is valid"));
+        let camera = &self.sensor.camera;
+        let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
+        let picture = Grey::try_new(&self.bytes, layout).expect("the picture is whole");
+        let expected = horizon.expect(&self.known).expect("what is known is possible");
+        Answer::of(&horizon.process(&picture, &expected))
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        let mut bytes = [0; table::MAX_BYTES];
+        let parameters = Parameters::new(self.sensor.clone());
+        let n = table::write(&parameters, 1, &mut bytes).expect("a table fits");
+        let [x, y, z] = self.known.position_m.unwrap_or([f32::NAN; 3]);
+        let altitude = self.known.altitude_m.unwrap_or(f32::NAN);
+        out.extend_from_slice(b"CASE");
+        out.extend_from_slice(&(n as u32).to_le_bytes());
+        out.extend_from_slice(&(self.bytes.len() as u32).to_le_bytes());
+        for float in [altitude, x, y, z, 0.0] {
+            out.extend_from_slice(&float.to_le_bytes());
+        }
+        out.extend_from_slice(&bytes[..n]);
+        out.extend_from_slice(&self.bytes);
+    }
+}
+
+/// The bytes of an answer: equal when every bit is.
+pub fn bits(answer: &Answer) -> Vec<u8> {
+    let mut bytes = vec![0; 640];
+    let mut out = Writer::new(&mut bytes);
+    answer.write(&mut out);
+    let n = out.finish().expect("an answer fits");
+    bytes.truncate(n);
+    bytes
+}
+
+/// Runs cases through the image `measure` of a board.
+///
+/// # Panics
+/// QEMU or the image fails.
+pub fn measure(board: Board, cases: &[Case]) -> Vec<Measured> {
+    let dir = tempfile::tempdir().expect("a temporary folder can be made");
+    let mut input = Vec::new();
+    cases.iter().for_each(|case| case.write(&mut input));
+    std::fs::write(dir.path().join("cases.bin"), input).expect("the folder is writable");
+    let status = board.qemu(&board.image("measure")).args(["-serial", "null"]).current_dir(dir.path()).status();
+    let status = status.expect("qemu-system-arm is installed");
+    assert!(status.success(), "{}: the image ended with {status}", board.name());
+    let results = std::fs::read(dir.path().join("results.bin")).expect("the image wrote its results");
+    let mut from = Reader::new(&results);
+    let out: Vec<_> = std::iter::from_fn(|| read(&mut from)).collect();
+    assert!(from.rest().is_empty() && out.len() == cases.len(), "{}: results are cut off", board.name());
+    out
+}
+
+fn read(from: &mut Reader<'_>) -> Option<Measured> {
+    let magic = from.u32()?;
+    assert_eq!(magic.to_be_bytes(), *b"DONE");
+    // Ticks of 40 ns, instructions of 1024 ns; reading the timer costs one.
+    let mut instructions = || Some(((u64::from(from.u32()?) * 40 + 512) / 1024).saturating_sub(1));
+    let mut calls = [0; 3];
+    for n in &mut calls {
+        *n = instructions()?;
+    }
+    let mut stages = [0; 8];
+    for n in &mut stages {
+        *n = instructions()?;
+    }
+    let (stack_bytes, _) = (from.u32()?, from.u32()?);
+    Some(Measured { answer: Answer::read(from)?, calls, stages, stack_bytes })
+}
