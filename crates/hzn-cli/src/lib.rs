@@ -2,7 +2,8 @@
 //!
 //! `main.rs` turns [`main`]'s answer into an exit code. Commands live in [`commands`], one file each; they are put
 //! together from [`input`] (where pictures come from), [`engine`] (all cores, results in order), [`output`] (where
-//! results go) and [`overlay`] (what is drawn).
+//! results go) and [`overlay`] and
+//! [`plot`] (what is drawn).
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when nobody reads; `tell` does not")]
 
@@ -12,6 +13,7 @@ pub mod exit;
 pub mod input;
 pub mod output;
 pub mod overlay;
+pub mod plot;
 mod progress;
 mod setup;
 mod tell;

@@ -18,12 +18,14 @@
 //! | [`truth`] | what is true of a scene |
 //! | [`ephemeris`] | where Sun and Moon stand |
 //! | [`utc`] | dates, seconds, terrestrial time |
+//! | [`evaluate`] | answers beside their truth: how many, how good, how honest |
 //! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
 
 mod counter;
 pub mod detector;
 pub mod ephemeris;
 pub mod error;
+pub mod evaluate;
 pub mod flight;
 pub mod foreground;
 pub mod globe;

@@ -1,4 +1,6 @@
-//! What is true of a scene: a row of truth.csv.
+//! What is true of a scene: a row of truth.csv, and the file.
+
+use std::path::{Path, PathBuf};
 
 use hzn_core::body::Kind;
 use hzn_core::ellipsoid::LimbCone;
@@ -66,6 +68,137 @@ impl Truth {
     }
 }
 
+/// Why a truth.csv cannot be used. Displayed as `truth.csv:3: axis_x: …`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TruthError {
+    /// The file.
+    pub path: PathBuf,
+    /// Line, from 1.
+    pub line: Option<u64>,
+    /// The column.
+    pub column: Option<String>,
+    /// What is wrong and what to do.
+    pub what: String,
+}
+
+impl core::fmt::Display for TruthError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{}", self.path.display())?;
+        if let Some(line) = self.line {
+            write!(f, ":{line}")?;
+        }
+        if let Some(column) = &self.column {
+            write!(f, ": {column}")?;
+        }
+        write!(f, ": {}", self.what)
+    }
+}
+
+impl core::error::Error for TruthError {}
+
+/// Reads a truth.csv. Columns are found by name; those of Sun and Moon may be missing, others stand for nothing.
+///
+/// # Errors
+/// A file that cannot be read, a column that is missing, a cell that is no finite number, an axis or a quaternion
+/// that has not unit length, a half-angle that is none, a file without rows.
+pub fn load(path: &Path) -> Result<Vec<Truth>, TruthError> {
+    let text = std::fs::read_to_string(path).map_err(|e| {
+        let what = match e.kind() {
+            std::io::ErrorKind::NotFound => "no such file".to_owned(),
+            _ => format!("cannot be read: {e}"),
+        };
+        TruthError { path: path.to_owned(), line: None, column: None, what }
+    })?;
+    parse(&text, path)
+}
+
+/// As [`load`], from text; `path` is named in messages.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
+    let wrong = |line: Option<u64>, column: Option<&str>, what: String| TruthError {
+        path: path.to_owned(),
+        line,
+        column: column.map(str::to_owned),
+        what,
+    };
+    // Spreadsheets put a byte-order mark first.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|e| wrong(Some(1), None, format!("not valid CSV: {e}")))?.clone();
+    const NEEDED: [&str; 13] = [
+        "file",
+        "time_s",
+        "body",
+        "limb",
+        "axis_x",
+        "axis_y",
+        "axis_z",
+        "half_angle_deg",
+        "altitude_km",
+        "qw",
+        "qx",
+        "qy",
+        "qz",
+    ];
+    if let Some(missing) = NEEDED.into_iter().find(|name| !header.iter().any(|h| h == *name)) {
+        return Err(wrong(Some(1), Some(missing), "this column is missing; is it a truth.csv?".into()));
+    }
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| {
+            let line = e.position().map(csv::Position::line);
+            wrong(line, None, format!("not valid CSV: {e}"))
+        })?;
+        let line = record.position().map(csv::Position::line);
+        let row: Truth = record.deserialize(Some(&header)).map_err(|e| match e.kind() {
+            csv::ErrorKind::Deserialize { err, .. } => {
+                let column = err.field().and_then(|i| header.get(i as usize));
+                wrong(line, column, err.kind().to_string())
+            }
+            _ => wrong(line, None, e.to_string()),
+        })?;
+        let numbers = NEEDED.iter().zip([
+            0.0,
+            row.time_s,
+            0.0,
+            0.0,
+            row.axis_x,
+            row.axis_y,
+            row.axis_z,
+            row.half_angle_deg,
+            row.altitude_km,
+            row.qw,
+            row.qx,
+            row.qy,
+            row.qz,
+        ]);
+        for (name, x) in numbers {
+            if !x.is_finite() {
+                return Err(wrong(line, Some(name), format!("{x} is not a finite number")));
+            }
+        }
+        let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let unit = |v: &[f64]| (length(v) - 1.0).abs() < 1e-3;
+        if !unit(&[row.axis_x, row.axis_y, row.axis_z]) {
+            return Err(wrong(line, Some("axis_x, axis_y, axis_z"), "must have length 1".into()));
+        }
+        if !unit(&[row.qw, row.qx, row.qy, row.qz]) {
+            return Err(wrong(line, Some("qw, qx, qy, qz"), "must have length 1".into()));
+        }
+        if !(row.half_angle_deg > 0.0 && row.half_angle_deg < 90.0) {
+            let what = format!("{} is no half-angle: above 0 and below 90 is expected", row.half_angle_deg);
+            return Err(wrong(line, Some("half_angle_deg"), what));
+        }
+        rows.push(row);
+    }
+    if rows.is_empty() {
+        return Err(wrong(None, None, "has no rows".into()));
+    }
+    Ok(rows)
+}
+
 /// The kind's name in sensor.toml.
 fn name(kind: Kind) -> &'static str {
     match kind {
@@ -126,6 +259,28 @@ mod tests {
 
     fn scene(look: Look) -> Scene {
         Scene::new(Config::ideal(Model::Pinhole, 640, 480, 400.0), Pose::looking(position_m(0.0, 0.0, 200.0), look))
+    }
+
+    #[test]
+    fn a_table_is_read_back_and_wrong_cells_are_named() {
+        let rows = vec![scene(Look::default()).truth("a.png", 1.5).unwrap()];
+        let mut table = csv::Writer::from_writer(Vec::new());
+        rows.iter().for_each(|r| table.serialize(r).unwrap());
+        let text = String::from_utf8(table.into_inner().unwrap()).unwrap();
+        let path = Path::new("truth.csv");
+        let read = parse(&text, path).unwrap();
+        assert_eq!((read[0].file.as_str(), read[0].sun_x, read[0].axis_y), ("a.png", None, rows[0].axis_y));
+        let says = |text: &str| parse(text, path).unwrap_err().to_string();
+        assert_eq!(says(&text.replace(",1.5,", ",soon,")), "truth.csv:2: time_s: invalid float literal");
+        assert_eq!(says(&text.replace(",1.5,", ",nan,")), "truth.csv:2: time_s: NaN is not a finite number");
+        assert_eq!(
+            says(&text.replace("axis_x", "x")),
+            "truth.csv:1: axis_x: this column is missing; is it a truth.csv?"
+        );
+        assert_eq!(says(text.lines().next().unwrap()), "truth.csv: has no rows");
+        let shown = rows[0].half_angle_deg.to_string();
+        assert!(says(&text.replace(&shown, "97")).contains("half_angle_deg: 97 is no half-angle"));
+        assert!(load(Path::new("/nowhere/truth.csv")).unwrap_err().to_string().ends_with("no such file"));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod camera;
 mod completions;
 mod demo;
+mod evaluate;
 mod explain;
 mod export;
 mod info;
@@ -34,6 +35,7 @@ enum Command {
     Export(export::Args),
     Recover(recover::Args),
     Init(init::Args),
+    Evaluate(evaluate::Args),
     Camera(camera::Args),
     Completions(completions::Args),
 }
@@ -51,6 +53,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Export(args) => export::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Init(args) => init::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
         Command::Camera(args) => camera::run(&args),
         Command::Completions(args) => completions::run(&args),
     }

@@ -20,6 +20,7 @@ const INLIER: Colour = [0, 158, 115];
 const REJECTED: Colour = [213, 94, 0];
 const LIMB: Colour = [240, 228, 66];
 const AXIS: Colour = [204, 121, 167];
+const TRUTH: Colour = [230, 159, 0];
 
 /// Name of the overlay of a picture.
 pub fn file_name(name: &str) -> String {
@@ -35,6 +36,16 @@ pub fn draw(picture: &Picture, camera: &Camera<f64>, trace: &Trace, report: &Rep
 
 /// Draws annotations (pixel centres at integers) with a legend that begins with `title`.
 pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title: &str) -> RgbImage {
+    draw_beside(image, drawing, &[], title)
+}
+
+/// As [`draw_annotations`], with the true limb beside it.
+pub fn draw_beside(
+    image: RgbImage,
+    drawing: &hzn_mcap::Annotations,
+    true_limb: &[Vec<[f64; 2]>],
+    title: &str,
+) -> RgbImage {
     let mut canvas = Canvas { image };
     let (w, h) = (canvas.image.width(), canvas.image.height());
     // Thick enough to be seen when the whole picture is looked at on a screen of some 1600 px.
@@ -46,6 +57,9 @@ pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title:
     }
     for limb in &drawing.limb {
         canvas.polyline(limb, pen * 3.2, LIMB);
+    }
+    for limb in true_limb {
+        canvas.polyline(limb, pen * 1.2, TRUTH);
     }
     // Points lie over the line and are narrower, so that both are seen.
     for p in &drawing.rejected {
@@ -61,11 +75,11 @@ pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title:
             canvas.line([u - dx, v - dy], [u + dx, v + dy], pen * 2.5, AXIS);
         }
     }
-    legend(&mut canvas, drawing, title);
+    legend(&mut canvas, drawing, !true_limb.is_empty(), title);
     canvas.image
 }
 
-fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, title: &str) {
+fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, title: &str) {
     let (w, h) = (canvas.image.width(), canvas.image.height());
     let scale = (w.max(h) / 600).max(1);
     let line = 11 * scale;
@@ -79,6 +93,7 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, title: &str) {
     add(!drawing.inliers.is_empty(), format!("inliers {}", drawing.inliers.len()), INLIER);
     add(!drawing.rejected.is_empty(), format!("rejected {}", drawing.rejected.len()), REJECTED);
     add(!drawing.limb.is_empty(), "fitted limb".into(), LIMB);
+    add(truth, "true limb".into(), TRUTH);
     add(drawing.axis.is_some(), "axis".into(), AXIS);
     let widest = entries.iter().map(|(t, _)| t.len()).max().unwrap_or(0) as u32 * 8 * scale;
     let (box_w, box_h) = (widest + 4 * scale, entries.len() as u32 * line + 3 * scale);

@@ -1,0 +1,146 @@
+//! `hzn evaluate`: results against the truth.
+
+mod page;
+mod text;
+mod worst;
+
+use std::path::{Path, PathBuf};
+
+use hzn_core::camera::Camera;
+use hzn_core::status::Status;
+use hzn_mcap::{Contents, Reader, Row};
+use hzn_sim::Truth;
+use hzn_sim::evaluate::{Answer, Case, Evaluation, Found, pair};
+use serde::Serialize;
+
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::input::ending;
+use crate::output;
+
+/// Compare results with the truth: shares, errors, honesty of the covariance
+///
+/// Every picture counts: one that was not answered as missed, one that was answered without a limb in view as false.
+/// The report goes to stdout; -o writes it as JSON with every frame, or as one HTML page with plots and the worst
+/// frames. Angles are in degrees.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// What `hzn run` wrote: .mcap, .csv or .jsonl
+    results: PathBuf,
+    /// The truth.csv of the sequence, or its folder
+    #[arg(long, value_name = "FILE")]
+    truth: PathBuf,
+    /// The sensor.toml, for the length of limb in view; without it, the one in the MCAP or beside the truth
+    #[arg(short, long, value_name = "FILE")]
+    sensor: Option<PathBuf>,
+    /// Also write the report: .json or .html; may be given twice
+    #[arg(short, long, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// How many of the worst frames are listed and drawn
+    #[arg(long, value_name = "N", default_value_t = 6)]
+    worst: usize,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+}
+
+/// Everything that a report says.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    results: String,
+    truth: String,
+    evaluations: Vec<Evaluation>,
+    frames: Vec<Case>,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    for path in &args.output {
+        match ending(path).as_str() {
+            "json" | "html" => {}
+            _ => return Err(usage(format!("{}: a report ends in .json or .html", path.display()))),
+        }
+        if path.exists() && !args.force {
+            return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
+        }
+    }
+    let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
+    let folder = truth_path.parent().unwrap_or(Path::new(""));
+    let truth = hzn_sim::truth::load(&truth_path).map_err(usage)?;
+    let (rows, recorded_sensor) = read(&args.results)?;
+    let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
+    let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
+    if camera.is_none() {
+        eprintln!("note: no sensor.toml at hand (--sensor): the length of limb in view is left out");
+    }
+    let answers: Vec<Answer> = rows.iter().map(answer).collect();
+    let cases = pair(&answers, &truth, camera.as_ref())
+        .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
+    warn_of_other_times(&rows, &truth);
+    let report = Report {
+        results: args.results.display().to_string(),
+        truth: truth_path.display().to_string(),
+        evaluations: Evaluation::by_body(&cases),
+        frames: cases,
+    };
+    let worst = worst::of(&report.frames, args.worst);
+    for path in &args.output {
+        let bytes = if ending(path) == "json" {
+            serde_json::to_vec_pretty(&report).map_err(failed)?
+        } else {
+            let drawn = worst::draw(&worst, &args.results, folder, &truth, camera.as_ref())?;
+            page::html(&report, &drawn)?.into_bytes()
+        };
+        std::fs::write(path, bytes).map_err(|e| output::cannot(path, &e))?;
+    }
+    print!("{}", text::of(&report, &worst));
+    Ok(Exit::Done)
+}
+
+/// Rows of results, and the sensor.toml that an MCAP holds.
+fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Stop> {
+    if !file.is_file() {
+        return Err(usage(format!("{}: no such file", file.display())));
+    }
+    match ending(file).as_str() {
+        "mcap" => {
+            let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
+            let rows = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
+            Ok((rows, reader.sensor_toml().map(str::to_owned)))
+        }
+        kind @ ("csv" | "jsonl") => Ok((super::export::rows(file, kind)?.collect::<Result<_, _>>()?, None)),
+        _ => Err(usage(format!("{}: results of `hzn run` are expected: .mcap, .csv or .jsonl", file.display()))),
+    }
+}
+
+fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result<Option<hzn_core::Config>, Stop> {
+    let beside = folder.join("sensor.toml");
+    Ok(match (given, recorded) {
+        (Some(path), _) => Some(hzn_calib::sensor::load(path)?.config),
+        // A recorded one may name a camera file that is not here.
+        (None, Some(text)) => hzn_calib::sensor::parse(text, Path::new("sensor.toml")).ok().map(|s| s.config),
+        (None, None) if beside.exists() => Some(hzn_calib::sensor::load(&beside)?.config),
+        (None, None) => None,
+    })
+}
+
+/// A row as the evaluation takes it.
+fn answer(row: &Row) -> Answer {
+    let covariance =
+        || -> Option<[f64; 6]> { Some([row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?]) };
+    let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| Found {
+        axis,
+        // Without a covariance the error still counts, its honesty does not.
+        covariance_rad2: covariance().unwrap_or_default(),
+        half_angle_deg: row.half_angle_deg,
+    });
+    Answer { file: row.file.clone(), time_s: row.time_s, body: row.body.clone(), status: row.status, found }
+}
+
+/// Two sequences may have the same names: other times give them away.
+fn warn_of_other_times(rows: &[Row], truth: &[Truth]) {
+    let time = |file: &str| truth.iter().find(|t| file.ends_with(t.file.as_str())).map(|t| t.time_s);
+    let other = rows.iter().find_map(|r| time(&r.file).filter(|t| (t - r.time_s).abs() > 1e-3).map(|t| (r, t)));
+    if let Some((row, t)) = other {
+        let what = "if they are not counted from different instants, this is the truth of another sequence";
+        eprintln!("warning: {}: at {} s in the results, at {t} s in the truth; {what}", row.file, row.time_s);
+    }
+}

@@ -1,0 +1,126 @@
+//! The report as one page of HTML that needs no other file and no network.
+
+use base64::Engine;
+use hzn_sim::evaluate::{Case, Evaluation, Miss};
+
+use super::worst::Drawn;
+use super::{Report, text};
+use crate::plot::{Chart, Series, Style};
+
+const STYLE: &str = "\
+body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 1rem;color:#222}\
+h1{font-size:1.5rem;margin-bottom:.2rem}h2{font-size:1.2rem;border-bottom:1px solid #ddd;margin-top:2rem}\
+table{border-collapse:collapse;margin:1rem 0}td,th{padding:.2rem .8rem;text-align:right;border-bottom:1px solid #eee}\
+th:first-child,td:first-child{text-align:left}.sum td{text-align:left}.sub{color:#666}\
+.plots{display:flex;flex-wrap:wrap;gap:1rem}.plots svg{max-width:100%;height:auto;border:1px solid #eee}\
+figure{margin:1rem 0}figure img{max-width:100%}figcaption{color:#444}.worst{display:grid;gap:1rem;\
+grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}";
+
+pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
+    let mut body = format!(
+        "<h1>Horizon sensor against the truth</h1><p class=\"sub\">{} against {}</p>",
+        escape(&report.results),
+        escape(&report.truth)
+    );
+    for e in &report.evaluations {
+        body.push_str(&format!("<h2>{}</h2><table class=\"sum\">", escape(&e.body)));
+        for (name, value) in text::lines(e) {
+            body.push_str(&format!("<tr><td>{}</td><td>{}</td></tr>", escape(name), escape(&value)));
+        }
+        body.push_str("</table><div class=\"plots\">");
+        for chart in charts(e, &report.frames) {
+            body.push_str(&chart.svg()?);
+        }
+        body.push_str("</div>");
+        for group in &e.groups {
+            let head: String = text::COLUMNS.iter().map(|c| format!("<th>{}</th>", escape(c))).collect();
+            body.push_str(&format!("<table><tr><th>{} [{}]</th>{head}</tr>", group.name, group.unit));
+            for (range, cells) in text::cells(group) {
+                let cells: String = cells.iter().map(|c| format!("<td>{}</td>", escape(c))).collect();
+                body.push_str(&format!("<tr><td>{}</td>{cells}</tr>", escape(&range)));
+            }
+            body.push_str("</table>");
+        }
+    }
+    if !worst.is_empty() {
+        body.push_str("<h2>Worst frames</h2><div class=\"worst\">");
+        for frame in worst {
+            let picture = match &frame.jpeg {
+                Some(jpeg) => {
+                    let data = base64::engine::general_purpose::STANDARD.encode(jpeg);
+                    format!("<img alt=\"{}\" src=\"data:image/jpeg;base64,{data}\">", escape(&frame.caption))
+                }
+                None => "<p class=\"sub\">the picture is neither recorded nor beside the truth</p>".into(),
+            };
+            body.push_str(&format!("<figure>{picture}<figcaption>{}</figcaption></figure>", escape(&frame.caption)));
+        }
+        body.push_str("</div>");
+    }
+    let head = format!("<meta charset=\"utf-8\"><title>hzn evaluate</title><style>{STYLE}</style>");
+    Ok(format!("<!doctype html><html lang=\"en\"><head>{head}</head><body>{body}</body></html>\n"))
+}
+
+/// What can be drawn of one body.
+fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
+    let cases: Vec<(&Case, Miss)> =
+        frames.iter().filter(|c| c.body == e.body && c.limb).filter_map(|c| Some((c, c.miss?))).collect();
+    if cases.is_empty() {
+        return Vec::new();
+    }
+    let dots = |name: &str, x: &dyn Fn(&Case) -> Option<f64>, y: &dyn Fn(&Miss) -> f64| {
+        Series::new(name, Style::Dots, cases.iter().filter_map(|(c, m)| Some((x(c)?, y(m)))))
+    };
+    let mut out = vec![
+        Chart::new("Error and claimed sigma over time", "time [s]", "deg")
+            .with(dots("error", &|c| Some(c.time_s), &|m| m.angle_deg))
+            .with(dots("largest sigma", &|c| Some(c.time_s), &|m| m.sigma_max_deg)),
+        Chart::new("Error about the camera's axes", "time [s]", "deg")
+            .with(dots("about x", &|c| Some(c.time_s), &|m| m.about_deg[0]))
+            .with(dots("about y", &|c| Some(c.time_s), &|m| m.about_deg[1]))
+            .with(dots("about z", &|c| Some(c.time_s), &|m| m.about_deg[2])),
+        distribution(&cases),
+    ];
+    out.extend(calibration(&cases));
+    for group in &e.groups {
+        let x: &dyn Fn(&Case) -> Option<f64> = match group.name {
+            "altitude" => &|c| Some(c.altitude_km),
+            "off nadir" => &|c| Some(c.off_nadir_deg),
+            _ => &|c| c.limb_in_view_px,
+        };
+        out.push(
+            Chart::new(format!("Error by {}", group.name), format!("{} [{}]", group.name, group.unit), "deg")
+                .with(dots("error", x, &|m| m.angle_deg))
+                .with(dots("largest sigma", x, &|m| m.sigma_max_deg)),
+        );
+    }
+    out
+}
+
+/// The share of answers with an error up to so much.
+fn distribution(cases: &[(&Case, Miss)]) -> Chart {
+    let mut errors: Vec<f64> = cases.iter().map(|(_, m)| m.angle_deg).collect();
+    errors.sort_by(f64::total_cmp);
+    let n = errors.len() as f64;
+    let steps = errors.iter().enumerate().flat_map(|(i, &e)| [(e, i as f64 / n), (e, (i as f64 + 1.0) / n)]);
+    Chart::new("Share of the answers up to an error", "error [deg]", "share").with(Series::new("", Style::Line, steps))
+}
+
+/// How far out answers are in sigma, against how far out they should be: on the diagonal when sigma is right.
+fn calibration(cases: &[(&Case, Miss)]) -> Option<Chart> {
+    let mut distances: Vec<f64> = cases.iter().filter_map(|(_, m)| Some(m.nees?.sqrt())).collect();
+    distances.sort_by(f64::total_cmp);
+    let n = distances.len() as f64;
+    // The quantile of a distance in two dimensions: 1 − exp(−k²/2) = p.
+    let points: Vec<(f64, f64)> =
+        distances.iter().enumerate().map(|(i, &d)| ((-2.0 * (1.0 - (i as f64 + 0.5) / n).ln()).sqrt(), d)).collect();
+    let far = points.last()?.0;
+    Some(
+        Chart::new("Calibration of sigma (above the line: too small)", "expected distance [sigma]", "distance [sigma]")
+            .with(Series::new("right", Style::Ideal, [(0.0, 0.0), (far, far)]))
+            .with(Series::new("answers", Style::Dots, points)),
+    )
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

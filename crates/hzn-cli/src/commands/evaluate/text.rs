@@ -1,0 +1,169 @@
+//! The report as text.
+
+use hzn_sim::evaluate::{Case, Evaluation, Group, Honesty};
+
+use super::Report;
+
+pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
+    let mut out = String::new();
+    for e in &report.evaluations {
+        out.push_str(&format!("{}\n", e.body));
+        for (name, value) in lines(e) {
+            out.push_str(&format!("  {name:<16} {value}\n"));
+        }
+        for group in &e.groups {
+            out.push('\n');
+            out.push_str(&table(group));
+        }
+        out.push('\n');
+    }
+    if !worst.is_empty() {
+        out.push_str("worst frames\n");
+        for case in worst {
+            out.push_str(&format!("  {}\n", worst_line(case)));
+        }
+    }
+    out
+}
+
+/// The numbers of one body with their names.
+pub(super) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
+    let mut out = Vec::new();
+    let mut line = |name, value| out.push((name, value));
+    let mut answered = format!("{} of {} frames with a limb in view", e.answered, e.with_limb);
+    if e.with_limb > 0 {
+        answered.push_str(&format!(" ({})", percent(e.answered_share())));
+    }
+    line("answered", answered);
+    if !e.unanswered.is_empty() {
+        let parts: Vec<String> = e.unanswered.iter().map(|(status, n)| format!("{n} {status}")).collect();
+        line("not answered", parts.join(", "));
+    }
+    let without = e.frames - e.with_limb;
+    line(
+        "false answers",
+        match without {
+            0 => "no frame is without a limb".into(),
+            n => format!("{} of {n} frames without a limb", e.false_answers),
+        },
+    );
+    if let Some(x) = &e.errors {
+        line(
+            "error of the axis",
+            format!(
+                "{} deg RMS, {} median, {} for 95 %, {} at worst",
+                deg(x.rms_deg),
+                deg(x.median_deg),
+                deg(x.p95_deg),
+                deg(x.worst_deg)
+            ),
+        );
+        let three = |v: [f64; 3]| v.map(deg).join(", ");
+        line(
+            "about x, y, z",
+            format!("{} deg RMS, mean {} (camera axes)", three(x.rms_about_deg), three(x.mean_about_deg)),
+        );
+    }
+    if let Some(h) = &e.honesty {
+        line("honesty (NEES)", format!("{}, {}", nees(h), verdict(h)));
+        let parts = h.within.map(|w| format!("{} within {} sigma", percent(w.share), w.sigma));
+        let ideal = h.within.map(|w| format!("{:.1}", 100.0 * w.expected)).join(", ");
+        line("sigma", format!("{} ({ideal} % when right)", parts.join(", ")));
+    }
+    if e.with_limb > 0 {
+        let positives = e.horace.false_positives.map(|p| format!(", false positives {}", percent(p)));
+        line(
+            "HORACE criteria",
+            format!(
+                "{} right within 10 %; false negatives {} (goal: below 10 %){}",
+                percent(e.horace.success),
+                percent(e.horace.false_negatives),
+                positives.unwrap_or_default()
+            ),
+        );
+    }
+    out
+}
+
+/// What the mean says.
+pub(super) fn verdict(h: &Honesty) -> &'static str {
+    match h {
+        h if h.is_within_interval() => "honest",
+        h if h.nees > h.interval[1] => "sigma is too small",
+        _ => "sigma is larger than it needs to be",
+    }
+}
+
+fn nees(h: &Honesty) -> String {
+    format!("{:.2}; honest means are {:.2} to {:.2} (95 %)", h.nees, h.interval[0], h.interval[1])
+}
+
+/// Columns of a group's table.
+pub(super) const COLUMNS: [&str; 7] = ["frames", "answered", "RMS deg", "median", "95 %", "worst", "NEES (95 %)"];
+
+/// The cells of a group: the range, then those of [`COLUMNS`].
+pub(super) fn cells(group: &Group) -> Vec<(String, [String; 7])> {
+    let none = || "-".to_owned();
+    let row = |r: &hzn_sim::evaluate::GroupRow| {
+        let e = |of: fn(&hzn_sim::evaluate::Errors) -> f64| r.errors.as_ref().map_or_else(none, |e| deg(of(e)));
+        let honesty = r.honesty.as_ref();
+        let n = honesty.map_or_else(none, |h| format!("{:.2} ({:.2}-{:.2})", h.nees, h.interval[0], h.interval[1]));
+        let cells = [
+            r.with_limb.to_string(),
+            r.answered.to_string(),
+            e(|e| e.rms_deg),
+            e(|e| e.median_deg),
+            e(|e| e.p95_deg),
+            e(|e| e.worst_deg),
+            n,
+        ];
+        (format!("{} to {}", short(r.range[0]), short(r.range[1])), cells)
+    };
+    group.rows.iter().map(row).collect()
+}
+
+fn table(group: &Group) -> String {
+    let head = format!("{} [{}]", group.name, group.unit);
+    let mut out = format!("  {head:<20}");
+    let width = |i: usize| if i == 6 { 18 } else { 9 };
+    for (i, c) in COLUMNS.iter().enumerate() {
+        out.push_str(&format!(" {c:>w$}", w = width(i)));
+    }
+    out.push('\n');
+    for (range, cells) in cells(group) {
+        out.push_str(&format!("  {range:<20}"));
+        for (i, c) in cells.iter().enumerate() {
+            out.push_str(&format!(" {c:>w$}", w = width(i)));
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// One of the worst frames in a line.
+pub(super) fn worst_line(case: &Case) -> String {
+    let what = match (&case.miss, case.limb) {
+        (Some(m), true) => {
+            let sigmas = m.nees.map_or_else(String::new, |n| format!(", {:.1} sigma", n.sqrt()));
+            format!("{} deg off{sigmas}", deg(m.angle_deg))
+        }
+        (Some(_), false) => "answered without a limb in view".into(),
+        (None, _) => format!("not answered: {}", case.status),
+    };
+    let place = format!("{:.0} km, {:.0} deg off nadir", case.altitude_km, case.off_nadir_deg);
+    format!("{} ({}): {what}; {place}", case.file, case.body)
+}
+
+/// An angle: four digits behind the point, more where it is small.
+pub(super) fn deg(x: f64) -> String {
+    if x != 0.0 && x.abs() < 1e-3 { format!("{x:.1e}") } else { format!("{x:.4}") }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+fn short(x: f64) -> String {
+    // Ranges are multiples of a step that binary numbers do not hold.
+    format!("{}", (x * 1e9).round() / 1e9)
+}

@@ -1,0 +1,95 @@
+//! The worst frames, and pictures of them.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use hzn_core::camera::Camera;
+use hzn_mcap::{Annotations, Contents, Reader};
+use hzn_sim::Truth;
+use hzn_sim::evaluate::Case;
+use image::RgbImage;
+
+use super::text::worst_line;
+use crate::exit::{Stop, failed};
+use crate::input::{Payload, ending};
+use crate::overlay::{self, limb};
+
+/// Wide enough to see a pixel's error on a page, small enough to be sent.
+const WIDTH_PX: u32 = 960;
+
+/// The worst first: answered without a limb, not answered, then by error.
+pub(super) fn of(cases: &[Case], count: usize) -> Vec<&Case> {
+    let badness = |c: &&Case| match (&c.miss, c.limb) {
+        (Some(_), false) => 2e3,
+        (None, true) => 1e3,
+        (Some(m), true) => m.angle_deg,
+        (None, false) => -1.0,
+    };
+    let mut sorted: Vec<&Case> = cases.iter().filter(|c| badness(c) >= 0.0).collect();
+    // Stable: equally bad ones stay in the order of the sequence.
+    sorted.sort_by(|a, b| badness(b).total_cmp(&badness(a)));
+    sorted.truncate(count);
+    sorted
+}
+
+/// A worst frame for the page.
+pub(super) struct Drawn {
+    /// What is wrong with it.
+    pub(super) caption: String,
+    /// JPEG, where the picture is at hand.
+    pub(super) jpeg: Option<Vec<u8>>,
+}
+
+/// Draws frames with what was found and what is true. Pictures come from the recording, else from beside the truth.
+pub(super) fn draw(
+    worst: &[&Case],
+    results: &Path,
+    folder: &Path,
+    truth: &[Truth],
+    camera: Option<&Camera<f64>>,
+) -> Result<Vec<Drawn>, Stop> {
+    let mut recorded: HashMap<(String, String), (Option<RgbImage>, Annotations)> = HashMap::new();
+    let base = |file: &str| file.rsplit(['/', '\\']).next().unwrap_or(file).to_owned();
+    let wanted = |file: &str, body: &str| worst.iter().any(|c| c.file == base(file) && c.body == body);
+    if ending(results) == "mcap" && !worst.is_empty() {
+        for frame in Reader::open(results, Contents::All).map_err(failed)? {
+            let frame = frame.map_err(failed)?;
+            if wanted(&frame.row.file, &frame.row.body) {
+                let image = frame.image.and_then(|i| crate::input::recorded(i).decode(None).ok());
+                let image = image.map(|(picture, _)| picture.to_rgb());
+                recorded.insert((base(&frame.row.file), frame.row.body), (image, frame.annotations));
+            }
+        }
+    }
+    let mut one = |case: &&Case| -> Result<Drawn, Stop> {
+        let (image, drawing) = recorded.remove(&(case.file.clone(), case.body.clone())).unwrap_or_default();
+        let beside = || {
+            let path = folder.join(&case.file);
+            let read = path.is_file().then(|| Payload::File(path).decode(None).ok()).flatten();
+            read.map(|(picture, _)| picture.to_rgb())
+        };
+        let is = truth.iter().find(|t| t.file == case.file && t.body == case.body);
+        let true_limb = is.filter(|_| case.limb).zip(camera).map_or_else(Vec::new, |(t, camera)| {
+            limb::lines([t.axis_x, t.axis_y, t.axis_z], t.half_angle_deg.to_radians(), camera)
+        });
+        let jpeg = match image.or_else(beside) {
+            Some(image) => Some(encode(overlay::draw_beside(image, &drawing, &true_limb, case.status))?),
+            None => None,
+        };
+        Ok(Drawn { caption: worst_line(case), jpeg })
+    };
+    worst.iter().map(&mut one).collect()
+}
+
+fn encode(image: RgbImage) -> Result<Vec<u8>, Stop> {
+    let image = if image.width() > WIDTH_PX {
+        let height = (u64::from(image.height()) * u64::from(WIDTH_PX) / u64::from(image.width())).max(1) as u32;
+        image::imageops::resize(&image, WIDTH_PX, height, image::imageops::FilterType::Triangle)
+    } else {
+        image
+    };
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 88);
+    image.write_with_encoder(encoder).map_err(failed)?;
+    Ok(bytes)
+}

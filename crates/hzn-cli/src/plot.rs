@@ -1,0 +1,234 @@
+//! Charts as SVG: lines and dots over two axes.
+
+use anyhow::anyhow;
+use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
+use plotters::prelude::*;
+
+/// The colours of Okabe and Ito, which stay apart for colour-blind eyes, in the order in which they are taken.
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(60, 60, 60),
+];
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// A line through the points; a point that is not finite breaks it.
+    Line,
+    /// A thin grey line, for what is expected.
+    Ideal,
+    /// A dot a point.
+    Dots,
+}
+
+/// Points with a name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// What the legend says; empty is not listed.
+    pub name: String,
+    /// How it is drawn.
+    pub style: Style,
+    /// (x, y).
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Series {
+    /// Points with a name and a style.
+    pub fn new(name: impl Into<String>, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { name: name.into(), style, points: points.into_iter().collect() }
+    }
+}
+
+/// A chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// Above the chart.
+    pub title: String,
+    /// Below the x axis, with its unit.
+    pub x: String,
+    /// Beside the y axis, with its unit.
+    pub y: String,
+    /// The y axis is logarithmic; values that are not above zero are left out.
+    pub log: bool,
+    /// What is drawn.
+    pub series: Vec<Series>,
+    /// Width and height.
+    pub size: (u32, u32),
+}
+
+impl Chart {
+    /// An empty chart of the usual size.
+    pub fn new(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        let size = (640, 360);
+        Self { title: title.into(), x: x.into(), y: y.into(), log: false, series: Vec::new(), size }
+    }
+    /// The same with a logarithmic y axis.
+    #[must_use]
+    pub fn logarithmic(mut self) -> Self {
+        self.log = true;
+        self
+    }
+    /// The same with one series more.
+    #[must_use]
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// As a text of SVG.
+    ///
+    /// # Errors
+    /// Nothing that can be drawn: no finite point.
+    pub fn svg(&self) -> anyhow::Result<String> {
+        let range = |of: fn(&(f64, f64)) -> f64| {
+            let values = self.series.iter().flat_map(|s| &s.points).filter(|p| self.shows(p)).map(of);
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+        };
+        let (x, y) = (range(|p| p.0), range(|p| p.1));
+        if !(x.0 <= x.1) {
+            return Err(anyhow!("{}: there is nothing to draw", self.title));
+        }
+        let x = margin(x);
+        if self.log {
+            let (low, high) = (y.0 / 1.2, y.1 * 1.2);
+            return self.draw(x, (low..high).log_scale());
+        }
+        // Errors and sigmas begin at zero, so that small differences do not look large.
+        let (low, high) = margin(if y.0 >= 0.0 { (0.0, y.1) } else { y });
+        self.draw(x, if y.0 >= 0.0 { 0.0..high } else { low..high })
+    }
+
+    /// Whether a point has a place in the chart.
+    fn shows(&self, &(x, y): &(f64, f64)) -> bool {
+        x.is_finite() && y.is_finite() && (!self.log || y > 0.0)
+    }
+
+    fn draw<Y>(&self, x: (f64, f64), y: Y) -> anyhow::Result<String>
+    where
+        Y: AsRangedCoord<Value = f64>,
+        Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    {
+        let mut out = String::new();
+        self.onto(SVGBackend::with_string(&mut out, self.size), x, y)
+            .map_err(|e| anyhow!("{}: cannot be drawn: {e}", self.title))?;
+        Ok(out)
+    }
+
+    fn onto<'a, Y>(&'a self, backend: SVGBackend<'a>, x: (f64, f64), y: Y) -> anyhow::Result<()>
+    where
+        Y: AsRangedCoord<Value = f64>,
+        Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    {
+        let font = |size: u32| ("sans-serif", size);
+        let root = backend.into_drawing_area();
+        root.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&root)
+            .caption(&self.title, font(17))
+            .margin(12)
+            .margin_right(20)
+            .x_label_area_size(44)
+            .y_label_area_size(64)
+            .build_cartesian_2d(x.0..x.1, y)?;
+        chart
+            .configure_mesh()
+            .x_desc(&self.x)
+            .y_desc(&self.y)
+            .axis_desc_style(font(14))
+            .label_style(font(12))
+            .light_line_style(WHITE)
+            .bold_line_style(BLACK.mix(0.1))
+            .x_label_formatter(&|v| number(*v))
+            .y_label_formatter(&|v| number(*v))
+            .draw()?;
+        let shown = |p: &(f64, f64)| self.shows(p);
+        let mut colours = COLOURS.iter().cycle();
+        for series in &self.series {
+            let (style, dots) = match series.style {
+                Style::Ideal => (BLACK.mix(0.45).stroke_width(1), false),
+                Style::Line => (colours.next().unwrap_or(&BLACK).stroke_width(2), false),
+                Style::Dots => (colours.next().unwrap_or(&BLACK).mix(0.75).filled(), true),
+            };
+            let annotation = if dots {
+                chart.draw_series(series.points.iter().filter(|p| shown(p)).map(|p| Circle::new(*p, 3, style)))?
+            } else {
+                for piece in series.points.split(|p| !shown(p)) {
+                    chart.draw_series(LineSeries::new(piece.iter().copied(), style))?;
+                }
+                // The legend is one for all pieces.
+                chart.draw_series(LineSeries::new([], style))?
+            };
+            if !series.name.is_empty() {
+                annotation.label(series.name.as_str()).legend(move |(x, y)| {
+                    if dots {
+                        Circle::new((x + 8, y), 3, style).into_dyn()
+                    } else {
+                        PathElement::new([(x, y), (x + 16, y)], style).into_dyn()
+                    }
+                });
+            }
+        }
+        if self.series.iter().any(|s| !s.name.is_empty()) {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .label_font(font(12))
+                .background_style(WHITE.mix(0.85))
+                .border_style(BLACK.mix(0.2))
+                .draw()?;
+        }
+        root.present()?;
+        Ok(())
+    }
+}
+
+/// A range with a little room at both ends, also where it has no length.
+fn margin((low, high): (f64, f64)) -> (f64, f64) {
+    let room = if high > low { 0.04 * (high - low) } else { (0.1 * high.abs()).max(0.5) };
+    (low - room, high + room)
+}
+
+/// A tick's number, without digits that say nothing.
+fn number(v: f64) -> String {
+    let digits = format!("{v:.4e}");
+    let v: f64 = digits.parse().unwrap_or(v);
+    if v != 0.0 && (v.abs() < 1e-3 || v.abs() >= 1e6) { format!("{v:e}") } else { format!("{v}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chart_names_everything_and_breaks_lines() {
+        let chart = Chart::new("Error & sigma", "altitude [km]", "error [deg]")
+            .with(Series::new("measured", Style::Dots, [(70.0, 0.01), (240.0, 0.02)]))
+            .with(Series::new("expected", Style::Line, [(70.0, 0.02), (100.0, f64::NAN), (200.0, 0.1), (240.0, 0.2)]));
+        for chart in [chart.clone(), chart.logarithmic()] {
+            let svg = chart.svg().unwrap();
+            for text in ["<svg", "Error &amp; sigma", "altitude [km]", "error [deg]", "measured", "expected", "</svg>"]
+            {
+                assert!(svg.contains(text), "{text} in {svg}");
+            }
+            assert!(!svg.contains("NaN"), "{svg}");
+            assert_eq!(svg.matches("<circle").count(), 3, "two points and the legend's");
+        }
+    }
+
+    #[test]
+    fn nothing_is_an_error_and_one_point_is_drawn() {
+        assert!(Chart::new("t", "x", "y").svg().unwrap_err().to_string().contains("nothing to draw"));
+        let one = Chart::new("t", "x", "y").with(Series::new("", Style::Dots, [(3.0, 0.0)]));
+        assert!(one.svg().unwrap().contains("<circle"));
+    }
+
+    #[test]
+    fn ticks_are_short() {
+        let shown = [0.1 + 0.2, 0.00002, 1500.0, 0.0].map(number);
+        assert_eq!(shown, ["0.3", "2e-5", "1500", "0"]);
+    }
+}
