@@ -94,13 +94,17 @@ impl Chart {
             return Err(anyhow!("{}: there is nothing to draw", self.title));
         }
         let x = margin(x);
+        // The legend has the top of the chart for itself.
+        let named = self.series.iter().filter(|s| !s.name.is_empty()).count();
+        let room = named as f64 * 18.0 / f64::from(self.size.1.max(100) - 90);
         if self.log {
             let (low, high) = (y.0 / 1.2, y.1 * 1.2);
-            return self.draw(x, (low..high).log_scale());
+            return self.draw(x, (low..high * (high / low).powf(room)).log_scale());
         }
         // Errors and sigmas begin at zero, so that small differences do not look large.
         let (low, high) = margin(if y.0 >= 0.0 { (0.0, y.1) } else { y });
-        self.draw(x, if y.0 >= 0.0 { 0.0..high } else { low..high })
+        let low = if y.0 >= 0.0 { 0.0 } else { low };
+        self.draw(x, low..high + room * (high - low))
     }
 
     /// Whether a point has a place in the chart.

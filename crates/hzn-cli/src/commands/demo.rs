@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use hzn_mcap::{Contents, Reader, Row};
+use hzn_sim::evaluate::{Evaluation, pair};
 use hzn_sim::{Flight, Truth};
 
-use super::run as sequence;
+use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::output;
 use crate::overlay;
@@ -75,7 +76,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     std::fs::create_dir_all(&overlays).map_err(|e| output::cannot(&overlays, &e))?;
     let shown = draw(&flight_mcap, &overlays, 5)? + draw(&iss_mcap, &overlays, 1)?;
 
-    let mut out = format!("{}\n{}\n", Accuracy::of(&rows, &truth).text(), iss_text(iss.first()));
+    let mut out = format!("{}\n{}\n", flight_text(&rows, &truth)?, iss_text(iss.first()));
     let place = |p: &Path| p.display().to_string();
     out.push_str(&format!("Files, after {:.1} s:\n", begin.elapsed().as_secs_f64()));
     for (name, what) in [
@@ -91,6 +92,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let picture = place(&iss_dir.join("iss-limb-2020-11-20.jpg"));
     out.push_str(&format!("\nNext:  hzn explain {picture} --overlay out.png\n"));
     out.push_str(&format!("       hzn run {} -o mine.csv\n", place(&flight_dir)));
+    let truth = place(&flight_dir.join("truth.csv"));
+    out.push_str(&format!("       hzn evaluate {} --truth {truth} -o report.html\n", place(&flight_mcap)));
     tell::result(out)?;
     Ok(Exit::Done)
 }
@@ -160,91 +163,20 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
 }
 
 /// Results beside the truth.
-#[derive(Debug, Clone, PartialEq)]
-struct Accuracy {
-    frames: usize,
-    with_limb: usize,
-    /// Errors of the answered frames, degrees, from small to large.
-    errors_deg: Vec<f64>,
-    /// Squared errors in units of the covariance; 2 on average when it is honest.
-    nees: Vec<f64>,
-    /// Frames that were answered though no limb is in view.
-    false_answers: usize,
-    microseconds: Vec<f64>,
-}
-
-impl Accuracy {
-    fn of(rows: &[Row], truth: &[Truth]) -> Self {
-        let mut all = Self {
-            frames: rows.len(),
-            with_limb: truth.iter().filter(|t| t.has_limb()).count(),
-            errors_deg: Vec::new(),
-            nees: Vec::new(),
-            false_answers: 0,
-            microseconds: rows.iter().filter_map(|r| r.elapsed_us).collect(),
-        };
-        for (row, truth) in rows.iter().zip(truth) {
-            let Some(axis) = row.axis() else { continue };
-            if !truth.has_limb() {
-                all.false_answers += 1;
-                continue;
-            }
-            let error = [0, 1, 2].map(|i| [truth.axis_x, truth.axis_y, truth.axis_z][i] - axis[i]);
-            let chord = error.iter().map(|x| x * x).sum::<f64>().sqrt();
-            all.errors_deg.push(2.0 * (chord / 2.0).min(1.0).asin().to_degrees());
-            all.nees.extend(nees(row, axis, error));
-        }
-        all.errors_deg.sort_by(f64::total_cmp);
-        all.microseconds.sort_by(f64::total_cmp);
-        all
+fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
+    let answers: Vec<_> = rows.iter().map(evaluate::answer).collect();
+    let cases = pair(&answers, truth, None).map_err(failed)?;
+    let mut out = String::from("Rendered rocket flight, against the truth\n");
+    let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));
+    for evaluation in Evaluation::by_body(&cases) {
+        evaluate::text::lines(&evaluation).into_iter().for_each(|(name, value)| line(name, value));
     }
-
-    fn text(&self) -> String {
-        let n = self.errors_deg.len();
-        let mut out = String::from("Rendered rocket flight, against the truth\n");
-        let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));
-        let share = 100.0 * n as f64 / self.with_limb.max(1) as f64;
-        line("answered", format!("{n} of {} frames with a limb in view ({share:.1} %)", self.with_limb));
-        if self.frames > self.with_limb || self.false_answers > 0 {
-            let without = self.frames - self.with_limb;
-            line("answered without limb", format!("{} of {without}", self.false_answers));
-        }
-        if n > 0 {
-            let rms = (self.errors_deg.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
-            let at = |p: f64| self.errors_deg[((n - 1) as f64 * p).round() as usize];
-            line(
-                "error of the axis",
-                format!("{rms:.4} deg RMS, {:.4} deg for 95 %, {:.4} deg at worst", at(0.95), at(1.0)),
-            );
-            let mean = self.nees.iter().sum::<f64>() / self.nees.len().max(1) as f64;
-            line(
-                "honesty (NEES)",
-                format!("{mean:.2} on average (2 is ideal; larger: too sure, smaller: too careful)"),
-            );
-        }
-        if let Some(middle) = self.microseconds.get(self.microseconds.len() / 2) {
-            line("processing", format!("{middle:.0} us a frame in the middle, without decoding"));
-        }
-        out
+    let mut microseconds: Vec<f64> = rows.iter().filter_map(|r| r.elapsed_us).collect();
+    microseconds.sort_by(f64::total_cmp);
+    if let Some(middle) = microseconds.get(microseconds.len() / 2) {
+        line("processing", format!("{middle:.0} us a frame in the middle, without decoding"));
     }
-}
-
-/// Squared error in units of the covariance, on the tangent plane.
-fn nees(row: &Row, axis: [f64; 3], error: [f64; 3]) -> Option<f64> {
-    let (xx, xy, xz, yy, yz, zz) = (row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?);
-    let p = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-    let helper = if axis[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let unit = |a: [f64; 3]| a.map(|x| x / dot(a, a).sqrt());
-    let b1 = unit(cross(axis, helper));
-    let b2 = cross(axis, b1);
-    let times = |b: [f64; 3]| p.map(|r| dot(r, b));
-    let (p11, p12, p22) = (dot(b1, times(b1)), dot(b1, times(b2)), dot(b2, times(b2)));
-    let (d1, d2) = (dot(b1, error), dot(b2, error));
-    let det = p11 * p22 - p12 * p12;
-    (det > 0.0).then(|| (p22 * d1 * d1 - 2.0 * p12 * d1 * d2 + p11 * d2 * d2) / det)
+    Ok(out)
 }
 
 fn iss_text(row: Option<&Row>) -> String {

@@ -204,7 +204,8 @@ impl Group {
         let values: Vec<f64> = cases.iter().map(|c| value(c)).collect::<Option<_>>()?;
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)));
         let step = nice_step((high - low) / ROWS)?;
-        if high - low < 1e-3 * high.abs() {
+        // A spread that tells nothing apart makes no table.
+        if high - low < 0.01 * high.abs() {
             return None;
         }
         let first = (low / step).floor();

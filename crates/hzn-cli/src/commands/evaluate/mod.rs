@@ -1,7 +1,7 @@
 //! `hzn evaluate`: results against the truth.
 
 mod page;
-mod text;
+pub(super) mod text;
 mod worst;
 
 use std::path::{Path, PathBuf};
@@ -16,6 +16,7 @@ use serde::Serialize;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::input::ending;
 use crate::output;
+use crate::tell;
 
 /// Compare results with the truth: shares, errors, honesty of the covariance
 ///
@@ -69,7 +70,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
     if camera.is_none() {
-        eprintln!("note: no sensor.toml at hand (--sensor): the length of limb in view is left out");
+        tell::line("note: no sensor.toml at hand (--sensor): the length of limb in view is left out");
     }
     let answers: Vec<Answer> = rows.iter().map(answer).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
@@ -91,7 +92,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         };
         std::fs::write(path, bytes).map_err(|e| output::cannot(path, &e))?;
     }
-    print!("{}", text::of(&report, &worst));
+    tell::result(text::of(&report, &worst))?;
     Ok(Exit::Done)
 }
 
@@ -123,7 +124,7 @@ fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result
 }
 
 /// A row as the evaluation takes it.
-fn answer(row: &Row) -> Answer {
+pub(super) fn answer(row: &Row) -> Answer {
     let covariance =
         || -> Option<[f64; 6]> { Some([row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?]) };
     let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| Found {
@@ -141,6 +142,6 @@ fn warn_of_other_times(rows: &[Row], truth: &[Truth]) {
     let other = rows.iter().find_map(|r| time(&r.file).filter(|t| (t - r.time_s).abs() > 1e-3).map(|t| (r, t)));
     if let Some((row, t)) = other {
         let what = "if they are not counted from different instants, this is the truth of another sequence";
-        eprintln!("warning: {}: at {} s in the results, at {t} s in the truth; {what}", row.file, row.time_s);
+        tell::warning(format_args!("{}: at {} s in the results, at {t} s in the truth; {what}", row.file, row.time_s));
     }
 }

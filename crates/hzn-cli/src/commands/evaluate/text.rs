@@ -9,7 +9,7 @@ pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
     for e in &report.evaluations {
         out.push_str(&format!("{}\n", e.body));
         for (name, value) in lines(e) {
-            out.push_str(&format!("  {name:<16} {value}\n"));
+            out.push_str(&format!("  {name:<18} {value}\n"));
         }
         for group in &e.groups {
             out.push('\n');
@@ -27,7 +27,7 @@ pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
 }
 
 /// The numbers of one body with their names.
-pub(super) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
+pub(in crate::commands) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
     let mut out = Vec::new();
     let mut line = |name, value| out.push((name, value));
     let mut answered = format!("{} of {} frames with a limb in view", e.answered, e.with_limb);
@@ -156,7 +156,7 @@ pub(super) fn worst_line(case: &Case) -> String {
 
 /// An angle: four digits behind the point, more where it is small.
 pub(super) fn deg(x: f64) -> String {
-    if x != 0.0 && x.abs() < 1e-3 { format!("{x:.1e}") } else { format!("{x:.4}") }
+    if (1e-7..1e-3).contains(&x.abs()) { format!("{x:.1e}") } else { format!("{x:.4}") }
 }
 
 fn percent(share: f64) -> String {
