@@ -44,7 +44,7 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     assert_eq!(json["frames"].as_array().unwrap().len(), 6);
 
     let page = place.read("r.html");
-    assert!(page.matches("<svg").count() >= 5 && page.contains("data:image/jpeg;base64,"));
+    assert!(page.matches("<svg").count() >= 4 && page.contains("data:image/jpeg;base64,"));
     // Nothing is fetched from anywhere.
     assert!(!page.contains("src=\"http") && !page.contains("href") && !page.contains("@import"));
     place.run(&args).expect(2).says("r.json: exists already; --force replaces it");

@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn a_table_is_read_back_and_wrong_cells_are_named() {
-        let rows = vec![scene(Look::default()).truth("a.png", 1.5).unwrap()];
+        let rows = [scene(Look::default()).truth("a.png", 1.5).unwrap()];
         let mut table = csv::Writer::from_writer(Vec::new());
         rows.iter().for_each(|r| table.serialize(r).unwrap());
         let text = String::from_utf8(table.into_inner().unwrap()).unwrap();
