@@ -57,12 +57,6 @@ impl<T: Real> Block<T> {
         lit: 0,
     };
 
-    /// Blocks without points. A function of its own so that they are made where they shall stand, not on the stack.
-    #[inline(never)]
-    pub(crate) fn none<const BLOCKS: usize>() -> [Self; BLOCKS] {
-        [Self::EMPTY; BLOCKS]
-    }
-
     pub(crate) fn set_point(&mut self, lane: usize, p: ImagePoint<T>, lit: Lit) {
         self.s[0][lane & 7] = p.u;
         self.s[1][lane & 7] = p.v;

@@ -93,3 +93,4 @@ pub mod pipeline;
 
 pub use body::{Expected, Frame};
 pub use pipeline::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Preset, Report, Solution};
+pub use pipeline::{FlightWorkspace, HostWorkspace, Sensor, Workspace};

@@ -22,8 +22,6 @@ pub use optional::{OPTIONAL, Optional, lacking};
 pub use preset::Preset;
 pub use report::{Candidate, Counters, MAX_LISTED, Report, Solution, Verdict};
 
-use core::mem::MaybeUninit;
-
 use crate::block::{Block, LANES};
 use crate::body::{Expected, Frame, FrameError};
 use crate::camera::Camera;
@@ -38,26 +36,22 @@ use crate::region::Region;
 use crate::status::{Stage, Status};
 use crate::{binarize, candidates, covariance, estimate, reject, select, undistort};
 
+/// The lists of a workstation.
+pub type HostWorkspace = Workspace<f64, 16384, 2048, 16384>;
+/// The lists of a flight computer.
+pub type FlightWorkspace = Workspace<f32, 2048, 256, 512>;
 /// The sensor of a workstation: f64, 16384 points.
 pub type HostHorizon = Horizon<f64, 16384, 2048, 16384>;
 /// The sensor of a flight computer: f32, 2048 points.
 pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 
-/// A horizon sensor: configuration, lens and every list it will ever need. There is no heap.
+/// A horizon sensor: a [`Sensor`] with its [`Workspace`].
 ///
-/// `POINTS` border pixels of an edge are stored (beyond, the stride doubles), `BLOCKS` blocks of eight edge points are
-/// fitted, and search lines are marked in `WORDS` words of 32 bits. See [`HostHorizon`] and [`FlightHorizon`].
-///
-/// It is large: keep it in a `static` or a `Box`.
+/// It is large: keep it in a `Box`. A flight computer keeps the two parts apart, the workspace in a `static`.
 #[derive(Debug, Clone)]
 pub struct Horizon<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
-    config: Config,
-    camera: Camera<T>,
-    region: Region<T>,
-    cam_to_body: Option<Rotation<Cam, Body, T>>,
-    border: [Pixel; POINTS],
-    blocks: [Block<T>; BLOCKS],
-    marks: [u32; WORDS],
+    sensor: Sensor<T>,
+    workspace: Workspace<T, POINTS, BLOCKS, WORDS>,
 }
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Horizon<T, POINTS, BLOCKS, WORDS> {
@@ -66,30 +60,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     /// # Errors
     /// The first field out of its limits.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
-        Ok(Self::assemble(Prepared::new(config)?))
-    }
-    /// As [`Self::new`], into memory that is there already, such as a `static`: a flight computer's stack is too small
-    /// for a sensor on its way there.
-    ///
-    /// # Errors
-    /// As [`Self::new`]; then nothing is written.
-    #[inline(never)]
-    pub fn new_in<'a>(place: &'a mut MaybeUninit<Self>, config: &Config) -> Result<&'a mut Self, ConfigError> {
-        let prepared = Prepared::new(config)?;
-        Ok(place.write(Self::assemble(prepared)))
-    }
-    /// Its result is written straight to where the caller wants it: the firmware's test of its stack holds that.
-    #[inline(never)]
-    fn assemble(prepared: Prepared<T>) -> Self {
-        Self {
-            region: prepared.region,
-            cam_to_body: prepared.cam_to_body,
-            camera: prepared.camera,
-            config: prepared.config,
-            border: [Pixel { x: 0, y: 0 }; POINTS],
-            blocks: Block::none(),
-            marks: [0; WORDS],
-        }
+        Ok(Self { sensor: Sensor::new(config)?, workspace: Workspace::new() })
     }
     /// As [`Self::new`], in a box, without the sensor ever standing on the caller's stack: the host's is larger than what
     /// a thread has left at times.
@@ -108,6 +79,134 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             builder.spawn_scoped(scope, move || build(config)).ok().and_then(|thread| thread.join().ok())
         })
         .unwrap_or_else(|| build(config))
+    }
+    /// Takes another configuration, from the next picture on. Refused, everything stays as it was.
+    ///
+    /// # Errors
+    /// The first field out of its limits.
+    pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
+        self.sensor = Sensor::new(config)?;
+        Ok(())
+    }
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        self.sensor.config()
+    }
+    /// The lens.
+    pub fn camera(&self) -> &Camera<T> {
+        self.sensor.camera()
+    }
+    /// The part of the picture that counts.
+    pub fn region(&self) -> &Region<T> {
+        self.sensor.region()
+    }
+    /// As [`Sensor::expect`].
+    ///
+    /// # Errors
+    /// An altitude or a position that cannot be.
+    pub fn expect(&self, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+        self.sensor.expect(frame)
+    }
+    /// As [`Sensor::expect_body`].
+    ///
+    /// # Errors
+    /// An altitude or a position that cannot be; a number beyond the last.
+    pub fn expect_body(&self, which: usize, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+        self.sensor.expect_body(which, frame)
+    }
+    /// Finds the limb. Total: any picture gives a report. One of another size than the camera's is `rejected` at the
+    /// first stage.
+    pub fn process<P: Pixels>(&mut self, picture: &P, expected: &Expected<T>) -> Report<T> {
+        self.process_observed(picture, expected, &Unobserved)
+    }
+    /// As [`Self::process`], watched.
+    pub fn process_observed<P: Pixels, O: Observer<T>>(
+        &mut self,
+        picture: &P,
+        expected: &Expected<T>,
+        observer: &O,
+    ) -> Report<T> {
+        self.sensor.process(&mut self.workspace, picture, expected, observer)
+    }
+    /// As [`Sensor::process_each`].
+    pub fn process_each<P: Pixels>(&mut self, picture: &P, expected: &[Expected<T>]) -> Reports<T> {
+        self.process_each_observed(picture, expected, &Unobserved)
+    }
+    /// As [`Self::process_each`], watched.
+    pub fn process_each_observed<P: Pixels, O: Observer<T>>(
+        &mut self,
+        picture: &P,
+        expected: &[Expected<T>],
+        observer: &O,
+    ) -> Reports<T> {
+        self.sensor.process_each(&mut self.workspace, picture, expected, observer)
+    }
+}
+
+/// Every list that a picture needs; nothing of it outlives the picture. There is no heap.
+///
+/// `POINTS` border pixels of an edge are stored (beyond, the stride doubles), `BLOCKS` blocks of eight edge points are
+/// fitted, and search lines are marked in `WORDS` words of 32 bits. See [`HostWorkspace`] and [`FlightWorkspace`].
+///
+/// It is large. A new one is all zeros: in a `static` it takes no room in flash, and is made without passing over the
+/// stack.
+#[derive(Debug, Clone)]
+pub struct Workspace<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
+    border: [Pixel; POINTS],
+    blocks: [Block<T>; BLOCKS],
+    marks: [u32; WORDS],
+}
+
+/// The lists of a workspace without their lengths, so that stages are compiled once.
+struct Lists<'a, T> {
+    border: &'a mut [Pixel],
+    blocks: &'a mut [Block<T>],
+    marks: &'a mut [u32],
+}
+
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Workspace<T, POINTS, BLOCKS, WORDS> {
+    /// Empty lists.
+    pub const fn new() -> Self {
+        Self { border: [Pixel { x: 0, y: 0 }; POINTS], blocks: [Block::EMPTY; BLOCKS], marks: [0; WORDS] }
+    }
+    fn lists(&mut self) -> Lists<'_, T> {
+        Lists { border: &mut self.border, blocks: &mut self.blocks, marks: &mut self.marks }
+    }
+}
+
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Default
+    for Workspace<T, POINTS, BLOCKS, WORDS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
+/// that a picture needs are in a [`Workspace`]. [`Horizon`] is both together.
+#[derive(Debug, Clone)]
+pub struct Sensor<T> {
+    config: Config,
+    camera: Camera<T>,
+    region: Region<T>,
+    cam_to_body: Option<Rotation<Cam, Body, T>>,
+}
+
+impl<T: Real> Sensor<T> {
+    /// Checks everything that can be refused.
+    ///
+    /// # Errors
+    /// The first field out of its limits.
+    pub fn new(config: &Config) -> Result<Self, ConfigError> {
+        config.check()?;
+        let camera = Camera::try_new(&config.camera)?;
+        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::of));
+        Ok(Self {
+            region: Region::new(&config.mask, &camera),
+            cam_to_body: config.mount.and_then(turn),
+            camera,
+            config: config.clone(),
+        })
     }
     /// The configuration.
     pub fn config(&self) -> &Config {
@@ -136,28 +235,22 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         let body = self.config.each_body().get(which).ok_or(FrameError::NoBody)?;
         Ok(Expected { which: which as u8, ..Expected::new(body, frame)? })
     }
-    /// Finds the limb. Total: any picture gives a report. One of another size than the camera's is `rejected` at the
-    /// first stage.
-    pub fn process<P: Pixels>(&mut self, picture: &P, expected: &Expected<T>) -> Report<T> {
-        self.process_observed(picture, expected, &Unobserved)
-    }
-    /// As [`Self::process`], watched.
-    pub fn process_observed<P: Pixels, O: Observer<T>>(
-        &mut self,
+    /// Finds the limb, watched. Total: any picture gives a report. One of another size than the camera's is `rejected`
+    /// at the first stage.
+    pub fn process<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+        &self,
+        workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
         picture: &P,
         expected: &Expected<T>,
         observer: &O,
     ) -> Report<T> {
-        self.process_beside(picture, expected, &[], observer)
+        self.process_beside(workspace.lists(), picture, expected, &[], observer)
     }
     /// Finds several bodies in one picture, one after the other in the order of `expected`; at most [`MAX_BODIES`].
     /// An edge on the limb of one that was found is not taken for another's.
-    pub fn process_each<P: Pixels>(&mut self, picture: &P, expected: &[Expected<T>]) -> Reports<T> {
-        self.process_each_observed(picture, expected, &Unobserved)
-    }
-    /// As [`Self::process_each`], watched.
-    pub fn process_each_observed<P: Pixels, O: Observer<T>>(
-        &mut self,
+    pub fn process_each<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+        &self,
+        workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
         picture: &P,
         expected: &[Expected<T>],
         observer: &O,
@@ -166,7 +259,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         let mut taken = heapless::Vec::<Taken<T>, MAX_BODIES>::new();
         for one in expected {
             observer.body(one.which);
-            let report = self.process_beside(picture, one, &taken, observer);
+            let report = self.process_beside(workspace.lists(), picture, one, &taken, observer);
             let found = report.solution.as_ref();
             let found = found.map(|s| Taken { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
             // There is room for as many as there can be bodies.
@@ -178,7 +271,8 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     }
 
     fn process_beside<P: Pixels, O: Observer<T>>(
-        &mut self,
+        &self,
+        lists: Lists<'_, T>,
         picture: &P,
         expected: &Expected<T>,
         taken: &[Taken<T>],
@@ -193,14 +287,15 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             solution: None,
         };
         if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
-            self.look(picture, expected, taken, observer, &mut report);
+            self.look(lists, picture, expected, taken, observer, &mut report);
         }
         observer.leave();
         report
     }
 
     fn look<P: Pixels, O: Observer<T>>(
-        &mut self,
+        &self,
+        lists: Lists<'_, T>,
         picture: &P,
         expected: &Expected<T>,
         taken: &[Taken<T>],
@@ -225,7 +320,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         let scene = Scene { picture, region: &self.region, level, observer };
         let (narrow, widest) = line_spacing(expected, &self.camera);
         let (spacing, widest) = config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
-        let mut marks = Marks::new(&mut self.marks, self.region.width(), self.region.height(), spacing, widest);
+        let mut marks = Marks::new(lists.marks, self.region.width(), self.region.height(), spacing, widest);
         // What is narrower on the border than a search line is apart from the next is no limb.
         let stride = spacing.min(self.region.width().min(self.region.height()) / BORDER_LOOKS).max(1);
         let mut judge = Judge {
@@ -237,14 +332,14 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             noise,
             min_points: config.candidates.min_points.min(select::small(expected.sin, &self.camera, 2)),
             observer,
-            blocks: &mut self.blocks,
+            blocks: lists.blocks,
             steps: config.contour.max_steps,
             best: None,
             rival: None,
             short: 0,
             report,
         };
-        let border = &mut self.border;
+        let border = lists.border;
 
         let ranked = scene.ranked_starts(stride);
         for start in &ranked {
@@ -268,28 +363,6 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
             });
         }
         judge.conclude();
-    }
-}
-
-/// A configuration that was accepted, with all that follows from it.
-struct Prepared<T> {
-    config: Config,
-    camera: Camera<T>,
-    region: Region<T>,
-    cam_to_body: Option<Rotation<Cam, Body, T>>,
-}
-
-impl<T: Real> Prepared<T> {
-    fn new(config: &Config) -> Result<Self, ConfigError> {
-        config.check()?;
-        let camera = Camera::try_new(&config.camera)?;
-        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::of));
-        Ok(Self {
-            region: Region::new(&config.mask, &camera),
-            cam_to_body: config.mount.and_then(turn),
-            camera,
-            config: config.clone(),
-        })
     }
 }
 

@@ -10,19 +10,21 @@
 #![no_main]
 
 use core::cell::Cell;
-use core::mem::MaybeUninit;
 
 use cortex_m_rt::entry;
 use hzn_core::image::{Grey, Layout};
-use hzn_core::pipeline::Observer;
+use hzn_core::pipeline::{Observer, Unobserved};
 use hzn_core::status::Stage;
-use hzn_core::{FlightHorizon, Frame};
+use hzn_core::{FlightWorkspace, Frame, Sensor};
 use hzn_flight::answer::Answer;
 use hzn_flight::bytes::Writer;
 use hzn_flight::table;
 use hzn_mps2::board::{Board, Timer};
 use hzn_mps2::host::{File, exit};
 use hzn_mps2::watermark;
+use static_cell::ConstStaticCell;
+
+static WORKSPACE: ConstStaticCell<FlightWorkspace> = ConstStaticCell::new(FlightWorkspace::new());
 
 /// Ticks by stage.
 struct Clock {
@@ -65,7 +67,7 @@ fn run() -> Option<()> {
     let mut cases = File::open(c"cases.bin")?;
     let mut results = File::create(c"results.bin")?;
     let [frame_buffer, table_buffer] = &mut board.frames;
-    let place = cortex_m::singleton!(: MaybeUninit<FlightHorizon> = MaybeUninit::uninit())?;
+    let workspace = WORKSPACE.try_take()?;
     let timer = board.timer;
     loop {
         let mut header = [0u8; 32];
@@ -96,11 +98,11 @@ fn run() -> Option<()> {
         let frame = Frame { altitude_m: given(altitude), position_m, ..Frame::default() };
 
         let t0 = timer.ticks();
-        let horizon = FlightHorizon::new_in(place, &parameters.sensor).ok()?;
+        let sensor = Sensor::new(&parameters.sensor).ok()?;
         let t1 = timer.ticks();
-        let expected = horizon.expect(&frame).ok()?;
+        let expected = sensor.expect(&frame).ok()?;
         let t2 = timer.ticks();
-        let report = horizon.process(&picture, &expected);
+        let report = sensor.process(workspace, &picture, &expected, &Unobserved);
         let t3 = timer.ticks();
         let clock = Clock {
             timer,
@@ -108,7 +110,7 @@ fn run() -> Option<()> {
             stage: Cell::new(usize::MAX),
             ticks: core::array::from_fn(|_| Cell::new(0)),
         };
-        let again = horizon.process_observed(&picture, &expected, &clock);
+        let again = sensor.process(workspace, &picture, &expected, &clock);
         let answer = Answer::of(&report);
         if Answer::of(&again).status != answer.status {
             return None;
