@@ -5,8 +5,14 @@
 //! wrong ones cost next to nothing, then scored by truncated squares on a part of the points. With 80 % outliers 574
 //! draws find the limb with 99 % probability.
 
+#[cfg(feature = "zju")]
+mod mlesac;
+#[cfg(feature = "zju")]
+mod preverified;
 #[cfg(feature = "dlr")]
 mod ransac;
+#[cfg(any(feature = "dlr", feature = "zju"))]
+mod sampled;
 
 use crate::block::{Block, LANES, sum};
 use crate::body::Expected;
@@ -29,6 +35,13 @@ pub enum Method {
     /// RANSAC on three points, every point counted in every draw (Braun & Barf 2022, 3.6).
     #[cfg(feature = "dlr")]
     Ransac,
+    /// RANSAC on five points, of which two verify the cone through the others before it is counted (Wang et al. 2022,
+    /// 2.3). Give it 20000 draws.
+    #[cfg(feature = "zju")]
+    RansacPreverify,
+    /// RANSAC on three points by the likelihood of a mixture (Torr & Zisserman 2000).
+    #[cfg(feature = "zju")]
+    Mlesac,
 }
 
 /// `[reject]` of sensor.toml.
@@ -98,6 +111,10 @@ pub(crate) fn keep<T: Real>(
         }
         #[cfg(feature = "dlr")]
         Method::Ransac => return ransac::keep(blocks, count, config),
+        #[cfg(feature = "zju")]
+        Method::RansacPreverify => return preverified::keep(blocks, count, config),
+        #[cfg(feature = "zju")]
+        Method::Mlesac => return mlesac::keep(blocks, count, focal_px, config),
     };
     for block in blocks {
         let g = block.gradient(&best.e);

@@ -40,6 +40,11 @@ fn draw(noise: &mut Noise, sigma_px: f64, snr: f64) -> Drawn {
         .map(|i| {
             // The mean over the pixel, 4×4.
             let (x, y) = (f64::from(i % SIZE), f64::from(i / SIZE));
+            let middle = x * nx + y * ny - offset;
+            if middle.abs() > 4.5 * sigma_px + 1.0 {
+                let share = f64::from(u8::from(middle > 0.0));
+                return (DIM + CONTRAST * (share + noise.normal() / snr) + 0.5) as u16;
+            }
             let share: f64 = (0..16)
                 .map(|k| {
                     let at = |k: i32| (f64::from(k) - 1.5) / 4.0;

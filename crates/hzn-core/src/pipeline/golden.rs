@@ -4,18 +4,18 @@
 #[cfg(feature = "zju")]
 mod zju;
 
-use crate::block::{Block, LANES, Lit};
+use crate::block::{Block, LANES};
 use crate::body::{self, Expected, Frame};
 use crate::camera::{Camera, Config as CameraConfig, Model};
 use crate::ellipsoid::LimbCone;
 use crate::estimate::{self, HalfAngle};
 use crate::frames::{Cam, Cov3, Ecef, Rotation, UnitVec3};
 use crate::linalg::{V3, basis, invert_spd2, unit};
+use crate::pipeline::edges::Edges;
 use crate::pixel::ImagePoint;
 use crate::real::Real;
-use crate::{covariance, reject, undistort};
+use crate::{covariance, reject};
 use serde_json::Value;
-use std::vec;
 use std::vec::Vec;
 
 pub(super) fn load(text: &str) -> Vec<Value> {
@@ -50,23 +50,8 @@ pub(super) fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
 
 /// Edge points as the candidates stage leaves them; the lit side is where the axis `e` lies.
 pub(super) fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
-    let mut blocks = vec![Block::<T>::default(); points.len().div_ceil(LANES)];
-    for (i, &(u, v)) in points.iter().enumerate() {
-        let p = ImagePoint { u: T::of(u), v: T::of(v) };
-        let lit = camera.ray(p).map_or(Lit::Below, |ray| {
-            let j = ray.jacobian();
-            let g: [T; 2] = core::array::from_fn(|k| (0..3).map(|r| j[r][k] * e.xyz()[r]).fold(T::ZERO, |a, b| a + b));
-            match (g[0].abs() >= g[1].abs(), g[0] > T::ZERO, g[1] > T::ZERO) {
-                (true, true, _) => Lit::Right,
-                (true, false, _) => Lit::Left,
-                (false, _, true) => Lit::Below,
-                (false, _, false) => Lit::Above,
-            }
-        });
-        blocks[i / LANES].set_point(i % LANES, p, lit);
-    }
-    undistort::to_rays(camera, &mut blocks);
-    blocks
+    let points: Vec<_> = points.iter().map(|&(u, v)| ImagePoint { u: T::of(u), v: T::of(v) }).collect();
+    Edges::new(camera, &points, e).blocks
 }
 
 /// `kb_lens.json`: OpenCV 5.0 fisheye and mpmath.

@@ -6,6 +6,8 @@
 //! doubt; otherwise the best of all that begin at the border is taken, and closed ones are looked at when none is.
 
 mod config;
+#[cfg(any(test, feature = "_edges"))]
+pub mod edges;
 mod observer;
 mod optional;
 mod preset;

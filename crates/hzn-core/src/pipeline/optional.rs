@@ -24,12 +24,15 @@ macro_rules! optional {
 pub const OPTIONAL: &[Optional] = optional! {
     "erf": "candidates.sub_pixel" = "erf";
     "zju": "candidates.sub_pixel" = "zernike";
+    "zju": "preset" = "zju-2022";
     "dlr": "covariance.method" = "braun-barf";
     "dlr": "estimate.method" = "conic";
     "dlr": "estimate.method" = "direct";
     "dlr": "preset" = "dlr-2022";
     "dlr": "reject.method" = "ransac";
     "zju": "estimate.method" = "tls";
+    "zju": "reject.method" = "mlesac";
+    "zju": "reject.method" = "ransac-preverify";
     "zju": "estimate.method" = "wtls";
 };
 

@@ -17,6 +17,9 @@ pub enum Preset {
     /// The optical horizon sensor of Braun & Barf 2022.
     #[cfg(feature = "dlr")]
     Dlr2022,
+    /// The infrared Earth sensor of Wang et al. 2022.
+    #[cfg(feature = "zju")]
+    Zju2022,
 }
 
 impl Preset {
@@ -27,6 +30,8 @@ impl Preset {
         Self::Moon,
         #[cfg(feature = "dlr")]
         Self::Dlr2022,
+        #[cfg(feature = "zju")]
+        Self::Zju2022,
     ];
 
     /// The name used in files.
@@ -37,6 +42,8 @@ impl Preset {
             Self::Moon => "moon",
             #[cfg(feature = "dlr")]
             Self::Dlr2022 => "dlr-2022",
+            #[cfg(feature = "zju")]
+            Self::Zju2022 => "zju-2022",
         }
     }
 
@@ -61,6 +68,8 @@ impl Config {
             }
             #[cfg(feature = "dlr")]
             Preset::Dlr2022 => dlr_2022(&mut config),
+            #[cfg(feature = "zju")]
+            Preset::Zju2022 => zju_2022(&mut config),
         }
         config
     }
@@ -93,8 +102,26 @@ fn dlr_2022(config: &mut Config) {
     config.select.max_section_residual = Some(0.025);
 }
 
+/// Wang et al. 2022 as flown on Tianping-2B: Zernike moments on every pixel of the edge, RANSAC with pre-verification,
+/// an elliptic cone by total least squares, weighed where the limb leaves the picture, and no gates.
+///
+/// Their threshold is 1°, which is 1.6 px with their lens (384×288, 92 px/rad); for another it is to be set.
+#[cfg(feature = "zju")]
+fn zju_2022(config: &mut Config) {
+    use crate::{candidates, estimate, reject};
+    config.candidates.sub_pixel = candidates::SubPixel::Zernike;
+    config.candidates.keep_points = 0;
+    config.reject.method = reject::Method::RansacPreverify;
+    config.reject.threshold_px = 1.6;
+    config.reject.max_draws = 20_000;
+    config.estimate.method = estimate::Method::Wtls;
+    config.estimate.weigh_above_deg = 60.0;
+    config.estimate.half_angle = estimate::HalfAngle::Free;
+    ungated(config);
+}
+
 /// Only what every fit must have.
-#[cfg(feature = "dlr")]
+#[cfg(any(feature = "dlr", feature = "zju"))]
 fn ungated(config: &mut Config) {
     config.select.min_arc_px = Some(0.0);
     config.select.max_rms_px = 1e6;

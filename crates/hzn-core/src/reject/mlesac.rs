@@ -1,0 +1,81 @@
+//! MLESAC (Torr & Zisserman 2000): RANSAC with the likelihood in place of the number of points.
+//!
+//! A point's distance d from the limb comes from a normal distribution of standard deviation σ if it is an inlier, and
+//! from an even one over ν otherwise; the share γ of inliers is found for every hypothesis by a few steps of
+//! expectation and maximisation. The hypothesis with the least −Σ ln(γ N(d; σ) + (1 − γ)/ν) wins. Every point is looked
+//! at several times in every draw, with an exponential each.
+
+use super::sampled::{FEWEST, distances2, drawn, leave_out, needed};
+use super::{Config, Consensus};
+use crate::block::{Block, LANES, sum};
+use crate::linalg::V3;
+use crate::real::Real;
+use crate::rng::Rng;
+
+/// Steps for the share of inliers.
+const STEPS: usize = 3;
+/// Standard deviations within the threshold: 95 % of the inliers.
+const SIGMAS: f64 = 1.96;
+
+/// The most likely cone; points farther from it than the threshold lose their weight. `None` with fewer than three
+/// points, or when hardly any is on a cone.
+pub(super) fn keep<T: Real>(blocks: &mut [Block<T>], count: u32, focal_px: T, config: &Config) -> Option<Consensus<T>> {
+    if count < 3 {
+        return None;
+    }
+    // Outliers lie up to a radian from the limb, to both sides.
+    let mixture = Mixture { sigma: T::of(config.threshold_px / SIGMAS), range: focal_px * T::of(2.0) };
+    let mut rng = Rng::new(config.seed);
+    let mut best: Option<(V3<T>, T, T)> = None;
+    let (mut draws, mut enough) = (0, config.max_draws);
+    while draws < enough.max(FEWEST).min(config.max_draws) {
+        draws += 1;
+        let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
+        let (cost, share) = mixture.cost(blocks, &e, c);
+        if best.is_none_or(|(_, _, least)| cost < least) && share * T::of(f64::from(count)) > T::of(3.5) {
+            best = Some((e, c, cost));
+            enough = needed(share);
+        }
+    }
+    let (e, c, _) = best?;
+    leave_out(blocks, &e, c, T::of(config.threshold_px * config.threshold_px));
+    Some(Consensus { e, c, draws, all: false })
+}
+
+/// Inliers and outliers: standard deviation of the ones, range of the others, in pixels.
+struct Mixture<T> {
+    sigma: T,
+    range: T,
+}
+
+impl<T: Real> Mixture<T> {
+    /// −Σ ln of the likelihood, and the share of inliers.
+    fn cost(&self, blocks: &[Block<T>], e: &V3<T>, c: T) -> (T, T) {
+        let per = T::of(-0.5) / (self.sigma * self.sigma);
+        let height = T::of(0.398_942_280_401_432_7) / self.sigma;
+        let mut share = T::of(0.5);
+        for _ in 0..STEPS {
+            let outlier = (T::one() - share) / self.range;
+            let (mut inliers, mut points) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+            for b in blocks {
+                let d2 = distances2(b, e, c);
+                for l in 0..LANES {
+                    let inlier = share * height * (d2[l] * per).exp();
+                    inliers[l] += b.weight[l] * inlier / (inlier + outlier);
+                    points[l] += b.weight[l];
+                }
+            }
+            // Neither all nor none, so that the logarithm is finite.
+            share = (sum(&inliers) / sum(&points).most(T::one())).most(T::of(1e-3)).least(T::of(0.999));
+        }
+        let outlier = (T::one() - share) / self.range;
+        let mut cost = [T::ZERO; LANES];
+        for b in blocks {
+            let d2 = distances2(b, e, c);
+            for l in 0..LANES {
+                cost[l] -= b.weight[l] * (share * height * (d2[l] * per).exp() + outlier).ln();
+            }
+        }
+        (sum(&cost), share)
+    }
+}
