@@ -32,7 +32,8 @@ pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
     }
     let mut table = Table::default();
     table.column("altitude_km", "altitude_km", rows.iter().map(|(km, _)| Some(*km)));
-    let columns: [(&str, &str, &str, fn(&Visibility) -> f64); 4] = [
+    type Pick = fn(&Visibility) -> f64;
+    let columns: [(&str, &str, &str, Pick); 4] = [
         ("half_angle_deg", "half-angle", "", |v| v.half_angle_deg),
         ("ellipse_from_deg", "ellipse from", "arc of an ellipse", |v| v.ellipse_deg),
         ("hyperbola_from_deg", "hyperbola from", "arc of a hyperbola", |v| v.hyperbola_deg),
@@ -71,7 +72,8 @@ pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
     let mut table = Table::default();
     table.column("altitude_km", "altitude_km", rows.iter().map(|r| Some(r.1)));
     table.column("latitude_deg", "latitude_deg", rows.iter().map(|r| Some(r.0)));
-    let columns: [(&str, &str, fn(&Vertical) -> f64); 4] = [
+    type Pick = fn(&Vertical) -> f64;
+    let columns: [(&str, &str, Pick); 4] = [
         ("geocentric_to_axis_deg", "centre to limb axis", |v| v.geocentric_to_axis_deg),
         ("geocentric_to_geodetic_deg", "centre to vertical", |v| v.geocentric_to_geodetic_deg),
         ("geodetic_to_axis_deg", "vertical to limb axis", |v| v.geodetic_to_axis_deg),

@@ -345,7 +345,7 @@ fn sigma(args: &Args) -> Result<Finished, Stop> {
         results.iter().filter_map(with).min_by(|a, b| a.1.total_cmp(&b.1))
     };
     if let Some((place, deg)) = best(|s| Some(s.fused.pitch_deg)).filter(|_| !swept.is_empty()) {
-        let at: Vec<String> = swept.iter().map(|&i| format!("{} {}", grid.axes[i].column, place[i])).collect();
+        let at: Vec<String> = swept.iter().map(|&i| format!("{} {}", grid.axes[i].label, place[i])).collect();
         notes.push(format!("smallest pitch, fused: {deg:.4} deg at {}", at.join(", ")));
     }
     let chart = swept.first().map(|&x| chart(&grid, &results, x, &swept[1..]));
@@ -354,9 +354,9 @@ fn sigma(args: &Args) -> Result<Finished, Stop> {
 
 /// Sigmas over the first quantity that varies; every combination of the others has its own lines.
 fn chart(grid: &Grid<'_>, results: &[(Vec<f64>, Option<Sigmas>)], x: usize, others: &[usize]) -> Chart {
-    let mut chart = Chart::new("Sigma of the direction by design (1 sigma)", grid.axes[x].label, "deg").logarithmic();
+    let mut chart = Chart::new("Sigma of the direction by design (1 sigma)", grid.axes[x].label, "deg");
     let name = |place: &[f64]| -> String {
-        others.iter().map(|&i| format!(", {} {}", grid.axes[i].column, place[i])).collect()
+        others.iter().map(|&i| format!(", {} {}", grid.axes[i].label, place[i])).collect()
     };
     let mut names: Vec<String> = results.iter().map(|(p, _)| name(p)).collect();
     names.dedup();

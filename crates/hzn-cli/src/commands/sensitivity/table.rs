@@ -35,20 +35,22 @@ impl Table {
 
     /// The columns with a head, to about four digits; `-` where there is no value.
     pub(super) fn text(&self) -> String {
-        let shown: Vec<(&Column, Vec<String>)> = self
+        let shown: Vec<Vec<String>> = self
             .columns
             .iter()
             .filter(|c| !c.head.is_empty())
-            .map(|c| (c, c.cells.iter().map(|x| x.map_or_else(|| "-".into(), number)).collect()))
+            .map(|c| {
+                let cells = c.cells.iter().map(|x| x.map_or_else(|| "-".into(), number));
+                std::iter::once(c.head.clone()).chain(cells).collect()
+            })
             .collect();
-        let width = |(c, cells): &(&Column, Vec<String>)| cells.iter().map(String::len).fold(c.head.len(), usize::max);
-        let line = |cell: &dyn Fn(&(&Column, Vec<String>)) -> String| {
-            let cells: Vec<String> = shown.iter().map(|c| format!("{:>w$}", cell(c), w = width(c))).collect();
-            cells.join("  ") + "\n"
-        };
-        let mut out = line(&|(c, _)| c.head.clone());
-        for row in 0..self.rows() {
-            out.push_str(&line(&|(_, cells)| cells.get(row).cloned().unwrap_or_default()));
+        let mut out = String::new();
+        for row in 0..=self.rows() {
+            let cell = |column: &Vec<String>| {
+                let width = column.iter().map(String::len).max().unwrap_or(0);
+                format!("{:>width$}", column.get(row).map_or("", String::as_str))
+            };
+            out.push_str(&(shown.iter().map(cell).collect::<Vec<_>>().join("  ") + "\n"));
         }
         out
     }
@@ -58,14 +60,9 @@ impl Table {
 fn number(x: f64) -> String {
     match x.abs() {
         0.0 => "0".into(),
+        _ if x.fract() == 0.0 => format!("{x:.0}"),
         a if a >= 1000.0 => format!("{x:.0}"),
-        a if a >= 1e-4 => {
-            let decimals = (3 - a.log10().floor() as i32).max(0) as usize;
-            let text = format!("{x:.decimals$}");
-            let trimmed = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-            // Whole and round numbers are what was asked for; measured ones keep their digits.
-            if trimmed.len() + 2 < text.len() { trimmed.to_owned() } else { text }
-        }
+        a if a >= 1e-4 => format!("{x:.*}", (3 - a.log10().floor() as i32).max(0) as usize),
         _ => format!("{x:.2e}"),
     }
 }
