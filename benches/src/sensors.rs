@@ -37,7 +37,7 @@ pub(crate) fn flight(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, Str
 }
 
 /// f64 with the lists of a workstation.
-pub(crate) fn host(config: &Config) -> Result<Sensor<f64, 16384, 2048, 16384>, String> {
+pub(crate) fn host(config: &Config) -> Result<Sensor<f64, 16384, 2048, 65536>, String> {
     Ok(Sensor::on(Box::new(HostHorizon::new(config).map_err(|e| e.to_string())?)))
 }
 

@@ -169,7 +169,7 @@ impl Watch {
 }
 
 impl<T: Real> Observer<T> for Watch {
-    fn edge(&self, _: u32, _: &[hzn_core::pixel::Pixel], _: u32) {
+    fn edge(&self, _: u32, _: impl Iterator<Item = hzn_core::pixel::Pixel>, _: u32) {
         self.all.borrow_mut().clear();
     }
     fn point(&self, _: u32, p: ImagePoint<T>) {

@@ -1,7 +1,10 @@
 //! The presets of published systems on rendered scenes: they answer what they should, as well as their methods can.
 
+use hzn_core::camera::{self, Model};
 use hzn_core::{Config, Preset};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
+use hzn_sim::pose::position_m;
+use hzn_sim::{Disc, Look, Pose};
 use hzn_tests::sensors::look;
 use hzn_tests::{Sensors, Tally};
 
@@ -47,5 +50,41 @@ fn wang_on_an_infrared_earth() {
         assert!(tally.rms_deg() < rms_deg && tally.worst_deg() < 2.0 * rms_deg, "{tally}");
         // The moments' bias from pixel to pixel counts as noise: too careful.
         assert!((0.1..2.5).contains(&tally.mean_nees()), "{tally}");
+    }
+}
+
+/// HORACE is right where the camera points at the Earth: the first frames of a swing from straight down.
+#[test]
+fn horace_near_nadir() {
+    let mut flight = leo_infrared(25, 1);
+    flight.frames.truncate(6);
+    let tally = fly(&flight, Preset::Horace2015, |_| {});
+    assert_eq!(tally.answered(), tally.frames, "{tally}");
+    assert!(tally.rms_deg() < 1.0 && tally.worst_deg() < 2.0, "{tally}");
+}
+
+/// HORACE's own geometry: a side camera of a rocket at 80 km that looks at the horizon, a pinhole, the Earth bright.
+/// The circle's centre is not the nadir then, by up to some twenty degrees.
+fn horizon_camera(frames: usize) -> Flight {
+    let mut flight = rocket(720, 576, frames, 1);
+    let camera = camera::Config::ideal(Model::Pinhole, 720, 576, 600.0);
+    flight.sensor.camera = camera.clone();
+    for (i, frame) in flight.frames.iter_mut().enumerate() {
+        let look =
+            Look { azimuth_rad: i as f64, depression_rad: (2.0 * i as f64).to_radians(), roll_rad: 0.3 * i as f64 };
+        frame.scene.camera = camera.clone();
+        frame.scene.pose = Pose::looking(position_m(67.9, 21.1, 80.0), look);
+        frame.scene.disc = Disc { surface: 0.7, clouds: None, band: None };
+    }
+    flight
+}
+
+#[test]
+fn horace_at_the_horizon() {
+    let flight = horizon_camera(8);
+    for rows in [None, Some(240)] {
+        let tally = fly(&flight, Preset::Horace2015, |config| config.input.scale_to_height = rows);
+        assert_eq!(tally.answered(), tally.frames, "{tally}");
+        assert!((1.0..10.0).contains(&tally.rms_deg()) && tally.worst_deg() < 20.0, "{tally}");
     }
 }

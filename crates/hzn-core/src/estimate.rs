@@ -9,6 +9,8 @@
 //! errors. With the weights so found the half-angle is then fitted freely, for the covariance, for the altitude
 //! estimate, and for the test of the candidate; `covariance` fuses the two.
 
+#[cfg(feature = "horace")]
+mod circle;
 #[cfg(feature = "dlr")]
 pub(crate) mod conic;
 #[cfg(feature = "dlr")]
@@ -18,6 +20,7 @@ mod quadric;
 
 use crate::block::{Block, LANES, sum};
 use crate::body::Expected;
+use crate::camera::Camera;
 use crate::covariance;
 use crate::error::ConfigError;
 use crate::limb::Azimuth;
@@ -59,6 +62,9 @@ pub enum Method {
     /// The same, every point weighed by what a pixel is to it (Wang et al. 2022, (18) to (21)).
     #[cfg(feature = "zju")]
     Wtls,
+    /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
+    #[cfg(feature = "horace")]
+    Circle,
 }
 
 /// `[estimate]` of sensor.toml.
@@ -132,10 +138,13 @@ pub(crate) fn fit<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,
     expected: &Expected<T>,
+    camera: &Camera<T>,
     threshold_px: T,
     config: &Config,
     noise: &covariance::Config,
 ) -> Option<Fit<T>> {
+    #[cfg(not(feature = "horace"))]
+    let _ = camera;
     let cone = match config.method {
         Method::Sphere => sphere(blocks, start, expected, threshold_px, config, noise)?,
         #[cfg(feature = "dlr")]
@@ -146,6 +155,8 @@ pub(crate) fn fit<T: Real>(
         Method::Tls => elliptic(blocks, start, threshold_px, HALF_TURN_RAD)?,
         #[cfg(feature = "zju")]
         Method::Wtls => elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?,
+        #[cfg(feature = "horace")]
+        Method::Circle => held(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
     };
     let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
     for block in blocks.iter() {

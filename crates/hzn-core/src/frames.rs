@@ -74,6 +74,23 @@ impl<F, T: Real> UnitVec3<F, T> {
     }
 }
 
+#[cfg(feature = "horace")]
+impl<T: Real> UnitVec3<Cam, T> {
+    /// Where it lies in the picture: a unit vector (right, down) from the principal point towards the body's centre,
+    /// HORACE's two-dimensional direction (Barf 2014, (2.37)). `None` straight ahead and straight behind.
+    pub fn in_picture(&self) -> Option<[T; 2]> {
+        let flat = (self.v.x * self.v.x + self.v.y * self.v.y).sqrt();
+        (flat > T::of(1e-12)).then(|| [self.v.x / flat, self.v.y / flat])
+    }
+    /// Angles in radians by which the camera has to be turned, first about its own y axis (positive: to the right, −π to
+    /// π), then about its x axis (positive: up, −π/2 to π/2), until it looks there (Barf 2014, 2.2.4). A turn about the
+    /// direction itself cannot be told from one direction.
+    pub fn euler_yx_rad(&self) -> [T; 2] {
+        let level = (self.v.x * self.v.x + self.v.z * self.v.z).sqrt();
+        [self.v.x.atan2(self.v.z), (-self.v.y).atan2(level)]
+    }
+}
+
 /// Covariance of a direction in frame `F`, rad²: symmetric 3×3 of rank 2, its null space along the direction.
 #[derive(Debug)]
 pub struct Cov3<F, T> {
@@ -200,6 +217,23 @@ mod tests {
         assert!((y.xyz()[1] - 1.0).abs() < 1e-15);
         assert!(r.inverse().apply(&y).angle_rad(&x) < 1e-15);
         assert!(Rotation::<Cam, Body, f64>::assume_from_quaternion([0.0; 4]).is_none());
+    }
+
+    #[cfg(feature = "horace")]
+    #[test]
+    fn euler_angles_turn_the_camera_to_the_direction() {
+        for v in [[0.3, -0.5, 0.8], [-0.9, 0.1, -0.3], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+            let d = UnitVec3::<Cam, f64>::try_new(v).unwrap();
+            let [y, x] = d.euler_yx_rad();
+            // The camera's z axis after a turn about y, then about the new x.
+            let ((sy, cy), (sx, cx)) = (libm::sincos(y), libm::sincos(x));
+            let z = UnitVec3::<Cam, f64>::try_new([sy * cx, -sx, cy * cx]).unwrap();
+            assert!(z.angle_rad(&d) < 1e-15, "{v:?}");
+            if let Some([a, b]) = d.in_picture() {
+                assert!((a * d.xyz()[1] - b * d.xyz()[0]).abs() < 1e-15 && (a * a + b * b - 1.0).abs() < 1e-15);
+            }
+        }
+        assert!(UnitVec3::<Cam, f64>::try_new([0.0, 0.0, 1.0]).unwrap().in_picture().is_none());
     }
 
     #[test]

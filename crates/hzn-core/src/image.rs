@@ -4,7 +4,13 @@
 //! pipeline is generic over [`Pixels`], so each kind gets its own compiled copy and a flight computer links only
 //! the one it uses.
 
+#[cfg(feature = "horace")]
+mod part;
+
 use core::fmt;
+
+#[cfg(feature = "horace")]
+pub(crate) use part::{Part, Window};
 
 /// What the pipeline reads: one brightness per pixel.
 pub trait Pixels {

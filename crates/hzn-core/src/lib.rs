@@ -45,7 +45,7 @@
 //! | workspace | scalar | border pixels | points fitted | bytes |
 //! |---|---|---|---|---|
 //! | [`FlightHorizon`] | f32 | 2048 | 2048 | below 96 KiB |
-//! | [`HostHorizon`] | f64 | 16384 | 16384 | 1.4 MiB |
+//! | [`HostHorizon`] | f64 | 16384 | 16384 | 1.5 MiB |
 //!
 //! # Features
 //!
@@ -63,6 +63,8 @@ extern crate std;
 mod block;
 pub mod body;
 pub mod camera;
+#[cfg(feature = "horace")]
+mod circle;
 pub mod ellipsoid;
 pub mod error;
 pub mod frames;

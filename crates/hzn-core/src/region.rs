@@ -2,6 +2,10 @@
 
 use crate::camera::{self, Camera};
 use crate::error::{ConfigError, Limit, between, require};
+#[cfg(feature = "horace")]
+use crate::image::Window;
+#[cfg(feature = "horace")]
+use crate::pixel::ImagePoint;
 use crate::real::Real;
 
 /// Most corners of one polygon.
@@ -97,6 +101,33 @@ impl<T: Real> Region<T> {
     /// A whole picture without mask.
     pub fn whole(width: u16, height: u16) -> Self {
         Self { width, height, circle: None, polygons: heapless::Vec::new() }
+    }
+
+    /// The region as it lies in a part of the picture, or in a smaller copy.
+    #[cfg(feature = "horace")]
+    pub(crate) fn through(&self, window: &Window) -> Self {
+        let [sx, sy] = window.scale::<T>();
+        let place = |[u, v]: [T; 2]| {
+            let p = window.of_picture(ImagePoint { u, v });
+            [p.u, p.v]
+        };
+        Self {
+            width: window.width,
+            height: window.height,
+            circle: self.circle.map(|c| {
+                let [cx, cy] = place([c.cx, c.cy]);
+                Circle { cx, cy, semi_x: c.semi_x / sx, inv_x: c.inv_x * sx, inv_y: c.inv_y * sy }
+            }),
+            polygons: self
+                .polygons
+                .iter()
+                .map(|o| Outline {
+                    low: place(o.low),
+                    high: place(o.high),
+                    corners: o.corners.iter().map(|c| place(*c)).collect(),
+                })
+                .collect(),
+        }
     }
 
     /// Columns of the picture.

@@ -1,7 +1,9 @@
 //! Gates and choice: whether a fitted cone is the body's limb, and which of several is.
 
 #[cfg(feature = "dlr")]
-mod published;
+mod braun_barf;
+#[cfg(feature = "horace")]
+mod horace;
 
 use crate::block::{Block, LANES};
 use crate::body::Expected;
@@ -48,6 +50,14 @@ pub struct Config {
     #[cfg(feature = "dlr")]
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub max_section_residual: Option<f64>,
+    /// Lowest and highest altitude in kilometres, 0 or more: the fitted circle's radius must be that of the limb from
+    /// between. Left out: any. At 0 the limb is infinitely wide.
+    #[cfg(feature = "horace")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub altitude_limits_km: Option<[f64; 2]>,
+    /// By how much the radius may lie beyond its limits, as a part of them, 0 or more.
+    #[cfg(feature = "horace")]
+    pub radius_margin: f64,
 }
 
 impl Default for Config {
@@ -64,6 +74,10 @@ impl Default for Config {
             limb_in_view: false,
             #[cfg(feature = "dlr")]
             max_section_residual: None,
+            #[cfg(feature = "horace")]
+            altitude_limits_km: None,
+            #[cfg(feature = "horace")]
+            radius_margin: 0.1,
         }
     }
 }
@@ -77,6 +91,14 @@ impl Config {
         #[cfg(feature = "dlr")]
         if let Some(limit) = self.max_section_residual {
             above("select.max_section_residual", limit, 0.0)?;
+        }
+        #[cfg(feature = "horace")]
+        {
+            if let Some([low, high]) = self.altitude_limits_km {
+                between("select.altitude_limits_km", low, 0.0, 1e9)?;
+                between("select.altitude_limits_km", high, low, 1e9)?;
+            }
+            between("select.radius_margin", self.radius_margin, 0.0, 1e3)?;
         }
         above("select.max_rms_px", self.max_rms_px, 0.0)?;
         above("select.max_half_angle_sigma", self.max_half_angle_sigma, 0.0)?;
@@ -138,7 +160,12 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     };
     #[cfg(feature = "dlr")]
     let verdict = match verdict {
-        Verdict::Passed => published::verdict(fit, expected, blocks, camera, scene.region, config).unwrap_or(verdict),
+        Verdict::Passed => braun_barf::verdict(fit, expected, blocks, camera, scene.region, config),
+        failed => failed,
+    };
+    #[cfg(feature = "horace")]
+    let verdict = match verdict {
+        Verdict::Passed => horace::verdict(fit, expected, config),
         failed => failed,
     };
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }

@@ -16,6 +16,7 @@ const VOCABULARY: &[&str] = &[
     "block",
     "rng",
     "camera",
+    "circle",
     "ellipsoid",
     "body",
     "error",

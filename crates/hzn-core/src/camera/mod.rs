@@ -12,6 +12,8 @@ pub use config::{Config, Model};
 use crate::block::{Block, LANES};
 use crate::error::{ConfigError, Limit, require};
 use crate::frames::{Cam, UnitVec3};
+#[cfg(feature = "horace")]
+use crate::image::Window;
 use crate::linalg::V3;
 use crate::pixel::ImagePoint;
 use crate::real::Real;
@@ -129,6 +131,23 @@ impl<T: Real> Camera<T> {
         })
     }
 
+    /// The camera that takes a part of this one's pictures, or smaller ones.
+    #[cfg(feature = "horace")]
+    pub(crate) fn through(&self, window: &Window) -> Self {
+        let ([sx, sy], centre) = (window.scale::<T>(), window.of_picture(self.principal_point()));
+        Self {
+            width: window.width,
+            height: window.height,
+            fx: self.fx / sx,
+            fy: self.fy / sy,
+            inv_fx: self.inv_fx * sx,
+            inv_fy: self.inv_fy * sy,
+            cx: centre.u,
+            cy: centre.v,
+            ..self.clone()
+        }
+    }
+
     /// Columns of the picture.
     pub fn width(&self) -> u16 {
         self.width
@@ -205,6 +224,27 @@ impl<T: Real> Camera<T> {
                 None => block.clear(l),
             }
         }
+    }
+
+    /// An image point from the principal point on, in focal lengths.
+    #[cfg(feature = "horace")]
+    pub(crate) fn in_focal_lengths(&self, p: ImagePoint<T>) -> [T; 2] {
+        [(p.u - self.cx) * self.inv_fx, (p.v - self.cy) * self.inv_fy]
+    }
+
+    /// The direction of a point so far from the principal point, in focal lengths, also beyond the picture and the image
+    /// circle: a radial lens goes on as it ends there, up to 180° off axis, and others go on as a pinhole. `None` for
+    /// what is not finite.
+    #[cfg(feature = "horace")]
+    pub(crate) fn continued(&self, [x, y]: [T; 2]) -> Option<UnitVec3<Cam, T>> {
+        let rho2 = x * x + y * y;
+        let Lens::Radial(lens) = &self.lens else { return UnitVec3::try_new([x, y, T::one()]) };
+        if rho2 <= self.rho_max * self.rho_max {
+            return Some(UnitVec3::assume_unit(lens.ray(x, y, rho2).0));
+        }
+        let rho = rho2.sqrt();
+        let (s, c) = lens.beyond(rho).sin_cos();
+        UnitVec3::try_new([x / rho * s, y / rho * s, c])
     }
 
     /// The direction of an image point; `None` beyond the image circle.

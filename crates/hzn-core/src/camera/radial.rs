@@ -204,6 +204,13 @@ impl<T: Real> Radial<T> {
         }
     }
 
+    /// θ beyond the largest radius, along the tangent there.
+    #[cfg(feature = "horace")]
+    pub(super) fn beyond(&self, rho: T) -> T {
+        let (r, d) = forward(&self.k, self.theta_max);
+        (self.theta_max + (rho - r) / d).least(T::of(core::f64::consts::PI))
+    }
+
     /// r(θ) in units of the focal length.
     pub(super) fn radius(&self, theta: T) -> T {
         forward(&self.k, theta).0

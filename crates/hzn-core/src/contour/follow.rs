@@ -15,7 +15,7 @@ use crate::real::Real;
 use crate::region::Region;
 
 /// Neighbours counter-clockwise on the screen from east: (dx, dy).
-const STEPS: [(i32, i32); 8] = [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
+pub(super) const STEPS: [(i32, i32); 8] = [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
 /// The western neighbour, which search lines mark.
 pub(super) const WEST: u8 = 4;
 

@@ -3,8 +3,12 @@
 //! Edges begin at the border of the region, where dark turns to lit; they are followed until they leave the picture. Edges that close on themselves are found on horizontal search lines. So the cost grows
 //! with the length of the edges, not with the number of pixels.
 
+#[cfg(feature = "horace")]
+pub(crate) mod erode;
 mod follow;
 mod marks;
+#[cfg(feature = "horace")]
+pub(crate) mod raster;
 mod search;
 mod thinned;
 
@@ -21,6 +25,12 @@ pub enum Method {
     /// From the border of the picture and from search lines along the edges; no pixel is looked at without need.
     #[default]
     BorderFollowing,
+    /// Every outer border, pixel by pixel and row by row (Suzuki & Abe 1985, algorithm 2).
+    #[cfg(feature = "horace")]
+    Raster,
+    /// Every lit pixel with too few lit ones around it, whatever it belongs to (Barf 2014, 2.2.3).
+    #[cfg(feature = "horace")]
+    Erode,
 }
 
 /// `[contour]` of sensor.toml.
@@ -35,11 +45,26 @@ pub struct Config {
     /// Steps of one picture's border following before it gives up, 1000 to 100 million: the bound on the worst
     /// picture's time.
     pub max_steps: u32,
+    /// For `erode`: side of the square neighbourhood in pixels, odd, 3 to 31.
+    #[cfg(feature = "horace")]
+    pub erode_size_px: u16,
+    /// For `erode`: a lit pixel with fewer lit ones in its neighbourhood, itself counted, is edge; 1 to the square of
+    /// the size.
+    #[cfg(feature = "horace")]
+    pub erode_threshold: u16,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { method: Method::BorderFollowing, line_spacing_px: None, max_steps: 250_000 }
+        Self {
+            method: Method::BorderFollowing,
+            line_spacing_px: None,
+            max_steps: 250_000,
+            #[cfg(feature = "horace")]
+            erode_size_px: 3,
+            #[cfg(feature = "horace")]
+            erode_threshold: 9,
+        }
     }
 }
 
@@ -47,6 +72,18 @@ impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         if let Some(n) = self.line_spacing_px {
             require(n >= 1, "contour.line_spacing_px", f64::from(n), Limit::AtLeast(1.0))?;
+        }
+        #[cfg(feature = "horace")]
+        {
+            let (size, least) = (f64::from(self.erode_size_px), f64::from(self.erode_threshold));
+            let odd = (3..=31).contains(&self.erode_size_px) && self.erode_size_px % 2 == 1;
+            require(odd, "contour.erode_size_px", size, Limit::Rule("must be an odd number from 3 to 31"))?;
+            require(
+                least >= 1.0 && least <= size * size,
+                "contour.erode_threshold",
+                least,
+                Limit::Between(1.0, size * size),
+            )?;
         }
         let steps = f64::from(self.max_steps);
         require((1000..=100_000_000).contains(&self.max_steps), "contour.max_steps", steps, Limit::Between(1e3, 1e8))

@@ -56,6 +56,18 @@ impl<'a> Thinned<'a> {
         self.stride *= 2;
     }
 
+    /// Forgets everything.
+    #[cfg(feature = "horace")]
+    pub(crate) fn clear(&mut self) {
+        (self.len, self.stride, self.wait, self.total) = (0, 1, 0, 0);
+    }
+
+    /// The stored pixels, to be brought into another order.
+    #[cfg(feature = "horace")]
+    pub(crate) fn pixels_mut(&mut self) -> &mut [Pixel] {
+        self.buffer.get_mut(..self.len).unwrap_or_default()
+    }
+
     /// The stored pixels in order.
     pub(crate) fn pixels(&self) -> &[Pixel] {
         self.buffer.get(..self.len).unwrap_or_default()

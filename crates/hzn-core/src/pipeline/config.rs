@@ -1,5 +1,7 @@
 //! Everything that describes a sensor, as plain values: sensor.toml without the file.
 
+#[cfg(feature = "horace")]
+use crate::error::between;
 use crate::error::{ConfigError, Limit, require};
 use crate::image::Channel;
 use crate::{binarize, body, camera, candidates, contour, covariance, estimate, recover, region, reject, select};
@@ -71,6 +73,11 @@ pub struct Mount {
 pub struct Input {
     /// Mean of the colours, or one of them.
     pub channel: Channel,
+    /// Rows of a smaller copy of the picture that is looked at instead of it, 16 up to the picture's own. From there on
+    /// every length is in the copy's pixels. Left out: the picture as it is.
+    #[cfg(feature = "horace")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub scale_to_height: Option<u16>,
 }
 
 impl Config {
@@ -130,6 +137,11 @@ impl Config {
         self.reject.check()?;
         self.estimate.check()?;
         self.covariance.check()?;
+        self.recover.check()?;
+        #[cfg(feature = "horace")]
+        if let Some(rows) = self.input.scale_to_height {
+            between("input.scale_to_height", f64::from(rows), 16.0, f64::from(self.camera.height.max(16)))?;
+        }
         self.select.check()
     }
 }

@@ -1,6 +1,10 @@
 //! Reference data from independent sources (`tests/golden/`, origin in its README) and Monte Carlo on edge points.
 //! Here, because the stages between an edge point and an answer are not public.
 
+#[cfg(feature = "dlr")]
+mod dlr;
+#[cfg(feature = "horace")]
+mod horace;
 #[cfg(feature = "zju")]
 mod zju;
 
@@ -18,19 +22,19 @@ use crate::{covariance, reject};
 use serde_json::Value;
 use std::vec::Vec;
 
-pub(super) fn load(text: &str) -> Vec<Value> {
+fn load(text: &str) -> Vec<Value> {
     serde_json::from_str::<Value>(text).unwrap()["cases"].as_array().unwrap().clone()
 }
-pub(super) fn num(v: &Value) -> f64 {
+fn num(v: &Value) -> f64 {
     v.as_f64().unwrap()
 }
-pub(super) fn triple(v: &Value) -> [f64; 3] {
+fn triple(v: &Value) -> [f64; 3] {
     core::array::from_fn(|i| num(&v[i]))
 }
-pub(super) fn rows(v: &Value) -> [[f64; 3]; 3] {
+fn rows(v: &Value) -> [[f64; 3]; 3] {
     core::array::from_fn(|i| triple(&v[i]))
 }
-pub(super) fn camera_config(v: &Value) -> CameraConfig {
+fn camera_config(v: &Value) -> CameraConfig {
     let model = match v["model"].as_str().unwrap() {
         "pinhole" => Model::Pinhole,
         _ => Model::Equidistant,
@@ -44,12 +48,12 @@ pub(super) fn camera_config(v: &Value) -> CameraConfig {
         ..CameraConfig::ideal(model, w, h, 1.0)
     }
 }
-pub(super) fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
+fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
     UnitVec3::try_new(v.map(T::of)).unwrap()
 }
 
 /// Edge points as the candidates stage leaves them; the lit side is where the axis `e` lies.
-pub(super) fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
+fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
     let points: Vec<_> = points.iter().map(|&(u, v)| ImagePoint { u: T::of(u), v: T::of(v) }).collect();
     Edges::new(camera, &points, e).blocks
 }
@@ -212,7 +216,7 @@ fn solve<T: Real>(
     let start = reject::keep(&mut blocks, points.len() as u32, expected, fx, &config)?;
     let estimate = estimate::Config { half_angle, ..Default::default() };
     let noise = covariance::Config { sigma_px, correlation_px, ..Default::default() };
-    let fit = estimate::fit(&mut blocks, &start, expected, T::of(config.threshold_px), &estimate, &noise)?;
+    let fit = estimate::fit(&mut blocks, &start, expected, camera, T::of(config.threshold_px), &estimate, &noise)?;
     let fused = covariance::fuse(&blocks, &fit, expected, &noise, &estimate)?;
     let (b1, b2) = basis(&fused.e);
     Some(Answer {
@@ -303,7 +307,8 @@ fn plain<T: Real>(
     let estimate = estimate::Config { half_angle: which, ..Default::default() };
     // A threshold so wide that Tukey's weights are one.
     let fit =
-        estimate::fit(&mut blocks, &start, expected, T::of(1e5), &estimate, &covariance::Config::default()).unwrap();
+        estimate::fit(&mut blocks, &start, expected, camera, T::of(1e5), &estimate, &covariance::Config::default())
+            .unwrap();
     UnitVec3::assume_unit(fit.e)
 }
 
@@ -357,15 +362,15 @@ fn covariance_equals_the_dense_product() {
 }
 
 /// Gaussian numbers for the Monte Carlo, by the sum of twelve.
-pub(super) struct Gauss(pub(super) crate::rng::Rng);
+struct Gauss(crate::rng::Rng);
 impl Gauss {
-    pub(super) fn next(&mut self) -> f64 {
+    fn next(&mut self) -> f64 {
         (0..12).map(|_| f64::from(self.0.below(1 << 24)) / f64::from(1 << 24)).sum::<f64>() - 6.0
     }
 }
 
 /// Points of the limb in view, one per `step_px` along it, in order.
-pub(super) fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> Vec<(f64, f64)> {
+fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> Vec<(f64, f64)> {
     let (b1, b2) = basis(e.v());
     let s = libm::sqrt(1.0 - c * c);
     let inside = |p: &ImagePoint<f64>| {

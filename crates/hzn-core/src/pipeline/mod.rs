@@ -10,13 +10,13 @@ mod config;
 pub mod edges;
 mod observer;
 mod optional;
+#[cfg(feature = "horace")]
+mod parts;
 mod preset;
 mod report;
 
 #[cfg(test)]
 mod golden;
-#[cfg(all(test, feature = "dlr"))]
-mod golden_dlr;
 
 pub use config::{Config, Input, MAX_BODIES, Mount};
 pub use observer::{Observer, Unobserved};
@@ -36,14 +36,14 @@ use crate::pixel::Pixel;
 use crate::real::Real;
 use crate::region::Region;
 use crate::status::{Stage, Status};
-use crate::{binarize, candidates, covariance, estimate, reject, select, undistort};
+use crate::{binarize, candidates, contour, covariance, estimate, reject, select, undistort};
 
 /// The lists of a workstation.
-pub type HostWorkspace = Workspace<f64, 16384, 2048, 16384>;
+pub type HostWorkspace = Workspace<f64, 16384, 2048, 65536>;
 /// The lists of a flight computer.
 pub type FlightWorkspace = Workspace<f32, 2048, 256, 512>;
 /// The sensor of a workstation: f64, 16384 points.
-pub type HostHorizon = Horizon<f64, 16384, 2048, 16384>;
+pub type HostHorizon = Horizon<f64, 16384, 2048, 65536>;
 /// The sensor of a flight computer: f32, 2048 points.
 pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 
@@ -148,7 +148,8 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
 /// Every list that a picture needs; nothing of it outlives the picture. There is no heap.
 ///
 /// `POINTS` border pixels of an edge are stored (beyond, the stride doubles), `BLOCKS` blocks of eight edge points are
-/// fitted, and search lines are marked in `WORDS` words of 32 bits. See [`HostWorkspace`] and [`FlightWorkspace`].
+/// fitted, and search lines are marked in `WORDS` words of 32 bits, in which the contour method `raster` marks every
+/// pixel. See [`HostWorkspace`] and [`FlightWorkspace`].
 ///
 /// It is large. A new one is all zeros: in a `static` it takes no room in flash, and is made without passing over the
 /// stack.
@@ -173,6 +174,14 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Work
     }
     fn lists(&mut self) -> Lists<'_, T> {
         Lists { border: &mut self.border, blocks: &mut self.blocks, marks: &mut self.marks }
+    }
+}
+
+#[cfg(feature = "horace")]
+impl<T> Lists<'_, T> {
+    /// The same, for one look of several.
+    fn again(&mut self) -> Lists<'_, T> {
+        Lists { border: self.border, blocks: self.blocks, marks: self.marks }
     }
 }
 
@@ -289,6 +298,9 @@ impl<T: Real> Sensor<T> {
             solution: None,
         };
         if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
+            #[cfg(feature = "horace")]
+            self.look_at_parts(lists, picture, expected, taken, observer, &mut report);
+            #[cfg(not(feature = "horace"))]
             self.look(lists, picture, expected, taken, observer, &mut report);
         }
         observer.leave();
@@ -320,11 +332,6 @@ impl<T: Real> Sensor<T> {
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
         let scene = Scene { picture, region: &self.region, level, observer };
-        let (narrow, widest) = line_spacing(expected, &self.camera);
-        let (spacing, widest) = config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
-        let mut marks = Marks::new(lists.marks, self.region.width(), self.region.height(), spacing, widest);
-        // What is narrower on the border than a search line is apart from the next is no limb.
-        let stride = spacing.min(self.region.width().min(self.region.height()) / BORDER_LOOKS).max(1);
         let mut judge = Judge {
             config,
             camera: &self.camera,
@@ -341,32 +348,22 @@ impl<T: Real> Sensor<T> {
             short: 0,
             report,
         };
-        let border = lists.border;
-
-        let ranked = scene.ranked_starts(stride);
-        for start in &ranked {
-            if judge.done() {
-                break;
+        match config.contour.method {
+            contour::Method::BorderFollowing => judge.border_following(&scene, lists.border, lists.marks),
+            #[cfg(feature = "horace")]
+            contour::Method::Raster => judge.raster(&scene, lists.border, lists.marks),
+            #[cfg(feature = "horace")]
+            contour::Method::Erode => {
+                let edge = contour::erode::edges(&scene, &config.contour, lists.border);
+                judge.piece(&scene, &edge);
             }
-            judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
-        }
-        if !judge.done() {
-            scene.each_start(stride, |start| {
-                if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
-                    judge.edge(&scene, start.pixel, start.dark, border, &mut marks);
-                }
-                !judge.done()
-            });
-        }
-        if judge.best.is_none() {
-            scene.each_crossing(&mut marks, |pixel, dark, marks| {
-                judge.edge(&scene, pixel, dark, border, marks);
-                !judge.done()
-            });
         }
         judge.conclude();
     }
 }
+
+/// Words that search lines are marked in, at most: more of them find nothing new.
+const LINE_WORDS: usize = 16384;
 
 /// The shorter side of the border is looked at in about this many places: a limb's dark and lit stretches are longer
 /// than what lies between, and each look at a column is a page of memory.
@@ -454,6 +451,51 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         self.steps == 0 || self.best.as_ref().is_some_and(|b| b.certain)
     }
 
+    /// Edges from the border of the picture, the likeliest first, then those that search lines meet.
+    #[inline(always)]
+    fn border_following<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, border: &mut [Pixel], bits: &mut [u32]) {
+        let (narrow, widest) = line_spacing(self.expected, self.camera);
+        let (spacing, widest) = self.config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
+        let bits = bits.get_mut(..LINE_WORDS.min(bits.len())).unwrap_or_default();
+        let (width, height) = (scene.region.width(), scene.region.height());
+        let mut marks = Marks::new(bits, width, height, spacing, widest);
+        // What is narrower on the border than a search line is apart from the next is no limb.
+        let stride = spacing.min(width.min(height) / BORDER_LOOKS).max(1);
+        let ranked = scene.ranked_starts(stride);
+        for start in &ranked {
+            if self.done() {
+                break;
+            }
+            self.edge(scene, start.pixel, start.dark, border, &mut marks);
+        }
+        if !self.done() {
+            scene.each_start(stride, |start| {
+                if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
+                    self.edge(scene, start.pixel, start.dark, border, &mut marks);
+                }
+                !self.done()
+            });
+        }
+        if self.best.is_none() {
+            scene.each_crossing(&mut marks, |pixel, dark, marks| {
+                self.edge(scene, pixel, dark, border, marks);
+                !self.done()
+            });
+        }
+    }
+
+    /// Every outer border of the picture.
+    #[cfg(feature = "horace")]
+    fn raster<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, border: &mut [Pixel], bits: &mut [u32]) {
+        let mut steps = self.steps;
+        let ended = contour::raster::each_border(scene, bits, border, &mut steps, |edge| {
+            self.piece(scene, edge);
+            true
+        });
+        self.report.counters.followed += self.steps - steps;
+        self.steps = if ended == contour::raster::Scanned::Truncated { 0 } else { steps.max(1) };
+    }
+
     /// Follows one edge and takes it through every stage.
     fn edge<P: Pixels>(
         &mut self,
@@ -472,6 +514,12 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
             // A hole: sky or ground seen through something.
             return;
         }
+        self.piece(scene, &edge);
+    }
+
+    /// Takes an edge through every stage.
+    fn piece<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, edge: &Thinned<'_>) {
+        let counters = &mut self.report.counters;
         let length = edge.total();
         if length < u32::from(self.min_points) {
             self.short += 1;
@@ -480,7 +528,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         let number = counters.candidates;
         counters.candidates += 1;
         counters.dropped += length - length.div_ceil(edge.stride().max(1));
-        self.observer.edge(number, edge.pixels(), edge.stride());
+        self.observer.edge(number, edge.pixels().iter().copied(), edge.stride());
         let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
         // Full: only counted.
@@ -534,7 +582,8 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
 
         enter(self.report, self.observer, Stage::Estimate);
         outcome.verdict = Verdict::NoFit;
-        let fit = estimate::fit(blocks, &consensus, self.expected, threshold, &config.estimate, self.noise);
+        let fit =
+            estimate::fit(blocks, &consensus, self.expected, self.camera, threshold, &config.estimate, self.noise);
         let Some(fit) = fit else { return (outcome, None) };
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;

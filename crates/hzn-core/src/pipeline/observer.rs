@@ -19,7 +19,7 @@ pub trait Observer<T> {
     /// The level was found: in counts, with the mean and the number of pixels of the sample.
     fn level(&self, _level: u16, _mean: T, _samples: u32) {}
     /// An edge was followed and is candidate number `candidate`: every `stride`-th of its border pixels, in order.
-    fn edge(&self, _candidate: u32, _border: &[Pixel], _stride: u32) {}
+    fn edge(&self, _candidate: u32, _border: impl Iterator<Item = Pixel>, _stride: u32) {}
     /// A sub-pixel point of a candidate; they come in order, numbered from 0.
     #[inline(always)]
     fn point(&self, _candidate: u32, _point: ImagePoint<T>) {}

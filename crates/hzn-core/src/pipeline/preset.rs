@@ -20,6 +20,9 @@ pub enum Preset {
     /// The infrared Earth sensor of Wang et al. 2022.
     #[cfg(feature = "zju")]
     Zju2022,
+    /// HORACE on REXUS-16 (Barf 2014, Barf et al. 2015).
+    #[cfg(feature = "horace")]
+    Horace2015,
 }
 
 impl Preset {
@@ -32,6 +35,8 @@ impl Preset {
         Self::Dlr2022,
         #[cfg(feature = "zju")]
         Self::Zju2022,
+        #[cfg(feature = "horace")]
+        Self::Horace2015,
     ];
 
     /// The name used in files.
@@ -44,6 +49,8 @@ impl Preset {
             Self::Dlr2022 => "dlr-2022",
             #[cfg(feature = "zju")]
             Self::Zju2022 => "zju-2022",
+            #[cfg(feature = "horace")]
+            Self::Horace2015 => "horace-2015",
         }
     }
 
@@ -70,6 +77,8 @@ impl Config {
             Preset::Dlr2022 => dlr_2022(&mut config),
             #[cfg(feature = "zju")]
             Preset::Zju2022 => zju_2022(&mut config),
+            #[cfg(feature = "horace")]
+            Preset::Horace2015 => horace_2015(&mut config),
         }
         config
     }
@@ -120,8 +129,31 @@ fn zju_2022(config: &mut Config) {
     ungated(config);
 }
 
+/// HORACE: brightness gate, dynamic threshold, outer borders of the whole picture, a circle through each, the radius
+/// check, and halves of the picture where that gives nothing. The theses' own numbers belong to their camera; these are
+/// for any.
+#[cfg(feature = "horace")]
+fn horace_2015(config: &mut Config) {
+    use crate::{candidates, contour, estimate, recover, reject};
+    config.gate.min_mean = 0.02;
+    config.gate.max_mean = 0.9;
+    config.binarize.method = binarize::Method::Dynamic;
+    config.contour.method = contour::Method::Raster;
+    config.contour.max_steps = 5_000_000;
+    config.candidates.sub_pixel = candidates::SubPixel::None;
+    config.candidates.min_points = 100;
+    config.candidates.keep_points = 0;
+    config.reject.method = reject::Method::None;
+    config.estimate.method = estimate::Method::Circle;
+    config.estimate.half_angle = estimate::HalfAngle::Free;
+    config.recover.method = recover::Method::Division;
+    ungated(config);
+    config.select.altitude_limits_km = Some([1.0, 1000.0]);
+    config.select.radius_margin = 0.5;
+}
+
 /// Only what every fit must have.
-#[cfg(any(feature = "dlr", feature = "zju"))]
+#[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
 fn ungated(config: &mut Config) {
     config.select.min_arc_px = Some(0.0);
     config.select.max_rms_px = 1e6;

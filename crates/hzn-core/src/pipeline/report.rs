@@ -87,6 +87,8 @@ pub enum Verdict {
     Taken = 12,
     /// No part of the limb that is expected about the fitted axis lies in the picture.
     OutOfView = 13,
+    /// The fitted circle is smaller or larger than the limb can be between the altitude limits.
+    Radius = 14,
 }
 
 impl Verdict {
@@ -107,6 +109,7 @@ impl Verdict {
             Self::NoSky => "no-sky",
             Self::Taken => "taken",
             Self::OutOfView => "out-of-view",
+            Self::Radius => "radius",
         }
     }
 }

@@ -27,7 +27,8 @@ fn fit<T: Real>(blocks: &mut [Block<T>], method: Method, weigh_above_deg: f64) -
     let start = Consensus { e: V3::new(zero, zero, T::one()), c: T::of(0.5), draws: 1, all: true };
     let expected = expected();
     let config = estimate::Config { method, half_angle: HalfAngle::Free, weigh_above_deg };
-    estimate::fit(blocks, &start, &expected, T::of(3.0), &config, &covariance::Config::default())
+    let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 2, 2, 1.0)).unwrap();
+    estimate::fit(blocks, &start, &expected, &camera, T::of(3.0), &config, &covariance::Config::default())
 }
 
 /// Reference solutions: total least squares by SVD, weighted with the dense cofactor matrix.

@@ -1,20 +1,14 @@
 //! The methods of Braun & Barf 2022 against reference data, and each erratum of the paper against its printed form.
 
-use super::golden::{Gauss, blocks, camera_config, direction, limb, load, num, rows, triple};
-use crate::block::LANES;
-use crate::camera::{Camera, Config as CameraConfig, Model};
+use super::*;
 use crate::covariance::braun_barf;
 use crate::estimate::{conic, direct};
-use crate::frames::{Cam, UnitVec3};
-use crate::linalg::{M3, V3, symmetric_eigen, unit};
-use crate::real::Real;
-use crate::reject;
-use std::vec::Vec;
+use crate::linalg::{M3, symmetric_eigen};
 
 /// `nadir_cases.json`: (24) by scipy, inliers only, pinholes only.
 fn directions<T: Real>(tolerance_deg: f64) {
     let mut compared = 0;
-    for case in load(include_str!("../../tests/golden/nadir_cases.json")) {
+    for case in load(include_str!("../../../tests/golden/nadir_cases.json")) {
         if case["reference"]["eq24_direction_c"].is_null() {
             continue;
         }
@@ -50,7 +44,7 @@ fn direct_nadir_equals_scipy() {
 /// `covariance.json`: (33) by dense matrices, with the paper's correlation from sample to sample and with ours.
 fn covariances<T: Real>(tolerance: f64) {
     let mut compared = 0;
-    for case in load(include_str!("../../tests/golden/covariance.json")) {
+    for case in load(include_str!("../../../tests/golden/covariance.json")) {
         let camera = Camera::<T>::try_new(&camera_config(&case["camera"])).unwrap();
         let points: Vec<(f64, f64)> =
             case["pixels"].as_array().unwrap().iter().map(|p| (num(&p[0]), num(&p[1]))).collect();
@@ -101,7 +95,7 @@ fn braun_barf_covariance_equals_the_dense_product() {
 /// (35) as printed takes the points for one pixel apart: with the golden cases' 16 px it is wrong by a factor.
 #[test]
 fn correlation_by_sample_is_not_that_by_distance() {
-    let case = &load(include_str!("../../tests/golden/covariance.json"))[0];
+    let case = &load(include_str!("../../../tests/golden/covariance.json"))[0];
     let (printed, right) = (rows(&case["eq33"]["P_c"]), rows(&case["eq33_arc"]["P_c"]));
     assert!(right[1][1] / printed[1][1] > 3.0);
 }

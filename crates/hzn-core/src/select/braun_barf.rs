@@ -1,4 +1,4 @@
-//! Gates of the published systems.
+//! Gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28), 7.3).
 
 use super::Config;
 use crate::block::{Block, LANES};
@@ -12,7 +12,7 @@ use crate::real::Real;
 use crate::region::Region;
 use crate::section::Section;
 
-/// The gate that a fit fails, if it does.
+/// `Passed`, or the gate that the fit fails.
 pub(super) fn verdict<T: Real>(
     fit: &Fit<T>,
     expected: &Expected<T>,
@@ -20,17 +20,15 @@ pub(super) fn verdict<T: Real>(
     camera: &Camera<T>,
     region: &Region<T>,
     config: &Config,
-) -> Option<Verdict> {
+) -> Verdict {
     let cos = if expected.free { fit.c } else { expected.cos };
     if config.limb_in_view && !in_view(&fit.e, cos, camera, region) {
-        return Some(Verdict::OutOfView);
+        return Verdict::OutOfView;
     }
-    if let Some(limit) = config.max_section_residual
-        && !section_residual(&fit.e, cos, blocks).is_some_and(|r| r <= T::of(limit))
-    {
-        return Some(Verdict::Residuals);
+    match config.max_section_residual {
+        Some(limit) if !section_residual(&fit.e, cos, blocks).is_some_and(|r| r <= T::of(limit)) => Verdict::Residuals,
+        _ => Verdict::Passed,
     }
-    None
 }
 
 /// Places around the limb that are looked at.

@@ -1,0 +1,182 @@
+//! A picture in parts: a smaller copy of it, and halves of halves where the whole gives no answer (Barf et al. 2015,
+//! 4.2.1; Barf 2014, 2.2.6).
+//!
+//! A part is a picture of its own, with the camera's principal point moved and its focal length scaled; what is watched
+//! of it is told in the whole picture's coordinates. (2.39) ends the division where a part is too small *and* too
+//! bright and too dark at once; it ends where a part is too small, or too bright, or too dark.
+
+use super::{Candidate, Lists, Observer, Report, Sensor, Solution, Taken};
+use crate::body::Expected;
+use crate::frames::{Cov3, UnitVec3};
+use crate::image::{Part, Pixels, Window};
+use crate::linalg::{V3, basis, unit};
+use crate::pixel::{ImagePoint, Pixel};
+use crate::real::Real;
+use crate::recover::{Combine, Method};
+use crate::status::{Stage, Status};
+
+/// Most parts that can answer.
+const ANSWERS: usize = 64;
+/// Parts that wait: one a halving.
+const WAITING: usize = 16;
+
+type Answers<T> = heapless::Vec<Solution<T>, ANSWERS>;
+
+impl<T: Real> Sensor<T> {
+    /// The whole picture, scaled if that is asked for, and its parts when it has no answer.
+    pub(super) fn look_at_parts<P: Pixels, O: Observer<T>>(
+        &self,
+        mut lists: Lists<'_, T>,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let whole = Window::whole([picture.width(), picture.height()], self.config.input.scale_to_height);
+        if whole.is_all() {
+            self.look(lists.again(), picture, expected, taken, observer, report);
+        } else {
+            self.look_through(lists.again(), whole, picture, expected, taken, observer, report);
+        }
+        let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright);
+        if self.config.recover.method == Method::Division && divisible {
+            self.divide(lists, whole, picture, expected, taken, observer, report);
+        }
+    }
+
+    fn divide<P: Pixels, O: Observer<T>>(
+        &self,
+        mut lists: Lists<'_, T>,
+        whole: Window,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let (status, level) = (report.status, report.level);
+        let least = f64::from(whole.area()) * self.config.recover.least_part;
+        let mut answers = Answers::<T>::new();
+        let mut waiting: heapless::Vec<Window, WAITING> = whole.halves().into_iter().flatten().collect();
+        while let Some(part) = waiting.pop() {
+            self.look_through(lists.again(), part, picture, expected, taken, observer, report);
+            if let Some(answer) = report.solution.take() {
+                // As many as the smallest parts can be.
+                let _ = answers.push(answer);
+                continue;
+            }
+            let ended = matches!(report.status, Status::TooDark | Status::TooBright);
+            if !ended && f64::from(part.area()) >= 2.0 * least {
+                // A half at a time: as many wait as there have been halvings.
+                let _ = waiting.extend_from_slice(part.halves().as_ref().map_or(&[][..], |h| h));
+            }
+        }
+        (report.status, report.level) = (status, level);
+        if let Some(mut answer) = together(&mut answers, self.config.recover.combine) {
+            answer.axis_body = self.cam_to_body.as_ref().map(|r| r.apply(&answer.axis));
+            report.status = Status::Ok;
+            report.stage = Stage::Select;
+            report.solution = Some(answer);
+        }
+    }
+
+    /// Looks at a part with the camera and the region that are its own.
+    fn look_through<P: Pixels, O: Observer<T>>(
+        &self,
+        lists: Lists<'_, T>,
+        window: Window,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let part = Sensor {
+            config: self.config.clone(),
+            camera: self.camera.through(&window),
+            region: self.region.through(&window),
+            cam_to_body: self.cam_to_body,
+        };
+        part.look(lists, &Part::new(picture, window), expected, taken, &Through { observer, window }, report);
+    }
+}
+
+/// The answer nearest to the median or mean of all, with that for its axis, and the scatter of all in its covariance.
+fn together<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Option<Solution<T>> {
+    let count = T::of(answers.len() as f64);
+    let axis = match combine {
+        Combine::Mean => answers.iter().fold(V3::new(T::ZERO, T::ZERO, T::ZERO), |sum, a| sum + a.axis.v()),
+        Combine::Median => {
+            let mut middle = [T::ZERO; 3];
+            for (k, m) in middle.iter_mut().enumerate() {
+                let mut values: heapless::Vec<T, ANSWERS> = answers.iter().map(|a| a.axis.v()[k]).collect();
+                values.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(core::cmp::Ordering::Equal));
+                let at = |i: usize| values.get(i).copied().unwrap_or(T::ZERO);
+                let n = values.len();
+                *m = (at(n / 2) + at(n.saturating_sub(1) / 2)) * T::of(0.5);
+            }
+            V3::from(middle)
+        }
+    };
+    let axis = unit(&axis)?;
+    let (b1, b2) = basis(&axis);
+    let mut p = [T::ZERO; 3];
+    for a in answers.iter() {
+        let rows = a.covariance.rows();
+        let form = |x: &V3<T>, y: &V3<T>| {
+            let mut sum = T::ZERO;
+            for i in 0..3 {
+                for j in 0..3 {
+                    sum += x[i] * rows[i][j] * y[j];
+                }
+            }
+            sum
+        };
+        let off = a.axis.v() - axis;
+        let (x, y) = (off.dot(&b1), off.dot(&b2));
+        p[0] += form(&b1, &b1) + x * x;
+        p[1] += form(&b1, &b2) + x * y;
+        p[2] += form(&b2, &b2) + y * y;
+    }
+    let nearest = answers.iter().max_by(|a, b| {
+        let along = |s: &Solution<T>| s.axis.v().dot(&axis);
+        along(a).partial_cmp(&along(b)).unwrap_or(core::cmp::Ordering::Equal)
+    })?;
+    Some(Solution {
+        axis: UnitVec3::assume_unit(axis),
+        covariance: Cov3::from_tangent(&b1, &b2, p.map(|x| x / count)),
+        ..*nearest
+    })
+}
+
+/// Tells of a part in the picture's coordinates.
+struct Through<'a, O> {
+    observer: &'a O,
+    window: Window,
+}
+
+impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
+    fn enter(&self, stage: Stage) {
+        self.observer.enter(stage);
+    }
+    fn pixel(&self, x: u16, y: u16) {
+        let at = self.window.pixel(x, y);
+        self.observer.pixel(at.x, at.y);
+    }
+    fn level(&self, level: u16, mean: T, samples: u32) {
+        self.observer.level(level, mean, samples);
+    }
+    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+        self.observer.edge(candidate, border.map(|p| self.window.pixel(p.x, p.y)), stride);
+    }
+    fn point(&self, candidate: u32, point: ImagePoint<T>) {
+        self.observer.point(candidate, self.window.in_picture(point));
+    }
+    fn weight(&self, candidate: u32, point: u32, weight: T) {
+        self.observer.weight(candidate, point, weight);
+    }
+    fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
+        self.observer.verdict(candidate, outcome, solution);
+    }
+}

@@ -1,0 +1,295 @@
+//! The methods of published systems through the whole pipeline: they find a drawn disc, in parts and in smaller copies
+//! too, and any picture gets a sound report.
+
+use std::cell::{Cell, RefCell};
+
+use hzn_core::body::{Frame, Kind};
+use hzn_core::camera::{self, Model};
+use hzn_core::candidates::SubPixel;
+use hzn_core::image::{Grey, Layout};
+use hzn_core::pipeline::Verdict;
+use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::recover::Combine;
+use hzn_core::status::Status;
+use hzn_core::{Config, FlightHorizon, HostHorizon, Observer, Preset, Report, contour, covariance, estimate, recover};
+use hzn_core::{binarize, reject};
+use proptest::prelude::*;
+
+/// A sphere 20° in radius seen by a pinhole of 60 px: a disc of 21.8 px.
+fn config(preset: Preset, scale: u16) -> Config {
+    let f = 60.0 * f64::from(scale);
+    let mut config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 96 * scale, 64 * scale, f));
+    config.body.kind = Kind::Sphere;
+    config.body.radius_km = Some(1000.0);
+    config.body.altitude_km = Some(1923.8);
+    config.body.limb_height_km = 0.0;
+    config.candidates.min_points = 30;
+    config.select.altitude_limits_km = Some([1800.0, 2000.0]);
+    config
+}
+
+/// A lit disc about (u, v).
+fn disc(config: &Config, u: f64, v: f64, radius_px: f64) -> Vec<u8> {
+    let (w, h) = (u32::from(config.camera.width), u32::from(config.camera.height));
+    (0..w * h)
+        .map(|i| {
+            let off = (f64::from(i % w) - u).hypot(f64::from(i / w) - v) - radius_px;
+            (210.0 * (0.5 - off).clamp(0.0, 1.0)) as u8 + 10
+        })
+        .collect()
+}
+
+fn answer(config: &Config, data: &[u8], observer: &impl Observer<f64>) -> Report<f64> {
+    let layout = Layout::packed(config.camera.width.into(), config.camera.height.into(), 1, 8);
+    let mut host = HostHorizon::boxed(config).unwrap();
+    let expected = host.expect(&Frame::default()).unwrap();
+    host.process_observed(&Grey::try_new(data, layout).unwrap(), &expected, observer)
+}
+
+/// Counts levels, and keeps what it is told of places.
+#[derive(Default)]
+struct Watch {
+    levels: Cell<u32>,
+    points: RefCell<Vec<ImagePoint<f64>>>,
+    border: RefCell<Vec<Pixel>>,
+    read: Cell<(u16, u16)>,
+}
+impl Observer<f64> for Watch {
+    fn level(&self, _: u16, _: f64, _: u32) {
+        self.levels.set(self.levels.get() + 1);
+    }
+    fn pixel(&self, x: u16, y: u16) {
+        let (u, v) = self.read.get();
+        self.read.set((u.max(x), v.max(y)));
+    }
+    fn edge(&self, _: u32, border: impl Iterator<Item = Pixel>, _: u32) {
+        self.border.borrow_mut().extend(border);
+    }
+    fn point(&self, _: u32, point: ImagePoint<f64>) {
+        self.points.borrow_mut().push(point);
+    }
+}
+
+fn off_deg(report: &Report<f64>, want: [f64; 3]) -> f64 {
+    let axis = report.solution.as_ref().unwrap_or_else(|| panic!("{:?} {:?}", report.status, report.candidates)).axis;
+    axis.angle_rad(&hzn_core::frames::UnitVec3::try_new(want).unwrap()).to_degrees()
+}
+
+#[test]
+fn every_preset_and_contour_method_finds_a_disc() {
+    for preset in [Preset::Hzn, Preset::Dlr2022, Preset::Horace2015] {
+        for method in [contour::Method::BorderFollowing, contour::Method::Raster, contour::Method::Erode] {
+            let mut config = config(preset, 2);
+            config.contour.method = method;
+            let radius = 120.0 * 20f64.to_radians().tan();
+            let report = answer(&config, &disc(&config, 95.5, 63.5, radius), &Watch::default());
+            let off = off_deg(&report, [0.0, 0.0, 1.0]);
+            // Whole pixels, and an edge of one to two pixels under erosion.
+            assert!(off < 0.3, "{} {method:?}: {off}", preset.name());
+        }
+    }
+}
+
+#[test]
+fn a_smaller_copy_is_looked_at_in_the_pictures_own_coordinates() {
+    let mut config = config(Preset::Horace2015, 4);
+    let (u, v, radius) = (200.0, 120.0, 240.0 * 20f64.to_radians().tan());
+    let data = disc(&config, u, v, radius);
+    let want = [(u - 191.5) / 240.0, (v - 127.5) / 240.0, 1.0];
+    let full = off_deg(&answer(&config, &data, &Watch::default()), want);
+    config.input.scale_to_height = Some(64);
+    let watch = Watch::default();
+    let report = answer(&config, &data, &watch);
+    let scaled = off_deg(&report, want);
+    // A pixel of the copy is a degree.
+    assert!(full < 0.1 && scaled < 0.4, "{full} {scaled}");
+    assert!(report.candidates[0].length_px < 200, "{:?}", report.candidates);
+    for p in watch.points.borrow().iter() {
+        assert!(((p.u - u).hypot(p.v - v) - radius).abs() < 4.0, "{p:?}");
+    }
+    for p in watch.border.borrow().iter() {
+        assert!(((f64::from(p.x) - u).hypot(f64::from(p.y) - v) - radius).abs() < 8.0, "{p:?}");
+    }
+    let (x, y) = watch.read.get();
+    assert!(x > 300 && y > 200, "the whole picture is read: {x} {y}");
+    config.input.scale_to_height = Some(300);
+    assert_eq!(config.check().unwrap_err().field, "input.scale_to_height");
+}
+
+/// The right part of the picture lit by something: the limb runs into it, and only the left parts show a limb.
+fn spoilt(config: &Config) -> Vec<u8> {
+    let (w, radius) = (u32::from(config.camera.width), 240.0 * 20f64.to_radians().tan());
+    let mut data = disc(config, 191.5, 127.5, radius);
+    for (i, v) in (0..).zip(data.iter_mut()) {
+        let (x, y) = (i % w, i / w);
+        if x >= 192 && (x / 24 + y / 24) % 2 == 0 {
+            *v = 255;
+        }
+    }
+    data
+}
+
+#[test]
+fn halves_answer_where_the_whole_does_not() {
+    let mut config = config(Preset::Horace2015, 4);
+    config.select.radius_margin = 0.03;
+    let data = spoilt(&config);
+    config.recover.method = recover::Method::None;
+    let report = answer(&config, &data, &Watch::default());
+    assert_eq!(report.status, Status::Rejected, "{:?}", report.candidates);
+    assert!(report.candidates.iter().any(|c| c.verdict == Verdict::Radius));
+    config.recover.method = recover::Method::Division;
+    for combine in [Combine::Median, Combine::Mean] {
+        config.recover.combine = combine;
+        let watch = Watch::default();
+        let report = answer(&config, &data, &watch);
+        let off = off_deg(&report, [0.0, 0.0, 1.0]);
+        assert!(off < 0.5, "{combine:?} {off}");
+        assert!(watch.levels.get() > 2);
+        // Candidates of all parts are numbered on.
+        assert!(report.counters.candidates as usize >= report.candidates.len());
+        let solution = report.solution.unwrap();
+        assert!(solution.covariance.sigma_max_rad() > 0.0 && report.counters.candidates > solution.candidate);
+    }
+    // No part is small enough to be cut: two halves.
+    config.recover.least_part = 1.0;
+    let watch = Watch::default();
+    let _ = answer(&config, &data, &watch);
+    assert_eq!(watch.levels.get(), 3);
+}
+
+/// (2.39) as printed divides on unless a part is too bright and too dark at once.
+#[test]
+fn division_ends_at_pictures_that_are_too_dark_or_too_bright() {
+    let mut config = config(Preset::Horace2015, 2);
+    config.recover.least_part = 1.0 / 64.0;
+    for (value, status) in [(0, Status::TooDark), (255, Status::TooBright)] {
+        let watch = Watch::default();
+        let data = vec![value; 192 * 128];
+        let report = answer(&config, &data, &watch);
+        assert_eq!((report.status, watch.levels.get()), (status, 0));
+    }
+    // One dark and one bright half, of a picture that is neither: each ends at once.
+    let data: Vec<u8> = (0..192 * 128).map(|i| if i % 192 < 96 { 0 } else { 255 }).collect();
+    let watch = Watch::default();
+    let report = answer(&config, &data, &watch);
+    assert!(report.status != Status::Ok && watch.levels.get() == 1, "{} {}", report.status, watch.levels.get());
+}
+
+#[test]
+fn a_picture_with_more_pixels_than_bits_is_truncated() {
+    let mut config = config(Preset::Horace2015, 4);
+    config.recover.method = recover::Method::None;
+    let data = disc(&config, 191.5, 127.5, 87.0);
+    let mut flight = FlightHorizon::boxed(&config).unwrap();
+    let expected = flight.expect(&Frame::default()).unwrap();
+    let picture = Grey::try_new(&data, Layout::packed(384, 256, 1, 8)).unwrap();
+    assert_eq!(flight.process(&picture, &expected).status, Status::Truncated);
+    // A copy that fits is answered.
+    config.input.scale_to_height = Some(96);
+    let mut flight = FlightHorizon::boxed(&config).unwrap();
+    let report = flight.process(&picture, &expected);
+    assert_eq!(report.status, Status::Ok, "{:?}", report.candidates);
+}
+
+#[test]
+fn limits_are_checked_by_name() {
+    let refused = |change: &dyn Fn(&mut Config)| {
+        let mut config = config(Preset::Horace2015, 1);
+        change(&mut config);
+        config.check().unwrap_err().field
+    };
+    assert_eq!(refused(&|c| c.contour.erode_size_px = 4), "contour.erode_size_px");
+    assert_eq!(refused(&|c| c.contour.erode_threshold = 10), "contour.erode_threshold");
+    assert_eq!(refused(&|c| c.contour.erode_threshold = 0), "contour.erode_threshold");
+    assert_eq!(refused(&|c| c.select.altitude_limits_km = Some([5.0, 4.0])), "select.altitude_limits_km");
+    assert_eq!(refused(&|c| c.select.altitude_limits_km = Some([-1.0, 4.0])), "select.altitude_limits_km");
+    assert_eq!(refused(&|c| c.select.radius_margin = f64::NAN), "select.radius_margin");
+    assert_eq!(refused(&|c| c.select.max_section_residual = Some(0.0)), "select.max_section_residual");
+    assert_eq!(refused(&|c| c.recover.least_part = 0.001), "recover.least_part");
+    assert_eq!(refused(&|c| c.input.scale_to_height = Some(8)), "input.scale_to_height");
+}
+
+/// Noise, stripes, blocks, one lit pixel, discs, slopes.
+fn garbage(kind: u8, seed: u64, level: u8) -> Vec<u8> {
+    let mut state = seed | 1;
+    (0..96u32 * 64)
+        .map(|i| {
+            let (x, y) = (i % 96, i / 96);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let random = (state >> 56) as u8;
+            let on = match kind {
+                0 => random > level,
+                1 => (x + y) % 2 == 0,
+                2 => x % (2 + u32::from(level % 7)) == 0,
+                3 => (x / 8 + y / 8) % 2 == 0,
+                4 => i == u32::from(level) * 20,
+                5 => y > 30 + (x * u32::from(level)) / 800,
+                6 => (x as i32 - 48).pow(2) + (y as i32 - 32).pow(2) < i32::from(level) * 4,
+                _ => y >= u32::from(level) / 4,
+            };
+            if on { 200 } else { random / 16 }
+        })
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+    #[test]
+    fn any_picture_gets_a_sound_report(
+        kind in 0u8..8, seed in any::<u64>(), level in any::<u8>(), lens in 0usize..3, circle: bool, mask: bool,
+        body in 0usize..4, methods in proptest::array::uniform6(0usize..4), scaled: bool, divided: bool, gates: bool,
+    ) {
+        let model = [Model::Pinhole, Model::Equidistant, Model::KannalaBrandt][lens];
+        let mut config = config(Preset::Horace2015, 1);
+        config.camera.model = model;
+        config.camera.theta_max_deg = circle.then_some(30.0);
+        config.body.kind = [Kind::Earth, Kind::EarthSphere, Kind::Sun, Kind::Moon][body];
+        config.body.radius_km = None;
+        config.candidates.min_points = 8;
+        config.select.min_inliers = 8;
+        config.select.limb_in_view = gates;
+        config.select.max_section_residual = gates.then_some(0.025);
+        config.select.altitude_limits_km = gates.then_some([0.0, 5000.0]);
+        if mask {
+            let triangle = [[10.0, 10.0], [50.0, 5.0], [30.0, 60.0]];
+            config.mask.polygons_px.push(triangle.into_iter().collect()).unwrap();
+        }
+        let pick = methods.map(|m| m % 3);
+        config.contour.method =
+            [contour::Method::BorderFollowing, contour::Method::Raster, contour::Method::Erode][pick[0]];
+        config.reject.method = [reject::Method::None, reject::Method::Ransac, reject::Method::TwoPoint][pick[1]];
+        config.estimate.method = [
+            estimate::Method::Sphere, estimate::Method::Direct, estimate::Method::Conic, estimate::Method::Circle,
+        ][methods[2]];
+        config.estimate.half_angle = [
+            estimate::HalfAngle::Free, estimate::HalfAngle::Fused, estimate::HalfAngle::Known,
+        ][pick[3]];
+        config.covariance.method = [covariance::Method::Sandwich, covariance::Method::BraunBarf][pick[4] % 2];
+        config.covariance.overbound = pick[5] == 0;
+        config.candidates.sub_pixel = [SubPixel::None, SubPixel::Linear][pick[5] % 2];
+        config.binarize.method = [binarize::Method::Otsu, binarize::Method::Dynamic, binarize::Method::Fixed][pick[5]];
+        config.input.scale_to_height = scaled.then_some(33);
+        config.recover.method = if divided { recover::Method::Division } else { recover::Method::None };
+        let data = garbage(kind, seed, level);
+        let report = answer(&config, &data, &Watch::default());
+        prop_assert_eq!(report.status == Status::Ok, report.solution.is_some());
+        if let Some(s) = &report.solution {
+            let n: f64 = s.axis.xyz().iter().map(|v| v * v).sum();
+            prop_assert!((n - 1.0).abs() < 1e-9);
+            prop_assert!(s.covariance.upper_rad2.iter().all(|v| v.is_finite()));
+            prop_assert!(s.covariance.sigma_max_rad() > 0.0);
+            prop_assert!(s.half_angle_rad.is_finite() && s.rms_px.is_finite() && s.arc_px.is_finite());
+            prop_assert!(s.altitude_m.is_none_or(|(h, sigma)| h.is_finite() && sigma.is_finite()));
+        }
+        let again = answer(&config, &data, &Watch::default());
+        prop_assert_eq!(report.solution.map(|s| s.axis.xyz()), again.solution.map(|s| s.axis.xyz()));
+        let mut flight = FlightHorizon::boxed(&config).unwrap();
+        let expected = flight.expect(&Frame::default()).unwrap();
+        let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
+        if let Some(s) = flight.process(&picture, &expected).solution {
+            prop_assert!(s.axis.xyz().iter().all(|v| v.is_finite()));
+            prop_assert!(s.covariance.upper_rad2.iter().all(|v| v.is_finite()));
+        }
+    }
+}
