@@ -1,7 +1,8 @@
 //! Charts as SVG: lines and dots over two axes.
 
+use std::ops::Range;
+
 use anyhow::anyhow;
-use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::prelude::*;
 
 /// The colours of Okabe and Ito, which stay apart for colour-blind eyes, in the order in which they are taken.
@@ -53,8 +54,6 @@ pub struct Chart {
     pub x: String,
     /// Beside the y axis, with its unit.
     pub y: String,
-    /// The y axis is logarithmic; values that are not above zero are left out.
-    pub log: bool,
     /// What is drawn.
     pub series: Vec<Series>,
     /// Width and height.
@@ -65,13 +64,7 @@ impl Chart {
     /// An empty chart of the usual size.
     pub fn new(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
         let size = (640, 360);
-        Self { title: title.into(), x: x.into(), y: y.into(), log: false, series: Vec::new(), size }
-    }
-    /// The same with a logarithmic y axis.
-    #[must_use]
-    pub fn logarithmic(mut self) -> Self {
-        self.log = true;
-        self
+        Self { title: title.into(), x: x.into(), y: y.into(), series: Vec::new(), size }
     }
     /// The same with one series more.
     #[must_use]
@@ -86,7 +79,7 @@ impl Chart {
     /// Nothing that can be drawn: no finite point.
     pub fn svg(&self) -> anyhow::Result<String> {
         let range = |of: fn(&(f64, f64)) -> f64| {
-            let values = self.series.iter().flat_map(|s| &s.points).filter(|p| self.shows(p)).map(of);
+            let values = self.series.iter().flat_map(|s| &s.points).filter(|p| shown(p)).map(of);
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
         };
         let (x, y) = (range(|p| p.0), range(|p| p.1));
@@ -97,37 +90,20 @@ impl Chart {
         // The legend has the top of the chart for itself.
         let named = self.series.iter().filter(|s| !s.name.is_empty()).count();
         let room = named as f64 * 18.0 / f64::from(self.size.1.max(100) - 90);
-        if self.log {
-            let (low, high) = (y.0 / 1.2, y.1 * 1.2);
-            return self.draw(x, (low..high * (high / low).powf(room)).log_scale());
-        }
         // Errors and sigmas begin at zero, so that small differences do not look large.
         let (low, high) = margin(if y.0 >= 0.0 { (0.0, y.1) } else { y });
         let low = if y.0 >= 0.0 { 0.0 } else { low };
         self.draw(x, low..high + room * (high - low))
     }
 
-    /// Whether a point has a place in the chart.
-    fn shows(&self, &(x, y): &(f64, f64)) -> bool {
-        x.is_finite() && y.is_finite() && (!self.log || y > 0.0)
-    }
-
-    fn draw<Y>(&self, x: (f64, f64), y: Y) -> anyhow::Result<String>
-    where
-        Y: AsRangedCoord<Value = f64>,
-        Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    {
+    fn draw(&self, x: (f64, f64), y: Range<f64>) -> anyhow::Result<String> {
         let mut out = String::new();
-        self.onto(SVGBackend::with_string(&mut out, self.size), x, y)
+        self.onto(SVGBackend::with_string(&mut out, self.size), x.0..x.1, y)
             .map_err(|e| anyhow!("{}: cannot be drawn: {e}", self.title))?;
         Ok(out)
     }
 
-    fn onto<'a, Y>(&'a self, backend: SVGBackend<'a>, x: (f64, f64), y: Y) -> anyhow::Result<()>
-    where
-        Y: AsRangedCoord<Value = f64>,
-        Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    {
+    fn onto<'a>(&'a self, backend: SVGBackend<'a>, x: Range<f64>, y: Range<f64>) -> anyhow::Result<()> {
         let font = |size: u32| ("sans-serif", size);
         let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
@@ -137,7 +113,7 @@ impl Chart {
             .margin_right(20)
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d(x.0..x.1, y)?;
+            .build_cartesian_2d(x, y)?;
         chart
             .configure_mesh()
             .x_desc(&self.x)
@@ -149,7 +125,6 @@ impl Chart {
             .x_label_formatter(&|v| number(*v))
             .y_label_formatter(&|v| number(*v))
             .draw()?;
-        let shown = |p: &(f64, f64)| self.shows(p);
         let mut colours = COLOURS.iter().cycle();
         for series in &self.series {
             let (style, dots) = match series.style {
@@ -190,6 +165,11 @@ impl Chart {
     }
 }
 
+/// Whether a point has a place in a chart.
+fn shown(&(x, y): &(f64, f64)) -> bool {
+    x.is_finite() && y.is_finite()
+}
+
 /// A range with a little room at both ends, also where it has no length.
 fn margin((low, high): (f64, f64)) -> (f64, f64) {
     let room = if high > low { 0.04 * (high - low) } else { (0.1 * high.abs()).max(0.5) };
@@ -212,15 +192,12 @@ mod tests {
         let chart = Chart::new("Error & sigma", "altitude [km]", "error [deg]")
             .with(Series::new("measured", Style::Dots, [(70.0, 0.01), (240.0, 0.02)]))
             .with(Series::new("expected", Style::Line, [(70.0, 0.02), (100.0, f64::NAN), (200.0, 0.1), (240.0, 0.2)]));
-        for chart in [chart.clone(), chart.logarithmic()] {
-            let svg = chart.svg().unwrap();
-            for text in ["<svg", "Error &amp; sigma", "altitude [km]", "error [deg]", "measured", "expected", "</svg>"]
-            {
-                assert!(svg.contains(text), "{text} in {svg}");
-            }
-            assert!(!svg.contains("NaN"), "{svg}");
-            assert_eq!(svg.matches("<circle").count(), 3, "two points and the legend's");
+        let svg = chart.svg().unwrap();
+        for text in ["<svg", "Error &amp; sigma", "altitude [km]", "error [deg]", "measured", "expected", "</svg>"] {
+            assert!(svg.contains(text), "{text} in {svg}");
         }
+        assert!(!svg.contains("NaN"), "{svg}");
+        assert_eq!(svg.matches("<circle").count(), 3, "two points and the legend's");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 use hzn_calib::{Frames, Sensor};
+use hzn_core::body;
 
 use crate::engine;
 use crate::exit::{Exit, Stop, usage};
@@ -58,7 +59,9 @@ impl SensorArgs {
         };
         let mut sensor = hzn_calib::sensor::load(&path)?;
         if let Some(km) = self.altitude_km {
-            sensor.config.body.altitude_km = Some(km);
+            for body in sensor.config.each_body_mut() {
+                body.altitude_km = Some(km);
+            }
             hzn_calib::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
         }
         Ok(sensor)
@@ -83,9 +86,13 @@ impl InputArgs {
             None => return Ok(None),
         };
         let frames = hzn_calib::frames::load(&path)?;
-        let body = &sensor.config.body;
-        for warning in frames.warnings.iter().chain(&frames.check_altitudes(body.kind, body.mean_radius_km())) {
+        for warning in &frames.warnings {
             tell::warning(warning);
+        }
+        for body in sensor.config.each_body() {
+            for warning in frames.check_altitudes(body.kind, body.mean_radius_km()) {
+                tell::warning(warning);
+            }
         }
         engine::prepare(&sensor.config, flight, Some(&frames))?;
         Ok(Some(frames))
@@ -114,9 +121,8 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
 
 /// Without an altitude from anywhere, every frame would fail.
 pub(crate) fn need_altitude(sensor: &Sensor, frames: Option<&Frames>) -> Result<(), Stop> {
-    let body = &sensor.config.body;
-    let known = body.half_angle_is_free() || body.altitude_km.is_some();
-    if known || frames.is_some_and(|f| !f.rows.is_empty()) {
+    let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some();
+    if sensor.config.each_body().iter().any(known) || frames.is_some_and(|f| !f.rows.is_empty()) {
         return Ok(());
     }
     let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or a frames.csv with it";

@@ -33,7 +33,7 @@ fn main() -> Result<(), Error> {
             bytes: (0..64 * 48u32).map(|k| if k / 64 > 20 + i / 2 { 200 } else { 10 }).collect(),
         });
         frame.annotations =
-            Annotations { inliers: limb.clone(), limb: vec![limb], axis: Some([32.0, 40.0]), ..Annotations::default() };
+            Annotations { inliers: limb.clone(), limb: vec![limb], axes: vec![[32.0, 40.0]], ..Annotations::default() };
         frame.log = vec![LogLine { level: LogLevel::Info, message: "a sample".into() }];
         writer.write(&frame)?;
     }

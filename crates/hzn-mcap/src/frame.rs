@@ -120,11 +120,19 @@ pub struct Annotations {
     pub rejected: Vec<[f64; 2]>,
     /// The fitted limb: one line for each part of it that the picture shows.
     pub limb: Vec<Vec<[f64; 2]>>,
-    /// Where the axis meets the picture; drawn as a cross.
-    pub axis: Option<[f64; 2]>,
+    /// Where the axis of each body meets the picture; drawn as crosses.
+    pub axes: Vec<[f64; 2]>,
 }
 
 impl Annotations {
+    /// Draws what `other` draws, too.
+    pub fn add(&mut self, other: Self) {
+        self.edges.extend(other.edges);
+        self.inliers.extend(other.inliers);
+        self.rejected.extend(other.rejected);
+        self.limb.extend(other.limb);
+        self.axes.extend(other.axes);
+    }
     /// Is there nothing to draw?
     pub fn is_empty(&self) -> bool {
         *self == Self::default()

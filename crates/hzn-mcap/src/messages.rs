@@ -213,7 +213,7 @@ pub(crate) fn annotations(a: &Annotations, ns: u64) -> ImageAnnotations {
     a.limb.iter().for_each(|line| draw(LIMB, line));
     draw(REJECTED, &a.rejected);
     draw(INLIER, &a.inliers);
-    if let Some([x, y]) = a.axis {
+    for &[x, y] in &a.axes {
         draw(AXIS, &[[x - CROSS_PX, y], [x + CROSS_PX, y], [x, y - CROSS_PX], [x, y + CROSS_PX]]);
     }
     ImageAnnotations { timestamp: stamp(ns), points, ..ImageAnnotations::default() }
@@ -231,7 +231,7 @@ pub(crate) fn parse_annotations(data: &[u8]) -> Result<Annotations, prost::Decod
             "limb" => a.limb.push(xy),
             "inlier" => a.inliers.append(&mut xy),
             "rejected" => a.rejected.append(&mut xy),
-            "axis" => a.axis = xy.first().map(|&[x, y]| [x + CROSS_PX, y]),
+            "axis" => a.axes.extend(xy.first().map(|&[x, y]| [x + CROSS_PX, y])),
             _ => {}
         }
     }
@@ -328,7 +328,7 @@ mod tests {
             inliers: vec![[10.0, 20.0]],
             rejected: vec![[3.5, -0.5]],
             limb: vec![vec![[5.0, 5.0], [6.0, 5.5]], vec![[7.0, 8.0], [9.0, 9.0]]],
-            axis: Some([100.0, 50.0]),
+            axes: vec![[7.0, 8.0], [100.0, 50.0]],
         };
         let m = annotations(&a, 0);
         assert_eq!(m.points.first().unwrap().points, [Point2 { x: 0.5, y: 0.5 }, Point2 { x: 1.5, y: 2.75 }]);

@@ -26,7 +26,7 @@ pub struct Recovered {
 /// A recording that goes on.
 #[derive(Debug)]
 pub struct Resumed {
-    /// Frames that are finished: go on with the next one.
+    /// Records (one a frame and body) that are finished: go on with the next one.
     pub frames: u64,
     /// Index of the last finished frame, from its row; `None` without frames.
     pub last_index: Option<u64>,

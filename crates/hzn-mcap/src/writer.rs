@@ -95,7 +95,7 @@ impl Writer {
         &self.part
     }
 
-    /// Frames written through this writer.
+    /// Records written through this writer: one a frame and body.
     pub fn frames(&self) -> u64 {
         self.frames
     }
@@ -105,6 +105,25 @@ impl Writer {
     /// # Errors
     /// The disk is full or broken; after that every call fails, and the finished frames are safe in the `.part` file.
     pub fn write(&mut self, frame: &FrameRecord) -> Result<(), Error> {
+        self.write_bodies(core::slice::from_ref(frame))
+    }
+
+    /// As [`Self::write`], a frame with a record for each of several bodies: either all of them are finished or none.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_bodies(&mut self, records: &[FrameRecord]) -> Result<(), Error> {
+        for record in records {
+            self.push(record)?;
+        }
+        self.waiting_since.get_or_insert_with(Instant::now);
+        if self.images.len() >= BATCH_IMAGE_BYTES || self.data.len() >= BATCH_DATA_BYTES {
+            return self.flush();
+        }
+        self.flush_if_due()
+    }
+
+    fn push(&mut self, frame: &FrameRecord) -> Result<(), Error> {
         let Some(container) = &mut self.container else { return Err(Error::AfterFailure { path: self.part.clone() }) };
         let bytes = frame.image.as_ref().map_or(0, |i| i.bytes.len() as u64);
         if bytes + (BATCH_IMAGE_BYTES as u64) >= MAX_RECORD_BYTES {
@@ -155,11 +174,7 @@ impl Writer {
         // The report comes last: where it is, the frame is whole.
         push(Topic::Report, &mut |b| b.extend_from_slice(&messages::report(frame)))?;
         self.frames += 1;
-        self.waiting_since.get_or_insert_with(Instant::now);
-        if self.images.len() >= BATCH_IMAGE_BYTES || self.data.len() >= BATCH_DATA_BYTES {
-            return self.flush();
-        }
-        self.flush_if_due()
+        Ok(())
     }
 
     /// Finishes the waiting frames when they have waited for [`FLUSH_INTERVAL`]; for loops in which frames may fail

@@ -58,7 +58,7 @@ fn frame(i: u64) -> FrameRecord {
             inliers: vec![[0.25, f]],
             rejected: vec![[3.0, 4.0]],
             limb: vec![vec![[0.0, 0.0], [1.0, 1.0]]],
-            axis: Some([320.0, 200.0]),
+            axes: vec![[320.0, 200.0]],
         },
         attitude: i
             .is_multiple_of(2)

@@ -19,6 +19,7 @@
 //! | [`ephemeris`] | where Sun and Moon stand |
 //! | [`utc`] | dates, seconds, terrestrial time |
 //! | [`evaluate`] | answers beside their truth: how many, how good, how honest |
+//! | [`sensitivity`] | covariances by design, without rendering |
 //! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
 
 mod counter;
@@ -35,6 +36,7 @@ pub mod picture;
 pub mod pose;
 mod render;
 pub mod scene;
+pub mod sensitivity;
 pub mod texture;
 pub mod truth;
 pub mod utc;

@@ -6,14 +6,15 @@ use std::time::{Duration, Instant};
 use hzn_calib::FrameData;
 use hzn_core::pipeline::Verdict;
 use hzn_core::status::{Stage, Status};
-use hzn_core::{Config, Report, Solution};
+use hzn_core::{Config, Report, Solution, body};
+use hzn_mcap::Annotations;
 
-use crate::engine::{AnySensor, Trace};
+use crate::engine::{AnySensor, Trace, Traces};
 use crate::exit::{Exit, Outcome, usage};
 use crate::input::Picture;
-use crate::overlay;
 use crate::setup::{InputArgs, SensorArgs, need_altitude};
 use crate::tell;
+use crate::{output, overlay};
 
 /// Show what happens to one frame: what was kept, what was dropped, and why
 #[derive(Debug, clap::Args)]
@@ -60,19 +61,36 @@ pub(super) fn run(args: &Args) -> Outcome {
     let decoding = decoding.elapsed();
     let flight = args.sensor.flight;
     let mut sensor = AnySensor::new(config, flight).map_err(usage)?;
-    let half_angle = sensor.expected_half_angle_rad(data).map_err(usage)?;
+    let half_angles = sensor.expected_half_angles_rad(data);
     let view = picture.view(config.input.channel).map_err(|e| usage(format!("input.channel: {e}")))?;
     // Once to warm up: the first picture of a process pays for memory that is touched for the first time.
-    sensor.process(&view, data, None).map_err(usage)?;
-    let start = Instant::now();
-    sensor.process(&view, data, None).map_err(usage)?;
-    let elapsed = start.elapsed();
-    let trace = Trace::default();
-    let report = sensor.process(&view, data, Some(&trace)).map_err(usage)?;
-    let told = Told { name: &item.name, config, data, picture: &picture, trace: &trace, report: &report, half_angle };
-    tell::result(told.text(decoding, elapsed))?;
+    sensor.process(&view, data, None);
+    let times = sensor.process(&view, data, None);
+    let traces = Traces::new(config.each_body().len());
+    let mut drawing = Annotations::default();
+    let mut statuses = Vec::new();
+    let several = config.each_body().len() > 1;
+    let processed = sensor.process(&view, data, Some(&traces)).into_iter().zip(times);
+    for (which, ((processed, time), half_angle)) in processed.zip(half_angles).enumerate() {
+        let (Some(body), Some(trace)) = (config.each_body().get(which), traces.each.get(which)) else { continue };
+        let report = processed.report.map_err(usage)?;
+        let told = Told {
+            name: &item.name,
+            config,
+            body,
+            data,
+            picture: &picture,
+            trace,
+            report: &report,
+            half_angle: half_angle.map_err(usage)?,
+        };
+        tell::result(format_args!("{}{}", if which > 0 { "\n" } else { "" }, told.text(decoding, time.elapsed)))?;
+        drawing.add(output::annotations(trace, report.solution.as_ref(), sensor.camera()));
+        let name = hzn_mcap::body_name(body.kind);
+        statuses.push(if several { format!("{name} {}", report.status) } else { report.status.name().to_owned() });
+    }
     if let Some(path) = &args.overlay {
-        overlay::save(&overlay::draw(&picture, sensor.camera(), &trace, &report), path)?;
+        overlay::save(&overlay::draw_annotations(picture.to_rgb(), &drawing, &statuses.join(", ")), path)?;
         tell::line(format_args!("overlay: {}", path.display()));
     }
     Ok(Exit::Done)
@@ -82,6 +100,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 struct Told<'a> {
     name: &'a str,
     config: &'a Config,
+    body: &'a body::Config,
     data: Option<&'a FrameData>,
     picture: &'a Picture,
     trace: &'a Trace,
@@ -190,7 +209,7 @@ impl Told<'_> {
     }
 
     fn expected(&self) -> String {
-        let body = &self.config.body;
+        let body = self.body;
         let given = self.data.and_then(|d| d.altitude_km).or(body.altitude_km);
         let from = match self.data {
             Some(d) if d.position_km.is_some() => "position from frames.csv".to_owned(),
@@ -207,7 +226,7 @@ impl Told<'_> {
     }
 
     fn level(&self) -> String {
-        let method = format!("{:?}", self.config.binarize.method).to_lowercase();
+        let method = format!("{:?}", self.body.binarize.unwrap_or(self.config.binarize).method).to_lowercase();
         let full = (1u32 << self.picture.layout.bits) - 1;
         match (self.trace.level(), self.report.status) {
             (_, Status::TooDark | Status::TooBright) => {

@@ -10,6 +10,7 @@ mod info;
 mod init;
 mod recover;
 mod run;
+mod sensitivity;
 
 use clap::{Parser, Subcommand};
 
@@ -36,6 +37,7 @@ enum Command {
     Recover(recover::Args),
     Init(init::Args),
     Evaluate(evaluate::Args),
+    Sensitivity(Box<sensitivity::Args>),
     Camera(camera::Args),
     Completions(completions::Args),
 }
@@ -54,6 +56,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Recover(args) => recover::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Sensitivity(args) => sensitivity::run(&args),
         Command::Camera(args) => camera::run(&args),
         Command::Completions(args) => completions::run(&args),
     }

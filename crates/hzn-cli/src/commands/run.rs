@@ -116,11 +116,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut progress = Progress::new(total, held.frames, args.quiet);
     let stop = stop_flag();
     let mut seen = |frame: &Finished| {
-        let status = frame.report.as_ref().map_or(Status::Unreadable, |r| r.status);
-        if let (Err(why), false) = (&frame.report, args.quiet) {
+        // A picture that cannot be read is so for every body; a frame counts by the first that was not found.
+        let statuses = frame.found.iter().map(|f| f.report.as_ref().map_or(Status::Unreadable, |r| r.status));
+        if let (Some(Err(why)), false) = (frame.found.iter().map(|f| &f.report).find(|r| r.is_err()), args.quiet) {
             progress.say(&format!("unreadable: {}: {why}", frame.name));
         }
-        progress.count(status);
+        progress.count(statuses.fold(Status::Ok, worse));
     };
     let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut seen);
     let summary = progress.summary();
@@ -144,6 +145,11 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(Exit::Interrupted);
     }
     Ok(if progress.of(Status::Unreadable) > 0 { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// What a frame of several bodies counts as: unreadable when one is, else as the first that has no answer.
+fn worse(a: Status, b: Status) -> Status {
+    if a == Status::Ok || b == Status::Unreadable { b } else { a }
 }
 
 pub(super) fn cores() -> usize {
@@ -171,7 +177,8 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
         return other(format!("{what}; give the input that it was begun with"));
     }
     let here = engine::one(&Plan { overlay: None, ..plan.clone() }, there.index, item)?;
-    let here = Row { elapsed_us: there.elapsed_us, ..output::row(&here, &plan.config) };
+    let Some(here) = output::rows(&here, &plan.config).pop() else { return Ok(()) };
+    let here = Row { elapsed_us: there.elapsed_us, ..here };
     if here != *there {
         let what = format!("its last frame, {}, now comes out differently", there.file);
         return other(format!(

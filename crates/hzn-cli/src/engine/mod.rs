@@ -18,12 +18,13 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use hzn_calib::Frames;
+use hzn_core::status::Status;
 use hzn_core::{Config, Report};
 
-pub use sensor::{AnySensor, prepare};
-pub use trace::Trace;
+pub use sensor::{AnySensor, Processed, prepare};
+pub use trace::{Trace, Traces};
 
-use crate::input::{Item, Picture, Source};
+use crate::input::{Item, Source};
 
 /// What a run does with every frame.
 #[derive(Debug, Clone)]
@@ -55,20 +56,35 @@ pub struct Finished {
     pub name: String,
     /// Time in seconds.
     pub time_s: f64,
-    /// Altitude that was given for this frame (frames.csv or sensor.toml), kilometres.
+    /// Altitude that frames.csv gives for this frame, kilometres.
     pub altitude_km: Option<f64>,
     /// Position in ECEF, kilometres.
     pub position_km: Option<[f64; 3]>,
     /// Prior attitude, camera to ECEF, scalar first.
     pub camera_to_ecef_wxyz: Option<[f64; 4]>,
-    /// The answer, or why the picture could not be read.
-    pub report: Result<Report<f64>, String>,
-    /// Time of processing, decoding not included.
-    pub elapsed: Duration,
+    /// What came of every body, in order.
+    pub found: Vec<Found>,
     /// What is drawn over the picture, when it was asked for.
     pub drawing: hzn_mcap::Annotations,
     /// The picture as PNG or JPEG, when it was asked for.
     pub picture: Option<Vec<u8>>,
+}
+
+/// What came of one body in one frame.
+#[derive(Debug)]
+pub struct Found {
+    /// The answer, or why the picture could not be read.
+    pub report: Result<Report<f64>, String>,
+    /// Time of processing, decoding not included.
+    pub elapsed: Duration,
+}
+
+impl Finished {
+    /// A picture that could not be read: so it is with every body.
+    fn unreadable(self, plan: &Plan, why: &str) -> Self {
+        let none = || Found { report: Err(why.to_owned()), elapsed: Duration::ZERO };
+        Self { found: plan.config.each_body().iter().map(|_| none()).collect(), ..self }
+    }
 }
 
 /// Where finished frames go, in order.
@@ -228,7 +244,6 @@ fn write_in_order(
 fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
     let Job { index, item } = job;
     let data = plan.frames.as_ref().and_then(|f| f.get(&item.name));
-    let altitude_km = data.and_then(|d| d.altitude_km).or(plan.config.body.altitude_km);
     let size = (u32::from(plan.config.camera.width), u32::from(plan.config.camera.height));
     let decoded = item.payload.decode(Some(size));
     let exif = decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
@@ -237,37 +252,38 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         index,
         name: item.name,
         time_s,
-        altitude_km,
+        altitude_km: data.and_then(|d| d.altitude_km),
         position_km: data.and_then(|d| d.position_km),
         camera_to_ecef_wxyz: data.and_then(|d| d.camera_to_ecef_wxyz),
-        report: Err(String::new()),
-        elapsed: Duration::ZERO,
+        found: Vec::new(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
-        Err(why) => return Ok(Finished { report: Err(why), ..finished }),
+        Err(why) => return Ok(finished.unreadable(plan, &why)),
     };
-    let trace = (plan.trace || plan.overlay.is_some()).then(Trace::default);
+    let traces = (plan.trace || plan.overlay.is_some()).then(|| Traces::new(plan.config.each_body().len()));
     let view = match picture.view(plan.config.input.channel) {
         Ok(view) => view,
-        Err(why) => return Ok(Finished { report: Err(format!("{why} (input.channel in sensor.toml)")), ..finished }),
+        Err(why) => return Ok(finished.unreadable(plan, &format!("{why} (input.channel in sensor.toml)"))),
     };
-    let start = Instant::now();
-    finished.report = match sensor.process(&view, data, trace.as_ref()) {
-        Ok(report) => Ok(report),
+    let found = |p: Processed| Found {
         // Rows of frames.csv were checked before the run: only a picture without a row, where the sensor has no
         // altitude either, comes this far. The others go on.
-        Err(why) => Err(why.to_string()),
+        report: p.report.map_err(|why| why.to_string()),
+        elapsed: p.elapsed,
     };
-    finished.elapsed = start.elapsed();
-    if let (Some(folder), Some(trace), Ok(report)) = (&plan.overlay, &trace, &finished.report) {
-        draw(folder, &finished.name, &picture, sensor, trace, report)?;
-    }
-    if let (true, Some(trace), Ok(report)) = (plan.trace, &trace, &finished.report) {
+    finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(found).collect();
+    if let Some(traces) = &traces {
         // Here and not in the one thread that writes, which would hold up all the others.
-        finished.drawing = crate::output::annotations(trace, report.solution.as_ref(), sensor.camera());
+        let drawing = draw(&finished.found, traces, sensor);
+        if let Some(folder) = &plan.overlay {
+            let title = statuses(&finished.found, plan);
+            let image = crate::overlay::draw_annotations(picture.to_rgb(), &drawing, &title);
+            crate::overlay::save(&image, &folder.join(crate::overlay::file_name(&finished.name)))?;
+        }
+        finished.drawing = drawing;
     }
     if plan.keep_picture {
         finished.picture = match original {
@@ -278,15 +294,25 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     Ok(finished)
 }
 
-fn draw(
-    folder: &std::path::Path,
-    name: &str,
-    picture: &Picture,
-    sensor: &AnySensor,
-    trace: &Trace,
-    report: &Report<f64>,
-) -> anyhow::Result<()> {
-    let path = folder.join(crate::overlay::file_name(name));
-    let image = crate::overlay::draw(picture, sensor.camera(), trace, report);
-    crate::overlay::save(&image, &path)
+/// What is drawn over the picture for all of its bodies.
+fn draw(found: &[Found], traces: &Traces, sensor: &AnySensor) -> hzn_mcap::Annotations {
+    let mut drawing = hzn_mcap::Annotations::default();
+    for (found, trace) in found.iter().zip(&traces.each) {
+        let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref());
+        drawing.add(crate::output::annotations(trace, solution, sensor.camera()));
+    }
+    drawing
+}
+
+/// What became of the bodies, in words.
+fn statuses(found: &[Found], plan: &Plan) -> String {
+    let status = |f: &Found| f.report.as_ref().map_or(Status::Unreadable, |r| r.status).name();
+    match found {
+        [one] => status(one).to_owned(),
+        several => {
+            let bodies = plan.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind));
+            let each: Vec<String> = bodies.zip(several).map(|(body, f)| format!("{body} {}", status(f))).collect();
+            each.join(", ")
+        }
+    }
 }

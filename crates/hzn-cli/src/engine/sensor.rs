@@ -1,5 +1,7 @@
 //! The sensor of the workstation or of the flight computer, behind one face that speaks f64.
 
+use std::time::Duration;
+
 use hzn_calib::{FrameData, Frames, Problem};
 use hzn_core::body::{self, FrameError};
 use hzn_core::camera::Camera;
@@ -12,7 +14,7 @@ use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report, Solut
 
 use hzn_sim::ephemeris;
 
-use super::Trace;
+use super::trace::{Clock, Traces};
 
 enum Kind {
     Host(Box<HostHorizon>),
@@ -24,7 +26,7 @@ pub struct AnySensor {
     kind: Kind,
     /// The lens in f64, for drawing.
     camera: Camera<f64>,
-    body: body::Kind,
+    bodies: Vec<body::Kind>,
 }
 
 impl AnySensor {
@@ -39,7 +41,7 @@ impl AnySensor {
         } else {
             Kind::Host(HostHorizon::boxed(config)?)
         };
-        Ok(Self { kind, camera, body: config.body.kind })
+        Ok(Self { kind, camera, bodies: config.each_body().iter().map(|b| b.kind).collect() })
     }
 
     /// The lens.
@@ -47,35 +49,35 @@ impl AnySensor {
         &self.camera
     }
 
-    /// Half-angle in radians that is expected for a frame.
-    ///
-    /// # Errors
-    /// An altitude or position that cannot be.
-    pub fn expected_half_angle_rad(&self, data: Option<&FrameData>) -> Result<f64, FrameError> {
+    /// Half-angle in radians that is expected of each body in a frame; or why nothing can be expected: an altitude or
+    /// position that cannot be.
+    pub fn expected_half_angles_rad(&self, data: Option<&FrameData>) -> Vec<Result<f64, FrameError>> {
         match &self.kind {
-            Kind::Host(h) => Ok(h.expect(&frame(data))?.half_angle_rad()),
-            Kind::Flight(h) => Ok(f64::from(h.expect(&frame(data))?.half_angle_rad())),
+            Kind::Host(h) => half_angles(h, data),
+            Kind::Flight(h) => half_angles(h, data),
         }
     }
 
-    /// Processes one picture. Of Sun and Moon the direction in ECEF is known too, from the time and the position.
-    ///
-    /// # Errors
-    /// An altitude or position that cannot be.
+    /// Processes one picture: a result for each body, in order. Of Sun and Moon the direction in ECEF is known too, from
+    /// the time and the position.
     pub fn process(
         &mut self,
         view: &ImageView<'_>,
         data: Option<&FrameData>,
-        trace: Option<&Trace>,
-    ) -> Result<Report<f64>, FrameError> {
-        let mut report = match &mut self.kind {
-            Kind::Host(h) => run(h, view, data, trace)?,
-            Kind::Flight(h) => widen(&run(h, view, data, trace)?),
+        traces: Option<&Traces>,
+    ) -> Vec<Processed> {
+        let mut processed = match &mut self.kind {
+            Kind::Host(h) => run(h, view, data, traces),
+            Kind::Flight(h) => run(h, view, data, traces),
         };
-        if let (Some(solution), Some(direction)) = (&mut report.solution, data.and_then(|d| in_the_sky(self.body, d))) {
-            solution.axis_ecef = Some(direction);
+        for (&body, processed) in self.bodies.iter().zip(&mut processed) {
+            if let (Ok(Report { solution: Some(solution), .. }), Some(direction)) =
+                (&mut processed.report, data.and_then(|d| in_the_sky(body, d)))
+            {
+                solution.axis_ecef = Some(direction);
+            }
         }
-        Ok(report)
+        processed
     }
 }
 
@@ -89,6 +91,23 @@ fn in_the_sky(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>>
     UnitVec3::try_new(place.seen_from(data.position_km?.map(|km| km * 1e3)).direction)
 }
 
+/// What came of one body in one picture.
+#[derive(Debug)]
+pub struct Processed {
+    /// The report; or an altitude or position that cannot be.
+    pub report: Result<Report<f64>, FrameError>,
+    /// Time of processing.
+    pub elapsed: Duration,
+}
+
+fn half_angles<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+    horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
+    data: Option<&FrameData>,
+) -> Vec<Result<f64, FrameError>> {
+    let expect = |which| Ok(horizon.expect_body(which, &frame(data))?.half_angle_rad().into());
+    (0..horizon.config().each_body().len()).map(expect).collect()
+}
+
 fn frame<T: Real>(data: Option<&FrameData>) -> Frame<T> {
     data.map(|d| d.to_frame(None)).unwrap_or_default()
 }
@@ -97,24 +116,36 @@ fn run<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORD
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
     view: &ImageView<'_>,
     data: Option<&FrameData>,
-    trace: Option<&Trace>,
-) -> Result<Report<T>, FrameError> {
-    let expected = horizon.expect(&frame(data))?;
+    traces: Option<&Traces>,
+) -> Vec<Processed> {
+    let bodies = horizon.config().each_body().len();
+    let expected: Vec<_> = (0..bodies).map(|which| horizon.expect_body(which, &frame(data))).collect();
+    let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
     // Each kind of picture has its own compiled pipeline; behind the enum every pixel would cost a branch.
     macro_rules! observed {
         ($observer:expr) => {
             match view {
-                ImageView::Grey8(p) => horizon.process_observed(p, &expected, $observer),
-                ImageView::Grey16(p) => horizon.process_observed(p, &expected, $observer),
-                ImageView::Colour8(p) => horizon.process_observed(p, &expected, $observer),
-                ImageView::Colour16(p) => horizon.process_observed(p, &expected, $observer),
+                ImageView::Grey8(p) => horizon.process_each_observed(p, &known, $observer),
+                ImageView::Grey16(p) => horizon.process_each_observed(p, &known, $observer),
+                ImageView::Colour8(p) => horizon.process_each_observed(p, &known, $observer),
+                ImageView::Colour16(p) => horizon.process_each_observed(p, &known, $observer),
             }
         };
     }
-    Ok(match trace {
-        Some(trace) => observed!(trace),
-        None => observed!(&hzn_core::pipeline::Unobserved),
-    })
+    let (reports, times) = match traces {
+        Some(traces) => (observed!(traces), traces.clock.times()),
+        None => {
+            let clock = Clock::default();
+            (observed!(&clock), clock.times())
+        }
+    };
+    let mut done = reports.iter().zip(times);
+    // As many reports as bodies of which something could be expected.
+    let result = |expected: Result<_, FrameError>| match expected {
+        Err(why) => Some(Processed { report: Err(why), elapsed: Duration::ZERO }),
+        Ok(_) => done.next().map(|(report, elapsed)| Processed { report: Ok(widen(report)), elapsed }),
+    };
+    expected.into_iter().filter_map(result).collect()
 }
 
 /// A report in f64.
@@ -166,7 +197,9 @@ pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result
     let Some(frames) = frames else { return Ok(()) };
     let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
     for row in &frames.rows {
-        sensor.expected_half_angle_rad(Some(row)).map_err(|why| frames.problem(row, why))?;
+        for half_angle in sensor.expected_half_angles_rad(Some(row)) {
+            half_angle.map_err(|why| frames.problem(row, why))?;
+        }
     }
     Ok(())
 }

@@ -79,6 +79,77 @@ impl Trace {
     }
 }
 
+/// The time spent on each body.
+#[derive(Debug, Clone, Default)]
+pub struct Clock {
+    since: Cell<Option<Instant>>,
+    times: RefCell<Vec<Duration>>,
+}
+
+impl Clock {
+    /// The times in the order of the bodies.
+    pub fn times(&self) -> Vec<Duration> {
+        self.times.borrow().clone()
+    }
+}
+
+impl<T> Observer<T> for Clock {
+    fn body(&self, _: u8) {
+        self.since.set(Some(Instant::now()));
+    }
+    fn leave(&self) {
+        self.times.borrow_mut().push(self.since.get().map_or(Duration::ZERO, |since| since.elapsed()));
+    }
+}
+
+/// Records of one picture, one for each body.
+#[derive(Debug, Default)]
+pub struct Traces {
+    /// In the order of the bodies.
+    pub each: Vec<Trace>,
+    pub(super) clock: Clock,
+    now: Cell<usize>,
+}
+
+impl Traces {
+    /// As many as there are bodies.
+    pub fn new(bodies: usize) -> Self {
+        Self { each: vec![Trace::default(); bodies], ..Self::default() }
+    }
+    fn now(&self) -> Option<&Trace> {
+        self.each.get(self.now.get())
+    }
+}
+
+impl<T: Real + Into<f64>> Observer<T> for Traces {
+    fn body(&self, which: u8) {
+        self.now.set(usize::from(which));
+        Observer::<T>::body(&self.clock, which);
+    }
+    fn enter(&self, stage: Stage) {
+        self.now().into_iter().for_each(|t| Observer::<T>::enter(t, stage));
+    }
+    fn leave(&self) {
+        Observer::<T>::leave(&self.clock);
+        self.now().into_iter().for_each(|t| Observer::<T>::leave(t));
+    }
+    fn level(&self, level: u16, mean: T, samples: u32) {
+        self.now().into_iter().for_each(|t| Observer::<T>::level(t, level, mean, samples));
+    }
+    fn edge(&self, candidate: u32, border: &[Pixel], stride: u32) {
+        self.now().into_iter().for_each(|t| Observer::<T>::edge(t, candidate, border, stride));
+    }
+    fn point(&self, candidate: u32, point: ImagePoint<T>) {
+        self.now().into_iter().for_each(|t| t.point(candidate, point));
+    }
+    fn weight(&self, candidate: u32, point: u32, weight: T) {
+        self.now().into_iter().for_each(|t| t.weight(candidate, point, weight));
+    }
+    fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
+        self.now().into_iter().for_each(|t| t.verdict(candidate, outcome, solution));
+    }
+}
+
 impl<T: Real + Into<f64>> Observer<T> for Trace {
     fn enter(&self, stage: Stage) {
         self.switch(Some(stage));

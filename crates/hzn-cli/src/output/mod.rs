@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_mcap::{Contents, Options, Reader, part_path};
 
-pub use record::{annotations, limb_lines, record, row};
+pub use record::{annotations, limb_lines, records, rows};
 
 use crate::engine::{Finished, Sink};
 use crate::exit::{Stop, failed, usage};
@@ -151,7 +151,8 @@ fn options(config: &Config, sensor_toml: &str, force: bool) -> Options {
 fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml: &str) -> Result<(Kind, Held), Stop> {
     match form(target) {
         Some(form) => {
-            let (text, held) = Text::resume(path, part, form).map_err(|e| cannot(part, &e))?;
+            let (text, held) =
+                Text::resume(path, part, form, config.each_body().len()).map_err(|e| cannot(part, &e))?;
             Ok((Kind::Text(text), held))
         }
         None => {
@@ -160,7 +161,8 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
                 hzn_mcap::Error::OtherSensor { .. } => usage(e),
                 e => failed(e),
             })?;
-            let held = Held { frames: resumed.frames, last: last.filter(|_| resumed.frames > 0) };
+            let frames = resumed.frames / config.each_body().len() as u64;
+            let held = Held { frames, last: last.filter(|_| resumed.frames > 0) };
             Ok((Kind::Mcap(Box::new(resumed.writer)), held))
         }
     }
@@ -212,8 +214,8 @@ impl Output {
 impl Sink for Output {
     fn write(&mut self, frame: &mut Finished) -> anyhow::Result<()> {
         match &mut self.kind {
-            Kind::Mcap(writer) => Ok(writer.write(&record(frame, &self.config))?),
-            Kind::Text(text) => text.write(&row(frame, &self.config)),
+            Kind::Mcap(writer) => Ok(writer.write_bodies(&records(frame, &self.config))?),
+            Kind::Text(text) => rows(frame, &self.config).iter().try_for_each(|row| text.write(row)),
         }
     }
 
@@ -275,7 +277,7 @@ pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result
     if file != part {
         std::fs::copy(file, &part)?;
     }
-    let (text, held) = Text::resume(path, &part, form)?;
+    let (text, held) = Text::resume(path, &part, form, 1)?;
     text.finish()?;
     Ok((held.frames, size.saturating_sub(std::fs::metadata(path)?.len())))
 }

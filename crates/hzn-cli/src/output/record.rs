@@ -2,48 +2,54 @@
 
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
-use hzn_core::{Config, Solution};
+use hzn_core::{Config, Solution, body};
 use hzn_mcap::{
     Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, Row, RowMeta,
 };
 
-use crate::engine::{Finished, Trace};
+use crate::engine::{Finished, Found, Trace};
 use crate::overlay::limb;
 
-/// The row of a frame.
-pub fn row(frame: &Finished, config: &Config) -> Row {
-    let meta = RowMeta {
-        index: frame.index,
-        file: frame.name.clone(),
-        time_s: frame.time_s,
-        body: hzn_mcap::body_name(config.body.kind).to_owned(),
-        altitude_km: frame.altitude_km,
+/// The rows of a frame, one for each body.
+pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
+    let row = |(body, found): (&body::Config, &Found)| {
+        let meta = RowMeta {
+            index: frame.index,
+            file: frame.name.clone(),
+            time_s: frame.time_s,
+            body: hzn_mcap::body_name(body.kind).to_owned(),
+            altitude_km: frame.altitude_km.or(body.altitude_km),
+        };
+        match &found.report {
+            Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3)),
+            Err(why) => Row::unreadable(&meta, why.clone()),
+        }
     };
-    match &frame.report {
-        Ok(report) => Row::from_report(&meta, report, Some(frame.elapsed.as_nanos() as f64 / 1e3)),
-        Err(why) => Row::unreadable(&meta, why.clone()),
-    }
+    config.each_body().iter().zip(&frame.found).map(row).collect()
 }
 
-/// The record of a frame, with the picture and the drawing that the run collected; both are moved out of it.
-pub fn record(frame: &mut Finished, config: &Config) -> FrameRecord {
-    let mut record = FrameRecord::new(row(frame, config));
-    record.attitude = frame.camera_to_ecef_wxyz.map(|q| Attitude {
-        q_ecef_from_camera_wxyz: q,
-        position_m: frame.position_km.unwrap_or_default().map(|km| km * 1e3),
-    });
-    record.image = frame.picture.take().map(|bytes| {
-        let png = matches!(crate::input::picture::format_of(&bytes), Some(image::ImageFormat::Png));
-        EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes }
-    });
-    match &frame.report {
-        Ok(report) => {
-            record.candidates = CandidateEdge::from_report(report);
-            record.annotations = std::mem::take(&mut frame.drawing);
-        }
-        Err(why) => record.log.push(LogLine { level: LogLevel::Error, message: why.clone() }),
+/// The records of a frame, one for each body. The picture and the drawing that the run collected are moved out of it,
+/// into the first.
+pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
+    let mut records: Vec<FrameRecord> = rows(frame, config).into_iter().map(FrameRecord::new).collect();
+    if let Some(first) = records.first_mut() {
+        first.attitude = frame.camera_to_ecef_wxyz.map(|q| Attitude {
+            q_ecef_from_camera_wxyz: q,
+            position_m: frame.position_km.unwrap_or_default().map(|km| km * 1e3),
+        });
+        first.image = frame.picture.take().map(|bytes| {
+            let png = matches!(crate::input::picture::format_of(&bytes), Some(image::ImageFormat::Png));
+            EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes }
+        });
+        first.annotations = std::mem::take(&mut frame.drawing);
     }
-    record
+    for (record, found) in records.iter_mut().zip(&frame.found) {
+        match &found.report {
+            Ok(report) => record.candidates = CandidateEdge::from_report(report),
+            Err(why) => record.log.push(LogLine { level: LogLevel::Error, message: why.clone() }),
+        }
+    }
+    records
 }
 
 /// What is drawn over a picture.
@@ -63,7 +69,7 @@ pub fn annotations(trace: &Trace, solution: Option<&Solution<f64>>, camera: &Cam
             (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)
                 && (-0.5..=f64::from(camera.height()) - 0.5).contains(&p.v)
         };
-        out.axis = camera.project(&s.axis).filter(inside).map(|p| [p.u, p.v]);
+        out.axes.extend(camera.project(&s.axis).filter(inside).map(|p| [p.u, p.v]));
     }
     out
 }

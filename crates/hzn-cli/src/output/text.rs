@@ -47,8 +47,8 @@ impl Text {
         Ok(text)
     }
 
-    /// Goes on after the last whole row; without an unfinished file, begins one.
-    pub(crate) fn resume(path: &Path, part: &Path, form: Form) -> io::Result<(Self, Held)> {
+    /// Goes on after the last frame that has all of its `bodies` rows; without an unfinished file, begins one.
+    pub(crate) fn resume(path: &Path, part: &Path, form: Form, bodies: usize) -> io::Result<(Self, Held)> {
         if !part.exists() {
             return Ok((Self::create(path, part, form)?, Held::default()));
         }
@@ -56,14 +56,14 @@ impl Text {
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         let (held, end) = match form {
-            Form::Csv => whole_csv(&bytes)?,
-            Form::Jsonl => whole_jsonl(&bytes),
+            Form::Csv => whole_csv(&bytes, bodies)?,
+            Form::Jsonl => whole_jsonl(&bytes, bodies),
         };
         if end == 0 {
             drop(file);
             return Ok((Self::create(path, part, form)?, Held::default()));
         }
-        // What follows is a row that was cut off.
+        // What follows is a row, or a frame, that was cut off.
         file.set_len(end as u64)?;
         file.seek(SeekFrom::End(0))?;
         Ok((Self::on(file, path, part, form), held))
@@ -111,8 +111,8 @@ pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
     writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))
 }
 
-/// Whole rows, and where they end.
-fn whole_csv(bytes: &[u8]) -> io::Result<(Held, usize)> {
+/// Whole frames of `bodies` rows each, and where they end.
+fn whole_csv(bytes: &[u8], bodies: usize) -> io::Result<(Held, usize)> {
     let header = header();
     if bytes.len() < header.len() {
         return Ok((Held::default(), 0));
@@ -121,7 +121,7 @@ fn whole_csv(bytes: &[u8]) -> io::Result<(Held, usize)> {
         let what = "has other columns than this version writes; start over with --force";
         return Err(io::Error::new(io::ErrorKind::InvalidData, what));
     }
-    let (mut held, mut end) = (Held::default(), header.len());
+    let (mut held, mut end, mut rows) = (Held::default(), header.len(), 0);
     // A row may hold line breaks within quotes, so that only the reader knows where it ends.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(&bytes[header.len()..]);
     let mut record = csv::StringRecord::new();
@@ -132,21 +132,27 @@ fn whole_csv(bytes: &[u8]) -> io::Result<(Held, usize)> {
         if !whole {
             break;
         }
-        held = Held { frames: held.frames + 1, last: Some(row) };
-        end = to;
+        rows += 1;
+        if rows % bodies == 0 {
+            held = Held { frames: held.frames + 1, last: Some(row) };
+            end = to;
+        }
     }
     Ok((held, end))
 }
 
-fn whole_jsonl(bytes: &[u8]) -> (Held, usize) {
-    let (mut held, mut end) = (Held::default(), 0);
+fn whole_jsonl(bytes: &[u8], bodies: usize) -> (Held, usize) {
+    let (mut held, mut end, mut to, mut rows) = (Held::default(), 0, 0, 0);
     for line in bytes.split_inclusive(|&b| b == b'\n') {
         if !line.ends_with(b"\n") {
             break;
         }
         let Ok(row) = serde_json::from_slice::<Row>(line) else { break };
-        held = Held { frames: held.frames + 1, last: Some(row) };
-        end += line.len();
+        (to, rows) = (to + line.len(), rows + 1);
+        if rows % bodies == 0 {
+            held = Held { frames: held.frames + 1, last: Some(row) };
+            end = to;
+        }
     }
     (held, end)
 }

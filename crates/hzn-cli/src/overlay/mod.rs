@@ -7,12 +7,8 @@ pub mod limb;
 
 use std::path::Path;
 
-use hzn_core::Report;
-use hzn_core::camera::Camera;
 use image::RgbImage;
 
-use crate::engine::Trace;
-use crate::input::Picture;
 use canvas::{Canvas, Colour};
 
 const EDGE: Colour = [86, 180, 233];
@@ -26,12 +22,6 @@ const TRUTH: Colour = [230, 159, 0];
 pub fn file_name(name: &str) -> String {
     let flat = name.replace(['/', '\\', ':'], "_");
     if flat.to_lowercase().ends_with(".png") { flat } else { format!("{flat}.png") }
-}
-
-/// Draws what one report stands on: candidate edges, inliers, rejected points, the fitted limb, the axis.
-pub fn draw(picture: &Picture, camera: &Camera<f64>, trace: &Trace, report: &Report<f64>) -> RgbImage {
-    let drawing = crate::output::annotations(trace, report.solution.as_ref(), camera);
-    draw_annotations(picture.to_rgb(), &drawing, report.status.name())
 }
 
 /// Draws annotations (pixel centres at integers) with a legend that begins with `title`.
@@ -68,7 +58,7 @@ pub fn draw_beside(
     for p in &drawing.inliers {
         canvas.disc(*p, pen, INLIER);
     }
-    if let Some([u, v]) = drawing.axis {
+    for &[u, v] in &drawing.axes {
         let arm = pen * 14.0;
         for (dx, dy) in [(arm, 0.0), (0.0, arm)] {
             canvas.line([u - dx, v - dy], [u + dx, v + dy], pen * 5.0, [0, 0, 0]);
@@ -94,7 +84,7 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, tit
     add(!drawing.rejected.is_empty(), format!("rejected {}", drawing.rejected.len()), REJECTED);
     add(!drawing.limb.is_empty(), "fitted limb".into(), LIMB);
     add(truth, "true limb".into(), TRUTH);
-    add(drawing.axis.is_some(), "axis".into(), AXIS);
+    add(!drawing.axes.is_empty(), "axis".into(), AXIS);
     let widest = entries.iter().map(|(t, _)| t.len()).max().unwrap_or(0) as u32 * 8 * scale;
     let (box_w, box_h) = (widest + 4 * scale, entries.len() as u32 * line + 3 * scale);
     // A legend that hides a small picture would help nobody.

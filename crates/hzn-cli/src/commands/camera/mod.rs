@@ -4,8 +4,8 @@ mod convert;
 
 use std::path::{Path, PathBuf};
 
+use crate::engine::AnySensor;
 use hzn_core::Config;
-use hzn_core::body::Expected;
 use hzn_core::camera::{self, Camera, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
@@ -78,13 +78,16 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
             None => "everywhere".into(),
         },
     );
-    match Expected::<f64>::of(config) {
-        Some(half_angle) => {
-            let deg = half_angle.to_degrees();
-            line("expected body", format!("{}, half-angle {deg:.3} deg", hzn_mcap::body_name(config.body.kind)));
-            line("expected limb", limb_size(half_angle, &camera, c));
+    let half_angles = AnySensor::new(config, false).map(|s| s.expected_half_angles_rad(None)).unwrap_or_default();
+    for (body, half_angle) in config.each_body().iter().zip(half_angles) {
+        let name = hzn_mcap::body_name(body.kind);
+        match half_angle {
+            Ok(rad) => {
+                line("expected body", format!("{name}, half-angle {:.3} deg", rad.to_degrees()));
+                line("expected limb", limb_size(rad, &camera, c));
+            }
+            Err(_) => line("expected limb", format!("unknown: set altitude_km of the {name}")),
         }
-        None => line("expected limb", "unknown: set altitude_km in [body]".into()),
     }
     out.push_str("\n off axis [deg]   distance from centre [px]   px a degree\n");
     let theta_max = camera.theta_max_rad();
@@ -98,16 +101,6 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
         out.push_str(&format!("{:>15.2} {:>27.2} {slope:>13.3}\n", theta.to_degrees(), r(theta)));
     }
     Ok(out)
-}
-
-/// The half-angle that a configuration alone expects.
-trait FromConfig {
-    fn of(config: &Config) -> Option<f64>;
-}
-impl FromConfig for Expected<f64> {
-    fn of(config: &Config) -> Option<f64> {
-        crate::engine::AnySensor::new(config, false).ok()?.expected_half_angle_rad(None).ok()
-    }
 }
 
 /// Distance from the principal point of a ray this far off axis, along x, pixels.

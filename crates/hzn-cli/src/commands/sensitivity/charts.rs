@@ -1,0 +1,92 @@
+//! Which conic is seen from where, and what a sphere for the Earth costs.
+
+use hzn_sim::sensitivity::chart::{Vertical, Visibility};
+
+use super::body::Body;
+use super::table::Table;
+use super::{Args, Finished};
+use crate::exit::{Stop, usage};
+use crate::plot::{Chart, Series, Style};
+
+/// Fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
+pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
+    let body = match args.body.as_slice() {
+        [] => Body::EARTH,
+        [one] => *one,
+        _ => return Err(usage("--body: one body for this chart")),
+    };
+    let altitudes =
+        args.altitude.as_ref().map_or_else(|| (1..=60).map(|i| 50.0 * f64::from(i)).collect(), |v| v.0.clone());
+    let limb_height_km = match args.limb_height.as_ref().map(|v| v.0.as_slice()) {
+        None => body.limb_height_km,
+        Some([one]) => *one,
+        Some(_) => return Err(usage("--limb-height: one value for this chart")),
+    };
+    let mut rows = Vec::new();
+    for km in altitudes {
+        if !(km > limb_height_km) {
+            return Err(usage(format!("--altitude: {km} km is not above the limb at {limb_height_km} km")));
+        }
+        let sin = (body.radius_km + limb_height_km) / (body.radius_km + km);
+        rows.push((km, Visibility::of(sin.asin())));
+    }
+    let mut table = Table::default();
+    table.column("altitude_km", "altitude_km", rows.iter().map(|(km, _)| Some(*km)));
+    type Pick = fn(&Visibility) -> f64;
+    let columns: [(&str, &str, &str, Pick); 4] = [
+        ("half_angle_deg", "half-angle", "", |v| v.half_angle_deg),
+        ("ellipse_from_deg", "ellipse from", "arc of an ellipse", |v| v.ellipse_deg),
+        ("hyperbola_from_deg", "hyperbola from", "arc of a hyperbola", |v| v.hyperbola_deg),
+        ("disc_from_deg", "whole disc from", "whole disc", |v| v.disc_deg),
+    ];
+    let mut chart =
+        Chart::new("Field of view from which on a limb can be seen", "altitude [km]", "field of view [deg]");
+    for (name, head, label, value) in columns {
+        table.column(name, head, rows.iter().map(|(_, v)| Some(value(v))));
+        if !label.is_empty() {
+            chart = chart.with(Series::new(label, Style::Line, rows.iter().map(|(km, v)| (*km, value(v)))));
+        }
+    }
+    let chart = (rows.len() > 1).then_some(chart);
+    Ok(Finished { table, chart, notes: Vec::new() })
+}
+
+/// Angles by latitude and altitude (Braun & Barf 2022, figure 8, and beside it what is left with the limb axis).
+pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
+    if !args.body.is_empty() {
+        return Err(usage("--body: this is about the Earth (WGS-84)"));
+    }
+    let altitudes = args.altitude.as_ref().map_or_else(|| vec![100.0, 240.0, 600.0, 2000.0], |v| v.0.clone());
+    let limb_height_km = args.limb_height.as_ref().map_or(Ok(0.0), |v| match v.0.as_slice() {
+        [one] => Ok(*one),
+        _ => Err(usage("--limb-height: one value for this chart")),
+    })?;
+    let mut rows = Vec::new();
+    for &km in &altitudes {
+        for i in 0..=18 {
+            let latitude = 5.0 * f64::from(i);
+            let refused = || usage(format!("--altitude: {km} km is not above the limb at {limb_height_km} km"));
+            rows.push((latitude, km, Vertical::at(latitude, km, limb_height_km).ok_or_else(refused)?));
+        }
+    }
+    let mut table = Table::default();
+    table.column("altitude_km", "altitude_km", rows.iter().map(|r| Some(r.1)));
+    table.column("latitude_deg", "latitude_deg", rows.iter().map(|r| Some(r.0)));
+    type Pick = fn(&Vertical) -> f64;
+    let columns: [(&str, &str, Pick); 4] = [
+        ("geocentric_to_axis_deg", "centre to limb axis", |v| v.geocentric_to_axis_deg),
+        ("geocentric_to_geodetic_deg", "centre to vertical", |v| v.geocentric_to_geodetic_deg),
+        ("geodetic_to_axis_deg", "vertical to limb axis", |v| v.geodetic_to_axis_deg),
+        ("half_angle_spread_deg", "spread of half-angle", |v| v.half_angle_spread_deg),
+    ];
+    for (name, head, value) in columns {
+        table.column(name, head, rows.iter().map(|r| Some(value(&r.2))));
+    }
+    let title = "Error of taking the Earth for a sphere: centre to limb axis";
+    let mut chart = Chart::new(title, "latitude [deg]", "deg");
+    for km in altitudes {
+        let of = rows.iter().filter(|r| r.1 == km).map(|r| (r.0, r.2.geocentric_to_axis_deg));
+        chart = chart.with(Series::new(format!("{km} km"), Style::Line, of));
+    }
+    Ok(Finished { table, chart: Some(chart), notes: Vec::new() })
+}

@@ -1,0 +1,104 @@
+//! `hzn sensitivity`: tables, plots, and what is said about designs that cannot be.
+
+mod common;
+
+use common::{Place, cell, rows};
+
+#[test]
+fn a_sweep_as_text_table_and_plot() {
+    let place = Place::new();
+    let sweep = [
+        "sensitivity",
+        "--fov",
+        "66:130:16",
+        "--altitude",
+        "200",
+        "--limb-height",
+        "0",
+        "--limb-height-sigma",
+        "0.5",
+        "-o",
+        "s.csv",
+        "-o",
+        "s.svg",
+    ];
+    let ran = place.run(&sweep).expect(0);
+    assert_eq!(ran.out.lines().count(), 6);
+    assert!(ran.err.contains("smallest pitch, fused:"), "{}", ran.err);
+    let table = rows(&place.read("s.csv"));
+    let number = |row: usize, name: &str| cell(&table[row], name).parse::<f64>().unwrap();
+    // The reference of Braun & Barf 33 at 98 degrees, 3 sigma: 0.5400 in pitch, 0.1248 in roll; α known 0.0998.
+    assert_eq!(cell(&table[2], "fov_deg"), "98");
+    for (name, expected) in
+        [("pitch_braun_barf_33_deg", 0.54), ("roll_braun_barf_33_deg", 0.1248), ("pitch_known_deg", 0.0998)]
+    {
+        assert!((3.0 * number(2, name) / expected - 1.0).abs() < 0.02, "{name} {}", number(2, name));
+    }
+    let svg = place.read("s.svg");
+    assert!(svg.starts_with("<svg") && svg.contains("field of view [deg]") && svg.contains("pitch, fused"));
+    place.run(&sweep).expect(2).says("s.csv: exists already; --force replaces it");
+}
+
+#[test]
+fn several_quantities_are_combined() {
+    let place = Place::new();
+    let args = ["sensitivity", "--fov", "60,90", "--altitude", "100:300:100", "--body", "earth,moon", "--rows", "540"];
+    let out = place.run(&args).expect(0).out;
+    assert_eq!(out.lines().count(), 1 + 2 * 3 * 2, "{out}");
+    let lens =
+        ["sensitivity", "--lens", "equidistant", "--fov", "180", "--altitude", "600", "--depression", "30:90:30"];
+    assert_eq!(place.run(&lens).expect(0).out.lines().count(), 4);
+}
+
+#[test]
+fn a_sensor_file_brings_camera_body_and_noise() {
+    let place = Place::new();
+    let own = place.run(&["sensitivity", "-s", "in/sensor.toml", "--depression", "20"]).expect(0);
+    let line = own.out.lines().nth(1).unwrap();
+    // Of the file: 400 km above a sphere with the limb at 10 km.
+    assert!(line.trim_start().starts_with("400") && line.contains("70.46"), "{}", own.out);
+    place.run(&["sensitivity", "-s", "in/sensor.toml", "--fov", "60"]).expect(2).says("cannot be used with");
+}
+
+#[test]
+fn charts_of_visibility_and_of_the_spherical_earth() {
+    let place = Place::new();
+    let args = ["sensitivity", "visibility", "--altitude", "238", "--limb-height", "0", "-o", "v.csv"];
+    place.run(&args).expect(0);
+    let table = rows(&place.read("v.csv"));
+    let from: f64 = cell(&table[0], "ellipse_from_deg").parse().unwrap();
+    assert!((from - 118.3).abs() < 0.1);
+    place.run(&["sensitivity", "visibility", "-o", "v.svg"]).expect(0);
+    assert!(place.read("v.svg").contains("arc of a hyperbola"));
+    place.run(&["sensitivity", "spherical-earth", "--altitude", "240", "-o", "e.csv", "-o", "e.svg"]).expect(0);
+    let table = rows(&place.read("e.csv"));
+    let middle = table.iter().find(|r| cell(r, "latitude_deg") == "45").unwrap();
+    let angle: f64 = cell(middle, "geocentric_to_axis_deg").parse().unwrap();
+    assert!((angle - 0.1787).abs() < 1e-3);
+}
+
+#[test]
+fn designs_that_cannot_be_are_refused_with_a_reason() {
+    let place = Place::new();
+    let refused = |args: &[&str], why: &str| {
+        place.run(&[&["sensitivity"], args].concat()).expect(2).says(why);
+    };
+    refused(&[], "--altitude: missing; give it in kilometres");
+    refused(&["--altitude", "5"], "the camera at 5 km is not above the limb at 10 km");
+    refused(&["--altitude", "high"], "\"high\" is no number");
+    refused(&["--altitude", "200", "--fov", "150:60"], "a range rises");
+    refused(&["--altitude", "200", "--fov", "190"], "--fov: 190 is refused: above 0 and up to 175 for this lens");
+    refused(&["--altitude", "200", "--size", "1920"], "expected WIDTHxHEIGHT");
+    refused(&["--altitude", "200", "--rows", "0.5"], "--rows: 0.5 is refused");
+    refused(&["--altitude", "200", "--body", "mars"], "\"mars\" is no body; expected earth, moon, sun, or a radius");
+    refused(&["--altitude", "200", "--sigma-px", "0"], "--sigma-px: 0 is refused");
+    refused(&["--altitude", "200", "-o", "x.pdf"], "a table ends in .csv, a plot in .svg");
+    refused(&["--altitude", "200", "-o", "x.svg"], "give one value a range");
+    refused(&["visibility", "--altitude", "5"], "5 km is not above the limb at 10 km");
+    // No limb in view is an answer, with advice.
+    let ran = place.run(&["sensitivity", "--altitude", "3000", "--fov", "30"]).expect(0);
+    assert!(ran.out.lines().nth(1).unwrap().ends_with('-'), "{}", ran.out);
+    ran.says(
+        "1 of 1 see no limb, or too little of it: at 3000 km it is 47.1 deg below the horizontal; --depression 47",
+    );
+}

@@ -1,0 +1,180 @@
+//! Camera, body and place of a sensor that does not exist yet.
+
+use core::f64::consts::TAU;
+
+use hzn_core::camera::{self, Camera};
+use hzn_core::error::ConfigError;
+use hzn_core::frames::UnitVec3;
+use hzn_core::pixel::ImagePoint;
+use nalgebra::Vector3;
+
+use super::sigmas::Sigmas;
+
+/// Steps around the cone in which its parts in view are found; parts between two of them are missed.
+const STEPS: usize = 16_384;
+/// Most points of a limb; beyond, they are farther apart than a pixel.
+const MOST_POINTS: f64 = 20_000.0;
+
+/// A camera above a sphere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    /// The lens and the size of the picture.
+    pub camera: camera::Config,
+    /// Radius of the body in kilometres, above 0.
+    pub radius_km: f64,
+    /// Altitude above it in kilometres, above the limb height.
+    pub altitude_km: f64,
+    /// 1-sigma of the altitude in kilometres, 0 or more.
+    pub altitude_sigma_km: f64,
+    /// Height of the visible limb above the surface in kilometres.
+    pub limb_height_km: f64,
+    /// 1-sigma of the limb height in kilometres, 0 or more.
+    pub limb_height_sigma_km: f64,
+    /// Angle of the optical axis below the local horizontal in degrees; 90 looks straight down.
+    pub depression_deg: f64,
+    /// Turn about the optical axis in degrees.
+    pub roll_deg: f64,
+    /// 1-sigma of an edge point along u and along v in pixels.
+    pub sigma_px: f64,
+    /// Length along the edge over which errors stay alike in pixels; 0 for white errors.
+    pub correlation_px: f64,
+}
+
+/// Why a design cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DesignError {
+    /// The camera is out of its limits.
+    #[error(transparent)]
+    Camera(#[from] ConfigError),
+    /// The camera is not above the limb.
+    #[error("the camera at {altitude_km} km is not above the limb at {limb_height_km} km, or the body has no radius")]
+    Inside {
+        /// Its altitude in kilometres.
+        altitude_km: f64,
+        /// The limb's height in kilometres.
+        limb_height_km: f64,
+    },
+}
+
+/// A point of the limb in the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Station {
+    pub(super) point: ImagePoint<f64>,
+    /// Length of limb from the point before it; `None` where a piece begins.
+    pub(super) step_px: Option<f64>,
+}
+
+impl Design {
+    /// Half-angle of the limb's cone in radians: sin α = (R + d)/(R + H).
+    ///
+    /// # Errors
+    /// The camera is not above the limb.
+    pub fn half_angle_rad(&self) -> Result<f64, DesignError> {
+        let sin = (self.radius_km + self.limb_height_km) / (self.radius_km + self.altitude_km);
+        if self.radius_km > 0.0 && sin > 0.0 && sin < 1.0 {
+            Ok(sin.asin())
+        } else {
+            Err(DesignError::Inside { altitude_km: self.altitude_km, limb_height_km: self.limb_height_km })
+        }
+    }
+
+    /// Direction to the body's centre in the camera frame.
+    pub fn axis(&self) -> [f64; 3] {
+        let (sd, cd) = self.depression_deg.to_radians().sin_cos();
+        let (sr, cr) = self.roll_deg.to_radians().sin_cos();
+        [sr * cd, cr * cd, sd]
+    }
+
+    /// How far the limb is below the local horizontal in degrees, where it is nearest.
+    ///
+    /// # Errors
+    /// As [`Self::half_angle_rad`].
+    pub fn dip_deg(&self) -> Result<f64, DesignError> {
+        Ok(90.0 - self.half_angle_rad()?.to_degrees())
+    }
+
+    /// The sigmas of this design; `None` when no limb is in view, or too little of it to determine a direction.
+    ///
+    /// # Errors
+    /// A camera that is refused, or one that is not above the limb.
+    pub fn sigmas(&self) -> Result<Option<Sigmas>, DesignError> {
+        let half_angle_rad = self.half_angle_rad()?;
+        let camera = Camera::try_new(&self.camera)?;
+        let stations = self.stations(&camera, half_angle_rad);
+        Ok(Sigmas::of(self, &camera, half_angle_rad, &stations))
+    }
+
+    /// The limb in view as points a pixel apart.
+    pub(super) fn stations(&self, camera: &Camera<f64>, half_angle_rad: f64) -> Vec<Station> {
+        let e = Vector3::from(self.axis());
+        let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
+        let b2 = e.cross(&b1);
+        let (sin, cos) = half_angle_rad.sin_cos();
+        let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
+        let at = |azimuth: f64| {
+            let (s, c) = azimuth.sin_cos();
+            let p = camera.project(&UnitVec3::try_new((e * cos + (b1 * c + b2 * s) * sin).into())?)?;
+            (p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5).then_some(p)
+        };
+        let mut stations = Vec::new();
+        for azimuths in pieces(&at) {
+            let points: Vec<(f64, ImagePoint<f64>)> = azimuths.iter().filter_map(|&a| Some((a, at(a)?))).collect();
+            // (arc length, azimuth) along the piece.
+            let mut arc = 0.0;
+            let mut along = Vec::with_capacity(points.len());
+            for (i, (azimuth, p)) in points.iter().enumerate() {
+                if let Some((_, before)) = i.checked_sub(1).and_then(|j| points.get(j)) {
+                    arc += (p.u - before.u).hypot(p.v - before.v);
+                }
+                along.push((arc, *azimuth));
+            }
+            let count = arc.round().clamp(1.0, MOST_POINTS);
+            let spacing = arc / count;
+            let mut place = along.windows(2);
+            let mut segment = place.next();
+            for i in 0..count as usize {
+                let target = (i as f64 + 0.5) * spacing;
+                while segment.is_some_and(|s| s[1].0 < target) {
+                    segment = place.next();
+                }
+                let Some([(a0, phi0), (a1, phi1)]) = segment else { break };
+                let azimuth = phi0 + (phi1 - phi0) * (target - a0) / (a1 - a0).max(1e-12);
+                if let Some(point) = at(azimuth) {
+                    stations.push(Station { point, step_px: (i > 0).then_some(spacing) });
+                }
+            }
+        }
+        stations
+    }
+}
+
+/// Ranges of azimuth that are in view, as rising azimuths with their ends bisected.
+fn pieces(at: &impl Fn(f64) -> Option<ImagePoint<f64>>) -> Vec<Vec<f64>> {
+    let azimuth = |i: usize| TAU * i as f64 / STEPS as f64;
+    let seen: Vec<bool> = (0..STEPS).map(|i| at(azimuth(i)).is_some()).collect();
+    let Some(start) = seen.iter().position(|s| !s) else {
+        return vec![(0..=STEPS).map(azimuth).collect()];
+    };
+    let end = |mut inside: f64, mut outside: f64| {
+        for _ in 0..40 {
+            let mid = 0.5 * (inside + outside);
+            if at(mid).is_some() { inside = mid } else { outside = mid }
+        }
+        inside
+    };
+    let mut out = Vec::new();
+    let mut piece: Vec<f64> = Vec::new();
+    for i in start..start + STEPS {
+        let (here, next) = (seen[i % STEPS], seen[(i + 1) % STEPS]);
+        if !here && next {
+            piece.push(end(azimuth(i + 1), azimuth(i)));
+        }
+        if next {
+            piece.push(azimuth(i + 1));
+        } else if here {
+            piece.push(end(azimuth(i), azimuth(i + 1)));
+            out.push(core::mem::take(&mut piece));
+        }
+    }
+    out
+}

@@ -1,0 +1,155 @@
+//! The covariance of a direction from limb points whose errors are alike along the edge.
+//!
+//! Errors of the points along u and v are independent Gauss-Markov processes of variance R and correlation
+//! ρ = exp(−Δs/L). A point enters the normal equations N with a row q and moves the residual by gᵀ(δu, δv); with
+//! b = q gᵀ the covariance is N⁻¹ (R X) N⁻¹, X = Σ (b bᵀ + b aᵀ + a bᵀ), a running along the edge: a ← ρ (a + b).
+//! It is written here apart from hzn-core's own, and a test holds the two together.
+
+use hzn_core::camera::{Camera, Model};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use serde::Serialize;
+
+use super::design::{Design, Station};
+
+/// Standard deviations of a direction in degrees (1 sigma).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Tilt {
+    /// Within the plane of optical axis and body: the pitch of a camera that looks along the horizon.
+    pub pitch_deg: f64,
+    /// Across that plane: the roll about the optical axis of a camera that looks along the horizon.
+    pub roll_deg: f64,
+}
+
+/// What a design reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Sigmas {
+    /// Half-angle of the limb's cone in degrees.
+    pub half_angle_deg: f64,
+    /// Length of limb in the picture in pixels.
+    pub limb_px: f64,
+    /// Half-angle fitted too.
+    pub free: Tilt,
+    /// The same with the half-angle that altitude and limb height give, by their sigmas: what `hzn run` reports.
+    pub fused: Tilt,
+    /// Half-angle known exactly.
+    pub known: Tilt,
+    /// By equation 33 of Braun & Barf 2022 (unweighted least squares in the plane of a pinhole picture); only for a
+    /// pinhole.
+    pub braun_barf: Option<Tilt>,
+    /// The overbound of their equation 37, one sigma in every direction.
+    pub braun_barf_bound_deg: Option<f64>,
+}
+
+/// A point as the normal equations take it.
+struct Row<const N: usize> {
+    q: SVector<f64, N>,
+    g: Vector2<f64>,
+    /// Correlation with the point before; 0 where a piece begins.
+    rho: f64,
+}
+
+/// Σ over all pairs of b ρ… bᵀ.
+fn correlated<const N: usize>(rows: &[Row<N>]) -> SMatrix<f64, N, N> {
+    let mut x = SMatrix::<f64, N, N>::zeros();
+    let (mut a, mut before) = (SMatrix::<f64, N, 2>::zeros(), SMatrix::<f64, N, 2>::zeros());
+    for row in rows {
+        let b = row.q * row.g.transpose();
+        a = (a + before) * row.rho;
+        x += b * b.transpose() + b * a.transpose() + a * b.transpose();
+        before = b;
+    }
+    x
+}
+
+impl Sigmas {
+    /// `None` when the points do not determine a direction with a free half-angle.
+    pub(super) fn of(design: &Design, camera: &Camera<f64>, half_angle_rad: f64, stations: &[Station]) -> Option<Self> {
+        let e = Vector3::from(design.axis());
+        // Towards the optical axis, and across; looking straight down any plane will do.
+        let z = Vector3::z();
+        let tilt = (z - e * e.z).try_normalize(1e-9).unwrap_or_else(|| (Vector3::y() - e * e.y).normalize());
+        let across = e.cross(&tilt);
+        let variance = design.sigma_px * design.sigma_px;
+        let rho = |s: &Station| match s.step_px {
+            Some(step) if design.correlation_px > 0.0 => (-step / design.correlation_px).exp(),
+            _ => 0.0,
+        };
+        let mut rows = Vec::with_capacity(stations.len());
+        let mut normal = Matrix3::zeros();
+        let mut plane = Plane::default();
+        let is_pinhole = design.camera.model == Model::Pinhole;
+        for station in stations {
+            let ray = camera.ray(station.point)?;
+            let s = Vector3::from(ray.direction().xyz());
+            let j = ray.jacobian();
+            let by = |column: usize| (0..3).map(|i| j[i][column] * e[i]).sum::<f64>();
+            let g = Vector2::new(by(0), by(1));
+            let w = 1.0 / g.norm_squared().max(1e-300);
+            let h = Vector3::new(tilt.dot(&s), across.dot(&s), -1.0);
+            normal += h * h.transpose() * w;
+            rows.push(Row { q: h * w, g, rho: rho(station) });
+            if is_pinhole {
+                plane.add(&s, &e, half_angle_rad.cos(), design.camera.fx_px, rho(station));
+            }
+        }
+        let x = correlated(&rows) * variance;
+        let n = normal.try_inverse()?;
+        let free = n * x * n;
+        // The half-angle known: the upper two rows alone.
+        let n2 = normal.fixed_view::<2, 2>(0, 0).into_owned().try_inverse()?;
+        let known = n2 * x.fixed_view::<2, 2>(0, 0) * n2;
+        let k = free.column(2) / (free[(2, 2)] + Self::variance_cos(design, half_angle_rad));
+        let fused = free - k * free.row(2);
+        let tilt_of = |p: Matrix2<f64>| Tilt { pitch_deg: root_deg(p.m11), roll_deg: root_deg(p.m22) };
+        let upper = |p: Matrix3<f64>| p.fixed_view::<2, 2>(0, 0).into_owned();
+        let paper = is_pinhole.then(|| plane.covariance(variance)).flatten();
+        let sigmas = Self {
+            half_angle_deg: half_angle_rad.to_degrees(),
+            limb_px: stations.len() as f64 * stations.iter().find_map(|s| s.step_px).unwrap_or(1.0),
+            free: tilt_of(upper(free)),
+            fused: tilt_of(upper(fused)),
+            known: tilt_of(known),
+            braun_barf: paper.map(|p| Tilt {
+                pitch_deg: root_deg(tilt.dot(&(p * tilt))),
+                roll_deg: root_deg(across.dot(&(p * across))),
+            }),
+            braun_barf_bound_deg: paper.map(|p| root_deg(p.symmetric_eigenvalues().max())),
+        };
+        sigmas.free.pitch_deg.is_finite().then_some(sigmas)
+    }
+
+    /// Variance of the expected cos α: sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    fn variance_cos(design: &Design, half_angle_rad: f64) -> f64 {
+        let (sin, cos) = half_angle_rad.sin_cos();
+        let distance_km = design.radius_km + design.altitude_km;
+        let by_limb = design.limb_height_sigma_km / (distance_km * cos);
+        let by_altitude = design.altitude_sigma_km * sin / (distance_km * cos);
+        sin * sin * (by_limb * by_limb + by_altitude * by_altitude)
+    }
+}
+
+/// Braun & Barf 2022, equation 33: rows p = (x, y, f) in pixels about the principal point, and the corrected second
+/// line of equation 29 for how an error of a point moves its residual, g = (cos α p/|p| − e) in x and y.
+#[derive(Default)]
+struct Plane {
+    rows: Vec<Row<3>>,
+    normal: Matrix3<f64>,
+}
+
+impl Plane {
+    fn add(&mut self, s: &Vector3<f64>, e: &Vector3<f64>, cos: f64, f_px: f64, rho: f64) {
+        let p = s * (f_px / s.z);
+        let g = s * cos - e;
+        self.normal += p * p.transpose();
+        self.rows.push(Row { q: p, g: g.xy(), rho });
+    }
+
+    fn covariance(&self, variance: f64) -> Option<Matrix3<f64>> {
+        let n = self.normal.try_inverse()?;
+        Some(n * correlated(&self.rows) * n * variance)
+    }
+}
+
+fn root_deg(variance: f64) -> f64 {
+    variance.sqrt().to_degrees()
+}

@@ -1,0 +1,177 @@
+//! Covariances by design against the reference tables, and against what the sensor itself reports.
+
+use hzn_core::body::{self, Kind};
+use hzn_core::camera::{self, Model};
+use hzn_core::{Config, Frame, HostHorizon, covariance};
+use hzn_sim::pose::position_m;
+use hzn_sim::sensitivity::{Design, Sigmas};
+use hzn_sim::{Look, Pose, Scene};
+
+/// 1920×1080, pinhole, level, 200 km, R = 1 px², L = 300 px.
+fn design(horizontal_fov_deg: f64) -> Design {
+    pinhole(1920, 1080, 960.0 / (horizontal_fov_deg / 2.0).to_radians().tan())
+}
+
+fn pinhole(width: u16, height: u16, f_px: f64) -> Design {
+    Design {
+        camera: camera::Config::ideal(Model::Pinhole, width, height, f_px),
+        radius_km: 6371.0,
+        altitude_km: 200.0,
+        altitude_sigma_km: 0.0,
+        limb_height_km: 0.0,
+        limb_height_sigma_km: 0.5,
+        depression_deg: 0.0,
+        roll_deg: 0.0,
+        sigma_px: 1.0,
+        correlation_px: 300.0,
+    }
+}
+
+fn sigmas(design: &Design) -> Sigmas {
+    design.sigmas().unwrap().unwrap()
+}
+
+/// Within 2 %, of 3 sigma.
+#[track_caller]
+fn near(sigma_deg: f64, expected_3_sigma_deg: f64) {
+    let ratio = 3.0 * sigma_deg / expected_3_sigma_deg;
+    assert!((ratio - 1.0).abs() < 0.02, "{} {expected_3_sigma_deg}", 3.0 * sigma_deg);
+}
+
+/// Section 8 of the mathematics: roll, pitch (Braun & Barf 33), pitch with α known, overbound (37).
+#[track_caller]
+fn row(design: &Design, [roll, pitch, known, bound]: [f64; 4]) {
+    let s = sigmas(design);
+    let paper = s.braun_barf.unwrap();
+    near(paper.roll_deg, roll);
+    near(paper.pitch_deg, pitch);
+    near(s.known.pitch_deg, known);
+    near(s.braun_barf_bound_deg.unwrap(), bound);
+}
+
+#[test]
+fn altitudes() {
+    for (altitude_km, expected) in [
+        (50.0, [0.1298, 0.5744, 0.0978, 3.76]),
+        (100.0, [0.1280, 0.5662, 0.0964, 2.65]),
+        (200.0, [0.1247, 0.5506, 0.0936, 1.856]),
+        (300.0, [0.1215, 0.5357, 0.0910, 1.502]),
+        (500.0, [0.1155, 0.5077, 0.0861, 1.142]),
+    ] {
+        row(&Design { altitude_km, ..design(94.4) }, expected);
+    }
+}
+
+#[test]
+fn fields_of_view_and_their_optimum() {
+    for (fov_deg, expected) in [
+        (66.0, [0.1242, 0.7197, 0.0562, 2.72]),
+        (82.0, [0.1244, 0.6039, 0.0753, 2.16]),
+        (98.0, [0.1248, 0.5400, 0.0998, 1.78]),
+        (114.0, [0.1252, 0.5166, 0.1337, 1.51]),
+        (130.0, [0.1257, 0.5400, 0.1865, 1.32]),
+        (146.0, [0.1262, 0.6500, 0.2849, 1.22]),
+    ] {
+        row(&design(fov_deg), expected);
+    }
+    let pitch = |d: &Design| sigmas(d).braun_barf.unwrap().pitch_deg;
+    let best = |f: &dyn Fn(f64) -> Design| {
+        let fovs = (160..=260).map(|i| 0.5 * f64::from(i));
+        fovs.min_by(|a, b| pitch(&f(*a)).total_cmp(&pitch(&f(*b)))).unwrap()
+    };
+    assert!((best(&design) - 116.0).abs() <= 1.0);
+    let square = |fov: f64| pinhole(1080, 1080, 540.0 / (fov / 2.0).to_radians().tan());
+    // Around it the curve is flat: from 108 to 115 degrees it changes by less than 0.3 %.
+    assert!((best(&square) / 110.0 - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn resolutions_and_limb_heights() {
+    let vertical = |rows: u16| {
+        let f_px = f64::from(rows) / 2.0 / (94.4f64 / 2.0).to_radians().tan();
+        pinhole(rows * 16 / 9, rows, f_px)
+    };
+    for (rows, roll, pitch) in [(270, 0.507, 1.93), (540, 0.270, 1.06), (1080, 0.1255, 0.526), (2160, 0.0512, 0.227)] {
+        let s = sigmas(&vertical(rows)).braun_barf.unwrap();
+        near(s.roll_deg, roll);
+        near(s.pitch_deg, pitch);
+    }
+    for (limb_height_km, roll, pitch) in
+        [(0.0, 0.1255, 0.5262), (5.0, 0.1256, 0.5271), (10.0, 0.1258, 0.5279), (20.0, 0.1261, 0.5293)]
+    {
+        let s = sigmas(&Design { limb_height_km, ..vertical(1080) }).braun_barf.unwrap();
+        near(s.roll_deg, roll);
+        near(s.pitch_deg, pitch);
+    }
+}
+
+#[test]
+fn fused_is_between_known_and_free() {
+    for limb_height_sigma_km in [0.0, 0.5, 2.0, 1e6] {
+        let s = sigmas(&Design { limb_height_sigma_km, ..design(94.4) });
+        assert!(s.fused.pitch_deg <= s.free.pitch_deg * (1.0 + 1e-9));
+        assert!((s.fused.roll_deg / s.free.roll_deg - 1.0).abs() < 1e-6, "a level camera's roll needs no half-angle");
+        if limb_height_sigma_km == 1e6 {
+            assert!((s.fused.pitch_deg / s.free.pitch_deg - 1.0).abs() < 1e-6);
+        }
+    }
+    // A rolled camera is as good, but about other axes of the picture.
+    let (level, rolled) = (sigmas(&design(94.4)), sigmas(&Design { roll_deg: 180.0, ..design(94.4) }));
+    assert!((level.free.pitch_deg / rolled.free.pitch_deg - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn what_cannot_be_seen_or_flown_is_said() {
+    // The limb of a low body is beyond the lower border of a narrow level picture.
+    assert_eq!(Design { altitude_km: 3000.0, ..design(30.0) }.sigmas().unwrap(), None);
+    let inside = Design { limb_height_km: 300.0, ..design(94.4) }.sigmas().unwrap_err();
+    assert!(inside.to_string().contains("at 200 km is not above the limb at 300 km"));
+    let mut d = design(94.4);
+    d.camera.fx_px = 0.0;
+    assert!(d.sigmas().unwrap_err().to_string().contains("fx_px"));
+}
+
+/// What a design promises is what the sensor reports on a picture without noise.
+#[test]
+fn the_sensor_reports_what_the_design_says() {
+    for (model, f_px, depression_deg) in [(Model::Pinhole, 500.0, 10.0), (Model::Equidistant, 420.0, 20.0)] {
+        let camera = camera::Config::ideal(model, 960, 540, f_px);
+        let mut config = Config::new(camera.clone());
+        config.body = body::Config {
+            kind: Kind::EarthSphere,
+            altitude_km: Some(200.0),
+            altitude_sigma_km: 0.3,
+            limb_height_km: 10.0,
+            limb_height_sigma_km: 1.0,
+            ..body::Config::default()
+        };
+        config.candidates.keep_points = 0;
+        config.covariance =
+            covariance::Config { sigma_px: 1.0, correlation_px: 100.0, ..covariance::Config::default() };
+        let promised = sigmas(&Design {
+            camera: camera.clone(),
+            radius_km: config.body.mean_radius_km(),
+            altitude_km: 200.0,
+            altitude_sigma_km: 0.3,
+            limb_height_km: 10.0,
+            limb_height_sigma_km: 1.0,
+            depression_deg,
+            roll_deg: 0.0,
+            sigma_px: 1.0,
+            correlation_px: 100.0,
+        });
+        // At the equator the geodetic vertical points to the centre; the radius there is made the sphere's.
+        let [x, y, z] = position_m(0.0, 0.0, 0.0);
+        let scale = (config.body.mean_radius_km() + 200.0) * 1e3 / x;
+        let look = Look { depression_rad: depression_deg.to_radians(), ..Look::default() };
+        let mut scene = Scene::new(camera, Pose::looking([x * scale, y, z], look));
+        scene.body = config.body.clone();
+        let picture = scene.render().unwrap();
+        let mut horizon = HostHorizon::boxed(&config).unwrap();
+        let expected = horizon.expect(&Frame::default()).unwrap();
+        let report = horizon.process(&picture.view(), &expected);
+        let reported = report.solution.unwrap().covariance.sigma_max_rad().to_degrees();
+        let largest = promised.fused.pitch_deg.max(promised.fused.roll_deg);
+        assert!((reported / largest - 1.0).abs() < 0.03, "{model:?}: {reported} {largest}");
+    }
+}
