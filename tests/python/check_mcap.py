@@ -5,11 +5,13 @@ usage: check_mcap.py FILE.mcap...
 Every CRC is checked, every message decoded. Prints one line a file; exits 1 at the first promise that is broken.
 """
 
+import importlib
 import json
 import sys
 import tomllib
 from collections import Counter
 
+from google.protobuf.descriptor_pb2 import DescriptorProto, FileDescriptorSet
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Attachment, Chunk, DataEnd
 from mcap.stream_reader import StreamReader
@@ -24,6 +26,7 @@ SCHEMAS = {
     "/tf": {"foxglove.FrameTransform"},
     "/log": {"foxglove.Log"},
 }
+FRAMES = {"/tf": ("ecef", "camera")}
 SIGNATURES = {"png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
 
 
@@ -42,6 +45,37 @@ def check_layout(path):
         need(kinds.index(Attachment) < kinds.index(Chunk), "the sensor.toml is not first")
     need(DataEnd in kinds, "the file does not end as it should")
     need({r.compression for r in records if isinstance(r, Chunk)} <= {"", "zstd"}, "unknown compression")
+
+
+def fields(message):
+    return {f.number: (f.name, f.type, f.label, f.type_name) for f in message.field}
+
+
+def check_schema(schema):
+    """Every message of an embedded schema is what Foxglove publishes."""
+    for file in FileDescriptorSet.FromString(schema.data).file:
+        if file.package != "foxglove":
+            continue
+        for message in file.message_type:
+            module = importlib.import_module(f"foxglove_schemas_protobuf.{message.name}_pb2")
+            official = DescriptorProto()
+            module.DESCRIPTOR.message_types_by_name[message.name].CopyToProto(official)
+            need(fields(message) == fields(official), f"foxglove.{message.name} is not Foxglove's own")
+            for nested, published in zip(message.enum_type, official.enum_type):
+                values = [[(v.name, v.number) for v in e.value] for e in (nested, published)]
+                need(values[0] == values[1], f"foxglove.{message.name}.{nested.name} is not Foxglove's own")
+
+
+def check_stamp(topic, message, log_time):
+    """The message's own time is the log time, and it stands in the camera's frame."""
+    stamp = message.timestamp
+    need(stamp.seconds * 10**9 + stamp.nanos == log_time, f"{topic}: another time within than without")
+    for p in getattr(message, "points", []):
+        need(p.timestamp == stamp, f"{topic}: an annotation of another time than its picture")
+    if hasattr(message, "frame_id"):
+        need(message.frame_id == "camera", f"{topic}: frame {message.frame_id}")
+    if topic in FRAMES:
+        need((message.parent_frame_id, message.child_frame_id) == FRAMES[topic], f"{topic}: wrong frames")
 
 
 def distance_to_line(point, line):
@@ -73,7 +107,7 @@ def check_annotations(message):
 
 def check(path):
     check_layout(path)
-    counts, times, reports, worst = Counter(), {}, [], 0.0
+    counts, times, reports, worst, schemas = Counter(), {}, [], 0.0, set()
     with open(path, "rb") as f:
         reader = make_reader(f, validate_crcs=True, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
@@ -88,9 +122,14 @@ def check(path):
         for schema, channel, message in reader.iter_messages():
             need(schema.name in SCHEMAS.get(channel.topic, set()), f"{channel.topic} has schema {schema.name}")
             if schema.encoding == "protobuf":
+                if schema.id not in schemas:
+                    check_schema(schema)
+                    schemas.add(schema.id)
                 decoded = DecoderFactory().decoder_for("protobuf", schema)(message.data)
             else:
                 decoded = json.loads(message.data)
+            if schema.encoding == "protobuf":
+                check_stamp(channel.topic, decoded, message.log_time)
             counts[channel.topic] += 1
             times.setdefault(channel.topic, set()).add(message.log_time)
             if channel.topic == "/hzn/report":

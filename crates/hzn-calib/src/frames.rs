@@ -79,6 +79,16 @@ impl FrameData {
     }
 }
 
+/// Altitude in kilometres of a position (ECEF, kilometres): above WGS-84 for `earth`, else above the radius. `None` for
+/// Sun and Moon, whose distance a position about the Earth does not give.
+pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Option<f64> {
+    match kind {
+        Kind::Earth => Some(geodetic(position_km.map(|km| km * 1e3), WGS84_A_M, WGS84_B_M).0 / 1e3),
+        Kind::EarthSphere | Kind::Sphere => Some(position_km.iter().map(|x| x * x).sum::<f64>().sqrt() - radius_km),
+        Kind::Sun | Kind::Moon => None,
+    }
+}
+
 /// A frames.csv that was read.
 #[derive(Debug, Clone, Default)]
 pub struct Frames {
@@ -100,12 +110,8 @@ impl Frames {
     /// Warnings for altitude and position of a row that differ by more than 0.1 km.
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
         let odd = |row: &FrameData| {
-            let (h, p) = (row.altitude_km?, row.position_km?);
-            let own = match kind {
-                Kind::Earth => geodetic(p.map(|km| km * 1e3), WGS84_A_M, WGS84_B_M).0 / 1e3,
-                Kind::EarthSphere | Kind::Sphere => p.iter().map(|x| x * x).sum::<f64>().sqrt() - radius_km,
-                Kind::Sun | Kind::Moon => return None,
-            };
+            let h = row.altitude_km?;
+            let own = altitude_at_km(row.position_km?, kind, radius_km)?;
             let what = format!("altitude_km is {h} but the position is at {own:.3} km; the position is used");
             ((own - h).abs() > 0.1).then(|| self.problem(row, what))
         };

@@ -20,7 +20,7 @@ pub(crate) struct SensorArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(crate) sensor: Option<PathBuf>,
     /// Altitude of the camera where frames.csv gives none, instead of body.altitude_km
-    #[arg(long, value_name = "KM")]
+    #[arg(long, value_name = "KM", allow_negative_numbers = true)]
     pub(crate) altitude_km: Option<f64>,
     /// Single precision and 2048 points, as on the flight computer
     #[arg(long)]
@@ -34,7 +34,7 @@ pub(crate) struct InputArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) frames: Option<PathBuf>,
     /// Frames a second, where neither frames.csv nor the container nor EXIF gives a time
-    #[arg(long, value_name = "RATE", default_value_t = 1.0)]
+    #[arg(long, value_name = "RATE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub(crate) fps: f64,
     /// Pictures are headerless: their size and format (mono8, mono10, mono12, mono16: little-endian words; mono10p,
     /// mono12p: packed; bayer8: every 2x2 cell becomes one pixel)

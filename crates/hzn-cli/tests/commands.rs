@@ -69,6 +69,28 @@ fn wrong_usage_is_2() {
     place.run(&["run"]).expect(2);
     place.run(&["export", "in/sensor.toml"]).expect(2).says("nothing to export");
     place.run(&["run", "in"]).expect(2).says("no pictures");
+    let place = Place::with_pictures(1);
+    for (args, what) in [
+        (&["--fps", "-1"][..], "--fps: must be above 0"),
+        (&["--fps", "0"], "--fps: must be above 0"),
+        (&["--altitude-km", "-5"], "--altitude-km: body.altitude_km"),
+        (&["-j", "0"], "0 is not in 1.."),
+        (&["--no-images", "-o", "a.csv"], "--no-images: only an MCAP"),
+        (&["--topic", "/x"], "--topic: only an MCAP"),
+        (&["--resume"], "--output <FILE>"),
+        (&["-o", "a.csv", "--resume", "--force"], "cannot be used with"),
+        (&["-s", "nowhere.toml"], "hzn init"),
+        (&["--frames", "nowhere.csv"], "no such file"),
+        (&["--raw", "10x10"], "such as 1920x1080:mono12"),
+    ] {
+        place.run(&[&["run", "in"], args].concat()).expect(2).says(what);
+    }
+    place.run(&["info", "in"]).expect(2).says("is a folder");
+    place.run(&["recover", "in/0000.png"]).expect(2).says("is no file of results");
+    place.write("other.csv", b"a,b\n1,2\n");
+    place.run(&["recover", "other.csv"]).expect(1).says("other.csv: has other columns");
+    place.run(&["export", "other.csv", "-o", "x.csv"]).expect(1).says("other.csv:2: no row of hzn results");
+    assert!(!place.path("other.recovered.csv.part").exists());
 }
 
 #[test]

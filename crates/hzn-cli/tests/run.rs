@@ -71,7 +71,13 @@ fn patterns_and_single_pictures() {
     let place = Place::with_pictures(12);
     assert_eq!(without_time(&place.run(&["run", "in/000*.png"]).expect(0).out).len(), 10);
     assert_eq!(without_time(&place.run(&["run", "in/0003.png", "in/0001.png"]).expect(0).out).len(), 2);
-    place.run(&["run", "in/9*.png"]).expect(2).says("in/9*.png: no file matches");
+    place.run(&["run", "in/9*.png"]).expect(2).says("in/9*.png: no picture matches");
+    // What the shell makes of in/*: the files beside the pictures are none.
+    place.write("in/notes.txt", b"x");
+    let all = ["run", "in/0000.png", "in/0001.png", "in/notes.txt", "in/sensor.toml"];
+    assert_eq!(without_time(&place.run(&all).expect(0).out).len(), 2);
+    assert_eq!(without_time(&place.run(&["run", "in/*"]).expect(0).out).len(), 12);
+    place.run(&["run", "in/sensor.toml"]).expect(2).says("is no picture");
     place.run(&["run", "nowhere"]).expect(2).says("nowhere: no such file or folder");
 }
 
@@ -139,10 +145,37 @@ fn a_full_disk_is_said_and_finished_frames_stay() {
     let place = Place::with_pictures(3);
     // /dev/full takes the place of the unfinished file: every write to it says that the disk is full.
     std::os::unix::fs::symlink("/dev/full", place.path("a.csv.part")).unwrap();
-    place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(1).says("the disk is full").says("--resume");
+    place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(1).says("the disk is full");
+    std::os::unix::fs::symlink("/dev/full", place.path("a.mcap.part")).unwrap();
+    place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(1).says("no space left").says("--resume");
+    std::os::unix::fs::symlink("/dev/full", place.path("o.png")).unwrap();
+    place.run(&["explain", "in/0000.png", "--overlay", "o.png"]).expect(1).says("the disk is full");
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output = place.command(&["run", "in"]).stdout(full).output().unwrap();
     common::Ran::of(&output, &place.path("")).expect(1).says("cannot be written to stdout");
+}
+
+/// A limit on the size of files stands for a disk that fills up in the middle of a run.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up_keeps_what_is_finished() {
+    let place = Place::with_pictures(600);
+    place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
+    let whole = without_time(&place.read("whole.csv"));
+    for (out, blocks) in [("a.csv", 60), ("a.jsonl", 120), ("a.mcap", 800)] {
+        // Without its signal, so that writing fails as on a full disk.
+        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run in -o {out}");
+        let hzn = place.command(&[]);
+        let mut shell = std::process::Command::new("bash");
+        shell.args(["-c", &limited]).arg(hzn.get_program()).current_dir(place.path(""));
+        common::Ran::of(&shell.output().unwrap(), &place.path("")).expect(1).says("ulimit -f").says("--resume goes on");
+        assert!(!place.path(out).exists());
+        let info = place.run(&["info", &format!("{out}.part")]).expect(0).out;
+        assert!(!info.contains("frames           0"), "{out}: {info}");
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
+        assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
+    }
 }
 
 /// Starts a run of many frames, waits until some are finished, and ends it with `end`.

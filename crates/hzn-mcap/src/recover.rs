@@ -92,12 +92,18 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     let mut copy_path = part.as_os_str().to_owned();
     copy_path.push(".new");
     let copy_path = PathBuf::from(copy_path);
-    let failed = |e| while_writing(&copy_path, e);
-    let mut out = open(&copy_path).map_err(failed)?;
-    let found = copy(&part, &mut out, &copy_path)?;
-    out.flush().map_err(failed)?;
-    // Until here the old file has everything, from here the new one.
-    fs::rename(&copy_path, &part).map_err(|e| while_writing(&part, e))?;
+    // Errors name the old file: it is the one that has everything until the new one takes its place.
+    let failed = |e| while_writing(&part, e);
+    let copied = open(&copy_path).map_err(failed).and_then(|mut out| {
+        let found = copy(&part, &mut out, &part)?;
+        out.flush().map_err(failed)?;
+        fs::rename(&copy_path, &part).map_err(failed)?;
+        Ok((found, out))
+    });
+    if copied.is_err() {
+        let _ = fs::remove_file(&copy_path);
+    }
+    let (found, out) = copied?;
     Ok(Resumed { frames: found.frames, last_index, writer: Writer::on(out, path, &part, options) })
 }
 

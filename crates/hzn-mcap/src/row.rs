@@ -18,7 +18,7 @@ pub struct RowMeta {
     pub time_s: f64,
     /// Name of the body; see [`body_name`].
     pub body: String,
-    /// Altitude that was given with the picture or by sensor.toml, kilometres.
+    /// Altitude of the position, or else the one given with the picture or by sensor.toml, kilometres.
     pub altitude_km: Option<f64>,
 }
 
@@ -67,7 +67,7 @@ pub struct Row {
     pub axis_e_z: Option<f64>,
     /// Half-angle of the half-angle-free fit, degrees.
     pub half_angle_deg: Option<f64>,
-    /// The altitude that was given, kilometres; beside every status.
+    /// The altitude of the position, or else the one that was given, kilometres; beside every status.
     pub altitude_km: Option<f64>,
     /// The altitude that follows from the half-angle-free fit, kilometres.
     pub altitude_est_km: Option<f64>,

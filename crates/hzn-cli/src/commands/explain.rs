@@ -212,7 +212,12 @@ impl Told<'_> {
         let body = self.body;
         let given = self.data.and_then(|d| d.altitude_km).or(body.altitude_km);
         let from = match self.data {
-            Some(d) if d.position_km.is_some() => "position from frames.csv".to_owned(),
+            Some(d) if d.position_km.is_some() => {
+                let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
+                let km = d.position_km.and_then(at);
+                let at = km.map(|km| format!(" at {km:.2} km")).unwrap_or_default();
+                format!("position{at} from frames.csv")
+            }
             Some(d) if d.altitude_km.is_some() => format!("altitude {} km from frames.csv", given.unwrap_or_default()),
             _ => given.map_or("no altitude needed".to_owned(), |km| format!("altitude {km} km")),
         };

@@ -121,23 +121,30 @@ fn picture_name(name: &str, ending: &str) -> String {
     if same(&self::ending(Path::new(&flat))) { flat } else { format!("{flat}.{ending}") }
 }
 
-/// Rows of a table of results.
-pub(super) fn rows(file: &Path, kind: &str) -> Result<Box<dyn Iterator<Item = Result<Row, Stop>>>, Stop> {
+/// Rows, one after the other.
+type AllRows = Box<dyn Iterator<Item = Result<Row, Stop>>>;
+
+/// Rows of a table of results. What an unfinished one (`.part`) ends with in the middle of a row is left out.
+pub(super) fn rows(file: &Path, kind: &str) -> Result<AllRows, Stop> {
     let name = file.display().to_string();
     let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
     match kind {
         "csv" => {
             let reader = csv::Reader::from_path(file).map_err(failed)?;
             let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| not(i as u64 + 2, e.to_string()));
-            Ok(Box::new(reader.into_deserialize().enumerate().map(row)))
+            Ok(whole(Box::new(reader.into_deserialize().enumerate().map(row)), file))
         }
         "jsonl" => {
             let lines = std::io::BufReader::new(std::fs::File::open(file)?).lines();
             let row = move |(i, line): (usize, std::io::Result<String>)| {
                 serde_json::from_str(&line?).map_err(|e| not(i as u64 + 1, e.to_string()))
             };
-            Ok(Box::new(lines.enumerate().map(row)))
+            Ok(whole(Box::new(lines.enumerate().map(row)), file))
         }
         _ => Err(usage(format!("{}: .mcap, .csv or .jsonl is expected", file.display()))),
     }
+}
+
+fn whole(rows: AllRows, file: &Path) -> AllRows {
+    if ending(file) == "part" { Box::new(rows.take_while(Result::is_ok)) } else { rows }
 }

@@ -7,7 +7,7 @@ use hzn_core::status::Status;
 use hzn_mcap::{Contents, Reader, Row};
 
 use crate::exit::{Exit, Outcome, Stop, failed};
-use crate::input::{self, picture};
+use crate::input::{self, ending, picture};
 use crate::tell;
 
 /// Summarise a file: results (.mcap, .csv, .jsonl), a sensor.toml, a frames.csv, a picture
@@ -44,8 +44,7 @@ fn recording(file: &Path) -> Result<String, Stop> {
         out.push_str(&format!("{key:<16} {value}\n"));
     }
     if !reader.is_complete() {
-        let name = file.display();
-        out.push_str(&format!("unfinished       `hzn run --resume` continues it, `hzn recover {name}` closes it\n"));
+        out.push_str(&unfinished(file));
     }
     if reader.broken_chunks() > 0 {
         out.push_str(&format!("damaged parts    {}\n", reader.broken_chunks()));
@@ -55,6 +54,10 @@ fn recording(file: &Path) -> Result<String, Stop> {
         out.push_str(&format!("camera           {} x {} px, {}\n", c.width, c.height, c.model.name()));
     }
     Ok(out)
+}
+
+fn unfinished(file: &Path) -> String {
+    format!("unfinished       `hzn run --resume` continues it, `hzn recover {}` closes it\n", file.display())
 }
 
 /// A recording of another program: its pictures.
@@ -83,20 +86,32 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
         if !header.iter().eq(Row::COLUMNS) {
             let frames = hzn_calib::frames::load(file)?;
             let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
-            return Ok(format!(
-                "frames.csv       {} pictures\nwith time        {}\nwith altitude    {}\nwith position    {}\nwith attitude    {}\n",
-                frames.rows.len(),
-                with(|r| r.time_s.is_some()),
-                with(|r| r.altitude_km.is_some()),
-                with(|r| r.position_km.is_some()),
-                with(|r| r.camera_to_ecef_wxyz.is_some())
-            ));
+            let mut out = format!("pictures         {}\n", frames.rows.len());
+            for (name, n) in [
+                ("time", with(|r| r.time_s.is_some())),
+                ("UTC", with(|r| r.utc_s.is_some())),
+                ("altitude", with(|r| r.altitude_km.is_some())),
+                ("position", with(|r| r.position_km.is_some())),
+                ("attitude", with(|r| r.camera_to_ecef_wxyz.is_some())),
+                ("Sun", with(|r| r.sun_camera.is_some())),
+            ] {
+                out.push_str(&format!("{:<16} {n}\n", format!("with {name}")));
+            }
+            let unused: Vec<&str> = frames.warnings.iter().filter_map(|w| w.field.as_deref()).collect();
+            if !unused.is_empty() {
+                out.push_str(&format!("columns not used {}\n", unused.join(", ")));
+            }
+            return Ok(out);
         }
     }
     for row in super::export::rows(file, kind)? {
         summary.add(&row?);
     }
-    Ok(summary.text())
+    let mut out = summary.text();
+    if ending(file) == "part" {
+        out.push_str(&unfinished(file));
+    }
+    Ok(out)
 }
 
 fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
@@ -152,7 +167,9 @@ impl Summary {
         if let Some((a, b)) = self.time {
             line("time", format!("{a:.3} to {b:.3} s"));
         }
-        line("body", self.bodies.keys().cloned().collect::<Vec<_>>().join(", "));
+        if self.frames > 0 {
+            line("body", self.bodies.keys().cloned().collect::<Vec<_>>().join(", "));
+        }
         for status in Status::ALL {
             if let Some(n) = self.statuses.get(&(status as u8)) {
                 line(status.name(), format!("{n} ({:.1} %)", 100.0 * *n as f64 / self.frames as f64));

@@ -25,6 +25,10 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
     let (kind, unfinished) = input::existing(file)?;
+    if !matches!(kind.as_str(), "mcap" | "csv" | "jsonl") {
+        let what = "is no file of results (.mcap, .csv or .jsonl, with .part behind it when it is unfinished)";
+        return Err(usage(format!("{}: {what}", file.display())));
+    }
     let path = match &args.output {
         Some(path) => path.clone(),
         None if unfinished => file.with_extension(""),
@@ -44,7 +48,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let (frames, lost) = match target {
         output::Target::Mcap => recording(file, &path)?,
-        target => output::recover_text(file, &path, target).map_err(|e| output::cannot(&path, &e))?,
+        target => output::recover_text(file, &path, target).map_err(|e| match e.kind() {
+            std::io::ErrorKind::InvalidData => failed(format!("{}: {e}", file.display())),
+            _ => output::cannot(&path, &e),
+        })?,
     };
     let dropped = if lost > 0 { format!(", {lost} bytes of a frame that was cut off dropped") } else { String::new() };
     tell::line(format_args!("{}: {frames} frames{dropped}", path.display()));

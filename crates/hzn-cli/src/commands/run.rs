@@ -8,7 +8,7 @@ use hzn_mcap::Row;
 
 use crate::engine::{self, End, Finished, Plan};
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::input::Source;
+use crate::input::{Source, ending};
 use crate::output::{self, Existing, Held, Output};
 use crate::progress::Progress;
 use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, stop_flag};
@@ -44,8 +44,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
     /// Threads; without it, all cores
-    #[arg(short, long, value_name = "N")]
-    jobs: Option<std::num::NonZeroUsize>,
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
     /// No progress and no summary
     #[arg(short, long)]
     quiet: bool,
@@ -73,6 +73,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.output {
         output::target(path)?;
     }
+    if args.no_images && args.output.as_deref().is_none_or(|p| ending(p) != "mcap") {
+        return Err(usage("--no-images: only an MCAP holds pictures; give -o out.mcap, or leave it out"));
+    }
     let mut source = args.source.open(&args.input)?;
     let folder = source.folder();
     let sensor = args.sensor.load(&folder)?;
@@ -96,7 +99,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let plan = Plan {
         config: sensor.config,
         flight: args.sensor.flight,
-        threads: args.jobs.map_or_else(cores, Into::into),
+        threads: args.jobs.map_or_else(cores, usize::from),
         frames,
         fps: args.source.fps,
         trace,

@@ -316,3 +316,78 @@ fn statuses(found: &[Found], plan: &Plan) -> String {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicU64;
+
+    use hzn_core::camera;
+    use hzn_core::image::Layout;
+
+    use super::*;
+    use crate::input::{Payload, Picture, picture::Samples};
+
+    /// Counts the frames that were handed out and not written yet.
+    struct Counted<'a> {
+        left: u64,
+        abroad: &'a AtomicU64,
+        most: &'a AtomicU64,
+    }
+
+    impl Source for Counted<'_> {
+        fn next(&mut self) -> Option<anyhow::Result<Item>> {
+            self.left = self.left.checked_sub(1)?;
+            let abroad = self.abroad.fetch_add(1, Ordering::SeqCst) + 1;
+            self.most.fetch_max(abroad, Ordering::SeqCst);
+            let layout = Layout::packed(32, 24, 1, 8);
+            let picture = Picture { samples: Samples::Bytes(vec![7; 32 * 24]), layout, exif_time_s: None };
+            Some(Ok(Item { name: self.left.to_string(), time_s: None, payload: Payload::Decoded(picture) }))
+        }
+        fn total(&self) -> Option<u64> {
+            None
+        }
+        fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
+            Box::new(std::iter::empty())
+        }
+        fn folder(&self) -> std::path::PathBuf {
+            Default::default()
+        }
+    }
+
+    struct Slow<'a>(&'a AtomicU64);
+
+    impl Sink for Slow<'_> {
+        fn write(&mut self, _frame: &mut Finished) -> anyhow::Result<()> {
+            std::thread::sleep(Duration::from_millis(1));
+            self.0.fetch_sub(1, Ordering::SeqCst);
+            Ok(())
+        }
+        fn flush(&mut self) -> anyhow::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_slow_disk_does_not_fill_the_memory() {
+        let mut config = Config::new(camera::Config::ideal(camera::Model::Pinhole, 32, 24, 30.0));
+        config.body.altitude_km = Some(400.0);
+        let plan = Plan {
+            config,
+            flight: true,
+            threads: 3,
+            frames: None,
+            fps: 1.0,
+            trace: false,
+            keep_picture: false,
+            overlay: None,
+        };
+        let (abroad, most) = (AtomicU64::new(0), AtomicU64::new(0));
+        let mut source = Counted { left: 200, abroad: &abroad, most: &most };
+        let mut written = 0;
+        let stop = AtomicBool::new(false);
+        let end = run(&plan, &mut source, 0, &stop, &mut Slow(&abroad), &mut |_| written += 1).unwrap();
+        assert_eq!((end, written, abroad.into_inner()), (End::Complete, 200, 0));
+        let most = most.into_inner();
+        assert!((3..=2 * 3 + 3).contains(&most), "{most} frames at once");
+    }
+}

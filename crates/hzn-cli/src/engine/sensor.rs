@@ -11,7 +11,6 @@ use hzn_core::image::ImageView;
 use hzn_core::pipeline::Candidate;
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report, Solution};
-
 use hzn_sim::ephemeris;
 
 use super::trace::{Clock, Traces};

@@ -41,12 +41,20 @@ impl Files {
                 if inputs.len() > 1 && (ending(input) == "mcap" || video::ENDINGS.contains(&ending(input).as_str())) {
                     return Err(usage(format!("{text}: a video or recording is a sequence of its own; give it alone")));
                 }
+                if raw.is_none() && COMPANIONS.contains(&ending(input).as_str()) {
+                    // `hzn run flight/*`, written out by the shell.
+                    if inputs.len() == 1 {
+                        return Err(usage(format!("{text}: is no picture (PNG, JPEG, TIFF, PNM, BMP)")));
+                    }
+                    continue;
+                }
                 paths.push(input.clone());
             } else if text.contains(['*', '?', '[']) {
                 let matches = glob::glob(&text).map_err(|e| usage(format!("{text}: not a valid pattern: {e}")))?;
                 let mut found: Vec<PathBuf> = matches.flatten().filter(|p| p.is_file()).collect();
+                found.retain(|p| raw.is_some() || !COMPANIONS.contains(&ending(p).as_str()));
                 if found.is_empty() {
-                    return Err(usage(format!("{text}: no file matches")));
+                    return Err(usage(format!("{text}: no picture matches")));
                 }
                 found.sort();
                 paths.extend(found);

@@ -103,6 +103,9 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
             _ => {}
         }
     }
+    if topic.is_some() {
+        return Err(usage("--topic: only an MCAP has topics; give one as the input, or leave it out"));
+    }
     Ok(Box::new(files::Files::open(inputs, raw)?))
 }
 

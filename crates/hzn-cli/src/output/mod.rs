@@ -151,8 +151,11 @@ fn options(config: &Config, sensor_toml: &str, force: bool) -> Options {
 fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml: &str) -> Result<(Kind, Held), Stop> {
     match form(target) {
         Some(form) => {
-            let (text, held) =
-                Text::resume(path, part, form, config.each_body().len()).map_err(|e| cannot(part, &e))?;
+            let resumed = Text::resume(path, part, form, config.each_body().len()).map_err(|e| match e.kind() {
+                std::io::ErrorKind::InvalidData => usage(format!("{}: {e}; --force starts over", part.display())),
+                _ => cannot(part, &e),
+            });
+            let (text, held) = resumed?;
             Ok((Kind::Text(text), held))
         }
         None => {
@@ -172,6 +175,17 @@ fn last_frame(part: &Path) -> Option<hzn_mcap::Row> {
     Reader::open(part, Contents::WithoutImages).ok()?.filter_map(Result::ok).last().map(|f| f.row)
 }
 
+/// As [`advice`] for the file of a run: what is finished stays in it.
+pub(crate) fn advice_of_run(path: &Path, error: &std::io::Error) -> String {
+    let what = advice(path, error);
+    match error.kind() {
+        std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded | std::io::ErrorKind::FileTooLarge => {
+            format!("{what}; finished frames are kept, and --resume goes on with them")
+        }
+        _ => what,
+    }
+}
+
 /// A file that cannot be written, and what to do.
 pub(crate) fn cannot(path: &Path, error: &std::io::Error) -> Stop {
     failed(advice(path, error))
@@ -181,10 +195,13 @@ pub(crate) fn advice(path: &Path, error: &std::io::Error) -> String {
     let name = path.display();
     match error.kind() {
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
-            format!("{name}: the disk is full; finished frames are kept: free some space and go on with --resume")
+            format!("{name}: the disk is full: free some space, or write elsewhere")
         }
         std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => {
             format!("{name}: no permission to write here; choose another folder for the output")
+        }
+        std::io::ErrorKind::FileTooLarge => {
+            format!("{name}: larger than files may be here (ulimit -f): raise the limit, or write elsewhere")
         }
         std::io::ErrorKind::NotFound => format!("{name}: the folder does not exist; create it first"),
         _ => format!("{name}: cannot be written: {error}"),
@@ -277,7 +294,12 @@ pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result
     if file != part {
         std::fs::copy(file, &part)?;
     }
-    let (text, held) = Text::resume(path, &part, form, 1)?;
+    let resumed = Text::resume(path, &part, form, 1);
+    if resumed.is_err() && file != part {
+        // Half a copy helps nobody.
+        let _ = std::fs::remove_file(&part);
+    }
+    let (text, held) = resumed?;
     text.finish()?;
     Ok((held.frames, size.saturating_sub(std::fs::metadata(path)?.len())))
 }

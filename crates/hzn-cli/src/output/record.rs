@@ -12,13 +12,15 @@ use crate::overlay::limb;
 
 /// The rows of a frame, one for each body.
 pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
+    let of_position =
+        |body: &body::Config| hzn_calib::frames::altitude_at_km(frame.position_km?, body.kind, body.mean_radius_km());
     let row = |(body, found): (&body::Config, &Found)| {
         let meta = RowMeta {
             index: frame.index,
             file: frame.name.clone(),
             time_s: frame.time_s,
             body: hzn_mcap::body_name(body.kind).to_owned(),
-            altitude_km: frame.altitude_km.or(body.altitude_km),
+            altitude_km: of_position(body).or(frame.altitude_km).or(body.altitude_km),
         };
         match &found.report {
             Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3)),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_mcap::Row;
 
-use super::{Held, advice};
+use super::{Held, advice_of_run};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
@@ -89,7 +89,7 @@ impl Text {
 
     fn told(&self, error: io::Error) -> anyhow::Error {
         match &self.names {
-            Some((_, part)) => anyhow::anyhow!(advice(part, &error)),
+            Some((_, part)) => anyhow::anyhow!(advice_of_run(part, &error)),
             None if error.kind() == io::ErrorKind::BrokenPipe => error.into(),
             None => anyhow::anyhow!("results cannot be written to stdout: {error}"),
         }
@@ -114,11 +114,11 @@ pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
 /// Whole frames of `bodies` rows each, and where they end.
 fn whole_csv(bytes: &[u8], bodies: usize) -> io::Result<(Held, usize)> {
     let header = header();
-    if bytes.len() < header.len() {
+    if header.as_bytes().starts_with(bytes) {
         return Ok((Held::default(), 0));
     }
     if !bytes.starts_with(header.as_bytes()) {
-        let what = "has other columns than this version writes; start over with --force";
+        let what = "has other columns than the results of this version";
         return Err(io::Error::new(io::ErrorKind::InvalidData, what));
     }
     let (mut held, mut end, mut rows) = (Held::default(), header.len(), 0);

@@ -103,12 +103,9 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, tit
 /// The file cannot be written.
 pub fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-    let written = std::fs::File::create(path).map_err(|e| anyhow::anyhow!(crate::output::advice(path, &e)))?;
-    let mut out = std::io::BufWriter::new(written);
-    let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Sub);
-    image.write_with_encoder(encoder).map_err(|e| match e {
-        image::ImageError::IoError(e) => anyhow::anyhow!(crate::output::advice(path, &e)),
-        e => anyhow::anyhow!("{}: {e}", path.display()),
-    })?;
-    std::io::Write::flush(&mut out).map_err(|e| anyhow::anyhow!(crate::output::advice(path, &e)))
+    // Through memory: the encoder would tell of a full disk in words of its own.
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
+    image.write_with_encoder(encoder).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))?;
+    std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::output::advice(path, &e)))
 }

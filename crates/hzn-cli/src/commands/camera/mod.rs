@@ -54,7 +54,10 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
     let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
     let model = c.model.name();
     line("picture", format!("{} x {} px", c.width, c.height));
-    line("lens", format!("{model}, f = {} x {} px, centre at ({}, {})", c.fx_px, c.fy_px, c.cx_px, c.cy_px));
+    line(
+        "lens",
+        format!("{model}, f = {:.2} x {:.2} px, centre at ({:.2}, {:.2})", c.fx_px, c.fy_px, c.cx_px, c.cy_px),
+    );
     if !c.k.is_empty() {
         line("coefficients", format!("{:?}", c.k.as_slice()));
     }
