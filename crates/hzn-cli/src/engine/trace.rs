@@ -136,8 +136,10 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn level(&self, level: u16, mean: T, samples: u32) {
         self.now().into_iter().for_each(|t| Observer::<T>::level(t, level, mean, samples));
     }
-    fn edge(&self, candidate: u32, border: &[Pixel], stride: u32) {
-        self.now().into_iter().for_each(|t| Observer::<T>::edge(t, candidate, border, stride));
+    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+        if let Some(trace) = self.now() {
+            Observer::<T>::edge(trace, candidate, border, stride);
+        }
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
         self.now().into_iter().for_each(|t| t.point(candidate, point));
