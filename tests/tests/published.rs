@@ -1,10 +1,10 @@
 //! The presets of published systems on rendered scenes: they answer what they should, as well as their methods can.
 
-use hzn_core::camera::{self, Model};
+use hzn_core::camera::{self, Camera, Model};
 use hzn_core::{Config, Preset};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::pose::position_m;
-use hzn_sim::{Disc, Look, Pose};
+use hzn_sim::{Detector, Disc, EdgeNoise, Look, Pose, Scene};
 use hzn_tests::sensors::look;
 use hzn_tests::{Sensors, Tally};
 
@@ -48,6 +48,7 @@ fn wang_on_an_infrared_earth() {
         let tally = fly(&part, Preset::Zju2022, |config| config.covariance = flight.sensor.covariance);
         assert_eq!(tally.answered(), tally.frames, "{tally}");
         assert!(tally.rms_deg() < rms_deg && tally.worst_deg() < 2.0 * rms_deg, "{tally}");
+        let _ = fly(&part, Preset::Hzn, |config| config.covariance = flight.sensor.covariance);
         // The moments' bias from pixel to pixel counts as noise: too careful.
         assert!((0.1..2.5).contains(&tally.mean_nees()), "{tally}");
     }
@@ -86,5 +87,35 @@ fn horace_at_the_horizon() {
         let tally = fly(&flight, Preset::Horace2015, |config| config.input.scale_to_height = rows);
         assert_eq!(tally.answered(), tally.frames, "{tally}");
         assert!((1.0..10.0).contains(&tally.rms_deg()) && tally.worst_deg() < 20.0, "{tally}");
+    }
+}
+
+/// Rays beyond 90° off the optical axis, through a lens whose radius is an odd polynomial of the angle: a camera that
+/// looks 30° beside the nadir from 600 km sees the limb from 36° to 96°.
+#[test]
+fn a_limb_beyond_ninety_degrees() {
+    let camera = camera::Config {
+        k: [0.012, -0.003, 0.0, 0.0].into_iter().collect(),
+        theta_max_deg: Some(105.0),
+        ..camera::Config::ideal(Model::KannalaBrandt, 384, 384, 92.0)
+    };
+    for preset in [Preset::Zju2022, Preset::Hzn] {
+        let look_at = Look::off_nadir(30f64.to_radians(), 0.7, 0.4);
+        let mut scene = Scene::new(camera.clone(), Pose::looking(position_m(35.0, 20.0, 600.0), look_at));
+        scene.detector = Detector { psf_sigma_px: 1.0, read_noise: 0.01, ..Detector::default() };
+        let lens = Camera::<f64>::try_new(&camera).unwrap();
+        let off_axis = |p| lens.unproject(p).unwrap().xyz()[2].acos().to_degrees();
+        let points = scene.limb_points(400, EdgeNoise::None).unwrap();
+        let widest = points.iter().map(|p| off_axis(p.exact)).fold(0.0, f64::max);
+        assert!(widest > 94.0, "the limb in view reaches {widest}° only");
+        let mut config = Config::preset(preset, camera.clone());
+        config.body = scene.body.clone();
+        let truth = scene.truth("", 0.0).unwrap();
+        let mut sensors = Sensors::new(&config);
+        let (host, flight) = sensors.both(&scene.render().unwrap().view(), &scene);
+        for answer in [host.unwrap(), flight.unwrap()] {
+            let error = answer.error_deg([truth.axis_x, truth.axis_y, truth.axis_z]);
+            assert!(error < 0.05, "{}: {error}°", preset.name());
+        }
     }
 }

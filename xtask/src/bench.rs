@@ -1,4 +1,4 @@
-//! hzn-core beside the OpenCV recipe, and `hzn run` beside decoding alone.
+//! hzn-core beside the OpenCV recipe, `hzn run` beside decoding alone, and the samplers of outliers beside each other.
 
 use std::path::Path;
 use std::process::Command;
@@ -15,6 +15,13 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             && first == "run"
         {
             return sequence(rest);
+        }
+        if let Some((first, rest)) = args.split_first()
+            && first == "ransac"
+        {
+            let mut samplers =
+                cargo(&["run", "--quiet", "--release", "--package", "hzn-benches", "--bin", "ransac", "--"]);
+            return steps::run(samplers.args(rest));
         }
         let python = python::environment("benches", Path::new("benches/requirements.txt"))?;
         let mut harness = cargo(&["run", "--quiet", "--release", "--package", "hzn-benches"]);

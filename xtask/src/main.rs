@@ -23,6 +23,7 @@ const USAGE: &str = "usage: cargo xtask <test|bench|firmware> [OPTION]...
                      CI=true turns a step that cannot run into a failure
   bench [ARG]...     hzn-core beside the OpenCV recipe; arguments go to hzn-benches (see --help there)
   bench run [ARG]... `hzn run` on PNGs beside decoding them alone
+  bench ransac [--runs N] samplers of outliers beside each other, on simulated edge points
   firmware           builds the images for the flight computer and counts their instructions in QEMU";
 
 fn main() -> ExitCode {

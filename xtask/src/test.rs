@@ -21,8 +21,9 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     // Features add up over a workspace: alone, the core is built as it flies.
     all.step("tests of hzn-core alone", |s| s.cargo_test(&["--package", "hzn-core"]));
     all.step("feature sets of hzn-core", |_| {
-        ["std", "serde", "std,serde", "dlr", "zju", "horace", "erf", "dlr,zju,horace,erf"].into_iter().try_for_each(
-            |features| {
+        ["std", "serde", "std,serde", "dlr", "zju", "horace", "erf", "_edges", "dlr,zju,horace,erf"]
+            .into_iter()
+            .try_for_each(|features| {
                 run_cargo(&[
                     "check",
                     "--quiet",
@@ -32,8 +33,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
                     "--features",
                     features,
                 ])
-            },
-        )
+            })
     });
     all.step("documents", |_| {
         steps::run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))

@@ -49,10 +49,16 @@ struct Mixture<T> {
 }
 
 impl<T: Real> Mixture<T> {
+    /// Of the inliers, at a squared distance; nothing beyond eight standard deviations, where numbers become too small to
+    /// be computed with at speed.
+    #[inline]
+    fn density(&self, d2: T) -> T {
+        let z2 = d2 / (self.sigma * self.sigma);
+        if z2 < T::of(64.0) { T::of(0.398_942_280_401_432_7) / self.sigma * (z2 * T::of(-0.5)).exp() } else { T::ZERO }
+    }
+
     /// −Σ ln of the likelihood, and the share of inliers.
     fn cost(&self, blocks: &[Block<T>], e: &V3<T>, c: T) -> (T, T) {
-        let per = T::of(-0.5) / (self.sigma * self.sigma);
-        let height = T::of(0.398_942_280_401_432_7) / self.sigma;
         let mut share = T::of(0.5);
         for _ in 0..STEPS {
             let outlier = (T::one() - share) / self.range;
@@ -60,7 +66,7 @@ impl<T: Real> Mixture<T> {
             for b in blocks {
                 let d2 = distances2(b, e, c);
                 for l in 0..LANES {
-                    let inlier = share * height * (d2[l] * per).exp();
+                    let inlier = share * self.density(d2[l]);
                     inliers[l] += b.weight[l] * inlier / (inlier + outlier);
                     points[l] += b.weight[l];
                 }
@@ -73,7 +79,7 @@ impl<T: Real> Mixture<T> {
         for b in blocks {
             let d2 = distances2(b, e, c);
             for l in 0..LANES {
-                cost[l] -= b.weight[l] * (share * height * (d2[l] * per).exp() + outlier).ln();
+                cost[l] -= b.weight[l] * (share * self.density(d2[l]) + outlier).ln();
             }
         }
         (sum(&cost), share)
