@@ -128,3 +128,12 @@ pub(crate) fn sum<T: Real>(lanes: &[T; LANES]) -> T {
     let [a, b, c, d, e, f, g, h] = *lanes;
     ((a + b) + (c + d)) + ((e + f) + (g + h))
 }
+
+/// exp(−x) for each lane, x ≥ 0. Together where all are small, as they are between neighbouring points of an edge.
+#[inline(always)]
+pub(crate) fn exp_neg<T: Real>(lanes: &[T; LANES]) -> [T; LANES] {
+    if lanes.iter().any(|&x| !(x <= T::EXP_SERIES)) {
+        return lanes.map(T::exp_neg);
+    }
+    lanes.map(T::exp_neg_series)
+}

@@ -76,6 +76,9 @@ impl Config {
 const REACH: i32 = 10;
 /// Widest step of a profile in pixels.
 const WIDEST: i32 = 6;
+/// Steps from a border pixel within which everything is read.
+const MARGIN: i32 = REACH + 3;
+
 /// What came of a candidate's border.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Points {
@@ -99,17 +102,17 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         n => n.min(room),
     };
     let every = border.len().div_ceil(keep.max(1)).max(1);
-    let margin = ((REACH + 3) * WIDEST) as u16;
     let unmasked = !scene.region.has_mask();
     let mut made = Points::default();
     let mut place = 0;
+    let mut sides = None;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
         let found = match config.sub_pixel {
             SubPixel::Linear => {
-                if unmasked && scene.region.is_inside_by(pixel.x, pixel.y, margin) {
-                    linear::<T, P, O, true>(scene, pixel)
+                if unmasked && scene.region.is_inside_by(pixel.x, pixel.y, MARGIN as u16) {
+                    linear::<T, P, O, true>(scene, pixel, &mut sides)
                 } else {
-                    linear::<T, P, O, false>(scene, pixel)
+                    linear::<T, P, O, false>(scene, pixel, &mut sides)
                 }
             }
             SubPixel::None => half_pixel(scene, pixel),
@@ -174,13 +177,79 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
         Some(i32::from(self.scene.picture.read(self.index.wrapping_add_signed(offset))))
     }
 
-    /// Brightness gradient (to the right, down) over the 3×3 neighbourhood.
+    /// The 3×3 neighbourhood.
     #[inline(always)]
-    fn gradient(&self) -> Option<(i32, i32)> {
+    fn near(&self) -> Option<Near> {
         let (nw, n, ne) = (self.at(-1, -1)?, self.at(0, -1)?, self.at(1, -1)?);
-        let (w, e) = (self.at(-1, 0)?, self.at(1, 0)?);
+        let (w, c, e) = (self.at(-1, 0)?, self.at(0, 0)?, self.at(1, 0)?);
         let (sw, s, se) = (self.at(-1, 1)?, self.at(0, 1)?, self.at(1, 1)?);
-        Some(((ne + 2 * e + se) - (nw + 2 * w + sw), (sw + 2 * s + se) - (nw + 2 * n + ne)))
+        let columns = [nw + 2 * w + sw, n + 2 * c + s, ne + 2 * e + se];
+        let rows = [nw + 2 * n + ne, w + 2 * c + e, sw + 2 * s + se];
+        Some(Near { columns, rows })
+    }
+}
+
+/// The line across the edge through a border pixel.
+struct Line<'a, 'b, 'c, T, P, O, const FREE: bool> {
+    around: &'a Around<'b, 'c, T, P, O, FREE>,
+    /// A step towards the dark in pixels, and in memory; a pixel to the side of it in memory.
+    step: (i32, i32),
+    ahead: isize,
+    aside: isize,
+}
+
+impl<'a, 'b, 'c, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'a, 'b, 'c, T, P, O, FREE> {
+    #[inline(always)]
+    fn new(around: &'a Around<'b, 'c, T, P, O, FREE>, (dx, dy): (i32, i32), step: i32) -> Self {
+        let (x, y) = (dx as isize, dy as isize);
+        Self {
+            around,
+            step: (dx * step, dy * step),
+            ahead: (x * around.across + y * around.down) * step as isize,
+            aside: y * around.across + x * around.down,
+        }
+    }
+    #[inline(always)]
+    fn at(&self, k: i32, side: i32) -> Option<i32> {
+        let (dx, dy) = self.step;
+        // To the side is across the step, one pixel.
+        let (sx, sy) = (dy.signum() * side, dx.signum() * side);
+        self.around.read(k * dx + sx, k * dy + sy, k as isize * self.ahead + side as isize * self.aside)
+    }
+    /// Four times the brightness `k` steps towards the dark.
+    #[inline(always)]
+    fn one(&self, k: i32) -> Option<i32> {
+        Some(4 * self.at(k, 0)?)
+    }
+    /// As [`Self::one`], smoothed with 1-2-1 along the edge.
+    #[inline(always)]
+    fn three(&self, k: i32) -> Option<i32> {
+        Some(self.at(k, -1)? + 2 * self.at(k, 0)? + self.at(k, 1)?)
+    }
+}
+
+/// Sums over columns (left to right) and rows (downwards) of a 3×3 neighbourhood, smoothed with 1-2-1.
+struct Near {
+    columns: [i32; 3],
+    rows: [i32; 3],
+}
+
+impl Near {
+    /// Eight times the brightness change a pixel, to the right and down.
+    #[inline(always)]
+    fn gradient(&self) -> (i32, i32) {
+        (self.columns[2] - self.columns[0], self.rows[2] - self.rows[0])
+    }
+    /// One step to the lit side, here, and one step to the dark side.
+    #[inline(always)]
+    fn across(&self, lit: Lit) -> [i32; 3] {
+        let ([w, x, e], [n, y, s]) = (self.columns, self.rows);
+        match lit {
+            Lit::Right => [e, x, w],
+            Lit::Left => [w, x, e],
+            Lit::Below => [s, y, n],
+            Lit::Above => [n, y, s],
+        }
     }
 }
 
@@ -212,7 +281,7 @@ fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(
     p: Pixel,
 ) -> Option<(ImagePoint<T>, Lit, bool)> {
     let around = Around::<T, P, O, false>::new(scene, p);
-    let (lit, dx, dy) = orientation(around.gradient()?)?;
+    let (lit, dx, dy) = orientation(around.near()?.gradient())?;
     Some((place(p, dx, dy, T::of(0.5)), lit, false))
 }
 
@@ -223,115 +292,153 @@ fn place<T: Real>(p: Pixel, dx: i32, dy: i32, towards_dark: T) -> ImagePoint<T> 
     }
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Lit,
-    Dark,
-}
-
-/// Reads on from the border pixel (or its dark neighbour), whose brightness is `v`, until the side has levelled off:
-/// two more pixels change it by less than a twelfth of the contrast to `other`. Gives the plateau's level and the offset
+/// Reads on from the border pixel or its dark neighbour, whose brightness is `v`, until the side has levelled off: two
+/// more pixels change it by less than a twelfth of the contrast to `other` each. Gives the plateau's level and the offset
 /// where it begins.
 #[inline(always)]
-fn plateau(side: Side, mut v: i32, other: i32, read: impl Fn(i32) -> Option<i32>) -> (i32, i32) {
-    let (from, out, sign) = match side {
-        Side::Lit => (0, -1, 1),
-        Side::Dark => (1, 1, -1),
-    };
+fn plateau<R: Fn(i32) -> Option<i32>, const LIT: bool>(mut v: i32, other: i32, read: R) -> (i32, i32) {
+    let (from, out) = if LIT { (0, -1) } else { (1, 1) };
+    // How far `v` lies beyond `w`, away from the other side.
+    let beyond = |v: i32, w: i32| if LIT { v - w } else { w - v };
     let mut k = from;
+    let (mut near, mut far) = (read(k + out), read(k + 2 * out));
     loop {
-        // What lies beyond on the same level counts towards it.
-        let (mut tail, mut tails, mut moved) = (0, 0, false);
-        let slack = (((v - other) * sign) / 12).max(2);
-        for far in 1..=2 {
-            let at = k + out * far;
-            let Some(next) = read(at) else { break };
-            let rise = (next - v) * sign;
-            if rise > slack * far {
-                (k, v, moved) = (at, next, true);
-                break;
-            }
-            if rise > -2 * slack {
-                tail += next;
-                tails += 1;
-            }
-        }
-        if !moved {
-            // Divisions by constants only: these are the innermost instructions.
-            let level = match tails {
-                1 => (v + tail) / 2,
-                2 => (v + tail) / 3,
-                _ => v,
+        // Where nothing can be read the side ends.
+        let (n, f) = (near.unwrap_or(v), far.unwrap_or(v));
+        let slack = (beyond(v, other) / 12).max(2);
+        if beyond(n, v) > slack {
+            (k, v, near) = (k + out, n, far);
+        } else if beyond(f, v) > 2 * slack {
+            (k, v, near) = (k + 2 * out, f, read(k + 3 * out));
+        } else {
+            // What lies beyond on the same level counts towards it.
+            let level = match (beyond(v, n) < 2 * slack, beyond(v, f) < 2 * slack) {
+                (true, true) => (v + n + f) / 3,
+                (true, false) => (v + n) / 2,
+                (false, true) => (v + f) / 2,
+                (false, false) => v,
             };
             return (level, k);
         }
         if (k - from).abs() >= REACH {
             return (v, k);
         }
+        far = read(k + 2 * out);
     }
 }
 
+/// The crossing of the mid-level; also whether the global level had to stand in for it.
+#[inline(always)]
 fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     scene: &Scene<'_, T, P, O>,
     p: Pixel,
+    sides: &mut Option<Sides>,
 ) -> Option<(ImagePoint<T>, Lit, bool)> {
     let around = Around::<T, P, O, FREE>::new(scene, p);
-    let gradient = around.gradient()?;
+    let near = around.near()?;
+    let gradient = near.gradient();
     let (lit, dx, dy) = orientation(gradient)?;
-    // A wide edge is read in wider steps: from dark to the level in about four of them. The gradient sums eight times
-    // the brightness change a pixel.
+    // A wide edge is read in wider steps: from dark to the level in about four of them.
     let steep = gradient.0.abs().max(gradient.1.abs());
     let wide = 3 * i32::from(scene.level);
-    let step = if wide < 4 * steep { 1 } else { (wide / (2 * steep).max(1)).min(WIDEST) };
-    // Four times the brightness at offset k towards the dark: in one row for the plateaus, of which the mean of several
-    // is taken, and over three rows, smoothed along the edge, for the crossing.
-    let (dark, side) = (
-        (dx as isize * around.across + dy as isize * around.down) * step as isize,
-        dy as isize * around.across + dx as isize * around.down,
-    );
-    let one = |k: i32| -> Option<i32> { Some(4 * around.read(k * dx * step, k * dy * step, k as isize * dark)?) };
-    let three = |k: i32| -> Option<i32> {
-        let (x, y, o) = (k * dx * step, k * dy * step, k as isize * dark);
-        Some(
-            around.read(x - dy, y - dx, o - side)?
-                + 2 * around.read(x, y, o)?
-                + around.read(x + dy, y + dx, o + side)?,
-        )
-    };
-    let (first_lit, first_dark) = (three(0)?, three(1)?);
-    let (bright, inner) = plateau(Side::Lit, first_lit, first_dark, one);
-    let (dim, outer) = plateau(Side::Dark, first_dark, bright, one);
-    let contrast = bright - dim;
-    let level4 = i32::from(scene.level) * 4;
-    let least = 4 * (i32::from(scene.picture.full_scale()) / 64).max(2);
-    let (mid2, fallback) = if contrast >= least {
-        (bright + dim, false)
-    } else if first_lit > first_dark {
-        (2 * level4.max(first_dark + 1).min(first_lit), true)
-    } else {
-        return None;
-    };
-    // The crossing next to the border pixel: outwards from it while lit, else inwards. `a` at k is lit, `b` at k + 1 not.
-    let (mut k, mut a, mut b) = (0, first_lit, first_dark);
-    while 2 * b >= mid2 {
-        (k, a) = (k + 1, b);
-        if k >= outer.max(1) {
+    if FREE && wide < 4 * steep {
+        let line = Line::new(&around, (dx, dy), 1);
+        let (part, fallback) = line.crossing(near.across(lit), sides)?;
+        return Some((place(p, dx, dy, part), lit, fallback));
+    }
+    let step = (wide / (2 * steep).max(1)).clamp(1, WIDEST);
+    in_steps(scene, p, lit, (dx, dy), step, sides)
+}
+
+/// As [`linear`], `step` pixels a step, wherever the border pixel is.
+#[inline(never)]
+fn in_steps<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+    lit: Lit,
+    (dx, dy): (i32, i32),
+    step: i32,
+    sides: &mut Option<Sides>,
+) -> Option<(ImagePoint<T>, Lit, bool)> {
+    let around = Around::<T, P, O, false>::new(scene, p);
+    let line = Line::new(&around, (dx, dy), step);
+    let (part, fallback) = line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?], sides)?;
+    Some((place(p, dx, dy, part * T::of_i32(step)), lit, fallback))
+}
+
+/// The plateaus on both sides of an edge, along a line across it.
+#[derive(Clone, Copy)]
+struct Sides {
+    /// A step towards the dark.
+    step: (i32, i32),
+    /// Points before this one that had the same plateaus.
+    age: u32,
+    bright: i32,
+    dim: i32,
+    /// Where they begin, in steps towards the dark.
+    inner: i32,
+    outer: i32,
+}
+
+/// Neighbours along the edge are alike: so many points share their plateaus.
+const SHARED: u32 = 4;
+
+impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P, O, FREE> {
+    /// The plateaus: those of the point before, or newly looked for.
+    #[inline(always)]
+    fn sides(&self, first_lit: i32, first_dark: i32, before: &mut Option<Sides>) -> Sides {
+        if let Some(s) = before
+            && s.step == self.step
+            && s.age + 1 < SHARED
+        {
+            s.age += 1;
+            return *s;
+        }
+        // In one row, of which the mean of several is taken.
+        let (bright, inner) = plateau::<_, true>(first_lit, first_dark, |k| self.one(k));
+        let (dim, outer) = plateau::<_, false>(first_dark, bright, |k| self.one(k));
+        *before.insert(Sides { step: self.step, age: 0, bright, dim, inner, outer })
+    }
+
+    /// Steps from the border pixel to the crossing of the mid-level; also whether the global level had to stand in for it.
+    /// From the smoothed brightness one step to the lit side, here, and one step to the dark side.
+    #[inline(always)]
+    fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3], before: &mut Option<Sides>) -> Option<(T, bool)> {
+        let scene = self.around.scene;
+        let Sides { bright, dim, inner, outer, .. } = self.sides(first_lit, first_dark, before);
+        let contrast = bright - dim;
+        let level4 = i32::from(scene.level) * 4;
+        let least = 4 * (i32::from(scene.picture.full_scale()) / 64).max(2);
+        let (mid2, fallback) = if contrast >= least {
+            (bright + dim, false)
+        } else if first_lit > first_dark {
+            (2 * level4.max(first_dark + 1).min(first_lit), true)
+        } else {
+            return None;
+        };
+        // The crossing next to the border pixel: outwards from it while lit, else inwards. `a` at k is lit, `b` at k + 1 not.
+        let (mut k, mut a, mut b) =
+            if 2 * first_lit >= mid2 { (0, first_lit, first_dark) } else { (-1, inside, first_lit) };
+        while 2 * b >= mid2 {
+            (k, a) = (k + 1, b);
+            if k >= outer.max(1) {
+                return None;
+            }
+            b = self.three(k + 1)?;
+        }
+        while 2 * a < mid2 {
+            if k <= inner.min(-1) {
+                return None;
+            }
+            (k, b) = (k - 1, a);
+            a = self.three(k)?;
+        }
+        if a <= b {
             return None;
         }
-        b = three(k + 1)?;
+        let part = T::of_i32(2 * a - mid2) / T::of_i32(2 * (a - b));
+        Some((T::of_i32(k) + part, fallback))
     }
-    while 2 * a < mid2 {
-        (k, b) = (k - 1, a);
-        if k < inner.min(-1) {
-            return None;
-        }
-        a = three(k)?;
-    }
-    if a <= b {
-        return None;
-    }
-    let part = T::of_i32(2 * a - mid2) / T::of_i32(2 * (a - b));
-    Some((place(p, dx, dy, (T::of_i32(k) + part) * T::of_i32(step)), lit, fallback))
 }
 
 #[cfg(test)]
@@ -356,7 +463,7 @@ mod tests {
     fn points(data: &[u8], config: &Config, level: u16) -> Vec<(f64, f64)> {
         let grey = Grey::try_new(data, Layout::packed(100, 100, 1, 8)).unwrap();
         let region = Region::<f64>::whole(100, 100);
-        let scene = Scene { picture: &grey, region: &region, level, observer: &Unobserved };
+        let scene = Scene::new(&grey, &region, level, &Unobserved);
         let border: Vec<Pixel> = (0..100u16)
             .flat_map(|y| (0..100u16).map(move |x| Pixel { x, y }))
             .filter(|p| (20..80).contains(&p.x) && (20..80).contains(&p.y))
@@ -409,7 +516,7 @@ mod tests {
         let config = Config { keep_points: 16, ..Config::default() };
         let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
         let region = Region::<f32>::whole(100, 100);
-        let scene = Scene { picture: &grey, region: &region, level: 120, observer: &Unobserved };
+        let scene = Scene::new(&grey, &region, 120, &Unobserved);
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
         let mut blocks = [Block::default(); 2];
         assert_eq!(pick(&scene, &config, &border, 0, &mut blocks), Points { count: 15, fallback: 0 });

@@ -11,7 +11,7 @@ pub(crate) mod braun_barf;
 #[cfg(feature = "zju")]
 mod elliptic;
 
-use crate::block::{Block, LANES};
+use crate::block::{Block, LANES, exp_neg, sum};
 use crate::body::Expected;
 use crate::error::{ConfigError, above, between};
 use crate::estimate::{self, Fit};
@@ -165,38 +165,45 @@ pub(crate) fn correlated<T: Real>(
     mean: [T; 2],
     length_px: T,
 ) -> [T; 6] {
-    let mut x = [T::ZERO; 6];
+    let mut sums = [[T::ZERO; LANES]; 6];
     // c for the errors in u and in v.
     let mut c = [[T::ZERO; 3]; 2];
     let per_length = if length_px > T::ZERO { T::one() / length_px } else { T::ZERO };
     for block in blocks {
         let g = block.gradient(e);
         let mut q = [[T::ZERO; LANES]; 3];
-        let mut rho = [T::ZERO; LANES];
         for l in 0..LANES {
             let (sx, sy, sz) = (block.s[0][l], block.s[1][l], block.s[2][l]);
             let w = block.weight[l] / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).most(T::of(1e-20));
             q[0][l] = w * (sx * b1.x + sy * b1.y + sz * b1.z - mean[0]);
             q[1][l] = w * (sx * b2.x + sy * b2.y + sz * b2.z - mean[1]);
             q[2][l] = -w;
-            rho[l] = if per_length > T::ZERO { (block.step_px[l] * per_length).exp_neg() } else { T::ZERO };
         }
-        for l in 0..LANES {
-            // The step before this point: close the one before with 1 − ρ², then carry on.
-            let gap = T::one() - rho[l] * rho[l];
-            for (k, c) in c.iter_mut().enumerate() {
-                let [c1, c2, c3] = *c;
-                x[0] += gap * c1 * c1;
-                x[1] += gap * c1 * c2;
-                x[2] += gap * c1 * c3;
-                x[3] += gap * c2 * c2;
-                x[4] += gap * c2 * c3;
-                x[5] += gap * c3 * c3;
-                *c =
-                    [rho[l] * c1 + q[0][l] * g[k][l], rho[l] * c2 + q[1][l] * g[k][l], rho[l] * c3 + q[2][l] * g[k][l]];
+        let rho =
+            if per_length > T::ZERO { exp_neg(&block.step_px.map(|step| step * per_length)) } else { [T::ZERO; LANES] };
+        // Each step closes the point before with 1 − ρ², then carries on: only the carrying is one lane after another.
+        let gap = rho.map(|r| T::one() - r * r);
+        for (c, g) in c.iter_mut().zip(&g) {
+            let mut before = [[T::ZERO; LANES]; 3];
+            for i in 0..3 {
+                for l in 0..LANES {
+                    before[i][l] = c[i];
+                    c[i] = rho[l] * c[i] + q[i][l] * g[l];
+                }
+            }
+            let [c1, c2, c3] = &before;
+            for l in 0..LANES {
+                let (g1, g2, g3) = (gap[l] * c1[l], gap[l] * c2[l], gap[l] * c3[l]);
+                sums[0][l] += g1 * c1[l];
+                sums[1][l] += g1 * c2[l];
+                sums[2][l] += g1 * c3[l];
+                sums[3][l] += g2 * c2[l];
+                sums[4][l] += g2 * c3[l];
+                sums[5][l] += g3 * c3[l];
             }
         }
     }
+    let mut x = sums.map(|lanes| sum(&lanes));
     for [c1, c2, c3] in c {
         x[0] += c1 * c1;
         x[1] += c1 * c2;

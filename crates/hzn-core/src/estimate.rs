@@ -118,7 +118,9 @@ pub(crate) struct Fit<T> {
 /// Tukey's constant: 95 % efficiency on Gaussian errors.
 const TUKEY: f64 = 4.685;
 /// Most robust iterations, and most with the weights kept.
-const ROBUST: usize = 8;
+const ROBUST: usize = 10;
+/// Blocks that the first robust iterations look at.
+const PART: usize = 24;
 const SETTLE: usize = 5;
 
 /// The correction by azimuth of an ellipsoid seen with a known attitude.
@@ -158,19 +160,17 @@ pub(crate) fn fit<T: Real>(
         #[cfg(feature = "horace")]
         Method::Circle => held(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
     };
-    let (mut inliers, mut arc, mut before) = (0, T::ZERO, false);
+    let (mut inliers, mut arc) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+    let mut before = T::ZERO;
     for block in blocks.iter() {
-        for lane in 0..LANES {
-            let inlier = block.weight[lane] > T::ZERO;
-            if inlier {
-                inliers += 1;
-                if before {
-                    arc += block.step_px[lane];
-                }
-            }
-            before = inlier;
+        let on = block.weight.map(|w| if w > T::ZERO { T::one() } else { T::ZERO });
+        for l in 0..LANES {
+            inliers[l] += on[l];
+            arc[l] += on[l] * before * block.step_px[l];
+            before = on[l];
         }
     }
+    let (inliers, arc) = (sum(&inliers).to_i32() as u32, sum(&arc));
     let Cone { at, mean, sums, free, .. } = cone;
     Some(Fit {
         e: at.e,
@@ -210,13 +210,13 @@ fn sphere<T: Real>(
     let azimuth = azimuth(expected);
     let azimuth = azimuth.as_ref();
     let known = config.half_angle == HalfAngle::Known && !expected.free;
-    let robust = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
-    let freely = if known { None } else { settle(blocks, robust, true, azimuth) };
+    let (robust, sums) = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
+    let freely = if known { None } else { settle(blocks, robust, Some(sums), true, azimuth) };
     let ((at, mean, sums), free) = match freely {
         Some(settled) => (settled, true),
         // Sun and Moon have no other half-angle to fall back on.
         None if expected.free => return None,
-        None => (settle(blocks, State { c: expected.cos, ..robust }, false, azimuth)?, false),
+        None => (settle(blocks, State { c: expected.cos, ..robust }, None, false, azimuth)?, false),
     };
     Some(Cone {
         at,
@@ -258,7 +258,7 @@ fn held<T: Real>(
     }
     let (b1, b2) = basis(&e);
     let mean = means(blocks, &b1, &b2);
-    let sums = pass(blocks, &e, &b1, &b2, c, mean, None, None, false);
+    let sums = pass(blocks, &e, &b1, &b2, c, mean, &Weights::Kept, None);
     // NaN is refused with the rest.
     (sums.weight > T::of(2.5) && sums.cost >= T::ZERO).then_some(Cone {
         at: State { e, c, mean, nearby: 0 },
@@ -314,7 +314,7 @@ impl<T: Real> State<T> {
 }
 
 /// Iterations with Tukey's weights, whose cut-off shrinks from three thresholds to what the residuals ask for; writes
-/// the last weights into the points.
+/// the last weights into the points, and gives the sums there.
 fn robust<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,
@@ -324,7 +324,7 @@ fn robust<T: Real>(
     config: &Config,
     noise: &covariance::Config,
     azimuth: Option<&Azimuth<T>>,
-) -> Option<State<T>> {
+) -> Option<(State<T>, Sums<T>)> {
     let (widest, narrowest) = (threshold_px * T::of(2.0), threshold_px * T::of(0.5));
     let mut cutoff = threshold_px * T::of(3.0);
     let prior = Prior::new(blocks, expected, config, noise);
@@ -332,9 +332,12 @@ fn robust<T: Real>(
     let (b1, b2) = basis(&e);
     let c = if known { expected.cos } else { start.c };
     let mut at = State { e, c, mean: means(blocks, &b1, &b2), nearby: 0 };
+    // A part of the points brings the cone near; all of them make the end.
+    let mut every = blocks.len().div_ceil(PART).max(1);
     for _ in 0..ROBUST {
         let (b1, b2) = basis(&at.e);
-        let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, Some(cutoff * cutoff), azimuth, false);
+        let weights = Weights::Tukey { cutoff2: cutoff * cutoff, every };
+        let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, &weights, azimuth);
         let free = if known { None } else { sums.step(at.mean, prior.as_ref(), at.c) };
         let step = match free {
             Some(step) => step,
@@ -344,24 +347,30 @@ fn robust<T: Real>(
         at.c = clamp(at.c);
         let spread = (sums.cost / sums.weight.most(T::of(1e-20))).sqrt() * T::of(1.2);
         let next = (spread * T::of(TUKEY)).most(narrowest).least(widest);
-        let settled = (next - cutoff).abs() < cutoff * T::of(0.05);
+        let settled = (next - cutoff).abs() < cutoff * T::of(0.05) && size < T::of(1e-4);
         cutoff = next;
         // The last digits come with the weights kept.
-        if settled && size < T::of(1e-4) {
+        if settled && every == 1 {
             break;
         }
+        if settled || size < T::of(1e-3) {
+            every = 1;
+        }
     }
-    at.nearby = beside(blocks, &at.e, at.c, cutoff);
     let (b1, b2) = basis(&at.e);
-    let last = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, Some(cutoff * cutoff), azimuth, true);
-    (last.weight > T::of(3.0)).then_some(at)
+    let weights = Weights::Last { cutoff2: cutoff * cutoff };
+    let last = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, &weights, azimuth);
+    at.nearby = last.nearby.to_i32() as u32;
+    (last.weight > T::of(3.0)).then_some((at, last))
 }
 
 /// Iterations with the weights kept, to the end, and the normal equations there with the means they are about. `None`
-/// when the points do not determine the cone: for a free half-angle, when the arc is too short.
+/// when the points do not determine the cone: for a free half-angle, when the arc is too short. `first`: the sums at the
+/// start, where they are known.
 fn settle<T: Real>(
     blocks: &mut [Block<T>],
     start: State<T>,
+    mut first: Option<Sums<T>>,
     free: bool,
     azimuth: Option<&Azimuth<T>>,
 ) -> Option<(State<T>, [T; 2], Sums<T>)> {
@@ -370,8 +379,10 @@ fn settle<T: Real>(
     for _ in 0..SETTLE {
         let (b1, b2) = basis(&at.e);
         let mean = at.mean;
-        let sums = pass(blocks, &at.e, &b1, &b2, at.c, mean, None, azimuth, false);
+        let known = first.take();
+        let mut sums = known.unwrap_or_else(|| pass(blocks, &at.e, &b1, &b2, at.c, mean, &Weights::Kept, azimuth));
         let step = if free { sums.step(mean, None, at.c)? } else { sums.step_known(mean)? };
+        sums.cost = (sums.cost - sums.gain(mean, step)).most(T::ZERO);
         let size = at.step(&b1, &b2, step, &sums)?;
         // 20° from the robust solution is another cone.
         if !(at.c.abs() < T::one()) || at.e.dot(&start.e) < T::of(0.94) {
@@ -379,7 +390,7 @@ fn settle<T: Real>(
         }
         end = Some((at, mean, sums));
         // Convergence is quadratic: after a step this small nothing is left, and the sums are those of the end.
-        if size < T::EPSILON * T::of(64.0) {
+        if size * size < T::EPSILON * T::of(0.1) {
             break;
         }
     }
@@ -430,9 +441,17 @@ pub(crate) struct Sums<T> {
     /// Σ of the robust weights, and of the squared distances times them, px².
     pub(crate) weight: T,
     pub(crate) cost: T,
+    /// Points that Tukey's cut-off leaves out although they lie within three times it; counted by the last pass only.
+    nearby: T,
 }
 
 impl<T: Real> Sums<T> {
+    /// By how much a step lowers the cost, to the second order.
+    fn gain(&self, mean: [T; 2], ([d1, d2], dc): ([T; 2], T)) -> T {
+        let [g1, g2, g3] = self.g;
+        g1 * d1 + g2 * d2 + g3 * (dc - mean[0] * d1 - mean[1] * d2)
+    }
+
     /// The step (δ₁₂, δc) with the half-angle free or under its prior.
     fn step(&self, mean: [T; 2], prior: Option<&Prior<T>>, c: T) -> Option<([T; 2], T)> {
         let [mut n11, mut n12, mut n13, mut n22, mut n23, mut n33] = self.n;
@@ -496,8 +515,17 @@ pub(crate) fn means<T: Real>(blocks: &[Block<T>], b1: &V3<T>, b2: &V3<T>) -> [T;
     [sum(&x) / n, sum(&y) / n]
 }
 
-/// One pass: sums at (e, c), with Tukey weights for squared distances up to `cutoff2` (all equal without). `keep`
-/// writes the weights into the points.
+/// What a pass weighs the points by, besides their distance in pixels.
+pub(crate) enum Weights<T> {
+    /// The weights that they have.
+    Kept,
+    /// Tukey's, on every so many blocks, which stand for all.
+    Tukey { cutoff2: T, every: usize },
+    /// Tukey's, which the points then keep.
+    Last { cutoff2: T },
+}
+
+/// One pass: sums at (e, c), about `mean`.
 pub(crate) fn pass<T: Real>(
     blocks: &mut [Block<T>],
     e: &V3<T>,
@@ -505,16 +533,19 @@ pub(crate) fn pass<T: Real>(
     b2: &V3<T>,
     c: T,
     mean: [T; 2],
-    cutoff2: Option<T>,
+    weights: &Weights<T>,
     azimuth: Option<&Azimuth<T>>,
-    keep: bool,
 ) -> Sums<T> {
+    let (inverse, every, last) = match *weights {
+        Weights::Kept => (T::ZERO, 1, false),
+        Weights::Tukey { cutoff2, every } => (T::one() / cutoff2, every, false),
+        Weights::Last { cutoff2 } => (T::one() / cutoff2, 1, true),
+    };
     let mut n = [[T::ZERO; LANES]; 6];
     let mut g = [[T::ZERO; LANES]; 3];
-    let (mut weight, mut cost) = ([T::ZERO; LANES], [T::ZERO; LANES]);
-    let inverse = cutoff2.map_or(T::ZERO, |c| T::one() / c);
+    let [mut weight, mut cost, mut nearby] = [[T::ZERO; LANES]; 3];
     let east_along = azimuth.map_or(T::ZERO, |a| a.east.dot(e));
-    for b in blocks {
+    for b in blocks.iter_mut().step_by(every) {
         let grad = b.gradient(e);
         let mut target = [c; LANES];
         if let Some(a) = azimuth {
@@ -524,15 +555,17 @@ pub(crate) fn pass<T: Real>(
                 target[l] += a.offset(s, d, east_along);
             }
         }
+        let [mut robust, mut parts] = [[T::ZERO; LANES]; 2];
         for l in 0..LANES {
             let (x, y, z) = (b.s[0][l], b.s[1][l], b.s[2][l]);
             let r = target[l] - (x * e.x + y * e.y + z * e.z);
             let g2 = (grad[0][l] * grad[0][l] + grad[1][l] * grad[1][l]).most(T::of(1e-20));
             let per = T::one() / g2;
             let d2 = r * r * per;
-            let u = (T::one() - d2 * inverse).most(T::ZERO);
-            let robust = b.weight[l] * u * u;
-            let w = robust * per;
+            parts[l] = d2 * inverse;
+            let u = (T::one() - parts[l]).most(T::ZERO);
+            robust[l] = b.weight[l] * u * u;
+            let w = robust[l] * per;
             let h1 = x * b1.x + y * b1.y + z * b1.z - mean[0];
             let h2 = x * b2.x + y * b2.y + z * b2.z - mean[1];
             let (w1, w2) = (w * h1, w * h2);
@@ -545,30 +578,20 @@ pub(crate) fn pass<T: Real>(
             g[0][l] += w1 * r;
             g[1][l] += w2 * r;
             g[2][l] -= w * r;
-            weight[l] += robust;
-            cost[l] += robust * d2;
-            if keep {
-                b.weight[l] = robust;
+            weight[l] += robust[l];
+            cost[l] += robust[l] * d2;
+        }
+        if last {
+            for l in 0..LANES {
+                let beside = parts[l] > T::one() && parts[l] <= T::of(9.0);
+                nearby[l] += if beside { b.weight[l] } else { T::ZERO };
             }
+            b.weight = robust;
         }
     }
-    Sums { n: n.map(|x| sum(&x)), g: g.map(|x| sum(&x)), weight: sum(&weight), cost: sum(&cost) }
-}
-
-/// Points that may count between one and three times `limit` pixels from the cone.
-fn beside<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit: T) -> u32 {
-    let (near, far) = (limit * limit, limit * limit * T::of(9.0));
-    let mut n = [T::ZERO; LANES];
-    for b in blocks {
-        let g = b.gradient(e);
-        for l in 0..LANES {
-            let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
-            let g2 = g[0][l] * g[0][l] + g[1][l] * g[1][l];
-            let d2 = r * r;
-            n[l] += if d2 > near * g2 && d2 <= far * g2 { b.weight[l] } else { T::ZERO };
-        }
-    }
-    sum(&n).to_i32() as u32
+    let times = T::of_i32(every as i32);
+    let total = |x: [T; LANES]| sum(&x) * times;
+    Sums { n: n.map(total), g: g.map(total), weight: total(weight), cost: total(cost), nearby: total(nearby) }
 }
 
 /// Inverse of the free normal equations about `mean`.

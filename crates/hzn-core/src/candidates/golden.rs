@@ -72,7 +72,7 @@ fn rmse(
         let grey = Grey::try_new(&data, Layout::packed(SIZE as u32, SIZE as u32, 1, 16)).unwrap();
         let region = Region::whole(SIZE as u16, SIZE as u16);
         let level = (DIM + CONTRAST / 2.0) as u16;
-        let scene = Scene { picture: &grey, region: &region, level, observer: &Unobserved };
+        let scene = Scene::new(&grey, &region, level, &Unobserved);
         let dark = |x: i32, y: i32| !scene.lit(x as u16, y as u16);
         let beside = |x: i32, y: i32| f64::from(x) * n[0] + f64::from(y) * n[1] - offset;
         // The border pixel nearest to the middle; noise far from the edge makes others.

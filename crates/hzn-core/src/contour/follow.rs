@@ -5,6 +5,9 @@
 //! counter-clockwise from the one where the follower came from; the first lit one is next. The dark ones passed over
 //! belong to the edge: where one of them lies beyond the region, the edge ends there; where it is masked, the pixel
 //! is no edge point.
+//!
+//! Most steps are far from the border, the masks, the search lines and the start: they are taken in runs in which
+//! nothing is looked at but the level.
 
 use super::marks::Marks;
 use super::thinned::Thinned;
@@ -25,6 +28,37 @@ pub(crate) struct Scene<'a, T, P, O> {
     pub(crate) region: &'a Region<T>,
     pub(crate) level: u16,
     pub(crate) observer: &'a O,
+    /// Twice around, so that eight directions follow each other from any of the first eight.
+    moves: [Move; 16],
+}
+
+/// A step of the follower.
+#[derive(Clone, Copy)]
+struct Move {
+    /// Its direction, and the first to be looked at after it: the dark neighbour passed over last is a neighbour of the
+    /// new pixel, too. It stands three directions before the way back after a straight step, two after a diagonal one.
+    direction: u8,
+    first: u8,
+    dx: i32,
+    dy: i32,
+    /// Added to a pixel as one word.
+    word: u32,
+    /// In the picture's memory.
+    offset: isize,
+}
+
+impl Move {
+    fn new(direction: u8, picture: &impl Pixels) -> Self {
+        let (dx, dy) = STEPS[usize::from(direction & 7)];
+        Self {
+            direction: direction & 7,
+            first: if direction.is_multiple_of(2) { direction + 7 } else { direction + 6 } & 7,
+            dx,
+            dy,
+            word: ((dy as u32) << 16).wrapping_add(dx as u32),
+            offset: dx as isize * picture.across() as isize + dy as isize * picture.down() as isize,
+        }
+    }
 }
 
 /// How an edge ended.
@@ -38,7 +72,25 @@ pub(crate) enum End {
     OutOfSteps,
 }
 
-impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
+/// Where the follower stands.
+struct Walk {
+    at: Pixel,
+    index: usize,
+    /// The direction back to where it came from.
+    back: u8,
+    /// Twice the area on the right of its way so far, by Green's theorem: each step adds (2x + dx) dy.
+    twice_area: i64,
+}
+
+/// Most steps of a run.
+const RUN: usize = 32;
+
+impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
+    pub(crate) fn new(picture: &'a P, region: &'a Region<T>, level: u16, observer: &'a O) -> Self {
+        let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
+        Self { picture, region, level, observer, moves }
+    }
+
     /// Whether a pixel of the region is lit.
     #[inline(always)]
     pub(crate) fn lit(&self, x: u16, y: u16) -> bool {
@@ -56,153 +108,155 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
         marks: &mut Marks<'_>,
         steps: &mut u32,
     ) -> End {
-        let (across, down) = (self.picture.across() as isize, self.picture.down() as isize);
-        let offsets = STEPS.map(|(dx, dy)| dx as isize * across + dy as isize * down);
-        let moves = STEPS.map(|(dx, dy)| ((dy as u32) << 16).wrapping_add(dx as u32));
-        let masked = self.region.has_mask();
-        let home = place(start);
-        let mut at = home;
-        let mut index = self.picture.index(start.x, start.y);
-        // The direction back to where the follower came from.
-        let mut back = dark;
-        // The first turn whose neighbour is not known yet.
-        let mut turn = 1u8;
-        // Steps that certainly stay away from the border of the region.
-        let mut away = 0u16;
-        let mut twice_area = 0i64;
-        let mut first = true;
+        let mut walk = Walk { at: start, index: self.picture.index(start.x, start.y), back: dark, twice_area: 0 };
+        let mut away = false;
         loop {
+            let free = self.free_steps(walk.at, start, marks).min(*steps);
+            if free > 0 {
+                *steps -= free;
+                self.run(&mut walk, free as usize, edge);
+                continue;
+            }
             if *steps == 0 {
                 return End::OutOfSteps;
             }
             *steps -= 1;
-            let here = pixel(at);
-            let marked_row = marks.has_row(here.y);
-            away = away.saturating_sub(1);
-            if away == 0 && self.region.is_inside_by(here.x, here.y, AWAY + 1) {
-                away = AWAY;
+            let home = (away && walk.at == start).then_some(dark);
+            away = true;
+            match self.look(&walk, home, marks) {
+                Seen::Lit { direction, cut } => {
+                    if !cut {
+                        edge.push(walk.at);
+                    }
+                    self.go(&mut walk, direction);
+                }
+                Seen::Border { cut } => {
+                    if !cut {
+                        edge.push(walk.at);
+                    }
+                    return End::Open;
+                }
+                Seen::Home => return End::Closed { twice_area: walk.twice_area },
+                Seen::Nothing { cut } => {
+                    if !cut {
+                        edge.push(walk.at);
+                    }
+                    return End::Closed { twice_area: 0 };
+                }
             }
-            let next = if away > 0 && !marked_row && at != home && !masked {
-                // Nothing to look after but the level.
-                let mut next = None;
-                while turn <= 8 {
-                    let d = usize::from((back + turn) & 7);
-                    let (to, there) = (at.wrapping_add(moves[d]), index.wrapping_add_signed(offsets[d]));
-                    self.observer.pixel(to as u16, (to >> 16) as u16);
-                    if self.picture.read(there) >= self.level {
-                        next = Some((to, there, d as u8));
-                        break;
-                    }
-                    turn += 1;
-                }
-                edge.push(here);
-                next
-            } else {
-                let look = Look {
-                    here,
-                    index,
-                    back,
-                    home: (!first && at == home).then_some(dark),
-                    marked_row,
-                    away: away > 0,
-                };
-                match self.look(&look, &offsets, marks) {
-                    Seen::Border { cut } => {
-                        if !cut {
-                            edge.push(here);
-                        }
-                        return End::Open;
-                    }
-                    Seen::Home => return End::Closed { twice_area },
-                    Seen::Neighbour { next, cut } => {
-                        if !cut {
-                            edge.push(here);
-                        }
-                        next
-                    }
-                }
-            };
-            let Some((to, there, d)) = next else {
-                // A single pixel: all around it is dark.
-                return End::Closed { twice_area: 0 };
-            };
-            let there_px = pixel(to);
-            twice_area += i64::from(here.x) * i64::from(there_px.y) - i64::from(there_px.x) * i64::from(here.y);
-            (at, index) = (to, there);
-            back = (d + 4) & 7;
-            // The dark neighbour passed over last is a neighbour of the new pixel, too: after a straight step it
-            // stands at the second turn, after a diagonal one at the first.
-            turn = if away > 0 && !first { 3 - d % 2 } else { 1 };
-            first = false;
         }
     }
 
-    /// Looks around a pixel where more counts than the level: at the border, at the mask, on a search line, at home.
-    /// Every neighbour is looked at, also the dark ones that are known already.
+    /// Steps from here during which nothing counts but the level.
+    #[inline]
+    fn free_steps(&self, here: Pixel, start: Pixel, marks: &Marks<'_>) -> u32 {
+        let home = here.x.abs_diff(start.x).max(here.y.abs_diff(start.y));
+        let most = home.min(marks.rows_away(here.y)).min(RUN as u16);
+        if most == 0 {
+            return 0;
+        }
+        // What the last step looks at is one pixel further.
+        u32::from(self.region.clearance(here.x, here.y, most + 1).saturating_sub(1))
+    }
+
+    /// `n` free steps, at most [`RUN`].
     #[inline(never)]
-    fn look(&self, look: &Look, offsets: &[isize; 8], marks: &mut Marks<'_>) -> Seen {
-        let here = look.here;
-        let inside = look.away || self.region.is_inside_by(here.x, here.y, 1);
+    fn run(&self, walk: &mut Walk, n: usize, edge: &mut Thinned<'_>) {
+        let mut passed = [Pixel::default(); RUN];
+        // The area of a run fits 32 bits.
+        let (mut at, mut index, mut twice_area) = (word(walk.at), walk.index, 0i32);
+        let mut last = &self.moves[usize::from((walk.back + 4) & 7)];
+        for slot in passed.iter_mut().take(n) {
+            *slot = pixel(at);
+            let first = usize::from(last.first & 7);
+            for turn in self.moves.get(first..first + 8).unwrap_or_default() {
+                let there = index.wrapping_add_signed(turn.offset);
+                let to = at.wrapping_add(turn.word);
+                self.observer.pixel(to as u16, (to >> 16) as u16);
+                if self.picture.read(there) >= self.level {
+                    twice_area += (2 * i32::from(at as u16) + turn.dx) * turn.dy;
+                    (at, index, last) = (to, there, turn);
+                    break;
+                }
+            }
+        }
+        edge.extend(passed.get(..n).unwrap_or_default());
+        let twice_area = walk.twice_area + i64::from(twice_area);
+        *walk = Walk { at: pixel(at), index, back: (last.direction + 4) & 7, twice_area };
+    }
+
+    /// One step.
+    fn go(&self, walk: &mut Walk, direction: u8) {
+        let step = &self.moves[usize::from(direction & 7)];
+        walk.twice_area += i64::from((2 * i32::from(walk.at.x) + step.dx) * step.dy);
+        walk.at = pixel(word(walk.at).wrapping_add(step.word));
+        walk.index = walk.index.wrapping_add_signed(step.offset);
+        walk.back = (direction + 4) & 7;
+    }
+
+    /// Looks around a pixel where more counts than the level: at the border, at the mask, on a search line, at home.
+    /// Every neighbour is looked at, also the dark ones that are known already. `home`: at the start again, the direction
+    /// whose dark neighbour closes the edge.
+    #[inline(never)]
+    fn look(&self, walk: &Walk, home: Option<u8>, marks: &mut Marks<'_>) -> Seen {
+        let here = walk.at;
+        let inside = self.region.is_inside_by(here.x, here.y, 1);
+        let marked_row = marks.has_row(here.y);
         let mut cut = false;
         for turn in 1..=8u8 {
-            let d = (look.back + turn) & 7;
-            let (dx, dy) = STEPS[usize::from(d)];
-            let (nx, ny) = (i32::from(here.x) + dx, i32::from(here.y) + dy);
+            let direction = (walk.back + turn) & 7;
+            let step = &self.moves[usize::from(direction)];
+            let (nx, ny) = (i32::from(here.x) + step.dx, i32::from(here.y) + step.dy);
             if !inside {
                 let beyond = nx < 0 || ny < 0 || !self.region.contains(nx as u16, ny as u16);
                 // The ring is made of the pixels with an outer 4-neighbour: an outer corner is merely dark.
-                if beyond && d % 2 == 1 {
+                if beyond && direction % 2 == 1 {
                     continue;
                 }
                 if beyond {
                     return Seen::Border { cut };
                 }
             }
-            let to = Pixel { x: nx as u16, y: ny as u16 };
-            self.observer.pixel(to.x, to.y);
-            let there = look.index.wrapping_add_signed(offsets[usize::from(d)]);
-            if self.picture.read(there) >= self.level {
-                if !self.region.masked(to.x, to.y) {
-                    return Seen::Neighbour { next: Some((place(to), there, d)), cut };
+            let (x, y) = (nx as u16, ny as u16);
+            self.observer.pixel(x, y);
+            if self.picture.read(walk.index.wrapping_add_signed(step.offset)) >= self.level {
+                if !self.region.masked(x, y) {
+                    return Seen::Lit { direction, cut };
                 }
                 cut = true;
             }
-            if look.marked_row && d == WEST {
+            if marked_row && direction == WEST {
                 marks.set(here.x, here.y);
             }
-            if look.home == Some(d) {
+            if home == Some(direction) {
                 return Seen::Home;
             }
         }
-        Seen::Neighbour { next: None, cut }
+        Seen::Nothing { cut }
     }
 }
 
-/// A look ahead by this many steps spares their checks.
-const AWAY: u16 = 31;
-
 /// A pixel as one word, row above column, so that a step is one addition.
-fn place(p: Pixel) -> u32 {
+fn word(p: Pixel) -> u32 {
     u32::from(p.y) << 16 | u32::from(p.x)
 }
-fn pixel(at: u32) -> Pixel {
-    Pixel { x: at as u16, y: (at >> 16) as u16 }
-}
-
-struct Look {
-    here: Pixel,
-    index: usize,
-    back: u8,
-    /// At the start again: the direction whose dark neighbour closes the edge.
-    home: Option<u8>,
-    marked_row: bool,
-    /// No neighbour can be beyond the region.
-    away: bool,
+fn pixel(word: u32) -> Pixel {
+    Pixel { x: word as u16, y: (word >> 16) as u16 }
 }
 
 /// What a look around came upon; `cut`: a masked pixel on the way, so that this one is no edge point.
 enum Seen {
-    Border { cut: bool },
+    /// The next pixel.
+    Lit {
+        direction: u8,
+        cut: bool,
+    },
+    Border {
+        cut: bool,
+    },
     Home,
-    Neighbour { next: Option<(u32, usize, u8)>, cut: bool },
+    /// A single pixel: all around it is dark.
+    Nothing {
+        cut: bool,
+    },
 }

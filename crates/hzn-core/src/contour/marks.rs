@@ -44,6 +44,13 @@ impl<'a> Marks<'a> {
         y & (self.spacing - 1) == self.offset & (self.spacing - 1)
     }
 
+    /// Rows from `y` to the nearest search line.
+    #[inline(always)]
+    pub(crate) fn rows_away(&self, y: u16) -> u16 {
+        let above = y.wrapping_sub(self.offset) & (self.spacing - 1);
+        above.min(self.spacing - above)
+    }
+
     fn place(&self, x: u16, y: u16) -> (usize, u32) {
         let bit = u32::from(y >> (self.spacing.trailing_zeros() & 15)) * self.width + u32::from(x);
         ((bit / 32) as usize, 1 << (bit % 32))

@@ -33,12 +33,13 @@ impl Bitmap {
         Grey::try_new(&self.data, Layout::packed(u32::from(self.w), u32::from(self.h), 1, 8)).unwrap()
     }
 
-    /// Every closed edge at spacing 1: (points, twice the area).
-    fn closed(&self) -> Vec<(Points, i64)> {
+    /// Every closed edge at a spacing: (points, twice the area).
+    fn closed(&self, spacing: u16) -> Vec<(Points, i64)> {
         let region = Region::<f64>::whole(self.w, self.h);
-        let scene = Scene { picture: &self.grey(), region: &region, level: 128, observer: &Unobserved };
+        let grey = self.grey();
+        let scene = Scene::new(&grey, &region, 128, &Unobserved);
         let mut bits = vec![0u32; 4096];
-        let mut marks = Marks::new(&mut bits, self.w, self.h, 1, 1);
+        let mut marks = Marks::new(&mut bits, self.w, self.h, spacing, spacing);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
         scene.each_crossing(&mut marks, |start, dark, marks| {
@@ -56,7 +57,8 @@ impl Bitmap {
 
     fn open(&self) -> Vec<Points> {
         let region = Region::<f64>::whole(self.w, self.h);
-        let scene = Scene { picture: &self.grey(), region: &region, level: 128, observer: &Unobserved };
+        let grey = self.grey();
+        let scene = Scene::new(&grey, &region, 128, &Unobserved);
         let mut bits = vec![0u32; 4096];
         let mut marks = Marks::new(&mut bits, self.w, self.h, 1, 1);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
@@ -92,7 +94,7 @@ fn outer_borders_equal_opencv_point_for_point() {
                 (points[0], points)
             })
             .collect();
-        let all = Bitmap::framed(&rows).closed();
+        let all = Bitmap::framed(&rows).closed(1);
         let got: BTreeMap<(u16, u16), Points> =
             all.iter().filter(|(_, area)| *area <= 0).map(|(p, _)| (p[0], p.clone())).collect();
         assert_eq!(got, want, "{}", case["id"]);
@@ -144,7 +146,7 @@ proptest! {
         for y in 0..h { for x in 0..w {
             if x == 0 || y == 0 || x == w - 1 || y == h - 1 { map.data[usize::from(y * w + x)] = 0; }
         } }
-        let seen: BTreeSet<(u16, u16)> = map.closed().into_iter().flat_map(|(p, _)| p).collect();
+        let seen: BTreeSet<(u16, u16)> = map.closed(1).into_iter().flat_map(|(p, _)| p).collect();
         let lit = |x: u16, y: u16| map.data[usize::from(y * w + x)] >= 128;
         for y in 1..h - 1 { for x in 1..w - 1 {
             if lit(x, y) && (!lit(x - 1, y) || !lit(x + 1, y) || !lit(x, y - 1) || !lit(x, y + 1)) {
@@ -152,4 +154,44 @@ proptest! {
             }
         } }
     }
+
+    /// In runs between the search lines, the same edges as step by step.
+    #[test]
+    fn runs_follow_as_single_steps_do(seed in 0u32..10_000, scale in 3u16..12) {
+        // Blobs that are large enough for runs: a coarse random bitmap, enlarged, with the odd pixel changed.
+        let (w, h) = (120u16, 90u16);
+        let mut rng = crate::rng::Rng::new(seed);
+        let coarse: Vec<bool> = (0..40 * 40).map(|_| rng.below(100) < 45).collect();
+        let data = (0..h)
+            .flat_map(|y| (0..w).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let frame = x == 0 || y == 0 || x == w - 1 || y == h - 1;
+                let lit = coarse[usize::from(y / scale) * 40 + usize::from(x / scale)] != (rng.below(100) < 3);
+                if lit && !frame { 200 } else { 0 }
+            })
+            .collect();
+        let map = Bitmap { w, h, data };
+        let single: BTreeMap<Points, i64> = map
+            .closed(1)
+            .into_iter()
+            .map(|(points, area)| (rotated(points), area))
+            .collect();
+        let in_runs = map.closed(16);
+        prop_assert!(in_runs.iter().any(|(points, _)| points.len() > 30));
+        for (points, area) in in_runs {
+            let points = rotated(points);
+            prop_assert_eq!(single.get(&points), Some(&area));
+        }
+    }
+}
+
+/// A closed edge from its least point on.
+fn rotated(mut points: Points) -> Points {
+    // An edge may pass its least pixel twice: the rotation that is least as a whole.
+    let least = points.iter().min().copied();
+    let best = (0..points.len())
+        .filter(|&i| Some(points[i]) == least)
+        .min_by_key(|&i| points[i..].iter().chain(&points[..i]).copied().collect::<Points>());
+    points.rotate_left(best.unwrap_or(0));
+    points
 }

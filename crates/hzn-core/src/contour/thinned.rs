@@ -19,7 +19,6 @@ impl<'a> Thinned<'a> {
         Self { buffer, len: 0, stride: 1, wait: 0, total: 0 }
     }
 
-    #[inline(always)]
     pub(crate) fn push(&mut self, p: Pixel) {
         self.total += 1;
         if self.wait > 0 {
@@ -38,6 +37,22 @@ impl<'a> Thinned<'a> {
             self.len += 1;
         }
         self.wait = self.stride - 1;
+    }
+
+    /// Pushes several.
+    #[inline]
+    pub(crate) fn extend(&mut self, passed: &[Pixel]) {
+        if self.stride == 1
+            && let Some(room) = self.buffer.get_mut(self.len..self.len + passed.len())
+        {
+            room.copy_from_slice(passed);
+            self.len += passed.len();
+            self.total += passed.len() as u32;
+        } else {
+            for &p in passed {
+                self.push(p);
+            }
+        }
     }
 
     #[cold]
@@ -100,6 +115,13 @@ mod tests {
             let got: Vec<u16> = t.pixels().iter().map(|p| p.x).collect();
             assert_eq!(got, want, "n {n}");
             assert_eq!(t.total(), u32::from(n));
+
+            let mut buffer = [Pixel::default(); 8];
+            let mut t = Thinned::new(&mut buffer);
+            let all: Vec<Pixel> = (0..n).map(|x| Pixel { x, y: 0 }).collect();
+            all.chunks(3).for_each(|three| t.extend(three));
+            let got: Vec<u16> = t.pixels().iter().map(|p| p.x).collect();
+            assert_eq!((got, t.total()), (want, u32::from(n)), "by threes, n {n}");
         }
     }
 }
