@@ -178,7 +178,7 @@ fn pictures_of_nothing_are_not_answered() {
         add("black".into(), &|_, _| 0);
         add("white".into(), &|_, _| 255);
         add("grey".into(), &|_, _| 128);
-        for seed in 0..4 {
+        for seed in 0..8 {
             add(format!("noise {seed}"), &move |x, y| noise(x, y, seed));
             add(format!("coarse noise {seed}"), &move |x, y| noise(x / 16, y / 16, seed));
         }

@@ -105,14 +105,13 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
     let unmasked = !scene.region.has_mask();
     let mut made = Points::default();
     let mut place = 0;
-    let mut sides = None;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
         let found = match config.sub_pixel {
             SubPixel::Linear => {
                 if unmasked && scene.region.is_inside_by(pixel.x, pixel.y, MARGIN as u16) {
-                    linear::<T, P, O, true>(scene, pixel, &mut sides)
+                    linear::<T, P, O, true>(scene, pixel)
                 } else {
-                    linear::<T, P, O, false>(scene, pixel, &mut sides)
+                    linear::<T, P, O, false>(scene, pixel)
                 }
             }
             SubPixel::None => half_pixel(scene, pixel),
@@ -292,47 +291,11 @@ fn place<T: Real>(p: Pixel, dx: i32, dy: i32, towards_dark: T) -> ImagePoint<T> 
     }
 }
 
-/// Reads on from the border pixel or its dark neighbour, whose brightness is `v`, until the side has levelled off: two
-/// more pixels change it by less than a twelfth of the contrast to `other` each. Gives the plateau's level and the offset
-/// where it begins.
-#[inline(always)]
-fn plateau<R: Fn(i32) -> Option<i32>, const LIT: bool>(mut v: i32, other: i32, read: R) -> (i32, i32) {
-    let (from, out) = if LIT { (0, -1) } else { (1, 1) };
-    // How far `v` lies beyond `w`, away from the other side.
-    let beyond = |v: i32, w: i32| if LIT { v - w } else { w - v };
-    let mut k = from;
-    let (mut near, mut far) = (read(k + out), read(k + 2 * out));
-    loop {
-        // Where nothing can be read the side ends.
-        let (n, f) = (near.unwrap_or(v), far.unwrap_or(v));
-        let slack = (beyond(v, other) / 12).max(2);
-        if beyond(n, v) > slack {
-            (k, v, near) = (k + out, n, far);
-        } else if beyond(f, v) > 2 * slack {
-            (k, v, near) = (k + 2 * out, f, read(k + 3 * out));
-        } else {
-            // What lies beyond on the same level counts towards it.
-            let level = match (beyond(v, n) < 2 * slack, beyond(v, f) < 2 * slack) {
-                (true, true) => (v + n + f) / 3,
-                (true, false) => (v + n) / 2,
-                (false, true) => (v + f) / 2,
-                (false, false) => v,
-            };
-            return (level, k);
-        }
-        if (k - from).abs() >= REACH {
-            return (v, k);
-        }
-        far = read(k + 2 * out);
-    }
-}
-
 /// The crossing of the mid-level; also whether the global level had to stand in for it.
 #[inline(always)]
 fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     scene: &Scene<'_, T, P, O>,
     p: Pixel,
-    sides: &mut Option<Sides>,
 ) -> Option<(ImagePoint<T>, Lit, bool)> {
     let around = Around::<T, P, O, FREE>::new(scene, p);
     let near = around.near()?;
@@ -343,11 +306,11 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let wide = 3 * i32::from(scene.level);
     if FREE && wide < 4 * steep {
         let line = Line::new(&around, (dx, dy), 1);
-        let (part, fallback) = line.crossing(near.across(lit), sides)?;
+        let (part, fallback) = line.crossing(near.across(lit))?;
         return Some((place(p, dx, dy, part), lit, fallback));
     }
     let step = (wide / (2 * steep).max(1)).clamp(1, WIDEST);
-    in_steps(scene, p, lit, (dx, dy), step, sides)
+    in_steps(scene, p, lit, (dx, dy), step)
 }
 
 /// As [`linear`], `step` pixels a step, wherever the border pixel is.
@@ -358,54 +321,57 @@ fn in_steps<T: Real, P: Pixels, O: Observer<T>>(
     lit: Lit,
     (dx, dy): (i32, i32),
     step: i32,
-    sides: &mut Option<Sides>,
 ) -> Option<(ImagePoint<T>, Lit, bool)> {
     let around = Around::<T, P, O, false>::new(scene, p);
     let line = Line::new(&around, (dx, dy), step);
-    let (part, fallback) = line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?], sides)?;
+    let (part, fallback) = line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
     Some((place(p, dx, dy, part * T::of_i32(step)), lit, fallback))
 }
 
-/// The plateaus on both sides of an edge, along a line across it.
-#[derive(Clone, Copy)]
-struct Sides {
-    /// A step towards the dark.
-    step: (i32, i32),
-    /// Points before this one that had the same plateaus.
-    age: u32,
-    bright: i32,
-    dim: i32,
-    /// Where they begin, in steps towards the dark.
-    inner: i32,
-    outer: i32,
-}
-
-/// Neighbours along the edge are alike: so many points share their plateaus.
-const SHARED: u32 = 4;
-
 impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P, O, FREE> {
-    /// The plateaus: those of the point before, or newly looked for.
+    /// Reads on from the border pixel or its dark neighbour, whose brightness is `v`, until the side has levelled off:
+    /// two more pixels change it by less than a twelfth of the contrast to `other` each. Gives the plateau's level and
+    /// the offset where it begins.
     #[inline(always)]
-    fn sides(&self, first_lit: i32, first_dark: i32, before: &mut Option<Sides>) -> Sides {
-        if let Some(s) = before
-            && s.step == self.step
-            && s.age + 1 < SHARED
-        {
-            s.age += 1;
-            return *s;
+    fn plateau<const LIT: bool>(&self, mut v: i32, other: i32) -> (i32, i32) {
+        let (from, out) = if LIT { (0, -1) } else { (1, 1) };
+        // How far `v` lies beyond `w`, away from the other side.
+        let beyond = |v: i32, w: i32| if LIT { v - w } else { w - v };
+        let mut k = from;
+        let (mut near, mut far) = (self.one(k + out), self.one(k + 2 * out));
+        loop {
+            // Where nothing can be read the side ends.
+            let (n, f) = (near.unwrap_or(v), far.unwrap_or(v));
+            let contrast = beyond(v, other).max(24);
+            if 12 * beyond(n, v) > contrast {
+                (k, v, near) = (k + out, n, far);
+            } else if 6 * beyond(f, v) > contrast {
+                (k, v, near) = (k + 2 * out, f, self.one(k + 3 * out));
+            } else {
+                // What lies beyond on the same level counts towards it.
+                let level = match (6 * beyond(v, n) < contrast, 6 * beyond(v, f) < contrast) {
+                    (true, true) => (v + n + f) / 3,
+                    (true, false) => (v + n) / 2,
+                    (false, true) => (v + f) / 2,
+                    (false, false) => v,
+                };
+                return (level, k);
+            }
+            if (k - from).abs() >= REACH {
+                return (v, k);
+            }
+            far = self.one(k + 2 * out);
         }
-        // In one row, of which the mean of several is taken.
-        let (bright, inner) = plateau::<_, true>(first_lit, first_dark, |k| self.one(k));
-        let (dim, outer) = plateau::<_, false>(first_dark, bright, |k| self.one(k));
-        *before.insert(Sides { step: self.step, age: 0, bright, dim, inner, outer })
     }
 
     /// Steps from the border pixel to the crossing of the mid-level; also whether the global level had to stand in for it.
     /// From the smoothed brightness one step to the lit side, here, and one step to the dark side.
     #[inline(always)]
-    fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3], before: &mut Option<Sides>) -> Option<(T, bool)> {
+    fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3]) -> Option<(T, bool)> {
         let scene = self.around.scene;
-        let Sides { bright, dim, inner, outer, .. } = self.sides(first_lit, first_dark, before);
+        // In one row for the plateaus, of which the mean of several is taken, over three rows for the crossing.
+        let (bright, inner) = self.plateau::<true>(first_lit, first_dark);
+        let (dim, outer) = self.plateau::<false>(first_dark, bright);
         let contrast = bright - dim;
         let level4 = i32::from(scene.level) * 4;
         let least = 4 * (i32::from(scene.picture.full_scale()) / 64).max(2);

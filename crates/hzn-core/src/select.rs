@@ -120,13 +120,17 @@ pub(crate) struct Judged<T> {
     pub(crate) support: T,
 }
 
-/// Looks a fit over, with the points that carry it.
+/// An edge of which less than one point in so many is on the curve has it by chance.
+const MOST_OUTLIERS: u32 = 20;
+
+/// Looks a fit over, with the points that carry it; `points` of the edge were made.
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
     sigma_max_rad: T,
     expected: &Expected<T>,
     blocks: &[Block<T>],
+    points: u32,
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -138,7 +142,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let sigma_limit = T::of(config.max_sigma_deg.to_radians());
     let chi = T::of(config.max_half_angle_sigma);
     let least = config.min_inliers.min(small(expected.sin, camera, 3));
-    let verdict = if fit.inliers < u32::from(least) {
+    let verdict = if fit.inliers < u32::from(least) || fit.inliers * MOST_OUTLIERS < points {
         Verdict::FewInliers
     } else if fit.arc_px < min_arc(&fused.c, camera, config) {
         Verdict::ShortArc

@@ -610,7 +610,8 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         let [p11, p12, p22] = fused.p;
         let covariance = Cov3::from_tangent(&b1, &b2, [p11 + shape * shape, p12, p22 + shape * shape]);
         let sigma = covariance.sigma_max_rad();
-        let judged = select::judge(&fit, &fused, sigma, self.expected, blocks, scene, self.camera, &config.select);
+        let judged =
+            select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, scene, self.camera, &config.select);
         outcome.verdict = judged.verdict;
         if judged.verdict != Verdict::Passed || !sigma.is_finite() {
             return (outcome, None);
