@@ -93,7 +93,7 @@ mod tests {
     fn eroded(data: &[u8], w: u16, h: u16, size: u16, threshold: u16) -> Vec<(u16, u16)> {
         let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
         let region = Region::<f64>::whole(w, h);
-        let scene = Scene { picture: &picture, region: &region, level: 128, observer: &Unobserved };
+        let scene = Scene::new(&picture, &region, 128, &Unobserved);
         let mut buffer = vec![Pixel::default(); 4096];
         let config = Config { erode_size_px: size, erode_threshold: threshold, ..Config::default() };
         edges(&scene, &config, &mut buffer).pixels().iter().map(|p| (p.x, p.y)).collect()

@@ -204,7 +204,7 @@ mod tests {
     fn borders(data: &[u8], w: u16, h: u16) -> Vec<Points> {
         let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
         let region = Region::<f64>::whole(w, h);
-        let scene = Scene { picture: &picture, region: &region, level: 128, observer: &Unobserved };
+        let scene = Scene::new(&picture, &region, 128, &Unobserved);
         let (mut words, mut buffer, mut steps) = (vec![0u32; 4096], vec![Pixel::default(); 4096], 1_000_000);
         let mut found = Vec::new();
         let ended = each_border(&scene, &mut words, &mut buffer, &mut steps, |piece| {
@@ -265,7 +265,7 @@ mod tests {
         let data: Vec<u8> = (0..64 * 64).map(|i| if (i / 7) % 3 == 0 { 200 } else { 0 }).collect();
         let picture = Grey::try_new(&data, Layout::packed(64, 64, 1, 8)).unwrap();
         let region = Region::<f32>::whole(64, 64);
-        let scene = Scene { picture: &picture, region: &region, level: 128, observer: &Unobserved };
+        let scene = Scene::new(&picture, &region, 128, &Unobserved);
         let mut buffer = vec![Pixel::default(); 64];
         let mut run = |words: usize, mut steps: u32| {
             each_border(&scene, &mut vec![u32::MAX; words], &mut buffer, &mut steps, |_| true)

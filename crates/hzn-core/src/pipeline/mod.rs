@@ -332,11 +332,6 @@ impl<T: Real> Sensor<T> {
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
         let scene = Scene::new(picture, &self.region, level, observer);
-        let (narrow, widest) = line_spacing(expected, &self.camera);
-        let (spacing, widest) = config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
-        let mut marks = Marks::new(lists.marks, self.region.width(), self.region.height(), spacing, widest);
-        // What is narrower on the border than a search line is apart from the next is no limb.
-        let stride = spacing.min(self.region.width().min(self.region.height()) / BORDER_LOOKS).max(1);
         let mut judge = Judge {
             config,
             camera: &self.camera,
