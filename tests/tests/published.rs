@@ -1,7 +1,7 @@
 //! The presets of published systems on rendered scenes: they answer what they should, as well as their methods can.
 
 use hzn_core::camera::{self, Camera, Model};
-use hzn_core::{Config, Preset};
+use hzn_core::{Config, Preset, estimate};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Detector, Disc, EdgeNoise, Look, Pose, Scene};
@@ -36,6 +36,18 @@ fn braun_barf_on_a_rocket_flight() {
     assert_eq!(tally.answered(), tally.frames, "{tally}");
     assert!(tally.rms_deg() < 0.1 && tally.worst_deg() < 0.5, "{tally}");
     assert!(tally.mean_nees() < 0.5, "{tally}");
+}
+
+/// With a part of the vehicle in view and masked, and half the pixels. Also the conic in place of the direct nadir,
+/// which has three unknowns more.
+#[test]
+fn braun_barf_with_payload_in_view() {
+    let flight = rocket(960, 540, 6, 3).with_payload();
+    let tally = fly(&flight, Preset::Dlr2022, |_| {});
+    assert_eq!(tally.answered(), tally.frames, "{tally}");
+    assert!(tally.rms_deg() < 0.3 && tally.worst_deg() < 1.0, "{tally}");
+    let tally = fly(&flight, Preset::Dlr2022, |config| config.estimate.method = estimate::Method::Conic);
+    assert!(tally.answered() * 2 >= tally.frames && tally.worst_deg() < 20.0, "{tally}");
 }
 
 /// Wang et al. 2022 on what they built it for, by off-nadir angle. They report 0.04° with the whole Earth in view and

@@ -41,6 +41,31 @@ fn direct_nadir_equals_scipy() {
     directions::<f32>(1e-4);
 }
 
+/// (13) has five coefficients in pixels, r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹: the same lens with f = κ₁ and the others
+/// divided by it. (16), the point on the plane by tan θ, ends at 90°; rays do not.
+#[test]
+fn five_coefficients_are_a_focal_length_and_four() {
+    let kappa = [1235.0, -67.9, 13.6, -4.3, 0.25];
+    let config = CameraConfig {
+        k: kappa[1..].iter().map(|k| k / kappa[0]).collect(),
+        theta_max_deg: Some(100.0),
+        ..CameraConfig::ideal(Model::KannalaBrandt, 6000, 6000, kappa[0])
+    };
+    let camera = Camera::<f64>::try_new(&config).unwrap();
+    for deg in [0.0, 20.0, 54.0, 89.9, 90.1, 99.0] {
+        let theta = f64::to_radians(deg);
+        let (s, c) = libm::sincos(theta);
+        let d = direction::<f64>([0.6 * s, 0.8 * s, c]);
+        let p = camera.project(&d).unwrap();
+        let radius: f64 = (0..5i32).zip(kappa).map(|(j, k)| k * theta.powi(2 * j + 1)).sum();
+        assert!((p.u - config.cx_px - 0.6 * radius).abs() < 1e-9 && (p.v - config.cy_px - 0.8 * radius).abs() < 1e-9);
+        assert!(camera.unproject(p).unwrap().angle_rad(&d) < 1e-11);
+        // The printed inverse, with the ray's side chosen by hand.
+        let printed = direction::<f64>([0.6 * libm::tan(theta), 0.8 * libm::tan(theta), 1.0]);
+        assert_eq!(printed.angle_rad(&d) < 1e-6, deg < 90.0, "{deg}");
+    }
+}
+
 /// `covariance.json`: (33) by dense matrices, with the paper's correlation from sample to sample and with ours.
 fn covariances<T: Real>(tolerance: f64) {
     let mut compared = 0;
