@@ -193,6 +193,42 @@ fn covariance_goes_through_the_lens() {
     assert!(!(0.8..1.25).contains(&ratio), "the printed form must not hold: {ratio}");
 }
 
+/// Honesty at 200 km with errors alike along the edge: squared errors over the covariance across the axis are two on
+/// average, over the overbound (37) a twentieth of that; and the errors are those of a free half-angle.
+#[test]
+fn covariance_is_honest_and_the_overbound_is_not() {
+    let (camera, e) = rocket_camera();
+    let sin: f64 = 6_371_008.8 / (6_371_008.8 + 200e3);
+    let exact = limb(&camera, &e, libm::sqrt(1.0 - sin * sin), 1.0);
+    let mut gauss = Gauss(crate::rng::Rng::new(11));
+    let (runs, rho) = (200, libm::exp(-1.0 / 300.0));
+    let (mut squares, mut nees, mut bounded) = (0.0, 0.0, 0.0);
+    for _ in 0..runs {
+        let (mut du, mut dv) = (gauss.next(), gauss.next());
+        let mut points = Vec::new();
+        for &(u, v) in &exact {
+            points.push((u + du, v + dv));
+            let fresh = libm::sqrt(1.0 - rho * rho);
+            (du, dv) = (rho * du + fresh * gauss.next(), rho * dv + fresh * gauss.next());
+        }
+        let blocks = blocks(&camera, &points, &e);
+        let (got, _) = direct::fit(&blocks).unwrap();
+        let p = braun_barf::of(&blocks, &got, 300.0).unwrap();
+        let (b1, b2) = basis(&got);
+        let off = V3::from(e.xyz()) - got;
+        let (x, y) = (off.dot(&b1), off.dot(&b2));
+        squares += x * x + y * y;
+        let [a, b, d] = invert_spd2(braun_barf::across(&p, &got, false)).unwrap();
+        nees += a * x * x + 2.0 * b * x * y + d * y * y;
+        bounded += (x * x + y * y) / braun_barf::across(&p, &got, true)[0];
+    }
+    let n = f64::from(runs);
+    let (rms_deg, nees, bounded) = (libm::sqrt(squares / n).to_degrees(), nees / n, bounded / n);
+    assert!((0.15..0.23).contains(&rms_deg), "{rms_deg}");
+    assert!((1.6..2.5).contains(&nees), "{nees}");
+    assert!((0.05..0.15).contains(&bounded), "{bounded}");
+}
+
 /// The conic as a quadratic form of rays, times any factor.
 fn form(e: &V3<f64>, c: f64, factor: f64) -> [[f64; 3]; 3] {
     let m = (e * e.transpose() - M3::identity() * (c * c)) * factor;
