@@ -1,6 +1,7 @@
 //! The presets of published systems on rendered scenes: they answer what they should, as well as their methods can.
 
 use hzn_core::camera::{self, Camera, Model};
+use hzn_core::candidates::SubPixel;
 use hzn_core::{Config, Preset, estimate};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::pose::position_m;
@@ -60,6 +61,14 @@ fn wang_on_an_infrared_earth() {
         let tally = fly(&part, Preset::Zju2022, |config| config.covariance = flight.sensor.covariance);
         assert_eq!(tally.answered(), tally.frames, "{tally}");
         assert!(tally.rms_deg() < rms_deg && tally.worst_deg() < 2.0 * rms_deg, "{tally}");
+        // What is known of the Earth's size, and the best points.
+        let best = fly(&part, Preset::Hzn, |config| {
+            config.covariance = flight.sensor.covariance;
+            config.candidates.sub_pixel = SubPixel::Erf;
+            config.candidates.keep_points = 0;
+        });
+        assert_eq!(best.answered(), best.frames, "{best}");
+        assert!(best.rms_deg() < tally.rms_deg() && best.rms_deg() < 0.025, "{best} against {tally}");
         let _ = fly(&part, Preset::Hzn, |config| config.covariance = flight.sensor.covariance);
         // The moments' bias from pixel to pixel counts as noise: too careful.
         assert!((0.1..2.5).contains(&tally.mean_nees()), "{tally}");

@@ -63,7 +63,7 @@ extern crate std;
 mod block;
 pub mod body;
 pub mod camera;
-#[cfg(feature = "horace")]
+#[cfg(any(feature = "horace", feature = "zju"))]
 mod circle;
 pub mod ellipsoid;
 pub mod error;

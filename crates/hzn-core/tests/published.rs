@@ -75,10 +75,13 @@ fn off_deg(report: &Report<f64>, want: [f64; 3]) -> f64 {
     axis.angle_rad(&hzn_core::frames::UnitVec3::try_new(want).unwrap()).to_degrees()
 }
 
+const CONTOURS: [contour::Method; 4] =
+    [contour::Method::BorderFollowing, contour::Method::Raster, contour::Method::Erode, contour::Method::Sobel];
+
 #[test]
 fn every_preset_and_contour_method_finds_a_disc() {
-    for preset in [Preset::Hzn, Preset::Dlr2022, Preset::Horace2015] {
-        for method in [contour::Method::BorderFollowing, contour::Method::Raster, contour::Method::Erode] {
+    for preset in [Preset::Hzn, Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015] {
+        for method in CONTOURS {
             let mut config = config(preset, 2);
             config.contour.method = method;
             let radius = 120.0 * 20f64.to_radians().tan();
@@ -238,7 +241,7 @@ proptest! {
     #[test]
     fn any_picture_gets_a_sound_report(
         kind in 0u8..8, seed in any::<u64>(), level in any::<u8>(), lens in 0usize..3, circle: bool, mask: bool,
-        body in 0usize..4, methods in proptest::array::uniform6(0usize..4), scaled: bool, divided: bool, gates: bool,
+        body in 0usize..4, methods in proptest::array::uniform6(0usize..6), scaled: bool, divided: bool, gates: bool,
     ) {
         let model = [Model::Pinhole, Model::Equidistant, Model::KannalaBrandt][lens];
         let mut config = config(Preset::Horace2015, 1);
@@ -256,18 +259,22 @@ proptest! {
             config.mask.polygons_px.push(triangle.into_iter().collect()).unwrap();
         }
         let pick = methods.map(|m| m % 3);
-        config.contour.method =
-            [contour::Method::BorderFollowing, contour::Method::Raster, contour::Method::Erode][pick[0]];
-        config.reject.method = [reject::Method::None, reject::Method::Ransac, reject::Method::TwoPoint][pick[1]];
+        config.contour.method = CONTOURS[methods[0] % 4];
+        config.reject.method = [
+            reject::Method::None, reject::Method::Ransac, reject::Method::TwoPoint, reject::Method::RansacPreverify,
+            reject::Method::Mlesac,
+        ][methods[1] % 5];
         config.estimate.method = [
             estimate::Method::Sphere, estimate::Method::Direct, estimate::Method::Conic, estimate::Method::Circle,
+            estimate::Method::Tls, estimate::Method::Wtls,
         ][methods[2]];
         config.estimate.half_angle = [
             estimate::HalfAngle::Free, estimate::HalfAngle::Fused, estimate::HalfAngle::Known,
         ][pick[3]];
         config.covariance.method = [covariance::Method::Sandwich, covariance::Method::BraunBarf][pick[4] % 2];
         config.covariance.overbound = pick[5] == 0;
-        config.candidates.sub_pixel = [SubPixel::None, SubPixel::Linear][pick[5] % 2];
+        config.candidates.sub_pixel =
+            [SubPixel::None, SubPixel::Linear, SubPixel::Zernike, SubPixel::Erf][methods[4] % 4];
         config.binarize.method = [binarize::Method::Otsu, binarize::Method::Dynamic, binarize::Method::Fixed][pick[5]];
         config.input.scale_to_height = scaled.then_some(33);
         config.recover.method = if divided { recover::Method::Division } else { recover::Method::None };

@@ -4,9 +4,9 @@
 //! whatever they belong to: there is no border to follow. To give the points an order along the limb they are sorted
 //! about the centre of the circle through all of them, from the widest gap on.
 
+use super::order::about_their_circle;
 use super::thinned::Thinned;
 use super::{Config, Scene};
-use crate::circle::Circle;
 use crate::image::Pixels;
 use crate::pipeline::Observer;
 use crate::pixel::Pixel;
@@ -30,7 +30,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
             }
         }
     }
-    sort::<T>(edge.pixels_mut());
+    about_their_circle::<T>(edge.pixels_mut());
     edge
 }
 
@@ -52,33 +52,6 @@ fn is_edge<T: Real, P: Pixels, O: Observer<T>>(
         }
     }
     lit < least
-}
-
-/// Sorts by the angle about the circle through all pixels, the widest gap between the last and the first. Pixels on a
-/// line stay in their order.
-fn sort<T: Real>(pixels: &mut [Pixel]) {
-    let place = |p: &Pixel| [T::of_i32(i32::from(p.x)), T::of_i32(i32::from(p.y))];
-    let Some(circle) = Circle::through(pixels.iter().map(place)) else { return };
-    // Grows with the angle from −x over −y: 0 to 4.
-    let angle = |p: &Pixel| -> T {
-        let [x, y] = place(p);
-        let (x, y) = (x - circle.centre[0], y - circle.centre[1]);
-        let along = x / (x.abs() + y.abs()).most(T::of(1e-20));
-        if y < T::ZERO { T::one() + along } else { T::of(3.0) - along }
-    };
-    pixels.sort_unstable_by(|a, b| angle(a).partial_cmp(&angle(b)).unwrap_or(core::cmp::Ordering::Equal));
-    let Some((first, last)) = pixels.first().zip(pixels.last()) else { return };
-    let (mut widest, mut start) = (angle(first) + T::of(4.0) - angle(last), 0);
-    for (i, pair) in pixels.windows(2).enumerate() {
-        if let [a, b] = pair
-            && angle(b) - angle(a) > widest
-        {
-            (widest, start) = (angle(b) - angle(a), i + 1);
-        }
-    }
-    if start < pixels.len() {
-        pixels.rotate_left(start);
-    }
 }
 
 #[cfg(test)]

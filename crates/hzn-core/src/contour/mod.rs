@@ -7,9 +7,13 @@
 pub(crate) mod erode;
 mod follow;
 mod marks;
+#[cfg(any(feature = "horace", feature = "zju"))]
+mod order;
 #[cfg(feature = "horace")]
 pub(crate) mod raster;
 mod search;
+#[cfg(feature = "zju")]
+pub(crate) mod sobel;
 mod thinned;
 
 pub(crate) use follow::{End, Scene};
@@ -31,6 +35,9 @@ pub enum Method {
     /// Every lit pixel with too few lit ones around it, whatever it belongs to (Barf 2014, 2.2.3).
     #[cfg(feature = "horace")]
     Erode,
+    /// Every pixel with a large gradient, whatever it belongs to (Wang et al. 2022, 2.1).
+    #[cfg(feature = "zju")]
+    Sobel,
 }
 
 /// `[contour]` of sensor.toml.

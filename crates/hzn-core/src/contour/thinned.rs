@@ -78,7 +78,7 @@ impl<'a> Thinned<'a> {
     }
 
     /// The stored pixels, to be brought into another order.
-    #[cfg(feature = "horace")]
+    #[cfg(any(feature = "horace", feature = "zju"))]
     pub(crate) fn pixels_mut(&mut self) -> &mut [Pixel] {
         self.buffer.get_mut(..self.len).unwrap_or_default()
     }

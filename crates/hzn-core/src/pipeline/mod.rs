@@ -357,6 +357,11 @@ impl<T: Real> Sensor<T> {
                 let edge = contour::erode::edges(&scene, &config.contour, lists.border);
                 judge.piece(&scene, &edge);
             }
+            #[cfg(feature = "zju")]
+            contour::Method::Sobel => {
+                let edge = contour::sobel::edges(&scene, lists.border);
+                judge.piece(&scene, &edge);
+            }
         }
         judge.conclude();
     }

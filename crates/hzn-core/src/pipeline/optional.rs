@@ -24,6 +24,7 @@ macro_rules! optional {
 pub const OPTIONAL: &[Optional] = optional! {
     "erf": "candidates.sub_pixel" = "erf";
     "zju": "candidates.sub_pixel" = "zernike";
+    "zju": "contour.method" = "sobel";
     "zju": "preset" = "zju-2022";
     "dlr": "covariance.method" = "braun-barf";
     "dlr": "estimate.method" = "conic";

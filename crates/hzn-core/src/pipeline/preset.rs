@@ -111,13 +111,14 @@ fn dlr_2022(config: &mut Config) {
     config.select.max_section_residual = Some(0.025);
 }
 
-/// Wang et al. 2022 as flown on Tianping-2B: Zernike moments on every pixel of the edge, RANSAC with pre-verification,
+/// Wang et al. 2022 as flown on Tianping-2B: Zernike moments on every Sobel edge pixel, RANSAC with pre-verification,
 /// an elliptic cone by total least squares, weighed where the limb leaves the picture, and no gates.
 ///
 /// Their threshold is 1°, which is 1.6 px with their lens (384×288, 92 px/rad); for another it is to be set.
 #[cfg(feature = "zju")]
 fn zju_2022(config: &mut Config) {
-    use crate::{candidates, estimate, reject};
+    use crate::{candidates, contour, estimate, reject};
+    config.contour.method = contour::Method::Sobel;
     config.candidates.sub_pixel = candidates::SubPixel::Zernike;
     config.candidates.keep_points = 0;
     config.reject.method = reject::Method::RansacPreverify;
