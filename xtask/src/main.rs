@@ -14,6 +14,7 @@ mod machine;
 mod python;
 mod steps;
 mod test;
+mod wheel;
 
 use std::process::ExitCode;
 

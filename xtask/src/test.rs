@@ -6,7 +6,7 @@ use std::process::Command;
 
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
-use crate::{firmware, flight_build, python};
+use crate::{firmware, flight_build, python, wheel};
 
 pub(crate) fn run(only: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
@@ -42,6 +42,10 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("firmware", |_| firmware::build());
     all.step("demo", |_| demo());
     all.step("files read by others", |_| files_read_by_others());
+    all.step("wheel", |_| {
+        built_with_the_tests()?;
+        wheel::run_step(&fs::canonicalize(target().join("debug/hzn"))?)
+    });
     all.conclude()
 }
 

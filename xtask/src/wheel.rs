@@ -1,0 +1,45 @@
+//! The Python package: built, installed, tested as its users have it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::machine::target;
+use crate::python;
+use crate::steps::{self, Outcome, Trouble};
+
+const CRATE: &str = "crates/hzn-py";
+
+/// Builds the wheel, installs it into an environment of its own, checks stubs and behaviour. `hzn` is the program of the
+/// same build.
+pub(crate) fn run_step(hzn: &Path) -> Outcome {
+    let folder = Path::new(CRATE);
+    let python = python::environment("wheel", &folder.join("tests/requirements.txt"))?;
+    let wheels = target().join("wheels");
+    if wheels.exists() {
+        fs::remove_dir_all(&wheels)?;
+    }
+    let mut maturin = Command::new(&python);
+    maturin.args(["-m", "maturin", "build", "--locked", "--profile", "dev", "--manifest-path"]);
+    steps::run(maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(&wheels))?;
+    let wheel = only_wheel(&wheels)?;
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--force-reinstall", "--no-deps"];
+    steps::run(Command::new(&python).args(pip).arg(wheel))?;
+    // Away from the sources, so that what was installed is what is imported.
+    let scratch = target().join("xtask");
+    fs::create_dir_all(&scratch)?;
+    let tests = fs::canonicalize(folder.join("tests"))?;
+    let module = |args: &[&str]| {
+        let mut command = Command::new(&python);
+        command.arg("-m").args(args).current_dir(&scratch).env("HZN_PROGRAM", hzn);
+        command
+    };
+    steps::run(&mut module(&["mypy.stubtest", "hzn", "--concise"]))?;
+    steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
+    steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider"]).arg(tests))
+}
+
+fn only_wheel(folder: &Path) -> Result<PathBuf, Trouble> {
+    let mut wheels = fs::read_dir(folder)?.flatten().map(|e| e.path()).filter(|p| p.extension().is_some());
+    wheels.next().ok_or_else(|| Trouble::Failed(format!("maturin left no wheel in {}", folder.display())))
+}
