@@ -187,7 +187,8 @@ fn wtls<T: Real>(blocks: &[Block<T>], mut v: [T; N]) -> Option<[T; N]> {
         }
         let per = T::one() / dot(&v, &v).sqrt();
         v = v.map(|x| x * per);
-        if size < T::EPSILON * T::EPSILON * T::of(1e4) {
+        // The weights hardly change with a step this small: the next would be lost in rounding.
+        if size < T::EPSILON * T::of(1e-3) {
             break;
         }
     }
