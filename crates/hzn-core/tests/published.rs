@@ -93,6 +93,36 @@ fn every_preset_and_contour_method_finds_a_disc() {
     }
 }
 
+/// Braun & Barf 2022, section 5: the Sun's disc, wider by bloom than it is, by search lines, its radius free, with their
+/// limit for the Sun (7.3).
+#[test]
+fn braun_barf_on_the_sun() {
+    let mut config = Config::preset(Preset::Dlr2022, camera::Config::ideal(Model::Pinhole, 160, 120, 1235.0));
+    config.body.kind = Kind::Sun;
+    config.body.altitude_km = None;
+    config.candidates.min_points = 16;
+    config.covariance.sigma_px = 3.0;
+    config.select.max_section_residual = Some(0.5e-5);
+    for (u, v, bloom_px) in [(80.0, 60.0, 0.0), (31.3, 77.6, 1.5), (120.9, 20.2, 3.0)] {
+        let radius = 1235.0 * 0.2666f64.to_radians().tan() + bloom_px;
+        let data = disc(&config, u, v, radius);
+        let report = answer(&config, &data, &Watch::default());
+        let off_px = off_deg(&report, [(u - 79.5) / 1235.0, (v - 59.5) / 1235.0, 1.0]).to_radians() * 1235.0;
+        assert!(off_px < 0.15, "{u} {v} {bloom_px}: {off_px}");
+        let solution = report.solution.unwrap();
+        assert!((solution.half_angle_rad * 1235.0 - radius).abs() < 0.3 && solution.altitude_m.is_none());
+    }
+    // Something else that is round, but not the Sun's edge: an ellipse's points lie off any circle.
+    let (w, h) = (160u32, 120u32);
+    let oval: Vec<u8> = (0..w * h)
+        .map(|i| {
+            let (x, y) = (f64::from(i % w) - 80.0, f64::from(i / w) - 60.0);
+            if (x / 22.0).hypot(y / 9.0) < 1.0 { 220 } else { 10 }
+        })
+        .collect();
+    assert!(answer(&config, &oval, &Watch::default()).solution.is_none());
+}
+
 #[test]
 fn a_smaller_copy_is_looked_at_in_the_pictures_own_coordinates() {
     let mut config = config(Preset::Horace2015, 4);
