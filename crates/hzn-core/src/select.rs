@@ -142,7 +142,9 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let sigma_limit = T::of(config.max_sigma_deg.to_radians());
     let chi = T::of(config.max_half_angle_sigma);
     let least = config.min_inliers.min(small(expected.sin, camera, 3));
-    let verdict = if fit.inliers < u32::from(least) || fit.inliers * MOST_OUTLIERS < points {
+    let verdict = if fit.inliers * MOST_OUTLIERS < points {
+        Verdict::NoConsensus
+    } else if fit.inliers < u32::from(least) {
         Verdict::FewInliers
     } else if fit.arc_px < min_arc(&fused.c, camera, config) {
         Verdict::ShortArc
