@@ -6,10 +6,13 @@
 //! | Kalibr camchain, OpenCV YAML, EuRoC `sensor.yaml` | [`camera_file::load`] | [`hzn_core::camera::Config`] |
 //! | `frames.csv` | [`frames::load`] | time, altitude, position, attitude of every picture |
 //!
+//! [`document`] reads TOML files of other crates, such as scene.toml, in the same way.
+//!
 //! Whatever is wrong with a file comes back as a [`Problem`]: which file, which line, which field, what was expected
 //! and, for a misspelt name, the nearest valid one. [`template`] writes a commented sensor.toml to start from.
 
 pub mod camera_file;
+pub mod document;
 pub mod frames;
 mod nearest;
 mod problem;

@@ -79,8 +79,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     if let Ok(values) = DeTable::parse(&starting_values) {
         fill(table.get_mut(), values.into_inner());
     }
-    let mut config =
-        Config::deserialize(toml::Deserializer::from(table)).map_err(|e| meaning(&e, text, path, &places))?;
+    let mut config = Config::deserialize(toml::Deserializer::from(table))
+        .map_err(|e| meaning(&e, text, path, &places, &["preset"]))?;
     if let Some(camera) = from_file {
         config.camera = camera;
     }
@@ -147,9 +147,9 @@ pub fn check(config: &Config) -> Result<(), ConfigError> {
 }
 
 /// A key with where it stands: the dotted path, the key's bytes, the value's bytes.
-struct Place {
-    path: Vec<String>,
-    key: Range<usize>,
+pub(crate) struct Place {
+    pub(crate) path: Vec<String>,
+    pub(crate) key: Range<usize>,
     value: Range<usize>,
 }
 
@@ -173,7 +173,7 @@ fn field_name(path: &[String]) -> String {
     }
 }
 
-fn places(table: &DeTable<'_>) -> Vec<Place> {
+pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<Place>) {
         for (key, value) in table {
             path.push(key.get_ref().to_string());
@@ -212,7 +212,7 @@ fn take<'i>(table: &mut DeTable<'i>, name: &str) -> Option<(DeValue<'i>, Range<u
     })
 }
 
-fn camera_from_file(
+pub(crate) fn camera_from_file(
     table: &mut DeTable<'_>,
     text: &str,
     path: &Path,
@@ -251,7 +251,7 @@ fn camera_from_file(
     Ok(Some(config))
 }
 
-fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
+pub(crate) fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
     let problem = Problem::new(path, format!("not valid TOML: {}", error.message().replace('\n', "; ")));
     match error.span() {
         Some(span) => problem.at_exactly(text, span.start),
@@ -259,11 +259,21 @@ fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
     }
 }
 
-/// serde's error, said in the file's own words.
-fn meaning(error: &toml::de::Error, text: &str, path: &Path, places: &[Place]) -> Problem {
+/// serde's error, said in the file's own words. `taken` are keys of the top that serde does not know of.
+pub(crate) fn meaning(
+    error: &toml::de::Error,
+    text: &str,
+    path: &Path,
+    places: &[Place],
+    taken: &[&'static str],
+) -> Problem {
     let message = error.message();
     let offset = error.span().map(|s| s.start);
-    let place = offset.and_then(|o| place_of(places, o));
+    let place = match error.span() {
+        // The table that lacks it, which may be the file as a whole.
+        Some(span) if message.starts_with("missing field") => places.iter().find(|p| p.value == span),
+        _ => offset.and_then(|o| place_of(places, o)),
+    };
     let attach = |p: Problem| match offset {
         // An error of the table as a whole, such as a missing section, has the first byte for its place.
         Some(o) if place.is_some() => p.at_offset(text, o),
@@ -275,7 +285,7 @@ fn meaning(error: &toml::de::Error, text: &str, path: &Path, places: &[Place]) -
     let own = place.map(Place::field).unwrap_or_default();
     let problem = if message.starts_with("unknown field") {
         let valid: Vec<&str> = match place.map(|p| p.path.as_slice()) {
-            Some([_]) => valid.into_iter().chain(["preset"]).collect(),
+            Some([_]) => valid.into_iter().chain(taken.iter().copied()).collect(),
             Some([section, _]) if section == "camera" => valid.into_iter().chain(["file"]).collect(),
             _ => valid,
         };

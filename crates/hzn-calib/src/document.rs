@@ -1,0 +1,104 @@
+//! A TOML file of another kind, read with the care of a sensor.toml: lines in errors, suggestions for misspelt names, and
+//! a `[camera]` that may come from another tool's `file`.
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use toml::de::{DeTable, DeValue};
+
+use crate::Problem;
+use crate::sensor::{camera_from_file, meaning, places, syntax};
+
+/// Reads `text` as a `T`. `path` is named in messages, and a camera `file` is looked for beside it. `check` says what is
+/// wrong with a value that can be read: the key, as `[section] key`, and the rule.
+///
+/// # Errors
+/// The first thing wrong with the text.
+pub fn parse<T: DeserializeOwned>(
+    text: &str,
+    path: &Path,
+    check: impl FnOnce(&T) -> Result<(), (String, String)>,
+) -> Result<T, Problem> {
+    let mut table = DeTable::parse(text).map_err(|e| syntax(&e, text, path))?;
+    let places = places(table.get_ref());
+    let camera = match camera_from_file(table.get_mut(), text, path)? {
+        Some(camera) => toml::to_string(&camera).unwrap_or_default(),
+        None => String::new(),
+    };
+    if !camera.is_empty()
+        && let Ok(camera) = DeTable::parse(&camera)
+    {
+        let span = camera.span();
+        let key = toml::Spanned::new(span.clone(), "camera".into());
+        table.get_mut().insert(key, toml::Spanned::new(span, DeValue::Table(camera.into_inner())));
+    }
+    let value = T::deserialize(toml::Deserializer::from(table)).map_err(|e| meaning(&e, text, path, &places, &[]))?;
+    check(&value).map_err(|(field, what)| {
+        let problem = Problem::new(path, what).in_field(field.clone());
+        let parts: Vec<&str> = field.split(|c: char| "[]. ".contains(c)).filter(|part| !part.is_empty()).collect();
+        // The key itself, or the section that it is missing from.
+        let place = (1..=parts.len()).rev().find_map(|n| places.iter().find(|p| p.path == parts[..n]));
+        match place {
+            Some(place) => problem.at_offset(text, place.key.start),
+            None => problem,
+        }
+    })?;
+    Ok(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Scene {
+        camera: hzn_core::camera::Config,
+        capture: Capture,
+    }
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Capture {
+        frames: u32,
+    }
+
+    const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px = 319.5\ncy_px = 239.5\n";
+
+    fn read(text: &str) -> Result<Scene, String> {
+        let check = |s: &Scene| match s.capture.frames {
+            0 => Err(("[capture] frames".to_owned(), "0 is refused: must be above 0".to_owned())),
+            _ => Ok(()),
+        };
+        parse(text, Path::new("scene.toml"), check).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn errors_have_lines_and_suggestions() {
+        let with = |rest: &str| read(&format!("{CAMERA}{rest}"));
+        assert_eq!(with("[capture]\nframes = 3\n").unwrap().camera.width, 640);
+        let error = |rest: &str| with(rest).unwrap_err();
+        assert_eq!(
+            error("[capture]\nframe = 3\n"),
+            "scene.toml:10: [capture] frame: unknown key; did you mean frames?"
+        );
+        assert_eq!(
+            error("[capture]\n\nframes = 0\n"),
+            "scene.toml:11: [capture] frames: 0 is refused: must be above 0"
+        );
+        assert!(error("[captures]\nframes = 1\n").contains("did you mean capture?"));
+        assert!(error("[capture]\nframes = \"many\"\n").starts_with("scene.toml:10: [capture] frames: "));
+        assert_eq!(error(""), "scene.toml: capture: the section [capture] is missing");
+    }
+
+    #[test]
+    fn the_camera_may_come_from_another_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  \
+                     distortion_model: equidistant\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, 480]\n";
+        std::fs::write(dir.path().join("camchain.yaml"), chain).unwrap();
+        let text = "[camera]\nfile = \"camchain.yaml\"\ntheta_max_deg = 50\n[capture]\nframes = 3\n";
+        let scene: Scene = parse(text, &dir.path().join("scene.toml"), |_| Ok(())).unwrap();
+        assert_eq!((scene.camera.fy_px, scene.camera.theta_max_deg), (301.0, Some(50.0)));
+    }
+}
