@@ -1,23 +1,62 @@
-//! Writes a few pictures of the built-in flights to look at into the folder given, and says how long each took.
+//! Writes pictures of a built-in scene to look at, runs the sensor over them and prints each answer beside the truth:
+//! `look SCENE [pictures] [folder] [fit]`; with `fit` the noise model is measured first.
 
 use std::path::PathBuf;
 use std::time::Instant;
 
-use hzn_sim::flight::{leo_infrared, rocket};
+use hzn_core::HostHorizon;
+use hzn_sim::Scenario;
+use hzn_sim::scenario::Fit;
 
 fn main() {
-    let dir = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "look".into()));
-    std::fs::create_dir_all(&dir).expect("the folder can be made");
-    for (kind, flight) in
-        [("", rocket(1920, 1080, 6, 1)), ("payload-", rocket(960, 540, 3, 1).with_payload()), ("", leo_infrared(6, 1))]
-    {
-        for frame in &flight.frames {
-            let start = Instant::now();
-            let picture = frame.render().expect("the scene is valid");
-            let took = start.elapsed();
-            let limb_px = frame.scene.visible_limb_px().expect("the scene is valid");
-            println!("{kind}{}: {took:.0?}, {limb_px:.0} px of limb", frame.file);
-            picture.save(&dir.join(format!("{kind}{}", frame.file))).expect("the picture can be written");
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let name = arguments.first().map_or("rocket", String::as_str);
+    let mut scenario = Scenario::builtin(name).expect("a built-in scene");
+    scenario.capture.frames = arguments.get(1).and_then(|a| a.parse().ok()).unwrap_or(6);
+    let folder = PathBuf::from(arguments.get(2).map_or("look", String::as_str));
+    std::fs::create_dir_all(&folder).expect("the folder can be made");
+    let begin = Instant::now();
+    let flight = scenario.flight().expect("the scene is valid");
+    println!("{name}: planned in {:.1?}", begin.elapsed());
+    let mut sensor = flight.sensor.clone();
+    if arguments.iter().any(|a| a == "fit") {
+        let fit = Fit::measure(&scenario, 24, &|_, _| ()).expect("the scene is valid");
+        println!("{fit:.3?} after {:.1?}", begin.elapsed());
+        if let Some(fit) = fit {
+            fit.apply(&mut sensor);
+        }
+    }
+    if let Some(body) = sensor.bodies.first().cloned() {
+        sensor.body = body;
+        sensor.bodies.clear();
+    }
+    let kind = sensor.body.kind;
+    let mut horizon = Box::new(HostHorizon::new(&sensor).expect("the sensor is valid"));
+    for frame in &flight.frames {
+        let start = Instant::now();
+        let picture = frame.render().expect("the scene is valid");
+        let took = start.elapsed();
+        picture.save(&folder.join(&frame.file)).expect("the picture can be written");
+        let truth = frame.scene.truth_of(kind, &frame.file, frame.time_s).expect("the scene is valid");
+        let expected = horizon.expect(&frame.known()).expect("the position is outside the Earth");
+        let report = horizon.process(&picture.view(), &expected);
+        let px = frame.scene.visible_px(kind).expect("the scene is valid");
+        print!(
+            "{} {:.0} s, {:.0} km, {px:.0} px of limb, exposure {:.2}, {took:.0?}: {}",
+            frame.file,
+            frame.time_s,
+            truth.altitude_km,
+            frame.scene.exposure,
+            report.status.name()
+        );
+        match (report.solution, truth.axis()) {
+            (Some(s), Some(axis)) => println!(
+                ", error {:.4} deg, sigma {:.4} deg, {} points",
+                s.axis.angle_rad(&axis).to_degrees(),
+                s.covariance.sigma_max_rad().to_degrees(),
+                s.inliers
+            ),
+            _ => println!(" {:?}", report.candidates.iter().map(|c| c.verdict.name()).collect::<Vec<_>>()),
         }
     }
 }

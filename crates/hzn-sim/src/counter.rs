@@ -19,6 +19,16 @@ pub(crate) enum Stream {
     EdgeV,
     /// The error of an attitude that is told to the sensor.
     AttitudePrior,
+    /// Offset of every pixel.
+    FixedPattern,
+    /// Gain of every pixel.
+    GainPattern,
+    /// How the vehicle turns.
+    Drift,
+    /// Errors of gyroscopes and accelerometers.
+    Imu,
+    /// Errors of a satellite receiver.
+    Gnss,
 }
 
 /// A sequence of random numbers, read by index.

@@ -18,10 +18,53 @@ pub struct Detector {
     pub full_well_electrons: Option<f64>,
     /// Share of pixels that are hot, and show anything up to full scale in every picture.
     pub hot_pixels: f64,
-    /// Which pixels are hot.
+    /// Which pixels are hot, and the fixed patterns.
     pub hot_pixel_seed: u64,
+    /// Standard deviation of the pixels' own offsets, the same in every picture, fraction of full scale.
+    pub offset_pattern: f64,
+    /// Standard deviation of the pixels' own gains over 1.
+    pub gain_pattern: f64,
+    /// From light to brightness. Shot noise comes before it, everything else after.
+    pub tone: Tone,
+    /// Three samples a pixel, red, green, blue, instead of their mean. In a world that is grey they are equal but for
+    /// their noise.
+    pub colour: bool,
     /// Bits of a sample, 8 to 16.
     pub bits: u8,
+}
+
+/// How light becomes brightness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tone {
+    /// In proportion.
+    #[default]
+    Linear,
+    /// As pictures for the eye: the curve of sRGB, which lifts what is dark.
+    Srgb,
+}
+
+/// The curve of sRGB and its slope in steps of light, as powers are slow.
+struct Curve(Vec<[f32; 2]>);
+
+impl Curve {
+    const STEPS: usize = 4096;
+
+    fn srgb() -> Self {
+        let value = |light: f32| {
+            if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * libm::powf(light, 1.0 / 2.4) - 0.055 }
+        };
+        let at = |i: usize| value(i as f32 / Self::STEPS as f32);
+        Self((0..=Self::STEPS).map(|i| [at(i), (at(i + 1) - at(i)) * Self::STEPS as f32]).collect())
+    }
+
+    /// Brightness and its slope.
+    #[inline(always)]
+    fn at(&self, light: f32) -> [f32; 2] {
+        let x = light.clamp(0.0, 1.0) * Self::STEPS as f32;
+        let [value, slope] = self.0.get(x as usize).copied().unwrap_or([1.0, 0.0]);
+        [value + slope * (x - x.trunc()) * (1.0 / Self::STEPS as f32), slope]
+    }
 }
 
 impl Default for Detector {
@@ -32,6 +75,10 @@ impl Default for Detector {
             full_well_electrons: None,
             hot_pixels: 0.0,
             hot_pixel_seed: 1,
+            offset_pattern: 0.0,
+            gain_pattern: 0.0,
+            tone: Tone::Linear,
+            colour: false,
             bits: 8,
         }
     }
@@ -103,36 +150,71 @@ impl Plane {
 }
 
 impl Detector {
-    /// Noise, hot pixels and quantisation.
-    pub(crate) fn expose(&self, light: &Plane, seed: u64) -> Picture {
+    /// Noise, hot pixels and quantisation of one plane, or of three for colours.
+    pub(crate) fn expose(&self, light: &[Plane], seed: u64) -> Picture {
         let bits = self.bits.clamp(8, 16);
+        let (width, height) = light.first().map_or((0, 0), |p| (p.width as u16, p.height() as u16));
         let samples = if bits == 8 {
-            let mut data = vec![0u8; light.data.len()];
-            self.fill(light, seed, bits, &mut data, |v| v as u8);
-            Samples::Bytes(data)
+            Samples::Bytes(self.samples(light, seed, bits, |v| v as u8))
         } else {
-            let mut data = vec![0u16; light.data.len()];
-            self.fill(light, seed, bits, &mut data, |v| v as u16);
-            Samples::Words(data)
+            Samples::Words(self.samples(light, seed, bits, |v| v as u16))
         };
-        Picture { width: light.width as u16, height: light.height() as u16, bits, samples }
+        Picture { width, height, channels: light.len() as u8, bits, samples }
     }
 
-    fn fill<S: Send>(&self, light: &Plane, seed: u64, bits: u8, out: &mut [S], to: impl Fn(u32) -> S + Sync) {
+    fn samples<S: Send + Copy + Default>(&self, light: &[Plane], seed: u64, bits: u8, to: fn(u32) -> S) -> Vec<S> {
+        let mut planes = light.iter().enumerate().map(|(channel, light)| {
+            let mut data = vec![S::default(); light.data.len()];
+            // Colours have noise of their own.
+            self.fill(light, seed.wrapping_add((channel as u64) << 40), channel, bits, &mut data, to);
+            data
+        });
+        match (planes.next(), planes.next(), planes.next()) {
+            (Some(r), Some(g), Some(b)) => r.iter().zip(&g).zip(&b).flat_map(|((&r, &g), &b)| [r, g, b]).collect(),
+            (one, ..) => one.unwrap_or_default(),
+        }
+    }
+
+    fn fill<S: Send>(
+        &self,
+        light: &Plane,
+        seed: u64,
+        channel: usize,
+        bits: u8,
+        out: &mut [S],
+        to: impl Fn(u32) -> S + Sync,
+    ) {
         let w = light.width;
         let full = ((1u32 << bits) - 1) as f32;
         let noise = Counter::new(seed, Stream::Detector);
-        let hot = Counter::new(self.hot_pixel_seed, Stream::HotPixels);
+        let own = self.hot_pixel_seed.wrapping_add((channel as u64) << 40);
+        let hot = Counter::new(own, Stream::HotPixels);
+        let (offsets, gains) = (Counter::new(own, Stream::FixedPattern), Counter::new(own, Stream::GainPattern));
+        let (offset, gain) = (self.offset_pattern as f32, self.gain_pattern as f32);
         let read2 = (self.read_noise * self.read_noise) as f32;
         let shot = self.full_well_electrons.map_or(0.0, |e| 1.0 / e.max(1.0)) as f32;
         let noisy = read2 > 0.0 || shot > 0.0;
+        let (tone, curve) = (self.tone, Curve::srgb());
         out.par_chunks_mut(w).zip(light.data.par_chunks(w)).enumerate().for_each(|(y, (out, light))| {
             // Pixels share a draw in pairs; an odd width leaves half a draw unused.
             let first = (y * w.div_ceil(2)) as u64;
             for (pair, (out, light)) in out.chunks_mut(2).zip(light.chunks(2)).enumerate() {
-                let normal = if noisy { noise.normal_pair(first + pair as u64) } else { [0.0; 2] };
+                let index = first + pair as u64;
+                let normal = if noisy { noise.normal_pair(index) } else { [0.0; 2] };
+                let offsets = if offset > 0.0 { offsets.normal_pair(index) } else { [0.0; 2] };
+                let gains = if gain > 0.0 { gains.normal_pair(index) } else { [0.0; 2] };
                 for (i, (out, &light)) in out.iter_mut().zip(light).enumerate() {
-                    let mut v = light + normal[i] * (read2 + shot * light.max(0.0)).sqrt();
+                    let light = light * (1.0 + gain * gains[i]);
+                    let mut v = match tone {
+                        // One draw serves both kinds: their variances add.
+                        Tone::Linear => light + normal[i] * (read2 + shot * light.max(0.0)).sqrt(),
+                        // Shot noise through the curve, to first order, keeps one draw enough.
+                        Tone::Srgb => {
+                            let [bright, slope] = curve.at(light);
+                            bright + normal[i] * (read2 + shot * light.clamp(0.0, 1.0) * slope * slope).sqrt()
+                        }
+                    };
+                    v += offset * offsets[i];
                     if self.hot_pixels > 0.0 {
                         let index = 2 * (y * w + 2 * pair + i) as u64;
                         if hot.uniform(index) < self.hot_pixels {
@@ -169,7 +251,9 @@ mod tests {
     fn noise_has_the_stated_sigma() {
         let d = Detector { read_noise: 0.02, bits: 16, ..Detector::default() };
         let sigma = |d: Detector, level: f32| {
-            let Samples::Words(data) = d.expose(&flat(401, 300, level), 3).samples else { panic!("16 bits are words") };
+            let Samples::Words(data) = d.expose(&[flat(401, 300, level)], 3).samples else {
+                panic!("16 bits are words")
+            };
             let n = data.len() as f64;
             let mean = data.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
             (data.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / n).sqrt() / 65535.0
@@ -181,10 +265,27 @@ mod tests {
     }
 
     #[test]
+    fn tone_is_that_of_srgb() {
+        let d = Detector { tone: Tone::Srgb, bits: 16, ..Detector::default() };
+        for (light, want) in [(0.0, 0.0), (0.002, 0.02584), (0.2140, 0.5), (0.5, 0.73536), (1.0, 1.0), (7.0, 1.0)] {
+            let got = f64::from(d.expose(&[flat(2, 1, light)], 0).at(0, 0)) / 65535.0;
+            assert!((got - want).abs() < 2e-4, "{light}: {got}");
+        }
+    }
+
+    #[test]
+    fn patterns_are_the_same_in_every_picture() {
+        let d = Detector { offset_pattern: 0.01, gain_pattern: 0.05, bits: 16, ..Detector::default() };
+        let shot = |light: f32, seed| d.expose(&[flat(64, 64, light)], seed);
+        assert_eq!(shot(0.5, 1), shot(0.5, 2));
+        assert_ne!(shot(0.5, 1), Detector { hot_pixel_seed: 2, ..d }.expose(&[flat(64, 64, 0.5)], 1));
+    }
+
+    #[test]
     fn hot_pixels_stay_where_they_are() {
         let d = Detector { hot_pixels: 0.01, ..Detector::default() };
-        let a = d.expose(&flat(200, 100, 0.0), 1);
-        assert_eq!(a, d.expose(&flat(200, 100, 0.0), 2));
+        let a = d.expose(&[flat(200, 100, 0.0)], 1);
+        assert_eq!(a, d.expose(&[flat(200, 100, 0.0)], 2));
         let Samples::Bytes(data) = a.samples else { panic!("8 bits are bytes") };
         let hot = data.iter().filter(|&&v| v > 0).count();
         assert!((150..250).contains(&hot), "{hot}");

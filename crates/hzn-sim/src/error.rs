@@ -14,4 +14,7 @@ pub enum SceneError {
     /// The direction to the Sun has no length.
     #[error("the direction to the Sun must have a length")]
     Sun,
+    /// There is no Moon in the scene.
+    #[error("the scene has no Moon")]
+    Moon,
 }

@@ -21,7 +21,7 @@ use crate::truth::Truth;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flight {
     /// Short name, usable in file names.
-    pub name: &'static str,
+    pub name: String,
     /// What the sensor is told.
     pub sensor: hzn_core::Config,
     /// The pictures in the order of time.
@@ -35,6 +35,8 @@ pub struct FlightFrame {
     pub file: String,
     /// Time since the first picture in seconds.
     pub time_s: f64,
+    /// UTC as ISO 8601, where there is a date.
+    pub utc: Option<String>,
     /// What is seen.
     pub scene: Scene,
 }
@@ -46,6 +48,8 @@ pub struct FrameRow {
     pub file: String,
     /// Time in seconds.
     pub time_s: f64,
+    /// UTC as ISO 8601.
+    pub utc: Option<String>,
     /// Altitude in kilometres, geodetic for `earth`.
     pub altitude_km: f64,
     /// Position in ECEF, kilometres.
@@ -54,6 +58,16 @@ pub struct FrameRow {
     pub y_km: f64,
     /// Third component of the position.
     pub z_km: f64,
+    /// Prior attitude as a quaternion from camera to ECEF, scalar part.
+    pub qw: Option<f64>,
+    /// First vector component of the prior attitude.
+    pub qx: Option<f64>,
+    /// Second vector component of the prior attitude.
+    pub qy: Option<f64>,
+    /// Third vector component of the prior attitude.
+    pub qz: Option<f64>,
+    /// 1-sigma of the prior attitude about each axis, degrees.
+    pub attitude_sigma_deg: Option<f64>,
 }
 
 impl FlightFrame {
@@ -61,7 +75,20 @@ impl FlightFrame {
     pub fn row(&self) -> FrameRow {
         let [x_km, y_km, z_km] = self.scene.pose.position_m.map(|m| m * 1e-3);
         let altitude_km = Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m) * 1e-3;
-        FrameRow { file: self.file.clone(), time_s: self.time_s, altitude_km, x_km, y_km, z_km }
+        FrameRow {
+            file: self.file.clone(),
+            time_s: self.time_s,
+            utc: self.utc.clone(),
+            altitude_km,
+            x_km,
+            y_km,
+            z_km,
+            qw: None,
+            qx: None,
+            qy: None,
+            qz: None,
+            attitude_sigma_deg: None,
+        }
     }
     /// The picture.
     ///
@@ -194,10 +221,10 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
                 seed: seed_of(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position, look))
             };
-            FlightFrame { file: format!("rocket-{index:04}.png"), time_s, scene }
+            FlightFrame { file: format!("rocket-{index:04}.png"), time_s, utc: None, scene }
         })
         .collect();
-    Flight { name: "rocket", sensor, frames }
+    Flight { name: "rocket".into(), sensor, frames }
 }
 
 /// An infrared Earth sensor in low orbit: 384×288, equidistant with 92 px/rad to 90° off axis, 600 km, a uniform disc
@@ -226,10 +253,10 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
                 seed: seed_of(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position_m(lat_deg, lon_deg, 600.0), look))
             };
-            FlightFrame { file: format!("leo-infrared-{index:04}.png"), time_s, scene }
+            FlightFrame { file: format!("leo-infrared-{index:04}.png"), time_s, utc: None, scene }
         })
         .collect();
-    Flight { name: "leo-infrared", sensor, frames }
+    Flight { name: "leo-infrared".into(), sensor, frames }
 }
 
 #[cfg(test)]

@@ -76,6 +76,11 @@ impl View {
         ok.then(|| Self { cam_to_scaled, y: Vector3::new(x / a, y / a, z / b), outside, inverse_axes })
     }
 
+    /// Away from the body's centre, ECEF, roughly up.
+    pub(crate) fn up(&self) -> Vector3<f64> {
+        self.y.normalize()
+    }
+
     /// What the ray with direction `s` (camera frame, unit length) meets.
     #[inline(always)]
     pub(crate) fn look(&self, s: [f64; 3]) -> Sight {

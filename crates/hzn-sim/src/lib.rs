@@ -9,6 +9,10 @@
 //! | [`pose`] | where the camera is and where it looks |
 //! | [`globe`] | the body as an ellipsoid, and what a ray meets on it |
 //! | [`texture`] | clouds |
+//! | [`visible`] | the Earth in sunlight: ground, clouds, air, Sun, Moon |
+//! | [`infrared`] | the Earth at 15 µm |
+//! | [`optics`] | fall-off and stray light |
+//! | [`motion`] | rotation during a picture |
 //! | [`foreground`] | structure of the vehicle in the picture |
 //! | `height` | the limb's height by latitude |
 //! | `render` | light on every pixel |
@@ -16,6 +20,8 @@
 //! | [`picture`] | the result, and its file |
 //! | [`limb`] | the limb as a line in the picture, edge points on it |
 //! | [`truth`] | what is true of a scene |
+//! | [`scenario`] | a whole sequence in one description: scene.toml |
+//! | [`trajectory`] | rocket, orbit, table; attitude; inertial sensors and satellite receiver |
 //! | [`ephemeris`] | where Sun and Moon stand |
 //! | [`utc`] | dates, seconds, terrestrial time |
 //! | [`evaluate`] | answers beside their truth: how many, how good, how honest |
@@ -31,24 +37,35 @@ pub mod flight;
 pub mod foreground;
 pub mod globe;
 mod height;
+pub mod infrared;
 pub mod limb;
+pub mod motion;
+pub mod optics;
 pub mod picture;
 pub mod pose;
 mod render;
+pub mod scenario;
 pub mod scene;
 pub mod sensitivity;
 pub mod texture;
+pub mod trajectory;
 pub mod truth;
 pub mod utc;
+pub mod visible;
 
-pub use detector::Detector;
+pub use detector::{Detector, Tone};
 pub use error::SceneError;
 pub use flight::{Flight, FlightFrame};
 pub use foreground::Foreground;
 pub use globe::Globe;
+pub use infrared::Infrared;
 pub use limb::{EdgeNoise, LimbCircle, LimbPoint};
+pub use motion::Motion;
+pub use optics::Optics;
 pub use picture::{Picture, Samples};
 pub use pose::{Look, Pose};
-pub use scene::{Band, Disc, Light, Profile, Scene, Sky};
+pub use scenario::{Scenario, ScenarioError};
+pub use scene::{Band, Disc, Light, Profile, Scene, Sky, World};
 pub use texture::Clouds;
 pub use truth::Truth;
+pub use visible::Visible;

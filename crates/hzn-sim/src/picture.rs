@@ -1,6 +1,9 @@
 //! A rendered picture in memory and as a file.
 
+use std::borrow::Cow;
 use std::path::Path;
+
+use image::ExtendedColorType;
 
 use hzn_core::image::{Channel, ImageView, Layout};
 
@@ -13,11 +16,13 @@ pub enum Samples {
     Words(Vec<u16>),
 }
 
-/// A grey picture.
+/// A picture, grey or in three colours.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
     pub(crate) width: u16,
     pub(crate) height: u16,
+    /// Samples a pixel: 1, or 3 for red, green, blue.
+    pub(crate) channels: u8,
     pub(crate) bits: u8,
     pub(crate) samples: Samples,
 }
@@ -31,6 +36,10 @@ impl Picture {
     pub fn height(&self) -> u16 {
         self.height
     }
+    /// Samples a pixel: 1 is grey, 3 is red, green, blue.
+    pub fn channels(&self) -> u8 {
+        self.channels
+    }
     /// Significant bits of a sample, 8 to 16.
     pub fn bits(&self) -> u8 {
         self.bits
@@ -39,21 +48,23 @@ impl Picture {
     pub fn samples(&self) -> &Samples {
         &self.samples
     }
-    /// Value at column `x`, row `y`; 0 outside the picture.
+    /// Value at column `x`, row `y`, of colours the mean; 0 outside the picture.
     pub fn at(&self, x: u16, y: u16) -> u16 {
         if x >= self.width || y >= self.height {
             return 0;
         }
-        let i = usize::from(y) * usize::from(self.width) + usize::from(x);
-        match &self.samples {
-            Samples::Bytes(data) => data[i].into(),
-            Samples::Words(data) => data[i],
-        }
+        let n = usize::from(self.channels);
+        let i = (usize::from(y) * usize::from(self.width) + usize::from(x)) * n;
+        let sum: u32 = match &self.samples {
+            Samples::Bytes(data) => data[i..i + n].iter().map(|&v| u32::from(v)).sum(),
+            Samples::Words(data) => data[i..i + n].iter().map(|&v| u32::from(v)).sum(),
+        };
+        (sum / u32::from(self.channels)) as u16
     }
 
     /// The picture as hzn-core reads it.
     pub fn view(&self) -> ImageView<'_> {
-        let layout = Layout::packed(self.width.into(), self.height.into(), 1, self.bits);
+        let layout = Layout::packed(self.width.into(), self.height.into(), self.channels, self.bits);
         match &self.samples {
             Samples::Bytes(data) => ImageView::from_bytes(data, layout, Channel::Mean),
             Samples::Words(data) => ImageView::from_words(data, layout, Channel::Mean),
@@ -61,20 +72,43 @@ impl Picture {
         .expect("a rendered picture is as large as it says")
     }
 
-    /// Writes the picture: 8 bits as 8, more as 16, where samples of 10 and 12 bits keep their values. The format
-    /// follows the ending of the name.
+    /// Writes the picture: 8 bits as 8, more as 16, over which samples of 10 and 12 bits are spread, as readers know of no
+    /// other full scale. The format follows the ending of the name.
     ///
     /// # Errors
     /// The file cannot be written, or its ending is not that of a format with this many bits.
     pub fn save(&self, path: &Path) -> Result<(), image::ImageError> {
         let (w, h) = (self.width.into(), self.height.into());
-        let (bytes, colour): (Vec<u8>, _) = match &self.samples {
-            Samples::Bytes(data) => return image::save_buffer(path, data, w, h, image::ExtendedColorType::L8),
-            Samples::Words(data) => {
-                (data.iter().flat_map(|v| v.to_ne_bytes()).collect(), image::ExtendedColorType::L16)
+        let grey = self.channels == 1;
+        match &self.samples {
+            Samples::Bytes(data) => {
+                let colour = if grey { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
+                image::save_buffer(path, data, w, h, colour)
             }
+            Samples::Words(data) => {
+                // The upper bits come again below, so that full scale stays full scale.
+                let spread =
+                    |v: u16| ((u32::from(v) << (16 - self.bits)) | (u32::from(v) >> (2 * self.bits - 16))) as u16;
+                let bytes: Vec<u8> = data.iter().flat_map(|&v| spread(v).to_ne_bytes()).collect();
+                let colour = if grey { ExtendedColorType::L16 } else { ExtendedColorType::Rgb16 };
+                image::save_buffer(path, &bytes, w, h, colour)
+            }
+        }
+    }
+
+    /// Writes the picture as JPEG with this quality, 1 to 100. More than 8 bits are cut to 8.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn save_jpeg(&self, path: &Path, quality: u8) -> Result<(), image::ImageError> {
+        let file = std::io::BufWriter::new(std::fs::File::create(path).map_err(image::ImageError::IoError)?);
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(file, quality.clamp(1, 100));
+        let colour = if self.channels == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
+        let bytes: Cow<'_, [u8]> = match &self.samples {
+            Samples::Bytes(data) => Cow::Borrowed(data),
+            Samples::Words(data) => Cow::Owned(data.iter().map(|v| (v >> (self.bits - 8)) as u8).collect()),
         };
-        image::save_buffer(path, &bytes, w, h, colour)
+        encoder.encode(&bytes, self.width.into(), self.height.into(), colour)
     }
 }
 
@@ -86,13 +120,25 @@ mod tests {
     #[test]
     fn written_and_read_back() {
         let dir = tempfile::tempdir().unwrap();
-        let bytes = Picture { width: 3, height: 2, bits: 8, samples: Samples::Bytes(vec![0, 1, 2, 253, 254, 255]) };
-        let words = Picture { width: 3, height: 2, bits: 12, samples: Samples::Words(vec![0, 1, 2, 4093, 4094, 4095]) };
+        let bytes = Picture {
+            width: 3,
+            height: 2,
+            channels: 1,
+            bits: 8,
+            samples: Samples::Bytes(vec![0, 1, 2, 253, 254, 255]),
+        };
+        let words = Picture {
+            width: 3,
+            height: 2,
+            channels: 1,
+            bits: 12,
+            samples: Samples::Words(vec![0, 1, 2, 4093, 4094, 4095]),
+        };
         let path = dir.path().join("a.png");
         bytes.save(&path).unwrap();
         assert_eq!(image::open(&path).unwrap().into_luma8().into_raw(), [0, 1, 2, 253, 254, 255]);
         words.save(&path).unwrap();
-        assert_eq!(image::open(&path).unwrap().into_luma16().into_raw(), [0, 1, 2, 4093, 4094, 4095]);
+        assert_eq!(image::open(&path).unwrap().into_luma16().into_raw(), [0, 16, 32, 65503, 65519, 65535]);
         assert_eq!((words.view().full_scale(), words.view().at(2, 1), words.at(2, 1)), (4095, 4095, 4095));
         assert_eq!(words.at(3, 0), 0);
     }

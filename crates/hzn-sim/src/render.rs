@@ -15,9 +15,17 @@ use crate::detector::Plane;
 use crate::error::SceneError;
 use crate::globe::{Globe, Sight, View};
 use crate::height::LimbHeight;
+use crate::infrared::Warmth;
+use crate::motion::Motion;
+use crate::optics::Optics;
 use crate::picture::Picture;
-use crate::scene::{Band, Light, Profile, Scene, Sky};
+use crate::pose::Pose;
+use crate::scene::{Band, Light, Profile, Scene, Sky, World};
 use crate::texture::{CloudField, smoothstep};
+use crate::visible::Visible;
+use crate::visible::air::Prepared;
+use crate::visible::discs::Canvas;
+use crate::visible::shade::Shader;
 
 /// Pixels this close to the limb are averaged.
 const NEAR_PX: f64 = 3.0;
@@ -32,9 +40,162 @@ impl Scene {
     /// # Errors
     /// A camera that [`Camera::try_new`] refuses, or a position that is not outside the body.
     pub fn render(&self) -> Result<Picture, SceneError> {
-        let painter = Painter::try_new(self)?;
-        let light = painter.light(self).blurred(self.detector.psf_sigma_px);
-        Ok(self.detector.expose(&painter.through_circle(light), self.seed))
+        let camera = Camera::<f64>::try_new(&self.camera)?;
+        let mut light = self.light()?;
+        for plane in &mut light {
+            self.expose(plane, &camera);
+        }
+        let blur = |plane: Plane| through_circle(plane.blurred(self.detector.psf_sigma_px), &camera);
+        let light: Vec<Plane> = light.into_iter().map(blur).collect();
+        Ok(self.detector.expose(&light, self.seed))
+    }
+
+    /// Light on every pixel before blur and exposure: one plane, or three for colours.
+    fn light(&self) -> Result<Vec<Plane>, SceneError> {
+        let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
+        let camera = beyond_circle(&self.camera)?;
+        let (fx, fy) = camera.focal_px();
+        let pixel_rad = 1.0 / fx.min(fy);
+        let motion = self.motion.filter(|m| m.matters(pixel_rad));
+        let poses = |row: usize| match &motion {
+            Some(motion) => motion.poses(&self.pose, row as f64, h, pixel_rad),
+            None => vec![self.pose],
+        };
+        let mut planes = match &self.world {
+            World::Plain => {
+                let painter = Painter::try_new(self)?;
+                let mut data = vec![0.0f32; w * h];
+                data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match &motion {
+                    None => painter.row(y as f64, row),
+                    Some(_) => {
+                        let poses = poses(y);
+                        let mut one = vec![0.0f32; w];
+                        for pose in &poses {
+                            painter.turned(pose).row(y as f64, &mut one);
+                            row.iter_mut().zip(&one).for_each(|(sum, p)| *sum += p / poses.len() as f32);
+                        }
+                    }
+                });
+                painter.draw_stars(&self.sky, w, &mut data);
+                vec![Plane { width: w, data }]
+            }
+            World::Infrared(world) => {
+                let globe = Globe::of(&self.body);
+                let warmth = Warmth::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
+                let mut data = vec![0.0f32; w * h];
+                data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match &motion {
+                    None => warmth.row(y as f64, 1.0, row),
+                    Some(_) => {
+                        let poses = poses(y);
+                        poses.iter().for_each(|p| warmth.turned(p).row(y as f64, 1.0 / poses.len() as f32, row));
+                    }
+                });
+                vec![Plane { width: w, data }]
+            }
+            World::Visible(world) => self.visible(world, camera, motion.as_ref())?,
+        };
+        for plane in &mut planes {
+            plane.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+                for f in &self.foreground {
+                    f.draw_row(y, row);
+                }
+            });
+        }
+        if let World::Visible(world) = &self.world
+            && world.sun_in_view
+        {
+            self.glare(world, &mut planes)?;
+        }
+        // A grey camera sees the mean of the colours; a coloured one of a grey world, three times the same.
+        if self.detector.colour {
+            while planes.len() < 3 {
+                planes.extend(planes.first().cloned());
+            }
+        } else if let [r, g, b] = planes.as_mut_slice() {
+            r.data.iter_mut().zip(&g.data).zip(&b.data).for_each(|((r, g), b)| *r = (*r + g + b) / 3.0);
+            planes.truncate(1);
+        }
+        Ok(planes)
+    }
+
+    /// The shader of a visible world from the scene's own pose.
+    fn shader(&self, world: &Visible, camera: Camera<f64>) -> Result<Shader, SceneError> {
+        let up = Vector3::from(self.pose.position_m);
+        let sun = match self.light {
+            Light::Sun { direction, .. } => Vector3::from(direction),
+            Light::Full | Light::Sector { .. } => up,
+        };
+        let sun = sun.try_normalize(1e-12).ok_or(SceneError::Sun)?;
+        Shader::try_new(world, camera, Globe::of(&self.body), &self.pose, sun).ok_or(SceneError::Pose)
+    }
+
+    /// Earth, sky, and what stands in it.
+    fn visible(&self, world: &Visible, camera: Camera<f64>, motion: Option<&Motion>) -> Result<Vec<Plane>, SceneError> {
+        let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
+        let (fx, fy) = camera.focal_px();
+        let pixel_rad = 1.0 / fx.min(fy);
+        let shader = self.shader(world, camera)?;
+        let mut pixels = vec![[0.0f32; 3]; w * h];
+        pixels.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
+            None => shader.row(y as f64, 1.0, row),
+            Some(motion) => {
+                let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
+                poses.iter().for_each(|p| shader.turned(p).row(y as f64, 1.0 / poses.len() as f32, row));
+            }
+        });
+        // Points and discs of the sky: from the poses of the middle row.
+        let poses =
+            motion.map_or_else(|| vec![self.pose], |m| m.poses(&self.pose, 0.5 * (h as f64 - 1.0), h, pixel_rad));
+        let weight = 1.0 / poses.len() as f32;
+        let mut canvas = Canvas { width: w, pixels: &mut pixels };
+        for pose in &poses {
+            let shader = shader.turned(pose);
+            shader.draw_stars(&mut canvas, weight, world, world.ground.seed);
+            if let Some(moon) = self.moon_ecef_m {
+                shader.draw_moon(&mut canvas, weight, moon, self.pose.position_m);
+            }
+            if world.sun_in_view {
+                shader.draw_sun(&mut canvas, weight);
+            }
+        }
+        Ok((0..3).map(|c| Plane { width: w, data: pixels.iter().map(|p| p[c]).collect() }).collect())
+    }
+
+    /// Stray light of the Sun, which no part of the vehicle hides but one in front of the Sun itself.
+    fn glare(&self, world: &Visible, planes: &mut [Plane]) -> Result<(), SceneError> {
+        if self.optics == Optics::default() {
+            return Ok(());
+        }
+        let shader = self.shader(world, beyond_circle(&self.camera)?)?;
+        let hidden = shader.sun_point().is_some_and(|p| self.foreground.iter().any(|f| f.contains([p.u, p.v])));
+        let width = usize::from(self.camera.width);
+        let mut pixels = vec![[0.0f32; 3]; width * usize::from(self.camera.height)];
+        shader.draw_glare(&mut Canvas { width, pixels: &mut pixels }, &self.optics, hidden);
+        for (c, plane) in planes.iter_mut().enumerate() {
+            plane.data.iter_mut().zip(&pixels).for_each(|(p, add)| *p += add[c]);
+        }
+        Ok(())
+    }
+
+    /// Fall-off towards the corners, and the exposure.
+    fn expose(&self, plane: &mut Plane, camera: &Camera<f64>) {
+        let (exposure, lost) = (self.exposure as f32, self.optics.vignetting as f32);
+        if exposure == 1.0 && lost == 0.0 {
+            return;
+        }
+        let w = plane.width;
+        let (middle, right, bottom) = (camera.principal_point(), w as f64 - 0.5, plane.height() as f64 - 0.5);
+        let far2 = [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)]
+            .map(|(x, y)| (x - middle.u) * (x - middle.u) + (y - middle.v) * (y - middle.v))
+            .into_iter()
+            .fold(1.0, f64::max);
+        plane.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+            let dy2 = (y as f64 - middle.v) * (y as f64 - middle.v);
+            for (x, p) in row.iter_mut().enumerate() {
+                let dx = x as f64 - middle.u;
+                *p *= exposure * (1.0 - lost * ((dx * dx + dy2) / far2) as f32);
+            }
+        });
     }
 }
 
@@ -46,15 +207,34 @@ fn beyond_circle(config: &camera::Config) -> Result<Camera<f64>, SceneError> {
     with(None).or_else(|_| with(wider)).or_else(|_| with(config.theta_max_deg)).map_err(SceneError::from)
 }
 
+/// No light reaches what is beyond the image circle.
+fn through_circle(mut light: Plane, camera: &Camera<f64>) -> Plane {
+    if let Some((c, a, b)) = camera.image_circle_px() {
+        let w = light.width;
+        light.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+            let dy = (y as f64 - c.v) / b;
+            for (x, p) in row.iter_mut().enumerate() {
+                let dx = (x as f64 - c.u) / a;
+                if dx * dx + dy * dy > 1.0 {
+                    *p = 0.0;
+                }
+            }
+        });
+    }
+    light
+}
+
 /// A scene, prepared for asking pixel by pixel.
+#[derive(Debug, Clone)]
 pub(crate) struct Painter {
     /// The lens, beyond its image circle too where it can be.
     camera: Camera<f64>,
-    /// Middle and semi-axes of the image circle in pixels.
-    circle: Option<(ImagePoint<f64>, f64, f64)>,
+    globe: Globe,
     view: View,
     edge: Edge,
     lamp: Lamp,
+    /// The air of a visible world, whose limb goes on to shine beyond the terminator.
+    air: Option<Prepared>,
     surface: f32,
     clouds: Option<CloudField>,
     band: Option<Band>,
@@ -69,7 +249,6 @@ pub(crate) struct Painter {
 
 impl Painter {
     pub(crate) fn try_new(scene: &Scene) -> Result<Self, SceneError> {
-        let circle = Camera::<f64>::try_new(&scene.camera)?.image_circle_px();
         let camera = beyond_circle(&scene.camera)?;
         let height = LimbHeight::of(scene);
         let globe = Globe::of(&scene.body).raised(height.reference_m);
@@ -88,6 +267,10 @@ impl Painter {
                 + 2.2 * height.largest_departure_m() / globe.b_m,
             edge: Edge::new(scene.profile),
             lamp: Lamp::try_new(scene, globe)?,
+            air: match &scene.world {
+                World::Visible(world) => Some(Prepared::new(&world.air, globe.a_m)),
+                World::Plain | World::Infrared(_) => None,
+            },
             surface: scene.disc.surface as f32,
             clouds: scene.disc.clouds.map(|c| CloudField::new(&c, globe.a_m)),
             band: scene.disc.band,
@@ -95,7 +278,7 @@ impl Painter {
             pixel_rad,
             radius_km: (globe.a_m / 1e3) as f32,
             camera,
-            circle,
+            globe,
             view,
             height,
         })
@@ -116,41 +299,21 @@ impl Painter {
     pub(crate) fn lit(&self, ecef: [f64; 3]) -> f32 {
         self.to_camera(ecef).map_or(0.0, |cam| {
             let sight = self.view.look(cam.xyz());
-            self.lamp.at(&self.view, &sight, &self.view.point(&sight))
+            let point = self.view.point(&sight);
+            match (&self.air, &self.lamp) {
+                (Some(air), Lamp::Sun { direction, .. }) => {
+                    let mu0 = self.view.normal(&point).dot(direction) as f32;
+                    air.sunlight(air.sun_path(mu0), air.thin(self.height.reference_m as f32))[1]
+                }
+                _ => self.lamp.at(&self.view, &sight, &point),
+            }
         })
     }
 
-    /// Light on every pixel before the blur.
-    pub(crate) fn light(&self, scene: &Scene) -> Plane {
-        let (w, h) = (usize::from(scene.camera.width), usize::from(scene.camera.height));
-        let mut data = vec![0.0f32; w * h];
-        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-            self.row(y as f64, row);
-        });
-        self.draw_stars(&scene.sky, w, &mut data);
-        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-            for f in &scene.foreground {
-                f.draw_row(y, row);
-            }
-        });
-        Plane { width: w, data }
-    }
-
-    /// No light reaches what is beyond the image circle.
-    fn through_circle(&self, mut light: Plane) -> Plane {
-        if let Some((c, a, b)) = self.circle {
-            let w = light.width;
-            light.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-                let dy = (y as f64 - c.v) / b;
-                for (x, p) in row.iter_mut().enumerate() {
-                    let dx = (x as f64 - c.u) / a;
-                    if dx * dx + dy * dy > 1.0 {
-                        *p = 0.0;
-                    }
-                }
-            });
-        }
-        light
+    /// The same from another attitude.
+    fn turned(&self, pose: &Pose) -> Self {
+        let view = View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone());
+        Self { view, ..self.clone() }
     }
 
     /// One row of pixels.

@@ -5,8 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
 use crate::foreground::Foreground;
+use crate::infrared::Infrared;
+use crate::motion::Motion;
+use crate::optics::Optics;
 use crate::pose::Pose;
 use crate::texture::Clouds;
+use crate::visible::Visible;
 
 /// One picture's worth of world: everything the renderer and the truth need. Brightness is a fraction of full scale.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,6 +27,9 @@ pub struct Scene {
     /// of the tangent point; in between it is linear. Empty: `body.limb_height_km` everywhere.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub limb_height_by_latitude_km: Vec<[f64; 2]>,
+    /// What kind of world it is; the next four belong to the plain one, `light` to the visible one too.
+    #[serde(default)]
+    pub world: World,
     /// How brightness falls off outside the limb.
     #[serde(default)]
     pub profile: Profile,
@@ -35,15 +42,45 @@ pub struct Scene {
     /// What is seen outside.
     #[serde(default)]
     pub sky: Sky,
+    /// Position of the Moon in ECEF, metres, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moon_ecef_m: Option<[f64; 3]>,
     /// Structure of the vehicle in front of everything.
     #[serde(default)]
     pub foreground: Vec<Foreground>,
+    /// Imperfections of the lens.
+    #[serde(default)]
+    pub optics: Optics,
+    /// Rotation during the picture; none: it is taken at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
+    /// What light is multiplied by to become fractions of full scale; what exceeds 1 is lost.
+    #[serde(default = "one")]
+    pub exposure: f64,
     /// From light to numbers.
     #[serde(default)]
     pub detector: Detector,
     /// Seed of the noise. The same scene and seed give the same picture on any number of threads.
     #[serde(default)]
     pub seed: u64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What kind of world is in front of the camera.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum World {
+    /// A body of uniform brightness under clouds and a band, as `profile`, `disc`, `light` and `sky` say: for tests and
+    /// tables, where everything but one thing should stay the same.
+    #[default]
+    Plain,
+    /// The Earth in sunlight.
+    Visible(Box<Visible>),
+    /// The Earth in the infrared.
+    Infrared(Infrared),
 }
 
 /// The limb's profile, outward.
@@ -145,11 +182,16 @@ impl Scene {
             pose,
             body: body::Config::default(),
             limb_height_by_latitude_km: Vec::new(),
+            world: World::default(),
             profile: Profile::default(),
             disc: Disc::default(),
             light: Light::default(),
             sky: Sky::default(),
+            moon_ecef_m: None,
             foreground: Vec::new(),
+            optics: Optics::default(),
+            motion: None,
+            exposure: 1.0,
             detector: Detector::default(),
             seed: 0,
         }

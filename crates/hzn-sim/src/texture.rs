@@ -89,6 +89,14 @@ impl CloudField {
     /// Brightness at a point of the unit sphere over a ground of brightness `ground`; `footprint_km` is what one
     /// pixel covers: finer detail is left out, as it would only flicker.
     pub(crate) fn over(&self, ground: f32, point: &Vector3<f64>, footprint_km: f32) -> f32 {
+        match self.at(point, footprint_km) {
+            Some((cover, bright)) => ground + cover * (bright - ground),
+            None => ground,
+        }
+    }
+
+    /// How much of the ground is hidden, 0 to 1, and how bright the cloud is there; `None` under a clear sky.
+    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32) -> Option<(f32, f32)> {
         let p = [point.x as f32, point.y as f32, point.z as f32];
         let (mut sum, mut fine) = (0.0f32, 0.0f32);
         for (i, o) in self.octaves.iter().enumerate() {
@@ -97,7 +105,7 @@ impl CloudField {
                 break;
             }
             if sum + o.rest < self.threshold - self.edge {
-                return ground;
+                return None;
             }
             let n = keep * o.amplitude * (value_noise(p.map(|x| x * o.frequency), o.salt) - 0.5);
             sum += n;
@@ -108,7 +116,51 @@ impl CloudField {
         let cover = smoothstep(((sum - self.threshold) / self.edge).clamp(-1.0, 1.0) * 0.5 + 0.5);
         // Thick clouds are brighter than their rims, and not smooth.
         let thick = (0.8 + (sum - self.threshold) * 0.6 + fine * 0.5).clamp(0.5, 1.0);
-        ground + cover * (self.brightness * thick - ground)
+        Some((cover, self.brightness * thick))
+    }
+}
+
+/// Fractal noise on the unit sphere: about 0 on average, with a standard deviation of 1.
+#[derive(Debug, Clone)]
+pub(crate) struct Relief {
+    octaves: Vec<Octave>,
+}
+
+impl Relief {
+    /// `detail_km` from the largest to the smallest size; `rough` is the amplitude of an octave over the one before.
+    pub(crate) fn new([largest_km, smallest_km]: [f64; 2], rough: f32, radius_m: f64, seed: u64) -> Self {
+        let count = 1 + libm::log2((largest_km / smallest_km).max(1.0)).round() as u32;
+        let mut octaves: Vec<Octave> = (0..count.min(16))
+            .map(|i| {
+                let size_km = largest_km / f64::from(1u32 << i);
+                Octave {
+                    size_km: size_km as f32,
+                    frequency: (radius_m / 1e3 / size_km) as f32,
+                    amplitude: rough.powi(i as i32),
+                    salt: hash3([i as i32, seed as i32, (seed >> 32) as i32], 0x6E0D),
+                    rest: 0.0,
+                }
+            })
+            .collect();
+        let sum2: f32 = octaves.iter().map(|o| o.amplitude * o.amplitude).sum();
+        for o in &mut octaves {
+            o.amplitude /= 0.17 * sum2.sqrt();
+        }
+        Self { octaves }
+    }
+
+    /// The value at a point, without what is finer than `footprint_km`.
+    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32) -> f32 {
+        let p = [point.x as f32, point.y as f32, point.z as f32];
+        let mut sum = 0.0;
+        for o in &self.octaves {
+            let keep = (o.size_km / footprint_km - 1.0).clamp(0.0, 1.0);
+            if keep <= 0.0 {
+                break;
+            }
+            sum += keep * o.amplitude * (value_noise(p.map(|x| x * o.frequency), o.salt) - 0.5);
+        }
+        sum
     }
 }
 

@@ -2,13 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_core::body::Kind;
+use hzn_core::body::{AU_KM, Kind, MOON_RADIUS_KM, SUN_RADIUS_KM};
+use hzn_core::camera::Camera;
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::{Cam, Ecef, UnitVec3};
+use hzn_core::pixel::ImagePoint;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SceneError;
-use crate::globe::Globe;
+use crate::globe::{Globe, View};
 use crate::scene::{Light, Scene};
 
 /// Visible pixels of limb from which a picture counts as showing one.
@@ -200,7 +203,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
 }
 
 /// The kind's name in sensor.toml.
-fn name(kind: Kind) -> &'static str {
+pub(crate) fn name(kind: Kind) -> &'static str {
     match kind {
         Kind::Earth => "earth",
         Kind::EarthSphere => "earth-sphere",
@@ -220,6 +223,10 @@ impl Scene {
         let raised = globe.raised(self.body.limb_height_km * 1e3);
         let cone = LimbCone::try_new(self.pose.position_m, raised.a_m, raised.b_m).ok_or(SceneError::Pose)?;
         let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
+        let moon = self.moon_ecef_m.and_then(|moon| {
+            let to = [0, 1, 2].map(|i| moon[i] - self.pose.position_m[i]);
+            Some(ecef_to_cam.apply(&UnitVec3::<Ecef, f64>::try_new(to)?).xyz())
+        });
         let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&cone.axis).xyz();
         let sun = match self.light {
             Light::Sun { direction, .. } => {
@@ -242,12 +249,118 @@ impl Scene {
             sun_x: sun.map(|s| s[0]),
             sun_y: sun.map(|s| s[1]),
             sun_z: sun.map(|s| s[2]),
+            moon_x: moon.map(|m| m[0]),
+            moon_y: moon.map(|m| m[1]),
+            moon_z: moon.map(|m| m[2]),
             qw,
             qx,
             qy,
             qz,
-            ..Truth::default()
         })
+    }
+
+    /// The truth about Sun or Moon in a scene whose camera flies around the Earth; for every other kind, as
+    /// [`Scene::truth`].
+    ///
+    /// # Errors
+    /// As [`Scene::truth`]; and a scene without that body.
+    pub fn truth_of(&self, kind: Kind, file: &str, time_s: f64) -> Result<Truth, SceneError> {
+        let truth = self.truth(file, time_s)?;
+        let Some(disc) = self.disc_of(kind)? else { return Ok(truth) };
+        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
+        let direction = UnitVec3::<Ecef, f64>::try_new(disc.direction).ok_or(SceneError::Sun)?;
+        let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&direction).xyz();
+        Ok(Truth {
+            body: name(kind).to_owned(),
+            limb: u8::from(self.visible_px(kind)? >= LIMB_IN_VIEW_PX),
+            axis_x,
+            axis_y,
+            axis_z,
+            half_angle_deg: disc.half_angle_rad.to_degrees(),
+            altitude_km: disc.distance_m * 1e-3 - disc.radius_km,
+            ..truth
+        })
+    }
+
+    /// Pixels of limb that are in the picture, lit and not hidden: of the Earth, or of Sun or Moon beside it.
+    ///
+    /// # Errors
+    /// As [`Scene::truth_of`].
+    pub fn visible_px(&self, kind: Kind) -> Result<f64, SceneError> {
+        let Some(disc) = self.disc_of(kind)? else { return self.visible_limb_px() };
+        let camera = Camera::<f64>::try_new(&self.camera)?;
+        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
+        let view = View::try_new(Globe::of(&self.body), &self.pose).ok_or(SceneError::Pose)?;
+        let centre = Vector3::from(disc.direction);
+        let helper = if centre.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+        let a = centre.cross(&helper).normalize();
+        let b = centre.cross(&a);
+        let sun = match (kind, self.light) {
+            (Kind::Moon, Light::Sun { direction, .. }) => Some(Vector3::from(direction)),
+            _ => None,
+        };
+        let (w, h) = (f64::from(self.camera.width), f64::from(self.camera.height));
+        const STEPS: i32 = 720;
+        let mut seen_px = 0.0;
+        let mut last = None;
+        for i in 0..=STEPS {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(i) / f64::from(STEPS));
+            let out = a * cos + b * sin;
+            let ray = (centre + out * libm::tan(disc.half_angle_rad)).normalize();
+            let point = UnitVec3::<Ecef, f64>::try_new(ray.into()).and_then(|r| {
+                let cam = ecef_to_cam.apply(&r);
+                let p = camera.project(&cam)?;
+                let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
+                let behind = view.look(cam.xyz()).miss <= 0.0;
+                let lit = sun.is_none_or(|s| s.dot(&out) > 0.05);
+                let hidden = self.foreground.iter().any(|f| f.contains([p.u, p.v]));
+                (inside && !behind && lit && !hidden).then_some(p)
+            });
+            if let (Some(p), Some(q)) = (point, last) {
+                let q: ImagePoint<f64> = q;
+                seen_px += libm::hypot(p.u - q.u, p.v - q.v);
+            }
+            last = point;
+        }
+        Ok(seen_px)
+    }
+
+    /// Sun or Moon as a disc of the sky; `None` for other bodies, and where the scene's own body is that one.
+    fn disc_of(&self, kind: Kind) -> Result<Option<SkyDisc>, SceneError> {
+        if self.body.kind == kind {
+            return Ok(None);
+        }
+        match kind {
+            Kind::Sun => match self.light {
+                Light::Sun { direction, .. } => {
+                    let direction = Vector3::from(direction).try_normalize(1e-12).ok_or(SceneError::Sun)?;
+                    let distance_m = AU_KM * 1e3;
+                    Ok(Some(SkyDisc::new(direction * distance_m, SUN_RADIUS_KM)))
+                }
+                Light::Full | Light::Sector { .. } => Err(SceneError::Sun),
+            },
+            Kind::Moon => {
+                let moon = Vector3::from(self.moon_ecef_m.ok_or(SceneError::Moon)?);
+                Ok(Some(SkyDisc::new(moon - Vector3::from(self.pose.position_m), MOON_RADIUS_KM)))
+            }
+            Kind::Earth | Kind::EarthSphere | Kind::Sphere => Ok(None),
+        }
+    }
+}
+
+/// A far body as seen from the camera.
+struct SkyDisc {
+    direction: [f64; 3],
+    distance_m: f64,
+    half_angle_rad: f64,
+    radius_km: f64,
+}
+
+impl SkyDisc {
+    fn new(to_m: Vector3<f64>, radius_km: f64) -> Self {
+        let distance_m = to_m.norm();
+        let half_angle_rad = libm::asin((radius_km * 1e3 / distance_m).min(1.0));
+        Self { direction: (to_m / distance_m).into(), distance_m, half_angle_rad, radius_km }
     }
 }
 

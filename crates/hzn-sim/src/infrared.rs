@@ -1,0 +1,205 @@
+//! The Earth in the infrared, around the carbon dioxide band at 15 µm, after section 3.2 of Wang et al. 2022: radiance
+//! by tangent height, latitude and season, interpolated in a table.
+//!
+//! The curves of their source are not printed. Ours are analytic: a level of the disc that is a little higher over
+//! warm ground, and a limb that falls off as a logistic curve, whose half level lies at 25 km on average, higher over
+//! the summer hemisphere and lower over the winter one.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::globe::{Globe, Sight, View};
+use crate::pose::Pose;
+use crate::texture::{CloudField, Clouds};
+use hzn_core::camera::Camera;
+use hzn_core::pixel::ImagePoint;
+use std::sync::Arc;
+
+/// What an infrared camera sees.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Infrared {
+    /// Season as an angle in degrees: 0 northern midsummer, 90 autumn, 180 midwinter. In a scene.toml it follows from
+    /// `utc` where it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub season_deg: Option<f64>,
+    /// Brightness of the disc, fraction of full scale.
+    pub brightness: f64,
+    /// By how much of itself the disc is brighter over the equator and darker over the poles.
+    pub by_latitude: f64,
+    /// Tangent height of half the disc's brightness on average, kilometres.
+    pub half_level_km: f64,
+    /// How much higher that is over the pole in midsummer, kilometres; linear in latitude, and as much lower over the
+    /// other pole.
+    pub half_level_season_km: f64,
+    /// Height over which the limb's odds fall by e, kilometres, above 0.
+    pub scale_km: f64,
+    /// Cold clouds; `brightness` is what a thick one has of the disc's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clouds: Option<Clouds>,
+    /// Brightness of space.
+    pub space: f64,
+}
+
+impl Default for Infrared {
+    fn default() -> Self {
+        Self {
+            season_deg: None,
+            brightness: 0.75,
+            by_latitude: 0.06,
+            half_level_km: 25.0,
+            half_level_season_km: 4.5,
+            scale_km: 4.0,
+            clouds: None,
+            space: 0.03,
+        }
+    }
+}
+
+/// Latitudes of the table's rows, degrees.
+const LATITUDES: usize = 13;
+/// Tangent heights of the table's columns, kilometres: 2 km apart from −30 km.
+const HEIGHTS: usize = 81;
+const FIRST_KM: f64 = -30.0;
+const STEP_KM: f64 = 2.0;
+
+impl Infrared {
+    /// Season as an angle by the day of the year of a UTC time (seconds since 1970): 0 on 15 July.
+    pub fn season_deg(unix_s: f64) -> f64 {
+        // 196 days after 1 January; a year of 365.2425 days.
+        ((unix_s / 86_400.0 - 195.0) / 365.2425).rem_euclid(1.0) * 360.0
+    }
+
+    /// Half level in kilometres at a geodetic latitude.
+    pub fn half_level_at_km(&self, latitude_deg: f64) -> f64 {
+        let season = libm::cos(self.season_deg.unwrap_or(0.0).to_radians());
+        self.half_level_km + self.half_level_season_km * season * latitude_deg / 90.0
+    }
+
+    /// The half level as rows of (geodetic latitude in degrees, kilometres): what a sensor may be told.
+    pub fn half_level_by_latitude_km(&self) -> Vec<[f64; 2]> {
+        if self.half_level_season_km == 0.0 {
+            return Vec::new();
+        }
+        [-90.0, 0.0, 90.0].map(|lat| [lat, self.half_level_at_km(lat)]).to_vec()
+    }
+
+    /// Radiance at a tangent height and a geodetic latitude, fraction of full scale, without space and clouds.
+    fn radiance(&self, height_km: f64, latitude_deg: f64) -> f64 {
+        let disc = self.brightness * (1.0 + self.by_latitude * libm::cos(2.0 * latitude_deg.to_radians()));
+        disc / (1.0 + libm::exp((height_km - self.half_level_at_km(latitude_deg)) / self.scale_km))
+    }
+}
+
+/// [`Infrared`] from one camera.
+#[derive(Debug, Clone)]
+pub(crate) struct Warmth {
+    camera: Camera<f64>,
+    globe: Globe,
+    view: View,
+    table: Arc<Vec<[f32; HEIGHTS]>>,
+    clouds: Option<Arc<CloudField>>,
+    space: f32,
+    disc: f32,
+    pixel_rad: f64,
+    near: f64,
+}
+
+/// Rays a side of a pixel across the limb.
+const SAMPLES: i32 = 9;
+
+impl Warmth {
+    pub(crate) fn try_new(world: &Infrared, camera: Camera<f64>, globe: Globe, pose: &Pose) -> Option<Self> {
+        let view = View::try_new(globe, pose)?;
+        let (fx, fy) = camera.focal_px();
+        let pixel_rad = 1.0 / fx.min(fy);
+        let away_m = Vector3::from(pose.position_m).norm();
+        let limb_m = (away_m * away_m - globe.b_m * globe.b_m).max(0.0).sqrt();
+        let table = (0..LATITUDES)
+            .map(|row| {
+                let latitude = 180.0 * row as f64 / (LATITUDES - 1) as f64 - 90.0;
+                core::array::from_fn(|i| world.radiance(FIRST_KM + STEP_KM * i as f64, latitude) as f32)
+            })
+            .collect();
+        Some(Self {
+            near: 2.0 * (1.3e5 + 3.0 * limb_m * pixel_rad) / globe.b_m,
+            table: Arc::new(table),
+            clouds: world.clouds.map(|c| Arc::new(CloudField::new(&c, globe.a_m))),
+            space: world.space as f32,
+            disc: world.brightness as f32,
+            camera,
+            globe,
+            view,
+            pixel_rad,
+        })
+    }
+
+    pub(crate) fn turned(&self, pose: &Pose) -> Self {
+        Self { view: View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone()), ..self.clone() }
+    }
+
+    pub(crate) fn row(&self, v: f64, weight: f32, row: &mut [f32]) {
+        for (x, p) in row.iter_mut().enumerate() {
+            let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { continue };
+            let sight = self.view.look(ray.direction().xyz());
+            let light = if sight.miss.abs() > self.near {
+                if sight.miss > 0.0 { self.space } else { self.at(&sight, self.view.tangent_height_m(&sight)) }
+            } else {
+                let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
+                let middle = self.view.tangent_height_m(&sight);
+                let mut sum = 0.0;
+                for (i, j) in (0..SAMPLES).flat_map(|i| (0..SAMPLES).map(move |j| (i, j))) {
+                    let [du, dv] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(SAMPLES) - 0.5);
+                    sum += self.at(&sight, middle + gradient[0] * du + gradient[1] * dv);
+                }
+                sum / (SAMPLES * SAMPLES) as f32
+            };
+            *p += weight * light;
+        }
+    }
+
+    /// Brightness along a ray whose tangent height is taken to be this.
+    fn at(&self, sight: &Sight, height_m: f64) -> f32 {
+        let point = self.view.point(sight);
+        let latitude = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
+        let row = (latitude + 90.0) / 180.0 * (LATITUDES - 1) as f64;
+        let column = (height_m * 1e-3 - FIRST_KM) / STEP_KM;
+        let (r, c) = (row.clamp(0.0, (LATITUDES - 1) as f64 - 1e-9), column.clamp(0.0, (HEIGHTS - 1) as f64 - 1e-9));
+        let ((i, fr), (k, fc)) = ((r as usize, (r - r.floor()) as f32), (c as usize, (c - c.floor()) as f32));
+        let cell = |i: usize, k: usize| self.table.get(i).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
+        let along = |i: usize| cell(i, k) + fc * (cell(i, k + 1) - cell(i, k));
+        let mut light = along(i) + fr * (along(i + 1) - along(i));
+        if sight.miss < 0.0
+            && let Some(clouds) = &self.clouds
+        {
+            let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
+            let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(0.02)) as f32;
+            if let Some((cover, bright)) = clouds.at(&point, footprint_km) {
+                // Clouds drown in the stratosphere's own light towards the limb.
+                let seen = (2.0 * cos * cos).min(1.0) as f32;
+                light += cover * seen * (bright * self.disc - light);
+            }
+        }
+        self.space + light * (1.0 - self.space)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_level_flips_with_the_season() {
+        let july = Infrared { season_deg: Some(0.0), ..Infrared::default() };
+        assert_eq!(july.half_level_by_latitude_km(), [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]]);
+        let january = Infrared { season_deg: Some(180.0), ..july.clone() };
+        assert_eq!(january.half_level_at_km(90.0), 20.5);
+        for lat in [-60.0, 0.0, 45.0] {
+            let deep = july.radiance(-1e3, lat);
+            assert!((july.radiance(july.half_level_at_km(lat), lat) / deep - 0.5).abs() < 1e-12);
+        }
+        // 2021-07-15 and 2022-01-14.
+        assert!(Infrared::season_deg(1_626_307_200.0) < 2.0);
+        assert!((Infrared::season_deg(1_642_118_400.0) - 180.0).abs() < 2.0);
+    }
+}

@@ -1,0 +1,194 @@
+//! From a scenario to scenes: a [`Flight`].
+
+use hzn_core::Preset;
+use hzn_core::body::Kind;
+use hzn_core::region;
+
+use super::{Scenario, ScenarioError};
+use crate::counter::{Counter, Stream};
+use crate::ephemeris;
+use crate::flight::{Flight, FlightFrame};
+use crate::foreground::Foreground;
+use crate::infrared::Infrared;
+use crate::motion::Motion;
+use crate::scene::{Light, Scene, World};
+use crate::trajectory::Path;
+use crate::utc;
+
+/// Pixels that a mask reaches beyond what it hides, as edges are blurred.
+const MASK_MARGIN_PX: f64 = 4.0;
+
+impl Scenario {
+    /// The pictures' times in seconds.
+    pub fn times_s(&self) -> Vec<f64> {
+        let c = &self.capture;
+        let last = f64::from(c.frames.saturating_sub(1).max(1));
+        (0..c.frames).map(|i| c.from_s + (c.to_s - c.from_s) * f64::from(i) / last).collect()
+    }
+
+    /// Name of a picture's file, by its number.
+    pub fn file(&self, index: usize) -> String {
+        format!("{}-{index:05}.{}", self.name, self.capture.format.ending())
+    }
+
+    /// The sensor, with the noise model of the defaults; [`super::Fit`] brings one that fits.
+    pub fn sensor(&self) -> hzn_core::Config {
+        let preset = |kind: Kind| match kind {
+            Kind::Sun => Preset::Sun,
+            Kind::Moon => Preset::Moon,
+            Kind::Earth | Kind::EarthSphere | Kind::Sphere => Preset::Hzn,
+        };
+        // Of several bodies the last is the faintest: its gates let the others through too.
+        let gates = self.bodies.last().copied().map_or(Preset::Hzn, preset);
+        let mut sensor = hzn_core::Config::preset(gates, self.camera.clone());
+        sensor.mount = self.mount;
+        let body = |kind: Kind| hzn_core::body::Config {
+            altitude_sigma_km: self.known.position_sigma_km.max(0.05),
+            ..self.body_of(kind)
+        };
+        match self.bodies.as_slice() {
+            [one] => sensor.body = body(*one),
+            // No more than three, as `check` says.
+            several => {
+                let own = |kind: Kind| hzn_core::body::Config {
+                    binarize: Some(hzn_core::Config::preset(preset(kind), self.camera.clone()).binarize),
+                    ..body(kind)
+                };
+                sensor.bodies = several.iter().map(|&kind| own(kind)).collect();
+                sensor.body = hzn_core::body::Config::default();
+            }
+        }
+        for part in self.vehicle.iter().filter(|p| p.masked) {
+            let polygon: region::Polygon = grown(&part.polygon_px, MASK_MARGIN_PX).into_iter().collect();
+            // More than eight masks are refused by `check`.
+            let _ = sensor.mask.polygons_px.push(polygon);
+        }
+        sensor
+    }
+
+    /// Every picture's scene, in the order of time.
+    ///
+    /// # Errors
+    /// A value out of its limits, a camera inside the Earth, or nothing to be seen in any picture.
+    pub fn flight(&self) -> Result<Flight, ScenarioError> {
+        self.check()?;
+        let sensor = self.sensor();
+        sensor.check().map_err(|e| ScenarioError::new("[[vehicle]]", e.to_string()))?;
+        let path = self.path()?;
+        let mut scenes = Vec::with_capacity(self.capture.frames as usize);
+        for (index, time_s) in self.times_s().into_iter().enumerate() {
+            scenes.push((time_s, self.scene(&path, index, time_s)?));
+        }
+        self.something_is_seen(&scenes)?;
+        self.exposure.set(&mut scenes).map_err(|e| ScenarioError::new("[exposure]", e.to_string()))?;
+        let frames = scenes
+            .into_iter()
+            .enumerate()
+            .map(|(index, (time_s, scene))| FlightFrame {
+                file: self.file(index),
+                time_s,
+                utc: Some(utc::iso8601(path.unix_s(time_s))),
+                scene,
+            })
+            .collect();
+        Ok(Flight { name: self.name.clone(), sensor, frames })
+    }
+
+    fn scene(&self, path: &Path, index: usize, time_s: f64) -> Result<Scene, ScenarioError> {
+        let pose = path.camera(time_s);
+        let unix_s = path.unix_s(time_s);
+        let mut scene = Scene::new(self.camera.clone(), pose);
+        // The camera flies around the Earth, whatever it looks for.
+        scene.body = self.body_of(Kind::Earth);
+        let altitude_km = crate::Globe::of(&scene.body).altitude_m(pose.position_m) * 1e-3;
+        if !(altitude_km > scene.body.limb_height_km) {
+            let what = format!(
+                "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the Earth or its limb of {:.1} km",
+                scene.body.limb_height_km
+            );
+            return Err(ScenarioError::new("[trajectory]", what));
+        }
+        scene.world = self.world.clone();
+        match &mut scene.world {
+            World::Visible(world) => {
+                world.clouds.seed = world.clouds.seed.wrapping_add(self.seed);
+                world.ground.seed = world.ground.seed.wrapping_add(self.seed);
+                scene.light = Light::Sun { direction: ephemeris::sun(unix_s).direction, twilight_rad: 0.01 };
+                scene.moon_ecef_m = Some(ephemeris::moon(unix_s).position_m());
+            }
+            World::Infrared(world) => {
+                if let Some(clouds) = &mut world.clouds {
+                    clouds.seed = clouds.seed.wrapping_add(self.seed);
+                }
+                world.season_deg.get_or_insert(Infrared::season_deg(unix_s));
+                scene.limb_height_by_latitude_km = world.half_level_by_latitude_km();
+            }
+            World::Plain => {}
+        }
+        scene.optics = self.optics;
+        let shutter = self.shutter;
+        scene.motion = (shutter.exposure_s > 0.0 || shutter.readout_s > 0.0).then(|| Motion {
+            rate_radps: path.camera_rate_radps(time_s),
+            exposure_s: shutter.exposure_s,
+            readout_s: shutter.readout_s,
+        });
+        scene.foreground = self
+            .vehicle
+            .iter()
+            .map(|part| Foreground { polygon_px: part.polygon_px.clone(), brightness: part.brightness })
+            .collect();
+        scene.detector = self.detector;
+        scene.seed = self.seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
+        Ok(scene)
+    }
+
+    /// Refuses a scenario in which the sensor's body is never in view.
+    fn something_is_seen(&self, scenes: &[(f64, Scene)]) -> Result<(), ScenarioError> {
+        let kind = self.bodies.first().copied().unwrap_or_default();
+        // Some 200 pictures say enough about thousands.
+        let step = (scenes.len() / 200).max(1);
+        for (_, scene) in scenes.iter().step_by(step).chain(scenes.last()) {
+            if scene.visible_px(kind).map_err(|e| ScenarioError::new("[trajectory]", e.to_string()))? > 0.0 {
+                return Ok(());
+            }
+        }
+        let name = crate::truth::name(kind);
+        let what = format!(
+            "the limb of the {name} is lit and in view in none of the pictures: check off-nadir angle, field of view, \
+             and the time of day (utc)"
+        );
+        Err(ScenarioError::new("[attitude]", what))
+    }
+
+    /// What frames.csv says of a picture: the position with its error, and the attitude with its error where
+    /// `[known]` has one.
+    pub fn known_of(&self, frame: &FlightFrame) -> crate::flight::FrameRow {
+        let draws = Counter::new(frame.scene.seed, Stream::Gnss);
+        let error_m = [0, 1, 2].map(|i| self.known.position_sigma_km * 1e3 * draws.normal(i));
+        let mut seen = frame.clone();
+        (0..3).for_each(|i| seen.scene.pose.position_m[i] += error_m[i]);
+        let mut row = seen.row();
+        if let Some(sigma_deg) = self.known.attitude_sigma_deg {
+            let draws = Counter::new(frame.scene.seed, Stream::AttitudePrior);
+            let error_rad = [0, 1, 2].map(|i| sigma_deg.to_radians() * draws.normal(i));
+            let [w, x, y, z] = frame.scene.pose.disturbed(error_rad).cam_to_ecef_wxyz;
+            (row.qw, row.qx, row.qy, row.qz) = (Some(w), Some(x), Some(y), Some(z));
+            row.attitude_sigma_deg = Some(sigma_deg);
+        }
+        row
+    }
+}
+
+/// A polygon with its corners moved outward, away from their middle.
+fn grown(corners: &[[f64; 2]], by_px: f64) -> Vec<[f64; 2]> {
+    let n = corners.len().max(1) as f64;
+    let middle = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / n);
+    corners
+        .iter()
+        .map(|c| {
+            let d = [c[0] - middle[0], c[1] - middle[1]];
+            // Along both axes, so that upright edges move by as much as asked for.
+            [0, 1].map(|i| c[i] + by_px * d[i].signum() * f64::from(u8::from(d[i] != 0.0)))
+        })
+        .collect()
+}

@@ -1,0 +1,378 @@
+//! A whole simulated sequence in one description: what a `scene.toml` says.
+//!
+//! A [`Scenario`] becomes a [`Flight`]: scenes with truth, and the sensor that took them. [`BUILTIN`] are the scenes that
+//! come with hzn. Reading a file (with lines and suggestions in errors) is the command line's business; every value is
+//! checked here, by [`Scenario::check`], and whether anything can be seen, by [`Scenario::flight`].
+
+mod exposure;
+mod fly;
+mod noise;
+
+pub use exposure::Exposure;
+pub use noise::Fit;
+
+use std::path::Path as FilePath;
+
+use hzn_core::body::{self, Kind};
+use hzn_core::camera::{self, Camera};
+use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
+use hzn_core::pipeline::Mount;
+use serde::{Deserialize, Serialize};
+
+use crate::detector::Detector;
+use crate::optics::Optics;
+use crate::scene::World;
+use crate::trajectory::instruments::{Gnss, Imu};
+use crate::trajectory::{Attitude, Path, Trajectory};
+use crate::utc;
+
+/// Scenes that come with hzn: name, what it is, its scene.toml.
+pub const BUILTIN: [(&str, &str, &str); 7] = [
+    (
+        "rocket",
+        "sounding rocket with the Sun, lens ghosts and payload in view, colour JPEG 1920x1080",
+        include_str!("builtin/rocket.toml"),
+    ),
+    ("rocket-clean", "such a flight at noon without them, grey 1920x1080", include_str!("builtin/rocket-clean.toml")),
+    (
+        "leo-infrared",
+        "infrared Earth sensor in low orbit, from nadir to 120 degrees off it, 384x288",
+        include_str!("builtin/leo-infrared.toml"),
+    ),
+    ("horace", "spinning rocket with motion blur and auto-exposure, grey 640x480", include_str!("builtin/horace.toml")),
+    (
+        "full-disc",
+        "the whole Earth from a high orbit, with its phases, 1024x1024",
+        include_str!("builtin/full-disc.toml"),
+    ),
+    ("sun-moon", "Sun and Moon through a long lens, 1024x768", include_str!("builtin/sun-moon.toml")),
+    ("tumble", "tumbling satellite, the limb in view now and then, 1280x960", include_str!("builtin/tumble.toml")),
+];
+
+/// A simulated sequence.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Short name; pictures are called after it.
+    pub name: String,
+    /// Seed of everything random.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// UTC of time 0, as a TOML date and time: where Sun and Moon stand, and the season.
+    pub utc: toml::value::Datetime,
+    /// Bodies that the sensor looks for and truth.csv tells of: `earth`, `sun`, `moon`.
+    #[serde(default = "earth")]
+    pub bodies: Vec<Kind>,
+    /// When pictures are taken, and how they are written.
+    pub capture: Capture,
+    /// The lens and the size of the picture, as in sensor.toml.
+    pub camera: camera::Config,
+    /// How the camera sits in the vehicle, as in sensor.toml.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mount: Option<Mount>,
+    /// The way.
+    pub trajectory: Trajectory,
+    /// The attitude.
+    pub attitude: Attitude,
+    /// What is seen.
+    pub world: World,
+    /// Imperfections of the lens.
+    #[serde(default)]
+    pub optics: Optics,
+    /// How long a picture takes.
+    #[serde(default)]
+    pub shutter: Shutter,
+    /// How bright a picture becomes.
+    #[serde(default)]
+    pub exposure: Exposure,
+    /// From light to numbers.
+    #[serde(default)]
+    pub detector: Detector,
+    /// Parts of the vehicle in the picture.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vehicle: Vec<Part>,
+    /// What the sensor is told besides the pictures.
+    #[serde(default)]
+    pub known: Known,
+    /// Inertial sensors, for imu.csv.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imu: Option<Imu>,
+    /// Satellite receiver, for gnss.csv.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gnss: Option<Gnss>,
+}
+
+fn one() -> u64 {
+    1
+}
+fn earth() -> Vec<Kind> {
+    vec![Kind::Earth]
+}
+
+/// `[capture]`: when pictures are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Capture {
+    /// Time of the first picture, seconds from time 0.
+    #[serde(default)]
+    pub from_s: f64,
+    /// Time of the last picture.
+    pub to_s: f64,
+    /// How many, evenly in between, 1 to 100000.
+    pub frames: u32,
+    /// The files' format.
+    #[serde(default)]
+    pub format: Format,
+    /// Quality of JPEG, 1 to 100.
+    #[serde(default = "quality")]
+    pub jpeg_quality: u8,
+}
+
+fn quality() -> u8 {
+    92
+}
+
+/// Format of the pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Format {
+    /// Without loss; 8 or 16 bits.
+    #[default]
+    Png,
+    /// With loss; 8 bits.
+    Jpeg,
+}
+
+impl Format {
+    /// The files' ending.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Jpeg => "jpg",
+        }
+    }
+}
+
+/// `[shutter]`: how long a picture takes; all zero: none.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Shutter {
+    /// Exposure of a row, seconds.
+    pub exposure_s: f64,
+    /// From the first row's exposure to the last one's, seconds; 0 is a global shutter.
+    pub readout_s: f64,
+}
+
+/// `[[vehicle]]`: a part of the vehicle in the picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// Corners (x, y) in pixels; the last is joined to the first.
+    pub polygon_px: Vec<[f64; 2]>,
+    /// Light it sends, as a white surface under the Sun sends 1.
+    pub brightness: f64,
+    /// Whether sensor.toml masks it, four pixels beyond its outline.
+    #[serde(default)]
+    pub masked: bool,
+}
+
+/// `[known]`: what frames.csv and sensor.toml say.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Known {
+    /// Error (1-sigma) of every component of the position, kilometres.
+    pub position_sigma_km: f64,
+    /// Error (1-sigma, about each axis) of the prior attitude in frames.csv, degrees; none: it has no attitude.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attitude_sigma_deg: Option<f64>,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self { position_sigma_km: 0.0, attitude_sigma_deg: None }
+    }
+}
+
+/// Why a scenario cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{field}: {what}")]
+pub struct ScenarioError {
+    /// The key, as `[capture] frames`.
+    pub field: String,
+    /// What is wrong and what to do.
+    pub what: String,
+}
+
+impl ScenarioError {
+    fn new(field: impl Into<String>, what: impl Into<String>) -> Self {
+        Self { field: field.into(), what: what.into() }
+    }
+}
+
+impl From<(String, String)> for ScenarioError {
+    fn from((field, what): (String, String)) -> Self {
+        Self { field, what }
+    }
+}
+
+impl Scenario {
+    /// A scene that comes with hzn; `None` for another name.
+    ///
+    /// # Panics
+    /// Never: the tests read every one.
+    pub fn builtin(name: &str) -> Option<Self> {
+        let text = BUILTIN.iter().find(|b| b.0 == name)?.2;
+        Some(toml::from_str(text).expect("built-in scenes are valid"))
+    }
+
+    /// Reads the files that the scenario names (maps, tables); `folder` is where their paths start.
+    ///
+    /// # Errors
+    /// One that cannot be read.
+    pub fn read_files(&mut self, folder: &FilePath) -> Result<(), ScenarioError> {
+        if let World::Visible(world) = &mut self.world {
+            world.ground.read_map(folder).map_err(|e| ScenarioError::new("[world] visible.ground.map", e))?;
+        }
+        if let Trajectory::Table(table) = &mut self.trajectory {
+            table.read(folder).map_err(|e| ScenarioError::new("[trajectory] table.file", e))?;
+        }
+        Ok(())
+    }
+
+    /// The first value out of its limits.
+    ///
+    /// # Errors
+    /// Which, and the limit.
+    pub fn check(&self) -> Result<(), ScenarioError> {
+        let refuse =
+            |field: &str, value: f64, rule: &str| Err(ScenarioError::new(field, format!("{value} is refused: {rule}")));
+        if self.name.is_empty() || !self.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+            return Err(ScenarioError::new("name", "must be letters, digits, - and _: pictures are called after it"));
+        }
+        if utc::unix_s(&self.utc).is_none() {
+            return Err(ScenarioError::new("utc", "must be a UTC date and time such as 2019-06-13T10:30:00Z"));
+        }
+        let c = &self.capture;
+        if !(1..=100_000).contains(&c.frames) {
+            return refuse("[capture] frames", c.frames.into(), "must be 1 to 100000");
+        }
+        if !(c.from_s.is_finite() && c.to_s.is_finite() && c.to_s >= c.from_s && (c.to_s - c.from_s) < 1e7) {
+            return refuse("[capture] to_s", c.to_s, "must be finite and not before from_s");
+        }
+        if !(1..=100).contains(&c.jpeg_quality) {
+            return refuse("[capture] jpeg_quality", c.jpeg_quality.into(), "must be 1 to 100");
+        }
+        Camera::<f64>::try_new(&self.camera).map_err(|e| {
+            let shown = e.to_string();
+            let rule = shown.split_once(": ").map_or(shown.as_str(), |(_, rule)| rule).to_owned();
+            ScenarioError::new(format!("[camera] {}", e.field.trim_start_matches("camera.")), rule)
+        })?;
+        if !matches!(self.bodies.first(), Some(Kind::Earth | Kind::Sun | Kind::Moon))
+            || self.bodies.iter().any(|b| matches!(b, Kind::Sphere | Kind::EarthSphere))
+            || self.bodies.len() > 3
+        {
+            return Err(ScenarioError::new("bodies", "must be one to three of \"earth\", \"sun\", \"moon\""));
+        }
+        let o = &self.optics;
+        let parts = [
+            ("[optics] vignetting", o.vignetting, (0.0..=1.0).contains(&o.vignetting), "must be 0 to 1"),
+            ("[optics] bloom", o.bloom, o.bloom >= 0.0, "must be 0 or more"),
+            ("[optics] veil", o.veil, o.veil >= 0.0, "must be 0 or more"),
+            ("[optics] ghosts", o.ghosts, o.ghosts >= 0.0, "must be 0 or more"),
+            ("[shutter] exposure_s", self.shutter.exposure_s, self.shutter.exposure_s >= 0.0, "must be 0 or more"),
+            ("[shutter] readout_s", self.shutter.readout_s, self.shutter.readout_s >= 0.0, "must be 0 or more"),
+            ("[exposure] gain", self.exposure.gain, self.exposure.gain > 0.0, "must be above 0"),
+            ("[exposure] lag_s", self.exposure.lag_s, self.exposure.lag_s >= 0.0, "must be 0 or more"),
+            (
+                "[detector] psf_sigma_px",
+                self.detector.psf_sigma_px,
+                (0.0..=50.0).contains(&self.detector.psf_sigma_px),
+                "must be 0 to 50",
+            ),
+            (
+                "[detector] read_noise",
+                self.detector.read_noise,
+                (0.0..=1.0).contains(&self.detector.read_noise),
+                "must be 0 to 1, a fraction of full scale",
+            ),
+            ("[detector] bits", self.detector.bits.into(), (8..=16).contains(&self.detector.bits), "must be 8 to 16"),
+            (
+                "[known] position_sigma_km",
+                self.known.position_sigma_km,
+                self.known.position_sigma_km >= 0.0,
+                "must be 0 or more",
+            ),
+        ];
+        if let Some((field, value, _, rule)) = parts.into_iter().find(|p| !(p.2 && p.1.is_finite())) {
+            return refuse(field, value, rule);
+        }
+        if c.format == Format::Jpeg && self.detector.bits != 8 {
+            return refuse("[detector] bits", self.detector.bits.into(), "JPEG has 8 bits; leave it out, or write PNG");
+        }
+        if let Some(part) = self.vehicle.iter().find(|p| !(3..=16).contains(&p.polygon_px.len())) {
+            return refuse("[[vehicle]] polygon_px", part.polygon_px.len() as f64, "must have 3 to 16 corners");
+        }
+        if let Some(mount) = &self.mount {
+            let n2: f64 = mount.q_body_from_camera_wxyz.iter().map(|x| x * x).sum();
+            if !((n2 - 1.0).abs() < 0.01) {
+                return refuse("[mount] q_body_from_camera_wxyz", n2, "its squared length must be 1");
+            }
+        }
+        if let World::Visible(w) = &self.world {
+            let a = &w.air;
+            if !(a.scale_height_km > 0.1 && a.scale_height_km < 100.0) {
+                return refuse("[world] visible.air.scale_height_km", a.scale_height_km, "must be 0.1 to 100");
+            }
+            if a.optical_depth.iter().any(|d| !(0.0..100.0).contains(d)) {
+                return Err(ScenarioError::new("[world] visible.air.optical_depth", "all three must be 0 to 100"));
+            }
+        }
+        if let World::Infrared(w) = &self.world
+            && !(w.scale_km > 0.01 && w.scale_km < 50.0)
+        {
+            return refuse("[world] infrared.scale_km", w.scale_km, "must be 0.01 to 50");
+        }
+        self.imu.map_or(Ok(()), |imu| imu.check())?;
+        self.gnss.map_or(Ok(()), |gnss| gnss.check())?;
+        Ok(())
+    }
+
+    /// UTC of time 0 in seconds since 1970.
+    pub fn start_unix_s(&self) -> f64 {
+        utc::unix_s(&self.utc).unwrap_or(0.0)
+    }
+
+    /// First and last time, seconds.
+    pub fn span_s(&self) -> [f64; 2] {
+        [self.capture.from_s, self.capture.to_s]
+    }
+
+    /// Way and attitude.
+    ///
+    /// # Errors
+    /// What cannot be, with its key.
+    pub fn path(&self) -> Result<Path, ScenarioError> {
+        let mount = self.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+        let [from_s, to_s] = self.span_s();
+        // A second before and after, for exposures and rates at the ends; a table has no more than its rows.
+        let span = match self.trajectory {
+            Trajectory::Table(_) => [from_s, to_s],
+            Trajectory::Rocket(_) | Trajectory::Orbit(_) => [from_s, to_s.max(from_s + 1e-3)],
+        };
+        Ok(Path::try_new(&self.trajectory, &self.attitude, mount, span, self.start_unix_s(), self.seed)?)
+    }
+
+    /// A body as the sensor is told of it, with the height at which the simulated limb stands.
+    pub fn body_of(&self, kind: Kind) -> body::Config {
+        let limb_height_km = match (&self.world, kind) {
+            (_, Kind::Sun | Kind::Moon) => 0.0,
+            (World::Visible(w), _) => w.air.half_height_km([1.0 / 3.0; 3], EARTH_MEAN_RADIUS_M / 1e3),
+            (World::Infrared(w), _) => w.half_level_km,
+            (World::Plain, _) => body::Config::default().limb_height_km,
+        };
+        body::Config { kind, limb_height_km, ..body::Config::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,82 @@
+use super::*;
+use crate::scene::Light;
+
+#[test]
+fn built_in_scenes_are_valid_and_show_their_bodies() {
+    for (name, what, text) in BUILTIN {
+        let mut scenario = Scenario::builtin(name).unwrap();
+        assert_eq!(scenario.name, name);
+        assert!(!what.is_empty());
+        // As a user's file would be.
+        assert_eq!(toml::from_str::<Scenario>(text).unwrap(), scenario);
+        let again = toml::to_string(&scenario).unwrap();
+        assert_eq!(toml::from_str::<Scenario>(&again).unwrap(), scenario, "{again}");
+        scenario.capture.frames = 24;
+        let flight = scenario.flight().unwrap();
+        flight.sensor.check().unwrap();
+        let bodies = scenario.bodies.clone();
+        for kind in bodies {
+            let seen = flight.frames.iter().filter(|f| f.scene.truth_of(kind, "", 0.0).unwrap().has_limb()).count();
+            println!("{name}: {kind:?} in {seen} of {}", flight.frames.len());
+            assert!(seen >= 8, "{name} {kind:?}: {seen}");
+        }
+    }
+}
+
+#[test]
+fn what_is_refused_is_named() {
+    let error = |change: &dyn Fn(&mut Scenario)| {
+        let mut s = Scenario::builtin("tumble").unwrap();
+        s.capture.frames = 4;
+        change(&mut s);
+        s.flight().unwrap_err().to_string()
+    };
+    assert_eq!(error(&|s| s.capture.frames = 0), "[capture] frames: 0 is refused: must be 1 to 100000");
+    assert_eq!(error(&|s| s.camera.fx_px = -1.0), "[camera] fx_px: must be above 0");
+    assert!(error(&|s| s.name = "a/b".into()).starts_with("name: "));
+    assert!(error(&|s| s.detector.bits = 7).starts_with("[detector] bits: 7 is refused"));
+    assert!(error(&|s| s.attitude = Attitude::Spin(Default::default())).contains("belongs to [trajectory.rocket]"));
+    let inside = error(&|s| {
+        s.trajectory = Trajectory::Orbit(crate::trajectory::Orbit { perigee_km: 50.0, ..Default::default() });
+        s.world = World::Infrared(crate::Infrared { half_level_km: 70.0, ..Default::default() });
+    });
+    assert!(inside.contains("inside the Earth or its limb"), "{inside}");
+    let nothing = error(&|s| {
+        s.attitude =
+            Attitude::Pointing(crate::trajectory::Pointing { off_nadir_deg: [180.0; 2], ..Default::default() });
+    });
+    assert!(nothing.contains("in none of the pictures"), "{nothing}");
+    let unknown = toml::from_str::<Scenario>(&BUILTIN[0].2.replace("[imu]", "[imu]\nrate = 3")).unwrap_err();
+    assert!(unknown.to_string().contains("unknown field `rate`"), "{unknown}");
+}
+
+#[test]
+fn sun_stands_where_the_ephemeris_says_and_seeds_change_the_clouds() {
+    let mut s = Scenario::builtin("rocket-clean").unwrap();
+    s.capture.frames = 2;
+    let (a, b) = (s.flight().unwrap(), Scenario { seed: 2, ..s.clone() }.flight().unwrap());
+    let Light::Sun { direction, .. } = a.frames[1].scene.light else { panic!("a visible world has a Sun") };
+    assert_eq!(direction, crate::ephemeris::sun(s.start_unix_s() + 430.0).direction);
+    assert_ne!(a.frames[0].scene.world, b.frames[0].scene.world);
+    assert_eq!(a, s.flight().unwrap());
+    // 10:30 UTC on 13 June at Esrange: 45 degrees above the horizon.
+    let up = nalgebra::Vector3::from(a.frames[0].scene.pose.position_m).normalize();
+    let elevation = libm::asin(up.dot(&nalgebra::Vector3::from(direction))).to_degrees();
+    assert!((elevation - 45.0).abs() < 2.0, "{elevation}");
+}
+
+#[test]
+fn frames_csv_says_what_is_known_and_no_more() {
+    let mut s = Scenario::builtin("leo-infrared").unwrap();
+    s.capture.frames = 3;
+    let flight = s.flight().unwrap();
+    let row = s.known_of(&flight.frames[1]);
+    assert!(row.qw.is_none() && row.utc.as_deref() == Some("2021-07-15T00:48:20.000Z"), "{:?}", row.utc);
+    s.known = Known { position_sigma_km: 0.1, attitude_sigma_deg: Some(5.0) };
+    let told = s.known_of(&flight.frames[1]);
+    assert!(told.x_km != row.x_km && (told.x_km - row.x_km).abs() < 0.5);
+    let [w, x, y, z] = flight.frames[1].scene.pose.cam_to_ecef_wxyz;
+    let dot = told.qw.unwrap() * w + told.qx.unwrap() * x + told.qy.unwrap() * y + told.qz.unwrap() * z;
+    let off_deg = 2.0 * libm::acos(dot.abs().min(1.0)).to_degrees();
+    assert!((1.0..25.0).contains(&off_deg), "{off_deg}");
+}

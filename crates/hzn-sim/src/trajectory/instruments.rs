@@ -1,0 +1,285 @@
+//! What the vehicle's other sensors say: gyroscopes and accelerometers, satellite receiver.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::Path;
+use crate::counter::{Counter, Stream};
+
+/// An inertial measurement unit in the vehicle's axes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Imu {
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Standard deviation of the gyroscopes' constant errors, degrees a second.
+    pub gyro_bias_deg_s: f64,
+    /// Standard deviation of a gyroscope sample's noise, degrees a second.
+    pub gyro_noise_deg_s: f64,
+    /// Step of the gyroscopes' numbers, degrees a second; 0: none.
+    pub gyro_step_deg_s: f64,
+    /// Largest rate a gyroscope can say, degrees a second.
+    pub gyro_range_deg_s: f64,
+    /// Standard deviation of the accelerometers' constant errors, m/s².
+    pub accel_bias_mps2: f64,
+    /// Standard deviation of an accelerometer sample's noise, m/s².
+    pub accel_noise_mps2: f64,
+    /// Step of the accelerometers' numbers, m/s²; 0: none.
+    pub accel_step_mps2: f64,
+    /// Largest specific force an accelerometer can say, m/s².
+    pub accel_range_mps2: f64,
+}
+
+impl Default for Imu {
+    /// A small unit of the better kind.
+    fn default() -> Self {
+        Self {
+            rate_hz: 100.0,
+            gyro_bias_deg_s: 0.05,
+            gyro_noise_deg_s: 0.03,
+            gyro_step_deg_s: 0.005,
+            gyro_range_deg_s: 2000.0,
+            accel_bias_mps2: 0.02,
+            accel_noise_mps2: 0.02,
+            accel_step_mps2: 0.005,
+            accel_range_mps2: 160.0,
+        }
+    }
+}
+
+/// A row of imu.csv.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ImuRow {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Rate against inertial space about the vehicle's x axis, rad/s.
+    pub gyro_x_radps: f64,
+    /// About its y axis.
+    pub gyro_y_radps: f64,
+    /// About its z axis.
+    pub gyro_z_radps: f64,
+    /// Specific force along the vehicle's x axis, m/s².
+    pub accel_x_mps2: f64,
+    /// Along its y axis.
+    pub accel_y_mps2: f64,
+    /// Along its z axis.
+    pub accel_z_mps2: f64,
+    /// 1 when one of the six is at the end of its range.
+    pub saturated: u8,
+}
+
+/// A satellite receiver.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gnss {
+    /// Fixes a second.
+    pub rate_hz: f64,
+    /// Standard deviation of every component of the position, metres.
+    pub position_noise_m: f64,
+    /// Standard deviation of every component of the velocity, m/s.
+    pub velocity_noise_mps: f64,
+}
+
+impl Default for Gnss {
+    fn default() -> Self {
+        Self { rate_hz: 1.0, position_noise_m: 5.0, velocity_noise_mps: 0.1 }
+    }
+}
+
+/// A row of gnss.csv: ECEF, velocity against the Earth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GnssRow {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Position, metres.
+    pub x_m: f64,
+    /// Second component of the position.
+    pub y_m: f64,
+    /// Third component of the position.
+    pub z_m: f64,
+    /// Velocity, m/s.
+    pub vx_mps: f64,
+    /// Second component of the velocity.
+    pub vy_mps: f64,
+    /// Third component of the velocity.
+    pub vz_mps: f64,
+}
+
+/// Times of a rate between two times, both included where they fall on a sample.
+fn times(rate_hz: f64, [from_s, to_s]: [f64; 2]) -> impl Iterator<Item = (u64, f64)> {
+    let count = ((to_s - from_s) * rate_hz + 1e-9).floor().max(0.0) as u64;
+    (0..=count).map(move |i| (i, from_s + i as f64 / rate_hz))
+}
+
+impl Imu {
+    /// The first thing that is out of its limits.
+    pub(crate) fn check(&self) -> Result<(), (String, String)> {
+        let all = [
+            ("rate_hz", self.rate_hz, self.rate_hz > 0.0 && self.rate_hz <= 10_000.0),
+            ("gyro_range_deg_s", self.gyro_range_deg_s, self.gyro_range_deg_s > 0.0),
+            ("accel_range_mps2", self.accel_range_mps2, self.accel_range_mps2 > 0.0),
+            ("gyro_noise_deg_s", self.gyro_noise_deg_s, self.gyro_noise_deg_s >= 0.0),
+            ("accel_noise_mps2", self.accel_noise_mps2, self.accel_noise_mps2 >= 0.0),
+        ];
+        match all.into_iter().find(|(_, _, ok)| !ok) {
+            Some((key, value, _)) => Err((format!("[imu] {key}"), format!("{value} is refused: must be above 0"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Samples of a flight.
+    pub fn rows(&self, path: &Path, span_s: [f64; 2], seed: u64) -> impl Iterator<Item = ImuRow> {
+        let (imu, path, draws) = (*self, path.clone(), Counter::new(seed, Stream::Imu));
+        let rad = f64::to_radians;
+        let bias = |first: u64, sigma: f64| Vector3::from([0, 1, 2].map(|i| sigma * draws.normal(first + i)));
+        let (gyro_bias, accel_bias) = (bias(0, rad(imu.gyro_bias_deg_s)), bias(3, imu.accel_bias_mps2));
+        times(imu.rate_hz, span_s).map(move |(i, time_s)| {
+            let state = path.state(time_s);
+            let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
+            let first = 6 + 6 * i;
+            let mut saturated = false;
+            let mut say = |truth: Vector3<f64>, first: u64, noise: f64, step: f64, range: f64| -> [f64; 3] {
+                core::array::from_fn(|a| {
+                    let value = truth[a] + noise * draws.normal(first + a as u64);
+                    let stepped = if step > 0.0 { (value / step).round() * step } else { value };
+                    saturated |= stepped.abs() >= range;
+                    stepped.clamp(-range, range)
+                })
+            };
+            let gyro = say(
+                state.rate_radps + gyro_bias,
+                first,
+                rad(imu.gyro_noise_deg_s),
+                rad(imu.gyro_step_deg_s),
+                rad(imu.gyro_range_deg_s),
+            );
+            let accel =
+                say(force + accel_bias, first + 3, imu.accel_noise_mps2, imu.accel_step_mps2, imu.accel_range_mps2);
+            ImuRow {
+                time_s,
+                gyro_x_radps: gyro[0],
+                gyro_y_radps: gyro[1],
+                gyro_z_radps: gyro[2],
+                accel_x_mps2: accel[0],
+                accel_y_mps2: accel[1],
+                accel_z_mps2: accel[2],
+                saturated: u8::from(saturated),
+            }
+        })
+    }
+}
+
+impl Gnss {
+    pub(crate) fn check(&self) -> Result<(), (String, String)> {
+        if self.rate_hz > 0.0 && self.rate_hz <= 1000.0 {
+            return Ok(());
+        }
+        Err(("[gnss] rate_hz".into(), format!("{} is refused: must be above 0, at most 1000", self.rate_hz)))
+    }
+
+    /// Fixes of a flight.
+    pub fn rows(&self, path: &Path, span_s: [f64; 2], seed: u64) -> impl Iterator<Item = GnssRow> {
+        let (gnss, path, draws) = (*self, path.clone(), Counter::new(seed, Stream::Gnss));
+        times(gnss.rate_hz, span_s).map(move |(i, time_s)| {
+            let point = path.point(time_s);
+            let noise =
+                |first: u64, sigma: f64| Vector3::from([0, 1, 2].map(|a| sigma * draws.normal(6 * i + first + a)));
+            let x = point.position_m + noise(0, gnss.position_noise_m);
+            let v = point.velocity_mps + noise(3, gnss.velocity_noise_mps);
+            GnssRow { time_s, x_m: x.x, y_m: x.y, z_m: x.z, vx_mps: v.x, vy_mps: v.y, vz_mps: v.z }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::{Attitude, Orbit, Rocket, Spin, Trajectory, Tumble};
+
+    fn rocket() -> Path {
+        Path::try_new(
+            &Trajectory::Rocket(Rocket::default()),
+            &Attitude::Spin(Spin::default()),
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 430.0],
+            1_560_421_800.0,
+            3,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn a_rocket_spins_up_and_drifts_under_its_limit() {
+        let path = rocket();
+        assert!((path.state(50.0).rate_radps.x / (3.0 * core::f64::consts::TAU) - 1.0).abs() < 0.01);
+        let limit = 0.9f64.to_radians() * 1.1;
+        let most = (60..430).map(|t| path.state(f64::from(t)).rate_radps.amax()).fold(0.0, f64::max);
+        assert!(most < limit && most > 0.4 * limit, "{most}");
+        // Under thrust the force is along the vehicle, but for the cone.
+        let state = path.state(30.0);
+        let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
+        assert!(force.x > 0.99 * force.norm() && force.x > 20.0);
+    }
+
+    #[test]
+    fn rates_turn_the_attitude() {
+        // What a strap-down integration of exact gyroscopes gives is the attitude.
+        let path = rocket();
+        let exact = Imu {
+            rate_hz: 1000.0,
+            gyro_bias_deg_s: 0.0,
+            gyro_noise_deg_s: 0.0,
+            gyro_step_deg_s: 0.0,
+            ..Imu::default()
+        };
+        let start = 70.0005;
+        let mut q = path.state(70.0).body_to_ecef;
+        for row in exact.rows(&path, [start, start + 9.999], 1) {
+            let w = Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps);
+            let earth = q.inverse_transform_vector(&Vector3::new(0.0, 0.0, crate::trajectory::EARTH_RATE));
+            q *= nalgebra::UnitQuaternion::from_scaled_axis((w - earth) * 1e-3);
+        }
+        let off = q.angle_to(&path.state(80.0).body_to_ecef);
+        assert!(off < 1e-4, "{off}");
+    }
+
+    #[test]
+    fn range_and_steps_are_kept() {
+        let imu = Imu { rate_hz: 10.0, gyro_range_deg_s: 500.0, ..Imu::default() };
+        let rows: Vec<ImuRow> = imu.rows(&rocket(), [30.0, 60.0], 1).collect();
+        assert_eq!(rows.len(), 301);
+        assert!(rows.iter().any(|r| r.saturated == 1) && rows.iter().any(|r| r.saturated == 0));
+        let step = 0.005f64.to_radians();
+        assert!(rows.iter().all(|r| r.gyro_x_radps.abs() <= 500f64.to_radians() + 1e-12));
+        assert!(rows.iter().all(|r| {
+            let k = r.gyro_y_radps / step;
+            (k - k.round()).abs() < 1e-6
+        }));
+    }
+
+    #[test]
+    fn free_fall_is_felt_by_nothing_and_a_tumble_keeps_its_momentum() {
+        let tumble = Tumble::default();
+        let path = Path::try_new(
+            &Trajectory::Orbit(Orbit::default()),
+            &Attitude::Tumble(tumble),
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 600.0],
+            1.6e9,
+            5,
+        )
+        .unwrap();
+        let momentum = |t: f64| {
+            let s = path.state(t);
+            assert_eq!(s.specific_force_mps2.norm(), 0.0);
+            let body = Vector3::from(tumble.inertia).component_mul(&s.rate_radps);
+            crate::trajectory::from_ecef(path.sidereal_rad(t), &(s.body_to_ecef * body))
+        };
+        let (a, b) = (momentum(0.0), momentum(600.0));
+        assert!((a - b).norm() < 1e-3 * a.norm(), "{a} {b}");
+        let fixes: Vec<GnssRow> = Gnss::default().rows(&path, [0.0, 100.0], 2).collect();
+        assert_eq!(fixes.len(), 101);
+        let off = Vector3::new(fixes[7].x_m, fixes[7].y_m, fixes[7].z_m) - path.state(7.0).position_m;
+        assert!(off.norm() < 40.0 && off.norm() > 0.1);
+    }
+}

@@ -1,0 +1,152 @@
+//! The air: an exponential atmosphere that scatters once, by channel.
+
+use serde::{Deserialize, Serialize};
+
+/// The atmosphere. Its optical depth falls as exp(−height/scale height) in every channel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Air {
+    /// Optical depth from the ground to the zenith: red, green, blue.
+    pub optical_depth: [f64; 3],
+    /// Height over which the air thins by e, kilometres, above 0.
+    pub scale_height_km: f64,
+    /// Brightness of air that is so deep that nothing is seen through it, under full sunlight.
+    pub brightness: f64,
+}
+
+impl Default for Air {
+    fn default() -> Self {
+        // Rayleigh scattering at 650, 550 and 450 nm.
+        Self { optical_depth: [0.049, 0.097, 0.22], scale_height_km: 8.0, brightness: 0.6 }
+    }
+}
+
+impl Air {
+    /// Length of a grazing path from the ground to space over that to the zenith: √(π R / 2 H).
+    fn grazing(&self, radius_km: f64) -> f64 {
+        (core::f64::consts::FRAC_PI_2 * radius_km / self.scale_height_km).sqrt()
+    }
+
+    /// Tangent height in kilometres above the ground at which a channel mix is half as bright as deep air, where no
+    /// ground shines through. `weights` of red, green, blue sum to 1.
+    pub fn half_height_km(&self, weights: [f64; 3], radius_km: f64) -> f64 {
+        let chord = 2.0 * self.grazing(radius_km);
+        let bright = |h_km: f64| -> f64 {
+            let thin = libm::exp(-h_km / self.scale_height_km);
+            (0..3).map(|c| weights[c] * (1.0 - libm::exp(-self.optical_depth[c] * chord * thin))).sum()
+        };
+        let (mut low, mut high) = (-100.0, 200.0);
+        for _ in 0..60 {
+            let mid = 0.5 * (low + high);
+            if bright(mid) > 0.5 { low = mid } else { high = mid }
+        }
+        0.5 * (low + high)
+    }
+}
+
+/// [`Air`] around one globe, prepared.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Prepared {
+    depth: [f32; 3],
+    per_m: f32,
+    pub(crate) brightness: f32,
+    /// Grazing path over zenith path.
+    grazing: f32,
+    /// R/2H: how fast the shadow rises beyond the terminator.
+    curve: f32,
+    /// Tangent heights above this have no air worth a thousandth of a count.
+    pub(crate) top_m: f64,
+}
+
+impl Prepared {
+    pub(crate) fn new(air: &Air, radius_m: f64) -> Self {
+        let scale_m = air.scale_height_km.max(1e-3) * 1e3;
+        Self {
+            depth: air.optical_depth.map(|x| x as f32),
+            per_m: (1.0 / scale_m) as f32,
+            brightness: air.brightness as f32,
+            grazing: air.grazing(radius_m / 1e3) as f32,
+            curve: (radius_m / (2.0 * scale_m)) as f32,
+            top_m: 15.0 * scale_m,
+        }
+    }
+
+    /// How much more air than to the zenith a ray of the Sun passes, by the cosine of the Sun's zenith angle. Beyond
+    /// the terminator it dips below the horizontal: twice the grazing path, in air that is denser by the dip.
+    #[inline(always)]
+    pub(crate) fn sun_path(&self, mu0: f32) -> f32 {
+        let g = self.grazing;
+        let near = 1.0 / (mu0 * mu0 + 1.0 / (g * g)).sqrt();
+        if mu0 >= 0.0 { near } else { 2.0 * g * libm::expf((self.curve * mu0 * mu0).min(60.0)) - near }
+    }
+
+    /// What a ray of this optical depth lets through.
+    #[inline(always)]
+    pub(crate) fn clear(depth: [f32; 3]) -> [f32; 3] {
+        depth.map(|d| libm::expf(-d))
+    }
+
+    /// Optical depth of a ray that passes at a tangent height.
+    #[inline(always)]
+    pub(crate) fn past(&self, height_m: f32) -> [f32; 3] {
+        let thin = 2.0 * self.grazing * libm::expf(-height_m * self.per_m);
+        self.depth.map(|d| d * thin)
+    }
+
+    /// Optical depth of a ray that meets the ground under this cosine of the zenith angle.
+    #[inline(always)]
+    pub(crate) fn down(&self, mu: f32) -> [f32; 3] {
+        let path = 1.0 / (mu * mu + 1.0 / (self.grazing * self.grazing)).sqrt();
+        self.depth.map(|d| d * path)
+    }
+
+    /// Sunlight that is left at a height: by channel, over that in space. `thin` is exp(−height/scale height).
+    #[inline(always)]
+    pub(crate) fn sunlight(&self, sun_path: f32, thin: f32) -> [f32; 3] {
+        self.depth.map(|d| libm::expf(-(d * thin * sun_path).min(60.0)))
+    }
+
+    /// exp(−height/scale height).
+    #[inline(always)]
+    pub(crate) fn thin(&self, height_m: f32) -> f32 {
+        libm::expf(-height_m.max(0.0) * self.per_m)
+    }
+
+    /// Light that the air along a ray of this optical depth, which lets `clear` = exp(−depth) through, sends to the
+    /// camera. What shines through deep air comes from its upper part: the density there is less by 1 + depth.
+    #[inline(always)]
+    pub(crate) fn glow(&self, depth: [f32; 3], clear: [f32; 3], thin: f32, sun_path: f32, phase: f32) -> [f32; 3] {
+        core::array::from_fn(|c| {
+            let sun = libm::expf(-(self.depth[c] * thin / (1.0 + depth[c]) * sun_path).min(60.0));
+            self.brightness * phase * sun * (1.0 - clear[c])
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_height_is_where_one_channel_is_at_half() {
+        let air = Air::default();
+        // 1 − exp(−τ) = ½ at τ = ln 2; √(2 π R/H) is 70.7 for 6371 and 8 km.
+        for (c, weights) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate() {
+            let tau0 = air.optical_depth[c] * (core::f64::consts::TAU * 6371.0 / 8.0).sqrt();
+            let want = 8.0 * (tau0 / core::f64::consts::LN_2).ln();
+            assert!((air.half_height_km(weights, 6371.0) - want).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_sun_sets_red_and_then_goes_out() {
+        let air = Prepared::new(&Air::default(), 6.371e6);
+        let at = |deg: f64| air.sunlight(air.sun_path(libm::sin(deg.to_radians()) as f32), 1.0);
+        let (noon, low, night) = (at(90.0), at(2.0), at(-4.0));
+        assert!((noon[1] - (-0.097f32).exp()).abs() < 1e-3);
+        assert!(low[0] > 2.0 * low[1] && low[1] > 2.0 * low[2]);
+        assert!(night.iter().all(|&x| x < 1e-6));
+        // Continuous at the horizon.
+        assert!((air.sun_path(1e-6) / air.sun_path(-1e-6) - 1.0).abs() < 1e-4);
+    }
+}

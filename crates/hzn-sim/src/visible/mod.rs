@@ -1,0 +1,58 @@
+//! The Earth in sunlight as a camera in the visible sees it: ground, clouds, air, Sun, Moon and stars.
+//!
+//! Light is counted in units of what a white, matt surface sends back under the Sun at the zenith, before the exposure;
+//! three channels (red 650 nm, green 550 nm, blue 450 nm). The equations are in docs/simulator.md.
+
+pub(crate) mod air;
+pub(crate) mod discs;
+pub(crate) mod ground;
+pub(crate) mod shade;
+
+pub use air::Air;
+pub use ground::{Ground, Texture};
+
+use serde::{Deserialize, Serialize};
+
+use crate::texture::Clouds;
+
+/// What a camera in the visible sees. Where the Sun stands is said by the scene's `light`: `Light::Sun`, else it is at
+/// the camera's zenith.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Visible {
+    /// Whether the Sun's own disc, with its bloom, glare and ghosts, is drawn where it is in view.
+    pub sun_in_view: bool,
+    /// Land, sea, ice.
+    pub ground: Ground,
+    /// Clouds; none: leave the table out and set `clear = true`.
+    pub clouds: Clouds,
+    /// No clouds at all.
+    pub clear: bool,
+    /// The air.
+    pub air: Air,
+    /// Number of stars over the whole sphere.
+    pub stars: u32,
+    /// Light of the brightest star in one pixel at exposure 1; the faintest has a hundredth of it.
+    pub star_brightness: f64,
+}
+
+impl Default for Visible {
+    fn default() -> Self {
+        Self {
+            sun_in_view: true,
+            ground: Ground::default(),
+            clouds: Clouds {
+                cover: 0.45,
+                largest_km: 900.0,
+                smallest_km: 1.5,
+                softness: 0.7,
+                brightness: 0.85,
+                seed: 1,
+            },
+            clear: false,
+            air: Air::default(),
+            stars: 4000,
+            star_brightness: 0.5,
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Light along one ray: ground, clouds and air.
+
+use std::sync::Arc;
+
+use hzn_core::camera::Camera;
+use hzn_core::pixel::ImagePoint;
+use nalgebra::Vector3;
+
+use super::Visible;
+use super::air::Prepared;
+use super::ground::Soil;
+use crate::globe::{Globe, Sight, View};
+use crate::pose::Pose;
+use crate::texture::CloudField;
+
+/// Every how many pixels of a row a ray is asked of the lens; between them it is interpolated, which is good to a
+/// hundredth of a pixel.
+const STRIDE: usize = 8;
+/// Metres of tangent height a pixel may cover before it is averaged over several rays.
+const FINE_M: f64 = 2500.0;
+/// Height of the clouds' tops above the ground, where sunlight reaches them, metres.
+const CLOUD_TOP_M: f32 = 6000.0;
+/// Light of the whole sky on the ground over that of the Sun.
+const SKYLIGHT: [f32; 3] = [0.03, 0.05, 0.09];
+
+/// Colour and light of the rays of one camera.
+#[derive(Debug, Clone)]
+pub(crate) struct Shader {
+    camera: Camera<f64>,
+    pub(crate) globe: Globe,
+    pub(crate) view: View,
+    pub(crate) air: Prepared,
+    soil: Soil,
+    clouds: Option<Arc<CloudField>>,
+    /// Direction to the Sun in ECEF, and in the camera.
+    pub(crate) sun: Vector3<f64>,
+    sun_cam: Vector3<f64>,
+    pixel_rad: f64,
+    radius_km: f32,
+    /// Rays a side of a pixel close to the limb, and [`Sight::miss`] up to where that is.
+    samples: u32,
+    near: f64,
+}
+
+impl Shader {
+    /// `None` when the position is not outside the globe.
+    pub(crate) fn try_new(
+        world: &Visible,
+        camera: Camera<f64>,
+        globe: Globe,
+        pose: &Pose,
+        sun: Vector3<f64>,
+    ) -> Option<Self> {
+        let view = View::try_new(globe, pose)?;
+        let (fx, fy) = camera.focal_px();
+        let pixel_rad = 1.0 / fx.min(fy);
+        let air = Prepared::new(&world.air, globe.a_m);
+        let away_m = Vector3::from(pose.position_m).norm();
+        let limb_m = (away_m * away_m - globe.b_m * globe.b_m).max(0.0).sqrt();
+        let pixel_m = limb_m * pixel_rad;
+        Some(Self {
+            samples: (pixel_m / FINE_M).ceil().clamp(1.0, 6.0) as u32,
+            near: 2.0 * (air.top_m + 3.0 * pixel_m) / globe.b_m,
+            soil: Soil::new(&world.ground, globe.a_m),
+            clouds: (!world.clear).then(|| Arc::new(CloudField::new(&world.clouds, globe.a_m))),
+            sun_cam: view.to_camera(sun).map_or(Vector3::z(), |s| s.xyz().into()),
+            radius_km: (globe.a_m / 1e3) as f32,
+            camera,
+            globe,
+            view,
+            air,
+            sun,
+            pixel_rad,
+        })
+    }
+
+    /// The same from another attitude.
+    pub(crate) fn turned(&self, pose: &Pose) -> Self {
+        let view = View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone());
+        let sun_cam = view.to_camera(self.sun).map_or(Vector3::z(), |s| s.xyz().into());
+        Self { view, sun_cam, ..self.clone() }
+    }
+
+    /// Adds `weight` times the light of one row of pixels.
+    pub(crate) fn row(&self, v: f64, weight: f32, row: &mut [[f32; 3]]) {
+        let ray = |u: f64| self.camera.ray(ImagePoint { u, v }).map(|r| Vector3::from(r.direction().xyz()));
+        let mut next = ray(0.0);
+        for (block, pixels) in row.chunks_mut(STRIDE).enumerate() {
+            let start = (block * STRIDE) as f64;
+            let (first, last) = (next, ray(start + STRIDE as f64));
+            next = last;
+            for (i, p) in pixels.iter_mut().enumerate() {
+                let s = match (first, last) {
+                    (Some(a), Some(b)) => Some(a + (b - a) * (i as f64 / STRIDE as f64)),
+                    _ => ray(start + i as f64),
+                };
+                let Some(s) = s else { continue };
+                let sight = self.view.look(s.into());
+                let light = if self.samples > 1 && sight.miss.abs() < self.near {
+                    self.averaged(start + i as f64, v)
+                } else {
+                    self.colour(&s, &sight)
+                };
+                for c in 0..3 {
+                    p[c] += weight * light[c];
+                }
+            }
+        }
+    }
+
+    /// The mean over a pixel.
+    fn averaged(&self, u: f64, v: f64) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        let n = self.samples;
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let [du, dv] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(n) - 0.5);
+            let Some(ray) = self.camera.ray(ImagePoint { u: u + du, v: v + dv }) else { continue };
+            let s = Vector3::from(ray.direction().xyz());
+            let light = self.colour(&s, &self.view.look(s.into()));
+            for c in 0..3 {
+                sum[c] += light[c];
+            }
+        }
+        sum.map(|x| x / (n * n) as f32)
+    }
+
+    /// Light along one ray.
+    #[inline]
+    pub(crate) fn colour(&self, s: &Vector3<f64>, sight: &Sight) -> [f32; 3] {
+        let air = &self.air;
+        let cos = s.dot(&self.sun_cam) as f32;
+        let phase = 0.75 * (1.0 + cos * cos);
+        if sight.miss > 0.0 {
+            let height_m = self.view.tangent_height_m(sight);
+            if height_m > air.top_m {
+                return [0.0; 3];
+            }
+            let mu0 = self.view.normal(&self.view.point(sight)).dot(&self.sun) as f32;
+            let (depth, thin) = (air.past(height_m as f32), air.thin(height_m as f32));
+            return air.glow(depth, Prepared::clear(depth), thin, air.sun_path(mu0), phase);
+        }
+        let point = self.view.point(sight);
+        let normal = self.view.normal(&point);
+        let mu0 = normal.dot(&self.sun) as f32;
+        let (range_m, mu) = self.view.range_m_and_incidence(sight, &point);
+        let sun_path = air.sun_path(mu0);
+        let depth = air.down(mu as f32);
+        let clear = Prepared::clear(depth);
+        let glow = air.glow(depth, clear, 1.0, sun_path, phase);
+        // Deep night, or air that hides the ground.
+        if mu0 < -0.15 || depth[0] > 5.0 {
+            return glow;
+        }
+        let footprint_km = ((range_m * 1e-3 * self.pixel_rad / mu.max(0.02)) as f32).min(self.radius_km);
+        let sunlight = air.sunlight(sun_path, 1.0);
+        let day = ((mu0 + 0.1) * 3.0).clamp(0.0, 1.0);
+        let cloud = self.clouds.as_ref().and_then(|c| c.at(&point, footprint_km));
+        let (cover, bright) = cloud.unwrap_or((0.0, 0.0));
+        let mut light = [0.0f32; 3];
+        if cover < 0.99 {
+            let (colour, sea) = self.soil.at(&point, &normal, footprint_km);
+            let glint = if sea > 0.0 && mu0 > 0.0 { sea * self.glint(s, &normal, mu as f32) } else { 0.0 };
+            for c in 0..3 {
+                let sky = SKYLIGHT[c] * day;
+                light[c] = (1.0 - cover) * (colour[c] * (sunlight[c] * mu0.max(0.0) + sky) + glint * sunlight[c]);
+            }
+        }
+        if cover > 0.0 {
+            let above = air.sunlight(sun_path, air.thin(CLOUD_TOP_M));
+            // A cloud is no flat sheet: its sides are lit when the Sun is low.
+            let lit = ((mu0 + 0.08) / 1.08).max(0.0);
+            for c in 0..3 {
+                light[c] += cover * bright * (above[c] * lit + SKYLIGHT[c] * day);
+            }
+        }
+        core::array::from_fn(|c| glow[c] + light[c] * clear[c])
+    }
+
+    /// The Sun mirrored by a rough sea.
+    fn glint(&self, s: &Vector3<f64>, normal: &Vector3<f64>, mu: f32) -> f32 {
+        let Some(normal) = self.view.to_camera(*normal) else { return 0.0 };
+        let half = (self.sun_cam - s).normalize();
+        let along = Vector3::from(normal.xyz()).dot(&half).max(0.0) as f32;
+        if along < 0.9 {
+            return 0.0;
+        }
+        let grazing = (1.0 - mu).powi(5);
+        (0.02 + 0.98 * grazing).min(0.5) * 12.0 * libm::powf(along, 250.0)
+    }
+
+    /// What the air leaves of the light of something beyond, by channel: 0 behind the globe.
+    pub(crate) fn through(&self, s: &Vector3<f64>) -> [f32; 3] {
+        let sight = self.view.look((*s).into());
+        if sight.miss <= 0.0 {
+            return [0.0; 3];
+        }
+        let height_m = self.view.tangent_height_m(&sight);
+        if height_m > self.air.top_m || s.dot(&self.down_cam()) <= 0.0 {
+            return [1.0; 3];
+        }
+        Prepared::clear(self.air.past(height_m as f32))
+    }
+
+    /// Roughly downward, in the camera.
+    fn down_cam(&self) -> Vector3<f64> {
+        self.view.to_camera(-self.view.up()).map_or(Vector3::z(), |d| d.xyz().into())
+    }
+
+    pub(crate) fn camera(&self) -> &Camera<f64> {
+        &self.camera
+    }
+}
