@@ -41,6 +41,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("flight build", |_| flight_build::run_step());
     all.step("firmware", |_| firmware::build());
     all.step("demo", |_| demo());
+    all.step("simulator rendered again", |_| simulator_rendered_again());
     all.step("files read by others", |_| files_read_by_others());
     all.step("wheel", |_| {
         built_with_the_tests()?;
@@ -86,6 +87,18 @@ fn demo() -> Outcome {
         return Err(Trouble::Failed(format!("the demo left no .mcap in {}", dir.display())));
     }
     Ok(())
+}
+
+/// A simulated picture beside what NumPy and OpenCV make of the documented model.
+fn simulator_rendered_again() -> Outcome {
+    let python = python::environment("benches", Path::new("benches/requirements.txt"))?;
+    built_with_the_tests()?;
+    let dir = target().join("xtask").join("simulator");
+    if dir.exists() {
+        fs::remove_dir_all(&dir)?;
+    }
+    let hzn = target().join("debug/hzn");
+    steps::run(Command::new(python).arg("tests/python/check_simulator.py").args([hzn, dir]))
 }
 
 /// The reference readers on a sample and on what the demo has written.

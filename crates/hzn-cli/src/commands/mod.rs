@@ -11,6 +11,7 @@ mod init;
 mod recover;
 mod run;
 mod sensitivity;
+mod simulate;
 
 use clap::{Parser, Subcommand};
 
@@ -35,6 +36,7 @@ enum Command {
     Info(info::Args),
     Export(export::Args),
     Recover(recover::Args),
+    Simulate(simulate::Args),
     Init(init::Args),
     Evaluate(evaluate::Args),
     Sensitivity(Box<sensitivity::Args>),
@@ -54,6 +56,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Info(args) => info::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Sensitivity(args) => sensitivity::run(&args),

@@ -1,0 +1,282 @@
+//! `hzn simulate`: pictures of a scene, with truth.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use hzn_core::status::Status;
+use hzn_sim::scenario::{BUILTIN, Fit, Format};
+use hzn_sim::{Flight, FlightFrame, Scenario, ScenarioError};
+use rayon::prelude::*;
+
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::output;
+use crate::progress::Progress;
+use crate::setup::stop_flag;
+use crate::tell;
+
+/// Pictures that the noise model is measured on.
+const MEASURED: u32 = 32;
+
+/// Render a sequence of pictures with truth, and the sensor.toml that fits it
+///
+/// Writes pictures, frames.csv (what the sensor is told), truth.csv, imu.csv and gnss.csv where the scene has such
+/// instruments, scene.toml, and sensor.toml, whose limb height and noise model are measured on other pictures of the scene.
+///
+/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, full-disc, sun-moon, tumble. `hzn simulate SCENE --show`
+/// prints one, to be changed and given as a file.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// A built-in scene, or a scene.toml
+    #[arg(value_name = "SCENE", required_unless_present = "list")]
+    scene: Option<String>,
+    /// Folder that is made
+    #[arg(short, long, value_name = "DIR", required_unless_present_any = ["show", "list"])]
+    output: Option<PathBuf>,
+    /// Number of pictures, instead of the scene's
+    #[arg(long, value_name = "N")]
+    frames: Option<u32>,
+    /// Seed of everything random, instead of the scene's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Write into a folder that exists
+    #[arg(long)]
+    force: bool,
+    /// Render what is missing of a folder
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// No progress on stderr
+    #[arg(short, long)]
+    quiet: bool,
+    /// Print the scene.toml and do nothing else
+    #[arg(long)]
+    show: bool,
+    /// List the built-in scenes
+    #[arg(long)]
+    list: bool,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if args.list {
+        for (name, what, _) in BUILTIN {
+            tell::result(format_args!("{name:<14} {what}\n"))?;
+        }
+        return Ok(Exit::Done);
+    }
+    let name = args.scene.as_deref().unwrap_or_default();
+    if args.show {
+        tell::result(format_args!("{}\n", source(name)?.1.trim_end()))?;
+        return Ok(Exit::Done);
+    }
+    let scenario = load(name, args)?;
+    let folder = args.output.clone().unwrap_or_default();
+    let text = toml::to_string(&scenario).map_err(failed)?;
+    let scene_toml = folder.join("scene.toml");
+    if args.resume {
+        match std::fs::read_to_string(&scene_toml) {
+            Ok(before) if before == text => {}
+            Ok(_) => {
+                let what = "is another scene, or another number of pictures or seed; --force starts over";
+                return Err(usage(format!("{}: {what}", scene_toml.display())));
+            }
+            Err(e) => return Err(usage(format!("{}: {e}; nothing to resume", scene_toml.display()))),
+        }
+    } else if folder.exists() && !args.force {
+        let what = "exists already; choose another folder, --resume goes on, or --force writes into it";
+        return Err(usage(format!("{}: {what}", folder.display())));
+    }
+    // Everything that can be wrong with the scene is said before anything is written.
+    let flight = scenario.flight().map_err(|e| refused(name, &e))?;
+    std::fs::create_dir_all(&folder).map_err(|e| output::cannot(&folder, &e))?;
+    write(&scene_toml, &text)?;
+    let sensor_toml = folder.join("sensor.toml");
+    if !(args.resume && sensor_toml.exists()) {
+        write(&sensor_toml, &sensor(&scenario, &flight, name, args.quiet)?)?;
+    }
+    tables(&scenario, &flight, &folder)?;
+    let end = pictures(&scenario, &flight, &folder, args)?;
+    if end == Exit::Done {
+        summary(&scenario, &flight, &folder)?;
+    }
+    Ok(end)
+}
+
+/// Path and text of a scene.
+fn source(name: &str) -> Result<(PathBuf, String), Stop> {
+    if let Some((_, _, text)) = BUILTIN.iter().find(|b| b.0 == name) {
+        return Ok((PathBuf::from(name), (*text).to_owned()));
+    }
+    let path = PathBuf::from(name);
+    let text = std::fs::read_to_string(&path).map_err(|e| {
+        let names: Vec<&str> = BUILTIN.iter().map(|b| b.0).collect();
+        match hzn_calib::nearest(name, names.iter().copied()) {
+            Some(near) if !path.exists() => usage(format!("{name}: no such scene or file; did you mean {near}?")),
+            _ if !path.exists() => usage(format!("{name}: no such file; built-in scenes are {}", names.join(", "))),
+            _ => output::cannot(&path, &e),
+        }
+    })?;
+    Ok((path, text))
+}
+
+fn load(name: &str, args: &Args) -> Result<Scenario, Stop> {
+    let (path, text) = source(name)?;
+    let pair = |e: ScenarioError| (e.field, e.what);
+    let mut scenario: Scenario =
+        hzn_calib::document::parse(&text, &path, |s: &Scenario| s.check().map_err(pair)).map_err(Stop::from)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    scenario.read_files(folder).map_err(|e| refused(name, &e))?;
+    if let Some(frames) = args.frames {
+        scenario.capture.frames = frames;
+    }
+    if let Some(seed) = args.seed {
+        scenario.seed = seed;
+    }
+    scenario.check().map_err(|e| refused(name, &e))?;
+    Ok(scenario)
+}
+
+fn refused(name: &str, error: &ScenarioError) -> Stop {
+    usage(format!("{name}: {error}"))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Stop> {
+    std::fs::write(path, text).map_err(|e| output::cannot(path, &e))
+}
+
+/// The text of the sensor.toml: what differs from the defaults, with a noise model that was measured.
+fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Result<String, Stop> {
+    if !quiet {
+        tell::line(format_args!("measuring limb height and noise on other pictures of the scene ..."));
+    }
+    let progress = Mutex::new(Progress::new(Some(MEASURED.into()), 0, quiet));
+    let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count(Status::Ok)).unwrap_or(());
+    let fit = Fit::measure(scenario, MEASURED, &seen).map_err(|e| refused(name, &e))?;
+    if let Ok(p) = progress.into_inner() {
+        p.summary();
+    }
+    let mut sensor = flight.sensor.clone();
+    let how = match fit {
+        Some(fit) => {
+            fit.apply(&mut sensor);
+            let [answered, of] = fit.frames;
+            format!(
+                "# Limb height and noise model: measured on {of} other pictures of the scene, {answered} of them answered;\n\
+                 # squared errors there are {:.2} times their covariance on average (2 is ideal).\n",
+                fit.nees
+            )
+        }
+        None => {
+            "# Too few pictures were answered to measure limb height and noise: these are the defaults.\n".to_owned()
+        }
+    };
+    let mut table = toml::Table::try_from(&sensor).map_err(failed)?;
+    let defaults = toml::Table::try_from(hzn_core::Config::new(sensor.camera.clone())).map_err(failed)?;
+    let several = table.get("bodies").is_some();
+    for key in defaults.keys() {
+        // The camera is always said, and so is the one body.
+        if key == "camera" || (key == "body" && !several) {
+            continue;
+        }
+        let same = match (table.get_mut(key), defaults.get(key)) {
+            (Some(toml::Value::Table(own)), Some(toml::Value::Table(default))) => {
+                own.retain(|k, v| default.get(k) != Some(v));
+                own.is_empty()
+            }
+            (own, default) => own.as_deref() == default,
+        };
+        if same || (key == "body" && several) {
+            table.remove(key);
+        }
+    }
+    Ok(format!("# The sensor of the simulated scene {}.\n{how}preset = \"hzn\"\n\n{table}", scenario.name))
+}
+
+/// frames.csv, truth.csv, imu.csv, gnss.csv.
+fn tables(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {
+    let table = |name: &str| csv::Writer::from_path(folder.join(name)).map_err(failed);
+    let mut known = table("frames.csv")?;
+    let mut truth = table("truth.csv")?;
+    for frame in &flight.frames {
+        known.serialize(scenario.known_of(frame)).map_err(failed)?;
+        for &kind in &scenario.bodies {
+            truth.serialize(frame.scene.truth_of(kind, &frame.file, frame.time_s).map_err(failed)?).map_err(failed)?;
+        }
+    }
+    known.flush()?;
+    truth.flush()?;
+    let path = scenario.path().map_err(failed)?;
+    let span = scenario.span_s();
+    if let Some(imu) = &scenario.imu {
+        let mut rows = table("imu.csv")?;
+        imu.rows(&path, span, scenario.seed).try_for_each(|row| rows.serialize(row)).map_err(failed)?;
+        rows.flush()?;
+    }
+    if let Some(gnss) = &scenario.gnss {
+        let mut rows = table("gnss.csv")?;
+        gnss.rows(&path, span, scenario.seed).try_for_each(|row| rows.serialize(row)).map_err(failed)?;
+        rows.flush()?;
+    }
+    Ok(())
+}
+
+/// Renders what is missing.
+fn pictures(scenario: &Scenario, flight: &Flight, folder: &Path, args: &Args) -> Outcome {
+    let missing: Vec<&FlightFrame> =
+        flight.frames.iter().filter(|f| !(args.resume && folder.join(&f.file).exists())).collect();
+    let before = flight.frames.len() - missing.len();
+    let stop = stop_flag();
+    let total = flight.frames.len() as u64;
+    let progress = Mutex::new(Progress::new(Some(total), before as u64, args.quiet));
+    let done = AtomicUsize::new(before);
+    missing.par_iter().try_for_each(|frame| {
+        if stop.load(Ordering::SeqCst) {
+            return Ok(());
+        }
+        render(scenario, frame, folder)?;
+        done.fetch_add(1, Ordering::SeqCst);
+        progress.lock().map(|mut p| p.count(Status::Ok)).unwrap_or(());
+        Ok::<(), Stop>(())
+    })?;
+    if let Ok(p) = progress.into_inner() {
+        p.summary();
+    }
+    let done = done.into_inner();
+    if done < flight.frames.len() {
+        tell::line(format_args!("interrupted after {done} of {total} pictures; --resume goes on"));
+        return Ok(Exit::Interrupted);
+    }
+    Ok(Exit::Done)
+}
+
+/// One picture; its name appears when it is whole.
+fn render(scenario: &Scenario, frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
+    let path = folder.join(&frame.file);
+    let part = folder.join(format!(".part-{}", frame.file));
+    let picture = frame.render().map_err(failed)?;
+    let saved = match scenario.capture.format {
+        Format::Png => picture.save(&part),
+        Format::Jpeg => picture.save_jpeg(&part, scenario.capture.jpeg_quality),
+    };
+    saved.map_err(|e| match e {
+        image::ImageError::IoError(e) => output::cannot(&path, &e),
+        e => failed(e),
+    })?;
+    std::fs::rename(&part, &path).map_err(|e| output::cannot(&path, &e))
+}
+
+fn summary(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {
+    let shown = folder.display();
+    tell::result(format_args!("{shown}: {} pictures of {}\n", flight.frames.len(), scenario.name))?;
+    for &kind in &scenario.bodies {
+        let mut seen = 0;
+        let mut body = String::new();
+        for frame in &flight.frames {
+            let truth = frame.scene.truth_of(kind, &frame.file, frame.time_s).map_err(failed)?;
+            seen += usize::from(truth.has_limb());
+            body = truth.body;
+        }
+        tell::result(format_args!("  limb of the {body} in view in {seen}\n"))?;
+    }
+    tell::result(format_args!("\nNext:  hzn run {shown} -o {shown}.csv\n"))?;
+    Ok(())
+}

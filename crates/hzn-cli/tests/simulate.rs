@@ -1,0 +1,125 @@
+//! `hzn simulate`, end to end through the binary.
+
+use std::path::Path;
+
+const SCENE: &str = r#"
+name = "small"
+utc = 2019-06-13T10:30:00Z
+[capture]
+from_s = 70.0
+to_s = 420.0
+frames = 5
+[camera]
+width = 192
+height = 128
+model = "pinhole"
+fx_px = 150.0
+fy_px = 150.0
+cx_px = 95.5
+cy_px = 63.5
+[trajectory.rocket]
+[attitude.pointing]
+off_nadir_deg = [75.0, 80.0]
+azimuth_deg = [0.0, 200.0]
+[world.visible]
+[detector]
+read_noise = 0.02
+[imu]
+rate_hz = 10
+[gnss]
+"#;
+
+/// Runs hzn in a folder: exit code, stdout, stderr.
+fn hzn(folder: &Path, threads: &str, args: &[&str]) -> (i32, String, String) {
+    let out = assert_cmd::Command::cargo_bin("hzn")
+        .expect("the binary is built")
+        .current_dir(folder)
+        .env("RAYON_NUM_THREADS", threads)
+        .args(args)
+        .output()
+        .expect("hzn starts");
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (out.status.code().unwrap_or(-1), text(&out.stdout), text(&out.stderr))
+}
+
+#[test]
+fn a_scene_becomes_pictures_that_the_sensor_answers() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    std::fs::write(at.join("my.toml"), SCENE).unwrap();
+    let (code, stdout, stderr) = hzn(at, "2", &["simulate", "my.toml", "-o", "out"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(
+        stdout.contains("out: 5 pictures of small") && stdout.contains("limb of the earth in view in 5"),
+        "{stdout}"
+    );
+    let lines = |name: &str| std::fs::read_to_string(at.join("out").join(name)).unwrap().lines().count();
+    assert_eq!((lines("frames.csv"), lines("truth.csv")), (6, 6));
+    // 350 s, both ends included, and the header.
+    assert_eq!((lines("imu.csv"), lines("gnss.csv")), (3502, 352));
+    let sensor = std::fs::read_to_string(at.join("out/sensor.toml")).unwrap();
+    assert!(sensor.contains("measured on 32 other pictures") && sensor.contains("sigma_px"), "{sensor}");
+
+    // The sensor takes them as they are.
+    let (code, stdout, stderr) = hzn(at, "2", &["run", "out"]);
+    assert_eq!((code, stdout.lines().count()), (0, 6), "{stderr}");
+    assert!(stdout.matches(",ok,").count() >= 4, "{stdout}");
+
+    // The same pictures on one thread, and where some are missing.
+    let read = |folder: &str, i: usize| std::fs::read(at.join(folder).join(format!("small-{i:05}.png"))).unwrap();
+    assert_eq!(hzn(at, "1", &["simulate", "my.toml", "-o", "one", "-q"]).0, 0);
+    assert!((0..5).all(|i| read("out", i) == read("one", i)));
+    std::fs::remove_file(at.join("one/small-00003.png")).unwrap();
+    let (code, _, stderr) = hzn(at, "1", &["simulate", "my.toml", "-o", "one", "--resume"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(read("out", 3), read("one", 3));
+
+    // What is there is not overwritten, and not mixed with another scene.
+    let (code, _, stderr) = hzn(at, "1", &["simulate", "my.toml", "-o", "one"]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("one: exists already"), "{stderr}");
+    let (code, _, stderr) = hzn(at, "1", &["simulate", "my.toml", "-o", "one", "--resume", "--seed", "9"]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("is another scene"), "{stderr}");
+}
+
+#[test]
+fn what_cannot_be_is_said_before_anything_is_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let refused = |text: &str| {
+        std::fs::write(at.join("bad.toml"), text).unwrap();
+        let (code, _, stderr) = hzn(at, "1", &["simulate", "bad.toml", "-o", "out"]);
+        assert!(code == 2 && !at.join("out").exists(), "{code} {stderr}");
+        stderr
+    };
+    assert_eq!(
+        refused(&SCENE.replace("frames = 5", "frame = 5")),
+        "error: bad.toml:7: [capture] frame: unknown key; did you mean frames?\n"
+    );
+    assert_eq!(
+        refused(&SCENE.replace("frames = 5", "frames = 0")),
+        "error: bad.toml:7: [capture] frames: 0 is refused: must be 1 to 100000\n"
+    );
+    let up = refused(&SCENE.replace("[75.0, 80.0]", "[180.0, 180.0]"));
+    assert!(up.contains("[attitude]") && up.contains("in view in none of the pictures"), "{up}");
+    let late = refused(&SCENE.replace("to_s = 420.0", "to_s = 4200.0"));
+    assert!(late.contains("[capture] to_s") && late.contains("after the impact"), "{late}");
+    let table = SCENE.replace("[trajectory.rocket]", "[trajectory.table]\nfile = \"way.csv\"");
+    assert!(refused(&table).contains("way.csv"));
+
+    let (code, _, stderr) = hzn(at, "1", &["simulate", "rockett", "-o", "out"]);
+    assert_eq!((code, stderr.as_str()), (2, "error: rockett: no such scene or file; did you mean rocket?\n"));
+}
+
+#[test]
+fn built_in_scenes_can_be_listed_and_printed() {
+    let at = tempfile::tempdir().unwrap();
+    let (code, list, _) = hzn(at.path(), "1", &["simulate", "--list"]);
+    assert_eq!((code, list.lines().count()), (0, 7));
+    for line in list.lines() {
+        let name = line.split_whitespace().next().unwrap();
+        let (code, text, _) = hzn(at.path(), "1", &["simulate", name, "--show"]);
+        assert!(code == 0 && text.contains(&format!("name = \"{name}\"")), "{text}");
+    }
+}
