@@ -3,6 +3,7 @@
 //! ```text
 //! cargo xtask test     everything that must hold: format, lints, tests, documents, flight build, files, demo
 //! cargo xtask bench    hzn-core beside the OpenCV recipe, in one run
+//! cargo xtask reproduce  our numbers beside the published ones, into docs/reproduction.md
 //! cargo xtask firmware the images for the flight computer, and what they cost in instructions
 //! ```
 #![forbid(unsafe_code)]
@@ -12,19 +13,21 @@ mod firmware;
 mod flight_build;
 mod machine;
 mod python;
+mod reproduce;
 mod steps;
 mod test;
 mod wheel;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask <test|bench|firmware> [OPTION]...
+const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware> [OPTION]...
 
   test [STEP]...     all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
   bench [ARG]...     hzn-core beside the OpenCV recipe; arguments go to hzn-benches (see --help there)
   bench run [ARG]... `hzn run` on PNGs beside decoding them alone
   bench ransac [--runs N] samplers of outliers beside each other, on simulated edge points
+  reproduce [STUDY]... measures again what docs/reproduction.md says, and writes it (see --help there)
   firmware           builds the images for the flight computer and counts their instructions in QEMU";
 
 fn main() -> ExitCode {
@@ -36,6 +39,7 @@ fn main() -> ExitCode {
     let result = match command {
         "test" => test::run(rest),
         "bench" => bench::run(rest),
+        "reproduce" => reproduce::run(rest),
         "firmware" => firmware::run(rest),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");

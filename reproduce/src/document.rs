@@ -1,0 +1,146 @@
+//! `docs/reproduction.md`: sections between marks, so that one study can be measured again alone.
+
+use std::path::Path;
+
+use anyhow::Context;
+use hzn_cli::plot::Chart;
+
+use crate::studies::ALL;
+
+const HEAD: &str = "# Reproduction
+
+Our numbers beside the published ones. Written by `cargo xtask reproduce`; a section alone by the command in it. Every
+picture follows from its seed and every answer from its picture, so the numbers come out alike on every machine.
+
+Sources: **[BB]** Braun & Barf 2022, **[W]** Wang, Wang & Jin 2022, **[B14]** Barf 2014, **[H15]** Barf et al. 2015.
+NEES is the squared error over the covariance (two degrees of freedom): 2 is ideal, more is too sure.
+";
+
+/// What a study found.
+#[derive(Debug, Default)]
+pub(crate) struct Section {
+    parts: Vec<Part>,
+}
+
+#[derive(Debug)]
+enum Part {
+    Text(String),
+    Table { head: Vec<String>, rows: Vec<Vec<String>> },
+    Figure { file: String, alt: String, svg: String },
+}
+
+impl Section {
+    /// Adds a paragraph of Markdown.
+    pub(crate) fn text(&mut self, text: impl Into<String>) {
+        self.parts.push(Part::Text(text.into()));
+    }
+    /// Adds a table; the first column stands to the left, the others to the right.
+    pub(crate) fn table<H: Into<String>>(
+        &mut self,
+        head: impl IntoIterator<Item = H>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) {
+        let head = head.into_iter().map(Into::into).collect();
+        self.parts.push(Part::Table { head, rows: rows.into_iter().collect() });
+    }
+    /// Adds a chart, which becomes `figures/NAME.svg`.
+    pub(crate) fn figure(&mut self, name: &str, chart: &Chart) -> anyhow::Result<()> {
+        let svg = chart.svg()?;
+        self.parts.push(Part::Figure { file: format!("figures/{name}.svg"), alt: chart.title.clone(), svg });
+        Ok(())
+    }
+
+    /// The section as Markdown, with its marks.
+    pub(crate) fn markdown(&self, name: &str, title: &str) -> String {
+        let mut out = format!("{}\n## {title}\n\n`cargo xtask reproduce {name}`\n", begin(name));
+        for part in &self.parts {
+            out.push('\n');
+            match part {
+                Part::Text(text) => out.push_str(&format!("{text}\n")),
+                Part::Table { head, rows } => {
+                    out.push_str(&format!("| {} |\n|---|{}\n", head.join(" | "), "---:|".repeat(head.len() - 1)));
+                    rows.iter().for_each(|row| out.push_str(&format!("| {} |\n", row.join(" | "))));
+                }
+                Part::Figure { file, alt, .. } => out.push_str(&format!("![{alt}]({file})\n")),
+            }
+        }
+        out + &end(name)
+    }
+
+    /// Writes the figures below the docs folder.
+    pub(crate) fn write_figures(&self, docs: &Path) -> anyhow::Result<()> {
+        for part in &self.parts {
+            if let Part::Figure { file, svg, .. } = part {
+                let path = docs.join(file);
+                if let Some(folder) = path.parent() {
+                    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+                }
+                std::fs::write(&path, svg).with_context(|| path.display().to_string())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn begin(name: &str) -> String {
+    format!("<!-- study {name} -->")
+}
+fn end(name: &str) -> String {
+    format!("<!-- end of {name} -->\n")
+}
+
+/// The section of a study in a document.
+fn find<'a>(document: &'a str, name: &str) -> Option<&'a str> {
+    let from = document.find(&begin(name))?;
+    let rest = &document[from..];
+    let to = rest.find(&end(name))? + end(name).len();
+    Some(&rest[..to])
+}
+
+/// The document with this section in its place; the others stay, in the order of the studies.
+pub(crate) fn put(document: &str, name: &str, section: &str) -> String {
+    let mut out = HEAD.to_owned();
+    for study in ALL {
+        let text = if study.name == name { Some(section) } else { find(document, study.name) };
+        if let Some(text) = text {
+            out.push('\n');
+            out.push_str(text);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_is_replaced_and_the_others_stay_in_order() {
+        let section = |word: &str, name: &str| {
+            let mut s = Section::default();
+            s.text(word);
+            s.markdown(name, "Title")
+        };
+        let [a, b] = [ALL[0].name, ALL[1].name];
+        let document = put("", b, &section("second", b));
+        let document = put(&document, a, &section("first", a));
+        assert!(document.find("first").unwrap() < document.find("second").unwrap());
+        let again = put(&document, b, &section("changed", b));
+        assert!(again.contains("first") && again.contains("changed") && !again.contains("second"));
+        assert_eq!(put(&again, b, &section("second", b)), document);
+    }
+
+    #[test]
+    fn the_document_holds_every_study_and_its_figures() {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+        let document = std::fs::read_to_string(docs.join("reproduction.md")).unwrap();
+        for study in ALL {
+            let section = find(&document, study.name).unwrap_or_else(|| panic!("{} was not run", study.name));
+            assert!(section.contains(study.title), "{}", study.name);
+        }
+        for figure in document.split("](figures/").skip(1) {
+            let file = figure.split(')').next().unwrap();
+            assert!(docs.join("figures").join(file).is_file(), "{file}");
+        }
+    }
+}

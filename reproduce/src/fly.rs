@@ -1,0 +1,123 @@
+//! Flights through sensors: every picture is rendered once and seen by each.
+
+use anyhow::Context;
+use hzn_core::{Config, HostHorizon};
+use hzn_sim::evaluate::{Answer, Case, Evaluation, Found, pair};
+use hzn_sim::{Flight, FlightFrame, Truth};
+use rayon::prelude::*;
+
+/// A sensor with what it is told.
+#[derive(Debug, Clone)]
+pub(crate) struct Sensor {
+    /// As tables name it.
+    pub(crate) name: String,
+    /// Its configuration.
+    pub(crate) config: Config,
+    /// Error of the prior attitude (1-sigma about each axis) in degrees; without it, the position only.
+    pub(crate) attitude_sigma_deg: Option<f64>,
+}
+
+impl Sensor {
+    /// Told the position only.
+    pub(crate) fn new(name: &str, config: Config) -> Self {
+        Self { name: name.into(), config, attitude_sigma_deg: None }
+    }
+    /// Told an attitude too.
+    pub(crate) fn with_attitude(self, sigma_deg: f64) -> Self {
+        Self { attitude_sigma_deg: Some(sigma_deg), ..self }
+    }
+}
+
+/// The pictures of a flight through sensors: cases, one list a sensor.
+pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec<Case>>> {
+    let make = || sensors.iter().map(|s| HostHorizon::boxed(&s.config)).collect::<Result<Vec<_>, _>>();
+    // Refused here, not in a thread.
+    make()?;
+    let seen: Vec<(Truth, Vec<Answer>)> = flight
+        .frames
+        .par_iter()
+        .map_init(make, |horizons, frame| {
+            let truth = frame.truth()?;
+            let picture = frame.render()?;
+            let horizons = horizons.as_mut().map_err(|e| *e)?;
+            let answers = horizons.iter_mut().zip(sensors);
+            let answers = answers.map(|(horizon, sensor)| look(horizon, sensor, frame, &picture, &truth));
+            let answers = answers.collect::<anyhow::Result<_>>()?;
+            anyhow::Ok((truth, answers))
+        })
+        .collect::<anyhow::Result<_>>()?;
+    let truth: Vec<Truth> = seen.iter().map(|(t, _)| t.clone()).collect();
+    let of = |i: usize| {
+        let answers: Vec<Answer> = seen.iter().filter_map(|(_, a)| a.get(i).cloned()).collect();
+        let camera = hzn_core::camera::Camera::try_new(&flight.sensor.camera)?;
+        Ok(pair(&answers, &truth, Some(&camera))?)
+    };
+    (0..sensors.len()).map(of).collect()
+}
+
+fn look(
+    horizon: &mut HostHorizon,
+    sensor: &Sensor,
+    frame: &FlightFrame,
+    picture: &hzn_sim::Picture,
+    truth: &Truth,
+) -> anyhow::Result<Answer> {
+    let known = match sensor.attitude_sigma_deg {
+        Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
+        None => frame.known(),
+    };
+    let expected = horizon.expect(&known).with_context(|| frame.file.clone())?;
+    let report = horizon.process(&picture.view(), &expected);
+    let found = report.solution.as_ref().map(|s| Found {
+        axis: s.axis.xyz(),
+        covariance_rad2: s.covariance.upper_rad2,
+        half_angle_deg: Some(s.half_angle_rad.to_degrees()),
+    });
+    Ok(Answer {
+        file: frame.file.clone(),
+        time_s: frame.time_s,
+        body: truth.body.clone(),
+        status: report.status,
+        found,
+    })
+}
+
+/// The one evaluation of cases of one body.
+pub(crate) fn evaluate(cases: &[Case]) -> Evaluation {
+    Evaluation::of(&cases.iter().collect::<Vec<_>>())
+}
+
+/// Cells of an evaluation: answered, false answers, RMS, 95 %, worst, NEES with its interval.
+pub(crate) fn cells(e: &Evaluation) -> Vec<String> {
+    let none = || "–".to_owned();
+    let error = |of: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or_else(none, |x| deg(of(x)));
+    let without = e.frames - e.with_limb;
+    vec![
+        format!("{}/{}", e.answered, e.with_limb),
+        if without > 0 { format!("{}/{without}", e.false_answers) } else { none() },
+        error(|x| x.rms_deg),
+        error(|x| x.p95_deg),
+        error(|x| x.worst_deg),
+        e.honesty
+            .as_ref()
+            .map_or_else(none, |h| format!("{} ({:.2}–{:.2})", two_digits(h.nees), h.interval[0], h.interval[1])),
+    ]
+}
+
+/// Heads of [`cells`].
+pub(crate) const HEADS: [&str; 6] = ["answered", "false", "RMS", "95 %", "worst", "NEES (95 % if honest)"];
+
+/// An angle to three digits.
+pub(crate) fn deg(x: f64) -> String {
+    if !x.is_finite() {
+        return "–".into();
+    }
+    let decimals = if x > 0.0 { (2 - x.log10().floor() as i32).clamp(1, 5) } else { 1 };
+    format!("{x:.*}°", decimals as usize)
+}
+
+/// A number to two digits, without an exponent.
+pub(crate) fn two_digits(x: f64) -> String {
+    let decimals = if x > 0.0 { (1 - x.log10().floor() as i32).clamp(0, 6) } else { 1 };
+    format!("{x:.*}", decimals as usize)
+}

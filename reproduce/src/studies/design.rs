@@ -1,0 +1,203 @@
+//! Braun & Barf 2022, figures 6 to 8 and 19 to 22: by calculation, without pictures.
+
+use hzn_cli::plot::{Chart, Series, Style};
+use hzn_core::camera::{self, Model};
+use hzn_sim::sensitivity::chart::{Vertical, Visibility};
+use hzn_sim::sensitivity::{Design, Sigmas};
+
+use super::Effort;
+use crate::document::Section;
+
+/// Level pinhole at 200 km, R = 1 px², L = 300 px, limb height 0.
+fn design(width: u16, height: u16, f_px: f64) -> Design {
+    Design {
+        camera: camera::Config::ideal(Model::Pinhole, width, height, f_px),
+        radius_km: 6371.0,
+        altitude_km: 200.0,
+        altitude_sigma_km: 0.5,
+        limb_height_km: 0.0,
+        limb_height_sigma_km: 2.0,
+        depression_deg: 0.0,
+        roll_deg: 0.0,
+        sigma_px: 1.0,
+        correlation_px: 300.0,
+    }
+}
+
+fn by_fov(fov_deg: f64) -> Design {
+    design(1920, 1080, 960.0 / (fov_deg / 2.0).to_radians().tan())
+}
+
+fn by_vertical_fov(rows: u16, fov_deg: f64) -> Design {
+    design(rows * 16 / 9, rows, f64::from(rows) / 2.0 / (fov_deg / 2.0).to_radians().tan())
+}
+
+fn sigmas(d: &Design) -> anyhow::Result<Sigmas> {
+    d.sigmas()?.ok_or_else(|| anyhow::anyhow!("no limb in view"))
+}
+
+/// Ours, the reference, and by how much they differ.
+fn beside(sigma_deg: f64, reference_3_sigma_deg: f64) -> String {
+    let ours = 3.0 * sigma_deg;
+    format!("{ours:.4}° / {reference_3_sigma_deg}° ({:+.1} %)", 100.0 * (ours / reference_3_sigma_deg - 1.0))
+}
+
+pub(super) fn sensitivity(_: &Effort) -> anyhow::Result<Section> {
+    let mut s = Section::default();
+    s.text(
+        "Level pinhole camera 1920×1080 at 200 km, edge errors of 1 px over 300 px, points a pixel apart; 3 sigma, ours / \
+         reference. [BB] print curves; the reference is an independent evaluation of their equations with the errata put \
+         right (docs/math.md), reached within 2 %. Roll is about the optical axis, pitch about the picture's horizontal. \
+         The same by hand: `hzn sensitivity --altitude 200 --limb-height 0 --fov 66:146:16 -o table.csv`.",
+    );
+    let head = ["", "roll [BB 33]", "pitch [BB 33]", "pitch, α known", "overbound [BB 37]"];
+    let row = |name: String, d: &Design, r: [f64; 4]| -> anyhow::Result<Vec<String>> {
+        let x = sigmas(d)?;
+        let paper = x.braun_barf.ok_or_else(|| anyhow::anyhow!("not a pinhole"))?;
+        let bound = x.braun_barf_bound_deg.unwrap_or(f64::NAN);
+        let ours = [paper.roll_deg, paper.pitch_deg, x.known.pitch_deg, bound];
+        Ok(std::iter::once(name).chain(ours.into_iter().zip(r).map(|(a, b)| beside(a, b))).collect())
+    };
+    let mut rows = Vec::new();
+    for (km, r) in [
+        (50.0, [0.1298, 0.5744, 0.0978, 3.76]),
+        (100.0, [0.1280, 0.5662, 0.0964, 2.65]),
+        (200.0, [0.1247, 0.5506, 0.0936, 1.856]),
+        (300.0, [0.1215, 0.5357, 0.0910, 1.502]),
+        (500.0, [0.1155, 0.5077, 0.0861, 1.142]),
+    ] {
+        rows.push(row(format!("{km} km, 94.4° wide"), &Design { altitude_km: km, ..by_fov(94.4) }, r)?);
+    }
+    for (fov, r) in [
+        (66.0, [0.1242, 0.7197, 0.0562, 2.72]),
+        (82.0, [0.1244, 0.6039, 0.0753, 2.16]),
+        (98.0, [0.1248, 0.5400, 0.0998, 1.78]),
+        (114.0, [0.1252, 0.5166, 0.1337, 1.51]),
+        (130.0, [0.1257, 0.5400, 0.1865, 1.32]),
+        (146.0, [0.1262, 0.6500, 0.2849, 1.22]),
+    ] {
+        rows.push(row(format!("200 km, {fov}° wide"), &by_fov(fov), r)?);
+    }
+    s.table(head, rows);
+    let pair = |name: String, d: &Design, roll: f64, pitch: f64| -> anyhow::Result<Vec<String>> {
+        let paper = sigmas(d)?.braun_barf.ok_or_else(|| anyhow::anyhow!("not a pinhole"))?;
+        Ok(vec![name, beside(paper.roll_deg, roll), beside(paper.pitch_deg, pitch)])
+    };
+    let mut rows = Vec::new();
+    for (px, roll, pitch) in [(270, 0.507, 1.93), (540, 0.270, 1.06), (1080, 0.1255, 0.526), (2160, 0.0512, 0.227)] {
+        rows.push(pair(format!("{px} rows, 94.4° high"), &by_vertical_fov(px, 94.4), roll, pitch)?);
+    }
+    for (km, roll, pitch) in
+        [(0.0, 0.1255, 0.5262), (5.0, 0.1256, 0.5271), (10.0, 0.1258, 0.5279), (20.0, 0.1261, 0.5293)]
+    {
+        let d = Design { limb_height_km: km, ..by_vertical_fov(1080, 94.4) };
+        rows.push(pair(format!("limb height {km} km, 94.4° high"), &d, roll, pitch)?);
+    }
+    s.table(["", "roll [BB 33]", "pitch [BB 33]"], rows);
+
+    let fovs: Vec<f64> = (120..=300).map(|i| 0.5 * f64::from(i)).collect();
+    let pitch = |f: &dyn Fn(f64) -> Design| -> anyhow::Result<Vec<(f64, f64)>> {
+        fovs.iter().map(|&fov| Ok((fov, sigmas(&f(fov))?.braun_barf.map_or(f64::NAN, |t| 3.0 * t.pitch_deg)))).collect()
+    };
+    let wide = pitch(&by_fov)?;
+    let square = pitch(&|fov| by_vertical_fov_square(fov))?;
+    let best = |curve: &[(f64, f64)]| curve.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 0.0));
+    let high = |fov: f64| 2.0 * ((fov / 2.0).to_radians().tan() * 9.0 / 16.0).atan().to_degrees();
+    let (a, b) = (best(&wide), best(&square));
+    s.text(format!(
+        "**Optimum field of view** of the pitch with the half-angle free: {}° wide ({:.4}°), which is {:.0}° high; for a \
+         square picture {}°. [BB] quote about 118° (reference: 116°, 84° high, 110°), and call the axis roll: which it is \
+         depends on how the camera is mounted. With the half-angle known there is no optimum: the narrower the better, \
+         as long as the limb spans the picture. The curve is flat: a few degrees around it cost less than 0.5 %.",
+        a.0,
+        a.1,
+        high(a.0),
+        b.0
+    ));
+    let mut curves = vec![Series::new("pitch [BB 33]", Style::Line, wide)];
+    let mut more = |name: &str, of: fn(&Sigmas) -> f64| -> anyhow::Result<()> {
+        let points: anyhow::Result<Vec<_>> =
+            fovs.iter().map(|&fov| Ok((fov, 3.0 * of(&sigmas(&by_fov(fov))?)))).collect();
+        curves.push(Series::new(name, Style::Line, points?));
+        Ok(())
+    };
+    more("pitch, fused (limb height 2 km, altitude 0.5 km)", |x| x.fused.pitch_deg)?;
+    more("pitch, α known", |x| x.known.pitch_deg)?;
+    more("roll", |x| x.fused.roll_deg)?;
+    let chart = Chart::new("3 sigma at 200 km, level camera", "field of view across the width [deg]", "deg");
+    s.figure("sensitivity", &curves.into_iter().fold(chart, Chart::with))?;
+    Ok(s)
+}
+
+fn by_vertical_fov_square(fov_deg: f64) -> Design {
+    design(1080, 1080, 540.0 / (fov_deg / 2.0).to_radians().tan())
+}
+
+pub(super) fn visibility(_: &Effort) -> anyhow::Result<Section> {
+    let mut s = Section::default();
+    s.text(
+        "In the plane of a pinhole picture the limb is an arc of an ellipse or of a hyperbola. An ellipse can be seen from \
+         a full field of view γ > 4α − π on, a hyperbola from γ > π − 4α on ([BB] section 2.7 has the two exchanged), the \
+         whole disc from 2α on. By hand: `hzn sensitivity visibility --limb-height 0`.",
+    );
+    let of = |km: f64| Visibility::of((6371.0f64 / (6371.0 + km)).asin());
+    let rows = [80.0, 238.0, 800.0, 2600.0, 6000.0].map(|km| {
+        let v = of(km);
+        let published = if km == 238.0 { "118.3°" } else { "" };
+        vec![
+            format!("{km} km"),
+            format!("{:.2}°", v.half_angle_deg),
+            format!("{:.1}°", v.ellipse_deg),
+            published.to_owned(),
+            format!("{:.1}°", v.hyperbola_deg),
+            format!("{:.1}°", v.disc_deg),
+        ]
+    });
+    s.table(["altitude", "half-angle α", "ellipse from", "[BB]", "hyperbola from", "whole disc from"], rows);
+    let altitudes: Vec<f64> = (1..=120).map(|i| 50.0 * f64::from(i)).collect();
+    let curve = |name: &str, value: fn(&Visibility) -> f64| {
+        Series::new(name, Style::Line, altitudes.iter().map(|&km| (km, value(&of(km)))))
+    };
+    let chart = Chart::new("Field of view from which on a limb can be seen", "altitude [km]", "field of view [deg]")
+        .with(curve("arc of an ellipse", |v| v.ellipse_deg))
+        .with(curve("arc of a hyperbola", |v| v.hyperbola_deg))
+        .with(curve("whole disc", |v| v.disc_deg));
+    s.figure("visibility", &chart)?;
+    Ok(s)
+}
+
+pub(super) fn spherical_earth(_: &Effort) -> anyhow::Result<Section> {
+    let mut s = Section::default();
+    s.text(
+        "What a sensor measures is the axis of the limb's cone. Taking it for the direction to the Earth's centre, as a \
+         sphere has it, is wrong by up to 0.19°; hzn gives the limb axis itself in both frames, so nothing of this is \
+         left. At 45° latitude, without a limb height; the reference is the independent table of docs/math.md's source. By \
+         hand: `hzn sensitivity spherical-earth`.",
+    );
+    let rows = [
+        (100.0, [0.1894, 0.1865, 0.0029]),
+        (240.0, [0.1854, 0.1787, 0.0067]),
+        (600.0, [0.1759, 0.1607, 0.0151]),
+        (2000.0, [0.1464, 0.1114, 0.0350]),
+        (20_000.0, [0.0465, 0.0112, 0.0352]),
+    ]
+    .map(|(km, reference)| {
+        let v = Vertical::at(45.0, km, 0.0);
+        let ours = v.map_or([f64::NAN; 3], |v| {
+            [v.geocentric_to_geodetic_deg, v.geocentric_to_axis_deg, v.geodetic_to_axis_deg]
+        });
+        let cell = |(a, b): (f64, f64)| format!("{a:.4}° / {b:.4}°");
+        std::iter::once(format!("{km} km")).chain(ours.into_iter().zip(reference).map(cell)).collect()
+    });
+    s.table(["altitude", "centre – vertical", "centre – limb axis", "vertical – limb axis"], rows);
+    let mut chart = Chart::new("Error of taking the Earth for a sphere", "latitude [deg]", "deg");
+    for km in [100.0, 240.0, 600.0, 2000.0] {
+        let points = (0..=90).map(|i| {
+            let latitude = f64::from(i);
+            (latitude, Vertical::at(latitude, km, 0.0).map_or(f64::NAN, |v| v.geocentric_to_axis_deg))
+        });
+        chart = chart.with(Series::new(format!("{km} km"), Style::Line, points));
+    }
+    s.figure("spherical-earth", &chart)?;
+    Ok(s)
+}

@@ -1,0 +1,53 @@
+//! The studies, in the order of the document.
+
+mod design;
+mod horace;
+mod infrared;
+mod rocket;
+
+use crate::document::Section;
+
+/// How much is done.
+pub(crate) struct Effort {
+    /// Frames a scene, instead of the study's own number.
+    pub(crate) frames: Option<usize>,
+}
+
+impl Effort {
+    /// Frames a scene, where the study itself takes `own`.
+    pub(crate) fn frames(&self, own: usize) -> usize {
+        self.frames.unwrap_or(own)
+    }
+}
+
+/// One heading of the document.
+pub(crate) struct Study {
+    /// On the command line and in marks.
+    pub(crate) name: &'static str,
+    /// The heading.
+    pub(crate) title: &'static str,
+    /// Measures.
+    pub(crate) run: fn(&Effort) -> anyhow::Result<Section>,
+}
+
+/// All of them.
+pub(crate) const ALL: &[Study] = &[
+    Study { name: "sensitivity", title: "Covariance by design: [BB] figures 19 to 22", run: design::sensitivity },
+    Study { name: "visibility", title: "Which conic is seen: [BB] figures 6 and 7", run: design::visibility },
+    Study { name: "spherical-earth", title: "Error of a spherical Earth: [BB] figure 8", run: design::spherical_earth },
+    Study { name: "infrared", title: "Infrared Earth sensor: [W] figures 5 to 8", run: infrared::off_nadir },
+    Study { name: "horace", title: "Criteria of HORACE: [B14], [H15]", run: horace::criteria },
+    Study { name: "leo-infrared", title: "Accuracy and honesty: infrared in low orbit", run: infrared::flight },
+    Study { name: "rocket", title: "Accuracy and honesty: sounding rocket", run: rocket::flight },
+];
+
+/// The radical inverse: points that fill 0…1 evenly, the same in every run.
+fn halton(mut index: usize, base: usize) -> f64 {
+    let (mut out, mut part) = (0.0, 1.0);
+    while index > 0 {
+        part /= base as f64;
+        out += part * (index % base) as f64;
+        index /= base;
+    }
+    out
+}

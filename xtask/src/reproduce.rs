@@ -1,0 +1,14 @@
+//! Campaigns: our numbers beside the published ones, into docs/reproduction.md.
+
+use crate::machine::root;
+use crate::steps::{self, Trouble, cargo};
+
+/// Builds the campaigns and runs those that are named; `args` go to them.
+pub(crate) fn run(args: &[String]) -> Result<(), String> {
+    let go = || -> Result<(), Trouble> {
+        std::env::set_current_dir(root())?;
+        let mut campaigns = cargo(&["run", "--quiet", "--release", "--package", "hzn-reproduce"]);
+        steps::run(campaigns.arg("--").args(args))
+    };
+    go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
+}
