@@ -8,7 +8,7 @@ use hzn_sim::flight::rocket;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Flight, Look, Pose};
 
-use super::{Effort, halton};
+use super::{Effort, halton, preset};
 use crate::document::Section;
 use crate::fly::{Sensor, deg, evaluate, fly};
 
@@ -49,10 +49,7 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
          limb in view is a false negative, an answer without one a false positive."
     ));
     let flight = pictures(count);
-    let horace = Config {
-        body: flight.sensor.body.clone(),
-        ..Config::preset(Preset::Horace2015, flight.sensor.camera.clone())
-    };
+    let horace = preset(Preset::Horace2015, &flight, flight.sensor.body.clone());
     let sensors = [Sensor::new("hzn", flight.sensor.clone()), Sensor::new("horace-2015", horace)];
     let flown = fly(&flight, &sensors)?;
     let percent = |x: f64| format!("{:.1} %", 100.0 * x);

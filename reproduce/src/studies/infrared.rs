@@ -8,7 +8,7 @@ use hzn_sim::flight::leo_infrared;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Flight, Look, Pose};
 
-use super::{Effort, halton};
+use super::{Effort, halton, preset};
 use crate::document::Section;
 use crate::fly::{HEADS, Sensor, cells, deg, evaluate, fly, two_digits};
 
@@ -24,7 +24,7 @@ const SCENE: &str = "384×288 pixels, equidistant lens of 92 px/rad to 90° off 
 fn sensors(flight: &Flight) -> Vec<Sensor> {
     let body = body::Config { limb_height_sigma_km: LIMB_SIGMA_KM, ..flight.sensor.body.clone() };
     let hzn = Config { body: body.clone(), ..flight.sensor.clone() };
-    let zju = Config { body, ..Config::preset(Preset::Zju2022, flight.sensor.camera.clone()) };
+    let zju = preset(Preset::Zju2022, flight, body);
     vec![
         Sensor::new("hzn", hzn.clone()),
         Sensor::new("hzn, attitude to 5°", hzn).with_attitude(ATTITUDE_SIGMA_DEG),
@@ -58,7 +58,7 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
         "{count} pictures at every angle off nadir, evenly over latitude, longitude, azimuth and roll: {SCENE}. [W]'s \
          radiance curves are not printed; ours are analytic. The sensor is told position and a limb height of 25 km \
          ± {LIMB_SIGMA_KM} km. RMS error of the axis, errors above \
-         2° counted apart as wrong; [W] as they print it.",
+         2° counted apart as wrong, pictures without an answer by their status; [W] as they print it.",
     ));
     let mut rows = Vec::new();
     let mut curves: Vec<Vec<(f64, f64)>> = Vec::new();
@@ -94,8 +94,7 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
          limb height helps it; `hzn` uses both, and the shape of the ellipsoid once an attitude good to 5° tells where \
          east is. What is left to `hzn` is the limb's height by latitude: its first harmonic along the limb cannot be told \
          from a tilt (0.02° a kilometre here), and the sensor is not told of it but for a sigma that stands for a common \
-         height, so NEES is above 2. [W]'s own covariance is that of five free parameters and takes edge errors to be alike \
-         along the edge, which on these pictures they are not: NEES far below 2.",
+         height, so NEES is above 2.",
     );
     Ok(s)
 }
@@ -110,9 +109,8 @@ fn beside_gross(cases: &[Case]) -> (String, f64) {
     let e = Evaluation::of(&good);
     let rms_deg = e.errors.as_ref().map_or(f64::NAN, |x| x.rms_deg);
     let mut cell = deg(rms_deg);
-    let missing = e.with_limb - e.answered;
-    if missing > 0 {
-        cell.push_str(&format!(", {missing} not answered"));
+    for (status, n) in &e.unanswered {
+        cell.push_str(&format!(", {n} {status}"));
     }
     if !bad.is_empty() {
         cell.push_str(&format!(", {} wrong", bad.len()));

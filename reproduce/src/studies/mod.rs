@@ -5,6 +5,10 @@ mod horace;
 mod infrared;
 mod rocket;
 
+use hzn_core::pipeline::Preset;
+use hzn_core::{Config, body, covariance};
+use hzn_sim::Flight;
+
 use crate::document::Section;
 
 /// How much is done.
@@ -50,4 +54,12 @@ fn halton(mut index: usize, base: usize) -> f64 {
         index /= base;
     }
     out
+}
+
+/// A published system on a flight: its own methods; the camera, mask, body and edge noise that `hzn` is told too.
+fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
+    let own = Config::preset(preset, flight.sensor.camera.clone());
+    let covariance::Config { sigma_px, correlation_px, .. } = flight.sensor.covariance;
+    let covariance = covariance::Config { sigma_px, correlation_px, ..own.covariance };
+    Config { body, mask: flight.sensor.mask.clone(), covariance, ..own }
 }

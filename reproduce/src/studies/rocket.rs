@@ -1,20 +1,15 @@
 //! The sounding rocket: accuracy and honesty.
 
-use hzn_core::Config;
 use hzn_core::pipeline::Preset;
 use hzn_sim::Flight;
 use hzn_sim::flight::rocket;
 
-use super::Effort;
+use super::{Effort, preset};
 use crate::document::Section;
 use crate::fly::{HEADS, Sensor, cells, evaluate, fly};
 
 fn sensors(flight: &Flight) -> Vec<Sensor> {
-    let dlr = Config {
-        body: flight.sensor.body.clone(),
-        mask: flight.sensor.mask.clone(),
-        ..Config::preset(Preset::Dlr2022, flight.sensor.camera.clone())
-    };
+    let dlr = preset(Preset::Dlr2022, flight, flight.sensor.body.clone());
     vec![
         Sensor::new("hzn", flight.sensor.clone()),
         Sensor::new("hzn, attitude to 5°", flight.sensor.clone()).with_attitude(5.0),

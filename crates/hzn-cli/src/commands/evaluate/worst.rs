@@ -48,21 +48,26 @@ pub(super) fn draw(
     truth: &[Truth],
     camera: Option<&Camera<f64>>,
 ) -> Result<Vec<Drawn>, Stop> {
-    let mut recorded: HashMap<(String, String), (Option<RgbImage>, Annotations)> = HashMap::new();
+    let mut pictures: HashMap<String, RgbImage> = HashMap::new();
+    let mut drawings: HashMap<(String, String), Annotations> = HashMap::new();
     let base = |file: &str| file.rsplit(['/', '\\']).next().unwrap_or(file).to_owned();
-    let wanted = |file: &str, body: &str| worst.iter().any(|c| c.file == base(file) && c.body == body);
     if ending(results) == "mcap" && !worst.is_empty() {
         for frame in Reader::open(results, Contents::All).map_err(failed)? {
             let frame = frame.map_err(failed)?;
-            if wanted(&frame.row.file, &frame.row.body) {
-                let image = frame.image.and_then(|i| crate::input::recorded(i).decode(None).ok());
-                let image = image.map(|(picture, _)| picture.to_rgb());
-                recorded.insert((base(&frame.row.file), frame.row.body), (image, frame.annotations));
+            let file = base(&frame.row.file);
+            // A picture of several bodies is recorded once, with one of them.
+            if let Some(image) = frame.image.filter(|_| worst.iter().any(|c| c.file == file))
+                && let Ok((picture, _)) = crate::input::recorded(image).decode(None)
+            {
+                pictures.insert(file.clone(), picture.to_rgb());
+            }
+            if worst.iter().any(|c| c.file == file && c.body == frame.row.body) {
+                drawings.insert((file, frame.row.body), frame.annotations);
             }
         }
     }
     let mut one = |case: &&Case| -> Result<Drawn, Stop> {
-        let (image, drawing) = recorded.remove(&(case.file.clone(), case.body.clone())).unwrap_or_default();
+        let drawing = drawings.remove(&(case.file.clone(), case.body.clone())).unwrap_or_default();
         let beside = || {
             let path = folder.join(&case.file);
             let read = path.is_file().then(|| Payload::File(path).decode(None).ok()).flatten();
@@ -72,7 +77,7 @@ pub(super) fn draw(
         let true_limb = is.filter(|_| case.limb).zip(camera).map_or_else(Vec::new, |(t, camera)| {
             limb::lines([t.axis_x, t.axis_y, t.axis_z], t.half_angle_deg.to_radians(), camera)
         });
-        let jpeg = match image.or_else(beside) {
+        let jpeg = match pictures.get(&case.file).cloned().or_else(beside) {
             Some(image) => Some(encode(overlay::draw_beside(image, &drawing, &true_limb, case.status))?),
             None => None,
         };
