@@ -121,3 +121,27 @@ pub(crate) fn two_digits(x: f64) -> String {
     let decimals = if x > 0.0 { (1 - x.log10().floor() as i32).clamp(0, 6) } else { 1 };
     format!("{x:.*}", decimals as usize)
 }
+
+/// Answers that are not of this limb: above [`GROSS_DEG`], or without one in view; empty when there are none.
+pub(crate) fn wrong(cases: &[Case]) -> String {
+    let wrong = cases.iter().filter_map(|c| {
+        let m = c.miss?;
+        let sigma = m.sigma_max_deg;
+        match c.limb {
+            true if m.angle_deg > GROSS_DEG => {
+                let (error, px) = (m.angle_deg, c.limb_in_view_px.unwrap_or(f64::NAN));
+                let place = c.off_nadir_deg;
+                Some(format!(
+                    "{} ({error:.0}° off, sigma {sigma:.2}°; {place:.0}° off nadir, limb of {px:.0} px)",
+                    c.file
+                ))
+            }
+            true => None,
+            false => Some(format!("{} (no limb, sigma {sigma:.2}°; {:.0}° off nadir)", c.file, c.off_nadir_deg)),
+        }
+    });
+    wrong.collect::<Vec<_>>().join(", ")
+}
+
+/// Larger errors are another curve than the limb, not a limb that is measured badly.
+pub(crate) const GROSS_DEG: f64 = 2.0;

@@ -10,7 +10,7 @@ use hzn_sim::{Flight, Look, Pose};
 
 use super::{Effort, halton, preset};
 use crate::document::Section;
-use crate::fly::{HEADS, Sensor, cells, deg, evaluate, fly, two_digits};
+use crate::fly::{GROSS_DEG, HEADS, Sensor, cells, deg, evaluate, fly, two_digits};
 
 /// Half-level of the radiance by latitude: 25 km ± 4.5 km.
 const LIMB_KM: [[f64; 2]; 3] = [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
@@ -98,9 +98,6 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     );
     Ok(s)
 }
-
-/// Larger errors are another curve than the limb, not a limb that is measured badly.
-const GROSS_DEG: f64 = 2.0;
 
 /// RMS of the errors up to [`GROSS_DEG`], what was not answered, what is above, NEES of the former; and the RMS itself.
 fn beside_gross(cases: &[Case]) -> (String, f64) {

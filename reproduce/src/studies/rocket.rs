@@ -40,7 +40,8 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
     s.text(
         "`dlr-2022` rebuilds [BB]: a fixed threshold, whole pixels, RANSAC on three points and their direct estimate, whose \
          direction does not use altitude and limb height. On these short arcs that knowledge is worth the factor between \
-         the two. Its covariance is the overbound [BB 37], far larger than its errors by design.",
+         the two. An RMS far above the 95 % is one answer or two that stand on another edge. \
+         Its covariance is the overbound [BB 37].",
     );
     Ok(s)
 }
