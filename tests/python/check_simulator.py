@@ -4,7 +4,8 @@ usage: check_simulator.py HZN FOLDER
 
 FOLDER is made: a scene.toml with a map of its own, and what `HZN simulate` makes of it. Lens: OpenCV's fisheye. Tangent
 heights: the lowest geodetic height along each ray, by search. Nothing is taken from the simulator but frames.csv, truth.csv
-and the picture. Exits 1 when more than a hundredth of full scale is wrong anywhere.
+and the picture. Where a ray only just meets the ground, a hundredth of a pixel decides what it sees: there a few pixels
+may be off by up to 0.03 of full scale. Exits 1 when any is off by more, or one in 100 by more than 0.003.
 """
 
 import csv
@@ -99,13 +100,17 @@ def sun_path(mu0, grazing, radius):
     return np.where(mu0 >= 0, near, beyond)
 
 
-def render(position, quaternion, sun, ground):
-    # Pixel centres at integers, as OpenCV has them.
+def lens():
+    """Every pixel's place and unit ray; pixel centres at integers, as OpenCV has them."""
     grid = np.stack(np.meshgrid(np.arange(W, dtype=float), np.arange(H, dtype=float)), axis=-1).reshape(-1, 1, 2)
     matrix = np.array([[FX, 0, CX], [0, FY, CY], [0, 0, 1]])
     plane = cv2.fisheye.undistortPoints(grid, matrix, np.array(K), criteria=(3, 100, 1e-12))[:, 0]
     rays = np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    return grid, rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def render(position, quaternion, sun, ground):
+    grid, rays = lens()
     turn = rotation(*quaternion)
     rays_e, sun_e = rays @ turn.T, turn @ sun
 
@@ -178,9 +183,13 @@ def main():
         sun = np.array([float(true[k]) for k in ("sun_x", "sun_y", "sun_z")])
         theirs = cv2.imread(str(out / row["file"]), cv2.IMREAD_UNCHANGED) / 65535.0
         ours = render(position, quaternion, sun, ground)
-        off = np.abs(theirs - ours)
-        print(f"{row['file']}: mean {theirs.mean():.3f}, differences {off.max():.5f} at most, {off.mean():.6f} on average")
-        if not (theirs.shape == ours.shape and theirs.mean() > 0.05 and off.max() < 0.01 and off.mean() < 5e-4):
+        # The Moon is in view, and not drawn again.
+        moon = np.array([float(true[k]) for k in ("moon_x", "moon_y", "moon_z")])
+        beside = (lens()[1] @ moon < np.cos(np.radians(1.5))).reshape(H, W)
+        off = np.abs(theirs - ours) * beside
+        print(f"{row['file']}: mean {theirs.mean():.3f}, differences {off.max():.5f} at most, {off.mean():.6f} on average, "
+              f"{100 * np.mean(off > 0.003):.2f} % above 0.003")
+        if not (theirs.shape == ours.shape and theirs.mean() > 0.05 and off.max() < 0.03 and np.mean(off > 0.003) < 0.01 and off.mean() < 5e-4):
             sys.exit(f"{row['file']}: not the documented picture")
 
 
