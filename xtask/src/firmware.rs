@@ -11,7 +11,7 @@ use crate::steps::{self, Outcome, Trouble, cargo};
 /// A board, and the flags of its core.
 const BOARDS: [(&str, &str); 2] = [("an386", ""), ("an500", "-C target-cpu=cortex-m7")];
 /// The images of a board.
-const IMAGES: [&str; 1] = ["measure"];
+const IMAGES: [&str; 2] = ["flight", "measure"];
 
 /// Builds every image and puts it where the tests find it: `target/firmware/BOARD/images`.
 pub(crate) fn build() -> Outcome {

@@ -8,6 +8,11 @@
 //! | [`parameters`] | every parameter by number, and its limits |
 //! | [`bytes`] | numbers into bytes and back |
 //! | [`answer`] | a report with every bit |
+//! | [`packet`] | space packets on a serial line |
+//! | [`messages`] | what stands in them |
+//! | [`board`] | what a board brings |
+//! | [`store`] | two copies of the parameters |
+//! | [`flight`] | the loop |
 //! | [`table`] | the parameters as bytes with a checksum |
 
 #![no_std]
@@ -17,8 +22,13 @@
 extern crate std;
 
 pub mod answer;
+pub mod board;
 pub mod bytes;
+pub mod flight;
+pub mod messages;
+pub mod packet;
 pub mod parameters;
+pub mod store;
 pub mod table;
 
 pub use parameters::Parameters;

@@ -221,6 +221,11 @@ impl Parameters {
         Self::new(sensor)
     }
 
+    /// The number of the body that a sensor looks for: parameter 30.
+    pub fn body_number(config: &Config) -> u8 {
+        config.body.kind.to_f64() as u8
+    }
+
     /// The numbers of every parameter that has a value now, in the order in which they must be set.
     pub fn numbers(&self) -> impl Iterator<Item = u16> + '_ {
         let polygons = &self.sensor.mask.polygons_px;

@@ -16,6 +16,14 @@ pub const FRAMES: usize = 2;
 /// Timer 0 (CMSDK APB timer), 25 MHz, counting down.
 const TIMER: *mut u32 = 0x4000_0000 as *mut u32;
 
+/// UART 0 (CMSDK APB UART): DATA (0), STATE (1), CTRL (2), BAUDDIV (4).
+const UART: *mut u32 = 0x4000_4000 as *mut u32;
+
+/// The watchdog (CMSDK APB watchdog), 25 MHz: LOAD (0), CONTROL (2), INTCLR (3), LOCK (0x300).
+const WATCHDOG: *mut u32 = 0x4000_8000 as *mut u32;
+/// Two seconds: the first time without food it complains, the second time it resets the board.
+const WATCHDOG_TICKS: u32 = 25_000_000;
+
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
 /// The board's parts. There is one board.
@@ -25,6 +33,10 @@ pub struct Board {
     pub frames: [&'static mut [u8]; FRAMES],
     /// The timer, running.
     pub timer: Timer,
+    /// The serial line.
+    pub uart: Uart,
+    /// The watchdog, not running yet.
+    pub watchdog: Watchdog,
 }
 
 impl Board {
@@ -38,7 +50,7 @@ impl Board {
             // buffers do not overlap, and `TAKEN` makes sure that they are handed out once.
             unsafe { core::slice::from_raw_parts_mut((PSRAM + i * FRAME_BYTES) as *mut u8, FRAME_BYTES) }
         });
-        Some(Self { frames, timer: Timer::start() })
+        Some(Self { frames, timer: Timer::start(), uart: Uart::start(), watchdog: Watchdog::new() })
     }
 }
 
@@ -62,5 +74,67 @@ impl Timer {
     pub fn ticks(&self) -> u32 {
         // SAFETY: reads the timer's VALUE register.
         unsafe { !TIMER.add(1).read_volatile() }
+    }
+}
+
+/// A serial line.
+#[derive(Debug)]
+pub struct Uart(());
+
+impl Uart {
+    fn start() -> Self {
+        // SAFETY: sets the divider (the least that is allowed) and turns both directions on; nothing else owns it.
+        unsafe {
+            UART.add(4).write_volatile(16);
+            UART.add(2).write_volatile(0b11);
+        }
+        Self(())
+    }
+
+    /// A byte that has come in.
+    pub fn receive(&mut self) -> Option<u8> {
+        // SAFETY: bit 1 of STATE says that DATA holds a byte; reading it takes it.
+        unsafe { (UART.add(1).read_volatile() & 0b10 != 0).then(|| UART.read_volatile() as u8) }
+    }
+
+    /// Sends a byte, waiting for room.
+    pub fn send(&mut self, byte: u8) {
+        // SAFETY: bit 0 of STATE says that there is no room; DATA takes the byte.
+        unsafe {
+            while UART.add(1).read_volatile() & 0b01 != 0 {}
+            UART.write_volatile(u32::from(byte));
+        }
+    }
+}
+
+/// The watchdog: runs from the first feeding on.
+#[derive(Debug)]
+pub struct Watchdog {
+    running: bool,
+}
+
+impl Watchdog {
+    fn new() -> Self {
+        Self { running: false }
+    }
+
+    /// Starts it, or starts its time anew.
+    pub fn feed(&mut self) {
+        // SAFETY: LOCK takes the key that allows writing, LOAD and CONTROL start it (interrupt and reset on), INTCLR
+        // starts its time anew; nothing else owns it.
+        unsafe {
+            WATCHDOG.add(0x300).write_volatile(0x1ACC_E551);
+            if !self.running {
+                WATCHDOG.write_volatile(WATCHDOG_TICKS);
+                WATCHDOG.add(2).write_volatile(0b11);
+                self.running = true;
+            }
+            WATCHDOG.add(3).write_volatile(1);
+        }
+    }
+
+    /// Whether it caused the last reset: these boards do not tell.
+    pub fn was_reset(&self) -> bool {
+        false
     }
 }

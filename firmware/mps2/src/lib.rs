@@ -2,14 +2,16 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`board`] | external memory, timer |
+//! | [`board`] | external memory, timer, serial line, watchdog |
 //! | [`host`] | files of the machine that emulates the board, by semihosting |
+//! | [`port`] | the flight software's view of it |
 //! | [`watermark`] | how much stack was used |
 
 #![no_std]
 
 pub mod board;
 pub mod host;
+pub mod port;
 pub mod watermark;
 
 use core::panic::PanicInfo;

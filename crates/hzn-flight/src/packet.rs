@@ -1,0 +1,289 @@
+//! CCSDS space packets on a serial line.
+//!
+//! ```text
+//! bytes  field (most significant byte first)
+//!     4  sync marker 1A CF FC 1D (CCSDS 131.0-B), to find the next packet after noise
+//!     6  primary header (CCSDS 133.0-B): version 0, type, secondary header flag 1, APID; unsegmented, sequence count;
+//!        length of what follows minus one
+//!     8  secondary header: time in microseconds since the start of the computer (telecommands: 0)
+//!     n  user data
+//!     2  CRC-16 (CCITT, start FFFF) from the primary header to the end of the user data
+//! ```
+
+use crate::bytes::{Reader, Writer};
+
+/// The sync marker before every packet.
+pub const SYNC: [u8; 4] = [0x1A, 0xCF, 0xFC, 0x1D];
+/// Most bytes of a packet, sync marker included.
+pub const MAX_BYTES: usize = 1024;
+const HEADER: usize = 6;
+const TIME: usize = 8;
+const CRC: usize = 2;
+
+const CRC16: crc::Crc<u16, crc::NoTable> = crc::Crc::<u16, crc::NoTable>::new(&crc::CRC_16_IBM_3740);
+
+/// What a packet is about: its application process identifier (APID). Frozen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u16)]
+pub enum Apid {
+    /// How the computer is.
+    Housekeeping = 0x100,
+    /// The answer to one picture.
+    Science = 0x101,
+    /// Something happened.
+    Event = 0x102,
+    /// What became of a telecommand.
+    Acknowledge = 0x103,
+    /// Values of parameters.
+    Parameters = 0x104,
+    /// A part of an edge.
+    Edge = 0x105,
+    /// A telecommand.
+    Command = 0x1C0,
+}
+
+impl Apid {
+    /// All.
+    pub const ALL: [Self; 7] = [
+        Self::Housekeeping,
+        Self::Science,
+        Self::Event,
+        Self::Acknowledge,
+        Self::Parameters,
+        Self::Edge,
+        Self::Command,
+    ];
+    /// By number.
+    pub fn numbered(n: u16) -> Option<Self> {
+        Self::ALL.iter().copied().find(|&a| a as u16 == n)
+    }
+}
+
+/// Writes a packet with `user` as its user data into `out`; gives its length, `None` without room.
+pub fn write(
+    out: &mut [u8],
+    apid: Apid,
+    sequence: u16,
+    time_us: u64,
+    user: impl FnOnce(&mut Writer<'_>),
+) -> Option<usize> {
+    let mut body = Writer::new(out.get_mut(SYNC.len() + HEADER..)?);
+    body.u64(time_us);
+    user(&mut body);
+    let len = body.finish()?;
+    let command = u16::from(apid == Apid::Command);
+    let mut head = Writer::new(out);
+    head.bytes(&SYNC);
+    head.u16(command << 12 | 1 << 11 | apid as u16);
+    head.u16(0b11 << 14 | sequence & 0x3FFF);
+    head.u16(u16::try_from(len + CRC - 1).ok()?);
+    head.finish()?;
+    let end = SYNC.len() + HEADER + len;
+    let crc = CRC16.checksum(out.get(SYNC.len()..end)?);
+    out.get_mut(end..end + CRC)?.copy_from_slice(&crc.to_be_bytes());
+    (end + CRC <= MAX_BYTES).then_some(end + CRC)
+}
+
+/// A packet as it was received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Packet<'a> {
+    /// The identifier's number.
+    pub apid: u16,
+    /// Sequence count, 0 to 16383, of this APID.
+    pub sequence: u16,
+    /// Time in microseconds since the start of the computer.
+    pub time_us: u64,
+    /// User data.
+    pub user: &'a [u8],
+}
+
+/// What stands at the start of received bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scan<'a> {
+    /// The first `skip` bytes belong to no packet; what follows may become one.
+    More {
+        /// Bytes to leave out.
+        skip: usize,
+    },
+    /// A packet, and the bytes up to its end.
+    Packet {
+        /// Bytes up to its end.
+        end: usize,
+        /// The packet.
+        packet: Packet<'a>,
+    },
+    /// A sync marker without a packet: broken or cut off. Go on after `skip` bytes.
+    Bad {
+        /// Bytes to leave out.
+        skip: usize,
+    },
+}
+
+/// Looks for the first packet in `bytes`.
+pub fn scan(bytes: &[u8]) -> Scan<'_> {
+    let Some(at) = bytes.windows(SYNC.len()).position(|w| w == SYNC) else {
+        // The end may be the first bytes of a marker.
+        return Scan::More { skip: bytes.len().saturating_sub(SYNC.len() - 1) };
+    };
+    let begin = at + SYNC.len();
+    let bad = Scan::Bad { skip: begin };
+    let mut from = Reader::new(bytes.get(begin..).unwrap_or_default());
+    let (Some(id), Some(sequence), Some(len)) = (from.u16(), from.u16(), from.u16()) else {
+        return Scan::More { skip: at };
+    };
+    let len = usize::from(len) + 1;
+    if id >> 13 != 0 || id & 1 << 11 == 0 || len < TIME + CRC || SYNC.len() + HEADER + len > MAX_BYTES {
+        return bad;
+    }
+    let end = begin + HEADER + len;
+    let Some(whole) = bytes.get(begin..end) else { return Scan::More { skip: at } };
+    let Some((checked, crc)) = whole.split_last_chunk::<CRC>() else { return bad };
+    if CRC16.checksum(checked) != u16::from_be_bytes(*crc) {
+        return bad;
+    }
+    let mut from = Reader::new(checked.get(HEADER..).unwrap_or_default());
+    let Some(time_us) = from.u64() else { return bad };
+    let packet = Packet { apid: id & 0x7FF, sequence: sequence & 0x3FFF, time_us, user: from.rest() };
+    Scan::Packet { end, packet }
+}
+
+/// Collects bytes as they come in.
+#[derive(Debug)]
+pub struct Inbox {
+    bytes: [u8; MAX_BYTES],
+    len: usize,
+}
+
+impl Default for Inbox {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Inbox {
+    /// Nothing received yet.
+    pub const fn new() -> Self {
+        Self { bytes: [0; MAX_BYTES], len: 0 }
+    }
+    /// Takes a byte; false when there is no room: [`Self::next`] makes some.
+    pub fn push(&mut self, byte: u8) -> bool {
+        match self.bytes.get_mut(self.len) {
+            Some(place) => {
+                *place = byte;
+                self.len += 1;
+                true
+            }
+            None => false,
+        }
+    }
+    /// Whether something waits that is no packet yet.
+    pub fn is_waiting(&self) -> bool {
+        self.len > 0
+    }
+    /// Hands the next packet to `with`, or says that there was a broken one.
+    pub fn next<R>(&mut self, with: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
+        let (drop, result) = match scan(self.bytes.get(..self.len).unwrap_or_default()) {
+            // A full inbox without a packet will not become one.
+            Scan::More { skip } => (if self.len == MAX_BYTES { skip.max(1) } else { skip }, None),
+            Scan::Packet { end, packet } => (end, Some(with(Some(packet)))),
+            Scan::Bad { skip } => (skip, Some(with(None))),
+        };
+        self.remove(drop);
+        result
+    }
+    /// Gives up the packet that was begun; what came after its sync marker may hold another.
+    pub fn give_up(&mut self) {
+        self.remove(SYNC.len());
+    }
+    fn remove(&mut self, count: usize) {
+        let count = count.min(self.len);
+        if let Some(bytes) = self.bytes.get_mut(..self.len)
+            && count <= bytes.len()
+        {
+            bytes.rotate_left(count);
+        }
+        self.len -= count;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn sample(apid: Apid, data: &[u8]) -> Vec<u8> {
+        let mut out = [0; MAX_BYTES];
+        let n = write(&mut out, apid, 77, 123_456_789_012, |w| w.bytes(data)).unwrap();
+        out[..n].to_vec()
+    }
+
+    #[test]
+    fn the_bytes_are_those_of_the_standard() {
+        let bytes = sample(Apid::Command, &[1, 2, 3]);
+        assert_eq!(bytes[..10], [0x1A, 0xCF, 0xFC, 0x1D, 0x19, 0xC0, 0xC0, 77, 0, 12]);
+        assert_eq!(bytes[10..18], 123_456_789_012u64.to_be_bytes());
+        assert_eq!(bytes[18..21], [1, 2, 3]);
+        // CRC-16/CCITT-FALSE's check value.
+        assert_eq!(CRC16.checksum(b"123456789"), 0x29B1);
+        let bytes = sample(Apid::Science, &[]);
+        assert_eq!(bytes[4..6], [0x09, 0x01]);
+    }
+
+    #[test]
+    fn another_implementation_reads_the_header() {
+        use spacepackets::{CcsdsPacket, PacketType, SpHeader};
+        let bytes = sample(Apid::Event, &[9; 20]);
+        let (header, _) = SpHeader::from_be_bytes(&bytes[SYNC.len()..]).unwrap();
+        assert_eq!((header.apid().value(), header.seq_count().value()), (0x102, 77));
+        assert_eq!((header.packet_type(), header.sec_header_flag()), (PacketType::Tm, true));
+        assert_eq!(header.packet_len(), bytes.len() - SYNC.len());
+    }
+
+    #[test]
+    fn a_stream_is_read_whatever_stands_between() {
+        let (a, b) = (sample(Apid::Science, &[1; 40]), sample(Apid::Event, &[2; 5]));
+        let mut stream = b"noise\x1A\xCF".to_vec();
+        stream.extend(&a);
+        stream.extend(&SYNC);
+        stream.extend(&a[..20]);
+        stream.extend(&b);
+        stream.extend([0x1A; 7]);
+        stream.extend(&b);
+        let mut inbox = Inbox::new();
+        let (mut good, mut bad) = (Vec::new(), 0);
+        for byte in stream {
+            assert!(inbox.push(byte));
+            while let Some(apid) = inbox.next(|p| p.map(|p| (p.apid, p.user.len()))) {
+                match apid {
+                    Some(found) => good.push(found),
+                    None => bad += 1,
+                }
+            }
+        }
+        // The packet that was cut off has swallowed the start of the next and gives it back.
+        assert_eq!(good, [(0x101, 40), (0x102, 5), (0x102, 5)]);
+        assert!(bad >= 1, "{bad}");
+    }
+
+    #[test]
+    fn a_packet_that_does_not_fit_is_not_written() {
+        let mut out = [0; 40];
+        assert_eq!(write(&mut out, Apid::Event, 0, 0, |w| w.bytes(&[0; 30])), None);
+        let mut out = [0; 2000];
+        assert_eq!(write(&mut out, Apid::Event, 0, 0, |w| w.bytes(&[0; 1500])), None);
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_survived(bytes in proptest::collection::vec(prop_oneof![Just(0x1Au8), Just(0xCF), Just(0xFC), Just(0x1D), any::<u8>()], 0..3000)) {
+            let mut inbox = Inbox::new();
+            for byte in bytes {
+                prop_assert!(inbox.push(byte));
+                while inbox.next(|_| ()).is_some() {}
+                // A full inbox is emptied.
+                prop_assert!(inbox.len < MAX_BYTES);
+            }
+        }
+    }
+}

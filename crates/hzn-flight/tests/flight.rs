@@ -1,0 +1,459 @@
+//! The flight software on a board made of vectors.
+
+use std::collections::VecDeque;
+
+use hzn_core::status::Status;
+use hzn_core::{FlightWorkspace, pixel};
+use hzn_flight::board::{Board, Shot};
+use hzn_flight::bytes::{Reader, Writer};
+use hzn_flight::flight::{Buffers, Flight};
+use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode};
+use hzn_flight::packet::{self, Apid, Scan};
+use hzn_flight::{Parameters, answer::Answer, table};
+
+const WIDTH: usize = 640;
+const HEIGHT: usize = 480;
+
+#[derive(Default)]
+struct Bench {
+    now_us: u64,
+    line: VecDeque<u8>,
+    sent: Vec<u8>,
+    shots: VecDeque<(Vec<u8>, u32)>,
+    picture: Vec<u8>,
+    copies: [Vec<u8>; 2],
+    /// Bytes that may still be written before power is cut.
+    power: Option<usize>,
+    lift_off: bool,
+    power_fails: bool,
+    camera_is_dead: bool,
+    fed: u32,
+}
+
+impl Board for Bench {
+    fn now_us(&mut self) -> u64 {
+        self.now_us += 10;
+        self.now_us
+    }
+    fn receive(&mut self) -> Option<u8> {
+        self.line.pop_front()
+    }
+    fn send(&mut self, bytes: &[u8]) {
+        self.sent.extend(bytes);
+    }
+    fn lift_off(&mut self) -> bool {
+        self.lift_off
+    }
+    fn power_fails(&mut self) -> bool {
+        self.power_fails
+    }
+    fn was_watchdog_reset(&mut self) -> bool {
+        false
+    }
+    fn feed_watchdog(&mut self) {
+        self.fed += 1;
+    }
+    fn camera_answers(&mut self) -> bool {
+        !self.camera_is_dead
+    }
+    fn next_shot(&mut self) -> Option<Shot> {
+        let (picture, lost) = self.shots.pop_front()?;
+        self.picture = picture;
+        Some(Shot { bytes: self.picture.len(), exposure_us: self.now_us, lost })
+    }
+    fn picture(&self) -> &[u8] {
+        &self.picture
+    }
+    fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
+        into.fill(0xFF);
+        let kept = &self.copies[usize::from(copy) - 1];
+        into[..kept.len()].copy_from_slice(kept);
+    }
+    fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
+        let n = self.power.unwrap_or(bytes.len()).min(bytes.len());
+        // A memory is erased before it is written.
+        self.copies[usize::from(copy) - 1] = bytes[..n].to_vec();
+        n == bytes.len()
+    }
+    fn stack_bytes(&mut self) -> u32 {
+        1234
+    }
+}
+
+/// Sky above, ground below the limb of a body as wide as the Earth at 230 km.
+fn limb() -> Vec<u8> {
+    (0..WIDTH * HEIGHT)
+        .map(|i| {
+            let (x, y) = ((i % WIDTH) as f64 - 319.5, (i / WIDTH) as f64 - 239.5);
+            // The axis is 75 degrees below the optical axis, the half-angle 74.8.
+            let (sin, cos) = 75f64.to_radians().sin_cos();
+            let ray = [x / 600.0, y / 600.0, 1.0];
+            let along = (ray[1] * sin + cos) / (ray[0] * ray[0] + ray[1] * ray[1] + 1.0).sqrt();
+            let edge = ((along - 74.8f64.to_radians().cos()) * 600.0).clamp(-1.0, 1.0);
+            (100.0 + 90.0 * edge) as u8
+        })
+        .collect()
+}
+
+fn stored(generation: u32) -> Vec<u8> {
+    let mut p = Parameters::idle();
+    p.set(33, f64::from(generation)).unwrap();
+    let mut bytes = vec![0; table::MAX_BYTES];
+    let n = table::write(&p, generation, &mut bytes).unwrap();
+    bytes.truncate(n);
+    bytes
+}
+
+fn ready() -> Bench {
+    Bench { copies: [stored(1), stored(2)], ..Bench::default() }
+}
+
+fn fly<R>(bench: Bench, turns: impl FnOnce(&mut Flight<'_, Bench>) -> R) -> R {
+    let (mut buffers, mut workspace) = (Box::new(Buffers::new()), Box::new(FlightWorkspace::new()));
+    turns(&mut Flight::start(bench, &mut buffers, &mut workspace).unwrap())
+}
+
+fn command(sequence: u16, function: Function, arguments: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
+    let mut out = [0; packet::MAX_BYTES];
+    let user = |w: &mut Writer<'_>| {
+        w.u8(function as u8);
+        arguments(w);
+    };
+    let n = packet::write(&mut out, Apid::Command, sequence, 0, user).unwrap();
+    out[..n].to_vec()
+}
+
+#[derive(Debug, Default)]
+struct Heard {
+    housekeeping: Vec<Housekeeping>,
+    science: Vec<(Exposure, Answer)>,
+    events: Vec<(Event, u32, u32)>,
+    answers: Vec<(u8, u16, Code)>,
+    parameters: Vec<(u16, f64)>,
+    edge: Vec<pixel::Pixel>,
+}
+
+/// What was sent since the last time.
+fn heard(flight: &mut Flight<'_, Bench>) -> Heard {
+    let sent = std::mem::take(&mut flight.board().sent);
+    let (mut rest, mut out) = (&sent[..], Heard::default());
+    let mut last_us = 0;
+    while !rest.is_empty() {
+        let Scan::Packet { end, packet } = packet::scan(rest) else { panic!("{rest:?}") };
+        rest = &rest[end..];
+        assert!(packet.time_us > last_us);
+        last_us = packet.time_us;
+        let mut r = Reader::new(packet.user);
+        match Apid::numbered(packet.apid).unwrap() {
+            Apid::Housekeeping => out.housekeeping.push(Housekeeping::read(&mut r).unwrap()),
+            Apid::Science => out.science.push((Exposure::read(&mut r).unwrap(), Answer::read(&mut r).unwrap())),
+            Apid::Event => {
+                let e = EventRecord::read(&mut r).unwrap();
+                out.events.push((Event::numbered(e.number).unwrap(), e.a, e.b));
+            }
+            Apid::Acknowledge => {
+                let a = Acknowledge::read(&mut r).unwrap();
+                out.answers.push((a.function, a.sequence, Code::numbered(a.code).unwrap()));
+            }
+            Apid::Parameters => {
+                for _ in 0..r.u8().unwrap() {
+                    out.parameters.push((r.u16().unwrap(), r.f64().unwrap()));
+                }
+            }
+            Apid::Edge => {
+                let part = EdgePart::read(&mut r).unwrap();
+                assert_eq!(usize::from(part.first), out.edge.len());
+                for _ in 0..part.count {
+                    out.edge.push(pixel::Pixel { x: r.u16().unwrap(), y: r.u16().unwrap() });
+                }
+            }
+            Apid::Command => panic!("a flight computer sends no commands"),
+        }
+        assert!(r.rest().is_empty(), "{packet:?}");
+    }
+    out
+}
+
+fn tell(flight: &mut Flight<'_, Bench>, bytes: &[u8]) -> Heard {
+    flight.board().line.extend(bytes);
+    flight.turn();
+    heard(flight)
+}
+
+#[test]
+fn starts_with_the_newer_copy_and_waits() {
+    fly(ready(), |f| {
+        let h = heard(f);
+        assert_eq!(h.events, [(Event::Started, 2, 2)]);
+        let hk = h.housekeeping[0];
+        assert_eq!((hk.mode, hk.parameter_copy, hk.parameter_generation, hk.last_status), (0, 2, 2, 255));
+        f.board().shots.push_back((limb(), 0));
+        f.turn();
+        assert_eq!(heard(f).science, [], "standby processes nothing by itself");
+    });
+}
+
+#[test]
+fn flies_at_lift_off_and_stops_before_power_is_cut() {
+    fly(ready(), |f| {
+        heard(f);
+        f.board().lift_off = true;
+        f.board().shots.extend((0..12).map(|_| (limb(), 0)));
+        (0..12).for_each(|_| f.turn());
+        let h = heard(f);
+        assert_eq!(h.events[0], (Event::ModeChanged, Mode::Standby as u32, Mode::Flight as u32));
+        assert_eq!(h.science.len(), 12);
+        for (n, (exposure, answer)) in h.science.iter().enumerate() {
+            assert_eq!(exposure.picture, n as u32 + 1);
+            assert!(exposure.done_us >= exposure.exposure_us);
+            assert_eq!(answer.status, Status::Ok as u8);
+            let axis = answer.direction.unwrap().axis;
+            assert!((axis[1] - 75f32.to_radians().sin()).abs() < 2e-3, "{axis:?}");
+        }
+        // At the change of mode, and after the tenth picture.
+        assert_eq!(h.housekeeping.len(), 2);
+        assert_eq!((h.housekeeping[1].pictures, h.housekeeping[1].answers), (10, 10));
+        f.board().power_fails = true;
+        f.turn();
+        assert_eq!(f.mode(), Mode::ShutDown);
+        heard(f);
+        f.board().shots.push_back((limb(), 0));
+        let set = command(1, Function::SetParameters, |w| {
+            w.u8(1);
+            w.u16(32);
+            w.f64(200.0);
+        });
+        let before = f.board().copies.clone();
+        assert!(tell(f, &set).answers.is_empty());
+        assert_eq!(f.board().copies, before, "nothing is written any more");
+    });
+}
+
+#[test]
+fn parameters_are_set_read_and_stored() {
+    let copies = fly(ready(), |f| {
+        heard(f);
+        let set = command(7, Function::SetParameters, |w| {
+            w.u8(2);
+            for (id, value) in [(32, 200.0), (81, 2.5)] {
+                w.u16(id);
+                w.f64(value);
+            }
+        });
+        let h = tell(f, &set);
+        assert_eq!(h.answers, [(2, 7, Code::Done)]);
+        assert_eq!(h.events, [(Event::Stored, 1, 3)]);
+        let read = command(8, Function::ReadParameters, |w| {
+            w.u8(2);
+            w.u16(81);
+            w.u16(32);
+        });
+        assert_eq!(tell(f, &read).parameters, [(81, 2.5), (32, 200.0)]);
+        // All or none: the second is refused.
+        for (id, value, code) in
+            [(4, -1.0, Code::Refused), (9999, 1.0, Code::UnknownParameter), (3, 0.5, Code::Refused)]
+        {
+            let set = command(9, Function::SetParameters, |w| {
+                w.u8(2);
+                w.u16(81);
+                w.f64(1.5);
+                w.u16(id);
+                w.f64(value);
+            });
+            assert_eq!(tell(f, &set).answers, [(2, 9, code)]);
+            assert_eq!(tell(f, &read).parameters, [(81, 2.5), (32, 200.0)]);
+        }
+        f.board().copies.clone()
+    });
+    // After a reset.
+    fly(Bench { copies, ..Bench::default() }, |f| {
+        assert_eq!(heard(f).events, [(Event::Started, 1, 3)]);
+        let read = command(8, Function::ReadParameters, |w| {
+            w.u8(1);
+            w.u16(32);
+        });
+        assert_eq!(tell(f, &read).parameters, [(32, 200.0)]);
+    });
+}
+
+#[test]
+fn a_power_cut_at_any_byte_of_a_write_costs_the_change_only() {
+    let length = stored(3).len();
+    for cut in 0..=length {
+        let copies = fly(Bench { power: Some(cut), ..ready() }, |f| {
+            let set = command(7, Function::SetParameters, |w| {
+                w.u8(1);
+                w.u16(33);
+                w.f64(0.25);
+            });
+            let h = tell(f, &set);
+            let done = cut == length;
+            assert_eq!(h.answers[0].2, if done { Code::Done } else { Code::NotStored }, "{cut}");
+            f.board().copies.clone()
+        });
+        fly(Bench { copies, ..Bench::default() }, |f| {
+            let events = heard(f).events;
+            let read = command(8, Function::ReadParameters, |w| {
+                w.u8(1);
+                w.u16(33);
+            });
+            let now = tell(f, &read).parameters[0].1;
+            if cut == length {
+                assert_eq!((events[0], now), ((Event::Started, 1, 3), 0.25));
+            } else {
+                // The copy that was not written stays the one that counts.
+                assert_eq!((events[0], now), ((Event::Started, 2, 2), 2.0), "{cut}");
+                assert!(matches!(events[1], (Event::CopyBroken, 1, _)));
+            }
+        });
+    }
+}
+
+#[test]
+fn broken_copies_end_in_the_defaults_and_in_safe_mode() {
+    let mut flipped = stored(2);
+    flipped[30] ^= 4;
+    fly(Bench { copies: [stored(1)[..50].to_vec(), flipped], ..Bench::default() }, |f| {
+        let h = heard(f);
+        let expected = [
+            (Event::Started, 0, 0),
+            (Event::CopyBroken, 1, 2),
+            (Event::CopyBroken, 2, 2),
+            (Event::Defaults, 0, 0),
+            (Event::SelfCheck, 4, 0),
+            (Event::ModeChanged, 0, 2),
+        ];
+        assert_eq!(h.events, expected);
+        assert_eq!(f.mode(), Mode::Safe);
+        // Told its parameters again, it is well.
+        let set = command(1, Function::SetParameters, |w| {
+            w.u8(1);
+            w.u16(32);
+            w.f64(240.0);
+        });
+        assert_eq!(tell(f, &set).answers, [(2, 1, Code::Done)]);
+        let h = tell(f, &command(2, Function::SetMode, |w| w.u8(Mode::Standby as u8)));
+        assert_eq!(h.housekeeping[0].self_check, 0);
+    });
+    fly(Bench { camera_is_dead: true, ..ready() }, |f| {
+        assert!(heard(f).events.contains(&(Event::SelfCheck, 1, 0)));
+    });
+}
+
+#[test]
+fn bad_commands_are_rejected_with_a_code() {
+    fly(ready(), |f| {
+        heard(f);
+        let good = command(1, Function::ProcessOnce, |_| {});
+        let mut broken = good.clone();
+        *broken.last_mut().unwrap() ^= 1;
+        assert_eq!(tell(f, &broken).answers, [(0, 0, Code::Broken)]);
+        assert_eq!(tell(f, &command(2, Function::ProcessOnce, |w| w.u8(1))).answers, [(4, 2, Code::Arguments)]);
+        assert_eq!(tell(f, &command(3, Function::SetMode, |w| w.u8(9))).answers, [(1, 3, Code::Arguments)]);
+        assert_eq!(tell(f, &command(4, Function::SetParameters, |w| w.u8(3))).answers, [(2, 4, Code::Arguments)]);
+        let mut out = [0; 64];
+        let n = packet::write(&mut out, Apid::Command, 5, 0, |w| w.u8(200)).unwrap();
+        assert_eq!(tell(f, &out[..n]).answers, [(200, 5, Code::Unknown)]);
+        let n = packet::write(&mut out, Apid::Science, 6, 0, |w| w.u8(1)).unwrap();
+        assert_eq!(tell(f, &out[..n]).answers, [(1, 6, Code::Unknown)]);
+        // Cut off, and nothing follows: broken after a second.
+        assert!(tell(f, &good[..9]).answers.is_empty());
+        f.board().now_us += 2_000_000;
+        f.turn();
+        assert_eq!(heard(f).answers, [(0, 0, Code::Broken)]);
+        // Cut off by the next one: that one is done.
+        f.board().line.extend(&good[..9]);
+        f.board().line.extend(&good);
+        f.turn();
+        f.turn();
+        f.board().now_us += 2_000_000;
+        (0..5).for_each(|_| f.turn());
+        let answers = heard(f).answers;
+        assert!(answers.contains(&(4, 1, Code::Done)), "{answers:?}");
+        let h = tell(f, &command(9, Function::SetMode, |w| w.u8(Mode::Safe as u8)));
+        assert_eq!(h.answers, [(1, 9, Code::Done)]);
+        assert_eq!(tell(f, &good).answers, [(4, 1, Code::Mode)]);
+        assert_eq!(tell(f, &command(10, Function::ResetCounters, |_| {})).answers, [(6, 10, Code::Done)]);
+    });
+}
+
+#[test]
+fn any_bytes_on_the_line_leave_it_in_order() {
+    fly(ready(), |f| {
+        let mut state = 1u32;
+        for _ in 0..200 {
+            let noise: Vec<u8> = (0..97)
+                .map(|_| {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    // Sync markers now and then.
+                    packet::SYNC.get((state >> 29) as usize).copied().unwrap_or((state >> 16) as u8)
+                })
+                .collect();
+            f.board().line.extend(noise);
+            f.turn();
+        }
+        while !f.board().line.is_empty() {
+            f.turn();
+        }
+        f.board().now_us += 2_000_000;
+        (0..400).for_each(|_| f.turn());
+        heard(f);
+        let answers = tell(f, &command(1, Function::ResetCounters, |_| {})).answers;
+        assert_eq!(answers, [(6, 1, Code::Done)]);
+    });
+}
+
+#[test]
+fn every_picture_gets_a_status_or_an_event_and_the_next_is_processed() {
+    fly(ready(), |f| {
+        tell(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        let noise = (0..WIDTH * HEIGHT).map(|i| (i as u32).wrapping_mul(2_654_435_761).to_be_bytes()[0]).collect();
+        let pictures = [vec![0; 100], vec![], vec![0; WIDTH * HEIGHT], vec![255; WIDTH * HEIGHT], noise, limb()];
+        f.board().shots.extend(pictures.map(|p| (p, 0)));
+        f.board().shots[5].1 = 3;
+        (0..6).for_each(|_| f.turn());
+        let h = heard(f);
+        let expected = WIDTH as u32 * HEIGHT as u32;
+        assert_eq!(
+            h.events,
+            [(Event::WrongSize, 100, expected), (Event::WrongSize, 0, expected), (Event::Overrun, 3, 0)]
+        );
+        let status: Vec<u8> = h.science.iter().map(|(_, a)| a.status).collect();
+        assert_eq!(status[..2], [Status::NoLimb as u8, Status::TooBright as u8]);
+        assert!(status[2] != Status::Ok as u8 && status[3] == Status::Ok as u8, "{status:?}");
+        assert!(f.board().fed >= 7);
+    });
+}
+
+#[test]
+fn a_picture_is_processed_on_command_and_its_edge_sent() {
+    fly(ready(), |f| {
+        heard(f);
+        f.board().shots.push_back((limb(), 0));
+        let known = command(1, Function::SetKnown, |w| {
+            [231e3, f32::NAN, f32::NAN, f32::NAN].map(|v| w.f32(v)).into_iter().collect()
+        });
+        assert_eq!(tell(f, &known).answers, [(7, 1, Code::Done)]);
+        let wrong = command(2, Function::SetKnown, |w| {
+            [-5.0, f32::NAN, f32::NAN, f32::NAN].map(|v| w.f32(v)).into_iter().collect()
+        });
+        assert_eq!(tell(f, &wrong).answers, [(7, 2, Code::Refused)]);
+        assert_eq!(tell(f, &command(3, Function::DumpEdges, |_| {})).answers, [(5, 3, Code::Done)]);
+        let h = tell(f, &command(4, Function::ProcessOnce, |_| {}));
+        assert_eq!(h.science.len(), 1);
+        assert_eq!(h.science[0].0.altitude_m, 231e3);
+        // The limb crosses the whole picture.
+        assert!(h.edge.len() > 300 && h.edge.len() <= 512, "{}", h.edge.len());
+        assert!(h.edge.iter().all(|p| p.y > 200 && p.y < 480));
+        assert!(h.edge.iter().any(|p| p.x < 5) && h.edge.iter().any(|p| p.x > 630));
+        // Once.
+        f.board().shots.push_back((limb(), 0));
+        f.turn();
+        assert!(heard(f).science.is_empty());
+    });
+}
+
+#[test]
+fn the_defaults_are_valid() {
+    Parameters::idle().check().unwrap();
+}
