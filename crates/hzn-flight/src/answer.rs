@@ -1,9 +1,31 @@
 //! A report as bytes, with every bit of its numbers: what science telemetry carries.
 
-use hzn_core::Report;
-use hzn_core::pipeline::MAX_LISTED;
+use hzn_core::frames::{Cov3, UnitVec3};
+use hzn_core::pipeline::{Candidate, Counters, MAX_LISTED, Verdict};
+use hzn_core::status::{Stage, Status};
+use hzn_core::{Report, Solution};
 
 use crate::bytes::{Reader, Writer};
+
+type Candidates = heapless::Vec<Candidate<f64>, MAX_LISTED>;
+
+/// Every verdict, to find one by its number.
+const VERDICTS: [Verdict; 14] = [
+    Verdict::Chosen,
+    Verdict::Passed,
+    Verdict::NoConsensus,
+    Verdict::FewInliers,
+    Verdict::ShortArc,
+    Verdict::Residuals,
+    Verdict::HalfAngle,
+    Verdict::Uncertain,
+    Verdict::NoFit,
+    Verdict::Unsupported,
+    Verdict::Indistinct,
+    Verdict::NoSky,
+    Verdict::Taken,
+    Verdict::OutOfView,
+];
 
 /// A candidate edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,6 +143,54 @@ impl Answer {
             direction,
             edges,
         }
+    }
+
+    /// The report in double precision, as a workstation has it; `None` when a number in it means nothing.
+    pub fn report(&self) -> Option<Report<f64>> {
+        let mut candidates = Candidates::default();
+        for e in self.edges.iter().flatten() {
+            let verdict = *VERDICTS.iter().find(|&&v| v as u8 == e.verdict)?;
+            let candidate = Candidate {
+                length_px: e.length_px,
+                points: e.points,
+                inliers: e.inliers,
+                rms_px: f64::from(e.rms_px),
+                verdict,
+            };
+            candidates.push(candidate).ok()?;
+        }
+        let unit = |v: [f32; 3]| v.map(f64::from);
+        let solution = match &self.direction {
+            None => None,
+            Some(d) => Some(Solution {
+                axis: UnitVec3::try_new(unit(d.axis))?,
+                covariance: Cov3::from_upper(d.cov.map(f64::from)),
+                axis_ecef: UnitVec3::try_new(unit(d.axis_ecef)),
+                axis_body: UnitVec3::try_new(unit(d.axis_body)),
+                half_angle_rad: d.half_angle_rad.into(),
+                fused_half_angle_rad: d.fused_half_angle_rad.into(),
+                altitude_m: (!d.altitude_m.is_nan()).then(|| (d.altitude_m.into(), d.altitude_sigma_m.into())),
+                rms_px: d.rms_px.into(),
+                inliers: d.inliers,
+                arc_px: d.arc_px.into(),
+                candidate: d.candidate,
+            }),
+        };
+        Some(Report {
+            status: *Status::ALL.get(usize::from(self.status))?,
+            stage: *Stage::ALL.get(usize::from(self.stage))?,
+            level: self.level,
+            counters: Counters {
+                followed: self.followed,
+                candidates: self.candidates,
+                dropped: self.dropped,
+                fallback_points: self.fallback_points,
+                edge_points: self.edge_points,
+                draws: self.draws,
+            },
+            candidates,
+            solution,
+        })
     }
 
     /// Appends the answer.

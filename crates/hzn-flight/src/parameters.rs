@@ -226,6 +226,16 @@ impl Parameters {
         config.body.kind.to_f64() as u8
     }
 
+    /// The body of a number, as parameter 30 has it.
+    pub fn body(number: u8) -> Option<Kind> {
+        Kind::from_f64(f64::from(number))
+    }
+
+    /// The number of a parameter by its name in sensor.toml; of one that has several numbers, the first.
+    pub fn named(name: &str) -> Option<u16> {
+        PLAIN.iter().copied().chain([K, MOUNT]).find(|&id| self::name(id) == Some(name))
+    }
+
     /// The numbers of every parameter that has a value now, in the order in which they must be set.
     pub fn numbers(&self) -> impl Iterator<Item = u16> + '_ {
         let polygons = &self.sensor.mask.polygons_px;
@@ -310,6 +320,29 @@ impl Parameters {
             return Ok(());
         }
         set_plain(self, id, value)
+    }
+
+    /// Whether every value can be told by a number: several bodies in one picture and the methods of published systems
+    /// cannot.
+    ///
+    /// # Errors
+    /// What cannot.
+    pub fn flyable(&self) -> Result<(), &'static str> {
+        let c = &self.sensor;
+        let mut same = Self { sensor: Config::new(c.camera.clone()), housekeeping_every: self.housekeeping_every };
+        for id in self.numbers() {
+            let value = self.get(id).unwrap_or(f64::NAN);
+            if same.set(id, value).is_err() {
+                return Err(name(id).unwrap_or("a value that does not fly"));
+            }
+        }
+        // Colours are mixed on the ground only.
+        same.sensor.input = c.input;
+        if same.sensor == self.sensor {
+            Ok(())
+        } else {
+            Err("this sensor has settings that do not fly (docs/telemetry.md)")
+        }
     }
 
     /// Whether the parameters go together.

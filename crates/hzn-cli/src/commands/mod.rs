@@ -12,6 +12,8 @@ mod recover;
 mod run;
 mod sensitivity;
 mod simulate;
+mod telecommand;
+mod telemetry;
 
 use clap::{Parser, Subcommand};
 
@@ -41,6 +43,8 @@ enum Command {
     Evaluate(evaluate::Args),
     Sensitivity(Box<sensitivity::Args>),
     Camera(camera::Args),
+    Telemetry(telemetry::Args),
+    Telecommand(telecommand::Args),
     Completions(completions::Args),
 }
 
@@ -61,6 +65,8 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Sensitivity(args) => sensitivity::run(&args),
         Command::Camera(args) => camera::run(&args),
+        Command::Telemetry(args) => telemetry::run(&args),
+        Command::Telecommand(args) => telecommand::run(&args),
         Command::Completions(args) => completions::run(&args),
     }
 }

@@ -1,0 +1,171 @@
+//! `hzn telecommand`: commands for a flight computer, as the bytes of the line.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use hzn_flight::bytes::Writer;
+use hzn_flight::messages::{Function, Mode};
+use hzn_flight::packet::{self, Apid};
+use hzn_flight::{Parameters, parameters};
+
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+
+/// Write commands for a flight computer
+///
+/// Each command is one argument:
+///   "mode standby|flight|safe|shut-down"
+///   "set NAME VALUE [NAME VALUE]..."   names as in sensor.toml, or numbers; all or none
+///   "load sensor.toml"                 every parameter of a sensor
+///   "read NAME [NAME]..."
+///   "known ALTITUDE_KM [X_KM Y_KM Z_KM]"
+///   "process-once", "dump-edges", "reset-counters"
+/// The bytes go to standard output unless -o is given. The format: docs/telemetry.md.
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Args {
+    /// The commands, in order
+    #[arg(required = true, value_name = "COMMAND")]
+    commands: Vec<String>,
+    /// The file to write
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Sequence count of the first command, 0 to 16383
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..16384))]
+    sequence: u16,
+    /// Replace an output that exists
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let mut out = Vec::new();
+    let mut sequence = args.sequence;
+    for command in &args.commands {
+        for user in encode(command)? {
+            let mut bytes = [0; packet::MAX_BYTES];
+            let n = packet::write(&mut bytes, Apid::Command, sequence, 0, |w| w.bytes(&user))
+                .ok_or_else(|| usage(format!("{command:?}: too long for one packet; split it")))?;
+            out.extend_from_slice(&bytes[..n]);
+            sequence = (sequence + 1) & 0x3FFF;
+        }
+    }
+    match &args.output {
+        Some(path) if path.exists() && !args.force => {
+            Err(usage(format!("{}: exists already; --force replaces it", path.display())))
+        }
+        Some(path) => {
+            std::fs::write(path, out).map_err(|e| failed(format!("{}: {e}", path.display())))?;
+            Ok(Exit::Done)
+        }
+        None => {
+            std::io::stdout().write_all(&out)?;
+            Ok(Exit::Done)
+        }
+    }
+}
+
+/// The user data of a command: of `load` there may be several.
+fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
+    let bad = |what: &str| usage(format!("{command:?}: {what}"));
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let Some((&verb, rest)) = words.split_first() else { return Err(bad("is empty")) };
+    if verb == "load" {
+        let [path] = rest else { return Err(bad("load takes one file, a sensor.toml")) };
+        return load(Path::new(path));
+    }
+    let Some(function) = Function::ALL.iter().copied().find(|f| f.name() == verb) else {
+        let names = Function::ALL.iter().map(|f| f.name()).chain(["load"]);
+        let near = hzn_calib::nearest(verb, names).map(|n| format!("; did you mean {n:?}?"));
+        return Err(bad(&format!("there is no such command{}", near.unwrap_or_default())));
+    };
+    let user = |fill: &mut dyn FnMut(&mut Writer<'_>)| {
+        let mut bytes = vec![0; packet::MAX_BYTES];
+        let mut out = Writer::new(&mut bytes);
+        out.u8(function as u8);
+        fill(&mut out);
+        let n = out.finish().ok_or_else(|| bad("is too long for one packet; split it"))?;
+        bytes.truncate(n);
+        Ok(vec![bytes])
+    };
+    let number = |word: &str| word.parse::<f64>().map_err(|_| bad(&format!("{word:?} is no number")));
+    match function {
+        Function::SetMode => {
+            let mode = rest.first().and_then(|w| Mode::ALL.iter().find(|m| m.name() == *w));
+            match (mode, rest.len()) {
+                (Some(&mode), 1) => user(&mut |w| w.u8(mode as u8)),
+                _ => Err(bad("modes are standby, flight, safe, shut-down")),
+            }
+        }
+        Function::SetParameters => {
+            if rest.is_empty() || !rest.len().is_multiple_of(2) || rest.len() > 160 {
+                return Err(bad("set takes pairs of a name and a value, up to 80"));
+            }
+            let mut pairs = Vec::new();
+            for pair in rest.chunks(2) {
+                pairs.push((parameter(pair[0]).map_err(|e| bad(&e))?, number(pair[1])?));
+            }
+            user(&mut |w| set(w, &pairs))
+        }
+        Function::ReadParameters => {
+            if rest.is_empty() || rest.len() > 90 {
+                return Err(bad("read takes the names of parameters, up to 90"));
+            }
+            let ids = rest.iter().map(|w| parameter(w).map_err(|e| bad(&e))).collect::<Result<Vec<_>, _>>()?;
+            user(&mut |w| {
+                w.u8(ids.len() as u8);
+                ids.iter().for_each(|&id| w.u16(id));
+            })
+        }
+        Function::SetKnown => {
+            let km = rest.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
+            let [h, x, y, z] = match km[..] {
+                [h] => [h, f64::NAN, f64::NAN, f64::NAN],
+                [h, x, y, z] => [h, x, y, z],
+                _ => return Err(bad("known takes the altitude in kilometres, and the ECEF position if there is one")),
+            };
+            user(&mut |w| [h, x, y, z].iter().for_each(|v| w.f32((v * 1e3) as f32)))
+        }
+        Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters if !rest.is_empty() => {
+            Err(bad("takes nothing else"))
+        }
+        Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters => user(&mut |_| {}),
+    }
+}
+
+fn set(out: &mut Writer<'_>, pairs: &[(u16, f64)]) {
+    out.u8(pairs.len() as u8);
+    for &(id, value) in pairs {
+        out.u16(id);
+        out.f64(value);
+    }
+}
+
+fn parameter(word: &str) -> Result<u16, String> {
+    if let Ok(id) = word.parse::<u16>() {
+        return parameters::name(id).map(|_| id).ok_or_else(|| format!("no parameter has the number {id}"));
+    }
+    Parameters::named(word).ok_or_else(|| {
+        let ids = Parameters::idle();
+        let names = ids.numbers().filter_map(parameters::name);
+        let near = hzn_calib::nearest(word, names).map(|n| format!("; did you mean {n}?"));
+        format!("{word} is no parameter{}", near.unwrap_or_default())
+    })
+}
+
+/// Every parameter of a sensor: one command, so that they are taken all or none.
+fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
+    let sensor = hzn_calib::sensor::load(path)?;
+    let parameters = Parameters::new(sensor.config);
+    parameters.flyable().map_err(|e| usage(format!("{}: {e}", path.display())))?;
+    let pairs: Vec<_> = parameters.numbers().filter_map(|id| Some((id, parameters.get(id)?))).collect();
+    let mut bytes = vec![0; packet::MAX_BYTES];
+    let mut out = Writer::new(&mut bytes);
+    out.u8(Function::SetParameters as u8);
+    set(&mut out, &pairs);
+    let n = out.finish().filter(|&n| n + 20 <= packet::MAX_BYTES).ok_or_else(|| {
+        let text = format!("{}: {} parameters are too many for one command (99)", path.display(), pairs.len());
+        usage(format!("{text}; a mask of fewer corners fits"))
+    })?;
+    bytes.truncate(n);
+    Ok(vec![bytes])
+}

@@ -1,0 +1,269 @@
+//! `hzn telemetry`: what a flight computer sent, decoded.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use hzn_flight::answer::Answer;
+use hzn_flight::bytes::Reader;
+use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode};
+use hzn_flight::packet::{self, Apid, Packet, Scan};
+use hzn_flight::{Parameters, parameters};
+use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
+
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::output::{self, Existing, Rows, Target};
+use crate::tell;
+
+/// Decode a flight computer's telemetry
+///
+/// Answers become rows as `hzn run` writes them; events, acknowledged commands and parameters are printed. What is no
+/// whole packet is skipped and counted. The format: docs/telemetry.md.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The stream as it was received; - for standard input
+    file: PathBuf,
+    /// The answers: .csv, .jsonl or .mcap
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// The housekeeping as a table: .csv
+    #[arg(long, value_name = "FILE")]
+    housekeeping: Option<PathBuf>,
+    /// Replace outputs that exist
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let bytes = read(&args.file)?;
+    let existing = if args.force { Existing::Replace } else { Existing::Refuse };
+    let mut sink = args.output.as_deref().map(|path| Sink::create(path, existing)).transpose()?;
+    let mut housekeeping = args.housekeeping.as_deref().map(|path| table(path, args.force)).transpose()?;
+    let mut heard = Heard::default();
+    let mut rest = &bytes[..];
+    loop {
+        match packet::scan(rest) {
+            Scan::More { skip } => {
+                heard.skipped += rest.len() as u64;
+                // A packet that was begun and not ended, or noise.
+                heard.cut += u64::from(rest.len() > skip + packet::SYNC.len());
+                break;
+            }
+            Scan::Bad { skip } => {
+                heard.cut += 1;
+                heard.skipped += skip as u64;
+                rest = rest.get(skip..).unwrap_or_default();
+            }
+            Scan::Packet { end, packet } => {
+                heard.skipped += end.saturating_sub(packet.user.len() + OVERHEAD) as u64;
+                heard.take(&packet, &mut sink, &mut housekeeping)?;
+                rest = rest.get(end..).unwrap_or_default();
+            }
+        }
+    }
+    if let Some(sink) = sink {
+        sink.finish()?;
+    }
+    if let Some(mut table) = housekeeping {
+        table.flush()?;
+    }
+    heard.summary();
+    Ok(Exit::Done)
+}
+
+/// Bytes of a packet beside its user data.
+const OVERHEAD: usize = 20;
+
+fn read(path: &Path) -> Result<Vec<u8>, Stop> {
+    let mut bytes = Vec::new();
+    if path == Path::new("-") {
+        std::io::stdin().read_to_end(&mut bytes)?;
+        return Ok(bytes);
+    }
+    std::fs::read(path).map_err(|e| usage(format!("{}: {e}", path.display())))
+}
+
+fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {
+    if path.exists() && !force {
+        return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
+    }
+    let mut table = csv::Writer::from_path(path).map_err(|e| failed(format!("{}: {e}", path.display())))?;
+    let columns = ["time_s"].into_iter().chain(Housekeeping::FIELDS.iter().copied());
+    table.write_record(columns).map_err(failed)?;
+    Ok(table)
+}
+
+/// Where answers go.
+enum Sink {
+    Rows(Rows),
+    Mcap(Box<hzn_mcap::Writer>),
+}
+
+impl Sink {
+    fn create(path: &Path, existing: Existing) -> Result<Self, Stop> {
+        if output::target(path)? != Target::Mcap {
+            return Rows::create(path, existing).map(Self::Rows);
+        }
+        let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
+        let options = hzn_mcap::Options { metadata, force: existing == Existing::Replace, ..Default::default() };
+        let writer = hzn_mcap::Writer::create(path, &options).map_err(usage)?;
+        Ok(Self::Mcap(Box::new(writer)))
+    }
+    fn write(&mut self, record: FrameRecord) -> Result<(), Stop> {
+        match self {
+            Self::Rows(rows) => Ok(rows.write(&record.row)?),
+            Self::Mcap(writer) => writer.write(&record).map_err(failed),
+        }
+    }
+    fn finish(self) -> Result<(), Stop> {
+        match self {
+            Self::Rows(rows) => rows.finish(),
+            Self::Mcap(writer) => writer.finish().map(drop).map_err(failed),
+        }
+    }
+}
+
+/// Counts of a stream, and what waits for the next answer.
+#[derive(Default)]
+struct Heard {
+    packets: u64,
+    answers: u64,
+    cut: u64,
+    skipped: u64,
+    /// Packets that were lost, by the gaps in the sequence counts.
+    lost: u64,
+    next: BTreeMap<u16, u16>,
+    log: Vec<LogLine>,
+}
+
+impl Heard {
+    fn take(
+        &mut self,
+        packet: &Packet<'_>,
+        sink: &mut Option<Sink>,
+        housekeeping: &mut Option<csv::Writer<std::fs::File>>,
+    ) -> Result<(), Stop> {
+        self.packets += 1;
+        if let Some(next) = self.next.insert(packet.apid, (packet.sequence + 1) & 0x3FFF) {
+            // A count of 0 is a computer that has started anew.
+            if packet.sequence != next && packet.sequence != 0 {
+                self.lost += u64::from(packet.sequence.wrapping_sub(next) & 0x3FFF);
+            }
+        }
+        let time_s = packet.time_us as f64 * 1e-6;
+        let from = &mut Reader::new(packet.user);
+        let strange =
+            || format!("a packet of APID {:#x} with {} bytes is not understood", packet.apid, packet.user.len());
+        match Apid::numbered(packet.apid) {
+            Some(Apid::Science) => match (Exposure::read(from), Answer::read(from)) {
+                (Some(exposure), Some(answer)) => self.answer(&exposure, &answer, sink)?,
+                _ => self.note(time_s, LogLevel::Warning, &strange()),
+            },
+            Some(Apid::Housekeeping) => match Housekeeping::read(from) {
+                Some(record) => {
+                    if let Some(table) = housekeeping {
+                        let values = std::iter::once(time_s).chain(record.values());
+                        table.write_record(values.map(|v| v.to_string())).map_err(failed)?;
+                    }
+                }
+                None => self.note(time_s, LogLevel::Warning, &strange()),
+            },
+            Some(Apid::Event) => match EventRecord::read(from) {
+                Some(record) => {
+                    let level = match record.severity {
+                        0 => LogLevel::Info,
+                        1 => LogLevel::Warning,
+                        _ => LogLevel::Error,
+                    };
+                    self.note(time_s, level, &event(&record));
+                }
+                None => self.note(time_s, LogLevel::Warning, &strange()),
+            },
+            Some(Apid::Acknowledge) => match Acknowledge::read(from) {
+                Some(a) => {
+                    let function = Function::numbered(a.function).map_or("?", Function::name);
+                    let code = Code::numbered(a.code).map_or("?", Code::text);
+                    let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
+                    self.note(time_s, level, &format!("command {} ({function}): {code}", a.sequence));
+                }
+                None => self.note(time_s, LogLevel::Warning, &strange()),
+            },
+            Some(Apid::Parameters) => {
+                let count = from.u8().unwrap_or(0);
+                for _ in 0..count {
+                    let (Some(id), Some(value)) = (from.u16(), from.f64()) else { break };
+                    let name = parameters::name(id).unwrap_or("?");
+                    self.note(time_s, LogLevel::Info, &format!("parameter {id} {name} = {value}"));
+                }
+            }
+            Some(Apid::Edge) => match EdgePart::read(from) {
+                Some(part) => {
+                    let pixels = std::iter::from_fn(|| Some(format!("{},{}", from.u16()?, from.u16()?)));
+                    let list: Vec<String> = pixels.take(part.count.into()).collect();
+                    let EdgePart { picture, candidate, first, total, stride, .. } = part;
+                    let what = format!("edge of picture {picture}, candidate {candidate}, stride {stride}");
+                    self.note(time_s, LogLevel::Info, &format!("{what}, {first} of {total}: {}", list.join(" ")));
+                }
+                None => self.note(time_s, LogLevel::Warning, &strange()),
+            },
+            Some(Apid::Command) | None => self.note(time_s, LogLevel::Warning, &strange()),
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, exposure: &Exposure, answer: &Answer, sink: &mut Option<Sink>) -> Result<(), Stop> {
+        let time_s = exposure.exposure_us as f64 * 1e-6;
+        let Some(report) = answer.report() else {
+            self.note(time_s, LogLevel::Warning, &format!("picture {}: numbers that mean nothing", exposure.picture));
+            return Ok(());
+        };
+        self.answers += 1;
+        let Some(sink) = sink else { return Ok(()) };
+        let meta = RowMeta {
+            index: u64::from(exposure.picture).saturating_sub(1),
+            file: format!("picture-{:06}", exposure.picture),
+            time_s,
+            body: Parameters::body(exposure.body).map_or("?", hzn_mcap::body_name).to_owned(),
+            altitude_km: (!exposure.altitude_m.is_nan()).then(|| f64::from(exposure.altitude_m) * 1e-3),
+        };
+        let row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)));
+        let mut record = FrameRecord::new(row);
+        record.candidates = CandidateEdge::from_report(&report);
+        record.annotations = Annotations::default();
+        record.log = std::mem::take(&mut self.log);
+        sink.write(record)
+    }
+
+    fn note(&mut self, time_s: f64, level: LogLevel, message: &str) {
+        tell::line(format!("{time_s:12.6} s  {message}"));
+        self.log.push(LogLine { level, message: message.to_owned() });
+    }
+
+    fn summary(&self) {
+        let Self { packets, answers, lost, cut, skipped, .. } = self;
+        let mut text = format!("{packets} packets, {answers} answers");
+        if *lost > 0 {
+            text += &format!(", {lost} packets lost on the way");
+        }
+        if *cut > 0 || *skipped > 0 {
+            text += &format!(", {cut} broken packets, {skipped} bytes skipped");
+        }
+        tell::line(&text);
+    }
+}
+
+fn event(record: &EventRecord) -> String {
+    let EventRecord { number, a, b, .. } = *record;
+    let mode = |n: u32| u8::try_from(n).ok().and_then(Mode::numbered).map_or("?", Mode::name);
+    match Event::numbered(number) {
+        Some(Event::ModeChanged) => format!("{} to {} mode", mode(a), mode(b)),
+        Some(Event::Started) => format!("started with copy {a} of the parameters, generation {b}"),
+        Some(Event::CommandRejected) => {
+            let code = u8::try_from(a).ok().and_then(Code::numbered).map_or("?", Code::text);
+            format!("telecommand rejected: {code} (function {b})")
+        }
+        Some(Event::Stored) => format!("parameters stored in copy {a}, generation {b}"),
+        Some(e) => format!("{} ({a}, {b})", e.text()),
+        None => format!("event {number} ({a}, {b})"),
+    }
+}

@@ -1,0 +1,267 @@
+//! hzn for C: one sensor in memory that the caller owns. No heap, no callbacks, nothing global.
+//!
+//! Functions return 0 to 7, the status of a picture as everywhere in hzn (0 is success), or a negative number for a
+//! mistake of the caller's, after which nothing has changed. Parameters have the numbers of docs/telemetry.md.
+
+#![no_std]
+
+use core::mem::{align_of, size_of};
+use core::ptr::{self, NonNull};
+
+use hzn_core::image::{Grey, Layout};
+use hzn_core::pipeline::Unobserved;
+use hzn_core::{FlightWorkspace, Frame, Sensor};
+use hzn_flight::Parameters;
+use hzn_flight::answer::Answer;
+use hzn_flight::parameters::Refused;
+
+#[cfg(feature = "standalone")]
+mod standalone {
+    unsafe extern "C" {
+        /// Defined nowhere: a library that can panic does not link.
+        safe fn panic_path_is_linked() -> !;
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+        panic_path_is_linked()
+    }
+}
+
+/// A pointer is null.
+pub const HZN_NULL: i32 = -1;
+/// The memory is too small or not aligned.
+pub const HZN_MEMORY: i32 = -2;
+/// No parameter has this number.
+pub const HZN_UNKNOWN_PARAMETER: i32 = -3;
+/// A parameter cannot have this value, or they do not go together.
+pub const HZN_REFUSED: i32 = -4;
+/// The picture is smaller than it says.
+pub const HZN_PICTURE: i32 = -5;
+/// What is known about the picture cannot be.
+pub const HZN_KNOWN: i32 = -6;
+
+/// A sensor. Opaque: only pointers to it are passed around.
+#[derive(Debug)]
+pub struct HznSensor {
+    /// What [`hzn_set`] has set; holds from [`hzn_apply`] on.
+    wanted: Parameters,
+    sensor: Sensor<f32>,
+    workspace: FlightWorkspace,
+}
+
+/// A picture: one byte a pixel, row by row.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct HznPicture {
+    /// The first pixel of the first row.
+    pub pixels: *const u8,
+    /// Bytes from `pixels` on that may be read.
+    pub bytes: usize,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bytes from the start of a row to the start of the next.
+    pub stride: usize,
+}
+
+/// What is known about a picture besides it. NaN: not known.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct HznKnown {
+    /// Altitude in metres: geodetic for the Earth, else above the radius.
+    pub altitude_m: f32,
+    /// Position of the camera in ECEF, metres. It beats the altitude.
+    pub position_m: [f32; 3],
+}
+
+/// The answer to a picture. Without a direction (status not 0) its numbers are NaN and 0.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct HznAnswer {
+    /// Unit vector to the body, camera frame (x right, y down, z forward).
+    pub axis: [f32; 3],
+    /// Its covariance: xx, xy, xz, yy, yz, zz, rad².
+    pub cov_rad2: [f32; 6],
+    /// The same direction in ECEF; NaN without a position.
+    pub axis_ecef: [f32; 3],
+    /// Half-angle of the free fit, rad.
+    pub half_angle_rad: f32,
+    /// Altitude from the free fit, m; NaN for Sun and Moon.
+    pub altitude_m: f32,
+    /// Its 1-sigma, m.
+    pub altitude_sigma_m: f32,
+    /// RMS distance of the inliers from the limb, px.
+    pub rms_px: f32,
+    /// Edge points that carry the answer.
+    pub inliers: u32,
+    /// Points of the chosen edge.
+    pub edge_points: u32,
+    /// Edges that were candidates.
+    pub candidates: u32,
+    /// Border pixels left out because lists were full.
+    pub dropped: u32,
+    /// Level between dark and lit, counts.
+    pub level: u16,
+    /// Status, as returned.
+    pub status: u8,
+    /// The last stage that was entered.
+    pub stage: u8,
+}
+
+/// Bytes that a sensor needs.
+#[unsafe(no_mangle)]
+pub extern "C" fn hzn_workspace_size() -> usize {
+    size_of::<HznSensor>()
+}
+
+/// Alignment that a sensor needs, in bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn hzn_workspace_align() -> usize {
+    align_of::<HznSensor>()
+}
+
+/// Makes a sensor with every parameter at its default in `memory`, and gives it in `out`.
+///
+/// # Safety
+/// `memory` is null or holds `bytes` writable bytes that nobody else uses as long as the sensor is used; `out` is null or
+/// writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut HznSensor) -> i32 {
+    let place = memory.cast::<HznSensor>();
+    let (Some(_), false) = (NonNull::new(place), out.is_null()) else { return HZN_NULL };
+    if bytes < size_of::<HznSensor>() || !place.is_aligned() {
+        return HZN_MEMORY;
+    }
+    let wanted = Parameters::idle();
+    let Ok(sensor) = Sensor::new(&wanted.sensor) else { return HZN_REFUSED };
+    // SAFETY: `place` is aligned and has room, as checked; nothing there is dropped, as it is not a sensor yet. A
+    // workspace is arrays of numbers: any bytes are one, and zeros are an empty one.
+    unsafe {
+        (&raw mut (*place).wanted).write(wanted);
+        (&raw mut (*place).sensor).write(sensor);
+        ptr::write_bytes(&raw mut (*place).workspace, 0, 1);
+        out.write(place);
+    }
+    0
+}
+
+/// Sets a parameter by its number. It holds from the next `hzn_apply` on.
+///
+/// # Safety
+/// `sensor` is null or from `hzn_open`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hzn_set(sensor: *mut HznSensor, number: u16, value: f64) -> i32 {
+    // SAFETY: the caller's promise.
+    let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
+    code(sensor.wanted.set(number, value))
+}
+
+/// Gives a parameter as it was set last.
+///
+/// # Safety
+/// `sensor` is null or from `hzn_open`; `value` is null or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *mut f64) -> i32 {
+    // SAFETY: the caller's promise.
+    let (Some(sensor), Some(value)) = (unsafe { sensor.as_ref() }, unsafe { value.as_mut() }) else { return HZN_NULL };
+    match sensor.wanted.get(number) {
+        Some(found) => {
+            *value = found;
+            0
+        }
+        None => HZN_UNKNOWN_PARAMETER,
+    }
+}
+
+/// Takes the parameters that were set, all or none: refused, the sensor stays as it was and what was set is forgotten.
+///
+/// # Safety
+/// `sensor` is null or from `hzn_open`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
+    // SAFETY: the caller's promise.
+    let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
+    match (sensor.wanted.check(), Sensor::new(&sensor.wanted.sensor)) {
+        (Ok(()), Ok(new)) => {
+            sensor.sensor = new;
+            0
+        }
+        _ => {
+            sensor.wanted.sensor = sensor.sensor.config().clone();
+            HZN_REFUSED
+        }
+    }
+}
+
+/// Finds the limb. Any picture gives a status, and an answer in `out`.
+///
+/// # Safety
+/// `sensor` is null or from `hzn_open`; `picture` is null or its `pixels` hold `bytes` readable bytes; `known` is null
+/// (nothing is known) or readable; `out` is null or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hzn_process(
+    sensor: *mut HznSensor,
+    picture: *const HznPicture,
+    known: *const HznKnown,
+    out: *mut HznAnswer,
+) -> i32 {
+    // SAFETY: the caller's promise.
+    let (Some(sensor), Some(picture), Some(out)) =
+        (unsafe { sensor.as_mut() }, unsafe { picture.as_ref() }, unsafe { out.as_mut() })
+    else {
+        return HZN_NULL;
+    };
+    if picture.pixels.is_null() || picture.bytes > isize::MAX as usize {
+        return HZN_PICTURE;
+    }
+    // SAFETY: the caller's promise; not null, and no longer than a slice can be.
+    let pixels = unsafe { core::slice::from_raw_parts(picture.pixels, picture.bytes) };
+    let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
+    let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
+    // SAFETY: the caller's promise.
+    let frame = unsafe { known.as_ref() }.map_or_else(Frame::default, frame);
+    let Ok(expected) = sensor.sensor.expect(&frame) else { return HZN_KNOWN };
+    let report = sensor.sensor.process(&mut sensor.workspace, &grey, &expected, &Unobserved);
+    *out = answer(&Answer::of(&report));
+    i32::from(out.status)
+}
+
+fn frame(known: &HznKnown) -> Frame<f32> {
+    let told = !known.position_m.iter().any(|x| x.is_nan());
+    Frame {
+        altitude_m: (!known.altitude_m.is_nan()).then_some(known.altitude_m),
+        position_m: told.then_some(known.position_m),
+        ..Frame::default()
+    }
+}
+
+fn answer(a: &Answer) -> HznAnswer {
+    let nan = f32::NAN;
+    let d = a.direction.as_ref();
+    HznAnswer {
+        axis: d.map_or([nan; 3], |d| d.axis),
+        cov_rad2: d.map_or([nan; 6], |d| d.cov),
+        axis_ecef: d.map_or([nan; 3], |d| d.axis_ecef),
+        half_angle_rad: d.map_or(nan, |d| d.half_angle_rad),
+        altitude_m: d.map_or(nan, |d| d.altitude_m),
+        altitude_sigma_m: d.map_or(nan, |d| d.altitude_sigma_m),
+        rms_px: d.map_or(nan, |d| d.rms_px),
+        inliers: d.map_or(0, |d| d.inliers),
+        edge_points: a.edge_points,
+        candidates: a.candidates,
+        dropped: a.dropped,
+        level: a.level,
+        status: a.status,
+        stage: a.stage,
+    }
+}
+
+fn code(result: Result<(), Refused>) -> i32 {
+    match result {
+        Ok(()) => 0,
+        Err(Refused::Unknown(_)) => HZN_UNKNOWN_PARAMETER,
+        Err(_) => HZN_REFUSED,
+    }
+}

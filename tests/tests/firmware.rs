@@ -1,0 +1,267 @@
+//! The firmware in QEMU beside this machine: the same bits; a scripted exchange over the line; a power cut. They need
+//! the images that `cargo xtask firmware` builds, and run there.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use hzn_core::image::Pixels;
+use hzn_core::status::Status;
+use hzn_core::{Config, Frame};
+use hzn_flight::{Parameters, table};
+use hzn_sim::flight::{leo_infrared, rocket};
+use hzn_tests::emulated::{Board, Case, bits, measure};
+use hzn_tests::real::Photograph;
+
+/// Rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and pictures that are none.
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for flight in [rocket(640, 480, 14, 1), rocket(960, 540, 12, 2).with_payload(), rocket(1280, 720, 8, 3)] {
+        for frame in &flight.frames {
+            cases.push(Case::rendered(format!("{} {}", flight.name, frame.file), &flight.sensor, frame));
+        }
+    }
+    let infrared = leo_infrared(10, 1);
+    for frame in &infrared.frames {
+        let mut frame = frame.clone();
+        frame.scene.detector.bits = 8;
+        cases.push(Case::rendered(format!("infrared {}", frame.file), &infrared.sensor, &frame));
+    }
+    for file in [
+        "iss-limb-2020-11-20.jpg",
+        "iss073e0293986-aurora.jpg",
+        "pluto-pia19948.jpg",
+        "sun-hmi-continuum-2023-01-31.png",
+    ] {
+        let photograph = Photograph::load(file);
+        let view = photograph.view();
+        let pixel = |i: usize| {
+            let (x, y) = (i % usize::from(view.width()), i / usize::from(view.width()));
+            view.at(x as u16, y as u16) as u8
+        };
+        let bytes = (0..usize::from(view.width()) * usize::from(view.height())).map(pixel).collect();
+        cases.push(Case { name: file.into(), sensor: photograph.sensor.clone(), known: Frame::default(), bytes });
+    }
+    let sensor = rocket(640, 480, 1, 1).sensor;
+    let told = Frame { altitude_m: Some(2e5f32), ..Frame::default() };
+    let paint = |name: &str, f: &dyn Fn(usize, usize) -> u8| Case {
+        name: name.into(),
+        sensor: sensor.clone(),
+        known: told,
+        bytes: (0..640 * 480).map(|i| f(i % 640, i / 640)).collect(),
+    };
+    cases.push(paint("black", &|_, _| 0));
+    cases.push(paint("white", &|_, _| 255));
+    cases.push(paint("checkerboard", &|x, y| 255 * ((x / 3 + y / 3) % 2) as u8));
+    cases.push(paint("noise", &|x, y| ((x * 7919 + y * 104_729) as u32).wrapping_mul(2_654_435_761).to_be_bytes()[0]));
+    cases
+}
+
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn same_bits_as_here() {
+    let cases = cases();
+    assert!(cases.len() >= 50, "{}", cases.len());
+    let here: Vec<_> = cases.iter().map(Case::here).collect();
+    let mut ok = 0;
+    for board in Board::ALL {
+        for ((case, here), there) in cases.iter().zip(&here).zip(measure(board, &cases)) {
+            assert_eq!(
+                bits(here),
+                bits(&there.answer),
+                "{} on {}:\n{here:?}\n{:?}",
+                case.name,
+                board.core(),
+                there.answer
+            );
+            ok += u32::from(here.status == Status::Ok as u8);
+        }
+    }
+    println!("{} pictures on two boards, {ok} answers", cases.len());
+    assert!(ok as usize >= cases.len(), "most pictures have an answer: {ok} of {}", 2 * cases.len());
+}
+
+/// The flight image with its files.
+struct Bench {
+    board: Board,
+    dir: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new(board: Board) -> Self {
+        Self { board, dir: tempfile::tempdir().unwrap() }
+    }
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+    fn copy(&self, number: u8, config: &Config, generation: u32) {
+        let mut bytes = vec![0; table::MAX_BYTES];
+        let n = table::write(&Parameters::new(config.clone()), generation, &mut bytes).unwrap();
+        std::fs::write(self.path(&format!("copy{number}.bin")), &bytes[..n]).unwrap();
+    }
+    fn frames(&self, pictures: &[(Vec<u8>, u32)]) {
+        let mut out = Vec::new();
+        for (bytes, lost) in pictures {
+            out.extend_from_slice(b"FRAM");
+            for word in [bytes.len() as u32, *lost, 0] {
+                out.extend_from_slice(&word.to_le_bytes());
+            }
+            out.extend_from_slice(bytes);
+        }
+        std::fs::write(self.path("frames.bin"), out).unwrap();
+    }
+    /// Runs until the image ends by itself; gives its exit status and what it sent.
+    fn run(&self, line: &[u8]) -> i32 {
+        std::fs::write(self.path("line.bin"), line).unwrap();
+        let sent = std::fs::File::create(self.path("sent.bin")).unwrap();
+        let mut command = self.board.qemu(&self.board.image("flight"));
+        let mut child = command
+            .args(["-serial", "stdio"])
+            .current_dir(self.dir.path())
+            .stdin(Stdio::piped())
+            .stdout(sent)
+            .spawn()
+            .unwrap();
+        let mut stdin = child.stdin.take().unwrap();
+        let line = line.to_vec();
+        // The line stays open until the image ends: QEMU would end with it.
+        let feed = std::thread::spawn(move || {
+            use std::io::Write;
+            let _ = stdin.write_all(&line);
+            let _ = stdin.flush();
+            stdin
+        });
+        let deadline = std::time::Instant::now() + std::time::Duration::from_secs(120);
+        let code = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break status.code().unwrap_or(-1);
+            }
+            if std::time::Instant::now() > deadline {
+                let _ = child.kill();
+                panic!("{}: the image did not end", self.board.name());
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        };
+        drop(feed.join());
+        code
+    }
+}
+
+/// `hzn` as the tests have built it.
+fn hzn() -> Command {
+    let mut path = std::env::current_exe().unwrap();
+    path.pop();
+    path.pop();
+    Command::new(path.join("hzn"))
+}
+
+fn hzn_run(dir: &Path, args: &[&str]) -> String {
+    let out = hzn().current_dir(dir).args(args).output().expect("hzn was built with the tests");
+    let text = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success(), "hzn {args:?}: {text}");
+    text
+}
+
+/// Cells of a table by column, without those that name the picture or the clock.
+fn answers(path: &Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let columns = lines.next().unwrap();
+    let apart = ["index", "file", "time_s", "elapsed_us"];
+    lines
+        .map(|cells| {
+            cells.into_iter().zip(&columns).filter(|(_, c)| !apart.contains(&c.as_str())).map(|(v, _)| v).collect()
+        })
+        .collect()
+}
+
+/// Ten pictures on command after a change of parameters: the telemetry, decoded, is what `hzn run --flight` writes.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn an_exchange_over_the_line() {
+    let mut flight = rocket(640, 480, 10, 5);
+    // The position changes from picture to picture; one altitude for all is what both are told here.
+    flight.sensor.body.altitude_km = Some(180.0);
+    flight.sensor.body.altitude_sigma_km = 60.0;
+    for board in Board::ALL {
+        let bench = Bench::new(board);
+        let dir = bench.dir.path();
+        std::fs::create_dir(bench.path("pictures")).unwrap();
+        let mut pictures = Vec::new();
+        for frame in &flight.frames {
+            let picture = frame.render().unwrap();
+            picture.save(&bench.path("pictures").join(&frame.file)).unwrap();
+            let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("8 bits") };
+            pictures.push((bytes.clone(), 0));
+        }
+        // One of the wrong size, and three lost, in between.
+        pictures.insert(4, (vec![7; 1000], 3));
+        bench.frames(&pictures);
+        let mut before = flight.sensor.clone();
+        before.reject.threshold_px = 5.0;
+        bench.copy(1, &before, 1);
+
+        let mut commands =
+            vec!["set reject.threshold_px 2.5 covariance.sigma_px 0.2", "read reject.threshold_px", "dump-edges"];
+        commands.extend(["process-once"; 11]);
+        commands.extend(["set camera.fx_px -1", "mode shut-down"]);
+        let mut args = vec!["telecommand", "-o", "commands.bin"];
+        args.extend(commands);
+        hzn_run(dir, &args);
+        let line = std::fs::read(bench.path("commands.bin")).unwrap();
+        assert_eq!(bench.run(&line), 0);
+
+        let said = hzn_run(dir, &["telemetry", "sent.bin", "-o", "sent.csv", "--housekeeping", "hk.csv"]);
+        assert!(said.contains("started with copy 1 of the parameters, generation 1"), "{said}");
+        assert!(said.contains("parameters stored in copy 2, generation 2"), "{said}");
+        assert!(said.contains("parameter 81 reject.threshold_px = 2.5"), "{said}");
+        assert!(said.contains("edge of picture 1, candidate"), "{said}");
+        assert!(
+            said.contains("picture of wrong size (1000, 307200)") && said.contains("pictures lost (3, 0)"),
+            "{said}"
+        );
+        assert!(said.contains("(set): value refused, nothing changed"), "{said}");
+        assert!(said.contains("standby to shut-down mode"), "{said}");
+        assert!(!said.contains("broken packets") && !said.contains("lost on the way"), "{said}");
+        let housekeeping = std::fs::read_to_string(bench.path("hk.csv")).unwrap();
+        let last: Vec<&str> = housekeeping.lines().last().unwrap().split(',').collect();
+        let column = |name: &str| housekeeping.lines().next().unwrap().split(',').position(|c| c == name).unwrap();
+        assert_eq!((last[column("pictures")], last[column("lost")], last[column("refused")]), ("10", "3", "1"));
+        println!("{}: most stack {} bytes", board.name(), last[column("stack_bytes")]);
+
+        let mut after = before;
+        after.reject.threshold_px = 2.5;
+        after.covariance.sigma_px = 0.2;
+        std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&after).unwrap()).unwrap();
+        hzn_run(dir, &["run", "pictures", "--flight", "-o", "here.csv"]);
+        let (sent, here) = (answers(&bench.path("sent.csv")), answers(&bench.path("here.csv")));
+        assert_eq!(sent.len(), 10);
+        assert_eq!(sent, here, "{}", board.name());
+        hzn_run(dir, &["telemetry", "sent.bin", "-o", "sent.mcap"]);
+        hzn_run(dir, &["export", "sent.mcap", "-o", "again.csv"]);
+        assert_eq!(answers(&bench.path("again.csv")), here);
+    }
+}
+
+/// Power is cut in the middle of writing the parameters: after the reset the old ones hold, and the ground is told.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn a_power_cut_in_the_middle_of_a_parameter_write() {
+    let sensor = rocket(640, 480, 1, 1).sensor;
+    let bench = Bench::new(Board::An500);
+    bench.frames(&[]);
+    bench.copy(1, &sensor, 1);
+    bench.copy(2, &sensor, 2);
+    std::fs::write(bench.path("cut.bin"), 200u32.to_le_bytes()).unwrap();
+    hzn_run(bench.dir.path(), &["telecommand", "set body.altitude_km 99", "-o", "one.bin"]);
+    let line = std::fs::read(bench.path("one.bin")).unwrap();
+    assert_eq!(bench.run(&line), 99, "power was cut");
+    assert_eq!(std::fs::metadata(bench.path("copy1.bin")).unwrap().len(), 200);
+    std::fs::remove_file(bench.path("cut.bin")).unwrap();
+    hzn_run(bench.dir.path(), &["telecommand", "read body.altitude_km", "mode shut-down", "-o", "two.bin"]);
+    let line = std::fs::read(bench.path("two.bin")).unwrap();
+    assert_eq!(bench.run(&line), 0);
+    let said = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
+    assert!(said.contains("started with copy 2 of the parameters, generation 2"), "{said}");
+    assert!(said.contains("a copy of the parameters cannot be used (1, 2)"), "{said}");
+    assert!(said.contains("parameter 32 body.altitude_km = NaN"), "{said}");
+}
