@@ -1,30 +1,31 @@
 //! The images of `firmware/`: built for both boards, looked into, and run in QEMU.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::flight_build::Toolchain;
 use crate::machine::{apt_install, output, root, target};
-use crate::steps::{self, Outcome, Trouble, cargo};
+use crate::steps::{self, Outcome, Steps, Trouble, cargo};
+use crate::test::built_with_the_tests;
 
 /// A board, and the flags of its core.
-const BOARDS: [(&str, &str); 2] = [("an386", ""), ("an500", "-C target-cpu=cortex-m7")];
+const BOARDS: [(&str, &str); 2] = [("an386", ""), (M7, M7_FLAGS)];
+const M7: &str = "an500";
+const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
 /// The images of a board.
 const IMAGES: [&str; 2] = ["flight", "measure"];
+/// Where the costs are written down.
+const COSTS: &str = "docs/firmware-cost.md";
 
 /// Builds every image and puts it where the tests find it: `target/firmware/BOARD/images`.
 pub(crate) fn build() -> Outcome {
-    apt_install(&["qemu-system-arm", "binutils-arm-none-eabi"])?;
+    apt_install(&["qemu-system-arm", "binutils-arm-none-eabi", "gcc-arm-none-eabi"])?;
     let toolchain = Toolchain::find()?;
     for (board, flags) in BOARDS {
-        let (mut command, built) =
-            toolchain.build(&format!("firmware/{board}"), &["--package", "hzn-mps2", "--features", board]);
-        command.current_dir(root().join("firmware"));
-        if !flags.is_empty() {
-            command.env("RUSTFLAGS", flags);
-        }
-        steps::run(&mut command)?;
+        let dir = format!("firmware/{board}");
+        let (mut command, built) = toolchain.cargo("build", &dir, &["--package", "hzn-mps2", "--features", board]);
+        steps::run(in_firmware(&mut command, flags))?;
         let images = images(board);
         fs::create_dir_all(&images)?;
         for image in IMAGES {
@@ -33,6 +34,36 @@ pub(crate) fn build() -> Outcome {
         }
     }
     Ok(())
+}
+
+/// What the tests of the images need is built; then the tests, the costs and the C interface.
+pub(crate) fn test(steps: &mut Steps) -> Outcome {
+    build()?;
+    built_with_the_tests()?;
+    // The whole workspace, so that nothing is built a second time with other features.
+    steps.cargo_test(&["--workspace", "--test", "firmware", "--", "--ignored"])?;
+    steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
+    c_interface()
+}
+
+/// `cargo xtask firmware [--write]`: the images, and what they cost.
+pub(crate) fn run(args: &[String]) -> Result<(), String> {
+    let go = || -> Outcome {
+        std::env::set_current_dir(root())?;
+        build()?;
+        let mut table = cargo(&["run", "--quiet", "--release", "--package", "hzn-tests", "--example", "firmware_cost"]);
+        let write: &[&str] = if args.iter().any(|a| a == "--write") { &["--write", COSTS] } else { &[] };
+        steps::run(table.arg("--").args(write))
+    };
+    go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
+}
+
+fn in_firmware<'a>(command: &'a mut Command, flags: &str) -> &'a mut Command {
+    command.current_dir(root().join("firmware"));
+    if !flags.is_empty() {
+        command.env("RUSTFLAGS", flags);
+    }
+    command
 }
 
 fn images(board: &str) -> PathBuf {
@@ -52,13 +83,64 @@ fn look_into(board: &str, image: &str) -> Outcome {
     steps::run(Command::new("arm-none-eabi-size").arg(&path))
 }
 
-/// `cargo xtask firmware`: the images, and what they cost.
-pub(crate) fn run(args: &[String]) -> Result<(), String> {
-    let go = || -> Outcome {
-        std::env::set_current_dir(root())?;
-        build()?;
-        let mut table = cargo(&["run", "--quiet", "--release", "--package", "hzn-tests", "--example", "firmware_cost"]);
-        steps::run(table.arg("--").args(args))
-    };
-    go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
+/// The C example on this machine and in QEMU: the same bits.
+fn c_interface() -> Outcome {
+    let toolchain = Toolchain::find()?;
+    let library = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
+    let (mut command, there) = toolchain.cargo("rustc", &format!("firmware/{M7}"), &library);
+    steps::run(in_firmware(&mut command, M7_FLAGS))?;
+    let here = target().join("firmware/host");
+    let mut command = cargo(&["rustc", "--release", "--target-dir"]);
+    steps::run(in_firmware(command.arg(&here).args(library), ""))?;
+
+    let c = root().join("firmware/hzn-c");
+    let (example, include) = (c.join("example"), format!("-I{}", c.join("include").display()));
+    let out = target().join("firmware/c");
+    fs::create_dir_all(&out)?;
+    let flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", &include];
+    steps::run(
+        Command::new("cc")
+            .args(flags)
+            .args([example.join("example.c"), example.join("host.c"), here.join("release/libhzn.a")])
+            .arg("-o")
+            .arg(out.join("host")),
+    )?;
+    steps::run(
+        Command::new("arm-none-eabi-gcc")
+            .args(flags)
+            .args([
+                "-mcpu=cortex-m7",
+                "-mfloat-abi=hard",
+                "-mfpu=fpv5-d16",
+                "-mthumb",
+                "-ffreestanding",
+                "-nostdlib",
+                "-Wl,-z,noexecstack",
+            ])
+            .arg(format!("-T{}", example.join("an500.ld").display()))
+            .args([example.join("example.c"), example.join("startup.c"), there.join("libhzn.a")])
+            .args(["-lgcc", "-o"])
+            .arg(out.join("an500")),
+    )?;
+    let host = said(&mut Command::new(out.join("host")))?;
+    let mut qemu = Command::new("timeout");
+    qemu.args(["60", "qemu-system-arm", "-M", "mps2-an500", "-display", "none", "-monitor", "none", "-serial", "null"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(out.join("an500"));
+    let emulated = said(&mut qemu)?;
+    println!("{host}");
+    if host != emulated {
+        return Err(Trouble::Failed(format!("the C example says something else in QEMU:\n{emulated}")));
+    }
+    Ok(())
+}
+
+/// What a program says, on either stream.
+fn said(command: &mut Command) -> Result<String, Trouble> {
+    steps::show(command);
+    let out = command.stdin(std::process::Stdio::null()).output()?;
+    let text = [out.stdout, out.stderr].concat();
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let program = Path::new(command.get_program()).display().to_string();
+    if out.status.success() { Ok(text) } else { Err(Trouble::Failed(format!("{program}: {}\n{text}", out.status))) }
 }

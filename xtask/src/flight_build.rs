@@ -46,14 +46,14 @@ impl Toolchain {
         Ok(Self::Debian)
     }
 
-    /// `cargo build --release` for the target, and where it builds to: under `dir` of the target folder.
-    pub(crate) fn build(self, dir: &str, args: &[&str]) -> (Command, PathBuf) {
+    /// `cargo build --release` (or `rustc`) for the target, and where it builds to: under `dir` of the target folder.
+    pub(crate) fn cargo(self, verb: &str, dir: &str, args: &[&str]) -> (Command, PathBuf) {
         let dir = target().join(dir);
         let mut command = match self {
-            Self::Own => cargo(&["build", "--release"]),
+            Self::Own => cargo(&[verb, "--release"]),
             Self::Debian => {
                 let mut command = Command::new("/usr/bin/cargo");
-                command.args(["build", "--release", "--locked", "-Zbuild-std=core"]);
+                command.args([verb, "--release", "--locked", "-Zbuild-std=core"]);
                 // RUSTC_BOOTSTRAP lets Debian's stable compiler build core from its own sources; flags and toolchain
                 // settings of the caller belong to another compiler.
                 command.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
@@ -68,7 +68,7 @@ impl Toolchain {
 
 /// Builds hzn-core without default features.
 pub(crate) fn run_step() -> Outcome {
-    run(&mut Toolchain::find()?.build("flight", &["--package", "hzn-core"]).0)
+    run(&mut Toolchain::find()?.cargo("build", "flight", &["--package", "hzn-core"]).0)
 }
 
 fn needs(trouble: Trouble) -> Trouble {

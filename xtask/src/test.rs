@@ -39,7 +39,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
         steps::run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
     });
     all.step("flight build", |_| flight_build::run_step());
-    all.step("firmware", |_| firmware::build());
+    all.step("firmware", firmware::test);
     all.step("demo", |_| demo());
     all.step("simulator rendered again", |_| simulator_rendered_again());
     all.step("files read by others", |_| files_read_by_others());
@@ -60,7 +60,7 @@ fn run_cargo(args: &[&str]) -> Outcome {
 
 /// Binaries and examples come out of the build of the tests. The same command again builds nothing a second time, as
 /// another selection of packages, with other features, would.
-fn built_with_the_tests() -> Outcome {
+pub(crate) fn built_with_the_tests() -> Outcome {
     run_cargo(&["test", "--workspace", "--no-run", "--quiet"])?;
     if target().join("debug/hzn").exists() {
         return Ok(());

@@ -508,20 +508,21 @@ struct Watch<'a> {
 }
 
 impl Observer<f32> for Watch<'_> {
-    fn edge(&self, candidate: u32, border: &[Pixel], stride: u32) {
+    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
         if !self.wanted {
             return;
         }
         let Ok(mut longest) = self.longest.try_borrow_mut() else { return };
-        let length = (border.len() as u32).saturating_mul(stride);
+        let (pixels, _) = border.size_hint();
+        let length = (pixels as u32).saturating_mul(stride);
         if length <= longest.length {
             return;
         }
-        let every = border.len().div_ceil(LISTED).max(1);
+        let every = pixels.div_ceil(LISTED).max(1);
         let list = &mut **longest;
         list.len = 0;
-        for (place, pixel) in list.pixels.iter_mut().zip(border.iter().step_by(every)) {
-            *place = *pixel;
+        for (place, pixel) in list.pixels.iter_mut().zip(border.step_by(every)) {
+            *place = pixel;
             list.len += 1;
         }
         (list.length, list.candidate, list.stride) = (length, candidate, stride.saturating_mul(every as u32));

@@ -30,12 +30,12 @@ static void print_floats(const char *name, const float *x, size_t n) {
     print("\n");
 }
 
-/* A bright body below a limb that bends through the picture, drawn with integers alone. */
+/* A bright body below a limb of the Earth seen from 400 km (y = 100 + x² cot(70.5°) / 2f), drawn with integers alone. */
 static void draw(void) {
     for (int y = 0; y < HEIGHT; y++) {
         for (int x = 0; x < WIDTH; x++) {
             int dx = x - WIDTH / 2;
-            int depth = 16 * (y - 100) - dx * dx / 72;
+            int depth = 16 * (y - 100) - dx * dx / 106;
             int v = 110 + 6 * depth;
             picture[y * WIDTH + x] = (uint8_t)(v < 10 ? 10 : v > 210 ? 210 : v);
         }
