@@ -113,7 +113,7 @@ impl Bench {
     fn run(&self, line: &[u8]) -> i32 {
         std::fs::write(self.path("line.bin"), line).unwrap();
         let sent = std::fs::File::create(self.path("sent.bin")).unwrap();
-        let mut command = self.board.qemu(&self.board.image("flight"));
+        let mut command = self.board.qemu(&self.board.image("flight"), 0);
         let mut child = command
             .args(["-serial", "stdio"])
             .current_dir(self.dir.path())

@@ -96,6 +96,8 @@ pub struct Flight<'a, B> {
 impl<'a, B: Board> Flight<'a, B> {
     /// Loads the parameters, checks itself, and waits in standby; in safe mode when a check fails. `None` cannot be: the
     /// defaults are valid, which a test holds.
+    // By itself, as are the other large functions: what one needs of the stack, the next one has again.
+    #[inline(never)]
     pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut FlightWorkspace) -> Option<Self> {
         let loaded = store::load(&mut board, &mut buffers.table);
         let sensor = Sensor::new(&loaded.parameters.sensor).ok()?;
@@ -208,6 +210,7 @@ impl<'a, B: Board> Flight<'a, B> {
     }
 
     /// Carries out the telecommand that has come in, if there is one.
+    #[inline(never)]
     fn command(&mut self) -> bool {
         // The packet is copied out of the inbox, as carrying it out may use every buffer.
         let mut user = [0; MAX_BYTES];
@@ -311,6 +314,7 @@ impl<'a, B: Board> Flight<'a, B> {
     }
 
     /// All or none.
+    #[inline(never)]
     fn set_parameters(&mut self, from: &mut Reader<'_>) -> Code {
         let Some(count) = from.u8() else { return Code::Arguments };
         let mut parameters = self.parameters();
@@ -346,6 +350,7 @@ impl<'a, B: Board> Flight<'a, B> {
         }
     }
 
+    #[inline(never)]
     fn read_parameters(&mut self, from: &mut Reader<'_>) -> Code {
         let Some(count) = from.u8() else { return Code::Arguments };
         if from.rest().len() != 2 * usize::from(count) || count > 96 {
@@ -379,6 +384,7 @@ impl<'a, B: Board> Flight<'a, B> {
         self.housekeeping();
     }
 
+    #[inline(never)]
     fn picture(&mut self, shot: Shot) {
         if shot.lost > 0 {
             self.state.lost = self.state.lost.saturating_add(shot.lost);

@@ -19,6 +19,7 @@ pub struct Loaded {
 }
 
 /// Reads both copies; `buffer` is used to read them.
+#[inline(never)]
 pub fn load(board: &mut impl Board, buffer: &mut [u8]) -> Loaded {
     let mut out = Loaded { parameters: Parameters::idle(), copy: 0, generation: 0, broken: [None; 2] };
     for (copy, broken) in (1u8..).zip(&mut out.broken) {
@@ -38,6 +39,7 @@ pub fn load(board: &mut impl Board, buffer: &mut [u8]) -> Loaded {
 ///
 /// # Errors
 /// The copy that was not kept.
+#[inline(never)]
 pub fn save(
     board: &mut impl Board,
     parameters: &Parameters,

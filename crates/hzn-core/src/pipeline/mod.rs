@@ -208,6 +208,8 @@ impl<T: Real> Sensor<T> {
     ///
     /// # Errors
     /// The first field out of its limits.
+    // Its workings, some kilobytes, are not to lie on the caller's stack.
+    #[inline(never)]
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
         let camera = Camera::try_new(&config.camera)?;
