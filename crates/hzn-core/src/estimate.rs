@@ -545,7 +545,7 @@ pub(crate) fn pass<T: Real>(
     let mut g = [[T::ZERO; LANES]; 3];
     let [mut weight, mut cost, mut nearby] = [[T::ZERO; LANES]; 3];
     let east_along = azimuth.map_or(T::ZERO, |a| a.east.dot(e));
-    for b in blocks.iter_mut().step_by(every) {
+    for b in blocks.iter_mut().step_by(every.max(1)) {
         let grad = b.gradient(e);
         let mut target = [c; LANES];
         if let Some(a) = azimuth {
