@@ -169,15 +169,19 @@ fn read(from: &mut Reader<'_>) -> Option<Measured> {
     let magic = from.u32()?;
     assert_eq!(magic.to_be_bytes(), *b"DONE");
     // Ticks of 40 ns, instructions of 1024 ns; reading the timer costs one.
-    let mut instructions = || Some(((u64::from(from.u32()?) * 40 + 512) / 1024).saturating_sub(1));
+    let instructions = |ticks: u64| ((ticks * 40 + 512) / 1024).saturating_sub(1);
     let mut calls = [0; 3];
     for n in &mut calls {
-        *n = instructions()?;
+        *n = instructions(from.u32()?.into());
     }
     let mut stages = [0; 8];
     for n in &mut stages {
-        *n = instructions()?;
+        *n = instructions(from.u64()?);
     }
+    // The timer wraps after 168 million instructions: stages, read in parts, tell how often it did.
+    const WRAP: u64 = (1 << 32) * 40 / 1024;
+    let sum: u64 = stages.iter().sum();
+    calls[2] += (sum.saturating_sub(calls[2]) + WRAP / 2) / WRAP * WRAP;
     let (stack_bytes, _) = (from.u32()?, from.u32()?);
     Some(Measured { answer: Answer::read(from)?, calls, stages, stack_bytes })
 }
