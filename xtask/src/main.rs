@@ -28,7 +28,6 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware> [OPTION]
   bench run [ARG]... `hzn run` on PNGs beside decoding them alone
   bench ransac [--runs N] samplers of outliers beside each other, on simulated edge points
   reproduce [STUDY]... measures again what docs/reproduction.md says, and writes it (see --help there)
-  firmware           builds the images for the flight computer and counts their instructions in QEMU";
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into docs/firmware-cost.md";
 
