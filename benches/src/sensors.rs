@@ -59,6 +59,8 @@ fn known<T: Real>(frame: &Picture) -> Frame<T> {
         position_m: frame.known.position_m.map(|p| p.map(T::of)),
         cam_to_ecef: None,
         attitude_sigma_rad: None,
+        sun: None,
+        level: None,
     }
 }
 

@@ -70,6 +70,8 @@ pub fn known<T: Real>(scene: &Scene) -> Frame<T> {
         position_m: (scene.body.kind == Kind::Earth).then(|| position_m.map(T::of)),
         cam_to_ecef: None,
         attitude_sigma_rad: None,
+        sun: None,
+        level: None,
     }
 }
 

@@ -44,7 +44,8 @@ pub fn cell(camera: &camera::Config, altitude_km: f64, noise: f64, open: f64) ->
     let mut sensor = Config::new(camera.clone());
     sensor.body = body::Config { altitude_sigma_km: 0.1, limb_height_sigma_km: HEIGHT_SIGMA_KM, ..sensor.body };
     // The rocket flight's limb, but in pixels that are three times as large: clouds shine through more of an edge.
-    sensor.covariance = covariance::Config { sigma_px: 0.15, correlation_px: 60.0, ..Default::default() };
+    sensor.covariance =
+        covariance::Config { sigma_px: 0.15, correlation_px: 60.0, bias_px: 0.25, ..Default::default() };
     let edge = (1.0 - open) * w;
     // Four pixels more in the mask than the vehicle covers, as its edge is blurred.
     let part = |grow: f64| [[-20.0, -20.0], [edge + grow, -20.0], [edge + grow, h + 20.0], [-20.0, h + 20.0]];
@@ -140,7 +141,7 @@ pub fn markdown() -> String {
 }
 
 /// A number to two significant digits, without an exponent; `–` where there is none.
-fn two_digits(x: f64) -> String {
+pub(crate) fn two_digits(x: f64) -> String {
     if !x.is_finite() {
         return "–".into();
     }

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Frame;
 use hzn_core::body::Kind;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
-use hzn_core::frames::Rotation;
+use hzn_core::frames::{Rotation, UnitVec3};
 use hzn_core::real::Real;
 
 use crate::nearest::nearest;
@@ -75,6 +75,8 @@ impl FrameData {
             position_m: self.position_km.map(|p| p.map(|km| T::of(km * 1e3))),
             cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::of))),
             attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::of(deg.to_radians())),
+            level: None,
+            sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::of))),
         }
     }
 }

@@ -23,6 +23,8 @@ pub enum Method {
     Fixed,
     /// `factor` times the sample's mean.
     Dynamic,
+    /// Halfway between the brightness on both sides of the limb in the picture before; `otsu` when that had no answer.
+    Track,
 }
 
 /// `[binarize]` of sensor.toml.
@@ -103,7 +105,7 @@ struct Histogram {
     shift: u32,
 }
 
-/// Finds the level.
+/// Finds the level. `last`: what the picture before says of it, for `track`.
 ///
 /// # Errors
 /// `too-dark`, `too-bright`, or `no-limb` when dark and lit differ by less than 3 % of full scale.
@@ -112,6 +114,7 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     region: &Region<T>,
     gate: &Gate,
     config: &Config,
+    last: Option<u16>,
     seed: u32,
     observer: &O,
 ) -> Result<Level<T>, Status> {
@@ -130,7 +133,8 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
             Method::Fixed if config.level < 1.0 => Some(T::of(config.level * f64::from(full))),
             Method::Fixed => Some(T::of(config.level)),
             Method::Dynamic => Some(mean * T::of(config.factor)),
-            Method::Otsu => sample.otsu::<T>(full).map(|l| l * T::of(config.scale)),
+            Method::Track if last.is_some() => last.map(|l| T::of_i32(i32::from(l))),
+            Method::Otsu | Method::Track => sample.otsu::<T>(full).map(|l| l * T::of(config.scale)),
         };
         let Some(level) = level else { continue };
         // A level of 0 would make everything lit.
@@ -225,7 +229,7 @@ mod tests {
 
     fn level(data: &[u16], bits: u8, gate: Gate, config: Config) -> Result<Level<f64>, Status> {
         let picture = Grey::try_new(data, Layout::packed(64, 64, 1, bits)).unwrap();
-        split(&picture, &Region::whole(64, 64), &gate, &config, 1, &Unobserved)
+        split(&picture, &Region::whole(64, 64), &gate, &config, None, 1, &Unobserved)
     }
 
     /// The upper part dark, the lower lit.

@@ -3,6 +3,7 @@
 use crate::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
 use crate::error::{ConfigError, Limit, above, between, require};
 use crate::frames::{Cam, Ecef, Rotation, UnitVec3};
+use crate::linalg::V3;
 use crate::real::Real;
 use crate::{binarize, covariance};
 
@@ -15,8 +16,11 @@ pub const AU_KM: f64 = 149_597_870.7;
 /// Mean distance of the Moon in kilometres.
 pub const MOON_DISTANCE_KM: f64 = 384_400.0;
 
-/// The part of the difference of an ellipsoid's half-angles that an axis fitted without an attitude is wrong by.
-const SHAPE_PART: f64 = 0.3;
+/// Most rows of a limb height by latitude.
+pub const MAX_LATITUDES: usize = 16;
+/// Places on one half of the limb at which a height by latitude is looked up.
+const PLACES: usize = 8;
+
 /// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude that comes without one: 5 degrees.
@@ -58,6 +62,15 @@ pub struct Config {
     pub limb_height_km: f64,
     /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts.
     pub limb_height_sigma_km: f64,
+    /// Limb height by latitude instead of `limb_height_km`: up to 16 rows of (geodetic latitude in degrees, height in
+    /// kilometres), latitudes rising, linear between them and constant beyond. For `earth` with a position; an attitude
+    /// is needed to make use of how the height varies along the limb, without one it widens the covariance.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "heapless::Vec::is_empty"))]
+    pub limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES>,
+    /// Whether the body is seen by sunlight, so that, where the direction to the Sun is known, only the limb that it
+    /// lights is limb. Left out: yes for `moon` and `sphere`.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub sunlit: Option<bool>,
     /// Its own level between dark and lit, where it differs from the sensor's: the Sun's is far above the Earth's.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub binarize: Option<binarize::Config>,
@@ -75,6 +88,8 @@ impl Default for Config {
             altitude_sigma_km: 0.5,
             limb_height_km: 10.0,
             limb_height_sigma_km: 2.0,
+            limb_height_by_latitude_km: heapless::Vec::new(),
+            sunlit: None,
             binarize: None,
             covariance: None,
         }
@@ -99,6 +114,20 @@ impl Config {
         between("body.altitude_sigma_km", self.altitude_sigma_km, 0.0, 1e6)?;
         between("body.limb_height_km", self.limb_height_km, -50.0, 500.0)?;
         between("body.limb_height_sigma_km", self.limb_height_sigma_km, 0.0, 1e4)?;
+        let rows = &self.limb_height_by_latitude_km;
+        let field = "body.limb_height_by_latitude_km";
+        for [latitude, height] in rows {
+            between(field, *latitude, -90.0, 90.0)?;
+            between(field, *height, -50.0, 500.0)?;
+        }
+        let rising = rows.windows(2).all(|w| matches!(w, [[a, _], [b, _]] if a < b));
+        require(rising, field, rows.len() as f64, Limit::Rule("latitudes must rise from row to row"))?;
+        require(
+            rows.is_empty() || self.kind == Kind::Earth,
+            field,
+            rows.len() as f64,
+            Limit::Rule("only body.kind = \"earth\" has latitudes"),
+        )?;
         self.binarize.map_or(Ok(()), |b| b.check())?;
         self.covariance.map_or(Ok(()), |c| c.check())
     }
@@ -113,9 +142,52 @@ impl Config {
         }
     }
 
+    /// Limb height in kilometres at a geodetic latitude in degrees.
+    fn limb_height_km(&self, latitude_deg: f64) -> f64 {
+        let rows = &self.limb_height_by_latitude_km;
+        let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return self.limb_height_km };
+        if latitude_deg <= first[0] {
+            return first[1];
+        }
+        for w in rows.windows(2) {
+            if let [[a, low], [b, high]] = w
+                && latitude_deg <= *b
+            {
+                return low + (high - low) * (latitude_deg - a) / (b - a);
+            }
+        }
+        last[1]
+    }
+
+    /// Mean height along the limb seen from a geodetic latitude, and the first and second harmonic of its azimuth from
+    /// north, kilometres. `sin` of the half-angle is the cosine of the limb's distance from the nadir on the ground.
+    fn limb_harmonics_km<T: Real>(&self, latitude_rad: T, sin: T) -> [T; 3] {
+        let (one, cos) = (T::one(), (T::one() - sin * sin).most(T::zero()).sqrt());
+        let (here, across) = latitude_rad.sin_cos();
+        let mut sums = [T::zero(); 3];
+        for k in 0..PLACES {
+            let azimuth = T::of((k as f64 + 0.5) * core::f64::consts::PI / PLACES as f64);
+            let (_, c) = azimuth.sin_cos();
+            let s = here * sin + across * cos * c;
+            let latitude = s.atan2((one - s * s).most(T::zero()).sqrt());
+            let height = T::of(self.limb_height_km(latitude.f64().to_degrees()));
+            sums = [
+                sums[0] + height,
+                sums[1] + height * c * T::of(2.0),
+                sums[2] + height * (c * c * T::of(4.0) - T::of(2.0)),
+            ];
+        }
+        sums.map(|s| s / T::of(PLACES as f64))
+    }
+
     /// Sun and Moon bloom or show phases: their apparent radius is no prior.
     pub fn half_angle_is_free(&self) -> bool {
         matches!(self.kind, Kind::Sun | Kind::Moon)
+    }
+
+    /// Whether only the limb that the Sun lights is limb, where its direction is known.
+    pub fn is_sunlit(&self) -> bool {
+        self.sunlit.unwrap_or(matches!(self.kind, Kind::Moon | Kind::Sphere))
     }
 }
 
@@ -128,6 +200,11 @@ pub struct Frame<T> {
     pub position_m: Option<[T; 3]>,
     /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction.
     pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// Level between dark and lit that the picture before asks for, in counts: its report's `next_level`, for
+    /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) remembers it itself.
+    pub level: Option<u16>,
+    /// Direction to the Sun in the camera.
+    pub sun: Option<UnitVec3<Cam, T>>,
     /// 1-sigma of that attitude about the axis in radians, 0 or more; 5 degrees when it is left out. It widens the
     /// covariance by what the ellipsoid's shape then leaves open; above 30 degrees the attitude is not used.
     pub attitude_sigma_rad: Option<T>,
@@ -176,8 +253,14 @@ pub struct Expected<T> {
     pub(crate) ellipsoid: Option<LimbCone<T>>,
     /// Prior attitude, camera to ECEF.
     pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
-    /// 1-sigma of that attitude about the axis, radians.
-    pub(crate) attitude_sigma_rad: T,
+    /// How the limb differs from the mean cone by azimuth about the axis: first and second harmonic of cos α, from north.
+    pub(crate) harmonics_cos: [T; 2],
+    /// 1-sigma amplitudes of what of this is not known to the fit, because the direction of north is not.
+    pub(crate) uneven_cos: [T; 2],
+    /// Level that the picture before asks for, counts.
+    pub(crate) level: Option<u16>,
+    /// Direction to the Sun in the camera, where only the limb that it lights is limb.
+    pub(crate) sun: Option<V3<T>>,
     /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
     pub(crate) radius_m: T,
     /// Limb height in metres and its sigma.
@@ -200,7 +283,8 @@ impl<T: Real> Expected<T> {
     /// sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
     pub(crate) fn new(body: &Config, frame: &Frame<T>) -> Result<Self, FrameError> {
         let km = T::of(1000.0);
-        let limb = T::of(body.limb_height_km) * km;
+        let mut limb = T::of(body.limb_height_km) * km;
+        let mut harmonics = [T::zero(); 2];
         let mut limb_sigma = T::of(body.limb_height_sigma_km) * km;
         let mut altitude_sigma = T::of(body.altitude_sigma_km) * km;
         let given = match frame.altitude_m {
@@ -219,9 +303,18 @@ impl<T: Real> Expected<T> {
         let mut ellipsoid = None;
         let (radius, altitude, sin) = match (body.kind, position) {
             (Kind::Earth, Some(p)) => {
-                let (a, b) = (T::of(WGS84_A_M) + limb, T::of(WGS84_B_M) + limb);
-                let cone = LimbCone::try_new(p, a, b).ok_or(FrameError::Position)?;
-                let (h, _) = geodetic(p, T::of(WGS84_A_M), T::of(WGS84_B_M));
+                let raised = |limb: T| {
+                    let (a, b) = (T::of(WGS84_A_M) + limb, T::of(WGS84_B_M) + limb);
+                    LimbCone::try_new(p, a, b).ok_or(FrameError::Position)
+                };
+                let mut cone = raised(limb)?;
+                let (h, latitude) = geodetic(p, T::of(WGS84_A_M), T::of(WGS84_B_M));
+                if !body.limb_height_by_latitude_km.is_empty() {
+                    let (sin, _) = cone.mean_half_angle_rad().sin_cos();
+                    let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
+                    (limb, harmonics) = (mean * km, [first * km, second * km]);
+                    cone = raised(limb)?;
+                }
                 if !(h > limb && h > T::zero()) {
                     return Err(FrameError::Position);
                 }
@@ -264,14 +357,29 @@ impl<T: Real> Expected<T> {
         // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
         let tan = sin / cos;
         let scale = tan / (radius + altitude);
+        let known = frame.cam_to_ecef.filter(|_| attitude_sigma < T::of(USELESS_ATTITUDE_RAD));
+        // A higher limb is a wider cone. Of the ellipsoid's own shape half the difference of its half-angles' cosines.
+        let harmonics_cos = harmonics.map(|h| -scale * h);
+        let own = ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
+            let (east, meridian) = cone.half_angles_rad();
+            (meridian.sin_cos().1 - east.sin_cos().1) * T::of(0.5)
+        });
+        let uneven = |k: f64, amplitude: T| match known {
+            // An attitude that is off by ψ leaves k ψ of the k-th harmonic.
+            Some(_) => amplitude.abs() * (attitude_sigma * T::of(k)).least(T::one()),
+            None => amplitude.abs(),
+        };
         let variance = limb_sigma * limb_sigma + sin * sin * altitude_sigma * altitude_sigma;
         Ok(Self {
             cos,
             sin,
             sigma_cos: scale * variance.sqrt(),
             ellipsoid,
-            cam_to_ecef: frame.cam_to_ecef.filter(|_| attitude_sigma < T::of(USELESS_ATTITUDE_RAD)),
-            attitude_sigma_rad: attitude_sigma,
+            cam_to_ecef: known,
+            harmonics_cos,
+            uneven_cos: [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1])],
+            level: frame.level,
+            sun: frame.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             radius_m: radius,
             limb_m: limb,
             limb_sigma_m: limb_sigma,
@@ -296,20 +404,6 @@ impl<T: Real> Expected<T> {
         Some((distance - self.radius_m, variance.sqrt()))
     }
 
-    /// 1-sigma in radians of what the ellipsoid's orientation leaves open in the axis. With a position but without an
-    /// attitude the limb is fitted by its mean cone, which errs by a part of the difference of the two half-angles,
-    /// measured over latitudes and azimuths of short arcs. With an attitude the error grows in proportion to that of the
-    /// attitude, until it is that of none.
-    pub(crate) fn shape_sigma_rad(&self) -> T {
-        let Some(cone) = &self.ellipsoid else { return T::ZERO };
-        let (east, meridian) = cone.half_angles_rad();
-        let unknown = (east - meridian).abs() * T::of(SHAPE_PART);
-        match self.cam_to_ecef {
-            Some(_) => unknown * self.attitude_sigma_rad * T::of(1.0 / USELESS_ATTITUDE_RAD),
-            None => unknown,
-        }
-    }
-
     /// The axis in ECEF, when the position is known.
     pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
         self.ellipsoid.as_ref().map(|c| c.axis)
@@ -330,18 +424,43 @@ mod tests {
         };
         let sigma = |deg: f64| {
             let frame = Frame { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
-            Expected::<f64>::new(&body, &frame).unwrap().shape_sigma_rad()
+            Expected::<f64>::new(&body, &frame).unwrap().uneven_cos[1]
         };
-        let none = Expected::new(&body, &Frame { cam_to_ecef: None, ..frame }).unwrap().shape_sigma_rad();
+        let [_, none] = Expected::new(&body, &Frame { cam_to_ecef: None, ..frame }).unwrap().uneven_cos;
         assert!(none > 1e-5);
         assert_eq!(sigma(0.0), 0.0);
-        assert!((sigma(10.0) / none - 1.0 / 3.0).abs() < 1e-12);
+        assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);
         // No better than none, and then it is not used.
         assert_eq!(sigma(40.0), none);
-        assert_eq!(Expected::new(&body, &frame).unwrap().shape_sigma_rad(), sigma(5.0));
+        assert_eq!(Expected::new(&body, &frame).unwrap().uneven_cos[1], sigma(5.0));
         for deg in [f64::NAN, -1.0, f64::INFINITY] {
             let frame = Frame { attitude_sigma_rad: Some(deg), ..frame };
             assert_eq!(Expected::new(&body, &frame).unwrap_err(), FrameError::AttitudeSigma);
         }
+    }
+
+    #[test]
+    fn heights_by_latitude_become_a_mean_and_harmonics() {
+        let rows = [[-90.0, 20.0], [0.0, 25.0], [90.0, 40.0]];
+        let body = Config { limb_height_by_latitude_km: rows.into_iter().collect(), ..Config::default() };
+        assert_eq!(body.check(), Ok(()));
+        for (latitude, height) in [(-90.0, 20.0), (-45.0, 22.5), (0.0, 25.0), (45.0, 32.5), (90.0, 40.0)] {
+            assert_eq!(body.limb_height_km(latitude), height);
+        }
+        // Where the height is linear in latitude, the limb to the north is as much higher as that to the south is lower.
+        let sin = 66f64.to_radians().sin();
+        let [mean, first, second] = body.limb_harmonics_km(45f64.to_radians(), sin);
+        assert!(
+            (mean - 32.2).abs() < 0.4 && (first - 24.0 / 6.0).abs() < 0.3 && second.abs() < 0.4,
+            "{mean} {first} {second}"
+        );
+        let wrong = |rows: &[[f64; 2]], kind| {
+            Config { limb_height_by_latitude_km: rows.iter().copied().collect(), kind, ..Config::default() }
+                .check()
+                .is_err()
+        };
+        assert!(wrong(&[[10.0, 5.0], [10.0, 6.0]], Kind::Earth));
+        assert!(wrong(&[[91.0, 5.0]], Kind::Earth) && wrong(&[[0.0, 900.0]], Kind::Earth));
+        assert!(wrong(&[[0.0, 5.0]], Kind::EarthSphere));
     }
 }

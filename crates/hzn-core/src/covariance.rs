@@ -10,6 +10,7 @@
 pub(crate) mod braun_barf;
 #[cfg(feature = "zju")]
 mod elliptic;
+mod uneven;
 
 use crate::block::{Block, LANES, exp_neg, sum};
 use crate::body::Expected;
@@ -39,6 +40,9 @@ pub struct Config {
     pub method: Method,
     /// 1-sigma of an edge point in pixels, above 0.
     pub sigma_px: f64,
+    /// 1-sigma in pixels of what shifts every point of an edge alike, 0 or more: level, blur, and the limb's profile where
+    /// it is no wider than a pixel. It counts against the expected half-angle.
+    pub bias_px: f64,
     /// Length along the edge over which errors stay alike, in pixels; 0 for white errors.
     pub correlation_px: f64,
     /// For `braun-barf`: the largest variance in every direction (Braun & Barf 2022, (37)). Too careful by far.
@@ -51,6 +55,7 @@ impl Default for Config {
         Self {
             method: Method::Sandwich,
             sigma_px: 1.0,
+            bias_px: 0.0,
             correlation_px: 300.0,
             #[cfg(feature = "dlr")]
             overbound: false,
@@ -62,6 +67,7 @@ impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         above("covariance.sigma_px", self.sigma_px, 0.0)?;
         between("covariance.sigma_px", self.sigma_px, 0.0, 1e4)?;
+        between("covariance.bias_px", self.bias_px, 0.0, 1e4)?;
         between("covariance.correlation_px", self.correlation_px, 0.0, 1e6)
     }
 }
@@ -104,7 +110,10 @@ pub(crate) fn fuse<T: Real>(
         let p = elliptic::covariance(blocks, quadric, length_px) * variance;
         return fused(fit, &p, expected, estimate);
     }
+    let is_uneven = expected.uneven_cos.iter().any(|a| *a > T::ZERO);
     let x = correlated(blocks, &fit.e, &b1, &b2, mean, length_px);
+    // All points shifted alike are another half-angle: by the mean of |g| a pixel.
+    let var_bias = T::of(config.bias_px * config.bias_px) * sums.weight / sums.n[5].most(T::of(1e-20));
     let var_c = expected.sigma_cos * expected.sigma_cos;
     if !fit.free {
         // Half-angle held at the expected one: what it is wrong by, the axis is wrong by in proportion.
@@ -113,11 +122,20 @@ pub(crate) fn fuse<T: Real>(
         // Σ w Bᵀs · 1: the right-hand side of δe for δc = 1.
         let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);
         let (d1, d2) = (n[0] * k1 + n[1] * k2, n[1] * k1 + n[2] * k2);
-        let var_c = if estimate.half_angle == estimate::HalfAngle::Known { T::ZERO } else { var_c };
-        let p = [p[0] + d1 * d1 * var_c, p[1] + d1 * d2 * var_c, p[2] + d2 * d2 * var_c];
+        let var_c = if estimate.half_angle == estimate::HalfAngle::Known { T::ZERO } else { var_c } + var_bias;
+        let mut p = [p[0] + d1 * d1 * var_c, p[1] + d1 * d2 * var_c, p[2] + d2 * d2 * var_c];
+        if is_uneven {
+            let more = uneven::known(blocks, fit, &expected.uneven_cos)?;
+            p = [p[0] + more[0], p[1] + more[1], p[2] + more[2]];
+        }
         return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: None, chi2: T::ZERO });
     }
-    fused(fit, &sandwich_free(sums, &x, mean, variance)?, expected, estimate)
+    let mut p = sandwich_free(sums, &x, mean, variance)?;
+    p.m33 += var_bias;
+    if is_uneven {
+        p += uneven::free(blocks, fit, &expected.uneven_cos)?;
+    }
+    fused(fit, &p, expected, estimate)
 }
 
 /// A fit with its half-angle free and the covariance of (δ₁₂, δc) fused with the expected half-angle, unless that is to

@@ -1,6 +1,7 @@
 //! Gauss-Newton on the sphere: the cone s·e = cos α through the edge points.
 //!
-//! State: the unit axis e and c = cos α. For each point r = c − s·e is the residual, g = ∂(s·e)/∂(u, v), and |r|/|g|
+//! State: the unit axis e and k = 1 − cos α, which keeps its digits for a small disc where cos α does not; for the same
+//! reason 1 − s·e is formed as |s − e|²/2. In what follows c = cos α. For each point r = c − s·e is the residual, g = ∂(s·e)/∂(u, v), and |r|/|g|
 //! the distance from the limb in pixels, so w = 1/|g|² weighs by pixels. With h = [Bᵀs − m, −1], B the tangent basis
 //! at e and m the mean of Bᵀs, a step solves (Σ w h hᵀ) δ = Σ w r h. Subtracting the means keeps the sums
 //! well-conditioned in single precision; the third unknown then is δc' = δc − m·δ₁₂.
@@ -96,6 +97,8 @@ pub(crate) struct Fit<T> {
     pub(crate) e: V3<T>,
     /// cos of the (mean) half-angle.
     pub(crate) c: T,
+    /// 1 − cos of it, to its own digits.
+    pub(crate) k: T,
     /// The half-angle was fitted too; otherwise it is the expected one.
     pub(crate) free: bool,
     /// Weighted RMS distance of the points from the limb in pixels.
@@ -126,8 +129,11 @@ const SETTLE: usize = 5;
 /// The correction by azimuth of an ellipsoid seen with a known attitude.
 pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
     let cone = expected.ellipsoid.as_ref()?;
-    let east = expected.cam_to_ecef?.inverse().apply(&cone.east);
+    let to_cam = expected.cam_to_ecef?.inverse();
+    let (east, axis) = (to_cam.apply(&cone.east), to_cam.apply(&cone.axis));
     Some(Azimuth {
+        north: east.v().cross(axis.v()),
+        harmonics_cos: expected.harmonics_cos,
         east: *east.v(),
         cot2_east: cone.cot2_east,
         cot2_meridian: cone.cot2_meridian,
@@ -174,7 +180,8 @@ pub(crate) fn fit<T: Real>(
     let Cone { at, mean, sums, free, .. } = cone;
     Some(Fit {
         e: at.e,
-        c: at.c,
+        c: at.c(),
+        k: at.k,
         free,
         rms_px: (sums.cost / sums.weight).sqrt(),
         inliers,
@@ -216,7 +223,7 @@ fn sphere<T: Real>(
         Some(settled) => (settled, true),
         // Sun and Moon have no other half-angle to fall back on.
         None if expected.free => return None,
-        None => (settle(blocks, State { c: expected.cos, ..robust }, None, false, azimuth)?, false),
+        None => (settle(blocks, State { k: T::one() - expected.cos, ..robust }, None, false, azimuth)?, false),
     };
     Some(Cone {
         at,
@@ -258,10 +265,10 @@ fn held<T: Real>(
     }
     let (b1, b2) = basis(&e);
     let mean = means(blocks, &b1, &b2);
-    let sums = pass(blocks, &e, &b1, &b2, c, mean, &Weights::Kept, None);
+    let sums = pass(blocks, &e, &b1, &b2, T::one() - c, mean, &Weights::Kept, None);
     // NaN is refused with the rest.
     (sums.weight > T::of(2.5) && sums.cost >= T::ZERO).then_some(Cone {
-        at: State { e, c, mean, nearby: 0 },
+        at: State { e, k: T::one() - c, mean, nearby: 0 },
         mean,
         sums,
         free: true,
@@ -297,17 +304,26 @@ fn elliptic<T: Real>(
 #[derive(Clone, Copy)]
 struct State<T> {
     e: V3<T>,
-    c: T,
+    /// 1 − cos of the half-angle.
+    k: T,
     /// Means of Bᵀs.
     mean: [T; 2],
     nearby: u32,
 }
 
 impl<T: Real> State<T> {
+    /// cos of the half-angle.
+    fn c(&self) -> T {
+        T::one() - self.k
+    }
+    /// Its sine.
+    fn sin(&self) -> T {
+        (self.k * (T::one() + self.c())).most(T::ZERO).sqrt()
+    }
     /// Takes the step and gives its size in radians; `None` when it leads nowhere.
     fn step(&mut self, b1: &V3<T>, b2: &V3<T>, ([d1, d2], dc): ([T; 2], T), sums: &Sums<T>) -> Option<T> {
         self.e = unit(&(self.e + b1 * d1 + b2 * d2))?;
-        self.c += dc;
+        self.k -= dc;
         self.mean = sums.means(self.mean);
         Some(d1.abs() + d2.abs() + dc.abs())
     }
@@ -330,36 +346,36 @@ fn robust<T: Real>(
     let prior = Prior::new(blocks, expected, config, noise);
     let e = unit(&start.e)?;
     let (b1, b2) = basis(&e);
-    let c = if known { expected.cos } else { start.c };
-    let mut at = State { e, c, mean: means(blocks, &b1, &b2), nearby: 0 };
+    let k = T::one() - if known { expected.cos } else { start.c };
+    let mut at = State { e, k, mean: means(blocks, &b1, &b2), nearby: 0 };
     // A part of the points brings the cone near; all of them make the end.
     let mut every = blocks.len().div_ceil(PART).max(1);
     for _ in 0..ROBUST {
         let (b1, b2) = basis(&at.e);
         let weights = Weights::Tukey { cutoff2: cutoff * cutoff, every };
-        let sums = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, &weights, azimuth);
-        let free = if known { None } else { sums.step(at.mean, prior.as_ref(), at.c) };
+        let sums = pass(blocks, &at.e, &b1, &b2, at.k, at.mean, &weights, azimuth);
+        let free = if known { None } else { sums.step(at.mean, prior.as_ref(), at.c()) };
         let step = match free {
             Some(step) => step,
             None => sums.step_known(at.mean)?,
         };
         let size = at.step(&b1, &b2, step, &sums)?;
-        at.c = clamp(at.c);
+        at.k = clamp(at.k);
         let spread = (sums.cost / sums.weight.most(T::of(1e-20))).sqrt() * T::of(1.2);
         let next = (spread * T::of(TUKEY)).most(narrowest).least(widest);
-        let settled = (next - cutoff).abs() < cutoff * T::of(0.05) && size < T::of(1e-4);
+        let settled = (next - cutoff).abs() < cutoff * T::of(0.05) && size < T::of(1e-4) * at.sin();
         cutoff = next;
         // The last digits come with the weights kept.
         if settled && every == 1 {
             break;
         }
-        if settled || size < T::of(1e-3) {
+        if settled || size < T::of(1e-3) * at.sin() {
             every = 1;
         }
     }
     let (b1, b2) = basis(&at.e);
     let weights = Weights::Last { cutoff2: cutoff * cutoff };
-    let last = pass(blocks, &at.e, &b1, &b2, at.c, at.mean, &weights, azimuth);
+    let last = pass(blocks, &at.e, &b1, &b2, at.k, at.mean, &weights, azimuth);
     at.nearby = last.nearby.to_i32() as u32;
     (last.weight > T::of(3.0)).then_some((at, last))
 }
@@ -380,26 +396,26 @@ fn settle<T: Real>(
         let (b1, b2) = basis(&at.e);
         let mean = at.mean;
         let known = first.take();
-        let mut sums = known.unwrap_or_else(|| pass(blocks, &at.e, &b1, &b2, at.c, mean, &Weights::Kept, azimuth));
-        let step = if free { sums.step(mean, None, at.c)? } else { sums.step_known(mean)? };
+        let mut sums = known.unwrap_or_else(|| pass(blocks, &at.e, &b1, &b2, at.k, mean, &Weights::Kept, azimuth));
+        let step = if free { sums.step(mean, None, at.c())? } else { sums.step_known(mean)? };
         sums.cost = (sums.cost - sums.gain(mean, step)).most(T::ZERO);
         let size = at.step(&b1, &b2, step, &sums)?;
         // 20° from the robust solution is another cone.
-        if !(at.c.abs() < T::one()) || at.e.dot(&start.e) < T::of(0.94) {
+        if !(at.k > T::ZERO && at.k < T::of(2.0)) || at.e.dot(&start.e) < T::of(0.94) {
             return None;
         }
         end = Some((at, mean, sums));
         // Convergence is quadratic: after a step this small nothing is left, and the sums are those of the end.
-        if size * size < T::EPSILON * T::of(0.1) {
+        if size * size < T::EPSILON * T::of(0.1) * at.sin() {
             break;
         }
     }
     end
 }
 
-fn clamp<T: Real>(c: T) -> T {
-    let end = T::one() - T::of(1e-6);
-    c.least(end).most(-end)
+/// 1 − cos within its ends.
+fn clamp<T: Real>(k: T) -> T {
+    k.most(T::of(1e-9)).least(T::of(2.0 - 1e-6))
 }
 
 /// The expected half-angle as a row of the normal equations.
@@ -525,13 +541,13 @@ pub(crate) enum Weights<T> {
     Last { cutoff2: T },
 }
 
-/// One pass: sums at (e, c), about `mean`.
+/// One pass: sums at (e, k), about `mean`.
 pub(crate) fn pass<T: Real>(
     blocks: &mut [Block<T>],
     e: &V3<T>,
     b1: &V3<T>,
     b2: &V3<T>,
-    c: T,
+    k: T,
     mean: [T; 2],
     weights: &Weights<T>,
     azimuth: Option<&Azimuth<T>>,
@@ -544,10 +560,11 @@ pub(crate) fn pass<T: Real>(
     let mut n = [[T::ZERO; LANES]; 6];
     let mut g = [[T::ZERO; LANES]; 3];
     let [mut weight, mut cost, mut nearby] = [[T::ZERO; LANES]; 3];
+    let half = T::of(0.5);
     let east_along = azimuth.map_or(T::ZERO, |a| a.east.dot(e));
     for b in blocks.iter_mut().step_by(every.max(1)) {
         let grad = b.gradient(e);
-        let mut target = [c; LANES];
+        let mut target = [-k; LANES];
         if let Some(a) = azimuth {
             for l in 0..LANES {
                 let s = [b.s[0][l], b.s[1][l], b.s[2][l]];
@@ -557,8 +574,8 @@ pub(crate) fn pass<T: Real>(
         }
         let [mut robust, mut parts] = [[T::ZERO; LANES]; 2];
         for l in 0..LANES {
-            let (x, y, z) = (b.s[0][l], b.s[1][l], b.s[2][l]);
-            let r = target[l] - (x * e.x + y * e.y + z * e.z);
+            let (x, y, z) = (b.s[0][l] - e.x, b.s[1][l] - e.y, b.s[2][l] - e.z);
+            let r = target[l] + (x * x + y * y + z * z) * half;
             let g2 = (grad[0][l] * grad[0][l] + grad[1][l] * grad[1][l]).most(T::of(1e-20));
             let per = T::one() / g2;
             let d2 = r * r * per;

@@ -49,6 +49,9 @@ pub(crate) struct Azimuth<T> {
     pub(crate) cot2_meridian: T,
     /// cos of the mean half-angle.
     pub(crate) mean_cos: T,
+    pub(crate) north: V3<T>,
+    /// First and second harmonic of cos α about the axis, from north, on top: a limb height that varies with latitude.
+    pub(crate) harmonics_cos: [T; 2],
 }
 
 impl<T: Real> Azimuth<T> {
@@ -61,7 +64,14 @@ impl<T: Real> Azimuth<T> {
         let along = s[0] * self.east.x + s[1] * self.east.y + s[2] * self.east.z - d * east_along;
         let cos2 = (along * along / transverse).least(one);
         let cot2 = self.cot2_meridian + (self.cot2_east - self.cot2_meridian) * cos2;
-        (cot2 / (one + cot2)).sqrt() - self.mean_cos
+        let [first, second] = self.harmonics_cos;
+        let mut height = second * (one - cos2 - cos2);
+        if first != T::ZERO {
+            // That north may lie some degrees off the tangent plane makes a small part of a small term.
+            let along = s[0] * self.north.x + s[1] * self.north.y + s[2] * self.north.z;
+            height += first * along / transverse.sqrt();
+        }
+        (cot2 / (one + cot2)).sqrt() - self.mean_cos + height
     }
 }
 

@@ -119,12 +119,19 @@ pub(crate) fn keep<T: Real>(
     for block in blocks {
         let g = block.gradient(&best.e);
         for lane in 0..LANES {
-            if !block.faces_along(lane, [g[0][lane], g[1][lane]]) {
+            let lit = || is_lit(&block.ray(lane), &best.e, best.c, expected);
+            if !(block.faces_along(lane, [g[0][lane], g[1][lane]]) && lit()) {
                 block.weight[lane] = T::ZERO;
             }
         }
     }
     Some(best)
+}
+
+/// Whether the Sun lights the body where the ray touches it; yes, where its direction is unknown. The normal there is
+/// (s cos α − e)/sin α.
+fn is_lit<T: Real>(s: &V3<T>, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
+    expected.sun.as_ref().is_none_or(|sun| s.dot(sun) * c - e.dot(sun) > T::ZERO)
 }
 
 fn ray<T: Real>(blocks: &[Block<T>], i: u32) -> Option<V3<T>> {
@@ -173,7 +180,12 @@ fn search<T: Real>(
             [Some((e, expected.cos)), Some((f, expected.cos))]
         };
         for (e, c) in hypotheses.into_iter().flatten() {
-            let faces = |i: u32| blocks.get(i as usize / LANES).is_some_and(|b| b.faces(i as usize % LANES, &e));
+            let faces = |i: u32| {
+                let lane = i as usize % LANES;
+                blocks
+                    .get(i as usize / LANES)
+                    .is_some_and(|b| b.faces(lane, &e) && is_lit(&b.ray(lane), &e, c, expected))
+            };
             if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {
                 continue;
             }

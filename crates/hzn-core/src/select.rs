@@ -245,6 +245,36 @@ fn lit_beyond<T: Real, P: Pixels, O: Observer<T>>(
     T::of_i32(lit) / T::of_i32(looks.max(1))
 }
 
+/// Distance from the limb at which the brightness on both sides is read for the next picture's level, pixels.
+const PLATEAU_PX: f64 = 6.0;
+
+/// Halfway between the brightness on both sides of the limb, in counts.
+pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
+    e: &V3<T>,
+    blocks: &[Block<T>],
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+) -> Option<u16> {
+    let (mut dark, mut lit, mut looks) = (0u32, 0u32, 0u32);
+    for (block, lane) in inliers(blocks, LOOKS) {
+        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
+        let [gu, gv] = block.gradient_at(lane, e);
+        let norm = (gu * gu + gv * gv).sqrt().most(T::of(1e-20));
+        let at = |px: f64| {
+            let (x, y) = ((from.u + gu / norm * T::of(px)).to_i32(), (from.v + gv / norm * T::of(px)).to_i32());
+            let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
+            (scene.region.contains(x, y) && !scene.region.masked(x, y)).then(|| {
+                scene.observer.pixel(x, y);
+                u32::from(scene.picture.at(x, y))
+            })
+        };
+        if let (Some(d), Some(l)) = (at(-PLATEAU_PX), at(PLATEAU_PX)) {
+            (dark, lit, looks) = (dark + d, lit + l, looks + 1);
+        }
+    }
+    (lit > dark).then(|| ((dark + lit) / (2 * looks.max(1))) as u16)
+}
+
 /// Most steps along the limb to each side.
 const STEPS: usize = 48;
 

@@ -2,9 +2,10 @@
 
 use hzn_core::body::{Frame, Kind};
 use hzn_core::camera::{self, Model};
+use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
 use hzn_core::status::Status;
-use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Report};
+use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Preset, Report};
 use proptest::prelude::*;
 
 fn config(model: Model, circle: bool, mask: bool, kind: Kind) -> Config {
@@ -85,6 +86,32 @@ proptest! {
             prop_assert!(s.axis.xyz().iter().all(|v| v.is_finite()));
             prop_assert!(s.covariance.upper_rad2.iter().all(|v| v.is_finite()));
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn every_preset_answers_any_picture_soundly(
+        kind in 0u8..10, seed in any::<u64>(), level in any::<u8>(), preset in 0..Preset::ALL.len(), wide: bool,
+        sun in proptest::option::of([-1.0..1.0f64, -1.0..1.0, -1.0..1.0]),
+    ) {
+        let model = if wide { Model::Equidistant } else { Model::Pinhole };
+        let mut config = Config::preset(Preset::ALL[preset], camera::Config::ideal(model, 96, 64, 60.0));
+        config.body.altitude_km = Some(300.0);
+        config.candidates.min_points = 8;
+        config.select.min_inliers = 8;
+        config.select.max_rms_px = 1e6;
+        let data = garbage(kind, seed, level);
+        let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
+        let mut host = HostHorizon::boxed(&config).unwrap();
+        let frame = Frame { sun: sun.and_then(UnitVec3::try_new), ..Frame::default() };
+        let expected = host.expect(&frame).unwrap();
+        sound(&host.process(&picture, &expected));
+        // The same body thrice: what is taken is not given again.
+        let reports = host.process_each(&picture, &[expected; 3]);
+        prop_assert_eq!(reports.len(), 3);
+        reports.iter().for_each(sound);
     }
 }
 

@@ -180,6 +180,8 @@ impl Answer {
             status: *Status::ALL.get(usize::from(self.status))?,
             stage: *Stage::ALL.get(usize::from(self.stage))?,
             level: self.level,
+            // Of the frame that came down; the next one has been taken long since.
+            next_level: None,
             counters: Counters {
                 followed: self.followed,
                 candidates: self.candidates,

@@ -304,6 +304,7 @@ mod tests {
             status,
             stage: Stage::Select,
             level: 80,
+            next_level: None,
             counters: Counters { edge_points: 600, candidates: 2, ..Counters::default() },
             candidates: Default::default(),
             solution: Some(solution),

@@ -111,6 +111,8 @@ impl FlightFrame {
             position_m: Some(self.scene.pose.position_m),
             cam_to_ecef: None,
             attitude_sigma_rad: None,
+            sun: None,
+            level: None,
         }
     }
     /// As [`FlightFrame::known`], with an attitude that is wrong by `sigma_rad` (1-sigma, about each axis).

@@ -96,10 +96,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     let path = args.output.as_deref();
     let trace = Output::wants_trace(path);
+    // One after another, where a picture's level comes from the one before.
+    let threads = if sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
     let plan = Plan {
         config: sensor.config,
         flight: args.sensor.flight,
-        threads: args.jobs.map_or_else(cores, usize::from),
+        threads,
         frames,
         fps: args.source.fps,
         trace,
@@ -178,6 +180,10 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
     if item.name != there.file {
         let what = format!("its last frame is {}, but the input has {} in that place", there.file, item.name);
         return other(format!("{what}; give the input that it was begun with"));
+    }
+    if plan.config.tracks() {
+        // It would come out differently without the pictures before it.
+        return Ok(());
     }
     let here = engine::one(&Plan { overlay: None, ..plan.clone() }, there.index, item)?;
     let Some(here) = output::rows(&here, &plan.config).pop() else { return Ok(()) };

@@ -153,6 +153,7 @@ fn widen<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
         status: r.status,
         stage: r.stage,
         level: r.level,
+        next_level: r.next_level,
         counters: r.counters,
         candidates: r.candidates.iter().map(widen_candidate).collect(),
         solution: r.solution.as_ref().and_then(widen_solution),

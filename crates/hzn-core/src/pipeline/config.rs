@@ -106,6 +106,11 @@ impl Config {
     pub fn each_body(&self) -> &[body::Config] {
         if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
     }
+    /// Whether a body's level comes from the picture before, so that pictures must come in order.
+    pub fn tracks(&self) -> bool {
+        let method = |b: &body::Config| b.binarize.unwrap_or(self.binarize).method;
+        self.each_body().iter().any(|b| method(b) == binarize::Method::Track)
+    }
     /// As [`Self::each_body`], to be changed.
     pub fn each_body_mut(&mut self) -> &mut [body::Config] {
         if self.bodies.is_empty() { core::slice::from_mut(&mut self.body) } else { &mut self.bodies }

@@ -332,7 +332,7 @@ fn sandwich<T: Real>(tolerance: f64) {
         let (b1, b2) = basis(e.v());
         let c = T::of(num(&case["cos_alpha"]));
         let mean = estimate::means(&blocks, &b1, &b2);
-        let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, c, mean, &estimate::Weights::Kept, None);
+        let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, T::one() - c, mean, &estimate::Weights::Kept, None);
         let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::of(num(&case["L_px"])));
         let variance = T::of(num(&case["R_px2"]));
         let known = covariance::sandwich_known(&sums, &x, mean, variance).unwrap();
@@ -461,7 +461,7 @@ fn bound_deg(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, altitude_m: f64, sigm
     let c = libm::sqrt(1.0 - sin * sin);
     let mut blocks = blocks(camera, &limb(camera, e, c, 3.0), e);
     let (b1, b2) = basis(e.v());
-    let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, c, [0.0; 2], &estimate::Weights::Kept, None);
+    let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, 1.0 - c, [0.0; 2], &estimate::Weights::Kept, None);
     let [a, _, d] = invert_spd2(sums.known([0.0; 2])).unwrap();
     (libm::sqrt(a + d) * sigma_px).to_degrees()
 }

@@ -54,6 +54,8 @@ pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 pub struct Horizon<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
     sensor: Sensor<T>,
     workspace: Workspace<T, POINTS, BLOCKS, WORDS>,
+    /// Levels that the last picture asks for, by body.
+    levels: [Option<u16>; MAX_BODIES],
 }
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Horizon<T, POINTS, BLOCKS, WORDS> {
@@ -62,7 +64,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     /// # Errors
     /// The first field out of its limits.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
-        Ok(Self { sensor: Sensor::new(config)?, workspace: Workspace::new() })
+        Ok(Self { sensor: Sensor::new(config)?, workspace: Workspace::new(), levels: [None; MAX_BODIES] })
     }
     /// As [`Self::new`], in a box, without the sensor ever standing on the caller's stack: the host's is larger than what
     /// a thread has left at times.
@@ -88,6 +90,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     /// The first field out of its limits.
     pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
         self.sensor = Sensor::new(config)?;
+        self.levels = [None; MAX_BODIES];
         Ok(())
     }
     /// The configuration.
@@ -128,7 +131,10 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         expected: &Expected<T>,
         observer: &O,
     ) -> Report<T> {
-        self.sensor.process(&mut self.workspace, picture, expected, observer)
+        let expected = self.remembered(expected);
+        let report = self.sensor.process(&mut self.workspace, picture, &expected, observer);
+        self.remember(&expected, &report);
+        report
     }
     /// As [`Sensor::process_each`].
     pub fn process_each<P: Pixels>(&mut self, picture: &P, expected: &[Expected<T>]) -> Reports<T> {
@@ -141,7 +147,23 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         expected: &[Expected<T>],
         observer: &O,
     ) -> Reports<T> {
-        self.sensor.process_each(&mut self.workspace, picture, expected, observer)
+        let known: heapless::Vec<Expected<T>, MAX_BODIES> =
+            expected.iter().take(MAX_BODIES).map(|e| self.remembered(e)).collect();
+        let reports = self.sensor.process_each(&mut self.workspace, picture, &known, observer);
+        for (expected, report) in known.iter().zip(&reports) {
+            self.remember(expected, report);
+        }
+        reports
+    }
+    /// With the level that the last picture asks for, where none is given.
+    fn remembered(&self, expected: &Expected<T>) -> Expected<T> {
+        let last = self.levels.get(usize::from(expected.which)).copied().flatten();
+        Expected { level: expected.level.or(last), ..*expected }
+    }
+    fn remember(&mut self, expected: &Expected<T>, report: &Report<T>) {
+        if let Some(level) = self.levels.get_mut(usize::from(expected.which)) {
+            *level = report.next_level;
+        }
     }
 }
 
@@ -295,6 +317,7 @@ impl<T: Real> Sensor<T> {
             status: Status::Rejected,
             stage: Stage::Binarize,
             level: 0,
+            next_level: None,
             counters: Counters::default(),
             candidates: heapless::Vec::new(),
             solution: None,
@@ -323,7 +346,15 @@ impl<T: Real> Sensor<T> {
         let body = config.each_body().get(usize::from(expected.which));
         let levels = body.and_then(|b| b.binarize.as_ref()).unwrap_or(&config.binarize);
         let noise = body.and_then(|b| b.covariance.as_ref()).unwrap_or(&config.covariance);
-        let level = match binarize::split(picture, &self.region, &config.gate, levels, config.reject.seed, observer) {
+        let level = match binarize::split(
+            picture,
+            &self.region,
+            &config.gate,
+            levels,
+            expected.level,
+            config.reject.seed,
+            observer,
+        ) {
             Ok(level) => level.level,
             Err(status) => {
                 report.status = status;
@@ -341,6 +372,7 @@ impl<T: Real> Sensor<T> {
             expected,
             taken,
             noise,
+            tracks: levels.method == binarize::Method::Track,
             min_points: config.candidates.min_points.min(select::small(expected.sin, &self.camera, 2)),
             observer,
             blocks: lists.blocks,
@@ -432,6 +464,8 @@ struct Judge<'a, T, O> {
     expected: &'a Expected<T>,
     taken: &'a [Taken<T>],
     noise: &'a covariance::Config,
+    /// The answer's level is asked for.
+    tracks: bool,
     /// Shortest edge, border pixels.
     min_points: u16,
     observer: &'a O,
@@ -447,6 +481,8 @@ struct Judge<'a, T, O> {
 
 struct Best<T> {
     solution: Solution<T>,
+    /// Level for the next picture.
+    level: Option<u16>,
     score: T,
     /// It explains most of the limb in view, and most of its edge or with small residuals: no need to look further.
     certain: bool,
@@ -606,11 +642,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
 
         enter(self.report, self.observer, Stage::Select);
         let (b1, b2) = basis(&fused.e);
-        // Around the whole limb the ellipsoid's shape cancels.
-        let around = (fit.arc_px / (focal * self.expected.sin * T::of(core::f64::consts::TAU))).least(T::one());
-        let shape = self.expected.shape_sigma_rad() * (T::one() - around);
-        let [p11, p12, p22] = fused.p;
-        let covariance = Cov3::from_tangent(&b1, &b2, [p11 + shape * shape, p12, p22 + shape * shape]);
+        let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
         let judged =
             select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, scene, self.camera, &config.select);
@@ -620,14 +652,14 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         }
         let axis = UnitVec3::assume_unit(fused.e);
         let one = T::one();
-        let half_angle = |c: T| ((one - c * c).most(T::ZERO)).sqrt().atan2(c);
+        let half_angle = |k: T| (k * (one + one - k)).most(T::ZERO).sqrt().atan2(one - k);
         let solution = Solution {
             axis,
             covariance,
             axis_ecef: self.expected.axis_ecef(),
             axis_body: self.cam_to_body.map(|r| r.apply(&axis)),
-            half_angle_rad: half_angle(fit.c),
-            fused_half_angle_rad: half_angle(fused.c),
+            half_angle_rad: half_angle(fit.k),
+            fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
             altitude_m: fused.var_free_cos.and_then(|v| self.expected.altitude(fit.c, v)),
             rms_px: fit.rms_px,
             inliers: fit.inliers,
@@ -636,7 +668,8 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
         };
         let certain =
             judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
-        (outcome, Some(Best { solution, score: judged.score, certain }))
+        let tracks = self.tracks.then(|| select::middle_level(&fused.e, blocks, scene, self.camera));
+        (outcome, Some(Best { solution, score: judged.score, certain, level: tracks.flatten() }))
     }
 
     /// Keeps the better of two answers, and remembers how good the other was if it says something else.
@@ -671,6 +704,7 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
                 report.counters.edge_points = candidate.points;
             }
             report.status = Status::Ok;
+            report.next_level = best.level;
             report.solution = Some(best.solution);
             return;
         }

@@ -15,6 +15,8 @@ pub struct Report<T> {
     pub stage: Stage,
     /// Level between dark and lit in the picture's own counts; 0 when it was not reached.
     pub level: u16,
+    /// For `track`: the level for the next picture, in counts; with an answer only.
+    pub next_level: Option<u16>,
     /// What was seen on the way.
     pub counters: Counters,
     /// The candidates that were looked at, in the order in which they were followed.
