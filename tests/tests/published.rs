@@ -68,7 +68,7 @@ fn wang_on_an_infrared_earth() {
             config.candidates.keep_points = 0;
         });
         assert_eq!(best.answered(), best.frames, "{best}");
-        assert!(best.rms_deg() < tally.rms_deg() && best.rms_deg() < 0.025, "{best} against {tally}");
+        assert!(best.rms_deg() < tally.rms_deg() && best.rms_deg() < 0.04, "{best} against {tally}");
         let _ = fly(&part, Preset::Hzn, |config| config.covariance = flight.sensor.covariance);
         // The moments' bias from pixel to pixel counts as noise: too careful.
         assert!((0.1..2.5).contains(&tally.mean_nees()), "{tally}");

@@ -208,7 +208,7 @@ fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {
 /// Up to `count` inliers, evenly along the edge, from the middle of each part.
 fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (&Block<T>, usize)> {
     let all = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l & 7] > T::ZERO).map(move |l| (b, l)));
-    let every = (all().count() / count).max(1);
+    let every = (all().count() / count.max(1)).max(1);
     all().skip(every / 2).step_by(every).take(count)
 }
 
@@ -272,7 +272,7 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
             (dark, lit, looks) = (dark + d, lit + l, looks + 1);
         }
     }
-    (lit > dark).then(|| ((dark + lit) / (2 * looks.max(1))) as u16)
+    (lit > dark).then(|| ((dark + lit) / 2 / looks.max(1)) as u16)
 }
 
 /// Most steps along the limb to each side.

@@ -10,7 +10,7 @@ use crate::bytes::{Reader, Writer};
 type Candidates = heapless::Vec<Candidate<f64>, MAX_LISTED>;
 
 /// Every verdict, to find one by its number.
-const VERDICTS: [Verdict; 14] = [
+const VERDICTS: [Verdict; 16] = [
     Verdict::Chosen,
     Verdict::Passed,
     Verdict::NoConsensus,
@@ -25,6 +25,8 @@ const VERDICTS: [Verdict; 14] = [
     Verdict::NoSky,
     Verdict::Taken,
     Verdict::OutOfView,
+    Verdict::Radius,
+    Verdict::Straight,
 ];
 
 /// A candidate edge.

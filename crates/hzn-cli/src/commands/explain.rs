@@ -308,6 +308,7 @@ impl Told<'_> {
             Verdict::OutOfView => {
                 "the limb that is expected about the fitted axis is not in the picture (select.limb_in_view)".into()
             }
+            Verdict::Straight => "too short or too rough an edge to tell on which side of it the body is".into(),
             Verdict::Radius => "the limb is not that wide at any altitude allowed (select.altitude_limits_km)".into(),
             Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
         }

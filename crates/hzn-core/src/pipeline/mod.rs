@@ -666,6 +666,12 @@ impl<T: Real, O: Observer<T>> Judge<'_, T, O> {
             arc_px: fit.arc_px,
             candidate: number,
         };
+        // The body on the other side of the same edge would have the half-angle π − α: two sigma at least from either.
+        let curved = fused.var_free_cos.is_some_and(|v| v * T::of(4.0) < fused.c * fused.c);
+        if config.estimate.half_angle == estimate::HalfAngle::Fused && !curved && !self.expected.free {
+            outcome.verdict = Verdict::Straight;
+            return (outcome, None);
+        }
         let certain =
             judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
         let tracks = self.tracks.then(|| select::middle_level(&fused.e, blocks, scene, self.camera));

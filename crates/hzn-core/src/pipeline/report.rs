@@ -91,6 +91,8 @@ pub enum Verdict {
     OutOfView = 13,
     /// The fitted circle is smaller or larger than the limb can be between the altitude limits.
     Radius = 14,
+    /// The edge is too short or too rough for its curvature to tell on which side of it the body is.
+    Straight = 15,
 }
 
 impl Verdict {
@@ -112,6 +114,7 @@ impl Verdict {
             Self::Taken => "taken",
             Self::OutOfView => "out-of-view",
             Self::Radius => "radius",
+            Self::Straight => "straight",
         }
     }
 }
