@@ -90,8 +90,8 @@ fn c_interface() -> Outcome {
     let (mut command, there) = toolchain.cargo("rustc", &format!("firmware/{M7}"), &library);
     steps::run(in_firmware(&mut command, M7_FLAGS))?;
     let here = target().join("firmware/host");
-    let mut command = cargo(&["rustc", "--release", "--target-dir"]);
-    steps::run(in_firmware(command.arg(&here).args(library), ""))?;
+    let mut command = cargo(&["rustc", "--release"]);
+    steps::run(in_firmware(command.arg("--target-dir").arg(&here).args(library), ""))?;
 
     let c = root().join("firmware/hzn-c");
     let (example, include) = (c.join("example"), format!("-I{}", c.join("include").display()));
