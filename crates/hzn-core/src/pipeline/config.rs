@@ -106,10 +106,19 @@ impl Config {
     pub fn each_body(&self) -> &[body::Config] {
         if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
     }
+    /// How body number `which` is split from the dark: its own values, or those of all.
+    pub(crate) fn levels_of(&self, which: u8) -> &binarize::Config {
+        let own = self.each_body().get(usize::from(which)).and_then(|b| b.binarize.as_ref());
+        own.unwrap_or(&self.binarize)
+    }
+    /// The errors of body number `which`'s edge points: its own values, or those of all.
+    pub(crate) fn noise_of(&self, which: u8) -> &covariance::Config {
+        let own = self.each_body().get(usize::from(which)).and_then(|b| b.covariance.as_ref());
+        own.unwrap_or(&self.covariance)
+    }
     /// Whether a body's level comes from the picture before, so that pictures must come in order.
     pub fn tracks(&self) -> bool {
-        let method = |b: &body::Config| b.binarize.unwrap_or(self.binarize).method;
-        self.each_body().iter().any(|b| method(b) == binarize::Method::Track)
+        (0..self.each_body().len()).any(|which| self.levels_of(which as u8).method == binarize::Method::Track)
     }
     /// As [`Self::each_body`], to be changed.
     pub fn each_body_mut(&mut self) -> &mut [body::Config] {

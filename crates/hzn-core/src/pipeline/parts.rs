@@ -5,7 +5,9 @@
 //! of it is told in the whole picture's coordinates. (2.39) ends the division where a part is too small *and* too
 //! bright and too dark at once; it ends where a part is too small, or too bright, or too dark.
 
-use super::{Candidate, Lists, Observer, Report, Sensor, Solution, Taken};
+use super::taken::Taken;
+use super::workspace::Lists;
+use super::{Candidate, Observer, Report, Sensor, Solution};
 use crate::body::Expected;
 use crate::frames::{Cov3, UnitVec3};
 use crate::image::{Part, Pixels, Window};

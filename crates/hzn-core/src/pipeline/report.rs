@@ -1,10 +1,14 @@
 //! What `process` answers.
 
+use super::config::MAX_BODIES;
 use crate::frames::{Body, Cam, Cov3, Ecef, UnitVec3};
 use crate::status::{Stage, Status};
 
 /// Most candidates that a report lists; further ones are only counted.
 pub const MAX_LISTED: usize = 16;
+
+/// Reports of several bodies, in the order in which they were looked for.
+pub type Reports<T> = heapless::Vec<Report<T>, MAX_BODIES>;
 
 /// The answer to one picture. There is always one, whatever the picture.
 #[derive(Debug, Clone)]

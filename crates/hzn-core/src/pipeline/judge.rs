@@ -1,0 +1,352 @@
+//! The edges of one picture, one after the other from border to verdict, and which of them is the limb.
+
+use super::observer::Observer;
+use super::report::{Candidate, Report, Solution, Verdict};
+use super::sensor::Sensor;
+use super::taken::Taken;
+use crate::block::{Block, LANES};
+use crate::body::Expected;
+use crate::camera::Camera;
+#[cfg(feature = "horace")]
+use crate::contour;
+use crate::contour::{End, Marks, Scene, Thinned};
+use crate::frames::{Cov3, UnitVec3};
+use crate::image::Pixels;
+use crate::linalg::basis;
+use crate::pixel::Pixel;
+use crate::real::Real;
+use crate::status::{Stage, Status};
+use crate::{binarize, candidates, covariance, estimate, reject, select, undistort};
+
+/// Words that search lines are marked in, at most: more of them find nothing new.
+const LINE_WORDS: usize = 16384;
+
+/// The shorter side of the border is looked at in about this many places: a limb's dark and lit stretches are longer
+/// than what lies between, and each look at a column is a page of memory.
+const BORDER_LOOKS: u16 = 128;
+
+/// Rows between search lines, and the most where memory is short: the least extent of the body's disc; a quarter of it
+/// where there are crescents, which are to be crossed too.
+///
+/// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows; the lens's own minimum is taken for half of f,
+/// which every lens in use exceeds.
+fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u16) {
+    let (_, fy) = camera.focal_px();
+    let disc = expected.half_angle_rad() * fy;
+    let narrow = if expected.phases { disc * T::of(0.25) } else { disc };
+    (narrow.to_i32().clamp(1, 64) as u16, disc.to_i32().clamp(1, 256) as u16)
+}
+
+/// Answers more than five degrees apart contradict each other, and one is not better than the other unless its score
+/// is half as large.
+const RIVAL_COS: f64 = 0.9962;
+const RIVAL_SCORE: f64 = 2.0;
+
+/// The edges of one picture, judged one by one.
+pub(super) struct Judge<'a, T, O> {
+    sensor: &'a Sensor<T>,
+    expected: &'a Expected<T>,
+    taken: &'a [Taken<T>],
+    noise: &'a covariance::Config,
+    /// The answer's level is asked for.
+    tracks: bool,
+    /// Shortest edge, border pixels.
+    min_points: u16,
+    observer: &'a O,
+    blocks: &'a mut [Block<T>],
+    /// Border pixels that may still be followed.
+    steps: u32,
+    best: Option<Best<T>>,
+    /// The best score of an answer that points elsewhere.
+    rival: Option<T>,
+    /// Edges with too few points.
+    short: u32,
+    report: &'a mut Report<T>,
+}
+
+struct Best<T> {
+    solution: Solution<T>,
+    /// Level for the next picture.
+    level: Option<u16>,
+    score: T,
+    /// It explains most of the limb in view, and most of its edge or with small residuals: no need to look further.
+    certain: bool,
+}
+
+impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
+    /// Nothing looked at yet. `taken` are the bodies found before; `blocks` is the room for one edge's points.
+    pub(super) fn new(
+        sensor: &'a Sensor<T>,
+        expected: &'a Expected<T>,
+        taken: &'a [Taken<T>],
+        observer: &'a O,
+        blocks: &'a mut [Block<T>],
+        report: &'a mut Report<T>,
+    ) -> Self {
+        let config = &sensor.config;
+        Self {
+            expected,
+            taken,
+            noise: config.noise_of(expected.which),
+            tracks: config.levels_of(expected.which).method == binarize::Method::Track,
+            min_points: config.candidates.min_points.min(select::small(expected.sin, &sensor.camera, 2)),
+            observer,
+            blocks,
+            steps: config.contour.max_steps,
+            best: None,
+            rival: None,
+            short: 0,
+            report,
+            sensor,
+        }
+    }
+
+    /// Nothing more to look for: the limb is found, or the picture's steps are used up.
+    fn done(&self) -> bool {
+        self.steps == 0 || self.best.as_ref().is_some_and(|b| b.certain)
+    }
+
+    /// Edges from the border of the picture, the likeliest first, then those that search lines meet.
+    #[inline(always)]
+    pub(super) fn border_following<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        border: &mut [Pixel],
+        bits: &mut [u32],
+    ) {
+        let (narrow, widest) = line_spacing(self.expected, &self.sensor.camera);
+        let (spacing, widest) =
+            self.sensor.config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
+        let bits = bits.get_mut(..LINE_WORDS.min(bits.len())).unwrap_or_default();
+        let (width, height) = (scene.region.width(), scene.region.height());
+        let mut marks = Marks::new(bits, width, height, spacing, widest);
+        // What is narrower on the border than a search line is apart from the next is no limb.
+        let stride = spacing.min(width.min(height) / BORDER_LOOKS).max(1);
+        let ranked = scene.ranked_starts(stride);
+        for start in &ranked {
+            if self.done() {
+                break;
+            }
+            self.edge(scene, start.pixel, start.dark, border, &mut marks);
+        }
+        if !self.done() {
+            scene.each_start(stride, |start| {
+                if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
+                    self.edge(scene, start.pixel, start.dark, border, &mut marks);
+                }
+                !self.done()
+            });
+        }
+        if self.best.is_none() {
+            scene.each_crossing(&mut marks, |pixel, dark, marks| {
+                self.edge(scene, pixel, dark, border, marks);
+                !self.done()
+            });
+        }
+    }
+
+    /// Every outer border of the picture.
+    #[cfg(feature = "horace")]
+    pub(super) fn raster<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, border: &mut [Pixel], bits: &mut [u32]) {
+        let mut steps = self.steps;
+        let ended = contour::raster::each_border(scene, bits, border, &mut steps, |edge| {
+            self.piece(scene, edge);
+            true
+        });
+        self.report.counters.followed += self.steps - steps;
+        self.steps = if ended == contour::raster::Scanned::Truncated { 0 } else { steps.max(1) };
+    }
+
+    /// Follows one edge and takes it through every stage.
+    fn edge<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        pixel: Pixel,
+        dark: u8,
+        border: &mut [Pixel],
+        marks: &mut Marks<'_>,
+    ) {
+        let mut edge = Thinned::new(border);
+        let before = self.steps;
+        let end = scene.follow(pixel, dark, &mut edge, marks, &mut self.steps);
+        let counters = &mut self.report.counters;
+        counters.followed += before - self.steps;
+        if matches!(end, End::Closed { twice_area } if twice_area > 0) {
+            // A hole: sky or ground seen through something.
+            return;
+        }
+        self.piece(scene, &edge);
+    }
+
+    /// Takes an edge through every stage.
+    pub(super) fn piece<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, edge: &Thinned<'_>) {
+        let counters = &mut self.report.counters;
+        let length = edge.total();
+        if length < u32::from(self.min_points) {
+            self.short += 1;
+            return;
+        }
+        let number = counters.candidates;
+        counters.candidates += 1;
+        counters.dropped += length - length.div_ceil(edge.stride().max(1));
+        self.observer.edge(number, edge.pixels().iter().copied(), edge.stride());
+        let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
+        self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
+        // Full: only counted.
+        let _ = self.report.candidates.push(outcome);
+        if let Some(new) = solution {
+            self.weigh(new);
+        }
+        self.observer.enter(Stage::Contour);
+    }
+
+    fn candidate<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        number: u32,
+        length: u32,
+        border: &[Pixel],
+    ) -> (Candidate<T>, Option<Best<T>>) {
+        let Sensor { config, camera, cam_to_body, .. } = self.sensor;
+        let mut outcome = Candidate {
+            length_px: length,
+            points: 0,
+            inliers: 0,
+            rms_px: T::of(f64::NAN),
+            verdict: Verdict::NoConsensus,
+        };
+
+        self.enter(Stage::Candidates);
+        let points = candidates::pick(scene, &config.candidates, border, number, self.blocks);
+        outcome.points = points.count;
+        self.report.counters.edge_points += points.count;
+        self.report.counters.fallback_points += points.fallback;
+        let used = (points.count as usize).div_ceil(LANES);
+        let Some(blocks) = self.blocks.get_mut(..used) else { return (outcome, None) };
+
+        enter(self.report, self.observer, Stage::Undistort);
+        undistort::to_rays(camera, blocks);
+
+        enter(self.report, self.observer, Stage::Reject);
+        let threshold = T::of(config.reject.threshold_px);
+        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, threshold)).sum();
+        if on_another * 2 > points.count {
+            outcome.verdict = Verdict::Taken;
+            return (outcome, None);
+        }
+        let (fx, fy) = camera.focal_px();
+        let focal = (fx + fy) * T::of(0.5);
+        let Some(consensus) = reject::keep(blocks, points.count, self.expected, focal, &config.reject) else {
+            return (outcome, None);
+        };
+        self.report.counters.draws += consensus.draws;
+
+        enter(self.report, self.observer, Stage::Estimate);
+        outcome.verdict = Verdict::NoFit;
+        let fit = estimate::fit(blocks, &consensus, self.expected, camera, threshold, &config.estimate, self.noise);
+        let Some(fit) = fit else { return (outcome, None) };
+        outcome.inliers = fit.inliers;
+        outcome.rms_px = fit.rms_px;
+        for place in 0..points.count {
+            if let Some(block) = blocks.get(place as usize / LANES) {
+                self.observer.weight(number, place, block.weight[place as usize % LANES]);
+            }
+        }
+
+        enter(self.report, self.observer, Stage::Covariance);
+        let fused = covariance::fuse(blocks, &fit, self.expected, self.noise, &config.estimate);
+        let Some(fused) = fused else { return (outcome, None) };
+
+        enter(self.report, self.observer, Stage::Select);
+        let (b1, b2) = basis(&fused.e);
+        let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
+        let sigma = covariance.sigma_max_rad();
+        let judged =
+            select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, scene, camera, &config.select);
+        outcome.verdict = judged.verdict;
+        if judged.verdict != Verdict::Passed || !sigma.is_finite() {
+            return (outcome, None);
+        }
+        let axis = UnitVec3::assume_unit(fused.e);
+        let one = T::one();
+        let half_angle = |k: T| (k * (one + one - k)).most(T::ZERO).sqrt().atan2(one - k);
+        let solution = Solution {
+            axis,
+            covariance,
+            axis_ecef: self.expected.axis_ecef(),
+            axis_body: cam_to_body.as_ref().map(|r| r.apply(&axis)),
+            half_angle_rad: half_angle(fit.k),
+            fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
+            altitude_m: fused.var_free_cos.and_then(|v| self.expected.altitude(fit.c, v)),
+            rms_px: fit.rms_px,
+            inliers: fit.inliers,
+            arc_px: fit.arc_px,
+            candidate: number,
+        };
+        // The body on the other side of the same edge would have the half-angle π − α: two sigma at least from either.
+        let curved = fused.var_free_cos.is_some_and(|v| v * T::of(4.0) < fused.c * fused.c);
+        if config.estimate.half_angle == estimate::HalfAngle::Fused && !curved && !self.expected.free {
+            outcome.verdict = Verdict::Straight;
+            return (outcome, None);
+        }
+        let certain =
+            judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
+        let tracks = self.tracks.then(|| select::middle_level(&fused.e, blocks, scene, camera));
+        (outcome, Some(Best { solution, score: judged.score, certain, level: tracks.flatten() }))
+    }
+
+    /// Keeps the better of two answers, and remembers how good the other was if it says something else.
+    fn weigh(&mut self, new: Best<T>) {
+        let Some(old) = self.best.take() else {
+            self.best = Some(new);
+            return;
+        };
+        let apart = new.solution.axis.dot(&old.solution.axis) < T::of(RIVAL_COS);
+        let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
+        if apart {
+            self.rival = Some(self.rival.map_or(other.score, |r| r.least(other.score)));
+        }
+        self.best = Some(better);
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        enter(self.report, self.observer, stage);
+    }
+
+    /// Writes the answer into the report.
+    pub(super) fn conclude(self) {
+        let report = self.report;
+        if let Some(best) = self.best {
+            if !best.certain && self.rival.is_some_and(|r| r < best.score * T::of(RIVAL_SCORE)) {
+                report.status = Status::Ambiguous;
+                return;
+            }
+            let chosen = best.solution.candidate;
+            if let Some(candidate) = report.candidates.get_mut(chosen as usize) {
+                candidate.verdict = Verdict::Chosen;
+                report.counters.edge_points = candidate.points;
+            }
+            report.status = Status::Ok;
+            report.next_level = best.level;
+            report.solution = Some(best.solution);
+            return;
+        }
+        let fitted = report.candidates.iter().any(|c| {
+            !matches!(c.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken)
+        });
+        report.status = if self.steps == 0 {
+            Status::Truncated
+        } else if fitted {
+            Status::Rejected
+        } else if report.counters.candidates == 0 && self.short > 0 {
+            Status::TooFewPoints
+        } else {
+            Status::NoLimb
+        };
+    }
+}
+
+fn enter<T, O: Observer<T>>(report: &mut Report<T>, observer: &O, stage: Stage) {
+    report.stage = report.stage.max(stage);
+    observer.enter(stage);
+}

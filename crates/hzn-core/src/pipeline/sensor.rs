@@ -1,0 +1,186 @@
+//! A configuration that was accepted, and the order of the stages.
+
+use super::config::{Config, MAX_BODIES, Mount};
+use super::judge::Judge;
+use super::observer::Observer;
+use super::report::{Counters, Report, Reports};
+use super::taken::Taken;
+use super::workspace::{Lists, Workspace};
+use crate::binarize;
+use crate::body::{Expected, Frame, FrameError};
+use crate::camera::Camera;
+use crate::contour::{self, Scene};
+use crate::error::ConfigError;
+use crate::frames::{Body, Cam, Rotation};
+use crate::image::Pixels;
+use crate::real::Real;
+use crate::region::Region;
+use crate::status::{Stage, Status};
+
+/// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
+/// that a picture needs are in a [`Workspace`]. [`Horizon`] is both together.
+#[derive(Debug, Clone)]
+pub struct Sensor<T> {
+    pub(super) config: Config,
+    pub(super) camera: Camera<T>,
+    pub(super) region: Region<T>,
+    pub(super) cam_to_body: Option<Rotation<Cam, Body, T>>,
+}
+
+impl<T: Real> Sensor<T> {
+    /// Checks everything that can be refused.
+    ///
+    /// # Errors
+    /// The first field out of its limits.
+    // Its workings, some kilobytes, are not to lie on the caller's stack.
+    #[inline(never)]
+    pub fn new(config: &Config) -> Result<Self, ConfigError> {
+        config.check()?;
+        let camera = Camera::try_new(&config.camera)?;
+        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::of));
+        Ok(Self {
+            region: Region::new(&config.mask, &camera),
+            cam_to_body: config.mount.and_then(turn),
+            camera,
+            config: config.clone(),
+        })
+    }
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+    /// The lens.
+    pub fn camera(&self) -> &Camera<T> {
+        &self.camera
+    }
+    /// The part of the picture that counts.
+    pub fn region(&self) -> &Region<T> {
+        &self.region
+    }
+    /// Checks what is known about a picture and works out the cone to expect: of the body, or of the first of several.
+    ///
+    /// # Errors
+    /// An altitude or a position that cannot be.
+    pub fn expect(&self, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+        self.expect_body(0, frame)
+    }
+    /// As [`Self::expect`], of the body number `which` of [`Config::each_body`], from 0.
+    ///
+    /// # Errors
+    /// An altitude or a position that cannot be; a number beyond the last.
+    pub fn expect_body(&self, which: usize, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+        let body = self.config.each_body().get(which).ok_or(FrameError::NoBody)?;
+        Ok(Expected { which: which as u8, ..Expected::new(body, frame)? })
+    }
+    /// Finds the limb, watched. Total: any picture gives a report. One of another size than the camera's is `rejected`
+    /// at the first stage.
+    pub fn process<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+        &self,
+        workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
+        picture: &P,
+        expected: &Expected<T>,
+        observer: &O,
+    ) -> Report<T> {
+        self.process_beside(workspace.lists(), picture, expected, &[], observer)
+    }
+    /// Finds several bodies in one picture, one after the other in the order of `expected`; at most [`MAX_BODIES`].
+    /// An edge on the limb of one that was found is not taken for another's.
+    pub fn process_each<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+        &self,
+        workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
+        picture: &P,
+        expected: &[Expected<T>],
+        observer: &O,
+    ) -> Reports<T> {
+        let mut reports = Reports::new();
+        let mut taken = heapless::Vec::<Taken<T>, MAX_BODIES>::new();
+        for one in expected {
+            observer.body(one.which);
+            let report = self.process_beside(workspace.lists(), picture, one, &taken, observer);
+            let found = report.solution.as_ref();
+            let found = found.map(|s| Taken { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
+            // There is room for as many as there can be bodies.
+            if reports.push(report).is_err() || found.is_some_and(|f| taken.push(f).is_err()) {
+                break;
+            }
+        }
+        reports
+    }
+
+    fn process_beside<P: Pixels, O: Observer<T>>(
+        &self,
+        lists: Lists<'_, T>,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+    ) -> Report<T> {
+        let mut report = Report {
+            status: Status::Rejected,
+            stage: Stage::Binarize,
+            level: 0,
+            next_level: None,
+            counters: Counters::default(),
+            candidates: heapless::Vec::new(),
+            solution: None,
+        };
+        if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
+            #[cfg(feature = "horace")]
+            self.look_at_parts(lists, picture, expected, taken, observer, &mut report);
+            #[cfg(not(feature = "horace"))]
+            self.look(lists, picture, expected, taken, observer, &mut report);
+        }
+        observer.leave();
+        report
+    }
+
+    pub(super) fn look<P: Pixels, O: Observer<T>>(
+        &self,
+        lists: Lists<'_, T>,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        observer.enter(Stage::Binarize);
+        let config = &self.config;
+        let levels = config.levels_of(expected.which);
+        let level = match binarize::split(
+            picture,
+            &self.region,
+            &config.gate,
+            levels,
+            expected.level,
+            config.reject.seed,
+            observer,
+        ) {
+            Ok(level) => level.level,
+            Err(status) => {
+                report.status = status;
+                return;
+            }
+        };
+        report.level = level;
+        report.stage = Stage::Contour;
+        observer.enter(Stage::Contour);
+        let scene = Scene::new(picture, &self.region, level, observer);
+        let mut judge = Judge::new(self, expected, taken, observer, lists.blocks, report);
+        match config.contour.method {
+            contour::Method::BorderFollowing => judge.border_following(&scene, lists.border, lists.marks),
+            #[cfg(feature = "horace")]
+            contour::Method::Raster => judge.raster(&scene, lists.border, lists.marks),
+            #[cfg(feature = "horace")]
+            contour::Method::Erode => {
+                let edge = contour::erode::edges(&scene, &config.contour, lists.border);
+                judge.piece(&scene, &edge);
+            }
+            #[cfg(feature = "zju")]
+            contour::Method::Sobel => {
+                let edge = contour::sobel::edges(&scene, lists.border);
+                judge.piece(&scene, &edge);
+            }
+        }
+        judge.conclude();
+    }
+}

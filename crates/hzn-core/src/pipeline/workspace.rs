@@ -1,0 +1,57 @@
+//! The lists that a picture needs, in memory of fixed size.
+
+use crate::block::Block;
+use crate::pixel::Pixel;
+use crate::real::Real;
+
+/// The lists of a workstation.
+pub type HostWorkspace = Workspace<f64, 16384, 2048, 65536>;
+/// The lists of a flight computer.
+pub type FlightWorkspace = Workspace<f32, 2048, 256, 512>;
+/// Every list that a picture needs; nothing of it outlives the picture. There is no heap.
+///
+/// `POINTS` border pixels of an edge are stored (beyond, the stride doubles), `BLOCKS` blocks of eight edge points are
+/// fitted, and search lines are marked in `WORDS` words of 32 bits, in which the contour method `raster` marks every
+/// pixel. See [`HostWorkspace`] and [`FlightWorkspace`].
+///
+/// It is large. A new one is all zeros: in a `static` it takes no room in flash, and is made without passing over the
+/// stack.
+#[derive(Debug, Clone)]
+pub struct Workspace<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
+    border: [Pixel; POINTS],
+    blocks: [Block<T>; BLOCKS],
+    marks: [u32; WORDS],
+}
+
+/// The lists of a workspace without their lengths, so that stages are compiled once.
+pub(super) struct Lists<'a, T> {
+    pub(super) border: &'a mut [Pixel],
+    pub(super) blocks: &'a mut [Block<T>],
+    pub(super) marks: &'a mut [u32],
+}
+
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Workspace<T, POINTS, BLOCKS, WORDS> {
+    /// Empty lists.
+    pub const fn new() -> Self {
+        Self { border: [Pixel { x: 0, y: 0 }; POINTS], blocks: [Block::EMPTY; BLOCKS], marks: [0; WORDS] }
+    }
+    pub(super) fn lists(&mut self) -> Lists<'_, T> {
+        Lists { border: &mut self.border, blocks: &mut self.blocks, marks: &mut self.marks }
+    }
+}
+
+#[cfg(feature = "horace")]
+impl<T> Lists<'_, T> {
+    /// The same, for one look of several.
+    pub(super) fn again(&mut self) -> Lists<'_, T> {
+        Lists { border: self.border, blocks: self.blocks, marks: self.marks }
+    }
+}
+
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Default
+    for Workspace<T, POINTS, BLOCKS, WORDS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
