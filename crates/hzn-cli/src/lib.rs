@@ -15,6 +15,7 @@ pub mod output;
 pub mod overlay;
 pub mod plot;
 mod progress;
+pub mod scene;
 mod setup;
 mod tell;
 

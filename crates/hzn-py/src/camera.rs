@@ -3,16 +3,17 @@
 use std::path::PathBuf;
 
 use hzn_calib::{camera_file, sensor};
-use hzn_core::camera::{self, Config};
+use hzn_core::camera::{self, Config, Model, Ray};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
-use numpy::ndarray::Array2;
-use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
+use numpy::ndarray::{Array2, Array3, ArrayView2, Axis};
+use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLike2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::errors;
+use crate::{errors, parameters};
 
-/// A lens: from directions to pixels and back.
+#[doc = doc!("Camera")]
 #[pyclass(frozen, module = "hzn")]
 #[derive(Clone)]
 pub(crate) struct Camera {
@@ -25,76 +26,148 @@ impl Camera {
         let lens = camera::Camera::try_new(&config).map_err(errors::config)?;
         Ok(Self { config, lens })
     }
+
+    /// What follows from the ray of each of n points; NaN where the lens does not see.
+    fn each_ray<'py, const N: usize>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        then: impl Fn(&Ray<f64>) -> Option<[f64; N]> + Sync,
+    ) -> PyResult<Array2<f64>> {
+        let points = rows(points, 2, "points")?;
+        let points = points.as_array();
+        errors::detached(py, || map_rows(points, |p| then(&self.lens.ray(ImagePoint { u: p[0], v: p[1] })?)))
+    }
 }
 
 #[pymethods]
 impl Camera {
+    #[new]
+    #[pyo3(signature = (**keys))]
+    fn new(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let sections = PyDict::new(py);
+        sections.set_item("camera", keys.map_or_else(|| PyDict::new(py), Clone::clone))?;
+        Self::of(parameters::config(&sections)?.camera)
+    }
+
+    #[doc = doc!("Camera.from_toml")]
     #[staticmethod]
     fn from_toml(path: PathBuf) -> PyResult<Self> {
         Self::of(sensor::load(&path).map_err(errors::config)?.config.camera)
     }
 
+    #[doc = doc!("Camera.from_kalibr")]
     #[staticmethod]
     #[pyo3(signature = (path, *, camera = None))]
     fn from_kalibr(path: PathBuf, camera: Option<&str>) -> PyResult<Self> {
         Self::of(camera_file::load(&path, camera).map_err(errors::config)?)
     }
 
+    #[doc = doc!("Camera.from_opencv")]
     #[staticmethod]
-    fn from_opencv(path: PathBuf) -> PyResult<Self> {
-        Self::of(camera_file::load(&path, None).map_err(errors::config)?)
+    #[pyo3(signature = (source, distortion = None, *, size = None, fisheye = false))]
+    fn from_opencv(
+        source: &Bound<'_, PyAny>,
+        distortion: Option<&Bound<'_, PyAny>>,
+        size: Option<(u16, u16)>,
+        fisheye: bool,
+    ) -> PyResult<Self> {
+        if let Ok(path) = source.extract::<PathBuf>() {
+            return Self::of(camera_file::load(&path, None).map_err(errors::config)?);
+        }
+        let matrix = rows(source, 3, "camera matrix")?;
+        let m = matrix.as_array();
+        if m.nrows() != 3 {
+            return Err(errors::config("camera matrix: shape (3, 3) is expected"));
+        }
+        let (width, height) =
+            size.ok_or_else(|| errors::config("size: a camera matrix does not say it; give size=(width, height)"))?;
+        let k: Vec<f64> = match distortion {
+            Some(d) => d.py().import("numpy")?.call_method1("ravel", (d,))?.call_method0("tolist")?.extract()?,
+            None => Vec::new(),
+        };
+        let model = match (fisheye, k.len()) {
+            (true, 0..=4) => Model::KannalaBrandt,
+            (false, 0) => Model::Pinhole,
+            (false, 4 | 5) => Model::BrownConrady,
+            (_, n) => {
+                let most = if fisheye { "up to 4 (fisheye)" } else { "4 or 5 (k1, k2, p1, p2, k3)" };
+                return Err(errors::config(format!("distortion: {n} coefficients; {most} are expected")));
+            }
+        };
+        let ideal = Config::ideal(model, width, height, m[(0, 0)]);
+        let k = k.into_iter().collect();
+        Self::of(Config { fx_px: m[(0, 0)], fy_px: m[(1, 1)], cx_px: m[(0, 2)], cy_px: m[(1, 2)], k, ..ideal })
     }
 
+    #[doc = doc!("Camera.parameters")]
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        parameters::to_python(py, &self.config)
+    }
+    #[doc = doc!("Camera.width")]
     #[getter]
     fn width(&self) -> u16 {
         self.config.width
     }
+    #[doc = doc!("Camera.height")]
     #[getter]
     fn height(&self) -> u16 {
         self.config.height
     }
+    #[doc = doc!("Camera.model")]
     #[getter]
     fn model(&self) -> &'static str {
         self.config.model.name()
     }
+    #[doc = doc!("Camera.k")]
     #[getter]
     fn k(&self) -> Vec<f64> {
         self.config.k.to_vec()
     }
-    /// The camera matrix.
+    #[doc = doc!("Camera.matrix")]
     #[getter]
     fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let c = &self.config;
         numpy::ndarray::arr2(&[[c.fx_px, 0.0, c.cx_px], [0.0, c.fy_px, c.cy_px], [0.0, 0.0, 1.0]]).to_pyarray(py)
     }
 
-    fn project<'py>(&self, py: Python<'py>, rays: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        columns(&rays, 3, "rays")?;
+    #[doc = doc!("Camera.project")]
+    fn project<'py>(&self, py: Python<'py>, rays: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rays = rows(rays, 3, "rays")?;
         let rays = rays.as_array();
-        let mut out = Array2::from_elem((rays.nrows(), 2), f64::NAN);
-        for (ray, mut row) in rays.outer_iter().zip(out.outer_iter_mut()) {
-            let ray = UnitVec3::try_new([ray[0], ray[1], ray[2]]);
-            if let Some(p) = ray.and_then(|r| self.lens.project(&r)) {
-                (row[0], row[1]) = (p.u, p.v);
-            }
-        }
-        Ok(out.to_pyarray(py))
+        let pixel = |ray: &[f64]| {
+            let p = self.lens.project(&UnitVec3::try_new([ray[0], ray[1], ray[2]])?)?;
+            Some([p.u, p.v])
+        };
+        Ok(errors::detached(py, || map_rows(rays, pixel))?.to_pyarray(py))
     }
 
-    fn unproject<'py>(
+    #[doc = doc!("Camera.unproject")]
+    fn unproject<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        Ok(self.each_ray(py, points, |ray| Some(ray.direction().xyz()))?.to_pyarray(py))
+    }
+
+    #[doc = doc!("Camera.undistort_points")]
+    fn undistort_points<'py>(
         &self,
         py: Python<'py>,
-        points: PyReadonlyArray2<'py, f64>,
+        points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        columns(&points, 2, "points")?;
-        let points = points.as_array();
-        let mut out = Array2::from_elem((points.nrows(), 3), f64::NAN);
-        for (point, mut row) in points.outer_iter().zip(out.outer_iter_mut()) {
-            if let Some(ray) = self.lens.unproject(ImagePoint { u: point[0], v: point[1] }) {
-                row.iter_mut().zip(ray.xyz()).for_each(|(slot, x)| *slot = x);
-            }
-        }
-        Ok(out.to_pyarray(py))
+        let plane = |ray: &Ray<f64>| {
+            let [x, y, z] = ray.direction().xyz();
+            (z > 0.0).then(|| [x / z, y / z])
+        };
+        Ok(self.each_ray(py, points, plane)?.to_pyarray(py))
+    }
+
+    #[doc = doc!("Camera.jacobian")]
+    fn jacobian<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let flat = self.each_ray(py, points, |ray| {
+            let [[a, b], [c, d], [e, f]] = ray.jacobian();
+            Some([a, b, c, d, e, f])
+        })?;
+        Ok(in_cubes(&flat).to_pyarray(py))
     }
 
     fn __repr__(&self) -> String {
@@ -104,11 +177,50 @@ impl Camera {
     fn __eq__(&self, other: &Self) -> bool {
         self.config == other.config
     }
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<(Py<PyAny>, (Py<PyAny>,))> {
+        let make = slf.get_type().getattr("_of")?.unbind();
+        Ok((make, (slf.get().parameters(slf.py())?.unbind(),)))
+    }
+    #[staticmethod]
+    fn _of(keys: &Bound<'_, PyDict>) -> PyResult<Self> {
+        Self::new(keys.py(), Some(keys))
+    }
 }
 
-fn columns(array: &PyReadonlyArray2<'_, f64>, n: usize, name: &str) -> PyResult<()> {
+/// Anything that NumPy makes an array of shape (n, `columns`) of.
+pub(crate) fn rows<'py>(
+    object: &Bound<'py, PyAny>,
+    columns: usize,
+    name: &str,
+) -> PyResult<PyArrayLike2<'py, f64, AllowTypeChange>> {
+    let wrong = |shape: String| errors::image(format!("{name}: shape (n, {columns}) is expected, not {shape}"));
+    let array: PyArrayLike2<'py, f64, AllowTypeChange> = object.extract().map_err(|_| {
+        let shape = object.py().import("numpy").and_then(|np| np.call_method1("shape", (object,)));
+        wrong(shape.map_or_else(|e| e.to_string(), |s| s.to_string()))
+    })?;
     match array.shape() {
-        [_, have] if *have == n => Ok(()),
-        shape => Err(errors::image(format!("{name}: shape (n, {n}) is expected, not {shape:?}"))),
+        [_, have] if *have == columns => Ok(array),
+        shape => Err(wrong(format!("{shape:?}"))),
     }
+}
+
+/// N numbers of each row; NaN where there are none.
+pub(crate) fn map_rows<const N: usize>(
+    rows: ArrayView2<'_, f64>,
+    then: impl Fn(&[f64]) -> Option<[f64; N]>,
+) -> Array2<f64> {
+    let mut out = Array2::from_elem((rows.nrows(), N), f64::NAN);
+    let mut row = vec![0.0; rows.ncols()];
+    for (from, mut to) in rows.outer_iter().zip(out.outer_iter_mut()) {
+        row.iter_mut().zip(from).for_each(|(slot, x)| *slot = *x);
+        if let Some(values) = then(&row) {
+            to.iter_mut().zip(values).for_each(|(slot, x)| *slot = x);
+        }
+    }
+    out
+}
+
+/// (n, 6) as (n, 3, 2).
+pub(crate) fn in_cubes(flat: &Array2<f64>) -> Array3<f64> {
+    Array3::from_shape_fn((flat.len_of(Axis(0)), 3, 2), |(i, j, k)| flat[(i, 2 * j + k)])
 }

@@ -1,6 +1,9 @@
-//! One exception a family of errors.
+//! One exception a family of errors, and the door through which no panic comes.
 
-use pyo3::exceptions::PyValueError;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
 use pyo3::{PyErr, create_exception};
 
 create_exception!(hzn, HznError, PyValueError, "Base of hzn's exceptions.");
@@ -20,4 +23,24 @@ pub(crate) fn config(what: impl std::fmt::Display) -> PyErr {
 /// A wrong picture.
 pub(crate) fn image(what: impl std::fmt::Display) -> PyErr {
     ImageError::new_err(what.to_string())
+}
+
+/// Anything else that went wrong, such as a file.
+pub(crate) fn other(what: impl std::fmt::Display) -> PyErr {
+    HznError::new_err(what.to_string())
+}
+
+/// Works without holding the interpreter. A panic becomes an exception: whatever `work` held is gone, the process lives.
+pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| {
+        let what = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
+        PyRuntimeError::new_err(format!("a fault of hzn itself, please report it: {}", what.unwrap_or("no message")))
+    })
+}
+
+/// For the tests: a panic in the middle of the work.
+#[pyfunction]
+#[pyo3(name = "_panic")]
+pub(crate) fn panic_within(py: Python<'_>) -> PyResult<()> {
+    detached(py, || panic!("asked for by a test"))
 }

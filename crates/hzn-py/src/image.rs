@@ -1,12 +1,14 @@
 //! Arrays as pictures.
 
-use hzn_core::image::{Channel, ImageView, Layout};
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use hzn_cli::input::picture;
+use hzn_core::image::{Channel, ImageView, Layout, Pixels};
+use numpy::ndarray::{Array3, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
+use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::errors;
 
-/// The samples of an array: borrowed when it is C-contiguous, else copied row by row.
+/// The samples of an array, borrowed.
 pub(crate) enum Array<'py> {
     /// uint8.
     Bytes(PyReadonlyArrayDyn<'py, u8>),
@@ -54,7 +56,7 @@ impl<'py> Array<'py> {
         (self.shape()[1], self.shape()[0])
     }
 
-    /// The layout of the samples, packed. `bits` are the significant ones of uint16.
+    /// The layout of the samples in C order. `bits` are the significant ones of uint16.
     pub(crate) fn layout(&self, bits: Option<u8>) -> PyResult<Layout> {
         let side = |n: usize| u32::try_from(n).map_err(errors::image);
         let (width, height) = self.size();
@@ -69,49 +71,125 @@ impl<'py> Array<'py> {
         Ok(Layout::packed(side(width)?, side(height)?, channels, bits))
     }
 
-    /// Its samples in C order.
-    pub(crate) fn samples(&self) -> Samples<'_> {
-        match self {
-            Self::Bytes(a) => match a.as_array().to_slice() {
-                Some(slice) => Samples::Bytes(slice),
-                None => Samples::OwnBytes(a.as_array().iter().copied().collect()),
-            },
-            Self::Words(a) => match a.as_array().to_slice() {
-                Some(slice) => Samples::Words(slice),
-                None => Samples::OwnWords(a.as_array().iter().copied().collect()),
-            },
-        }
-    }
-}
-
-/// Samples in C order.
-pub(crate) enum Samples<'a> {
-    Bytes(&'a [u8]),
-    Words(&'a [u16]),
-    OwnBytes(Vec<u8>),
-    OwnWords(Vec<u16>),
-}
-
-impl Samples<'_> {
-    /// The picture for the pipeline.
-    pub(crate) fn view(&self, layout: Layout, channel: Channel) -> PyResult<ImageView<'_>> {
-        let view = match self {
-            Self::Bytes(d) => ImageView::from_bytes(d, layout, channel),
-            Self::OwnBytes(d) => ImageView::from_bytes(d, layout, channel),
-            Self::Words(d) => ImageView::from_words(d, layout, channel),
-            Self::OwnWords(d) => ImageView::from_words(d, layout, channel),
+    /// The picture for the pipeline, without a copy.
+    pub(crate) fn view(&self, bits: Option<u8>, channel: Channel) -> PyResult<View<'_>> {
+        let layout = self.layout(bits)?;
+        let packed = match self {
+            Self::Bytes(a) => a.as_array().to_slice().map(|d| ImageView::from_bytes(d, layout, channel)),
+            Self::Words(a) => a.as_array().to_slice().map(|d| ImageView::from_words(d, layout, channel)),
         };
-        view.map_err(errors::image)
+        match packed {
+            Some(view) => Ok(View::Packed(view.map_err(errors::image)?)),
+            None => Ok(View::Strided(Strided::try_new(self, layout, channel)?)),
+        }
     }
 
     /// A copy, for drawing on.
-    pub(crate) fn into_owned(self) -> hzn_cli::input::picture::Samples {
-        use hzn_cli::input::picture::Samples as Own;
+    pub(crate) fn to_samples(&self) -> picture::Samples {
         match self {
-            Self::Bytes(d) => Own::Bytes(d.to_vec()),
-            Self::OwnBytes(d) => Own::Bytes(d),
-            Self::Words(d) => Own::Words(d.to_vec()),
-            Self::OwnWords(d) => Own::Words(d),
+            Self::Bytes(a) => picture::Samples::Bytes(a.as_array().iter().copied().collect()),
+            Self::Words(a) => picture::Samples::Words(a.as_array().iter().copied().collect()),
         }
     }
+}
+
+/// A picture where it stands in Python's memory.
+pub(crate) enum View<'a> {
+    /// In C order: as fast as anywhere.
+    Packed(ImageView<'a>),
+    /// In any other order.
+    Strided(Strided<'a>),
+}
+
+enum Samples<'a> {
+    Bytes(ArrayView3<'a, u8>),
+    Words(ArrayView3<'a, u16>),
+}
+
+/// A picture of any strides, such as part of another, transposed, upside down, or a colour alone. A pixel costs more than
+/// in a packed one, and few are read.
+pub(crate) struct Strided<'a> {
+    samples: Samples<'a>,
+    layout: Layout,
+    /// The channels that make up the brightness.
+    channels: std::ops::Range<usize>,
+}
+
+/// Index distance between rows: wider than any picture.
+const DOWN: usize = 1 << 16;
+
+impl<'a> Strided<'a> {
+    fn try_new(array: &'a Array<'_>, layout: Layout, channel: Channel) -> PyResult<Self> {
+        // The rules for channels are the packed picture's.
+        let pixel = [0u8; 4];
+        let one = Layout { bits: 8, ..Layout::packed(1, 1, layout.channels, 8) };
+        ImageView::from_bytes(&pixel, one, channel).map_err(errors::image)?;
+        if layout.width > u32::from(u16::MAX) || layout.height > u32::from(u16::MAX) {
+            return Err(errors::image("width and height must be 1 to 65535 pixels"));
+        }
+        let samples = match array {
+            Array::Bytes(a) => Samples::Bytes(in_three(a.as_array())?),
+            Array::Words(a) => Samples::Words(in_three(a.as_array())?),
+        };
+        let channels = match channel {
+            Channel::Mean if layout.channels >= 3 => 0..3,
+            Channel::Mean | Channel::Red => 0..1,
+            Channel::Green => 1..2,
+            Channel::Blue => 2..3,
+        };
+        Ok(Self { samples, layout, channels })
+    }
+}
+
+fn in_three<T>(array: ArrayViewD<'_, T>) -> PyResult<ArrayView3<'_, T>> {
+    match array.ndim() {
+        2 => array.into_dimensionality::<Ix2>().map(|a| a.insert_axis(Axis(2))),
+        _ => array.into_dimensionality::<Ix3>(),
+    }
+    .map_err(errors::image)
+}
+
+impl Pixels for Strided<'_> {
+    fn width(&self) -> u16 {
+        self.layout.width as u16
+    }
+    fn height(&self) -> u16 {
+        self.layout.height as u16
+    }
+    fn full_scale(&self) -> u16 {
+        ((1u32 << self.layout.bits) - 1) as u16
+    }
+    fn index(&self, x: u16, y: u16) -> usize {
+        usize::from(y) * DOWN + usize::from(x)
+    }
+    fn across(&self) -> usize {
+        1
+    }
+    fn down(&self) -> usize {
+        DOWN
+    }
+    fn read(&self, index: usize) -> u16 {
+        let (y, x) = (index / DOWN, index % DOWN);
+        let of = |c: usize| match &self.samples {
+            Samples::Bytes(a) => a.get((y, x, c)).copied().map(u32::from),
+            Samples::Words(a) => a.get((y, x, c)).copied().map(u32::from),
+        };
+        let sum: u32 = self.channels.clone().filter_map(of).sum();
+        (sum / self.channels.len() as u32) as u16
+    }
+}
+
+/// A decoded picture as an array: (height, width), or (height, width, channels) where there are several.
+pub(crate) fn to_array(py: Python<'_>, picture: picture::Picture) -> PyResult<Bound<'_, PyAny>> {
+    let l = picture.layout;
+    let shape = (l.height as usize, l.width as usize, usize::from(l.channels));
+    let array = match picture.samples {
+        picture::Samples::Bytes(d) => {
+            Array3::from_shape_vec(shape, d).map_err(errors::image)?.into_pyarray(py).into_any()
+        }
+        picture::Samples::Words(d) => {
+            Array3::from_shape_vec(shape, d).map_err(errors::image)?.into_pyarray(py).into_any()
+        }
+    };
+    if l.channels == 1 { array.call_method1("reshape", (shape.0, shape.1)) } else { Ok(array) }
 }

@@ -1,14 +1,24 @@
 //! The private half of the Python package `hzn`: classes over the sensor that the command line has too.
 //!
-//! Arrays come in without a copy when they are C-contiguous, and the interpreter is free while a picture is processed.
+//! Arrays come in without a copy, and the interpreter is free while there is work.
+
+/// The docstring of a class or function, as the stubs have it.
+macro_rules! doc {
+    ($name:literal) => {
+        include_str!(concat!(env!("OUT_DIR"), "/", $name))
+    };
+}
 
 mod camera;
 mod errors;
 mod image;
 mod overlay;
+mod parameters;
 mod recording;
 mod report;
 mod sensor;
+mod sequence;
+mod simulation;
 
 /// `hzn._hzn`.
 #[pyo3::pymodule(gil_used = false)]
@@ -16,15 +26,19 @@ mod _hzn {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
-    use crate::errors::{ConfigError, HznError, ImageError};
+    use crate::errors::{ConfigError, HznError, ImageError, panic_within};
     #[pymodule_export]
     use crate::overlay::overlay;
     #[pymodule_export]
-    use crate::recording::read_mcap;
+    use crate::recording::{Frame, Recording, open_mcap, read_mcap, write_mcap};
     #[pymodule_export]
     use crate::report::Report;
     #[pymodule_export]
     use crate::sensor::Sensor;
+    #[pymodule_export]
+    use crate::sequence::{Item, Sequence, process_encoded};
+    #[pymodule_export]
+    use crate::simulation::{SimulatedFrame, Simulation, design, evaluate};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's own spelling")]

@@ -1,6 +1,7 @@
 //! `hzn.overlay`.
 
 use hzn_cli::input::Picture;
+use image::RgbImage;
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
@@ -9,7 +10,7 @@ use crate::errors;
 use crate::image::Array;
 use crate::report::Report;
 
-/// Draws what a report stands on over its picture.
+#[doc = doc!("overlay")]
 #[pyfunction]
 #[pyo3(signature = (image, report, *, bits = None))]
 pub(crate) fn overlay<'py>(
@@ -18,10 +19,15 @@ pub(crate) fn overlay<'py>(
     report: &Report,
     bits: Option<u8>,
 ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-    let array = Array::of(image)?;
-    let layout = array.layout(bits)?;
-    let picture = Picture { samples: array.samples().into_owned(), layout, exif_time_s: None };
-    let drawn = hzn_cli::overlay::draw_annotations(picture.to_rgb(), &report.drawing, report.title());
+    let drawn = draw(py, image, report, bits)?;
     let (width, height) = (drawn.width() as usize, drawn.height() as usize);
     Ok(Array3::from_shape_vec((height, width, 3), drawn.into_raw()).map_err(errors::image)?.into_pyarray(py))
+}
+
+/// A picture in colour with what the report stands on drawn over it.
+pub(crate) fn draw(py: Python<'_>, image: &Bound<'_, PyAny>, report: &Report, bits: Option<u8>) -> PyResult<RgbImage> {
+    let array = Array::of(image)?;
+    let picture = Picture { samples: array.to_samples(), layout: array.layout(bits)?, exif_time_s: None };
+    let (drawing, title) = (report.drawing_of_all(), report.title());
+    errors::detached(py, || hzn_cli::overlay::draw_annotations(picture.to_rgb(), &drawing, &title))
 }

@@ -1,23 +1,28 @@
-//! Results that were recorded, as columns.
+//! Recordings: results as columns, frames one after another, and shards of an archive.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use hzn_mcap::{Contents, Reader, Row};
+use hzn_core::camera::Camera as Lens;
+use hzn_mcap::{Contents, EncodedImage, FrameRecord, Reader, Row};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use serde_json::Value;
 
-use crate::errors::HznError;
+use crate::errors;
+use crate::report::Report;
+use crate::sensor::Sensor;
 
-/// Columns of an MCAP's results.
+#[doc = doc!("read_mcap")]
 #[pyfunction]
 pub(crate) fn read_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
-    let failed = |e: hzn_mcap::Error| HznError::new_err(e.to_string());
-    let rows = py.detach(|| {
+    let rows = errors::detached(py, || {
         let reader = Reader::open(&path, Contents::WithoutImages)?;
-        reader.map(|frame| frame.map(|f| f.row)).collect::<Result<Vec<Row>, _>>()
-    });
-    let rows: Vec<Value> = rows.map_err(failed)?.iter().map(|r| serde_json::to_value(r).unwrap_or_default()).collect();
+        reader.map(|frame| frame.map(|f| f.row)).collect::<Result<Vec<Row>, hzn_mcap::Error>>()
+    })?;
+    let rows = rows.map_err(errors::other)?;
+    let rows: Vec<Value> = rows.iter().map(|r| serde_json::to_value(r).unwrap_or_default()).collect();
     let numpy = py.import("numpy")?;
     let table = PyDict::new(py);
     for name in Row::COLUMNS {
@@ -35,4 +40,133 @@ pub(crate) fn read_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyD
         table.set_item(name, column)?;
     }
     Ok(table)
+}
+
+#[doc = doc!("open_mcap")]
+#[pyfunction]
+pub(crate) fn open_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
+    let reader = errors::detached(py, || Reader::open(&path, Contents::All))?.map_err(errors::other)?;
+    let text = reader.sensor_toml().map(str::to_owned);
+    let config = text.as_deref().and_then(|t| hzn_calib::sensor::parse(t, Path::new("sensor.toml")).ok());
+    Ok(Recording {
+        sensor_toml: text,
+        metadata: reader.metadata().clone(),
+        lens: config.and_then(|c| Lens::try_new(&c.config.camera).ok()).map(Arc::new),
+        open: Mutex::new(Some(Open { reader, ahead: None })),
+    })
+}
+
+#[doc = doc!("Recording")]
+#[pyclass(frozen, module = "hzn")]
+pub(crate) struct Recording {
+    sensor_toml: Option<String>,
+    metadata: BTreeMap<String, String>,
+    lens: Option<Arc<Lens<f64>>>,
+    open: Mutex<Option<Open>>,
+}
+
+struct Open {
+    reader: Reader,
+    /// The first record of the next frame.
+    ahead: Option<FrameRecord>,
+}
+
+impl Open {
+    /// The records of a frame, one a body.
+    fn next(&mut self) -> Result<Vec<FrameRecord>, hzn_mcap::Error> {
+        let mut records: Vec<FrameRecord> = self.ahead.take().into_iter().collect();
+        while let Some(record) = self.reader.next().transpose()? {
+            if records.first().is_some_and(|first| first.row.index != record.row.index) {
+                self.ahead = Some(record);
+                break;
+            }
+            records.push(record);
+        }
+        Ok(records)
+    }
+}
+
+#[pymethods]
+impl Recording {
+    #[doc = doc!("Recording.sensor_toml")]
+    #[getter]
+    fn sensor_toml(&self) -> Option<&str> {
+        self.sensor_toml.as_deref()
+    }
+    #[doc = doc!("Recording.metadata")]
+    #[getter]
+    fn metadata(&self) -> BTreeMap<String, String> {
+        self.metadata.clone()
+    }
+    #[doc = doc!("Recording.sensor")]
+    fn sensor(&self) -> PyResult<Sensor> {
+        let text = self.sensor_toml.as_deref().ok_or_else(|| errors::other("the recording holds no sensor.toml"))?;
+        let parsed = hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(errors::config)?;
+        Sensor::of(parsed.config, false)
+    }
+    #[doc = doc!("Recording.close")]
+    fn close(&self) {
+        *self.open.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Frame>> {
+        let records = errors::detached(py, || {
+            let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+            let open =
+                open.as_mut().ok_or_else(|| errors::other("the recording is closed; open_mcap opens it again"))?;
+            open.next().map_err(errors::other)
+        })??;
+        let Some(image) = records.first().map(|first| first.image.clone()) else { return Ok(None) };
+        let reports = records.into_iter().map(|r| Report::recorded(r, self.lens.clone()));
+        Ok(Some(Frame { image, report: Py::new(py, Report::of_bodies(py, reports)?)? }))
+    }
+    fn __enter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&self, _exception: &Bound<'_, pyo3::types::PyTuple>) {
+        self.close();
+    }
+}
+
+#[doc = doc!("Frame")]
+#[pyclass(frozen, module = "hzn")]
+pub(crate) struct Frame {
+    image: Option<EncodedImage>,
+    report: Py<Report>,
+}
+
+#[pymethods]
+impl Frame {
+    #[doc = doc!("Frame.image")]
+    #[getter]
+    fn image<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(image) = self.image.clone() else { return Ok(None) };
+        let decoded = errors::detached(py, || hzn_cli::input::recorded(image).decode(None))?;
+        crate::image::to_array(py, decoded.map_err(errors::image)?.0).map(Some)
+    }
+    #[doc = doc!("Frame.report")]
+    #[getter]
+    fn report(&self, py: Python<'_>) -> Py<Report> {
+        self.report.clone_ref(py)
+    }
+}
+
+/// Writes reports into a recording, replacing it.
+#[pyfunction]
+#[pyo3(name = "_write_mcap")]
+pub(crate) fn write_mcap(py: Python<'_>, path: PathBuf, sensor: &Sensor, reports: Vec<Py<Report>>) -> PyResult<()> {
+    let config = sensor.state().config.clone();
+    let frames: Vec<Vec<FrameRecord>> = reports.iter().map(|r| r.get().each().map(Report::record).collect()).collect();
+    errors::detached(py, || {
+        let sensor_toml = toml::to_string(&config).map_err(errors::other)?;
+        let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
+        let options = hzn_mcap::Options { sensor_toml, metadata, camera: Some(config.camera), force: true };
+        let mut writer = hzn_mcap::Writer::create(&path, &options).map_err(errors::other)?;
+        frames.iter().try_for_each(|bodies| writer.write_bodies(bodies)).map_err(errors::other)?;
+        writer.finish().map(drop).map_err(errors::other)
+    })?
 }

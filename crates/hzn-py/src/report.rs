@@ -1,69 +1,153 @@
 //! `hzn.Report`.
 
-use std::time::Duration;
+use std::sync::{Arc, OnceLock};
 
-use hzn_calib::FrameData;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use hzn_cli::engine::Trace;
-use hzn_core::{body, camera};
-use hzn_mcap::{Annotations, CandidateEdge, Row, RowMeta};
+use hzn_core::Solution;
+use hzn_core::camera::Camera;
+use hzn_core::pixel::ImagePoint;
+use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
 use numpy::ndarray::{Array2, arr1, arr2};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyWeakrefMethods, PyWeakrefReference};
 
-use crate::errors;
+use crate::{errors, parameters};
 
-/// What was found in one picture.
-#[pyclass(frozen, module = "hzn")]
+/// Longest side of a picture in a notebook, pixels.
+const SHOWN_PX: u32 = 960;
+
+#[doc = doc!("Report")]
+#[pyclass(frozen, module = "hzn", weakref)]
 pub(crate) struct Report {
-    row: Row,
+    pub(crate) row: Row,
     candidates: Vec<CandidateEdge>,
-    pub(crate) drawing: Annotations,
-    detail: bool,
+    lens: Option<Arc<Camera<f64>>>,
+    solution: Option<Solution<f64>>,
+    /// Edges and points, where they were asked for or recorded.
+    detail: Option<Detail>,
+    /// What is drawn; the limb in it takes longer to follow than the picture took.
+    drawing: OnceLock<Annotations>,
     stage: &'static str,
+    others: Vec<Py<Self>>,
+    /// The picture, as long as somebody else keeps it.
+    image: Option<Py<PyWeakrefReference>>,
+    bits: Option<u8>,
+}
+
+#[derive(Default)]
+struct Detail {
     stages_us: Vec<(&'static str, f64)>,
+    drawing: Annotations,
 }
 
 impl Report {
+    /// Of a picture that was processed.
     pub(crate) fn new(
+        row: Row,
         report: &hzn_core::Report<f64>,
-        trace: Option<Trace>,
-        lens: &camera::Camera<f64>,
-        body: &body::Config,
-        data: &FrameData,
-        elapsed: Duration,
+        trace: Option<&Trace>,
+        lens: &Arc<Camera<f64>>,
     ) -> Self {
-        let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
-        let altitude = data.position_km.and_then(at);
-        let meta = RowMeta {
-            time_s: data.time_s.unwrap_or(0.0),
-            body: hzn_mcap::body_name(body.kind).to_owned(),
-            altitude_km: altitude.or(data.altitude_km).or(body.altitude_km),
-            ..RowMeta::default()
-        };
-        let detail = trace.is_some();
-        let trace = trace.unwrap_or_default();
-        let us = |d: Duration| d.as_nanos() as f64 / 1e3;
+        let detail = trace.map(|trace| Detail {
+            stages_us: trace.times().into_iter().map(|(s, t)| (s.name(), t.as_nanos() as f64 / 1e3)).collect(),
+            drawing: hzn_cli::output::annotations(trace, report.solution.as_ref(), lens),
+        });
         Self {
-            row: Row::from_report(&meta, report, Some(us(elapsed))),
             candidates: CandidateEdge::from_report(report),
-            drawing: hzn_cli::output::annotations(&trace, report.solution.as_ref(), lens),
+            lens: Some(Arc::clone(lens)),
+            solution: report.solution,
             detail,
             stage: report.stage.name(),
-            stages_us: trace.times().into_iter().map(|(stage, t)| (stage.name(), us(t))).collect(),
+            ..Self::of_row(row)
         }
+    }
+
+    /// Of a row alone, such as that of a picture that could not be read.
+    pub(crate) fn of_row(row: Row) -> Self {
+        Self {
+            row,
+            candidates: Vec::new(),
+            lens: None,
+            solution: None,
+            detail: None,
+            drawing: OnceLock::new(),
+            stage: "",
+            others: Vec::new(),
+            image: None,
+            bits: None,
+        }
+    }
+
+    /// As a recording holds it.
+    pub(crate) fn recorded(record: FrameRecord, lens: Option<Arc<Camera<f64>>>) -> Self {
+        let drawing = record.annotations;
+        Self {
+            candidates: record.candidates,
+            lens,
+            detail: (!drawing.is_empty()).then(|| Detail { drawing, ..Detail::default() }),
+            ..Self::of_row(record.row)
+        }
+    }
+
+    /// The report of the first body, with those of the others.
+    pub(crate) fn of_bodies(py: Python<'_>, reports: impl IntoIterator<Item = Self>) -> PyResult<Self> {
+        let mut reports = reports.into_iter();
+        let first = reports.next().ok_or_else(|| errors::config("bodies: there is none"))?;
+        Ok(Self { others: reports.map(|r| Py::new(py, r)).collect::<PyResult<_>>()?, ..first })
+    }
+
+    /// Remembers its picture, without keeping it.
+    pub(crate) fn with_image(self, image: &Bound<'_, PyAny>, bits: Option<u8>) -> Self {
+        let image = PyWeakrefReference::new(image).ok().map(Bound::unbind);
+        Self { image, bits, ..self }
     }
 
     /// The first line of an overlay's legend.
-    pub(crate) fn title(&self) -> &'static str {
-        self.row.status.name()
+    pub(crate) fn title(&self) -> String {
+        if self.others.is_empty() {
+            return self.row.status.name().to_owned();
+        }
+        let each: Vec<String> = self.each().map(|r| format!("{} {}", r.row.body, r.row.status.name())).collect();
+        each.join(", ")
     }
 
-    fn need_detail(&self, what: &str) -> PyResult<()> {
-        if self.detail {
-            return Ok(());
+    /// This one and the others.
+    pub(crate) fn each(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.others.iter().map(Py::get))
+    }
+
+    pub(crate) fn drawing(&self) -> &Annotations {
+        self.drawing.get_or_init(|| {
+            if let Some(detail) = &self.detail {
+                return detail.drawing.clone();
+            }
+            let (Some(solution), Some(lens)) = (&self.solution, &self.lens) else { return Annotations::default() };
+            hzn_cli::output::annotations(&Trace::default(), Some(solution), lens)
+        })
+    }
+
+    /// What is drawn for all bodies.
+    pub(crate) fn drawing_of_all(&self) -> Annotations {
+        let mut all = Annotations::default();
+        self.each().for_each(|r| all.add(r.drawing().clone()));
+        all
+    }
+
+    /// As a recording takes it.
+    pub(crate) fn record(&self) -> FrameRecord {
+        FrameRecord {
+            candidates: self.candidates.clone(),
+            annotations: self.drawing().clone(),
+            ..FrameRecord::new(self.row.clone())
         }
-        Err(errors::HznError::new_err(format!("{what} are kept by process(image, detail=True) only")))
+    }
+
+    fn detail_of(&self, what: &str) -> PyResult<&Detail> {
+        let missing = || errors::other(format!("{what} are kept by process(image, detail=True) only"));
+        self.detail.as_ref().ok_or_else(missing)
     }
 }
 
@@ -72,36 +156,63 @@ fn vector<'py>(py: Python<'py>, xyz: [Option<f64>; 3]) -> Option<Bound<'py, PyAr
     Some(arr1(&[x, y, z]).to_pyarray(py))
 }
 
-fn points<'py>(py: Python<'py>, points: &[[f64; 2]]) -> Bound<'py, PyArray2<f64>> {
-    Array2::from_shape_fn((points.len(), 2), |(i, j)| points[i][j]).to_pyarray(py)
+fn table<'py, const N: usize>(py: Python<'py>, rows: &[[f64; N]]) -> Bound<'py, PyArray2<f64>> {
+    Array2::from_shape_fn((rows.len(), N), |(i, j)| rows[i][j]).to_pyarray(py)
 }
 
 #[pymethods]
 impl Report {
+    #[doc = doc!("Report.index")]
+    #[getter]
+    fn index(&self) -> u64 {
+        self.row.index
+    }
+    #[doc = doc!("Report.file")]
+    #[getter]
+    fn file(&self) -> &str {
+        &self.row.file
+    }
+    #[doc = doc!("Report.time_s")]
+    #[getter]
+    fn time_s(&self) -> f64 {
+        self.row.time_s
+    }
+    #[doc = doc!("Report.body")]
+    #[getter]
+    fn body(&self) -> &str {
+        &self.row.body
+    }
+    #[doc = doc!("Report.status")]
     #[getter]
     fn status(&self) -> &'static str {
         self.row.status.name()
     }
+    #[doc = doc!("Report.ok")]
     #[getter]
     fn ok(&self) -> bool {
         self.row.axis().is_some()
     }
+    #[doc = doc!("Report.stage")]
     #[getter]
     fn stage(&self) -> &'static str {
         self.stage
     }
+    #[doc = doc!("Report.detail")]
     #[getter]
     fn detail(&self) -> &str {
         &self.row.detail
     }
+    #[doc = doc!("Report.axis")]
     #[getter]
     fn axis<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.axis_x, self.row.axis_y, self.row.axis_z])
     }
+    #[doc = doc!("Report.axis_ecef")]
     #[getter]
     fn axis_ecef<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.axis_e_x, self.row.axis_e_y, self.row.axis_e_z])
     }
+    #[doc = doc!("Report.covariance")]
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let r = &self.row;
@@ -109,46 +220,72 @@ impl Report {
         let (yy, yz, zz) = (r.cov_yy?, r.cov_yz?, r.cov_zz?);
         Some(arr2(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).to_pyarray(py))
     }
+    #[doc = doc!("Report.sigma_max_deg")]
     #[getter]
     fn sigma_max_deg(&self) -> Option<f64> {
         self.row.sigma_max_deg
     }
+    #[doc = doc!("Report.half_angle_deg")]
     #[getter]
     fn half_angle_deg(&self) -> Option<f64> {
         self.row.half_angle_deg
     }
+    #[doc = doc!("Report.altitude_km")]
     #[getter]
     fn altitude_km(&self) -> Option<f64> {
         self.row.altitude_km
     }
+    #[doc = doc!("Report.altitude_est_km")]
     #[getter]
     fn altitude_est_km(&self) -> Option<f64> {
         self.row.altitude_est_km
     }
+    #[doc = doc!("Report.altitude_est_sigma_km")]
     #[getter]
     fn altitude_est_sigma_km(&self) -> Option<f64> {
         self.row.altitude_est_sigma_km
     }
+    #[doc = doc!("Report.rms_px")]
     #[getter]
     fn rms_px(&self) -> Option<f64> {
         self.row.rms_px
     }
+    #[doc = doc!("Report.roll_deg")]
+    #[getter]
+    fn roll_deg(&self) -> Option<f64> {
+        self.row.roll_deg
+    }
+    #[doc = doc!("Report.pitch_deg")]
+    #[getter]
+    fn pitch_deg(&self) -> Option<f64> {
+        self.row.pitch_deg
+    }
+    #[doc = doc!("Report.edge_points")]
     #[getter]
     fn edge_points(&self) -> Option<u32> {
         self.row.edge_points
     }
+    #[doc = doc!("Report.dropped")]
     #[getter]
     fn dropped(&self) -> Option<u32> {
         self.row.dropped
     }
+    #[doc = doc!("Report.level")]
     #[getter]
     fn level(&self) -> Option<u16> {
         self.row.level
     }
+    #[doc = doc!("Report.elapsed_us")]
     #[getter]
     fn elapsed_us(&self) -> Option<f64> {
         self.row.elapsed_us
     }
+    #[doc = doc!("Report.others")]
+    #[getter]
+    fn others(&self, py: Python<'_>) -> Vec<Py<Self>> {
+        self.others.iter().map(|r| r.clone_ref(py)).collect()
+    }
+    #[doc = doc!("Report.candidates")]
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let edge = |c: &CandidateEdge| {
@@ -162,53 +299,123 @@ impl Report {
         };
         self.candidates.iter().map(edge).collect()
     }
-    #[getter]
-    fn edges<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-        self.need_detail("edges")?;
-        Ok(self.drawing.edges.iter().map(|e| points(py, e)).collect())
-    }
-    #[getter]
-    fn inliers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.need_detail("inliers")?;
-        Ok(points(py, &self.drawing.inliers))
-    }
-    #[getter]
-    fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.need_detail("rejected points")?;
-        Ok(points(py, &self.drawing.rejected))
-    }
+    #[doc = doc!("Report.limb")]
     #[getter]
     fn limb<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray2<f64>>> {
-        self.drawing.limb.iter().map(|l| points(py, l)).collect()
+        self.drawing().limb.iter().map(|l| table(py, l)).collect()
     }
+    #[doc = doc!("Report.edges")]
+    #[getter]
+    fn edges<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        Ok(self.detail_of("edges")?.drawing.edges.iter().map(|e| table(py, e)).collect())
+    }
+    #[doc = doc!("Report.inliers")]
+    #[getter]
+    fn inliers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        Ok(table(py, &self.detail_of("inliers")?.drawing.inliers))
+    }
+    #[doc = doc!("Report.rejected")]
+    #[getter]
+    fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        Ok(table(py, &self.detail_of("rejected points")?.drawing.rejected))
+    }
+    #[doc = doc!("Report.rays")]
+    #[getter]
+    fn rays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let inliers = &self.detail_of("rays")?.drawing.inliers;
+        let lens = self.lens.as_ref().ok_or_else(|| errors::other("rays: the recording does not say its camera"))?;
+        let ray = |p: &[f64; 2]| lens.unproject(ImagePoint { u: p[0], v: p[1] }).map_or([f64::NAN; 3], |ray| ray.xyz());
+        Ok(table(py, &inliers.iter().map(ray).collect::<Vec<_>>()))
+    }
+    #[doc = doc!("Report.stages_us")]
     #[getter]
     fn stages_us<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.need_detail("times of the stages")?;
         let dict = PyDict::new(py);
-        for (name, us) in &self.stages_us {
+        for (name, us) in &self.detail_of("times of the stages")?.stages_us {
             dict.set_item(name, us)?;
         }
         Ok(dict)
     }
 
-    /// The row of a table of results.
+    #[doc = doc!("Report.to_dict")]
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let text = serde_json::to_string(&self.row).map_err(errors::config)?;
-        let dict = py.import("json")?.call_method1("loads", (text,))?;
-        for key in ["index", "file"] {
-            dict.call_method1("pop", (key,))?;
-        }
-        Ok(dict)
+        parameters::to_python(py, &self.row)
     }
 
     fn __repr__(&self) -> String {
         let r = &self.row;
         match (r.axis(), r.sigma_max_deg, r.inliers) {
             (Some([x, y, z]), Some(sigma), Some(inliers)) => format!(
-                "Report(ok, axis [{x:.6}, {y:.6}, {z:.6}], sigma {sigma:.4} deg, {inliers} inliers, rms {:.2} px)",
+                "Report({}, axis [{x:.6}, {y:.6}, {z:.6}], sigma {sigma:.4} deg, {inliers} inliers, rms {:.2} px)",
+                self.title(),
                 r.rms_px.unwrap_or(f64::NAN)
             ),
-            _ => format!("Report({}, {})", r.status.name(), r.detail),
+            _ => format!("Report({}: {})", self.title(), r.detail),
         }
     }
+
+    /// What a notebook shows: the numbers beside the picture with everything drawn on it.
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        let mut html = String::from("<div style=\"display:flex;gap:1em;align-items:start\">");
+        if let Some(image) = self.image.as_ref().and_then(|w| w.bind(py).upgrade()) {
+            let rgb = crate::overlay::draw(py, &image, self, self.bits)?;
+            let png = errors::detached(py, || png(&rgb))??;
+            html += &format!("<img style=\"max-width:60%\" src=\"data:image/png;base64,{}\">", STANDARD.encode(png));
+        }
+        html += "<table>";
+        for report in self.each() {
+            for (name, value) in report.shown() {
+                html += &format!("<tr><th style=\"text-align:left\">{name}</th><td>{}</td></tr>", escaped(&value));
+            }
+        }
+        Ok(html + "</table></div>")
+    }
+}
+
+impl Report {
+    /// Names and values of what a notebook shows.
+    fn shown(&self) -> Vec<(&'static str, String)> {
+        let r = &self.row;
+        let mut rows = vec![(
+            if r.body.is_empty() { "status" } else { "body, status" },
+            format!("{} {}", r.body, r.status.name()),
+        )];
+        if !r.detail.is_empty() {
+            rows.push(("detail", r.detail.clone()));
+        }
+        if let Some([x, y, z]) = r.axis() {
+            rows.push(("axis (camera)", format!("{x:.6}, {y:.6}, {z:.6}")));
+        }
+        let numbers = [
+            ("sigma", r.sigma_max_deg, 4, "°"),
+            ("half-angle, free", r.half_angle_deg, 4, "°"),
+            ("altitude, free", r.altitude_est_km, 1, "km"),
+            ("... its sigma", r.altitude_est_sigma_km, 1, "km"),
+            ("rms", r.rms_px, 2, "px"),
+            ("inliers", r.inliers.map(f64::from), 0, ""),
+            ("edge points", r.edge_points.map(f64::from), 0, ""),
+            ("time", r.elapsed_us, 0, "µs"),
+        ];
+        rows.extend(
+            numbers.into_iter().filter_map(|(n, v, digits, unit)| Some((n, format!("{:.digits$} {unit}", v?)))),
+        );
+        rows
+    }
+}
+
+fn png(picture: &image::RgbImage) -> PyResult<Vec<u8>> {
+    let (w, h) = picture.dimensions();
+    let small = (w.max(h) > SHOWN_PX).then(|| {
+        let scale = f64::from(SHOWN_PX) / f64::from(w.max(h));
+        let side = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
+        image::imageops::resize(picture, side(w), side(h), image::imageops::FilterType::Triangle)
+    });
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let shown = small.as_ref().unwrap_or(picture);
+    shown.write_to(&mut bytes, image::ImageFormat::Png).map_err(errors::other)?;
+    Ok(bytes.into_inner())
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -1,122 +1,108 @@
 //! `hzn.Sensor`.
 
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use hzn_calib::{FrameData, sensor};
-use hzn_cli::engine::{AnySensor, Processed, Traces};
-use hzn_core::{Config, body};
+use hzn_cli::engine::{AnySensor, Traces};
+use hzn_core::Config;
+use hzn_core::camera::Camera as Lens;
+use hzn_mcap::{Row, RowMeta};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::camera::Camera;
-use crate::errors;
-use crate::image::Array;
+use crate::image::{Array, View};
 use crate::report::Report;
+use crate::{errors, parameters};
 
 /// What pickle calls, and with what.
 type Pickled = (Py<PyAny>, (Py<PyAny>, bool));
 
-/// A horizon sensor.
+#[doc = doc!("Sensor")]
 #[pyclass(frozen, module = "hzn")]
 pub(crate) struct Sensor {
-    config: Config,
-    flight: bool,
+    state: RwLock<Arc<State>>,
+}
+
+/// A configuration that was accepted, and what was made of it.
+pub(crate) struct State {
+    pub(crate) config: Config,
+    pub(crate) flight: bool,
+    pub(crate) lens: Arc<Lens<f64>>,
     /// Sensors at rest: each call takes one or makes one, so that threads never wait for each other.
     idle: Mutex<Vec<AnySensor>>,
 }
 
-impl Sensor {
-    fn of(sensor: Result<hzn_calib::Sensor, hzn_calib::Problem>, flight: bool) -> PyResult<Self> {
-        Ok(Self { config: sensor.map_err(errors::config)?.config, flight, idle: Mutex::new(Vec::new()) })
+impl State {
+    fn of(config: Config, flight: bool) -> PyResult<Arc<Self>> {
+        let lens = Arc::new(Lens::try_new(&config.camera).map_err(errors::config)?);
+        Ok(Arc::new(Self { config, flight, lens, idle: Mutex::default() }))
     }
 
-    fn take(&self) -> PyResult<AnySensor> {
-        let idle = self.idle.lock().ok().and_then(|mut idle| idle.pop());
-        match idle {
-            Some(sensor) => Ok(sensor),
-            None => AnySensor::new(&self.config, self.flight).map_err(errors::config),
-        }
-    }
-
-    /// A report of each body, in order.
-    fn look(
-        &self,
-        py: Python<'_>,
-        image: &Bound<'_, PyAny>,
-        data: &FrameData,
-        bits: Option<u8>,
-        detail: bool,
-    ) -> PyResult<Vec<Report>> {
-        let array = Array::of(image)?;
-        let layout = array.layout(bits)?;
-        let camera = &self.config.camera;
-        let (width, height) = array.size();
-        if (width, height) != (usize::from(camera.width), usize::from(camera.height)) {
-            return Err(errors::image(format!(
-                "the picture is {width} x {height} px (shape ({height}, {width})), but the camera is {} x {}",
-                camera.width, camera.height
-            )));
-        }
-        let samples = array.samples();
-        let view = samples.view(layout, self.config.input.channel)?;
-        let bodies = self.config.each_body();
-        let mut sensor = self.take()?;
-        let (processed, traces, sensor) = py.detach(move || {
-            let traces = detail.then(|| Traces::new(bodies.len()));
-            (sensor.process(&view, Some(data), traces.as_ref()), traces, sensor)
-        });
-        let lens = sensor.camera().clone();
-        self.give_back(sensor);
-        let mut traces = traces.map(|t| t.each).unwrap_or_default().into_iter();
-        let report = |(processed, body): (Processed, &body::Config)| {
-            let trace = traces.next();
-            let report = processed.report.map_err(errors::config)?;
-            Ok(Report::new(&report, trace, &lens, body, data, processed.elapsed))
+    /// Lends a sensor to `work`. One in which something panicked does not come back.
+    pub(crate) fn lend<T>(&self, work: impl FnOnce(&mut AnySensor) -> T) -> PyResult<T> {
+        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut sensor = match idle {
+            Some(sensor) => sensor,
+            None => AnySensor::new(&self.config, self.flight).map_err(errors::config)?,
         };
-        processed.into_iter().zip(bodies).map(report).collect()
+        let done = work(&mut sensor);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(sensor);
+        Ok(done)
+    }
+}
+
+impl Sensor {
+    pub(crate) fn of(config: Config, flight: bool) -> PyResult<Self> {
+        Ok(Self { state: RwLock::new(State::of(config, flight)?) })
     }
 
-    fn give_back(&self, sensor: AnySensor) {
-        if let Ok(mut idle) = self.idle.lock() {
-            idle.push(sensor);
-        }
+    /// As it is now: a change of the parameters leaves calls under way alone.
+    pub(crate) fn state(&self) -> Arc<State> {
+        Arc::clone(&self.state.read().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 #[pymethods]
 impl Sensor {
     #[new]
-    #[pyo3(signature = (parameters, *, flight = false))]
-    fn new(parameters: &Bound<'_, PyDict>, flight: bool) -> PyResult<Self> {
-        let json = parameters.py().import("json")?.call_method1("dumps", (parameters,));
-        let json: String = json.map_err(|e| errors::config(format!("parameters: {e}")))?.extract()?;
-        let value: serde_json::Value = serde_json::from_str(&json)
-            .map_err(|_| errors::config("parameters: hold a number that is not finite; leave it out"))?;
-        let text = toml::to_string(&without_null(value)).map_err(errors::config)?;
-        Self::of(sensor::parse(&text, Path::new("parameters")), flight)
+    #[pyo3(signature = (*, flight = false, **sections))]
+    fn new(py: Python<'_>, flight: bool, sections: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let none = PyDict::new(py);
+        Self::of(parameters::config(sections.unwrap_or(&none))?, flight)
     }
 
+    #[doc = doc!("Sensor.from_toml")]
     #[staticmethod]
     #[pyo3(signature = (path, *, flight = false))]
     fn from_toml(path: PathBuf, flight: bool) -> PyResult<Self> {
-        Self::of(sensor::load(&path), flight)
+        Self::of(sensor::load(&path).map_err(errors::config)?.config, flight)
     }
 
+    #[doc = doc!("Sensor.parameters")]
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let text = serde_json::to_string(&self.config).map_err(errors::config)?;
-        py.import("json")?.call_method1("loads", (text,))
+        parameters::to_python(py, &self.state().config)
     }
+    #[setter]
+    fn set_parameters(&self, sections: &Bound<'_, PyDict>) -> PyResult<()> {
+        let state = State::of(parameters::config(sections)?, self.flight())?;
+        *self.state.write().unwrap_or_else(PoisonError::into_inner) = state;
+        Ok(())
+    }
+    #[doc = doc!("Sensor.camera")]
     #[getter]
     fn camera(&self) -> PyResult<Camera> {
-        Camera::of(self.config.camera.clone())
+        Camera::of(self.state().config.camera.clone())
     }
+    #[doc = doc!("Sensor.flight")]
     #[getter]
     fn flight(&self) -> bool {
-        self.flight
+        self.state().flight
     }
 
+    #[doc = doc!("Sensor.process")]
     #[pyo3(signature = (image, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
                         time_s = None, bits = None, detail = false))]
     fn process(
@@ -131,53 +117,83 @@ impl Sensor {
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<Report> {
-        if self.config.each_body().len() > 1 {
-            return Err(errors::config("bodies: several are looked for; process_each(...) gives a report of each"));
-        }
         let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?;
-        let mut reports = self.look(py, image, &data, bits, detail)?;
-        reports.pop().ok_or_else(|| errors::config("bodies: there is none"))
+        let state = self.state();
+        let array = Array::of(image)?;
+        let camera = &state.config.camera;
+        let (width, height) = array.size();
+        if (width, height) != (usize::from(camera.width), usize::from(camera.height)) {
+            return Err(errors::image(format!(
+                "the picture is {width} x {height} px (shape ({height}, {width})), but the camera is {} x {}",
+                camera.width, camera.height
+            )));
+        }
+        let view = array.view(bits, state.config.input.channel)?;
+        let bodies = state.config.each_body();
+        let (processed, traces) = errors::detached(py, || {
+            let traces = detail.then(|| Traces::new(bodies.len()));
+            let processed = state.lend(|sensor| match &view {
+                View::Packed(view) => sensor.process(view, Some(&data), traces.as_ref()),
+                View::Strided(view) => sensor.process_pixels(view, Some(&data), traces.as_ref()),
+            });
+            processed.map(|p| (p, traces))
+        })??;
+        let traces = traces.map(|t| t.each).unwrap_or_default();
+        let report = |(which, (processed, body)): (usize, (hzn_cli::engine::Processed, &hzn_core::body::Config))| {
+            let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
+            let meta = RowMeta {
+                time_s: data.time_s.unwrap_or(0.0),
+                body: hzn_mcap::body_name(body.kind).to_owned(),
+                altitude_km: data.position_km.and_then(at).or(data.altitude_km).or(body.altitude_km),
+                ..RowMeta::default()
+            };
+            let found = processed.report.map_err(errors::config)?;
+            let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
+            let row = Row::from_report(&meta, &found, Some(elapsed_us));
+            Ok(Report::new(row, &found, traces.get(which), &state.lens))
+        };
+        let reports: Vec<Report> =
+            processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<_>>()?;
+        Ok(Report::of_bodies(py, reports)?.with_image(image, bits))
     }
 
-    #[pyo3(signature = (image, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
-                        time_s = None, bits = None, detail = false))]
-    fn process_each(
-        &self,
-        py: Python<'_>,
-        image: &Bound<'_, PyAny>,
-        altitude_km: Option<f64>,
-        position_km: Option<[f64; 3]>,
-        attitude: Option<[f64; 4]>,
-        attitude_sigma_deg: Option<f64>,
-        time_s: Option<f64>,
-        bits: Option<u8>,
-        detail: bool,
-    ) -> PyResult<Vec<Report>> {
-        let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?;
-        self.look(py, image, &data, bits, detail)
+    #[doc = doc!("Sensor.process_many")]
+    #[pyo3(signature = (images, *, jobs = None, progress = false))]
+    fn process_many<'py>(
+        slf: &Bound<'py, Self>,
+        images: &Bound<'py, PyAny>,
+        jobs: Option<usize>,
+        progress: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let tracks = slf.get().state().config.tracks();
+        let many = slf.py().import("hzn._many")?.getattr("process_many")?;
+        // One after another, where a picture's level comes from the one before.
+        many.call1((slf, images, if tracks { Some(1) } else { jobs }, progress))
     }
 
     fn __repr__(&self) -> String {
-        let c = &self.config.camera;
-        let bodies: Vec<&str> = self.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
+        let state = self.state();
+        let c = &state.config.camera;
+        let bodies: Vec<&str> = state.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
         format!("Sensor({} x {} px, {}, {})", c.width, c.height, c.model.name(), bodies.join(", "))
     }
     fn __eq__(&self, other: &Self) -> bool {
-        self.config == other.config && self.flight == other.flight
+        let (a, b) = (self.state(), other.state());
+        a.config == b.config && a.flight == b.flight
     }
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Pickled> {
         let this = slf.get();
         let make = slf.get_type().getattr("_of")?.unbind();
-        Ok((make, (this.parameters(slf.py())?.unbind(), this.flight)))
+        Ok((make, (this.parameters(slf.py())?.unbind(), this.flight())))
     }
     #[staticmethod]
-    fn _of(parameters: &Bound<'_, PyDict>, flight: bool) -> PyResult<Self> {
-        Self::new(parameters, flight)
+    fn _of(sections: &Bound<'_, PyDict>, flight: bool) -> PyResult<Self> {
+        Self::of(parameters::config(sections)?, flight)
     }
 }
 
 /// What is known about a picture, checked as far as the core cannot.
-fn known(
+pub(crate) fn known(
     altitude_km: Option<f64>,
     position_km: Option<[f64; 3]>,
     attitude: Option<[f64; 4]>,
@@ -200,17 +216,4 @@ fn known(
         attitude_sigma_deg,
         ..FrameData::default()
     })
-}
-
-/// JSON has null where TOML leaves a key out.
-fn without_null(value: serde_json::Value) -> serde_json::Value {
-    match value {
-        serde_json::Value::Object(map) => map
-            .into_iter()
-            .filter(|(_, v)| !v.is_null())
-            .map(|(k, v)| (k, without_null(v)))
-            .collect::<serde_json::Map<_, _>>()
-            .into(),
-        other => other,
-    }
 }

@@ -23,3 +23,23 @@ def statuses(path: str) -> dict[str, int]:
     table = hzn.read_mcap(path)
     names, counts = np.unique(table["status"], return_counts=True)
     return dict(zip(names.tolist(), counts.tolist(), strict=True))
+
+
+def sequence(folder: str) -> list[str]:
+    sensor = hzn.Sensor(camera=hzn.Camera.from_opencv(np.eye(3), size=(4, 4)), preset="sun")
+    sensor.parameters = {**sensor.parameters, "reject": {"seed": 2}}
+    known = [(np.zeros((4, 4), np.uint8), {"altitude_km": 3.0})]
+    found: list[str] = [r.status for images in (folder, known) for r in sensor.process_many(images, jobs=2)]
+    with hzn.open_mcap("flight.mcap") as recording:
+        for frame in recording:
+            if frame.image is not None and frame.report.axis is not None:
+                found.append(f"{frame.image.shape} {frame.report.axis[0]}")
+    return found
+
+
+def simulated() -> float:
+    flight = hzn.simulate("horace", frames=3)
+    reports = [flight.sensor.process(frame.image, **frame.known) for frame in flight]
+    result = hzn.evaluate(reports, flight)
+    table = hzn.sensitivity(altitude_km=[100.0, 200.0])
+    return float(result["evaluations"][0]["answered"]) + float(table["pitch_free_deg"][0])

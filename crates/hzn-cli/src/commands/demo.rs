@@ -164,7 +164,7 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
 
 /// Results beside the truth.
 fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
-    let answers: Vec<_> = rows.iter().map(evaluate::answer).collect();
+    let answers: Vec<_> = rows.iter().map(crate::output::answer).collect();
     let cases = pair(&answers, truth, None).map_err(failed)?;
     let mut out = String::from("Rendered rocket flight, against the truth\n");
     let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));

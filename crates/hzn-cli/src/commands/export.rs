@@ -122,10 +122,10 @@ fn picture_name(name: &str, ending: &str) -> String {
 }
 
 /// Rows, one after the other.
-type AllRows = Box<dyn Iterator<Item = Result<Row, Stop>>>;
+pub(crate) type AllRows = Box<dyn Iterator<Item = Result<Row, Stop>>>;
 
 /// Rows of a table of results. What an unfinished one (`.part`) ends with in the middle of a row is left out.
-pub(super) fn rows(file: &Path, kind: &str) -> Result<AllRows, Stop> {
+pub(crate) fn rows(file: &Path, kind: &str) -> Result<AllRows, Stop> {
     let name = file.display().to_string();
     let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
     match kind {

@@ -6,7 +6,7 @@ use hzn_calib::Frames;
 use hzn_core::status::Status;
 use hzn_mcap::Row;
 
-use crate::engine::{self, End, Finished, Plan};
+use crate::engine::{self, AnySensor, End, Finished, Plan};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::input::{Source, ending};
 use crate::output::{self, Existing, Held, Output};
@@ -185,7 +185,8 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
         // It would come out differently without the pictures before it.
         return Ok(());
     }
-    let here = engine::one(&Plan { overlay: None, ..plan.clone() }, there.index, item)?;
+    let mut sensor = AnySensor::new(&plan.config, plan.flight).map_err(usage)?;
+    let here = engine::one(&Plan { overlay: None, ..plan.clone() }, &mut sensor, there.index, item)?;
     let Some(here) = output::rows(&here, &plan.config).pop() else { return Ok(()) };
     let here = Row { elapsed_us: there.elapsed_us, ..here };
     if here != *there {

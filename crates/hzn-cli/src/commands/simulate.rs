@@ -6,12 +6,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
 use hzn_sim::scenario::{BUILTIN, Fit, Format};
-use hzn_sim::{Flight, FlightFrame, Scenario, ScenarioError};
+use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::output;
 use crate::progress::Progress;
+use crate::scene;
 use crate::setup::stop_flag;
 use crate::tell;
 
@@ -65,10 +66,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let name = args.scene.as_deref().unwrap_or_default();
     if args.show {
-        tell::result(format_args!("{}\n", source(name)?.1.trim_end()))?;
+        tell::result(format_args!("{}\n", scene::source(name)?.1.trim_end()))?;
         return Ok(Exit::Done);
     }
-    let scenario = load(name, args)?;
+    let scenario = scene::load(name, args.frames, args.seed)?;
     let folder = args.output.clone().unwrap_or_default();
     let text = toml::to_string(&scenario).map_err(failed)?;
     let scene_toml = folder.join("scene.toml");
@@ -86,7 +87,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{}: {what}", folder.display())));
     }
     // Everything that can be wrong with the scene is said before anything is written.
-    let flight = scenario.flight().map_err(|e| refused(name, &e))?;
+    let flight = scenario.flight().map_err(|e| scene::refused(name, &e))?;
     std::fs::create_dir_all(&folder).map_err(|e| output::cannot(&folder, &e))?;
     write(&scene_toml, &text)?;
     let sensor_toml = folder.join("sensor.toml");
@@ -101,44 +102,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(end)
 }
 
-/// Path and text of a scene.
-fn source(name: &str) -> Result<(PathBuf, String), Stop> {
-    if let Some((_, _, text)) = BUILTIN.iter().find(|b| b.0 == name) {
-        return Ok((PathBuf::from(name), (*text).to_owned()));
-    }
-    let path = PathBuf::from(name);
-    let text = std::fs::read_to_string(&path).map_err(|e| {
-        let names: Vec<&str> = BUILTIN.iter().map(|b| b.0).collect();
-        match hzn_calib::nearest(name, names.iter().copied()) {
-            Some(near) if !path.exists() => usage(format!("{name}: no such scene or file; did you mean {near}?")),
-            _ if !path.exists() => usage(format!("{name}: no such file; built-in scenes are {}", names.join(", "))),
-            _ => output::cannot(&path, &e),
-        }
-    })?;
-    Ok((path, text))
-}
-
-fn load(name: &str, args: &Args) -> Result<Scenario, Stop> {
-    let (path, text) = source(name)?;
-    let pair = |e: ScenarioError| (e.field, e.what);
-    let mut scenario: Scenario =
-        hzn_calib::document::parse(&text, &path, |s: &Scenario| s.check().map_err(pair)).map_err(Stop::from)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    scenario.read_files(folder).map_err(|e| refused(name, &e))?;
-    if let Some(frames) = args.frames {
-        scenario.capture.frames = frames;
-    }
-    if let Some(seed) = args.seed {
-        scenario.seed = seed;
-    }
-    scenario.check().map_err(|e| refused(name, &e))?;
-    Ok(scenario)
-}
-
-fn refused(name: &str, error: &ScenarioError) -> Stop {
-    usage(format!("{name}: {error}"))
-}
-
 fn write(path: &Path, text: &str) -> Result<(), Stop> {
     std::fs::write(path, text).map_err(|e| output::cannot(path, &e))
 }
@@ -150,7 +113,7 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
     }
     let progress = Mutex::new(Progress::new(Some(MEASURED.into()), 0, quiet));
     let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count(Status::Ok)).unwrap_or(());
-    let fit = Fit::measure(scenario, MEASURED, &seen).map_err(|e| refused(name, &e))?;
+    let fit = Fit::measure(scenario, MEASURED, &seen).map_err(|e| scene::refused(name, &e))?;
     if let Ok(p) = progress.into_inner() {
         p.summary();
     }

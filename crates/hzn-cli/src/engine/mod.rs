@@ -194,9 +194,9 @@ pub fn run(
 /// Processes one frame by itself, as [`run`] would.
 ///
 /// # Errors
-/// The sensor's configuration is refused, or an overlay cannot be written.
-pub fn one(plan: &Plan, index: u64, item: Item) -> anyhow::Result<Finished> {
-    process(plan, &mut AnySensor::new(&plan.config, plan.flight)?, Job { index, item })
+/// An overlay cannot be written.
+pub fn one(plan: &Plan, sensor: &mut AnySensor, index: u64, item: Item) -> anyhow::Result<Finished> {
+    process(plan, sensor, Job { index, item })
 }
 
 fn write_in_order(

@@ -7,7 +7,7 @@ use hzn_core::body::{self, FrameError};
 use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
 use hzn_core::frames::{Cov3, Ecef, UnitVec3};
-use hzn_core::image::ImageView;
+use hzn_core::image::{ImageView, Pixels};
 use hzn_core::pipeline::Candidate;
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report, Solution};
@@ -65,9 +65,25 @@ impl AnySensor {
         data: Option<&FrameData>,
         traces: Option<&Traces>,
     ) -> Vec<Processed> {
+        // Each kind of picture has its own compiled pipeline; behind the enum every pixel would cost a branch.
+        match view {
+            ImageView::Grey8(p) => self.process_pixels(p, data, traces),
+            ImageView::Grey16(p) => self.process_pixels(p, data, traces),
+            ImageView::Colour8(p) => self.process_pixels(p, data, traces),
+            ImageView::Colour16(p) => self.process_pixels(p, data, traces),
+        }
+    }
+
+    /// As [`Self::process`], of a kind of picture of the caller's own.
+    pub fn process_pixels<P: Pixels>(
+        &mut self,
+        picture: &P,
+        data: Option<&FrameData>,
+        traces: Option<&Traces>,
+    ) -> Vec<Processed> {
         let mut processed = match &mut self.kind {
-            Kind::Host(h) => run(h, view, data, traces),
-            Kind::Flight(h) => run(h, view, data, traces),
+            Kind::Host(h) => run(h, picture, data, traces),
+            Kind::Flight(h) => run(h, picture, data, traces),
         };
         for (&body, processed) in self.bodies.iter().zip(&mut processed) {
             if let (Ok(Report { solution: Some(solution), .. }), Some(direction)) =
@@ -111,31 +127,20 @@ fn frame<T: Real>(data: Option<&FrameData>) -> Frame<T> {
     data.map(|d| d.to_frame(None)).unwrap_or_default()
 }
 
-fn run<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+fn run<P: Pixels, T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
-    view: &ImageView<'_>,
+    picture: &P,
     data: Option<&FrameData>,
     traces: Option<&Traces>,
 ) -> Vec<Processed> {
     let bodies = horizon.config().each_body().len();
     let expected: Vec<_> = (0..bodies).map(|which| horizon.expect_body(which, &frame(data))).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
-    // Each kind of picture has its own compiled pipeline; behind the enum every pixel would cost a branch.
-    macro_rules! observed {
-        ($observer:expr) => {
-            match view {
-                ImageView::Grey8(p) => horizon.process_each_observed(p, &known, $observer),
-                ImageView::Grey16(p) => horizon.process_each_observed(p, &known, $observer),
-                ImageView::Colour8(p) => horizon.process_each_observed(p, &known, $observer),
-                ImageView::Colour16(p) => horizon.process_each_observed(p, &known, $observer),
-            }
-        };
-    }
     let (reports, times) = match traces {
-        Some(traces) => (observed!(traces), traces.clock.times()),
+        Some(traces) => (horizon.process_each_observed(picture, &known, traces), traces.clock.times()),
         None => {
             let clock = Clock::default();
-            (observed!(&clock), clock.times())
+            (horizon.process_each_observed(picture, &known, &clock), clock.times())
         }
     };
     let mut done = reports.iter().zip(times);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_mcap::{Contents, Options, Reader, part_path};
 
-pub use record::{annotations, limb_lines, records, rows};
+pub use record::{annotations, answer, limb_lines, records, rows};
 
 use crate::engine::{Finished, Sink};
 use crate::exit::{Stop, failed, usage};
@@ -280,6 +280,25 @@ impl Rows {
     pub fn finish(self) -> Result<(), Stop> {
         let Self { text, path } = self;
         text.finish().map_err(|e| cannot(&path, &e))
+    }
+}
+
+/// Rows of results, and the sensor.toml that an MCAP holds.
+///
+/// # Errors
+/// No such file, none of `hzn run`, or a broken one.
+pub fn read(file: &Path) -> Result<(Vec<hzn_mcap::Row>, Option<String>), Stop> {
+    if !file.is_file() {
+        return Err(usage(format!("{}: no such file", file.display())));
+    }
+    match ending(file).as_str() {
+        "mcap" => {
+            let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
+            let rows = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
+            Ok((rows, reader.sensor_toml().map(str::to_owned)))
+        }
+        kind @ ("csv" | "jsonl") => Ok((crate::commands::rows(file, kind)?.collect::<Result<_, _>>()?, None)),
+        _ => Err(usage(format!("{}: results of `hzn run` are expected: .mcap, .csv or .jsonl", file.display()))),
     }
 }
 

@@ -2,10 +2,12 @@
 
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
+use hzn_core::status::Status;
 use hzn_core::{Config, Solution, body};
 use hzn_mcap::{
     Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, Row, RowMeta,
 };
+use hzn_sim::evaluate;
 
 use crate::engine::{Finished, Found, Trace};
 use crate::overlay::limb;
@@ -52,6 +54,19 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
         }
     }
     records
+}
+
+/// A row as the evaluation takes it.
+pub fn answer(row: &Row) -> evaluate::Answer {
+    let covariance =
+        || -> Option<[f64; 6]> { Some([row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?]) };
+    let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| evaluate::Found {
+        axis,
+        // Without a covariance the error still counts, its honesty does not.
+        covariance_rad2: covariance().unwrap_or_default(),
+        half_angle_deg: row.half_angle_deg,
+    });
+    evaluate::Answer { file: row.file.clone(), time_s: row.time_s, body: row.body.clone(), status: row.status, found }
 }
 
 /// What is drawn over a picture.

@@ -8,26 +8,20 @@ Everything is in the camera frame (x right, y down, z forward) unless its name s
 integers, as in OpenCV. Names end with their unit.
 """
 
-from ._hzn import (
-    Camera,
-    ConfigError,
-    HznError,
-    ImageError,
-    Report,
-    Sensor,
-    __version__,
-    overlay,
-    read_mcap,
-)
-
-__all__ = [
-    "Camera",
-    "ConfigError",
-    "HznError",
-    "ImageError",
-    "Report",
-    "Sensor",
-    "__version__",
-    "overlay",
-    "read_mcap",
-]
+from ._hzn import Camera as Camera
+from ._hzn import ConfigError as ConfigError
+from ._hzn import Frame as Frame
+from ._hzn import HznError as HznError
+from ._hzn import ImageError as ImageError
+from ._hzn import Recording as Recording
+from ._hzn import Report as Report
+from ._hzn import Sensor as Sensor
+from ._hzn import SimulatedFrame as SimulatedFrame
+from ._hzn import Simulation as Simulation
+from ._hzn import __version__ as __version__
+from ._hzn import open_mcap as open_mcap
+from ._hzn import overlay as overlay
+from ._hzn import read_mcap as read_mcap
+from ._simulation import evaluate as evaluate
+from ._simulation import sensitivity as sensitivity
+from ._simulation import simulate as simulate

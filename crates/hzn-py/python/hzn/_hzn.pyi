@@ -1,11 +1,12 @@
-"""Classes over the sensor that the command line has too."""
+"""Classes over the sensor that the command line has too. Their docstrings are written here, and compiled into the module."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
+from types import TracebackType
 from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 _Path: TypeAlias = str | PathLike[str]
 _Image: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]
@@ -19,18 +20,6 @@ _Status: TypeAlias = Literal[
     "rejected",
     "truncated",
     "unreadable",
-]
-
-__all__ = [
-    "Camera",
-    "ConfigError",
-    "HznError",
-    "ImageError",
-    "Report",
-    "Sensor",
-    "__version__",
-    "overlay",
-    "read_mcap",
 ]
 
 __version__: str
@@ -48,9 +37,12 @@ class ImageError(HznError):
 class Camera:
     """A lens: from directions to pixels and back.
 
-    Directions are in the camera frame (x right, y down, z forward); pixel centres are at integers.
+    Directions are in the camera frame (x right, y down, z forward); pixel centres are at integers, as in OpenCV.
+    ``Camera(width=..., height=..., model=..., fx_px=..., fy_px=..., cx_px=..., cy_px=..., k=[...])`` takes the keys of
+    ``[camera]`` in sensor.toml.
     """
 
+    def __new__(cls, **keys: Any) -> Camera: ...
     @staticmethod
     def from_toml(path: _Path) -> Camera:
         """Read ``[camera]`` of a sensor.toml.
@@ -67,6 +59,8 @@ class Camera:
 
         Parameters
         ----------
+        path
+            The YAML file.
         camera
             Which camera of the chain, such as ``"cam1"``; without it the first.
 
@@ -77,14 +71,35 @@ class Camera:
         """
 
     @staticmethod
-    def from_opencv(path: _Path) -> Camera:
-        """Read OpenCV's calibration YAML.
+    def from_opencv(
+        source: _Path | ArrayLike,
+        distortion: ArrayLike | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        fisheye: bool = False,
+    ) -> Camera:
+        """Take an OpenCV calibration: its YAML file, or camera matrix and coefficients.
+
+        Parameters
+        ----------
+        source
+            Path of the YAML file, or the camera matrix K, shape (3, 3), pixels.
+        distortion
+            D: 4 or 5 coefficients k1, k2, p1, p2, k3; with ``fisheye`` k1 to k4. Without it an ideal pinhole.
+        size
+            Width and height of the picture, pixels; K does not say it.
+        fisheye
+            K and D are of ``cv2.fisheye``.
 
         Raises
         ------
         ConfigError
-            A file or a lens that is not known.
+            A file or a lens that is not known; which argument.
         """
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The keys of ``[camera]`` in sensor.toml. A copy."""
 
     @property
     def width(self) -> int:
@@ -106,7 +121,7 @@ class Camera:
     def k(self) -> list[float]:
         """Coefficients of the lens, as sensor.toml has them."""
 
-    def project(self, rays: NDArray[np.float64]) -> NDArray[np.float64]:
+    def project(self, rays: ArrayLike) -> NDArray[np.float64]:
         """Pixels of directions.
 
         Parameters
@@ -118,9 +133,14 @@ class Camera:
         -------
         numpy.ndarray
             Points (u, v) in pixels, shape (n, 2); NaN where the lens does not see.
+
+        Raises
+        ------
+        ImageError
+            Another shape.
         """
 
-    def unproject(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unproject(self, points: ArrayLike) -> NDArray[np.float64]:
         """Directions of pixels.
 
         Parameters
@@ -132,6 +152,50 @@ class Camera:
         -------
         numpy.ndarray
             Unit vectors in the camera frame, shape (n, 3); NaN outside of the image circle.
+
+        Raises
+        ------
+        ImageError
+            Another shape.
+        """
+
+    def undistort_points(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Points on the plane z = 1, as ``cv2.undistortPoints`` and ``cv2.fisheye.undistortPoints`` give them.
+
+        Parameters
+        ----------
+        points
+            Points (u, v) in pixels, shape (n, 2).
+
+        Returns
+        -------
+        numpy.ndarray
+            (x / z, y / z) of their rays, shape (n, 2); NaN outside of the image circle and from 90 degrees off axis on,
+            where there is no such point: `unproject` has no such limit.
+
+        Raises
+        ------
+        ImageError
+            Another shape.
+        """
+
+    def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Derivatives of the unit rays by (u, v).
+
+        Parameters
+        ----------
+        points
+            Points (u, v) in pixels, shape (n, 2).
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (n, 3, 2), radians a pixel: rows x, y, z of the ray, columns u, v. NaN outside of the image circle.
+
+        Raises
+        ------
+        ImageError
+            Another shape.
         """
 
     def __eq__(self, other: object, /) -> bool: ...
@@ -140,25 +204,19 @@ class Camera:
 class Sensor:
     """A horizon sensor.
 
-    One sensor may be used from many threads at once: the answers are the same as from one.
+    ``Sensor(camera=..., body=..., preset=...)`` takes the sections of a sensor.toml as dictionaries; for ``camera`` a
+    `Camera` will do, and only it must be there. ``preset`` is ``"hzn"``, ``"dlr-2022"``, ``"zju-2022"``,
+    ``"horace-2015"``, ``"sun"`` or ``"moon"``. ``flight=True`` calculates in single precision with 2048 points, as on the
+    flight computer. A key or value that is refused is a `ConfigError` with its name and limit.
+
+    One sensor may be used from many threads at once: the answers are the same as from one. It can be copied and pickled.
+
+    Examples
+    --------
+    >>> sensor = hzn.Sensor(camera=hzn.Camera.from_kalibr("camchain.yaml"), body={"altitude_km": 230.0})
     """
 
-    def __new__(cls, parameters: Mapping[str, Any], *, flight: bool = False) -> Sensor:
-        """Make a sensor of the sections and keys of a sensor.toml.
-
-        Parameters
-        ----------
-        parameters
-            As `Sensor.parameters` gives them; only ``camera`` must be there.
-        flight
-            Single precision and 2048 points, as on the flight computer.
-
-        Raises
-        ------
-        ConfigError
-            The first key or value that is refused, with its limit.
-        """
-
+    def __new__(cls, *, flight: bool = False, **sections: Any) -> Sensor: ...
     @staticmethod
     def from_toml(path: _Path, *, flight: bool = False) -> Sensor:
         """Read a sensor.toml.
@@ -171,8 +229,20 @@ class Sensor:
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Every parameter, as sections and keys of sensor.toml. A copy: make another sensor of it to change one."""
+        """Every parameter, as sections and keys of sensor.toml.
 
+        What is read is a copy: change it and set it again. A set that is refused (`ConfigError`) leaves everything as it
+        was; calls under way in other threads end with the parameters that they began with.
+
+        Examples
+        --------
+        >>> parameters = sensor.parameters
+        >>> parameters["reject"]["threshold_px"] = 2.0
+        >>> sensor.parameters = parameters
+        """
+
+    @parameters.setter
+    def parameters(self, sections: dict[str, Any], /) -> None: ...
     @property
     def camera(self) -> Camera:
         """The lens."""
@@ -198,11 +268,12 @@ class Sensor:
         Parameters
         ----------
         image
-            Shape (height, width) or (height, width, channels), uint8 or uint16. Not copied when it is C-contiguous.
+            Shape (height, width) or (height, width, channels), uint8 or uint16, of any strides. It is not copied; in C
+            order it is read fastest.
         altitude_km
             Above WGS-84 for ``earth``, else above the radius; without it, that of the parameters.
         position_km
-            Position of the camera in ECEF; it beats the altitude.
+            Position of the camera in ECEF, shape (3,); it beats the altitude.
         attitude
             Prior attitude, quaternion (w, x, y, z) that takes the camera frame to ECEF.
         attitude_sigma_deg
@@ -214,6 +285,11 @@ class Sensor:
         detail
             Keep edges, points and times of the stages.
 
+        Returns
+        -------
+        Report
+            Of a sensor of several bodies that of the first; `Report.others` has the rest.
+
         Raises
         ------
         ImageError
@@ -222,25 +298,64 @@ class Sensor:
             An altitude, position or attitude that cannot be.
         """
 
-    def process_each(
+    def process_many(
         self,
-        image: _Image,
+        images: _Path | Iterable[_Image | _Path | tuple[_Image, Mapping[str, Any]]],
         *,
-        altitude_km: float | None = None,
-        position_km: Sequence[float] | None = None,
-        attitude: Sequence[float] | None = None,
-        attitude_sigma_deg: float | None = None,
-        time_s: float | None = None,
-        bits: int | None = None,
-        detail: bool = False,
-    ) -> list[Report]:
-        """As `process`, for a sensor of several bodies: a report of each, in the order of the parameters."""
+        jobs: int | None = None,
+        progress: bool = False,
+    ) -> Iterator[Report]:
+        """Process a sequence on all cores. Reports come in order while it runs; memory does not grow with its length.
+
+        Parameters
+        ----------
+        images
+            A folder, a pattern, a video or an MCAP, taken as ``hzn run`` takes it, with the frames.csv beside it; or paths
+            of pictures; or arrays; or pairs of an array and a dictionary of what `process` is told besides
+            (``altitude_km`` and so on). Of an iterable no more is taken than is being worked on.
+        jobs
+            Threads; without it, one a core. With ``binarize.method = "track"`` there is only one.
+        progress
+            Show a bar (needs the package tqdm).
+
+        Yields
+        ------
+        Report
+            One a picture. A picture file that cannot be read has the status ``unreadable`` and its reason in
+            `Report.detail`; an array that is refused raises as in `process`, after the reports before it.
+
+        Raises
+        ------
+        ConfigError
+            Nothing there, or a frames.csv that is wrong.
+        KeyboardInterrupt
+            Within a frame's time; the pictures that were begun are finished first.
+        """
 
     def __eq__(self, other: object, /) -> bool: ...
 
 @final
 class Report:
-    """What was found in one picture. Without an answer the properties of the answer are None."""
+    """What was found in one picture. Without an answer the properties of the answer are None.
+
+    A notebook shows it with the picture (the array that was processed, as it is now) and everything drawn over it.
+    """
+
+    @property
+    def index(self) -> int:
+        """Place in the sequence, from 0."""
+
+    @property
+    def file(self) -> str:
+        """Name of the picture; empty for an array."""
+
+    @property
+    def time_s(self) -> float:
+        """Time of the picture, seconds."""
+
+    @property
+    def body(self) -> str:
+        """Kind of the body, as in sensor.toml."""
 
     @property
     def status(self) -> _Status:
@@ -252,7 +367,7 @@ class Report:
 
     @property
     def stage(self) -> str:
-        """The stage that was reached."""
+        """The stage that was reached; empty when it was read from a recording."""
 
     @property
     def detail(self) -> str:
@@ -295,6 +410,14 @@ class Report:
         """Weighted RMS distance of the inliers from the fitted limb, pixels."""
 
     @property
+    def roll_deg(self) -> float | None:
+        """Roll of the vehicle, degrees; with a mounting."""
+
+    @property
+    def pitch_deg(self) -> float | None:
+        """Pitch of the vehicle, degrees; with a mounting."""
+
+    @property
     def edge_points(self) -> int | None:
         """Sub-pixel edge points that were measured."""
 
@@ -311,6 +434,10 @@ class Report:
         """Time of processing, microseconds."""
 
     @property
+    def others(self) -> list[Report]:
+        """Of a sensor of several bodies, the reports of those after the first."""
+
+    @property
     def candidates(self) -> list[dict[str, Any]]:
         """Edges that were looked at: length_px, points, inliers, rms_px, verdict."""
 
@@ -320,19 +447,23 @@ class Report:
 
     @property
     def edges(self) -> list[NDArray[np.float64]]:
-        """Border pixels of the edges, each of shape (n, 2). Needs ``detail=True``."""
+        """Border pixels of the edges, each of shape (n, 2). Needs ``detail=True`` (`HznError`)."""
 
     @property
     def inliers(self) -> NDArray[np.float64]:
-        """Edge points (u, v) that carry the answer, shape (n, 2), pixels. Needs ``detail=True``."""
+        """Edge points (u, v) that carry the answer, shape (n, 2), pixels. Needs ``detail=True`` (`HznError`)."""
 
     @property
     def rejected(self) -> NDArray[np.float64]:
-        """Edge points (u, v) that were rejected, shape (n, 2), pixels. Needs ``detail=True``."""
+        """Edge points (u, v) that were rejected, shape (n, 2), pixels. Needs ``detail=True`` (`HznError`)."""
+
+    @property
+    def rays(self) -> NDArray[np.float64]:
+        """Unit rays of the inliers in the camera frame, shape (n, 3). Needs ``detail=True`` (`HznError`)."""
 
     @property
     def stages_us(self) -> dict[str, float]:
-        """Time of each stage, microseconds. Needs ``detail=True``."""
+        """Time of each stage, microseconds. Needs ``detail=True`` (`HznError`)."""
 
     def to_dict(self) -> dict[str, Any]:
         """The row that ``hzn run`` would write, by its columns; None for an empty cell."""
@@ -340,10 +471,24 @@ class Report:
 def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:
     """Draw what a report stands on over its picture: limb and axis, with ``detail=True`` edges and points too.
 
+    Parameters
+    ----------
+    image
+        The picture, as for `Sensor.process`.
+    report
+        Its report.
+    bits
+        Significant bits of uint16.
+
     Returns
     -------
     numpy.ndarray
         RGB, shape (height, width, 3), uint8.
+
+    Raises
+    ------
+    ImageError
+        An array that is no picture.
     """
 
 def read_mcap(path: _Path) -> dict[str, NDArray[Any]]:
@@ -352,10 +497,159 @@ def read_mcap(path: _Path) -> dict[str, NDArray[Any]]:
     Returns
     -------
     dict
-        One array a column, of equal length; NaN in empty cells.
+        One array a column, of equal length; NaN in empty cells. Columns and units: docs/files.md.
 
     Raises
     ------
     HznError
         The file cannot be read, or is no MCAP.
     """
+
+def open_mcap(path: _Path) -> Recording:
+    """Open a recording to go through its frames, one after another; memory does not grow with its length.
+
+    Raises
+    ------
+    HznError
+        The file cannot be read, or is no MCAP.
+
+    Examples
+    --------
+    >>> with hzn.open_mcap("flight.mcap") as recording:
+    ...     for frame in recording:
+    ...         print(frame.report.file, frame.report.status)
+    """
+
+@final
+class Recording:
+    """A recording that is being read, from `open_mcap`. It is an iterator of its frames, and a context manager."""
+
+    @property
+    def sensor_toml(self) -> str | None:
+        """Text of the sensor.toml that it was made with."""
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """Versions and settings of the run."""
+
+    def sensor(self) -> Sensor:
+        """Make the sensor that it was made with.
+
+        Raises
+        ------
+        HznError
+            It holds no sensor.toml.
+        """
+
+    def close(self) -> None:
+        """Close the file. To read on is an `HznError`."""
+
+    def __iter__(self) -> Recording: ...
+    def __next__(self) -> Frame: ...
+    def __enter__(self) -> Recording: ...
+    def __exit__(
+        self,
+        *_exception: type[BaseException] | BaseException | TracebackType | None,
+    ) -> None: ...
+
+@final
+class Frame:
+    """A frame of a recording."""
+
+    @property
+    def image(self) -> _Image | None:
+        """The picture, shape (height, width) or (height, width, channels), decoded anew at each access; None when it was
+        left out.
+
+        Raises
+        ------
+        ImageError
+            It cannot be decoded.
+        """
+
+    @property
+    def report(self) -> Report:
+        """What was found in it."""
+
+@final
+class Simulation:
+    """A flight that is rendered frame by frame when it is looked at, from `simulate`. A sequence of `SimulatedFrame`."""
+
+    def __new__(
+        cls, scene: _Path | Mapping[str, Any], *, frames: int | None = None, seed: int | None = None
+    ) -> Simulation: ...
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Sections and keys of the scene.toml: change a copy and give it to `simulate`."""
+
+    @property
+    def sensor(self) -> Sensor:
+        """The sensor that took the pictures, with limb height and noise model measured on 32 other pictures of the scene.
+        That takes as long as to render them, once."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: int, /) -> SimulatedFrame: ...
+    def __iter__(self) -> Iterator[SimulatedFrame]: ...
+
+@final
+class SimulatedFrame:
+    """A simulated picture with its truth."""
+
+    @property
+    def file(self) -> str:
+        """Name that ``hzn simulate`` would give the picture."""
+
+    @property
+    def image(self) -> _Image:
+        """The picture, shape (height, width) or (height, width, 3); rendered once."""
+
+    @property
+    def known(self) -> dict[str, Any]:
+        """What `Sensor.process` is told of it: ``sensor.process(frame.image, **frame.known)``."""
+
+    @property
+    def truth(self) -> list[dict[str, Any]]:
+        """The truth for each body: columns of truth.csv (docs/files.md)."""
+
+@final
+class _Sequence:
+    def __new__(cls, sensor: Sensor, inputs: Sequence[_Path]) -> _Sequence: ...
+    def total(self) -> int | None: ...
+    def __iter__(self) -> _Sequence: ...
+    def __next__(self) -> _Item: ...
+    def process(self, item: _Item) -> Report: ...
+
+@final
+class _Item: ...
+
+def _process_encoded(
+    sensor: Sensor,
+    index: int,
+    name: str,
+    data: bytes | None,
+    why: str,
+    *,
+    altitude_km: float | None = None,
+    position_km: Sequence[float] | None = None,
+    attitude: Sequence[float] | None = None,
+    attitude_sigma_deg: float | None = None,
+    time_s: float | None = None,
+) -> Report: ...
+def _write_mcap(path: _Path, sensor: Sensor, reports: Sequence[Report]) -> None: ...
+def _evaluate(
+    results: _Path | Iterable[Report], truth: _Path | Sequence[Mapping[str, Any]], camera: Camera | None
+) -> dict[str, Any]: ...
+def _design(
+    camera: Camera,
+    *,
+    radius_km: float,
+    altitude_km: float,
+    altitude_sigma_km: float,
+    limb_height_km: float,
+    limb_height_sigma_km: float,
+    depression_deg: float,
+    roll_deg: float,
+    sigma_px: float,
+    correlation_px: float,
+) -> dict[str, Any] | None: ...
+def _panic() -> None: ...

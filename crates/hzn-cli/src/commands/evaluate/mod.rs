@@ -7,10 +7,9 @@ mod worst;
 use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera;
-use hzn_core::status::Status;
-use hzn_mcap::{Contents, Reader, Row};
+use hzn_mcap::Row;
 use hzn_sim::Truth;
-use hzn_sim::evaluate::{Answer, Case, Evaluation, Found, pair};
+use hzn_sim::evaluate::{Answer, Case, Evaluation, pair};
 use serde::Serialize;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
@@ -66,13 +65,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
     let truth = hzn_sim::truth::load(&truth_path).map_err(usage)?;
-    let (rows, recorded_sensor) = read(&args.results)?;
+    let (rows, recorded_sensor) = output::read(&args.results)?;
     let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
     if camera.is_none() {
         tell::line("note: no sensor.toml at hand (--sensor): the length of limb in view is left out");
     }
-    let answers: Vec<Answer> = rows.iter().map(answer).collect();
+    let answers: Vec<Answer> = rows.iter().map(output::answer).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
         .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
     warn_of_other_times(&rows, &truth);
@@ -96,22 +95,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// Rows of results, and the sensor.toml that an MCAP holds.
-fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Stop> {
-    if !file.is_file() {
-        return Err(usage(format!("{}: no such file", file.display())));
-    }
-    match ending(file).as_str() {
-        "mcap" => {
-            let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
-            let rows = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
-            Ok((rows, reader.sensor_toml().map(str::to_owned)))
-        }
-        kind @ ("csv" | "jsonl") => Ok((super::export::rows(file, kind)?.collect::<Result<_, _>>()?, None)),
-        _ => Err(usage(format!("{}: results of `hzn run` are expected: .mcap, .csv or .jsonl", file.display()))),
-    }
-}
-
 fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result<Option<hzn_core::Config>, Stop> {
     let beside = folder.join("sensor.toml");
     Ok(match (given, recorded) {
@@ -121,19 +104,6 @@ fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result
         (None, None) if beside.exists() => Some(hzn_calib::sensor::load(&beside)?.config),
         (None, None) => None,
     })
-}
-
-/// A row as the evaluation takes it.
-pub(super) fn answer(row: &Row) -> Answer {
-    let covariance =
-        || -> Option<[f64; 6]> { Some([row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?]) };
-    let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| Found {
-        axis,
-        // Without a covariance the error still counts, its honesty does not.
-        covariance_rad2: covariance().unwrap_or_default(),
-        half_angle_deg: row.half_angle_deg,
-    });
-    Answer { file: row.file.clone(), time_s: row.time_s, body: row.body.clone(), status: row.status, found }
 }
 
 /// Two sequences may have the same names: other times give them away.

@@ -1,0 +1,190 @@
+"""Before there are pictures: scenes with truth, answers beside their truth, and what a camera could reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
+from os import PathLike
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._hzn import Camera, ConfigError, Report, Simulation, _design, _evaluate
+
+
+def simulate(
+    scene: str | PathLike[str] | Mapping[str, Any], *, frames: int | None = None, seed: int | None = None
+) -> Simulation:
+    """Simulate a flight: pictures with exact truth, and the sensor that fits them.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``horace``, ``full-disc``, ``sun-moon``,
+        ``tumble``), the path of a scene.toml, or its sections and keys as a dictionary.
+    frames
+        Number of pictures, instead of the scene's.
+    seed
+        Seed of everything random, instead of the scene's.
+
+    Returns
+    -------
+    Simulation
+        A sequence of frames, each rendered when its picture is asked for.
+
+    Raises
+    ------
+    ConfigError
+        No such scene, or the first key or value that is refused.
+
+    Examples
+    --------
+    >>> flight = hzn.simulate("leo-infrared", frames=20)
+    >>> reports = [flight.sensor.process(frame.image, **frame.known) for frame in flight]
+    >>> hzn.evaluate(reports, flight)["evaluations"][0]["errors"]["rms_deg"]
+    """
+    return Simulation(scene, frames=frames, seed=seed)
+
+
+def evaluate(
+    results: str | PathLike[str] | Iterable[Report],
+    truth: str | PathLike[str] | Simulation | Iterable[Mapping[str, Any]],
+    *,
+    camera: Camera | None = None,
+) -> dict[str, Any]:
+    """Put results beside the truth: shares, errors, honesty of the covariances. Every picture counts.
+
+    Parameters
+    ----------
+    results
+        What ``hzn run`` wrote (.mcap, .csv, .jsonl), or reports; those of arrays, which have no name, in the order of the
+        truth.
+    truth
+        A truth.csv or its folder, a `Simulation`, or rows of truth (`SimulatedFrame.truth`).
+    camera
+        For the length of limb in view; an MCAP and a `Simulation` know it.
+
+    Returns
+    -------
+    dict
+        ``evaluations``: a dictionary a body, as ``hzn evaluate -o report.json`` writes it (docs/evaluation.md; angles in
+        degrees). ``frames``: a dictionary a frame, ready for ``pandas.json_normalize``.
+
+    Raises
+    ------
+    HznError
+        Results and truth that do not belong together, a file that cannot be read.
+    """
+    if isinstance(truth, Simulation):
+        camera = camera or Camera(**truth.parameters["camera"])
+        truth = [row for frame in truth for row in frame.truth]
+    rows = truth if isinstance(truth, str | PathLike) else list(truth)
+    return _evaluate(results, rows, camera)
+
+
+def sensitivity(
+    *,
+    altitude_km: float | Sequence[float],
+    camera: Camera | None = None,
+    fov_deg: float | Sequence[float] = 90.0,
+    size: tuple[int, int] = (1920, 1080),
+    lens: Literal["pinhole", "equidistant"] = "pinhole",
+    depression_deg: float | Sequence[float] = 0.0,
+    roll_deg: float | Sequence[float] = 0.0,
+    radius_km: float | Sequence[float] = 6371.0088,
+    limb_height_km: float | Sequence[float] = 10.0,
+    limb_height_sigma_km: float | Sequence[float] = 2.0,
+    altitude_sigma_km: float | Sequence[float] = 0.5,
+    sigma_px: float | Sequence[float] = 1.0,
+    correlation_px: float | Sequence[float] = 300.0,
+) -> dict[str, NDArray[np.float64]]:
+    """Say how well a camera would do, without rendering, for every combination of the values given.
+
+    Parameters
+    ----------
+    altitude_km
+        Altitude above the sphere.
+    camera
+        A lens, instead of ``fov_deg``, ``size`` and ``lens``.
+    fov_deg
+        Field of view across the width.
+    size
+        Width and height of the picture, pixels.
+    lens
+        Projection.
+    depression_deg
+        Angle of the optical axis below the horizontal; 90 looks straight down.
+    roll_deg
+        Turn of the camera about its optical axis.
+    radius_km
+        Radius of the body.
+    limb_height_km, limb_height_sigma_km
+        Height of the visible limb, and its 1-sigma.
+    altitude_sigma_km
+        1-sigma of the altitude.
+    sigma_px, correlation_px
+        1-sigma of an edge point, and the length along the edge over which errors stay alike.
+
+    Returns
+    -------
+    dict
+        Columns of equal length, ready for a data frame: the values of each combination, then sigmas in degrees (1 sigma;
+        pitch in the plane of optical axis and body, roll across it) with the half-angle ``free``, ``fused`` with what
+        altitude and limb height say, and ``known``. NaN where too little of a limb is in view.
+
+    Raises
+    ------
+    ConfigError
+        A value that is refused, by name.
+    """
+    grid: dict[str, float | Sequence[float]] = {
+        "altitude_km": altitude_km,
+        "depression_deg": depression_deg,
+        "roll_deg": roll_deg,
+        "radius_km": radius_km,
+        "limb_height_km": limb_height_km,
+        "limb_height_sigma_km": limb_height_sigma_km,
+        "altitude_sigma_km": altitude_sigma_km,
+        "sigma_px": sigma_px,
+        "correlation_px": correlation_px,
+    }
+    if camera is None:
+        grid = {"fov_deg": fov_deg, **grid}
+    columns: dict[str, list[float]] = {name: [] for name in [*grid, *_SIGMAS]}
+    for values in product(*(np.atleast_1d(np.asarray(v, float)).tolist() for v in grid.values())):
+        place = dict(zip(grid, values, strict=True))
+        own = {name: value for name, value in place.items() if name != "fov_deg"}
+        sigmas = _design(camera or _ideal(lens, size, place["fov_deg"]), **own)
+        for name, value in place.items():
+            columns[name].append(value)
+        for name, (group, key) in _SIGMAS.items():
+            within = (sigmas[group] if group else sigmas) if sigmas else {key: math.nan}
+            columns[name].append(within[key])
+    return {name: np.array(column) for name, column in columns.items()}
+
+
+_SIGMAS = {
+    "half_angle_deg": ("", "half_angle_deg"),
+    "limb_px": ("", "limb_px"),
+    **{f"{axis}_{fit}_deg": (fit, f"{axis}_deg") for fit in ("free", "fused", "known") for axis in ("pitch", "roll")},
+}
+
+
+def _ideal(lens: str, size: tuple[int, int], fov_deg: float) -> Camera:
+    """An ideal lens with this field of view across the width."""
+    most = {"pinhole": 175.0, "equidistant": 350.0}.get(lens)
+    if most is None:
+        raise ConfigError(f"lens: {lens!r} is refused: pinhole or equidistant")
+    if not 0.0 < fov_deg <= most:
+        raise ConfigError(f"fov_deg: {fov_deg} is refused: above 0 and up to {most:g} for this lens")
+    width, height = size
+    half = math.radians(fov_deg / 2)
+    f_px = width / 2 / (math.tan(half) if lens == "pinhole" else half)
+    # Beyond 175 degrees off axis the corners of an equidistant picture hold nothing.
+    circle = {"theta_max_deg": 175.0} if math.degrees(math.hypot(width, height) / 2 / f_px) > 175 else {}
+    if lens == "pinhole":
+        circle = {}
+    centre = {"cx_px": (width - 1) / 2, "cy_px": (height - 1) / 2}
+    return Camera(width=width, height=height, model=lens, fx_px=f_px, fy_px=f_px, **centre, **circle)

@@ -1,0 +1,127 @@
+//! Pictures from files, as `hzn run` takes them.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use hzn_cli::engine::{self, Finished, Plan};
+use hzn_cli::exit::{Exit, Stop};
+use hzn_cli::input::{self, Payload, Source};
+use pyo3::prelude::*;
+
+use crate::errors;
+use crate::report::Report;
+use crate::sensor::{Sensor, State, known};
+
+/// A folder, a pattern, a video, a recording, or picture files, in order and not yet decoded.
+#[pyclass(frozen, name = "_Sequence", module = "hzn._hzn")]
+pub(crate) struct Sequence {
+    state: Arc<State>,
+    plan: Plan,
+    source: Mutex<Box<dyn Source>>,
+    next: AtomicU64,
+}
+
+/// One of its pictures.
+#[pyclass(frozen, name = "_Item", module = "hzn._hzn")]
+pub(crate) struct Item {
+    index: u64,
+    item: Mutex<Option<input::Item>>,
+}
+
+/// What the command line ends with, as an exception.
+pub(crate) fn stopped(stop: Stop) -> PyErr {
+    let text = format!("{:#}", stop.error);
+    if stop.exit == Exit::Usage { errors::config(text) } else { errors::other(text) }
+}
+
+#[pymethods]
+impl Sequence {
+    #[new]
+    fn new(py: Python<'_>, sensor: &Sensor, inputs: Vec<PathBuf>) -> PyResult<Self> {
+        let state = sensor.state();
+        let (source, frames) = errors::detached(py, || -> PyResult<_> {
+            let source = input::open(&inputs, None, None).map_err(stopped)?;
+            let beside = source.folder().join("frames.csv");
+            let frames = beside.exists().then(|| hzn_calib::frames::load(&beside)).transpose();
+            let frames = frames.map_err(errors::config)?;
+            engine::prepare(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
+            Ok((source, frames))
+        })??;
+        let plan = plan(&state, frames);
+        Ok(Self { state, plan, source: Mutex::new(source), next: AtomicU64::new(0) })
+    }
+
+    /// Number of pictures, where it is known before.
+    fn total(&self) -> Option<u64> {
+        self.source.lock().unwrap_or_else(PoisonError::into_inner).total()
+    }
+
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Item>> {
+        let next = || self.source.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let Some(item) = errors::detached(py, next)? else { return Ok(None) };
+        let item = item.map_err(|e| errors::other(format!("{e:#}")))?;
+        Ok(Some(Item { index: self.next.fetch_add(1, Ordering::Relaxed), item: Mutex::new(Some(item)) }))
+    }
+
+    /// Decodes and processes one of the pictures; once each.
+    fn process(&self, py: Python<'_>, item: &Item) -> PyResult<Report> {
+        let taken = item.item.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let taken = taken.ok_or_else(|| errors::other("this picture was processed already"))?;
+        processed(py, &self.state, &self.plan, item.index, taken)
+    }
+}
+
+/// Decodes and processes the contents of a picture file; `None` stands for one that could not be had, for the reason
+/// `why`.
+#[pyfunction]
+#[pyo3(name = "_process_encoded")]
+#[pyo3(signature = (sensor, index, name, data, why, *, altitude_km = None, position_km = None, attitude = None,
+                    attitude_sigma_deg = None, time_s = None))]
+pub(crate) fn process_encoded(
+    py: Python<'_>,
+    sensor: &Sensor,
+    index: u64,
+    name: String,
+    data: Option<Vec<u8>>,
+    why: String,
+    altitude_km: Option<f64>,
+    position_km: Option<[f64; 3]>,
+    attitude: Option<[f64; 4]>,
+    attitude_sigma_deg: Option<f64>,
+    time_s: Option<f64>,
+) -> PyResult<Report> {
+    let state = sensor.state();
+    let mut row = known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?;
+    row.file.clone_from(&name);
+    let plan = plan(&state, Some(hzn_calib::Frames::of(vec![row])));
+    let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
+    processed(py, &state, &plan, index, input::Item { name, time_s: None, payload })
+}
+
+fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
+    Plan {
+        config: state.config.clone(),
+        flight: state.flight,
+        threads: 1,
+        frames,
+        fps: 1.0,
+        trace: false,
+        keep_picture: false,
+        overlay: None,
+    }
+}
+
+fn processed(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: input::Item) -> PyResult<Report> {
+    let finished = errors::detached(py, || state.lend(|sensor| engine::one(plan, sensor, index, item)))??;
+    let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
+    let rows = hzn_cli::output::rows(&finished, &plan.config);
+    let report = |(row, found): (hzn_mcap::Row, &engine::Found)| match &found.report {
+        Ok(found) => Report::new(row, found, None, &state.lens),
+        Err(_) => Report::of_row(row),
+    };
+    Report::of_bodies(py, rows.into_iter().zip(&finished.found).map(report))
+}

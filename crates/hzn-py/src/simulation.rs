@@ -1,0 +1,265 @@
+//! Scenes with truth, answers beside their truth, and what a camera could reach.
+
+use std::path::{Path, PathBuf};
+
+use hzn_cli::input::picture::{Picture, Samples};
+use hzn_cli::scene;
+use hzn_core::camera::Camera as Lens;
+use hzn_core::image::Layout;
+use hzn_sim::evaluate::{Evaluation, pair};
+use hzn_sim::scenario::Fit;
+use hzn_sim::sensitivity::Design;
+use hzn_sim::{Flight, FlightFrame, Scenario, Truth};
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use serde_json::{Value, json};
+
+use crate::camera::Camera;
+use crate::report::Report;
+use crate::sensor::Sensor;
+use crate::sequence::stopped;
+use crate::{errors, parameters};
+
+/// Pictures that the noise model is measured on, as `hzn simulate` does.
+const MEASURED: u32 = 32;
+
+#[doc = doc!("Simulation")]
+#[pyclass(frozen, module = "hzn")]
+pub(crate) struct Simulation {
+    scenario: Scenario,
+    flight: Flight,
+    sensor: PyOnceLock<Py<Sensor>>,
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (scene, *, frames = None, seed = None))]
+    fn new(py: Python<'_>, scene: &Bound<'_, PyAny>, frames: Option<u32>, seed: Option<u64>) -> PyResult<Self> {
+        let scenario = if let Ok(name) = scene.extract::<PathBuf>() {
+            scene::load(&name.to_string_lossy(), frames, seed)
+        } else {
+            let text = toml::to_string(&parameters::from_python(scene)?).map_err(errors::config)?;
+            // JSON has no dates: in a scene.toml the time of the start is one, not text.
+            scene::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
+        };
+        let scenario = scenario.map_err(stopped)?;
+        let flight = errors::detached(py, || scenario.flight())?.map_err(errors::config)?;
+        Ok(Self { scenario, flight, sensor: PyOnceLock::new() })
+    }
+
+    #[doc = doc!("Simulation.parameters")]
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mut value = serde_json::to_value(&self.scenario).map_err(errors::other)?;
+        value["utc"] = Value::String(self.scenario.utc.to_string());
+        parameters::to_python(py, &value)
+    }
+    #[doc = doc!("Simulation.sensor")]
+    #[getter]
+    fn sensor(&self, py: Python<'_>) -> PyResult<Py<Sensor>> {
+        let made = self.sensor.get_or_try_init(py, || {
+            let fit = errors::detached(py, || Fit::measure(&self.scenario, MEASURED, &|_, _| ()))?;
+            let mut config = self.flight.sensor.clone();
+            if let Some(fit) = fit.map_err(errors::config)? {
+                fit.apply(&mut config);
+            }
+            Py::new(py, Sensor::of(config, false)?)
+        });
+        made.map(|sensor| sensor.clone_ref(py))
+    }
+
+    fn __len__(&self) -> usize {
+        self.flight.frames.len()
+    }
+    fn __getitem__(&self, index: isize) -> PyResult<SimulatedFrame> {
+        let at = if index < 0 { index + self.flight.frames.len() as isize } else { index };
+        let frame = usize::try_from(at).ok().and_then(|i| self.flight.frames.get(i));
+        let frame = frame.ok_or_else(|| PyIndexError::new_err(format!("frame {index} of {}", self.__len__())))?;
+        let truths = self.scenario.bodies.iter().map(|&body| frame.scene.truth_of(body, &frame.file, frame.time_s));
+        Ok(SimulatedFrame {
+            known: known(&self.scenario, frame),
+            truths: truths.collect::<Result<_, _>>().map_err(errors::config)?,
+            frame: frame.clone(),
+            image: PyOnceLock::new(),
+        })
+    }
+    fn __iter__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let builtins = slf.py().import("builtins")?;
+        let all = builtins.call_method1("range", (slf.get().__len__(),))?;
+        builtins.call_method1("map", (slf.getattr("__getitem__")?, all))?.try_iter().map(Bound::into_any)
+    }
+    fn __repr__(&self) -> String {
+        format!("Simulation({}, {} frames)", self.scenario.name, self.flight.frames.len())
+    }
+}
+
+/// What `Sensor.process` is told of a frame.
+fn known(scenario: &Scenario, frame: &FlightFrame) -> Value {
+    let row = scenario.known_of(frame);
+    let mut known = json!({
+        "altitude_km": row.altitude_km,
+        "position_km": [row.x_km, row.y_km, row.z_km],
+        "time_s": scenario.start_unix_s() + frame.time_s,
+    });
+    if let (Some(w), Some(x), Some(y), Some(z)) = (row.qw, row.qx, row.qy, row.qz) {
+        known["attitude"] = json!([w, x, y, z]);
+        known["attitude_sigma_deg"] = json!(row.attitude_sigma_deg);
+    }
+    known
+}
+
+/// `utc = "2026-06-21T12:00:00Z"` without its quotes.
+fn unquoted_date(text: &str) -> String {
+    let line = |l: &str| if l.starts_with("utc = ") { l.replace('"', "") } else { l.to_owned() };
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[doc = doc!("SimulatedFrame")]
+#[pyclass(frozen, module = "hzn")]
+pub(crate) struct SimulatedFrame {
+    frame: FlightFrame,
+    known: Value,
+    truths: Vec<Truth>,
+    image: PyOnceLock<Py<PyAny>>,
+}
+
+#[pymethods]
+impl SimulatedFrame {
+    #[doc = doc!("SimulatedFrame.file")]
+    #[getter]
+    fn file(&self) -> &str {
+        &self.frame.file
+    }
+    #[doc = doc!("SimulatedFrame.image")]
+    #[getter]
+    fn image(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let image = self.image.get_or_try_init(py, || {
+            let p = errors::detached(py, || self.frame.render())?.map_err(errors::config)?;
+            let layout = Layout::packed(p.width().into(), p.height().into(), p.channels(), p.bits());
+            let samples = match p.samples() {
+                hzn_sim::Samples::Bytes(d) => Samples::Bytes(d.clone()),
+                hzn_sim::Samples::Words(d) => Samples::Words(d.clone()),
+            };
+            Ok::<_, PyErr>(crate::image::to_array(py, Picture { samples, layout, exif_time_s: None })?.unbind())
+        });
+        image.map(|i| i.clone_ref(py))
+    }
+    #[doc = doc!("SimulatedFrame.known")]
+    #[getter]
+    fn known<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mut known = self.known.clone();
+        let bits = self.frame.scene.detector.bits;
+        if bits > 8 {
+            known["bits"] = json!(bits);
+        }
+        parameters::to_python(py, &known)
+    }
+    #[doc = doc!("SimulatedFrame.truth")]
+    #[getter]
+    fn truth<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        self.truths.iter().map(|t| parameters::to_python(py, t)).collect()
+    }
+    fn __repr__(&self) -> String {
+        format!("SimulatedFrame({}, {:.2} s)", self.frame.file, self.frame.time_s)
+    }
+}
+
+/// Results beside their truth. Either may be a file; reports without a name stand in the order of the truth.
+#[pyfunction]
+#[pyo3(name = "_evaluate")]
+pub(crate) fn evaluate<'py>(
+    py: Python<'py>,
+    results: &Bound<'py, PyAny>,
+    truth: &Bound<'py, PyAny>,
+    camera: Option<&Camera>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let truth = match truth.extract::<PathBuf>() {
+        Ok(path) => {
+            let path = if path.is_dir() { path.join("truth.csv") } else { path };
+            hzn_sim::truth::load(&path).map_err(errors::config)?
+        }
+        Err(_) => serde_json::from_value::<Vec<Truth>>(parameters::from_python(truth)?)
+            .map_err(|e| errors::config(format!("truth: {e}")))?,
+    };
+    let mut camera = camera.map(|c| c.config.clone());
+    let mut rows = match results.extract::<PathBuf>() {
+        Ok(path) => {
+            let (rows, sensor) = hzn_cli::output::read(&path).map_err(stopped)?;
+            let recorded = sensor.and_then(|t| hzn_calib::sensor::parse(&t, Path::new("sensor.toml")).ok());
+            camera = camera.or(recorded.map(|s| s.config.camera));
+            rows
+        }
+        Err(_) => {
+            let mut files: Vec<&str> = truth.iter().map(|t| t.file.as_str()).collect();
+            files.dedup();
+            let mut rows = Vec::new();
+            for (i, report) in results.try_iter()?.enumerate() {
+                let report: Py<Report> = report?.extract()?;
+                let of_truth = files.get(i).copied().unwrap_or_default();
+                rows.extend(report.get().each().map(|r| {
+                    let mut row = r.row.clone();
+                    if row.file.is_empty() {
+                        of_truth.clone_into(&mut row.file);
+                    }
+                    row
+                }));
+            }
+            rows
+        }
+    };
+    let value = errors::detached(py, move || -> PyResult<Value> {
+        let lens = camera.and_then(|c| Lens::<f64>::try_new(&c).ok());
+        let answers: Vec<_> = rows.drain(..).map(|r| hzn_cli::output::answer(&r)).collect();
+        let cases = pair(&answers, &truth, lens.as_ref()).map_err(errors::other)?;
+        Ok(json!({ "evaluations": Evaluation::by_body(&cases), "frames": cases }))
+    })??;
+    parameters::to_python(py, &value)
+}
+
+/// Sigmas of one design; None where too little of a limb is in view.
+#[pyfunction]
+#[pyo3(name = "_design")]
+#[pyo3(signature = (camera, *, radius_km, altitude_km, altitude_sigma_km, limb_height_km, limb_height_sigma_km,
+                    depression_deg, roll_deg, sigma_px, correlation_px))]
+pub(crate) fn design<'py>(
+    py: Python<'py>,
+    camera: &Camera,
+    radius_km: f64,
+    altitude_km: f64,
+    altitude_sigma_km: f64,
+    limb_height_km: f64,
+    limb_height_sigma_km: f64,
+    depression_deg: f64,
+    roll_deg: f64,
+    sigma_px: f64,
+    correlation_px: f64,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    for (name, value) in [
+        ("altitude_sigma_km", altitude_sigma_km),
+        ("limb_height_sigma_km", limb_height_sigma_km),
+        ("correlation_px", correlation_px),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(errors::config(format!("{name}: {value} is refused: must be 0 or more")));
+        }
+    }
+    if !(sigma_px > 0.0 && sigma_px.is_finite()) {
+        return Err(errors::config(format!("sigma_px: {sigma_px} is refused: must be above 0")));
+    }
+    let design = Design {
+        camera: camera.config.clone(),
+        radius_km,
+        altitude_km,
+        altitude_sigma_km,
+        limb_height_km,
+        limb_height_sigma_km,
+        depression_deg,
+        roll_deg,
+        sigma_px,
+        correlation_px,
+    };
+    let sigmas = errors::detached(py, || design.sigmas())?.map_err(errors::config)?;
+    sigmas.map(|s| parameters::to_python(py, &s)).transpose()
+}

@@ -1,0 +1,103 @@
+"""Sequences: in order, with bounded memory, interruptible."""
+
+import _thread
+import threading
+
+import numpy as np
+import pytest
+
+import hzn
+from conftest import PARAMETERS, limb, pgm
+
+
+def test_arrays_come_out_in_order(sensor):
+    pictures = [limb(i) for i in range(20)]
+    alone = [sensor.process(p).axis for p in pictures]
+    for images in (pictures, iter(pictures), ((p, {}) for p in pictures)):
+        many = list(sensor.process_many(images, jobs=3))
+        assert all(np.array_equal(a, b.axis) for a, b in zip(alone, many, strict=True))
+    assert list(sensor.process_many([])) == []
+
+
+def test_what_is_known_of_each_picture(sensor):
+    many = sensor.process_many((limb(), {"altitude_km": km}) for km in (390.0, 400.0, 410.0))
+    assert [r.altitude_km for r in many] == [390.0, 400.0, 410.0]
+
+
+def test_no_more_is_taken_than_is_worked_on(sensor):
+    taken = 0
+
+    def endless():
+        nonlocal taken
+        while True:
+            taken += 1
+            yield limb()
+
+    reports = sensor.process_many(endless(), jobs=2)
+    for _ in range(10):
+        assert next(reports).ok
+    reports.close()
+    assert 10 <= taken <= 10 + 2 * 2 + 1
+    assert not [t for t in threading.enumerate() if t.name.startswith("hzn")]
+
+
+def test_an_interrupt_ends_it(sensor):
+    taken, at = 0, None
+
+    def endless():
+        nonlocal taken, at
+        while True:
+            taken += 1
+            if taken == 20:
+                at = taken
+                threading.Thread(target=_thread.interrupt_main).start()
+            yield limb()
+
+    with pytest.raises(KeyboardInterrupt):
+        for report in sensor.process_many(endless(), jobs=2):
+            assert report.ok
+    # Not one window later.
+    assert at <= taken <= at + 6
+    assert not [t for t in threading.enumerate() if t.name.startswith("hzn")]
+    assert sensor.process(limb()).ok
+
+
+def test_a_picture_that_is_refused_raises_after_those_before(sensor):
+    reports = sensor.process_many([limb(), limb()[0], limb()], jobs=2)
+    assert next(reports).ok
+    with pytest.raises(hzn.ImageError, match="shape"):
+        next(reports)
+    with pytest.raises(hzn.ConfigError, match="jobs"):
+        sensor.process_many([limb()], jobs=0)
+
+
+def test_files_as_the_command_line_takes_them(sensor, folder, recording):
+    table = hzn.read_mcap(recording)
+    pattern = str(folder / "*.pgm")
+    for images in (folder, pattern, [folder / f"{i:02}.pgm" for i in range(50)], recording):
+        reports = list(sensor.process_many(images, jobs=2))
+        assert [r.index for r in reports] == list(range(50))
+        assert np.array_equal([r.axis[1] for r in reports], table["axis_y"])
+    assert [r.file for r in sensor.process_many(folder)][:2] == ["00.pgm", "01.pgm"]
+
+
+def test_a_table_beside_the_pictures_and_a_file_that_is_cut(sensor, tmp_path):
+    for i in range(3):
+        (tmp_path / f"{i}.pgm").write_bytes(pgm(limb(i))[: None if i != 1 else 999])
+    (tmp_path / "frames.csv").write_text("file,time_s,altitude_km\n0.pgm,5,390\n2.pgm,7,410\n")
+    reports = list(sensor.process_many(tmp_path))
+    assert [r.status for r in reports] == ["ok", "unreadable", "ok"]
+    assert [r.altitude_km for r in reports] == [390.0, 400.0, 410.0] and reports[2].time_s == 7.0
+    assert "end before" in reports[1].detail or "cannot be decoded" in reports[1].detail
+    with pytest.raises(hzn.ConfigError, match="nowhere"):
+        sensor.process_many(tmp_path / "nowhere")
+    (tmp_path / "frames.csv").write_text("file,altitude_km\n0.pgm,-9000\n")
+    with pytest.raises(hzn.ConfigError, match="altitude_km"):
+        sensor.process_many(tmp_path)
+
+
+def test_a_tracked_level_goes_from_picture_to_picture():
+    sensor = hzn.Sensor(**PARAMETERS, binarize={"method": "track"})
+    reports = list(sensor.process_many([limb(i) for i in range(6)], jobs=4))
+    alone = hzn.Sensor(**PARAMETERS, binarize={"method": "track"})
+    assert [r.level for r in reports] == [alone.process(limb(i)).level for i in range(6)]

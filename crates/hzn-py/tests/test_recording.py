@@ -1,0 +1,43 @@
+"""Recordings, frame by frame."""
+
+import numpy as np
+import pytest
+
+import hzn
+from conftest import limb
+
+
+def test_frames_with_their_pictures(sensor, recording):
+    with hzn.open_mcap(recording) as opened:
+        assert opened.sensor() == sensor and "[camera]" in opened.sensor_toml and opened.metadata["program"]
+        count = 0
+        for count, frame in enumerate(opened, 1):
+            report = frame.report
+            assert report.ok and report.file == f"{count - 1:02}.pgm"
+            if count <= 3:
+                image = frame.image
+                assert np.array_equal(image, limb(count - 1))
+                again = sensor.process(image, detail=True)
+                assert np.array_equal(again.axis, report.axis) and np.array_equal(again.inliers, report.inliers)
+                assert np.allclose(again.rays, report.rays) and report.candidates == again.candidates
+                assert hzn.overlay(image, report).shape == (240, 320, 3)
+        assert count == 50
+    with pytest.raises(hzn.HznError, match="closed"):
+        next(opened)
+
+
+def test_a_recording_that_is_none(tmp_path):
+    for read in (hzn.read_mcap, hzn.open_mcap):
+        with pytest.raises(hzn.HznError, match="cannot read"):
+            read(tmp_path / "nowhere.mcap")
+        other = tmp_path / "other.mcap"
+        other.write_bytes(b"nothing")
+        with pytest.raises(hzn.HznError, match="not an MCAP"):
+            read(other)
+
+
+def test_a_recording_that_was_cut(recording, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recording.read_bytes()[:-20_000])
+    frames = list(hzn.open_mcap(cut))
+    assert 0 < len(frames) < 50 and all(frame.report.ok for frame in frames)
