@@ -26,6 +26,28 @@ pub(crate) enum Lit {
     Above = 3,
 }
 
+#[cfg(any(test, feature = "_edges"))]
+impl Lit {
+    /// The side on which a direction (u, v) in the picture lies.
+    pub(crate) fn towards<T: Real>(g: [T; 2]) -> Self {
+        match (g[0].abs() >= g[1].abs(), g[0] > T::ZERO, g[1] > T::ZERO) {
+            (true, true, _) => Self::Right,
+            (true, false, _) => Self::Left,
+            (false, _, true) => Self::Below,
+            (false, _, false) => Self::Above,
+        }
+    }
+    /// The other way: a step of one pixel (u, v) towards the light.
+    pub(crate) fn step(self) -> [i8; 2] {
+        match self {
+            Self::Right => [1, 0],
+            Self::Left => [-1, 0],
+            Self::Below => [0, 1],
+            Self::Above => [0, -1],
+        }
+    }
+}
+
 /// Eight edge points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Block<T> {
@@ -65,6 +87,15 @@ impl<T: Real> Block<T> {
     }
     pub(crate) fn point(&self, lane: usize) -> ImagePoint<T> {
         ImagePoint { u: self.s[0][lane & 7], v: self.s[1][lane & 7] }
+    }
+    #[cfg(any(test, feature = "_edges"))]
+    pub(crate) fn lit(&self, lane: usize) -> Lit {
+        match (self.lit >> (2 * (lane & 7))) & 3 {
+            0 => Lit::Right,
+            1 => Lit::Left,
+            2 => Lit::Below,
+            _ => Lit::Above,
+        }
     }
     pub(crate) fn set_ray(&mut self, lane: usize, ray: &Ray<T>) {
         let l = lane & 7;

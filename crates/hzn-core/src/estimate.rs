@@ -166,6 +166,11 @@ pub(crate) fn fit<T: Real>(
         #[cfg(feature = "horace")]
         Method::Circle => held(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
     };
+    Some(counted(blocks, cone))
+}
+
+/// The fit that a cone is, with what there is to count of its points.
+fn counted<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T> {
     let (mut inliers, mut arc) = ([T::ZERO; LANES], [T::ZERO; LANES]);
     let mut before = T::ZERO;
     for block in blocks.iter() {
@@ -178,7 +183,7 @@ pub(crate) fn fit<T: Real>(
     }
     let (inliers, arc) = (sum(&inliers).to_i32() as u32, sum(&arc));
     let Cone { at, mean, sums, free, .. } = cone;
-    Some(Fit {
+    Fit {
         e: at.e,
         c: at.c(),
         k: at.k,
@@ -191,7 +196,7 @@ pub(crate) fn fit<T: Real>(
         mean,
         #[cfg(feature = "zju")]
         quadric: cone.quadric,
-    })
+    }
 }
 
 /// What every method ends with.
@@ -259,6 +264,20 @@ fn held<T: Real>(
         }
     }
     let (e, c) = find(blocks)?;
+    at(blocks, e, c)
+}
+
+/// The fit that a given cone is, by the weights that the points have.
+#[cfg(any(test, feature = "_edges"))]
+#[allow(dead_code, reason = "behind a feature")]
+pub(crate) fn given<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Fit<T>> {
+    let cone = at(blocks, e, c)?;
+    Some(counted(blocks, cone))
+}
+
+/// A cone with the normal equations there.
+#[cfg(any(test, feature = "dlr", feature = "zju", feature = "horace", feature = "_edges"))]
+fn at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
     let e = unit(&e)?;
     if !(c.abs() < T::one()) {
         return None;

@@ -2,6 +2,8 @@
 //!
 //! Arrays come in without a copy, and the interpreter is free while there is work.
 
+#![allow(clippy::doc_lazy_continuation, reason = "docstrings are NumPy's, not Markdown")]
+
 /// The docstring of a class or function, as the stubs have it.
 macro_rules! doc {
     ($name:literal) => {
@@ -19,6 +21,7 @@ mod report;
 mod sensor;
 mod sequence;
 mod simulation;
+mod stages;
 
 /// `hzn._hzn`.
 #[pyo3::pymodule(gil_used = false)]
@@ -39,6 +42,8 @@ mod _hzn {
     use crate::sequence::{Item, Sequence, process_encoded};
     #[pymodule_export]
     use crate::simulation::{SimulatedFrame, Simulation, design, evaluate};
+    #[pymodule_export]
+    use crate::stages::{Cone, Expected, Fit, Rays, borders, fit, fuse, keep, level, pick, rays};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's own spelling")]

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use hzn_calib::{FrameData, sensor};
 use hzn_cli::engine::{AnySensor, Traces};
-use hzn_core::Config;
 use hzn_core::camera::Camera as Lens;
+use hzn_core::{Config, Sensor as CoreSensor};
 use hzn_mcap::{Row, RowMeta};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -14,6 +14,7 @@ use pyo3::types::PyDict;
 use crate::camera::Camera;
 use crate::image::{Array, View};
 use crate::report::Report;
+use crate::stages::Expected;
 use crate::{errors, parameters};
 
 /// What pickle calls, and with what.
@@ -30,14 +31,17 @@ pub(crate) struct State {
     pub(crate) config: Config,
     pub(crate) flight: bool,
     pub(crate) lens: Arc<Lens<f64>>,
+    /// The same in double precision, for the single stages.
+    pub(crate) core: CoreSensor<f64>,
     /// Sensors at rest: each call takes one or makes one, so that threads never wait for each other.
     idle: Mutex<Vec<AnySensor>>,
 }
 
 impl State {
     fn of(config: Config, flight: bool) -> PyResult<Arc<Self>> {
-        let lens = Arc::new(Lens::try_new(&config.camera).map_err(errors::config)?);
-        Ok(Arc::new(Self { config, flight, lens, idle: Mutex::default() }))
+        let core = CoreSensor::new(&config).map_err(errors::config)?;
+        let lens = Arc::new(core.camera().clone());
+        Ok(Arc::new(Self { config, flight, lens, core, idle: Mutex::default() }))
     }
 
     /// Lends a sensor to `work`. One in which something panicked does not come back.
@@ -102,6 +106,20 @@ impl Sensor {
         self.state().flight
     }
 
+    #[doc = doc!("Sensor.expect")]
+    #[pyo3(signature = (*, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
+                        time_s = None))]
+    fn expect(
+        &self,
+        altitude_km: Option<f64>,
+        position_km: Option<[f64; 3]>,
+        attitude: Option<[f64; 4]>,
+        attitude_sigma_deg: Option<f64>,
+        time_s: Option<f64>,
+    ) -> PyResult<Expected> {
+        Expected::of(&self.state(), known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?)
+    }
+
     #[doc = doc!("Sensor.process")]
     #[pyo3(signature = (image, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
                         time_s = None, bits = None, detail = false))]
@@ -120,14 +138,7 @@ impl Sensor {
         let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?;
         let state = self.state();
         let array = Array::of(image)?;
-        let camera = &state.config.camera;
-        let (width, height) = array.size();
-        if (width, height) != (usize::from(camera.width), usize::from(camera.height)) {
-            return Err(errors::image(format!(
-                "the picture is {width} x {height} px (shape ({height}, {width})), but the camera is {} x {}",
-                camera.width, camera.height
-            )));
-        }
+        state.check_size(&array)?;
         let view = array.view(bits, state.config.input.channel)?;
         let bodies = state.config.each_body();
         let (processed, traces) = errors::detached(py, || {

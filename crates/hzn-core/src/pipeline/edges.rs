@@ -1,13 +1,25 @@
-//! The stages after the picture on edge points that were made elsewhere: for comparing methods on simulated points.
-//! Not part of the interface that stays (feature `_edges`).
+//! The stages one at a time, with the parts between them in the open: for comparing methods on simulated points, and for
+//! trying a step of one's own in place of one of these (the Python package's `hzn.ransac` and its neighbours). Feature
+//! `_edges`.
+//!
+//! ```text
+//! Sensor::level → (borders) → Edges::pick → reject → fit → fuse
+//! ```
 
+use super::observer::Unobserved;
+use super::sensor::Sensor;
+use crate::binarize::{self, Level};
 use crate::block::{Block, LANES, Lit};
 use crate::body::Expected;
 use crate::camera::Camera;
-use crate::frames::{Cam, UnitVec3};
-use crate::pixel::ImagePoint;
+use crate::contour::Scene;
+use crate::frames::{Cam, Cov3, UnitVec3};
+use crate::image::Pixels;
+use crate::linalg::basis;
+use crate::pixel::{ImagePoint, Pixel};
 use crate::real::Real;
-use crate::{reject, undistort};
+use crate::status::Status;
+use crate::{candidates, covariance, estimate, reject, undistort};
 use std::vec;
 use std::vec::Vec;
 
@@ -15,7 +27,7 @@ use std::vec::Vec;
 #[derive(Debug, Clone)]
 pub struct Edges<T> {
     pub(crate) blocks: Vec<Block<T>>,
-    count: u32,
+    points: Vec<(ImagePoint<T>, Lit)>,
     focal_px: T,
 }
 
@@ -28,40 +40,160 @@ pub struct Agreed<T> {
     pub cos_half_angle: T,
     /// Draws made.
     pub draws: u32,
+    /// No point is to be left out.
+    pub all: bool,
+}
+
+/// A cone that was fitted, with its normal equations.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted<T>(estimate::Fit<T>);
+
+impl<T: Real> Fitted<T> {
+    /// Axis of the cone, towards the body.
+    pub fn axis(&self) -> UnitVec3<Cam, T> {
+        UnitVec3::assume_unit(self.0.e)
+    }
+    /// cos of its half-angle.
+    pub fn cos_half_angle(&self) -> T {
+        self.0.c
+    }
+    /// Weighted RMS distance of the points from the limb, pixels.
+    pub fn rms_px(&self) -> T {
+        self.0.rms_px
+    }
+    /// Points with a weight.
+    pub fn inliers(&self) -> u32 {
+        self.0.inliers
+    }
+}
+
+/// The answer: a fit with the expected half-angle fused.
+#[derive(Debug, Clone, Copy)]
+pub struct Fused<T> {
+    /// Axis, towards the body.
+    pub axis: UnitVec3<Cam, T>,
+    /// Its covariance, rad².
+    pub covariance: Cov3<Cam, T>,
+    /// cos of the half-angle.
+    pub cos_half_angle: T,
+}
+
+impl<T: Real> Sensor<T> {
+    /// The level between dark and lit, of the body's own method.
+    ///
+    /// # Errors
+    /// `too-dark`, `too-bright`, or `no-limb` when there are no two sides.
+    pub fn level<P: Pixels>(&self, picture: &P, expected: &Expected<T>) -> Result<Level<T>, Status> {
+        let config = self.config();
+        let body = config.each_body().get(usize::from(expected.which));
+        let levels = body.and_then(|b| b.binarize.as_ref()).unwrap_or(&config.binarize);
+        let seed = config.reject.seed;
+        binarize::split(picture, self.region(), &config.gate, levels, expected.level, seed, &Unobserved)
+    }
+
+    /// The body's noise model, or that of all.
+    fn noise(&self, expected: &Expected<T>) -> &covariance::Config {
+        let body = self.config().each_body().get(usize::from(expected.which));
+        body.and_then(|b| b.covariance.as_ref()).unwrap_or(&self.config().covariance)
+    }
 }
 
 impl<T: Real> Edges<T> {
     /// Points as the candidates stage leaves them, in the order of the list; on each the light is on the side of `lit`.
     pub fn new(camera: &Camera<T>, points: &[ImagePoint<T>], lit: &UnitVec3<Cam, T>) -> Self {
-        let mut blocks = vec![Block::<T>::default(); points.len().div_ceil(LANES)];
-        for (i, &p) in points.iter().enumerate() {
-            let side = camera.ray(p).map_or(Lit::Below, |ray| {
+        let side = |p: &ImagePoint<T>| {
+            camera.ray(*p).map_or(Lit::Below, |ray| {
                 let j = ray.jacobian();
                 let e = lit.xyz();
                 let g: [T; 2] = core::array::from_fn(|k| (0..3).map(|r| j[r][k] * e[r]).fold(T::ZERO, |a, b| a + b));
-                match (g[0].abs() >= g[1].abs(), g[0] > T::ZERO, g[1] > T::ZERO) {
-                    (true, true, _) => Lit::Right,
-                    (true, false, _) => Lit::Left,
-                    (false, _, true) => Lit::Below,
-                    (false, _, false) => Lit::Above,
-                }
-            });
-            blocks[i / LANES].set_point(i % LANES, p, side);
+                Lit::towards(g)
+            })
+        };
+        Self::of(camera, points.iter().map(|p| (*p, side(p))).collect())
+    }
+
+    /// As [`Self::new`], with the direction of the light in the picture, (u, v), for each point.
+    pub fn towards(camera: &Camera<T>, points: &[(ImagePoint<T>, [T; 2])]) -> Self {
+        Self::of(camera, points.iter().map(|(p, lit)| (*p, Lit::towards(*lit))).collect())
+    }
+
+    /// The points that the candidates stage makes of a border.
+    pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
+        let scene = Scene::new(picture, sensor.region(), level, &Unobserved);
+        let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
+        let made = candidates::pick(&scene, &sensor.config().candidates, border, 0, &mut blocks);
+        let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
+        Self::of(sensor.camera(), (0..made.count as usize).map(point).collect())
+    }
+
+    fn of(camera: &Camera<T>, points: Vec<(ImagePoint<T>, Lit)>) -> Self {
+        let mut blocks = vec![Block::<T>::default(); points.len().div_ceil(LANES)];
+        for (i, &(point, lit)) in points.iter().enumerate() {
+            blocks[i / LANES].set_point(i % LANES, point, lit);
         }
         undistort::to_rays(camera, &mut blocks);
         let (fx, fy) = camera.focal_px();
-        Self { blocks, count: points.len() as u32, focal_px: (fx + fy) * T::of(0.5) }
+        Self { blocks, points, focal_px: (fx + fy) * T::of(0.5) }
+    }
+
+    /// The points in the picture, and on which side of each the light is: a step along u or v.
+    pub fn points(&self) -> impl ExactSizeIterator<Item = (ImagePoint<T>, [i8; 2])> {
+        self.points.iter().map(|(p, lit)| (*p, lit.step()))
+    }
+    /// Their unit rays.
+    pub fn rays(&self) -> impl Iterator<Item = [T; 3]> {
+        (0..self.points.len()).map(|i| self.blocks[i / LANES].ray(i % LANES).into())
+    }
+    /// Their weights: 0 for a point that may not count, after the fit the one that it had.
+    pub fn weights(&self) -> impl Iterator<Item = T> {
+        (0..self.points.len()).map(|i| self.blocks[i / LANES].weight[i % LANES])
+    }
+    /// Sets the weights of the first points, from 0 to 1. A point that the lens does not see stays at 0.
+    pub fn set_weights(&mut self, weights: &[T]) {
+        for (i, &weight) in weights.iter().enumerate().take(self.points.len()) {
+            let block = &mut self.blocks[i / LANES];
+            let seen = block.m.iter().any(|m| m[i % LANES] != T::ZERO);
+            block.weight[i % LANES] = if seen { weight } else { T::ZERO };
+        }
+    }
+    /// Points that were not rejected.
+    pub fn inliers(&self) -> u32 {
+        self.weights().filter(|w| *w > T::ZERO).count() as u32
     }
 
     /// Rejects outliers.
     pub fn reject(&mut self, expected: &Expected<T>, config: &reject::Config) -> Option<Agreed<T>> {
-        let found = reject::keep(&mut self.blocks, self.count, expected, self.focal_px, config)?;
+        let count = self.points.len() as u32;
+        let found = reject::keep(&mut self.blocks, count, expected, self.focal_px, config)?;
         let axis = UnitVec3::assume_unit(found.e);
-        Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws })
+        Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
     }
 
-    /// Points that were not rejected.
-    pub fn inliers(&self) -> u32 {
-        self.blocks.iter().map(|b| b.weight.iter().filter(|w| **w > T::ZERO).count() as u32).sum()
+    /// Fits the cone, from what a method of rejection has found. Leaves in each point the weight that it had.
+    pub fn fit(&mut self, sensor: &Sensor<T>, start: &Agreed<T>, expected: &Expected<T>) -> Option<Fitted<T>> {
+        let config = sensor.config();
+        let start =
+            reject::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
+        let threshold = T::of(config.reject.threshold_px);
+        let noise = sensor.noise(expected);
+        estimate::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise)
+            .map(Fitted)
+    }
+
+    /// The cone that somebody else has fitted, with the normal equations of the points at it, by their weights.
+    pub fn given(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T) -> Option<Fitted<T>> {
+        estimate::given(&mut self.blocks, *axis.v(), cos_half_angle).map(Fitted)
+    }
+
+    /// The covariance of a fit, and the expected half-angle fused with it.
+    pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
+        let noise = sensor.noise(expected);
+        let fused = covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate)?;
+        let (b1, b2) = basis(&fused.e);
+        Some(Fused {
+            axis: UnitVec3::assume_unit(fused.e),
+            covariance: Cov3::from_tangent(&b1, &b2, fused.p),
+            cos_half_angle: fused.c,
+        })
     }
 }

@@ -8,8 +8,15 @@ Everything is in the camera frame (x right, y down, z forward) unless its name s
 integers, as in OpenCV. Names end with their unit.
 """
 
+from . import binarize as binarize
+from . import contours as contours
+from . import covariance as covariance
+from . import fit as fit
+from . import ransac as ransac
+from . import rays as rays
 from ._hzn import Camera as Camera
 from ._hzn import ConfigError as ConfigError
+from ._hzn import Expected as Expected
 from ._hzn import Frame as Frame
 from ._hzn import HznError as HznError
 from ._hzn import ImageError as ImageError

@@ -251,6 +251,23 @@ class Sensor:
     def flight(self) -> bool:
         """Single precision, as on the flight computer?"""
 
+    def expect(
+        self,
+        *,
+        altitude_km: float | None = None,
+        position_km: Sequence[float] | None = None,
+        attitude: Sequence[float] | None = None,
+        attitude_sigma_deg: float | None = None,
+        time_s: float | None = None,
+    ) -> Expected:
+        """Work out the cone to expect, for the single stages (`hzn.ransac` and its neighbours). Parameters as in `process`.
+
+        Raises
+        ------
+        ConfigError
+            An altitude, position or attitude that cannot be; or a sensor with ``flight=True``.
+        """
+
     def process(
         self,
         image: _Image,
@@ -611,6 +628,88 @@ class SimulatedFrame:
     def truth(self) -> list[dict[str, Any]]:
         """The truth for each body: columns of truth.csv (docs/files.md)."""
 
+@final
+class Expected:
+    """The cone that follows from what is known about a picture, from `Sensor.expect`."""
+
+    @property
+    def half_angle_deg(self) -> float:
+        """Its half-angle, degrees."""
+
+@final
+class Cone:
+    """A cone of directions: what a method of rejection finds. ``Cone(axis, cos_half_angle)`` makes one's own."""
+
+    def __new__(cls, axis: Sequence[float] | NDArray[np.float64], cos_half_angle: float) -> Cone: ...
+    @property
+    def axis(self) -> NDArray[np.float64]:
+        """Unit vector to the body in the camera frame, shape (3,)."""
+
+    @property
+    def cos_half_angle(self) -> float:
+        """cos of the half-angle."""
+
+    @property
+    def draws(self) -> int:
+        """Draws that were made to find it."""
+
+@final
+class Fit:
+    """A cone that was fitted, from `hzn.fit.cone`."""
+
+    @property
+    def axis(self) -> NDArray[np.float64]:
+        """Unit vector to the body in the camera frame, shape (3,)."""
+
+    @property
+    def cos_half_angle(self) -> float:
+        """cos of the half-angle."""
+
+    @property
+    def rms_px(self) -> float:
+        """Weighted RMS distance of the points from the limb, pixels."""
+
+    @property
+    def inliers(self) -> int:
+        """Points with a weight."""
+
+@final
+class Rays:
+    """Edge points in order along their edge, with their rays and weights."""
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """The points (u, v), shape (n, 2), pixels."""
+
+    @property
+    def lit(self) -> NDArray[np.float64]:
+        """On which side of each point the light is: a step of a pixel along u or v, shape (n, 2)."""
+
+    @property
+    def directions(self) -> NDArray[np.float64]:
+        """Unit rays in the camera frame, shape (n, 3)."""
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """Weights from 0 (does not count) to 1, shape (n,). A copy: set it to choose the points. After a fit, what each point
+        counted. Points that the lens does not see stay at 0.
+        """
+
+    @weights.setter
+    def weights(self, weights: ArrayLike, /) -> None: ...
+    def __len__(self) -> int: ...
+
+def _level(sensor: Sensor, image: _Image, expected: Expected, bits: int | None = None) -> int: ...
+def _borders(
+    sensor: Sensor, image: _Image, level: int, expected: Expected, bits: int | None = None
+) -> list[NDArray[np.float64]]: ...
+def _pick(sensor: Sensor, image: _Image, level: int, border: ArrayLike, bits: int | None = None) -> Rays: ...
+def _rays(sensor: Sensor, points: ArrayLike, lit: ArrayLike) -> Rays: ...
+def _keep(sensor: Sensor, rays: Rays, expected: Expected) -> Cone | None: ...
+def _fit(sensor: Sensor, rays: Rays, start: Cone, expected: Expected) -> Fit | None: ...
+def _fuse(
+    sensor: Sensor, rays: Rays, fit: Fit | Cone, expected: Expected
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float] | None: ...
 @final
 class _Sequence:
     def __new__(cls, sensor: Sensor, inputs: Sequence[_Path]) -> _Sequence: ...

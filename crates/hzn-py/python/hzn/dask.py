@@ -1,0 +1,179 @@
+"""An archive of pictures on a Dask cluster: `pip install hzn[dask]`.
+
+One task a shard; the engine does the work, on one core a task. A shard is written under another name and then renamed, so
+whatever has its name is whole; a second run passes over shards that are there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from ._hzn import ConfigError, Report, Sensor, __version__, _process_encoded, _write_mcap
+
+try:
+    import fsspec  # type: ignore[import-untyped]
+    import pyarrow  # type: ignore[import-untyped]
+    import pyarrow.parquet  # type: ignore[import-untyped]
+    from distributed import as_completed, get_client
+except ImportError as _missing:
+    raise ImportError(f"hzn.dask needs the package {_missing.name}: pip install hzn[dask]") from None
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Url: TypeAlias = str | tuple[str, Mapping[str, Any]]
+
+_TEXTS = ("file", "body", "status", "detail")
+_COUNTS = ("index", "edge_points", "inliers", "candidates", "dropped", "level")
+
+
+@dataclass
+class Archive:
+    """What became of an archive."""
+
+    shards: list[str]
+    """URLs of the shards, in the order of the pictures."""
+    frames: int
+    """Pictures in them."""
+    skipped: int
+    """Shards that were there already."""
+    failed: list[dict[str, Any]] = field(repr=False)
+    """Pictures that could not be read: ``file`` and ``detail``. They have a row with status ``unreadable`` in their shard."""
+
+
+def process_archive(
+    urls: Iterable[Url],
+    sensor: Sensor,
+    *,
+    client: Client | None = None,
+    out: str,
+    format: Literal["parquet", "mcap"] = "parquet",
+    shard_frames: int = 500,
+    retries: int = 2,
+) -> Archive:
+    """Process pictures wherever fsspec finds them, into shards of results.
+
+    Parameters
+    ----------
+    urls
+        URLs or paths of picture files; or pairs of one and a dictionary of what `hzn.Sensor.process` is told besides
+        (``altitude_km`` and so on).
+    sensor
+        The sensor. One with ``binarize.method = "track"`` is refused: its levels go from picture to picture.
+    client
+        A Dask client; without it the one at hand.
+    out
+        URL or path of a folder for the shards.
+    format
+        Of the shards: Parquet with the columns of docs/files.md, or MCAP without pictures.
+    shard_frames
+        Pictures a shard; another number makes other shards.
+    retries
+        How often a shard is tried again when its task fails. A worker that dies is not counted: Dask gives its tasks to
+        others.
+
+    Returns
+    -------
+    Archive
+        The shards, and the pictures that could not be read.
+
+    Raises
+    ------
+    ConfigError
+        No pictures, or a sensor or option that cannot be.
+    Exception
+        What a shard failed with in the end; the others are written, and the next run begins with what is missing.
+    """
+    pictures = [(url, {}) if isinstance(url, str) else (url[0], dict(url[1])) for url in urls]
+    if not pictures:
+        raise ConfigError("urls: there are none")
+    if shard_frames < 1:
+        raise ConfigError(f"shard_frames: {shard_frames} is refused: must be 1 or more")
+    if format not in ("parquet", "mcap"):
+        raise ConfigError(f"format: {format!r} is refused: parquet or mcap")
+    if sensor.parameters["binarize"]["method"] == "track":
+        raise ConfigError("binarize.method: track takes its level from the picture before, which another worker may have")
+    client = client or get_client()
+    filesystem, folder = fsspec.core.url_to_fs(out)
+    filesystem.makedirs(folder, exist_ok=True)
+    there = set(filesystem.ls(folder, detail=False))
+    names: list[str] = []
+    tasks = []
+    for first in range(0, len(pictures), shard_frames):
+        shard = pictures[first : first + shard_frames]
+        name = f"{folder}/part-{first // shard_frames:06}-{_digest(sensor, first, shard)}.{format}"
+        names.append(name)
+        if not any(path.endswith(name.lstrip("/")) for path in there):
+            # Not pure: what a task returns is on the disk, not in its key.
+            tasks.append(client.submit(_shard, sensor, first, shard, out, name, retries=retries, pure=False))
+    for _ in as_completed(tasks):
+        pass
+    client.gather(tasks)
+    return Archive(
+        shards=[filesystem.unstrip_protocol(name) for name in names],
+        frames=len(pictures),
+        skipped=len(names) - len(tasks),
+        failed=[row for name in names for row in _unreadable(filesystem, name)],
+    )
+
+
+def _digest(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
+    """What a shard depends on: the same name is the same result."""
+    told = json.dumps([__version__, sensor.parameters, sensor.flight, first, shard], default=list, sort_keys=True)
+    return hashlib.sha256(told.encode()).hexdigest()[:12]
+
+
+def _shard(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]], out: str, name: str) -> None:
+    """The task: runs on a worker."""
+    filesystem, _ = fsspec.core.url_to_fs(out)
+    if filesystem.exists(name):
+        # A worker that died had written it, or a second one was given the same task.
+        return
+    reports = [_picture(sensor, first + i, url, known) for i, (url, known) in enumerate(shard)]
+    part = f"{name}.{os.getpid()}.part"
+    with tempfile.TemporaryDirectory() as scratch:
+        local = os.path.join(scratch, "shard")
+        if name.endswith(".mcap"):
+            _write_mcap(local, sensor, reports)
+        else:
+            pyarrow.parquet.write_table(_table(reports), local)
+        filesystem.put_file(local, part)
+    filesystem.mv(part, name)
+
+
+def _picture(sensor: Sensor, index: int, url: str, known: Mapping[str, Any]) -> Report:
+    try:
+        with fsspec.open(url, "rb") as file:
+            data, why = file.read(), ""
+    except OSError as error:
+        data, why = None, f"cannot be read: {error}"
+    return _process_encoded(sensor, index, url, data, why, **known)
+
+
+def _table(reports: Sequence[Report]) -> Any:
+    rows = [r.to_dict() for report in reports for r in (report, *report.others)]
+    kinds = {name: pyarrow.string() for name in _TEXTS} | {name: pyarrow.int64() for name in _COUNTS}
+    schema = pyarrow.schema([(name, kinds.get(name, pyarrow.float64())) for name in rows[0]])
+    return pyarrow.Table.from_pylist(rows, schema=schema)
+
+
+def _unreadable(filesystem: Any, name: str) -> list[dict[str, Any]]:
+    if name.endswith(".mcap"):
+        from ._hzn import read_mcap
+
+        with tempfile.TemporaryDirectory() as scratch:
+            local = os.path.join(scratch, "shard.mcap")
+            filesystem.get_file(name, local)
+            table = read_mcap(local)
+        rows = zip(table["status"].tolist(), table["file"].tolist(), table["detail"].tolist(), strict=True)
+    else:
+        with filesystem.open(name, "rb") as file:
+            columns = pyarrow.parquet.read_table(file, columns=["status", "file", "detail"])
+        rows = zip(*(columns[c].to_pylist() for c in ("status", "file", "detail")), strict=True)
+    return [{"file": file, "detail": detail} for status, file, detail in rows if status == "unreadable"]

@@ -1,0 +1,330 @@
+//! The stages one at a time: what `hzn.binarize` and its neighbours call.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use hzn_calib::FrameData;
+use hzn_cli::engine::{AnySensor, Traces};
+use hzn_core::frames::{Cam, UnitVec3};
+use hzn_core::pipeline::edges::{Agreed, Edges, Fitted};
+use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::{Config, Expected as CoreExpected, Sensor as CoreSensor, binarize, reject};
+use numpy::ndarray::{Array1, Array2, arr1, arr2};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, ToPyArray};
+use pyo3::prelude::*;
+
+use crate::camera::rows;
+use crate::errors;
+use crate::image::{Array, View};
+use crate::sensor::{Sensor, State};
+
+type Two<'py> = Bound<'py, PyArray2<f64>>;
+
+#[doc = doc!("Expected")]
+#[pyclass(frozen, module = "hzn")]
+pub(crate) struct Expected {
+    data: FrameData,
+    core: CoreExpected<f64>,
+}
+
+impl Expected {
+    pub(crate) fn of(state: &State, data: FrameData) -> PyResult<Self> {
+        let core = state.core()?.expect(&data.to_frame(None)).map_err(errors::config)?;
+        Ok(Self { data, core })
+    }
+}
+
+#[pymethods]
+impl Expected {
+    #[doc = doc!("Expected.half_angle_deg")]
+    #[getter]
+    fn half_angle_deg(&self) -> f64 {
+        self.core.half_angle_rad().to_degrees()
+    }
+}
+
+#[doc = doc!("Cone")]
+#[pyclass(frozen, module = "hzn.ransac")]
+pub(crate) struct Cone(Agreed<f64>);
+
+#[pymethods]
+impl Cone {
+    #[new]
+    fn new(axis: [f64; 3], cos_half_angle: f64) -> PyResult<Self> {
+        let axis = UnitVec3::<Cam, f64>::try_new(axis).ok_or_else(|| errors::config("axis: is no direction"))?;
+        if !(cos_half_angle.abs() < 1.0) {
+            return Err(errors::config(format!(
+                "cos_half_angle: {cos_half_angle} is refused: must be between -1 and 1"
+            )));
+        }
+        Ok(Self(Agreed { axis, cos_half_angle, draws: 0, all: false }))
+    }
+    #[doc = doc!("Cone.axis")]
+    #[getter]
+    fn axis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arr1(&self.0.axis.xyz()).to_pyarray(py)
+    }
+    #[doc = doc!("Cone.cos_half_angle")]
+    #[getter]
+    fn cos_half_angle(&self) -> f64 {
+        self.0.cos_half_angle
+    }
+    #[doc = doc!("Cone.draws")]
+    #[getter]
+    fn draws(&self) -> u32 {
+        self.0.draws
+    }
+    fn __repr__(&self) -> String {
+        let [x, y, z] = self.0.axis.xyz();
+        format!("Cone([{x:.6}, {y:.6}, {z:.6}], half-angle {:.4} deg)", self.0.cos_half_angle.acos().to_degrees())
+    }
+}
+
+#[doc = doc!("Fit")]
+#[pyclass(frozen, module = "hzn.fit")]
+pub(crate) struct Fit(Fitted<f64>);
+
+#[pymethods]
+impl Fit {
+    #[doc = doc!("Fit.axis")]
+    #[getter]
+    fn axis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arr1(&self.0.axis().xyz()).to_pyarray(py)
+    }
+    #[doc = doc!("Fit.cos_half_angle")]
+    #[getter]
+    fn cos_half_angle(&self) -> f64 {
+        self.0.cos_half_angle()
+    }
+    #[doc = doc!("Fit.rms_px")]
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        self.0.rms_px()
+    }
+    #[doc = doc!("Fit.inliers")]
+    #[getter]
+    fn inliers(&self) -> u32 {
+        self.0.inliers()
+    }
+}
+
+#[doc = doc!("Rays")]
+#[pyclass(frozen, module = "hzn.rays")]
+pub(crate) struct Rays(Mutex<Edges<f64>>);
+
+impl Rays {
+    fn of(edges: Edges<f64>) -> Self {
+        Self(Mutex::new(edges))
+    }
+    fn edges(&self) -> MutexGuard<'_, Edges<f64>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Rays {
+    #[doc = doc!("Rays.points")]
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> Two<'py> {
+        let points: Vec<[f64; 2]> = self.edges().points().map(|(p, _)| [p.u, p.v]).collect();
+        arr2(&points).to_pyarray(py)
+    }
+    #[doc = doc!("Rays.lit")]
+    #[getter]
+    fn lit<'py>(&self, py: Python<'py>) -> Two<'py> {
+        let lit: Vec<[f64; 2]> = self.edges().points().map(|(_, lit)| lit.map(f64::from)).collect();
+        arr2(&lit).to_pyarray(py)
+    }
+    #[doc = doc!("Rays.directions")]
+    #[getter]
+    fn directions<'py>(&self, py: Python<'py>) -> Two<'py> {
+        let rays: Vec<[f64; 3]> = self.edges().rays().collect();
+        arr2(&rays).to_pyarray(py)
+    }
+    #[doc = doc!("Rays.weights")]
+    #[getter]
+    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.edges().weights().collect::<Array1<f64>>().to_pyarray(py)
+    }
+    #[setter]
+    fn set_weights(&self, weights: &Bound<'_, PyAny>) -> PyResult<()> {
+        let n = self.__len__();
+        let given: PyArrayLike1<'_, f64, AllowTypeChange> =
+            weights.extract().map_err(|_| errors::config(format!("weights: shape ({n},) is expected")))?;
+        let given: Vec<f64> = given.as_array().iter().copied().collect();
+        if given.len() != n || given.iter().any(|w| !(0.0..=1.0).contains(w)) {
+            return Err(errors::config(format!("weights: {n} numbers from 0 to 1 are expected")));
+        }
+        self.edges().set_weights(&given);
+        Ok(())
+    }
+    fn __len__(&self) -> usize {
+        self.edges().points().len()
+    }
+}
+
+/// Reads the array as a picture of this sensor and hands it on, packed or not.
+macro_rules! with_picture {
+    ($image:expr, $state:expr, $bits:expr, |$picture:ident| $work:expr) => {{
+        let array = Array::of($image)?;
+        $state.check_size(&array)?;
+        match array.view($bits, $state.config.input.channel)? {
+            View::Packed($picture) => $work,
+            View::Strided($picture) => $work,
+        }
+    }};
+}
+
+#[pyfunction]
+#[pyo3(name = "_level", signature = (sensor, image, expected, bits = None))]
+pub(crate) fn level(sensor: &Sensor, image: &Bound<'_, PyAny>, expected: &Expected, bits: Option<u8>) -> PyResult<u16> {
+    let state = sensor.state();
+    let core = state.core()?;
+    let found = with_picture!(image, state, bits, |picture| core.level(&picture, &expected.core));
+    found.map(|l| l.level).map_err(|status| errors::other(format!("no level: {}", status.name())))
+}
+
+/// Every edge of a picture at a level, longer than `candidates.min_points`, in the order in which they are looked at.
+#[pyfunction]
+#[pyo3(name = "_borders", signature = (sensor, image, level, expected, bits = None))]
+pub(crate) fn borders<'py>(
+    py: Python<'py>,
+    sensor: &Sensor,
+    image: &Bound<'py, PyAny>,
+    level: u16,
+    expected: &Expected,
+    bits: Option<u8>,
+) -> PyResult<Vec<Two<'py>>> {
+    let state = sensor.state();
+    let mut every = AnySensor::new(&every_edge(&state.config, level), false).map_err(errors::config)?;
+    let traces = Traces::new(1);
+    with_picture!(image, state, bits, |picture| every.process_pixels(&picture, Some(&expected.data), Some(&traces)));
+    let edges = traces.each.first().map(|t| t.edges().clone()).unwrap_or_default();
+    let table = |edge: &hzn_cli::engine::trace::Edge| {
+        let border = &edge.border;
+        let cell = |(i, k): (usize, usize)| f64::from(if k == 0 { border[i].x } else { border[i].y });
+        Array2::from_shape_fn((border.len(), 2), cell).to_pyarray(py)
+    };
+    Ok(edges.iter().map(table).collect())
+}
+
+/// The sensor that goes through every edge of a picture at this level, because it agrees to none.
+fn every_edge(config: &Config, level: u16) -> Config {
+    let mut every = config.clone();
+    if let Some(first) = config.bodies.first() {
+        every.body = first.clone();
+        every.bodies.clear();
+    }
+    every.body.binarize = None;
+    every.binarize = binarize::Config { method: binarize::Method::Fixed, level: f64::from(level), ..config.binarize };
+    every.gate = binarize::Gate { min_mean: 0.0, max_mean: 1.0 };
+    every.reject =
+        reject::Config { method: reject::Method::TwoPoint, threshold_px: 1e-9, max_draws: 1, ..config.reject };
+    every
+}
+
+#[pyfunction]
+#[pyo3(name = "_pick", signature = (sensor, image, level, border, bits = None))]
+pub(crate) fn pick(
+    sensor: &Sensor,
+    image: &Bound<'_, PyAny>,
+    level: u16,
+    border: &Bound<'_, PyAny>,
+    bits: Option<u8>,
+) -> PyResult<Rays> {
+    let state = sensor.state();
+    let core = state.core()?;
+    let border = rows(border, 2, "border")?;
+    let region = (f64::from(state.config.camera.width), f64::from(state.config.camera.height));
+    let pixel = |r: numpy::ndarray::ArrayView1<'_, f64>| {
+        let inside = (0.0..region.0).contains(&r[0]) && (0.0..region.1).contains(&r[1]);
+        inside.then_some(Pixel { x: r[0] as u16, y: r[1] as u16 })
+    };
+    let border: Option<Vec<Pixel>> = border.as_array().outer_iter().map(pixel).collect();
+    let border = border.ok_or_else(|| errors::image("border: a pixel lies outside of the picture"))?;
+    Ok(Rays::of(with_picture!(image, state, bits, |picture| Edges::pick(core, &picture, level, &border))))
+}
+
+#[pyfunction]
+#[pyo3(name = "_rays")]
+pub(crate) fn rays(sensor: &Sensor, points: &Bound<'_, PyAny>, lit: &Bound<'_, PyAny>) -> PyResult<Rays> {
+    let state = sensor.state();
+    let (points, lit) = (rows(points, 2, "points")?, rows(lit, 2, "lit")?);
+    if points.as_array().nrows() != lit.as_array().nrows() {
+        return Err(errors::image("lit: as many rows as points are expected"));
+    }
+    let both: Vec<_> = points
+        .as_array()
+        .outer_iter()
+        .zip(lit.as_array().outer_iter())
+        .map(|(p, l)| (ImagePoint { u: p[0], v: p[1] }, [l[0], l[1]]))
+        .collect();
+    Ok(Rays::of(Edges::towards(state.core()?.camera(), &both)))
+}
+
+#[pyfunction]
+#[pyo3(name = "_keep")]
+pub(crate) fn keep(py: Python<'_>, sensor: &Sensor, rays: &Rays, expected: &Expected) -> PyResult<Option<Cone>> {
+    let state = sensor.state();
+    Ok(errors::detached(py, || rays.edges().reject(&expected.core, &state.config.reject))?.map(Cone))
+}
+
+#[pyfunction]
+#[pyo3(name = "_fit")]
+pub(crate) fn fit(
+    py: Python<'_>,
+    sensor: &Sensor,
+    rays: &Rays,
+    start: &Cone,
+    expected: &Expected,
+) -> PyResult<Option<Fit>> {
+    let state = sensor.state();
+    let core = state.core()?;
+    Ok(errors::detached(py, || rays.edges().fit(core, &start.0, &expected.core))?.map(Fit))
+}
+
+/// Axis, covariance, cos of the half-angle; None where the points do not determine them.
+type Fused<'py> = Option<(Bound<'py, PyArray1<f64>>, Two<'py>, f64)>;
+
+#[pyfunction]
+#[pyo3(name = "_fuse")]
+pub(crate) fn fuse<'py>(
+    py: Python<'py>,
+    sensor: &Sensor,
+    rays: &Rays,
+    fit: &Bound<'py, PyAny>,
+    expected: &Expected,
+) -> PyResult<Fused<'py>> {
+    let state = sensor.state();
+    let core = state.core()?;
+    let mut edges = rays.edges();
+    let fitted = match (fit.cast::<Fit>(), fit.cast::<Cone>()) {
+        (Ok(fit), _) => Some(fit.get().0),
+        (_, Ok(cone)) => edges.given(&cone.get().0.axis, cone.get().0.cos_half_angle),
+        _ => return Err(errors::config("fit: a Fit of hzn.fit, or a Cone of one's own, is expected")),
+    };
+    let fused = fitted.and_then(|fit| edges.fuse(core, &fit, &expected.core));
+    Ok(fused.map(|f| (arr1(&f.axis.xyz()).to_pyarray(py), arr2(&f.covariance.rows()).to_pyarray(py), f.cos_half_angle)))
+}
+
+impl State {
+    /// The sensor in double precision.
+    pub(crate) fn core(&self) -> PyResult<&CoreSensor<f64>> {
+        if self.flight {
+            return Err(errors::config("flight: the single stages are those of the workstation, in double precision"));
+        }
+        Ok(&self.core)
+    }
+
+    /// Is it a picture of this camera?
+    pub(crate) fn check_size(&self, array: &Array<'_>) -> PyResult<()> {
+        let camera = &self.config.camera;
+        let (width, height) = array.size();
+        if (width, height) == (usize::from(camera.width), usize::from(camera.height)) {
+            return Ok(());
+        }
+        Err(errors::image(format!(
+            "the picture is {width} x {height} px (shape ({height}, {width})), but the camera is {} x {}",
+            camera.width, camera.height
+        )))
+    }
+}

@@ -1,0 +1,115 @@
+"""An archive on a real cluster of two processes."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import hzn
+from conftest import CAMERA, limb, pgm
+
+dask = pytest.importorskip("dask")
+import distributed  # noqa: E402
+import pyarrow.parquet as parquet  # noqa: E402
+
+from hzn.dask import process_archive  # noqa: E402
+
+FRAMES = 2000
+SMALL = dict(CAMERA, width=80, height=60, fx_px=75.0, fy_px=75.0, cx_px=39.5, cy_px=29.5)
+
+
+@pytest.fixture(scope="module")
+def client():
+    dask.config.set({"distributed.comm.timeouts.connect": "60s", "distributed.worker.daemon": False})
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster, distributed.Client(cluster) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    """Small pictures of which two cannot be read; one is not there."""
+    folder = tmp_path_factory.mktemp("archive")
+    kinds = [pgm(np.ascontiguousarray(limb(i)[::4, ::4])) for i in range(50)]
+    for i in range(FRAMES):
+        (folder / f"{i:04}.pgm").write_bytes(kinds[i % 50] if i != 77 else b"P5 cut")
+    return [str(folder / f"{i:04}.pgm") for i in range(FRAMES)][:-1] + [str(folder / "lost.pgm")]
+
+
+@pytest.fixture
+def small():
+    body = {"kind": "earth-sphere", "altitude_km": 400.0}
+    return hzn.Sensor(camera=SMALL, body=body, candidates={"min_points": 20})
+
+
+def columns(archive):
+    tables = [parquet.read_table(shard.removeprefix("file://")).to_pydict() for shard in archive.shards]
+    return {name: [cell for table in tables for cell in table[name]] for name in tables[0]}
+
+
+def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_path):
+    out = tmp_path / "out"
+
+    def kill_one():
+        # When the first shards are written, so in the middle of others.
+        while len(list(out.glob("*.parquet"))) < 3:
+            time.sleep(0.02)
+        os.kill(victim, signal.SIGKILL)
+
+    victim = next(iter(client.run(os.getpid).values()))
+    killer = threading.Thread(target=kill_one)
+    killer.start()
+    result = process_archive(archive, small, client=client, out=str(out), shard_frames=50)
+    killer.join()
+    client.wait_for_workers(2, timeout=60)
+    assert victim not in client.run(os.getpid).values()
+    assert (result.frames, len(result.shards), result.skipped) == (FRAMES, 40, 0)
+    assert [os.path.basename(f["file"]) for f in result.failed] == ["0077.pgm", "lost.pgm"]
+    assert "no such file" in result.failed[1]["detail"].lower()
+    assert sorted(p.name for p in out.iterdir()) == sorted(os.path.basename(s) for s in result.shards)
+    found = columns(result)
+    serial = [r.to_dict() for r in small.process_many([p for p in archive if os.path.exists(p)])]
+    assert found["index"] == list(range(FRAMES)) and found["file"] == archive
+    for name in ("status", "axis_x", "axis_y", "cov_xx", "sigma_max_deg", "level", "inliers"):
+        assert found[name][:-1] == [row[name] for row in serial], name
+    assert found["status"].count("ok") > 0.9 * FRAMES
+
+    # A second run has nothing to do; a shard that is lost is made again, the same.
+    times = {p: p.stat().st_mtime_ns for p in out.iterdir()}
+    lost = sorted(out.iterdir())[3]
+    lost.unlink()
+    again = process_archive(archive, small, client=client, out=str(out), shard_frames=50)
+    assert again.skipped == 39 and columns(again)["axis_y"] == found["axis_y"]
+    assert {p for p in out.iterdir() if p.stat().st_mtime_ns != times[p]} == {lost}
+    # Another sensor does not take these for its own.
+    other = hzn.Sensor(**{**small.parameters, "reject": {"seed": 5}})
+    assert process_archive(archive[:60], other, client=client, out=str(out), shard_frames=50).skipped == 0
+
+
+def test_mcap_shards_and_what_is_known(client, archive, small, tmp_path):
+    told = [(path, {"altitude_km": 399.0}) for path in archive[:30]]
+    result = process_archive(told, small, client=client, out=f"file://{tmp_path}/m", format="mcap", shard_frames=20)
+    (first, second) = [shard.removeprefix("file://") for shard in result.shards]
+    table = hzn.read_mcap(first)
+    assert len(table["index"]) == 20 and len(hzn.read_mcap(second)["index"]) == 10 and result.failed == []
+    assert set(table["altitude_km"]) == {399.0}
+    with hzn.open_mcap(first) as recording:
+        assert recording.sensor() == small and next(recording).image is None
+
+
+def test_what_an_archive_refuses(client, archive, small, tmp_path):
+    out = str(tmp_path)
+    for urls, sensor, more, what in [
+        ([], small, {}, "urls"),
+        (archive, small, {"format": "csv"}, "format"),
+        (archive, small, {"shard_frames": 0}, "shard_frames"),
+        (archive, hzn.Sensor(camera=SMALL, binarize={"method": "track"}), {}, "track"),
+    ]:
+        with pytest.raises(hzn.ConfigError, match=what):
+            process_archive(urls, sensor, client=client, out=out, **more)
+    with pytest.raises(hzn.ConfigError, match="attitude"):
+        process_archive([(archive[0], {"attitude": [2, 0, 0, 0]})], small, client=client, out=out, retries=0)

@@ -1,0 +1,89 @@
+"""The stages one at a time, and one step swapped for another."""
+
+import numpy as np
+import pytest
+
+import hzn
+from conftest import limb
+
+TRUTH = np.array([0.0, np.sin(np.radians(68)), np.cos(np.radians(68))])
+
+
+def degrees(a, b):
+    return np.degrees(np.arccos(np.clip(a @ b, -1, 1)))
+
+
+def test_the_stages_are_the_pipeline(sensor):
+    """Every number of the report, to the last bit."""
+    image = limb()
+    report = sensor.process(image, altitude_km=401.0, detail=True)
+    expected = sensor.expect(altitude_km=401.0)
+    level = hzn.binarize.level(sensor, image, expected)
+    assert level == report.level
+    borders = hzn.contours.find(sensor, image, level, expected)
+    assert np.array_equal(borders[0], report.edges[0])
+    rays = hzn.contours.points(sensor, image, level, borders[0])
+    assert len(rays) == report.edge_points
+    assert np.allclose(np.linalg.norm(rays.directions, axis=1), 1.0) and set(np.abs(rays.lit).sum(1)) == {1.0}
+    start = hzn.ransac.keep(sensor, rays, expected)
+    fit = hzn.fit.cone(sensor, rays, start, expected)
+    assert (fit.rms_px, fit.inliers) == (report.rms_px, len(report.inliers)) and start.draws > 0
+    assert np.array_equal(rays.points[rays.weights > 0], report.inliers)
+    fused = hzn.covariance.fuse(sensor, rays, fit, expected)
+    assert np.array_equal(fused.axis, report.axis) and np.array_equal(fused.covariance, report.covariance)
+
+
+def test_other_strides_and_a_round_trip_through_arrays(sensor):
+    image = limb()
+    level = hzn.binarize.level(sensor, np.asfortranarray(image))
+    borders = hzn.contours.find(sensor, np.asfortranarray(image), level)
+    assert np.array_equal(borders[0], hzn.contours.find(sensor, image, level)[0])
+    there = hzn.contours.points(sensor, image, level, borders[0])
+    back = hzn.rays.of(sensor, there.points, there.lit)
+    assert np.array_equal(back.directions, there.directions) and np.array_equal(back.lit, there.lit)
+
+
+def test_every_step_can_be_ones_own(sensor):
+    """A level, points, a consensus and a fit in NumPy, between the stages that stay."""
+    image = limb()
+    # Points: half-level crossings by column.
+    columns = np.arange(0, 320, 2)
+    profile = image[:, columns].astype(float) - 110
+    rows = np.argmax(profile > 0, axis=0)
+    above, below = profile[rows - 1, np.arange(160)], profile[rows, np.arange(160)]
+    points = np.column_stack([columns, rows - below / (below - above)])
+    points[::10, 1] += 40.0
+    rays = hzn.rays.of(sensor, points, np.tile([0.0, 1.0], (160, 1)))
+    # Consensus: the truth is known.
+    start = hzn.ransac.Cone(TRUTH, np.cos(np.radians(70.38)))
+    weights = np.ones(160)
+    weights[::10] = 0.0
+    rays.weights = weights
+    fit = hzn.fit.cone(sensor, rays, start)
+    assert fit.inliers == 144 and degrees(fit.axis, TRUTH) < 0.1
+    # Fit: a plane through the ends of the rays, s . n = 1.
+    chosen = rays.directions[weights > 0]
+    n = np.linalg.lstsq(chosen, np.ones(len(chosen)), rcond=None)[0]
+    rays.weights = weights
+    own = hzn.ransac.Cone(n / np.linalg.norm(n), 1 / np.linalg.norm(n))
+    fused = hzn.covariance.fuse(sensor, rays, own)
+    assert degrees(fused.axis, TRUTH) < 0.1 and np.allclose(fused.covariance @ fused.axis, 0, atol=1e-12)
+
+
+def test_what_the_stages_refuse(sensor):
+    image = limb()
+    rays = hzn.rays.of(sensor, [[1.0, 2.0]] * 3, [[0.0, 1.0]] * 3)
+    for wrong in ([1.0], [2.0, 0.0, 0.0], [np.nan] * 3, "x"):
+        with pytest.raises(hzn.ConfigError, match="weights"):
+            rays.weights = wrong
+    with pytest.raises(hzn.ImageError, match="outside"):
+        hzn.contours.points(sensor, image, 100, [[500.0, 0.0]])
+    with pytest.raises(hzn.ImageError, match="lit"):
+        hzn.rays.of(sensor, [[1.0, 2.0]], [[0.0, 1.0]] * 2)
+    with pytest.raises(hzn.HznError, match="no-limb"):
+        hzn.binarize.level(sensor, np.full_like(image, 100))
+    with pytest.raises(hzn.ConfigError, match="cos_half_angle"):
+        hzn.ransac.Cone([0.0, 0.0, 1.0], 2.0)
+    with pytest.raises(hzn.ConfigError, match="flight"):
+        hzn.Sensor(**sensor.parameters, flight=True).expect()
+    assert hzn.ransac.keep(sensor, rays) is None or hzn.fit.cone(sensor, rays, hzn.ransac.keep(sensor, rays)) is None
