@@ -78,6 +78,8 @@ const REACH: i32 = 10;
 const WIDEST: i32 = 6;
 /// Steps from a border pixel within which everything is read.
 const MARGIN: i32 = REACH + 3;
+/// Stands for a brightness that cannot be read.
+const UNSEEN: i32 = i32::MIN;
 
 /// What came of a candidate's border.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -165,23 +167,29 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
     /// The pixel (dx, dy) further, which stands `offset` further in memory.
     #[inline(always)]
     fn read(&self, dx: i32, dy: i32, offset: isize) -> Option<i32> {
-        let (x, y) = (self.x + dx, self.y + dy);
+        read::<T, P, O, FREE>(self.scene, (self.x + dx, self.y + dy), self.index.wrapping_add_signed(offset))
+    }
+
+    /// Three pixels side by side, `dy` rows down.
+    #[inline(always)]
+    fn row(&self, dy: i32) -> Option<[i32; 3]> {
         if !FREE {
-            let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
-            if !self.scene.region.contains(x, y) || self.scene.region.masked(x, y) {
-                return None;
-            }
+            return Some([self.at(-1, dy)?, self.at(0, dy)?, self.at(1, dy)?]);
         }
-        self.scene.observer.pixel(x as u16, y as u16);
-        Some(i32::from(self.scene.picture.read(self.index.wrapping_add_signed(offset))))
+        let (x, y) = (self.x as u16, (self.y + dy) as u16);
+        for dx in [u16::MAX, 0, 1] {
+            self.scene.observer.pixel(x.wrapping_add(dx), y);
+        }
+        let first = self.index.wrapping_add_signed(dy as isize * self.down - self.across);
+        Some(self.scene.picture.three(first).map(i32::from))
     }
 
     /// The 3×3 neighbourhood.
     #[inline(always)]
     fn near(&self) -> Option<Near> {
-        let (nw, n, ne) = (self.at(-1, -1)?, self.at(0, -1)?, self.at(1, -1)?);
-        let (w, c, e) = (self.at(-1, 0)?, self.at(0, 0)?, self.at(1, 0)?);
-        let (sw, s, se) = (self.at(-1, 1)?, self.at(0, 1)?, self.at(1, 1)?);
+        let [nw, n, ne] = self.row(-1)?;
+        let [w, c, e] = self.row(0)?;
+        let [sw, s, se] = self.row(1)?;
         let columns = [nw + 2 * w + sw, n + 2 * c + s, ne + 2 * e + se];
         let rows = [nw + 2 * n + ne, w + 2 * c + e, sw + 2 * s + se];
         Some(Near { columns, rows })
@@ -215,16 +223,50 @@ impl<'a, 'b, 'c, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'a, 
         let (sx, sy) = (dy.signum() * side, dx.signum() * side);
         self.around.read(k * dx + sx, k * dy + sy, k as isize * self.ahead + side as isize * self.aside)
     }
-    /// Four times the brightness `k` steps towards the dark.
-    #[inline(always)]
-    fn one(&self, k: i32) -> Option<i32> {
-        Some(4 * self.at(k, 0)?)
-    }
-    /// As [`Self::one`], smoothed with 1-2-1 along the edge.
+    /// Four times the brightness `k` steps towards the dark, smoothed with 1-2-1 along the edge.
     #[inline(always)]
     fn three(&self, k: i32) -> Option<i32> {
         Some(self.at(k, -1)? + 2 * self.at(k, 0)? + self.at(k, 1)?)
     }
+}
+
+/// Reads in a straight line.
+struct Walk<'a, 'b, T, P, O, const FREE: bool> {
+    scene: &'a Scene<'b, T, P, O>,
+    /// Column and row of the next pixel, and the step to the one after it.
+    at: (i32, i32),
+    step: (i32, i32),
+    index: usize,
+    ahead: isize,
+}
+
+impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O, FREE> {
+    /// Four times the brightness of the next pixel; [`UNSEEN`] where nothing can be read.
+    #[inline(always)]
+    fn next(&mut self) -> i32 {
+        let seen = read::<T, P, O, FREE>(self.scene, self.at, self.index);
+        self.at = (self.at.0 + self.step.0, self.at.1 + self.step.1);
+        self.index = self.index.wrapping_add_signed(self.ahead);
+        seen.map_or(UNSEEN, |v| 4 * v)
+    }
+}
+
+/// The pixel at column `x`, row `y`, which stands at `index`; `None` beyond the region and under the mask. `FREE`: it is
+/// known to be within and unmasked.
+#[inline(always)]
+fn read<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+    scene: &Scene<'_, T, P, O>,
+    (x, y): (i32, i32),
+    index: usize,
+) -> Option<i32> {
+    if !FREE {
+        let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
+        if !scene.region.contains(x, y) || scene.region.masked(x, y) {
+            return None;
+        }
+    }
+    scene.observer.pixel(x as u16, y as u16);
+    Some(i32::from(scene.picture.read(index)))
 }
 
 /// Sums over columns (left to right) and rows (downwards) of a 3×3 neighbourhood, smoothed with 1-2-1.
@@ -329,6 +371,20 @@ fn in_steps<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P, O, FREE> {
+    /// One pixel after another from `k` steps towards the dark, in the direction `out`.
+    #[inline(always)]
+    fn outwards(&self, k: i32, out: i32) -> Walk<'_, '_, T, P, O, FREE> {
+        let Around { scene, x, y, index, .. } = *self.around;
+        let (dx, dy) = self.step;
+        Walk {
+            scene,
+            at: (x + k * dx, y + k * dy),
+            step: (out * dx, out * dy),
+            index: index.wrapping_add_signed(k as isize * self.ahead),
+            ahead: out as isize * self.ahead,
+        }
+    }
+
     /// Reads on from the border pixel or its dark neighbour, whose brightness is `v`, until the side has levelled off:
     /// two more pixels change it by less than a twelfth of the contrast to `other` each. Gives the plateau's level and
     /// the offset where it begins.
@@ -337,16 +393,18 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         let (from, out) = if LIT { (0, -1) } else { (1, 1) };
         // How far `v` lies beyond `w`, away from the other side.
         let beyond = |v: i32, w: i32| if LIT { v - w } else { w - v };
+        // Where nothing can be read the side ends.
+        let or_here = |seen: i32, v: i32| if FREE || seen != UNSEEN { seen } else { v };
         let mut k = from;
-        let (mut near, mut far) = (self.one(k + out), self.one(k + 2 * out));
+        let mut outwards = self.outwards(from + out, out);
+        let (mut near, mut far) = (outwards.next(), outwards.next());
         loop {
-            // Where nothing can be read the side ends.
-            let (n, f) = (near.unwrap_or(v), far.unwrap_or(v));
+            let (n, f) = (or_here(near, v), or_here(far, v));
             let contrast = beyond(v, other).max(24);
             if 12 * beyond(n, v) > contrast {
                 (k, v, near) = (k + out, n, far);
             } else if 6 * beyond(f, v) > contrast {
-                (k, v, near) = (k + 2 * out, f, self.one(k + 3 * out));
+                (k, v, near) = (k + 2 * out, f, outwards.next());
             } else {
                 // What lies beyond on the same level counts towards it.
                 let level = match (6 * beyond(v, n) < contrast, 6 * beyond(v, f) < contrast) {
@@ -357,10 +415,10 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
                 };
                 return (level, k);
             }
-            if (k - from).abs() >= REACH {
+            if (k - from) * out >= REACH {
                 return (v, k);
             }
-            far = self.one(k + 2 * out);
+            far = outwards.next();
         }
     }
 

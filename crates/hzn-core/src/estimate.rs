@@ -384,11 +384,11 @@ fn robust<T: Real>(
         let next = (spread * T::of(TUKEY)).most(narrowest).least(widest);
         let settled = (next - cutoff).abs() < cutoff * T::of(0.05) && size < T::of(1e-4) * at.sin();
         cutoff = next;
-        // The last digits come with the weights kept.
-        if settled && every == 1 {
+        // All points and the last digits come with the weights kept.
+        if settled {
             break;
         }
-        if settled || size < T::of(1e-3) * at.sin() {
+        if size < T::of(1e-3) * at.sin() {
             every = 1;
         }
     }

@@ -28,6 +28,11 @@ pub trait Pixels {
     fn down(&self) -> usize;
     /// Brightness at an index; 0 beyond the end.
     fn read(&self, index: usize) -> u16;
+    /// Brightness at an index and at the two columns to the right of it.
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        [0, 1, 2].map(|k| self.read(index + k * self.across()))
+    }
     /// Brightness at column `x`, row `y`. The caller stays within the picture: beyond, it is some pixel or 0.
     #[inline(always)]
     fn at(&self, x: u16, y: u16) -> u16 {
@@ -60,6 +65,10 @@ impl<P: Pixels> Pixels for &P {
     #[inline(always)]
     fn read(&self, index: usize) -> u16 {
         (**self).read(index)
+    }
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        (**self).three(index)
     }
 }
 
@@ -237,6 +246,13 @@ impl<S: Sample> Pixels for Grey<'_, S> {
     #[inline(always)]
     fn read(&self, index: usize) -> u16 {
         self.data.get(index).map_or(0, |&s| s.into())
+    }
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        match self.data.get(index..index + 3) {
+            Some(&[a, b, c]) => [a.into(), b.into(), c.into()],
+            _ => [0, 1, 2].map(|k| self.read(index + k)),
+        }
     }
 }
 

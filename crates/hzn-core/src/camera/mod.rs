@@ -204,16 +204,18 @@ impl<T: Real> Camera<T> {
             }
             if let Some((s, [a, b, c, d])) = lens.rays(&x, &y) {
                 for l in 0..LANES {
-                    let beyond = !(x[l] * x[l] + y[l] * y[l] <= self.rho_max * self.rho_max);
-                    block.m[0][l] = a[l] * self.inv_fx;
-                    block.m[1][l] = b[l] * self.inv_fy;
-                    block.m[2][l] = c[l] * self.inv_fx;
-                    block.m[3][l] = d[l] * self.inv_fy;
-                    if beyond || block.weight[l] == T::ZERO {
-                        block.clear(l);
-                    } else {
-                        (block.s[0][l], block.s[1][l], block.s[2][l]) = (s[0][l], s[1][l], s[2][l]);
-                    }
+                    let within = x[l] * x[l] + y[l] * y[l] <= self.rho_max * self.rho_max;
+                    let counts = within && block.weight[l] > T::ZERO;
+                    // As `Block::clear`.
+                    let or_zero = |value: T| if counts { value } else { T::ZERO };
+                    block.s[0][l] = or_zero(s[0][l]);
+                    block.s[1][l] = or_zero(s[1][l]);
+                    block.s[2][l] = if counts { s[2][l] } else { T::one() };
+                    block.m[0][l] = or_zero(a[l] * self.inv_fx);
+                    block.m[1][l] = or_zero(b[l] * self.inv_fy);
+                    block.m[2][l] = or_zero(c[l] * self.inv_fx);
+                    block.m[3][l] = or_zero(d[l] * self.inv_fy);
+                    block.weight[l] = if counts { block.weight[l] } else { T::ZERO };
                 }
                 return;
             }

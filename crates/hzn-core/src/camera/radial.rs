@@ -1,9 +1,9 @@
 //! Kannala-Brandt and equidistant lenses.
 //!
 //! The inverse θ(ρ) has no closed form. On loading it is solved by Newton's method at Chebyshev nodes, and what a
-//! ray needs (sin θ/ρ, cos θ, dθ/dρ) is kept as three Chebyshev series in ρ². The series are checked against Newton
-//! between the nodes; where they do not reach the precision of `T` (close to the end of monotony), rays are solved
-//! by Newton instead.
+//! ray needs (sin θ/ρ, cos θ, dθ/dρ) is kept as three polynomials in ρ², made from Chebyshev series. They are checked
+//! against Newton between the nodes; where they do not reach the precision of `T` (close to the end of monotony), rays
+//! are solved by Newton instead.
 
 use super::config::Config;
 use super::radial_ray;
@@ -26,8 +26,8 @@ pub(super) struct Radial<T> {
 #[derive(Debug, Clone)]
 enum Inverse<T> {
     Newton,
-    /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds one order's coefficients of the three series
-    /// (sin θ/ρ, cos θ, dθ/dρ), lowest first; the first `used` are summed by Clenshaw's recurrence.
+    /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds one power's coefficients of the three polynomials
+    /// (sin θ/ρ, cos θ, dθ/dρ), lowest first; the first `used` count.
     Series {
         scale: T,
         used: usize,
@@ -133,55 +133,53 @@ impl<T: Real> Radial<T> {
         let scale = 2.0 / (r_max * r_max);
         // Direction to the working precision; the derivative only weighs points, so 1e-6 is ample.
         let tolerance = (T::EPSILON.f64() * 2.0).most(1e-14);
-        let good = |used: usize| {
+        let good = |powers: &[[f64; 3]]| {
             (0..=64).all(|i| {
                 let rho = r_max * f64::from(i) / 64.0;
-                let (got, want) =
-                    (clenshaw(terms.get(..used).unwrap_or_default(), scale * rho * rho - 1.0), values(rho));
+                let (got, want) = (horner(powers, scale * rho * rho - 1.0), values(rho));
                 let direction = ((got[0] - want[0]).abs() * rho).most((got[1] - want[1]).abs());
                 direction <= tolerance && (got[2] - want[2]).abs() <= (1e-6 * want[2]).most(tolerance)
             })
         };
-        match (4..=TERMS).find(|&used| good(used)) {
-            Some(used) => Inverse::Series { scale: T::of(scale), used, terms: terms.map(|row| row.map(T::of)) },
-            None => Inverse::Newton,
+        for used in 4..=TERMS {
+            let powers = powers(terms.get(..used).unwrap_or_default());
+            if good(powers.get(..used).unwrap_or_default()) {
+                return Inverse::Series { scale: T::of(scale), used, terms: powers.map(|row| row.map(T::of)) };
+            }
         }
+        Inverse::Newton
     }
 
     /// Rays of eight points (x, y) at once, where there are series: unit vectors and derivatives in the tangent basis.
     #[inline(always)]
     pub(super) fn rays(&self, x: &[T; LANES], y: &[T; LANES]) -> Option<Lanes<T>> {
         let Inverse::Series { scale, used, terms } = &self.inverse else { return None };
-        let terms = terms.get(..*used)?;
-        let (first, rest) = terms.split_first()?;
+        let (last, rest) = terms.get(..*used)?.split_last()?;
         let zero = [T::ZERO; LANES];
-        let mut t = zero;
+        let (mut rho2, mut t) = (zero, zero);
         for l in 0..LANES {
-            t[l] = *scale * (x[l] * x[l] + y[l] * y[l]) - T::one();
+            rho2[l] = x[l] * x[l] + y[l] * y[l];
+            t[l] = *scale * rho2[l] - T::one();
         }
-        let (mut b1, mut b2) = ([zero; 3], [zero; 3]);
+        let [mut sin, mut cos, mut dtheta] = last.map(|highest| [highest; LANES]);
         for term in rest.iter().rev() {
-            for k in 0..3 {
-                for l in 0..LANES {
-                    let next = (t[l] + t[l]) * b1[k][l] - b2[k][l] + term[k];
-                    b2[k][l] = b1[k][l];
-                    b1[k][l] = next;
-                }
+            for l in 0..LANES {
+                sin[l] = sin[l] * t[l] + term[0];
+                cos[l] = cos[l] * t[l] + term[1];
+                dtheta[l] = dtheta[l] * t[l] + term[2];
             }
         }
         let (mut s, mut m) = ([zero; 3], [zero; 4]);
         for l in 0..LANES {
-            let [sin, cos, dtheta]: [T; 3] = core::array::from_fn(|k| t[l] * b1[k][l] - b2[k][l] + first[k]);
-            let rho2 = (x[l] * x[l] + y[l] * y[l]).most(T::of(1e-24));
-            let k = (dtheta - sin) / rho2;
+            let k = (dtheta[l] - sin[l]) / rho2[l].most(T::of(1e-24));
             let xy = k * x[l] * y[l];
-            s[0][l] = x[l] * sin;
-            s[1][l] = y[l] * sin;
-            s[2][l] = cos;
-            m[0][l] = sin + k * x[l] * x[l];
+            s[0][l] = x[l] * sin[l];
+            s[1][l] = y[l] * sin[l];
+            s[2][l] = cos[l];
+            m[0][l] = sin[l] + k * x[l] * x[l];
             m[1][l] = xy;
             m[2][l] = xy;
-            m[3][l] = sin + k * y[l] * y[l];
+            m[3][l] = sin[l] + k * y[l] * y[l];
         }
         Some((s, m))
     }
@@ -191,7 +189,7 @@ impl<T: Real> Radial<T> {
     pub(super) fn ray(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
         match &self.inverse {
             Inverse::Series { scale, used, terms } => {
-                let [s, c, d] = clenshaw(terms.get(..*used).unwrap_or_default(), *scale * rho2 - T::one());
+                let [s, c, d] = horner(terms.get(..*used).unwrap_or_default(), *scale * rho2 - T::one());
                 radial_ray(x, y, s, c, d)
             }
             Inverse::Newton => {
@@ -217,18 +215,29 @@ impl<T: Real> Radial<T> {
     }
 }
 
-/// The three series at t in −1…1.
+/// The three polynomials at t.
 #[inline(always)]
-fn clenshaw<T: Real>(terms: &[[T; 3]], t: T) -> [T; 3] {
-    let two_t = t + t;
-    let (mut b1, mut b2) = ([T::zero(); 3], [T::zero(); 3]);
-    let Some((first, rest)) = terms.split_first() else { return b1 };
-    for term in rest.iter().rev() {
-        for i in 0..3 {
-            let next = two_t * b1[i] - b2[i] + term[i];
-            b2[i] = b1[i];
-            b1[i] = next;
+fn horner<T: Real>(terms: &[[T; 3]], t: T) -> [T; 3] {
+    terms.iter().rev().fold([T::zero(); 3], |sum, term| core::array::from_fn(|i| sum[i] * t + term[i]))
+}
+
+/// The coefficients by powers of t of three Chebyshev series, by T₀ = 1, T₁ = t, Tₙ₊₁ = 2 t Tₙ − Tₙ₋₁.
+fn powers(series: &[[f64; 3]]) -> [[f64; 3]; TERMS] {
+    let mut sums = [[0.0; 3]; TERMS];
+    let (mut before, mut this) = ([0.0; TERMS], [0.0; TERMS]);
+    for (order, term) in series.iter().enumerate() {
+        let next: [f64; TERMS] = core::array::from_fn(|power| match (order, power) {
+            (0, 0) | (1, 1) => 1.0,
+            (0 | 1, _) => 0.0,
+            (_, 0) => -before[0],
+            _ => 2.0 * this[power - 1] - before[power],
+        });
+        (before, this) = (this, next);
+        for (sum, factor) in sums.iter_mut().zip(this) {
+            for (s, c) in sum.iter_mut().zip(term) {
+                *s += factor * c;
+            }
         }
     }
-    core::array::from_fn(|i| t * b1[i] - b2[i] + first[i])
+    sums
 }
