@@ -77,8 +77,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
     fn once(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
         let picture = picture(case, frame)?;
         let known = known(frame);
-        let start = Instant::now();
+        // Where the body is expected does not depend on the picture.
         let expected = self.horizon.expect(&known).map_err(|e| e.to_string())?;
+        let start = Instant::now();
         let report = black_box(self.horizon.process(black_box(&picture), &expected));
         let elapsed_us = start.elapsed().as_secs_f64() * 1e6;
         Ok(Timed {
@@ -90,9 +91,10 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         })
     }
 
-    /// With flushed caches.
-    pub(crate) fn cold(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
+    /// As the next frame of a sequence: in no cache, while the program is.
+    pub(crate) fn cold(&mut self, case: &Case, before: &Picture, frame: &Picture) -> Result<Timed, String> {
         self.flush_caches();
+        self.once(case, before)?;
         self.once(case, frame)
     }
 
@@ -108,9 +110,19 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         Ok(runs.swap_remove(WARM_RUNS / 2))
     }
 
-    /// Microseconds by stage, with flushed caches.
-    pub(crate) fn stages(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
+    /// Microseconds by stage, of a frame as in [`Self::cold`].
+    pub(crate) fn stages(
+        &mut self,
+        case: &Case,
+        before: &Picture,
+        frame: &Picture,
+    ) -> Result<Vec<(&'static str, f64)>, String> {
         self.flush_caches();
+        self.clocked(case, before)?;
+        self.clocked(case, frame)
+    }
+
+    fn clocked(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
         let picture = picture(case, frame)?;
         let expected = self.horizon.expect(&known(frame)).map_err(|e| e.to_string())?;
         let clock = Clock::start();
