@@ -1,4 +1,5 @@
-//! hzn-core beside the OpenCV recipe, `hzn run` beside decoding alone, and the samplers of outliers beside each other.
+//! hzn-core beside the OpenCV recipe, `hzn run` beside decoding alone, samplers of outliers beside each other, and what
+//! Python costs beside the sensor.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,6 +7,7 @@ use std::process::Command;
 use crate::machine::{root, target};
 use crate::python;
 use crate::steps::{self, Trouble, cargo};
+use crate::wheel;
 
 /// Prepares both programs and runs them in one go; `args` go to the harness.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
@@ -15,6 +17,11 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             && first == "run"
         {
             return sequence(rest);
+        }
+        if let Some((first, rest)) = args.split_first()
+            && first == "python"
+        {
+            return wheel::measure(rest);
         }
         if let Some((first, rest)) = args.split_first()
             && first == "ransac"

@@ -26,6 +26,7 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware> [OPTION]
                      CI=true turns a step that cannot run into a failure
   bench [ARG]...     hzn-core beside the OpenCV recipe; arguments go to hzn-benches (see --help there)
   bench run [ARG]... `hzn run` on PNGs beside decoding them alone
+  bench python       what the Python package costs beside the sensor, into crates/hzn-py/docs/measured.md
   bench ransac [--runs N] samplers of outliers beside each other, on simulated edge points
   reproduce [STUDY]... measures again what docs/reproduction.md says, and writes it (see --help there)
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;

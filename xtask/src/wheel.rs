@@ -10,24 +10,12 @@ use crate::steps::{self, Outcome, Trouble};
 
 const CRATE: &str = "crates/hzn-py";
 
-/// Builds the wheel, installs it into an environment of its own, checks stubs and behaviour. `hzn` is the program of the
-/// same build.
+/// Builds the wheel, installs it into an environment of its own, checks stubs, behaviour, notebooks and documents. `hzn` is
+/// the program of the same build.
 pub(crate) fn run_step(hzn: &Path) -> Outcome {
     let folder = Path::new(CRATE);
-    let python = python::environment("wheel", &folder.join("tests/requirements.txt"))?;
-    let wheels = target().join("wheels");
-    if wheels.exists() {
-        fs::remove_dir_all(&wheels)?;
-    }
-    let mut maturin = Command::new(&python);
-    maturin.args(["-m", "maturin", "build", "--locked", "--profile", "dev", "--manifest-path"]);
-    steps::run(maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(&wheels))?;
-    let wheel = only_wheel(&wheels)?;
-    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--force-reinstall", "--no-deps"];
-    steps::run(Command::new(&python).args(pip).arg(wheel))?;
-    // Away from the sources, so that what was installed is what is imported.
-    let scratch = target().join("xtask");
-    fs::create_dir_all(&scratch)?;
+    let python = installed("dev")?;
+    let scratch = scratch()?;
     let tests = fs::canonicalize(folder.join("tests"))?;
     let module = |args: &[&str]| {
         let mut command = Command::new(&python);
@@ -37,7 +25,45 @@ pub(crate) fn run_step(hzn: &Path) -> Outcome {
     let stubs = ["mypy.stubtest", "hzn", "--concise", "--allowlist"];
     steps::run(module(&stubs).arg(tests.join("stubtest.txt")))?;
     steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
-    steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider"]).arg(tests))
+    steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider"]).arg(tests))?;
+    // The site, with the reference out of the docstrings; its notebooks are executed on the way.
+    let config = fs::canonicalize(folder.join("mkdocs.yml"))?;
+    let mut site = module(&["mkdocs", "build", "--strict", "--quiet", "--config-file"]);
+    site.env("NO_MKDOCS_2_WARNING", "1");
+    steps::run(site.arg(config).arg("--site-dir").arg(scratch.join("python-site")))
+}
+
+/// Measures the wheel of a release build.
+pub(crate) fn measure(args: &[String]) -> Outcome {
+    let folder = fs::canonicalize(CRATE)?;
+    let python = installed("release")?;
+    let mut measure = Command::new(python);
+    measure.arg(folder.join("benches/measure.py")).arg(folder.join("docs/measured.md"));
+    steps::run(measure.args(args).current_dir(scratch()?))
+}
+
+/// A folder away from the sources, so that what was installed is what is imported.
+fn scratch() -> Result<PathBuf, Trouble> {
+    let scratch = target().join("xtask");
+    fs::create_dir_all(&scratch)?;
+    Ok(fs::canonicalize(scratch)?)
+}
+
+/// The Python that has the wheel of this profile.
+fn installed(profile: &str) -> Result<PathBuf, Trouble> {
+    let folder = Path::new(CRATE);
+    let python = python::environment("wheel", &folder.join("tests/requirements.txt"))?;
+    let wheels = target().join("wheels");
+    if wheels.exists() {
+        fs::remove_dir_all(&wheels)?;
+    }
+    let mut maturin = Command::new(&python);
+    maturin.args(["-m", "maturin", "build", "--locked", "--profile", profile, "--manifest-path"]);
+    steps::run(maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(&wheels))?;
+    let wheel = only_wheel(&wheels)?;
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--force-reinstall", "--no-deps"];
+    steps::run(Command::new(&python).args(pip).arg(wheel))?;
+    Ok(python)
 }
 
 fn only_wheel(folder: &Path) -> Result<PathBuf, Trouble> {

@@ -204,7 +204,7 @@ impl Sensor {
 }
 
 /// What is known about a picture, checked as far as the core cannot.
-pub(crate) fn known(
+fn known(
     altitude_km: Option<f64>,
     position_km: Option<[f64; 3]>,
     attitude: Option<[f64; 4]>,

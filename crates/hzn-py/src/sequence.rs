@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use hzn_calib::FrameData;
 use hzn_cli::engine::{self, Finished, Plan};
 use hzn_cli::exit::{Exit, Stop};
 use hzn_cli::input::{self, Payload, Source};
@@ -11,7 +12,8 @@ use pyo3::prelude::*;
 
 use crate::errors;
 use crate::report::Report;
-use crate::sensor::{Sensor, State, known};
+use crate::sensor::{Sensor, State};
+use crate::stages::Expected;
 
 /// A folder, a pattern, a video, a recording, or picture files, in order and not yet decoded.
 #[pyclass(frozen, name = "_Sequence", module = "hzn._hzn")]
@@ -79,8 +81,6 @@ impl Sequence {
 /// `why`.
 #[pyfunction]
 #[pyo3(name = "_process_encoded")]
-#[pyo3(signature = (sensor, index, name, data, why, *, altitude_km = None, position_km = None, attitude = None,
-                    attitude_sigma_deg = None, time_s = None))]
 pub(crate) fn process_encoded(
     py: Python<'_>,
     sensor: &Sensor,
@@ -88,15 +88,10 @@ pub(crate) fn process_encoded(
     name: String,
     data: Option<Vec<u8>>,
     why: String,
-    altitude_km: Option<f64>,
-    position_km: Option<[f64; 3]>,
-    attitude: Option<[f64; 4]>,
-    attitude_sigma_deg: Option<f64>,
-    time_s: Option<f64>,
+    expected: &Expected,
 ) -> PyResult<Report> {
     let state = sensor.state();
-    let mut row = known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?;
-    row.file.clone_from(&name);
+    let row = FrameData { file: name.clone(), ..expected.data.clone() };
     let plan = plan(&state, Some(hzn_calib::Frames::of(vec![row])));
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
     processed(py, &state, &plan, index, input::Item { name, time_s: None, payload })

@@ -22,13 +22,13 @@ type Two<'py> = Bound<'py, PyArray2<f64>>;
 #[doc = doc!("Expected")]
 #[pyclass(frozen, module = "hzn")]
 pub(crate) struct Expected {
-    data: FrameData,
+    pub(crate) data: FrameData,
     core: CoreExpected<f64>,
 }
 
 impl Expected {
     pub(crate) fn of(state: &State, data: FrameData) -> PyResult<Self> {
-        let core = state.core()?.expect(&data.to_frame(None)).map_err(errors::config)?;
+        let core = state.core.expect(&data.to_frame(None)).map_err(errors::config)?;
         Ok(Self { data, core })
     }
 }
@@ -195,6 +195,7 @@ pub(crate) fn borders<'py>(
     bits: Option<u8>,
 ) -> PyResult<Vec<Two<'py>>> {
     let state = sensor.state();
+    state.core()?;
     let mut every = AnySensor::new(&every_edge(&state.config, level), false).map_err(errors::config)?;
     let traces = Traces::new(1);
     with_picture!(image, state, bits, |picture| every.process_pixels(&picture, Some(&expected.data), Some(&traces)));
@@ -265,6 +266,7 @@ pub(crate) fn rays(sensor: &Sensor, points: &Bound<'_, PyAny>, lit: &Bound<'_, P
 #[pyo3(name = "_keep")]
 pub(crate) fn keep(py: Python<'_>, sensor: &Sensor, rays: &Rays, expected: &Expected) -> PyResult<Option<Cone>> {
     let state = sensor.state();
+    state.core()?;
     Ok(errors::detached(py, || rays.edges().reject(&expected.core, &state.config.reject))?.map(Cone))
 }
 
@@ -308,7 +310,7 @@ pub(crate) fn fuse<'py>(
 
 impl State {
     /// The sensor in double precision.
-    pub(crate) fn core(&self) -> PyResult<&CoreSensor<f64>> {
+    fn core(&self) -> PyResult<&CoreSensor<f64>> {
         if self.flight {
             return Err(errors::config("flight: the single stages are those of the workstation, in double precision"));
         }

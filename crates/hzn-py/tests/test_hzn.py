@@ -4,6 +4,7 @@ import copy
 import csv
 import pickle
 import subprocess
+import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -275,22 +276,32 @@ def test_a_panic_becomes_an_exception(sensor):
     assert sensor.process(limb()).ok
 
 
-def test_the_same_bits_as_the_command_line(sensor, folder, recording, hzn_program):
-    table_csv = folder / "out.csv"
-    subprocess.run([hzn_program, "export", recording, "-o", table_csv], check=True, stderr=subprocess.DEVNULL)
-    from_file = hzn.Sensor.from_toml(folder / "sensor.toml")
-    assert from_file == sensor
-    with open(table_csv, newline="") as f:
+@pytest.mark.parametrize("flight", [False, True])
+def test_the_same_bits_as_the_command_line(folder, hzn_program, flight):
+    out = folder / "out.csv"
+    options = ["--flight"] if flight else []
+    subprocess.run([hzn_program, "run", "-q", folder, "-o", out, *options], check=True)
+    sensor = hzn.Sensor.from_toml(folder / "sensor.toml", flight=flight)
+    assert sensor == hzn.Sensor(**PARAMETERS, flight=flight)
+    with open(out, newline="") as f:
         rows = list(csv.DictReader(f))
     assert len(rows) == 50
-    table = hzn.read_mcap(recording)
     for i, row in enumerate(rows):
-        report = from_file.process(limb(i)).to_dict()
+        report = sensor.process(limb(i)).to_dict()
         for name in set(row) - {"index", "file", "time_s", "elapsed_us"}:
             value = "" if report[name] is None else report[name]
             assert str(value) == row[name] or float(row[name]) == value, (i, name)
-        assert table["axis_y"][i] == report["axis_y"] and table["status"][i] == "ok"
-    assert len({len(column) for column in table.values()}) == 1
+
+
+def test_nothing_is_kept(sensor):
+    image = limb()
+    before = sys.getrefcount(image)
+    reports = [sensor.process(image, detail=i % 2 == 0) for i in range(20)]
+    assert sys.getrefcount(image) == before and len(reports) == 20
+    for _ in range(200):
+        with pytest.raises(hzn.ImageError):
+            sensor.process(image[0])
+    assert sys.getrefcount(image) == before
 
 
 def test_the_example_of_the_readme_runs(tmp_path, hzn_program, monkeypatch, capsys):
@@ -298,13 +309,15 @@ def test_the_example_of_the_readme_runs(tmp_path, hzn_program, monkeypatch, caps
     example = readme.read_text().split("```python\n")[1].split("```")[0]
     monkeypatch.chdir(tmp_path)
     subprocess.run([hzn_program, "demo", "d", "--count", "1"], check=True, capture_output=True)
-    for path in (tmp_path / "d" / "flight" / "sensor.toml", tmp_path / "d" / "flight.mcap"):
-        path.rename(tmp_path / path.name)
+    (tmp_path / "d" / "flight" / "sensor.toml").rename(tmp_path / "sensor.toml")
+    (tmp_path / "d" / "flight.mcap").rename(tmp_path / "flight.mcap")
+    (tmp_path / "d" / "flight").rename(tmp_path / "flight")
     image = np.zeros((720, 1280), np.uint8)
     image[300:] = 200
     names = {"image": image}
     exec(example, names)
     assert names["picture"].shape == (720, 1280, 3) and list(names["table"]["status"]) == ["ok"]
+    assert capsys.readouterr().out.splitlines()[-1].split()[1] == "ok"
 
 
 def test_the_package_is_typed_and_documented():

@@ -26,6 +26,12 @@ def test_frames_with_their_pictures(sensor, recording):
         next(opened)
 
 
+def test_columns_of_equal_length(recording):
+    table = hzn.read_mcap(recording)
+    assert {len(column) for column in table.values()} == {50} and set(table["status"]) == {"ok"}
+    assert np.isnan(table["roll_deg"]).all() and table["index"].dtype == np.uint64
+
+
 def test_a_recording_that_is_none(tmp_path):
     for read in (hzn.read_mcap, hzn.open_mcap):
         with pytest.raises(hzn.HznError, match="cannot read"):

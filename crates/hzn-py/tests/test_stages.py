@@ -85,5 +85,5 @@ def test_what_the_stages_refuse(sensor):
     with pytest.raises(hzn.ConfigError, match="cos_half_angle"):
         hzn.ransac.Cone([0.0, 0.0, 1.0], 2.0)
     with pytest.raises(hzn.ConfigError, match="flight"):
-        hzn.Sensor(**sensor.parameters, flight=True).expect()
+        hzn.binarize.level(hzn.Sensor(**sensor.parameters, flight=True), image)
     assert hzn.ransac.keep(sensor, rays) is None or hzn.fit.cone(sensor, rays, hzn.ransac.keep(sensor, rays)) is None

@@ -265,7 +265,7 @@ class Sensor:
         Raises
         ------
         ConfigError
-            An altitude, position or attitude that cannot be; or a sensor with ``flight=True``.
+            An altitude, position or attitude that cannot be.
         """
 
     def process(
@@ -727,12 +727,7 @@ def _process_encoded(
     name: str,
     data: bytes | None,
     why: str,
-    *,
-    altitude_km: float | None = None,
-    position_km: Sequence[float] | None = None,
-    attitude: Sequence[float] | None = None,
-    attitude_sigma_deg: float | None = None,
-    time_s: float | None = None,
+    expected: Expected,
 ) -> Report: ...
 def _write_mcap(path: _Path, sensor: Sensor, reports: Sequence[Report]) -> None: ...
 def _evaluate(

@@ -153,7 +153,7 @@ def _picture(sensor: Sensor, index: int, url: str, known: Mapping[str, Any]) -> 
             data, why = file.read(), ""
     except OSError as error:
         data, why = None, f"cannot be read: {error}"
-    return _process_encoded(sensor, index, url, data, why, **known)
+    return _process_encoded(sensor, index, url, data, why, sensor.expect(**known))
 
 
 def _table(reports: Sequence[Report]) -> Any:

@@ -1,0 +1,139 @@
+"""What Python costs beside the sensor, in one run: `cargo xtask bench python` writes it into docs/measured.md.
+
+    measure.py OUTPUT [--frames N]
+"""
+
+import argparse
+import os
+import platform
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+import distributed
+import numpy as np
+
+import hzn
+from hzn.dask import process_archive
+
+
+def limb(width, height):
+    """A bright body with a half-angle of 70 degrees, blurred, with noise, over a sixth of the picture."""
+    f = width * 0.9375
+    x, y = (np.arange(width) - (width - 1) / 2) / f, (np.arange(height)[:, None] - (height - 1) / 2) / f
+    s = np.radians(68.0)
+    cos = (y * np.sin(s) + np.cos(s)) / np.sqrt(1 + x * x + y * y)
+    px = (np.radians(70.38) - np.arccos(np.clip(cos, -1, 1))) * f
+    noise = np.random.default_rng(1).normal(0, 4, (height, width))
+    image = np.clip(20 + 180 * np.clip(0.5 + px / 2, 0, 1) + noise, 0, 255).astype(np.uint8)
+    camera = hzn.Camera(
+        width=width, height=height, model="pinhole", fx_px=f, fy_px=f, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2
+    )
+    return image, hzn.Sensor(camera=camera, body={"kind": "earth-sphere", "altitude_km": 400.0})
+
+
+def overhead(width, height, calls=400):
+    """Medians of a call from Python, of the Rust call within it, and of their difference, microseconds."""
+    image, sensor = limb(width, height)
+    whole, within = [], []
+    for _ in range(calls):
+        start = time.perf_counter()
+        report = sensor.process(image)
+        whole.append((time.perf_counter() - start) * 1e6)
+        assert report.ok
+        within.append(report.elapsed_us)
+    more = [a - b for a, b in zip(whole, within, strict=True)]
+    return [statistics.median(times) for times in (whole, within, more)]
+
+
+def scaling(width, height, frames):
+    """Frames a second by threads."""
+    image, sensor = limb(width, height)
+    rates = {}
+    jobs = 1
+    while jobs <= (os.cpu_count() or 1):
+        start = time.perf_counter()
+        for report in sensor.process_many((image for _ in range(frames)), jobs=jobs):
+            assert report.ok
+        rates[jobs] = frames / (time.perf_counter() - start)
+        jobs *= 2
+    return rates
+
+
+def resident_mb():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def memory(frames):
+    """Resident megabytes after a tenth of the frames and after all; each frame is a new array."""
+    image, sensor = limb(160, 120)
+    after = []
+    for count, report in enumerate(sensor.process_many((image.copy() for _ in range(frames)), jobs=2), 1):
+        assert report.ok
+        if count in (frames // 10, frames):
+            after.append(resident_mb())
+    return after
+
+
+def archive(frames, workers):
+    """Frames a second of `hzn.dask`, from files on this machine."""
+    image, sensor = limb(640, 480)
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "picture.pgm"
+        picture.write_bytes(b"P5\n640 480\n255\n" + image.tobytes())
+        with distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=None
+        ) as cluster, distributed.Client(cluster) as client:
+            told = [(str(picture), {"time_s": float(i)}) for i in range(frames)]
+            process_archive(told[: 2 * workers], sensor, client=client, out=f"{folder}/warm", shard_frames=1)
+            start = time.perf_counter()
+            result = process_archive(told, sensor, client=client, out=f"{folder}/out", shard_frames=500)
+            assert not result.failed
+            return frames / (time.perf_counter() - start)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path)
+    parser.add_argument("--frames", type=int, default=100_000, help="frames of the run that watches the memory")
+    arguments = parser.parse_args()
+    load = os.getloadavg()[0]
+    lines = [
+        "# Measured",
+        "",
+        "Written by `cargo xtask bench python`: the wheel of a release build, "
+        f"Python {platform.python_version()}, NumPy {np.__version__}, {os.cpu_count()} cores; "
+        f"load of the machine at the start {load:.1f}.",
+        "",
+        "## What a call costs",
+        "",
+        "Medians of 400 calls of `Sensor.process` on one picture, warm, in double precision. The difference is everything that"
+        " Python adds to the Rust call: taking the array, lending a sensor, releasing the interpreter, making the report.",
+        "",
+        "| picture | call, µs | Rust within it, µs | difference, µs |",
+        "|---|---|---|---|",
+    ]
+    for width, height in ((640, 480), (1920, 1080)):
+        whole, within, more = overhead(width, height)
+        lines.append(f"| {width}×{height} | {whole:.1f} | {within:.1f} | {more:.1f} |")
+    lines += ["", "## `process_many`", "", "Pictures of 1920×1080 in memory.", "", "| threads | frames a second |", "|---|---|"]
+    lines += [f"| {jobs} | {rate:.0f} |" for jobs, rate in scaling(1920, 1080, 4000).items()]
+    tenth, all_of_it = memory(arguments.frames)
+    lines += [
+        "",
+        f"Memory of the process after {arguments.frames // 10} frames {tenth:.0f} MB, after {arguments.frames} frames"
+        f" {all_of_it:.0f} MB (160×120, a new array each).",
+        "",
+        "## `hzn.dask`",
+        "",
+        f"A `LocalCluster` of 2 processes on this machine, pictures of 640×480 from PGM files, Parquet shards of 500:"
+        f" {archive(10_000, 2):.0f} frames a second.",
+        "",
+    ]
+    arguments.output.write_text("\n".join(lines))
+    print("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
