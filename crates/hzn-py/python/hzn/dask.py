@@ -115,12 +115,23 @@ def process_archive(
     for _ in as_completed(tasks):
         pass
     client.gather(tasks)
+    _sweep(filesystem, folder, names)
     return Archive(
         shards=[filesystem.unstrip_protocol(name) for name in names],
         frames=len(pictures),
         skipped=len(names) - len(tasks),
         failed=[row for name in names for row in _unreadable(filesystem, name)],
     )
+
+
+def _sweep(filesystem: Any, folder: str, names: Sequence[str]) -> None:
+    """Removes what workers left that died between writing a shard and giving it its name."""
+    own = {os.path.basename(name) for name in names}
+    filesystem.invalidate_cache()
+    for path in filesystem.ls(folder, detail=False):
+        # NAME.PROCESS.part
+        if path.endswith(".part") and os.path.basename(path).rsplit(".", 2)[0] in own:
+            filesystem.rm(path)
 
 
 def _digest(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
