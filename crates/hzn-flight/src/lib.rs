@@ -26,6 +26,7 @@ pub mod board;
 pub mod bytes;
 pub mod flight;
 pub mod messages;
+mod numbered;
 pub mod packet;
 pub mod parameters;
 pub mod store;

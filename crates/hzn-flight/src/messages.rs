@@ -1,204 +1,108 @@
 //! What stands in packets: telecommands, and telemetry besides the answers. Numbers are frozen.
 
 use crate::bytes::{Reader, Writer};
+use crate::numbered::numbered;
 
-/// Modes, after HORACE (Barf 2014).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Mode {
-    /// Checked and waiting for lift-off or a command; pictures are processed on command.
-    Standby = 0,
-    /// Every picture is processed.
-    Flight = 1,
-    /// No picture is processed; commands are answered. Entered when a self-check fails.
-    Safe = 2,
-    /// Nothing is written any more: power may be cut. Left by a reset only.
-    ShutDown = 3,
-}
-
-impl Mode {
-    /// All.
-    pub const ALL: [Self; 4] = [Self::Standby, Self::Flight, Self::Safe, Self::ShutDown];
-    /// By number.
-    pub fn numbered(n: u8) -> Option<Self> {
-        Self::ALL.iter().copied().find(|&m| m as u8 == n)
-    }
-    /// The name that people use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Standby => "standby",
-            Self::Flight => "flight",
-            Self::Safe => "safe",
-            Self::ShutDown => "shut-down",
-        }
+numbered! {
+    /// Modes, after HORACE (Barf 2014).
+    pub enum Mode: u8 {
+        /// Checked and waiting for lift-off or a command; pictures are processed on command.
+        Standby = 0 => "standby",
+        /// Every picture is processed.
+        Flight = 1 => "flight",
+        /// No picture is processed; commands are answered. Entered when a self-check fails.
+        Safe = 2 => "safe",
+        /// Nothing is written any more: power may be cut. Left by a reset only.
+        ShutDown = 3 => "shut-down",
     }
 }
 
-/// What became of a telecommand.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Code {
-    /// Done.
-    Done = 0,
-    /// The packet was broken or cut off.
-    Broken = 1,
-    /// The arguments are too short, too long, or not of this function.
-    Arguments = 2,
-    /// There is no such function, or the packet is no telecommand.
-    Unknown = 3,
-    /// Not in this mode.
-    Mode = 4,
-    /// No parameter has this number.
-    UnknownParameter = 5,
-    /// A parameter, or all together, was refused; nothing changed.
-    Refused = 6,
-    /// The memory did not keep the parameters; they hold until the next reset.
-    NotStored = 7,
-}
-
-impl Code {
-    /// All.
-    pub const ALL: [Self; 8] = [
-        Self::Done,
-        Self::Broken,
-        Self::Arguments,
-        Self::Unknown,
-        Self::Mode,
-        Self::UnknownParameter,
-        Self::Refused,
-        Self::NotStored,
-    ];
-    /// By number.
-    pub fn numbered(n: u8) -> Option<Self> {
-        Self::ALL.iter().copied().find(|&c| c as u8 == n)
-    }
-    /// In words.
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::Broken => "packet broken or cut off",
-            Self::Arguments => "wrong arguments",
-            Self::Unknown => "no such function",
-            Self::Mode => "not in this mode",
-            Self::UnknownParameter => "no such parameter",
-            Self::Refused => "value refused, nothing changed",
-            Self::NotStored => "in force, but not stored",
-        }
+numbered! {
+    /// What became of a telecommand.
+    pub enum Code: u8 {
+        /// Done.
+        Done = 0 => "done",
+        /// The packet was broken or cut off.
+        Broken = 1 => "packet broken or cut off",
+        /// The arguments are too short, too long, or not of this function.
+        Arguments = 2 => "wrong arguments",
+        /// There is no such function, or the packet is no telecommand.
+        Unknown = 3 => "no such function",
+        /// Not in this mode.
+        Mode = 4 => "not in this mode",
+        /// No parameter has this number.
+        UnknownParameter = 5 => "no such parameter",
+        /// A parameter, or all together, was refused; nothing changed.
+        Refused = 6 => "value refused, nothing changed",
+        /// The memory did not keep the parameters; they hold until the next reset.
+        NotStored = 7 => "in force, but not stored",
     }
 }
 
-/// Functions of telecommands: the first byte of the user data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Function {
-    /// A mode (u8).
-    SetMode = 1,
-    /// How many (u8), then number (u16) and value (f64) of each: all or none, then stored.
-    SetParameters = 2,
-    /// How many (u8), then the number (u16) of each.
-    ReadParameters = 3,
-    /// Processes the next picture, in standby.
-    ProcessOnce = 4,
-    /// Sends the edges of the next picture that is processed.
-    DumpEdges = 5,
-    /// Sets the counters of housekeeping to zero.
-    ResetCounters = 6,
-    /// What navigation knows, for the pictures to come: altitude in metres, ECEF position in metres (4 × f32, NaN: not
-    /// known).
-    SetKnown = 7,
-}
-
-impl Function {
-    /// All.
-    pub const ALL: [Self; 7] = [
-        Self::SetMode,
-        Self::SetParameters,
-        Self::ReadParameters,
-        Self::ProcessOnce,
-        Self::DumpEdges,
-        Self::ResetCounters,
-        Self::SetKnown,
-    ];
-    /// By number.
-    pub fn numbered(n: u8) -> Option<Self> {
-        Self::ALL.iter().copied().find(|&f| f as u8 == n)
-    }
-    /// The word that `hzn telecommand` has for it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::SetMode => "mode",
-            Self::SetParameters => "set",
-            Self::ReadParameters => "read",
-            Self::ProcessOnce => "process-once",
-            Self::DumpEdges => "dump-edges",
-            Self::ResetCounters => "reset-counters",
-            Self::SetKnown => "known",
-        }
+numbered! {
+    /// Functions of telecommands: the first byte of the user data.
+    pub enum Function: u8 {
+        /// A mode (u8).
+        SetMode = 1 => "mode",
+        /// How many (u8), then number (u16) and value (f64) of each: all or none, then stored.
+        SetParameters = 2 => "set",
+        /// How many (u8), then the number (u16) of each.
+        ReadParameters = 3 => "read",
+        /// Processes the next picture, in standby.
+        ProcessOnce = 4 => "process-once",
+        /// Sends the edges of the next picture that is processed.
+        DumpEdges = 5 => "dump-edges",
+        /// Sets the counters of housekeeping to zero.
+        ResetCounters = 6 => "reset-counters",
+        /// What navigation knows, for the pictures to come: altitude in metres, ECEF position in metres (4 × f32, NaN: not
+        /// known).
+        SetKnown = 7 => "known",
     }
 }
 
-/// How bad an event is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Severity {
-    /// As it should be.
-    Information = 0,
-    /// Something was wrong and was dealt with.
-    Warning = 1,
-    /// Something is wrong.
-    Error = 2,
+numbered! {
+    /// How bad an event is.
+    pub enum Severity: u8 {
+        /// As it should be.
+        Information = 0 => "information",
+        /// Something was wrong and was dealt with.
+        Warning = 1 => "warning",
+        /// Something is wrong.
+        Error = 2 => "error",
+    }
 }
 
-/// Something that happened, with two numbers that say more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u16)]
-pub enum Event {
-    /// Started. Copy of the parameters that was taken (1, 2; 0 defaults), their generation.
-    Started = 1,
-    /// A copy of the parameters cannot be used. Copy (1, 2); 1 no table, 2 checksum, 3 refused.
-    CopyBroken = 2,
-    /// No copy can be used: the defaults hold. 0, 0.
-    Defaults = 3,
-    /// The mode changed. From, to.
-    ModeChanged = 4,
-    /// A telecommand was rejected. [`Code`], function.
-    CommandRejected = 5,
-    /// A picture has the wrong size. Bytes, expected bytes.
-    WrongSize = 6,
-    /// Pictures were lost because the processing was not done. How many, 0.
-    Overrun = 7,
-    /// The parameters were stored. Copy (1, 2), generation.
-    Stored = 8,
-    /// A self-check failed. Bits: 1 camera, 2 memory, 4 parameters; 0.
-    SelfCheck = 9,
-    /// The last reset was the watchdog's. 0, 0.
-    Watchdog = 10,
-    /// The memory did not keep the parameters. Copy (1, 2), 0.
-    StoreFailed = 11,
-    /// What navigation told cannot be. 0, 0.
-    KnownRefused = 12,
+numbered! {
+    /// Something that happened, with two numbers that say more.
+    pub enum Event: u16 {
+        /// Started. Copy of the parameters that was taken (1, 2; 0 defaults), their generation.
+        Started = 1 => "started",
+        /// A copy of the parameters cannot be used. Copy (1, 2); 1 no table, 2 checksum, 3 refused.
+        CopyBroken = 2 => "a copy of the parameters cannot be used",
+        /// No copy can be used: the defaults hold. 0, 0.
+        Defaults = 3 => "no copy of the parameters can be used: defaults",
+        /// The mode changed. From, to.
+        ModeChanged = 4 => "mode changed",
+        /// A telecommand was rejected. [`Code`], function.
+        CommandRejected = 5 => "telecommand rejected",
+        /// A picture has the wrong size. Bytes, expected bytes.
+        WrongSize = 6 => "picture of wrong size",
+        /// Pictures were lost because the processing was not done. How many, 0.
+        Overrun = 7 => "pictures lost",
+        /// The parameters were stored. Copy (1, 2), generation.
+        Stored = 8 => "parameters stored",
+        /// A self-check failed. Bits: 1 camera, 2 memory, 4 parameters; 0.
+        SelfCheck = 9 => "self-check failed",
+        /// The last reset was the watchdog's. 0, 0.
+        Watchdog = 10 => "reset by the watchdog",
+        /// The memory did not keep the parameters. Copy (1, 2), 0.
+        StoreFailed = 11 => "parameters not stored",
+        /// What navigation told cannot be. 0, 0.
+        KnownRefused = 12 => "what navigation told cannot be",
+    }
 }
 
 impl Event {
-    /// All.
-    pub const ALL: [Self; 12] = [
-        Self::Started,
-        Self::CopyBroken,
-        Self::Defaults,
-        Self::ModeChanged,
-        Self::CommandRejected,
-        Self::WrongSize,
-        Self::Overrun,
-        Self::Stored,
-        Self::SelfCheck,
-        Self::Watchdog,
-        Self::StoreFailed,
-        Self::KnownRefused,
-    ];
-    /// By number.
-    pub fn numbered(n: u16) -> Option<Self> {
-        Self::ALL.iter().copied().find(|&e| e as u16 == n)
-    }
     /// How bad it is.
     pub const fn severity(self) -> Severity {
         match self {
@@ -207,23 +111,6 @@ impl Event {
                 Severity::Warning
             }
             Self::Defaults | Self::SelfCheck | Self::Watchdog | Self::StoreFailed => Severity::Error,
-        }
-    }
-    /// In words.
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::Started => "started",
-            Self::CopyBroken => "a copy of the parameters cannot be used",
-            Self::Defaults => "no copy of the parameters can be used: defaults",
-            Self::ModeChanged => "mode changed",
-            Self::CommandRejected => "telecommand rejected",
-            Self::WrongSize => "picture of wrong size",
-            Self::Overrun => "pictures lost",
-            Self::Stored => "parameters stored",
-            Self::SelfCheck => "self-check failed",
-            Self::Watchdog => "reset by the watchdog",
-            Self::StoreFailed => "parameters not stored",
-            Self::KnownRefused => "what navigation told cannot be",
         }
     }
 }

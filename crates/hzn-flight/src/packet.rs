@@ -11,6 +11,7 @@
 //! ```
 
 use crate::bytes::{Reader, Writer};
+use crate::numbered::numbered;
 
 /// The sync marker before every packet.
 pub const SYNC: [u8; 4] = [0x1A, 0xCF, 0xFC, 0x1D];
@@ -22,40 +23,23 @@ const CRC: usize = 2;
 
 const CRC16: crc::Crc<u16, crc::NoTable> = crc::Crc::<u16, crc::NoTable>::new(&crc::CRC_16_IBM_3740);
 
-/// What a packet is about: its application process identifier (APID). Frozen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u16)]
-pub enum Apid {
-    /// How the computer is.
-    Housekeeping = 0x100,
-    /// The answer to one picture.
-    Science = 0x101,
-    /// Something happened.
-    Event = 0x102,
-    /// What became of a telecommand.
-    Acknowledge = 0x103,
-    /// Values of parameters.
-    Parameters = 0x104,
-    /// A part of an edge.
-    Edge = 0x105,
-    /// A telecommand.
-    Command = 0x1C0,
-}
-
-impl Apid {
-    /// All.
-    pub const ALL: [Self; 7] = [
-        Self::Housekeeping,
-        Self::Science,
-        Self::Event,
-        Self::Acknowledge,
-        Self::Parameters,
-        Self::Edge,
-        Self::Command,
-    ];
-    /// By number.
-    pub fn numbered(n: u16) -> Option<Self> {
-        Self::ALL.iter().copied().find(|&a| a as u16 == n)
+numbered! {
+    /// What a packet is about: its application process identifier (APID). Frozen.
+    pub enum Apid: u16 {
+        /// How the computer is.
+        Housekeeping = 0x100 => "housekeeping",
+        /// The answer to one picture.
+        Science = 0x101 => "science",
+        /// Something happened.
+        Event = 0x102 => "event",
+        /// What became of a telecommand.
+        Acknowledge = 0x103 => "acknowledgement",
+        /// Values of parameters.
+        Parameters = 0x104 => "parameters",
+        /// A part of an edge.
+        Edge = 0x105 => "edge",
+        /// A telecommand.
+        Command = 0x1C0 => "telecommand",
     }
 }
 

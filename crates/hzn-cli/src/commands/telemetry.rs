@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use hzn_flight::answer::Answer;
 use hzn_flight::bytes::Reader;
-use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode};
+use hzn_flight::messages::{
+    Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode, Severity,
+};
 use hzn_flight::packet::{self, Apid, Packet, Scan};
 use hzn_flight::{Parameters, parameters};
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
@@ -152,9 +154,12 @@ impl Heard {
         }
         let time_s = packet.time_us as f64 * 1e-6;
         let from = &mut Reader::new(packet.user);
-        let strange =
-            || format!("a packet of APID {:#x} with {} bytes is not understood", packet.apid, packet.user.len());
-        match Apid::numbered(packet.apid) {
+        let apid = Apid::numbered(packet.apid);
+        let strange = || {
+            let name = apid.map_or(String::new(), |a| format!(" ({})", a.name()));
+            format!("a packet of APID {:#x}{name} with {} bytes is not understood", packet.apid, packet.user.len())
+        };
+        match apid {
             Some(Apid::Science) => match (Exposure::read(from), Answer::read(from)) {
                 (Some(exposure), Some(answer)) => self.answer(&exposure, &answer, sink)?,
                 _ => self.note(time_s, LogLevel::Warning, &strange()),
@@ -170,10 +175,10 @@ impl Heard {
             },
             Some(Apid::Event) => match EventRecord::read(from) {
                 Some(record) => {
-                    let level = match record.severity {
-                        0 => LogLevel::Info,
-                        1 => LogLevel::Warning,
-                        _ => LogLevel::Error,
+                    let level = match Severity::numbered(record.severity) {
+                        Some(Severity::Information) => LogLevel::Info,
+                        Some(Severity::Warning) => LogLevel::Warning,
+                        Some(Severity::Error) | None => LogLevel::Error,
                     };
                     self.note(time_s, level, &event(&record));
                 }
@@ -182,7 +187,7 @@ impl Heard {
             Some(Apid::Acknowledge) => match Acknowledge::read(from) {
                 Some(a) => {
                     let function = Function::numbered(a.function).map_or("?", Function::name);
-                    let code = Code::numbered(a.code).map_or("?", Code::text);
+                    let code = Code::numbered(a.code).map_or("?", Code::name);
                     let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
                     self.note(time_s, level, &format!("command {} ({function}): {code}", a.sequence));
                 }
@@ -259,11 +264,11 @@ fn event(record: &EventRecord) -> String {
         Some(Event::ModeChanged) => format!("{} to {} mode", mode(a), mode(b)),
         Some(Event::Started) => format!("started with copy {a} of the parameters, generation {b}"),
         Some(Event::CommandRejected) => {
-            let code = u8::try_from(a).ok().and_then(Code::numbered).map_or("?", Code::text);
+            let code = u8::try_from(a).ok().and_then(Code::numbered).map_or("?", Code::name);
             format!("telecommand rejected: {code} (function {b})")
         }
         Some(Event::Stored) => format!("parameters stored in copy {a}, generation {b}"),
-        Some(e) => format!("{} ({a}, {b})", e.text()),
+        Some(e) => format!("{} ({a}, {b})", e.name()),
         None => format!("event {number} ({a}, {b})"),
     }
 }
