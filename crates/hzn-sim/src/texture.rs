@@ -47,27 +47,34 @@ struct Octave {
     rest: f32,
 }
 
+/// Octaves from the largest to the smallest size, each half as large and `rough` times as strong as the one before, and
+/// the root of the sum of their squares.
+fn octaves([largest_km, smallest_km]: [f64; 2], rough: f32, radius_m: f64, seed: u64, salt: u32) -> (Vec<Octave>, f32) {
+    let count = 1 + libm::log2((largest_km / smallest_km).max(1.0)).round() as u32;
+    let octaves: Vec<Octave> = (0..count.min(16))
+        .map(|i| {
+            let size_km = largest_km / f64::from(1u32 << i);
+            Octave {
+                size_km: size_km as f32,
+                frequency: (radius_m / 1e3 / size_km) as f32,
+                amplitude: rough.powi(i as i32),
+                salt: hash3([i as i32, seed as i32, (seed >> 32) as i32], salt),
+                rest: 0.0,
+            }
+        })
+        .collect();
+    let sum2: f32 = octaves.iter().map(|o| o.amplitude * o.amplitude).sum();
+    (octaves, sum2.sqrt())
+}
+
 impl CloudField {
     pub(crate) fn new(clouds: &Clouds, radius_m: f64) -> Self {
-        let largest = clouds.largest_km.max(1e-3);
-        let count = 1 + libm::log2((largest / clouds.smallest_km.max(1e-3)).max(1.0)).round() as u32;
-        let mut octaves: Vec<Octave> = (0..count.min(16))
-            .map(|i| {
-                let size_km = largest / f64::from(1u32 << i);
-                Octave {
-                    size_km: size_km as f32,
-                    frequency: (radius_m / 1e3 / size_km) as f32,
-                    // Slightly rougher than 1/2 an octave: clouds have detail.
-                    amplitude: 0.7f32.powi(i as i32),
-                    salt: hash3([i as i32, clouds.seed as i32, (clouds.seed >> 32) as i32], 0x5EED),
-                    rest: 0.0,
-                }
-            })
-            .collect();
+        let sizes_km = [clouds.largest_km, clouds.smallest_km].map(|km| km.max(1e-3));
+        // Slightly rougher than 1/2 an octave: clouds have detail.
+        let (mut octaves, root) = octaves(sizes_km, 0.7, radius_m, clouds.seed, 0x5EED);
         // Value noise in 3-D has a standard deviation of about 0.17; the octaves add as squares.
-        let sum2: f32 = octaves.iter().map(|o| o.amplitude * o.amplitude).sum();
         for o in &mut octaves {
-            o.amplitude *= 1.0 / sum2.sqrt();
+            o.amplitude *= 1.0 / root;
         }
         let mut rest = 0.0;
         for o in octaves.iter_mut().rev() {
@@ -128,23 +135,10 @@ pub(crate) struct Relief {
 
 impl Relief {
     /// `detail_km` from the largest to the smallest size; `rough` is the amplitude of an octave over the one before.
-    pub(crate) fn new([largest_km, smallest_km]: [f64; 2], rough: f32, radius_m: f64, seed: u64) -> Self {
-        let count = 1 + libm::log2((largest_km / smallest_km).max(1.0)).round() as u32;
-        let mut octaves: Vec<Octave> = (0..count.min(16))
-            .map(|i| {
-                let size_km = largest_km / f64::from(1u32 << i);
-                Octave {
-                    size_km: size_km as f32,
-                    frequency: (radius_m / 1e3 / size_km) as f32,
-                    amplitude: rough.powi(i as i32),
-                    salt: hash3([i as i32, seed as i32, (seed >> 32) as i32], 0x6E0D),
-                    rest: 0.0,
-                }
-            })
-            .collect();
-        let sum2: f32 = octaves.iter().map(|o| o.amplitude * o.amplitude).sum();
+    pub(crate) fn new(detail_km: [f64; 2], rough: f32, radius_m: f64, seed: u64) -> Self {
+        let (mut octaves, root) = octaves(detail_km, rough, radius_m, seed, 0x6E0D);
         for o in &mut octaves {
-            o.amplitude /= 0.17 * sum2.sqrt();
+            o.amplitude /= 0.17 * root;
         }
         Self { octaves }
     }
