@@ -41,6 +41,7 @@ pub mod infrared;
 pub mod limb;
 pub mod motion;
 pub mod optics;
+mod painter;
 pub mod picture;
 pub mod pose;
 mod render;

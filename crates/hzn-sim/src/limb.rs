@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use crate::counter::{Counter, Stream};
 use crate::error::SceneError;
 use crate::globe::Globe;
-use crate::render::Painter;
+use crate::painter::Painter;
 use crate::scene::Scene;
 
 /// Errors of edge points along u and v, independent of each other, in pixels.

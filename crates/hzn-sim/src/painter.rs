@@ -1,0 +1,242 @@
+//! The plain world: a body with clouds and a bright band, lit or not, before a sky with stars.
+//!
+//! One ray is followed a pixel. Where the limb passes through the pixel or close by, brightness is averaged
+//! over the pixel with the tangent height taken as linear across it; a sharp limb's share of the pixel is exact.
+
+mod edge;
+mod lamp;
+
+use hzn_core::camera::Camera;
+use hzn_core::frames::{Cam, UnitVec3};
+use hzn_core::pixel::ImagePoint;
+use nalgebra::Vector3;
+
+use crate::counter::{Counter, Stream};
+use crate::error::SceneError;
+use crate::globe::{Globe, Sight, View};
+use crate::height::LimbHeight;
+use crate::pose::Pose;
+use crate::render::beyond_circle;
+use crate::scene::{Band, Profile, Scene, Sky, World};
+use crate::texture::{CloudField, smoothstep};
+use crate::visible::air::Prepared;
+
+use edge::Edge;
+use lamp::Lamp;
+
+/// Pixels this close to the limb are averaged.
+const NEAR_PX: f64 = 3.0;
+/// Every how many pixels of a row a ray is asked of the lens, away from the limb.
+const STRIDE: usize = 8;
+
+/// A scene, prepared for asking pixel by pixel.
+#[derive(Debug, Clone)]
+pub(crate) struct Painter {
+    /// The lens, beyond its image circle too where it can be.
+    camera: Camera<f64>,
+    globe: Globe,
+    view: View,
+    edge: Edge,
+    lamp: Lamp,
+    /// The air of a visible world, whose limb goes on to shine beyond the terminator.
+    air: Option<Prepared>,
+    surface: f32,
+    clouds: Option<CloudField>,
+    band: Option<Band>,
+    sky: f32,
+    /// Larger of the two angles a pixel in the middle covers, radians.
+    pixel_rad: f64,
+    height: LimbHeight,
+    /// [`Sight::miss`] of pixels that may have the limb within [`NEAR_PX`].
+    near: f64,
+    radius_km: f32,
+}
+
+impl Painter {
+    pub(crate) fn try_new(scene: &Scene) -> Result<Self, SceneError> {
+        let camera = beyond_circle(&scene.camera)?;
+        let height = LimbHeight::of(scene);
+        let globe = Globe::of(&scene.body).raised(height.reference_m);
+        let view = View::try_new(globe, &scene.pose).ok_or(SceneError::Pose)?;
+        let (fx, fy) = camera.focal_px();
+        let pixel_rad = 1.0 / fx.min(fy);
+        let reach_px = match scene.profile {
+            Profile::Sharp => NEAR_PX,
+            // Steep profiles have all their light within a few pixels, and all of them need averaging.
+            Profile::Exponential { .. } => 2.0 * NEAR_PX,
+        };
+        Ok(Self {
+            // Off the axis a pixel can cover more than in the middle.
+            near: 2.0 * reach_px * pixel_rad * view.miss_per_rad()
+                // To first order: twice the height in units of the radius.
+                + 2.2 * height.largest_departure_m() / globe.b_m,
+            edge: Edge::new(scene.profile),
+            lamp: Lamp::try_new(scene, globe)?,
+            air: match &scene.world {
+                World::Visible(world) => Some(Prepared::new(&world.air, globe.a_m)),
+                World::Plain | World::Infrared(_) => None,
+            },
+            surface: scene.disc.surface as f32,
+            clouds: scene.disc.clouds.map(|c| CloudField::new(&c, globe.a_m)),
+            band: scene.disc.band,
+            sky: scene.sky.brightness as f32,
+            pixel_rad,
+            radius_km: (globe.a_m / 1e3) as f32,
+            camera,
+            globe,
+            view,
+            height,
+        })
+    }
+
+    /// A direction given in ECEF (unit) as the camera sees it.
+    pub(crate) fn to_camera(&self, ecef: [f64; 3]) -> Option<UnitVec3<Cam, f64>> {
+        self.view.to_camera(ecef.into())
+    }
+
+    /// Height of the limb in metres at the latitude where this ray (ECEF, unit) meets or passes the body.
+    pub(crate) fn limb_height_m(&self, ecef: [f64; 3]) -> f64 {
+        let lat = |cam: UnitVec3<Cam, f64>| self.latitude_rad(&self.view.look(cam.xyz()));
+        self.height.at_m(self.to_camera(ecef).map_or(0.0, lat))
+    }
+
+    /// How much light falls where this ray (ECEF, unit) meets or passes the body, 0 to 1.
+    pub(crate) fn lit(&self, ecef: [f64; 3]) -> f32 {
+        self.to_camera(ecef).map_or(0.0, |cam| {
+            let sight = self.view.look(cam.xyz());
+            let point = self.view.point(&sight);
+            match (&self.air, &self.lamp) {
+                (Some(air), Lamp::Sun { direction, .. }) => {
+                    let mu0 = self.view.normal(&point).dot(direction) as f32;
+                    air.sunlight(air.sun_path(mu0), air.thin(self.height.reference_m as f32))[1]
+                }
+                _ => self.lamp.at(&self.view, &sight, &point),
+            }
+        })
+    }
+
+    /// The same from another attitude.
+    pub(crate) fn turned(&self, pose: &Pose) -> Self {
+        let view = View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone());
+        Self { view, ..self.clone() }
+    }
+
+    /// One row of pixels.
+    ///
+    /// Away from the limb a ray interpolated between every [`STRIDE`]th one is good to a hundredth of a pixel, which
+    /// no cloud shows; close to it every pixel gets its own.
+    pub(crate) fn row(&self, v: f64, row: &mut [f32]) {
+        let ray = |x: usize| self.camera.ray(ImagePoint { u: x as f64, v }).map(|r| Vector3::from(r.direction().xyz()));
+        let mut next = ray(0);
+        for (block, pixels) in row.chunks_mut(STRIDE).enumerate() {
+            let start = block * STRIDE;
+            let (first, last) = (next, ray(start + STRIDE));
+            next = last;
+            for (i, p) in pixels.iter_mut().enumerate() {
+                *p = match (first, last) {
+                    (Some(a), Some(b)) => self.roughly((a + (b - a) * (i as f64 / STRIDE as f64)).into(), start + i, v),
+                    _ => self.exactly(start + i, v),
+                };
+            }
+        }
+    }
+
+    /// A pixel whose ray is about `s`.
+    #[inline(always)]
+    fn roughly(&self, s: [f64; 3], x: usize, v: f64) -> f32 {
+        let sight = self.view.look(s);
+        if sight.miss.abs() <= self.near {
+            return self.exactly(x, v);
+        }
+        let cover = if sight.miss <= 0.0 { 1.0 } else { self.edge.at(self.above_limb_m(&sight)) };
+        self.blend(cover, &sight)
+    }
+
+    /// A pixel with its own ray, averaged over its area.
+    fn exactly(&self, x: usize, v: f64) -> f32 {
+        // Where the lens sees nothing is sky, so that no dark rim is blurred inward.
+        let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { return self.sky };
+        let sight = self.view.look(ray.direction().xyz());
+        let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
+        self.blend(self.edge.mean(self.above_limb_m(&sight), gradient), &sight)
+    }
+
+    /// Tangent height of a ray above the limb height at its latitude, metres.
+    #[inline(always)]
+    fn above_limb_m(&self, sight: &Sight) -> f64 {
+        let above_reference = self.view.tangent_height_m(sight);
+        if !self.height.varies() {
+            return above_reference;
+        }
+        above_reference + self.height.reference_m - self.height.at_m(self.latitude_rad(sight))
+    }
+
+    /// Geodetic latitude of the point that a ray meets or passes, radians.
+    fn latitude_rad(&self, sight: &Sight) -> f64 {
+        libm::asin(self.view.normal(&self.view.point(sight)).z.clamp(-1.0, 1.0))
+    }
+
+    /// Sky and body, the body with weight `cover`.
+    #[inline(always)]
+    fn blend(&self, cover: f32, sight: &Sight) -> f32 {
+        if cover <= 1e-4 {
+            return self.sky;
+        }
+        self.sky + cover * (self.body(sight) - self.sky)
+    }
+
+    /// Brightness of the body where the ray meets or passes it.
+    fn body(&self, sight: &Sight) -> f32 {
+        let point = self.view.point(sight);
+        let lit = self.lamp.at(&self.view, sight, &point);
+        if lit <= 0.0 {
+            return self.sky;
+        }
+        let air = self.band.map_or(0.0, |b| {
+            let depth_km = (-self.above_limb_m(sight) * 1e-3).max(0.0);
+            let fade = ((b.depth_km - depth_km) / b.fade_km.max(1e-6) + 0.5).clamp(0.0, 1.0);
+            smoothstep(fade as f32)
+        });
+        let ground = match &self.clouds {
+            Some(clouds) if air < 1.0 => {
+                let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
+                let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(1e-3)) as f32;
+                clouds.over(self.surface, &point, footprint_km.min(self.radius_km))
+            }
+            _ => self.surface,
+        };
+        let bright = self.band.map_or(ground, |b| ground + air * (b.brightness as f32 - ground));
+        self.sky + lit * (bright - self.sky)
+    }
+
+    /// Adds the stars that are neither behind the body nor outside the picture, each spread over four pixels.
+    pub(crate) fn draw_stars(&self, sky: &Sky, width: usize, data: &mut [f32]) {
+        let draws = Counter::new(sky.seed, Stream::Stars);
+        for i in 0..u64::from(sky.stars) {
+            let [a, b, c] = [3 * i, 3 * i + 1, 3 * i + 2].map(|j| draws.uniform(j));
+            let z = 2.0 * a - 1.0;
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * b);
+            let r = (1.0 - z * z).sqrt();
+            let Some(cam) = self.view.to_camera(Vector3::new(r * cos, r * sin, z)) else { continue };
+            let Some(p) = self.camera.project(&cam) else { continue };
+            let seen = 1.0 - self.edge.at(self.above_limb_m(&self.view.look(cam.xyz())));
+            // Evenly distributed in magnitude over five magnitudes.
+            let light = sky.star_brightness as f32 * libm::exp(-4.6 * c) as f32 * seen;
+            let (x, y) = (p.u.floor(), p.v.floor());
+            let (fx, fy) = ((p.u - x) as f32, (p.v - y) as f32);
+            for (dx, dy, weight) in [
+                (0.0, 0.0, (1.0 - fx) * (1.0 - fy)),
+                (1.0, 0.0, fx * (1.0 - fy)),
+                (0.0, 1.0, (1.0 - fx) * fy),
+                (1.0, 1.0, fx * fy),
+            ] {
+                let (x, y) = (x + dx, y + dy);
+                let inside = x >= 0.0 && y >= 0.0 && x < width as f64;
+                let index = if inside { y as usize * width + x as usize } else { usize::MAX };
+                if let Some(pixel) = data.get_mut(index) {
+                    *pixel += light * weight;
+                }
+            }
+        }
+    }
+}
