@@ -7,7 +7,8 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
 use crate::Problem;
-use crate::sensor::{camera_from_file, meaning, places, syntax};
+use crate::located::{meaning, places, syntax};
+use crate::sensor::camera_from_file;
 
 /// Reads `text` as a `T`. `path` is named in messages, and a camera `file` is looked for beside it. `check` says what is
 /// wrong with a value that can be read: the key, as `[section] key`, and the rule.

@@ -14,6 +14,7 @@
 pub mod camera_file;
 pub mod document;
 pub mod frames;
+mod located;
 mod nearest;
 mod problem;
 pub mod sensor;

@@ -1,0 +1,166 @@
+//! Where things stand in a TOML file, and errors that say so in the file's own words.
+
+use std::ops::Range;
+use std::path::Path;
+
+use hzn_core::error::ConfigError;
+use hzn_core::pipeline::lacking;
+use toml::de::{DeTable, DeValue};
+
+use crate::Problem;
+use crate::nearest::suggestion;
+
+/// A key with where it stands: the dotted path, the key's bytes, the value's bytes.
+pub(crate) struct Place {
+    pub(crate) path: Vec<String>,
+    pub(crate) key: Range<usize>,
+    value: Range<usize>,
+}
+
+impl Place {
+    fn field(&self) -> String {
+        field_name(&self.path)
+    }
+}
+
+/// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`; of the second of several tables
+/// `[[bodies]] 2 radius_km`.
+fn field_name(path: &[String]) -> String {
+    match path {
+        [] => String::new(),
+        [one] => one.clone(),
+        [section, place, rest @ ..] if place.parse::<usize>().is_ok() => {
+            let nth = place.parse::<usize>().map_or(0, |n| n + 1);
+            format!("[[{section}]] {nth} {}", rest.join(".")).trim_end().to_owned()
+        }
+        [section, rest @ ..] => format!("[{section}] {}", rest.join(".")),
+    }
+}
+
+/// Every key of the file, those of inner tables too.
+pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
+    fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<Place>) {
+        for (key, value) in table {
+            path.push(key.get_ref().to_string());
+            out.push(Place { path: path.clone(), key: key.span(), value: value.span() });
+            match value.get_ref() {
+                DeValue::Table(inner) => walk(inner, path, out),
+                DeValue::Array(items) => {
+                    for (i, item) in items.iter().enumerate() {
+                        let DeValue::Table(inner) = item.get_ref() else { continue };
+                        path.push(i.to_string());
+                        out.push(Place { path: path.clone(), key: item.span(), value: item.span() });
+                        walk(inner, path, out);
+                        path.pop();
+                    }
+                }
+                _ => {}
+            }
+            path.pop();
+        }
+    }
+    let mut out = Vec::new();
+    walk(table, &mut Vec::new(), &mut out);
+    out
+}
+
+/// The innermost key whose name or value holds the byte `offset`.
+fn place_of(places: &[Place], offset: usize) -> Option<&Place> {
+    let holds = |p: &&Place| p.key.contains(&offset) || p.value.contains(&offset);
+    places.iter().filter(holds).max_by_key(|p| p.path.len())
+}
+
+/// What is no TOML.
+pub(crate) fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
+    let problem = Problem::new(path, format!("not valid TOML: {}", error.message().replace('\n', "; ")));
+    match error.span() {
+        Some(span) => problem.at_exactly(text, span.start),
+        None => problem,
+    }
+}
+
+/// serde's error, said in the file's own words. `taken` are keys of the top that serde does not know of.
+pub(crate) fn meaning(
+    error: &toml::de::Error,
+    text: &str,
+    path: &Path,
+    places: &[Place],
+    taken: &[&'static str],
+) -> Problem {
+    let message = error.message();
+    let offset = error.span().map(|s| s.start);
+    let place = match error.span() {
+        // The table that lacks it, which may be the file as a whole.
+        Some(span) if message.starts_with("missing field") => places.iter().find(|p| p.value == span),
+        _ => offset.and_then(|o| place_of(places, o)),
+    };
+    let attach = |p: Problem| match offset {
+        // An error of the table as a whole, such as a missing section, has the first byte for its place.
+        Some(o) if place.is_some() => p.at_offset(text, o),
+        _ => p,
+    };
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let first = quoted.next().unwrap_or_default();
+    let valid: Vec<&str> = quoted.collect();
+    let own = place.map(Place::field).unwrap_or_default();
+    let problem = if message.starts_with("unknown field") {
+        let valid: Vec<&str> = match place.map(|p| p.path.as_slice()) {
+            Some([_]) => valid.into_iter().chain(taken.iter().copied()).collect(),
+            Some([section, _]) if section == "camera" => valid.into_iter().chain(["file"]).collect(),
+            _ => valid,
+        };
+        let what = if own.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
+        Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(own)
+    } else if message.starts_with("unknown variant") {
+        let key = place.map(|p| p.path.join(".")).unwrap_or_default();
+        let what = unbuilt(&key, first)
+            .unwrap_or_else(|| format!("{first:?} is not a valid value{}", suggestion(first, &valid)));
+        Problem::new(path, what).in_field(own)
+    } else if message.starts_with("missing field") {
+        let mut p: Vec<String> = place.map(|p| p.path.clone()).unwrap_or_default();
+        p.push(first.to_owned());
+        let what = if p.len() == 1 {
+            format!("the section [{first}] is missing")
+        } else if p.first().is_some_and(|s| s == "camera") {
+            "missing; give it, or take the calibration from a `file`".to_owned()
+        } else {
+            "missing".to_owned()
+        };
+        Problem::new(path, what).in_field(field_name(&p))
+    } else {
+        let what = message
+            .replace("expected f64", "expected a number")
+            .replace("expected u16", "expected a whole number from 0 to 65535")
+            .replace("expected u32", "expected a whole number, 0 or more")
+            .replace("floating point `", "number `")
+            .replace('\n', "; ");
+        let problem = Problem::new(path, what);
+        if own.is_empty() { problem } else { problem.in_field(own) }
+    };
+    attach(problem)
+}
+
+/// A value that hzn-core refused, with the place where it was given.
+pub(crate) fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Place]) -> Problem {
+    let rule = error.limit;
+    let what = if error.value.is_nan() { rule.to_string() } else { format!("{} is refused: {rule}", error.value) };
+    let mut parts: Vec<String> = error.field.split('.').map(str::to_owned).collect();
+    if let Some(which) = error.body {
+        // Core says `body.` for the body's own keys, and no more for its level and its edge errors.
+        parts.retain(|p| p != "body");
+        parts.splice(0..0, ["bodies".to_owned(), which.to_string()]);
+    }
+    let problem = Problem::new(path, what).in_field(field_name(&parts));
+    // The field itself, or the section that it is missing from.
+    let place = (1..=parts.len()).rev().find_map(|n| places.iter().find(|p| p.path == parts[..n]));
+    match place {
+        Some(place) => problem.at_offset(text, place.key.start),
+        None => problem,
+    }
+}
+
+/// That a value exists, but not in this build.
+pub(crate) fn unbuilt(key: &str, value: &str) -> Option<String> {
+    let feature = lacking(key, value)?;
+    Some(format!("{value:?} is not in this build: it needs hzn-core with the feature {feature:?}"))
+}
