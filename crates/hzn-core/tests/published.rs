@@ -1,8 +1,11 @@
 //! The methods of published systems through the whole pipeline: they find a drawn disc, in parts and in smaller copies
 //! too, and any picture gets a sound report.
 
+mod common;
+
 use std::cell::{Cell, RefCell};
 
+use common::{KINDS, garbage};
 use hzn_core::body::{Frame, Kind};
 use hzn_core::camera::{self, Model};
 use hzn_core::candidates::SubPixel;
@@ -243,34 +246,11 @@ fn limits_are_checked_by_name() {
     assert_eq!(refused(&|c| c.input.scale_to_height = Some(8)), "input.scale_to_height");
 }
 
-/// Noise, stripes, blocks, one lit pixel, discs, slopes.
-fn garbage(kind: u8, seed: u64, level: u8) -> Vec<u8> {
-    let mut state = seed | 1;
-    (0..96u32 * 64)
-        .map(|i| {
-            let (x, y) = (i % 96, i / 96);
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let random = (state >> 56) as u8;
-            let on = match kind {
-                0 => random > level,
-                1 => (x + y) % 2 == 0,
-                2 => x % (2 + u32::from(level % 7)) == 0,
-                3 => (x / 8 + y / 8) % 2 == 0,
-                4 => i == u32::from(level) * 20,
-                5 => y > 30 + (x * u32::from(level)) / 800,
-                6 => (x as i32 - 48).pow(2) + (y as i32 - 32).pow(2) < i32::from(level) * 4,
-                _ => y >= u32::from(level) / 4,
-            };
-            if on { 200 } else { random / 16 }
-        })
-        .collect()
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
     #[test]
     fn any_picture_gets_a_sound_report(
-        kind in 0u8..8, seed in any::<u64>(), level in any::<u8>(), lens in 0usize..3, circle: bool, mask: bool,
+        kind in 0..KINDS, seed in any::<u64>(), level in any::<u8>(), lens in 0usize..3, circle: bool, mask: bool,
         body in 0usize..4, methods in proptest::array::uniform6(0usize..6), scaled: bool, divided: bool, gates: bool,
     ) {
         let model = [Model::Pinhole, Model::Equidistant, Model::KannalaBrandt][lens];
