@@ -1,11 +1,14 @@
 //! The body whose limb is looked for, and what a position and an altitude say about its cone.
 
-use crate::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
+mod expected;
+
+use crate::ellipsoid::EARTH_MEAN_RADIUS_M;
 use crate::error::{ConfigError, Limit, above, between, require};
 use crate::frames::{Cam, Ecef, Rotation, UnitVec3};
-use crate::linalg::V3;
 use crate::real::Real;
 use crate::{binarize, covariance};
+
+pub use expected::Expected;
 
 /// Radius of the Sun's photosphere in kilometres (IAU 2015).
 pub const SUN_RADIUS_KM: f64 = 695_700.0;
@@ -20,11 +23,6 @@ pub const MOON_DISTANCE_KM: f64 = 384_400.0;
 pub const MAX_LATITUDES: usize = 16;
 /// Places on one half of the limb at which a height by latitude is looked up.
 const PLACES: usize = 8;
-
-/// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
-const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
-/// 1-sigma of an attitude that comes without one: 5 degrees.
-const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
 
 /// Which body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -240,204 +238,9 @@ impl core::fmt::Display for FrameError {
 }
 impl core::error::Error for FrameError {}
 
-/// The cone that is expected: cosine of its half-angle with its sigma, and what turns a half-angle into an altitude.
-#[derive(Debug, Clone, Copy)]
-pub struct Expected<T> {
-    /// cos α₀ of the best single cone.
-    pub(crate) cos: T,
-    /// sin α₀.
-    pub(crate) sin: T,
-    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
-    pub(crate) sigma_cos: T,
-    /// The limb cone of the ellipsoid, when the position is known.
-    pub(crate) ellipsoid: Option<LimbCone<T>>,
-    /// Prior attitude, camera to ECEF.
-    pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
-    /// How the limb differs from the mean cone by azimuth about the axis: first and second harmonic of cos α, from north.
-    pub(crate) harmonics_cos: [T; 2],
-    /// 1-sigma amplitudes of what of this is not known to the fit, because the direction of north is not.
-    pub(crate) uneven_cos: [T; 2],
-    /// Level that the picture before asks for, counts.
-    pub(crate) level: Option<u16>,
-    /// Direction to the Sun in the camera, where only the limb that it lights is limb.
-    pub(crate) sun: Option<V3<T>>,
-    /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
-    pub(crate) radius_m: T,
-    /// Limb height in metres and its sigma.
-    pub(crate) limb_m: T,
-    pub(crate) limb_sigma_m: T,
-    /// The half-angle says nothing about the distance (Sun, Moon).
-    pub(crate) free: bool,
-    /// It may be seen as a crescent.
-    pub(crate) phases: bool,
-    /// Which of the sensor's bodies it is, from 0.
-    pub(crate) which: u8,
-}
-
-impl<T: Real> Expected<T> {
-    /// Expected half-angle in radians.
-    pub fn half_angle_rad(&self) -> T {
-        self.sin.atan2(self.cos)
-    }
-
-    /// sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
-    pub(crate) fn new(body: &Config, frame: &Frame<T>) -> Result<Self, FrameError> {
-        let km = T::of(1000.0);
-        let mut limb = T::of(body.limb_height_km) * km;
-        let mut harmonics = [T::zero(); 2];
-        let mut limb_sigma = T::of(body.limb_height_sigma_km) * km;
-        let mut altitude_sigma = T::of(body.altitude_sigma_km) * km;
-        let given = match frame.altitude_m {
-            Some(h) if !(h > T::zero() && h.is_finite()) => return Err(FrameError::Altitude),
-            Some(h) => Some(h),
-            None => body.altitude_km.map(|h| T::of(h) * km),
-        };
-        let position = match frame.position_m {
-            Some(p) if !p.iter().all(|x| x.is_finite()) => return Err(FrameError::Position),
-            other => other,
-        };
-        let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(T::of(ATTITUDE_SIGMA_RAD));
-        if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
-            return Err(FrameError::AttitudeSigma);
-        }
-        let mut ellipsoid = None;
-        let (radius, altitude, sin) = match (body.kind, position) {
-            (Kind::Earth, Some(p)) => {
-                let raised = |limb: T| {
-                    let (a, b) = (T::of(WGS84_A_M) + limb, T::of(WGS84_B_M) + limb);
-                    LimbCone::try_new(p, a, b).ok_or(FrameError::Position)
-                };
-                let mut cone = raised(limb)?;
-                let (h, latitude) = geodetic(p, T::of(WGS84_A_M), T::of(WGS84_B_M));
-                if !body.limb_height_by_latitude_km.is_empty() {
-                    let (sin, _) = cone.mean_half_angle_rad().sin_cos();
-                    let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
-                    (limb, harmonics) = (mean * km, [first * km, second * km]);
-                    cone = raised(limb)?;
-                }
-                if !(h > limb && h > T::zero()) {
-                    return Err(FrameError::Position);
-                }
-                let (sin, _) = cone.mean_half_angle_rad().sin_cos();
-                ellipsoid = Some(cone);
-                // The sphere with this half-angle at this altitude.
-                ((sin * h - limb) / (T::one() - sin), h, sin)
-            }
-            (_, position) => {
-                let r = T::of(body.mean_radius_km()) * km;
-                let altitude = match (position, given, body.kind) {
-                    (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
-                        let h = (x * x + y * y + z * z).sqrt() - r;
-                        if !(h > T::zero()) {
-                            return Err(FrameError::Position);
-                        }
-                        h
-                    }
-                    (_, _, Kind::Sun) => T::of((AU_KM - SUN_RADIUS_KM) * 1e3),
-                    (_, _, Kind::Moon) => T::of((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
-                    (_, Some(h), _) => h,
-                    (_, None, _) => return Err(FrameError::NoAltitude),
-                };
-                if body.kind == Kind::Earth {
-                    // The local radius is unknown without a position.
-                    let unknown = T::of(20e3);
-                    limb_sigma = (limb_sigma * limb_sigma + unknown * unknown).sqrt();
-                }
-                (r, altitude, (r + limb) / (r + altitude))
-            }
-        };
-        let cos2 = T::one() - sin * sin;
-        if !(sin > T::zero() && cos2 > T::EPSILON) {
-            return Err(FrameError::Altitude);
-        }
-        let cos = cos2.sqrt();
-        if body.half_angle_is_free() {
-            altitude_sigma = T::zero();
-        }
-        // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
-        let tan = sin / cos;
-        let scale = tan / (radius + altitude);
-        let known = frame.cam_to_ecef.filter(|_| attitude_sigma < T::of(USELESS_ATTITUDE_RAD));
-        // A higher limb is a wider cone. Of the ellipsoid's own shape half the difference of its half-angles' cosines.
-        let harmonics_cos = harmonics.map(|h| -scale * h);
-        let own = ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
-            let (east, meridian) = cone.half_angles_rad();
-            (meridian.sin_cos().1 - east.sin_cos().1) * T::of(0.5)
-        });
-        let uneven = |k: f64, amplitude: T| match known {
-            // An attitude that is off by ψ leaves k ψ of the k-th harmonic.
-            Some(_) => amplitude.abs() * (attitude_sigma * T::of(k)).least(T::one()),
-            None => amplitude.abs(),
-        };
-        let variance = limb_sigma * limb_sigma + sin * sin * altitude_sigma * altitude_sigma;
-        Ok(Self {
-            cos,
-            sin,
-            sigma_cos: scale * variance.sqrt(),
-            ellipsoid,
-            cam_to_ecef: known,
-            harmonics_cos,
-            uneven_cos: [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1])],
-            level: frame.level,
-            sun: frame.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
-            radius_m: radius,
-            limb_m: limb,
-            limb_sigma_m: limb_sigma,
-            free: body.half_angle_is_free(),
-            phases: body.kind != Kind::Sun,
-            which: 0,
-        })
-    }
-
-    /// Altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle says
-    /// nothing about the distance.
-    pub(crate) fn altitude(&self, cos: T, var_cos: T) -> Option<(T, T)> {
-        let sin = (T::one() - cos * cos).sqrt();
-        if self.free || !(sin > T::zero() && cos > T::zero()) {
-            return None;
-        }
-        let distance = (self.radius_m + self.limb_m) / sin;
-        // dH/dcos = (R + d) cos/sin³, dH/dd = 1/sin − 1 + 1 for a shift of the limb at fixed radius.
-        let by_cos = distance * cos / (sin * sin);
-        let by_limb = T::one() / sin;
-        let variance = by_cos * by_cos * var_cos + by_limb * by_limb * self.limb_sigma_m * self.limb_sigma_m;
-        Some((distance - self.radius_m, variance.sqrt()))
-    }
-
-    /// The axis in ECEF, when the position is known.
-    pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
-        self.ellipsoid.as_ref().map(|c| c.axis)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_better_attitude_leaves_less_of_the_shape_open() {
-        let body = Config::default();
-        let frame = Frame {
-            position_m: Some([4.9e6, 0.0, 4.9e6]),
-            cam_to_ecef: Rotation::assume_from_quaternion([1.0, 0.0, 0.0, 0.0]),
-            ..Frame::default()
-        };
-        let sigma = |deg: f64| {
-            let frame = Frame { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
-            Expected::<f64>::new(&body, &frame).unwrap().uneven_cos[1]
-        };
-        let [_, none] = Expected::new(&body, &Frame { cam_to_ecef: None, ..frame }).unwrap().uneven_cos;
-        assert!(none > 1e-5);
-        assert_eq!(sigma(0.0), 0.0);
-        assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);
-        // No better than none, and then it is not used.
-        assert_eq!(sigma(40.0), none);
-        assert_eq!(Expected::new(&body, &frame).unwrap().uneven_cos[1], sigma(5.0));
-        for deg in [f64::NAN, -1.0, f64::INFINITY] {
-            let frame = Frame { attitude_sigma_rad: Some(deg), ..frame };
-            assert_eq!(Expected::new(&body, &frame).unwrap_err(), FrameError::AttitudeSigma);
-        }
-    }
 
     #[test]
     fn heights_by_latitude_become_a_mean_and_harmonics() {
