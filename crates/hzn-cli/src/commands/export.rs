@@ -92,16 +92,12 @@ fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
             _ => (decode(&image, &name)?.to_png().map_err(failed)?, "png"),
         };
         let path = folder.join(picture_name(&name, ending));
-        if path.exists() && !args.force {
-            return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
-        }
+        output::refuse_existing(&path, args.force)?;
         std::fs::write(&path, bytes).map_err(|e| output::cannot(&path, &e))?;
     }
     if let Some(folder) = &args.overlay {
         let path = folder.join(overlay::file_name(&name));
-        if path.exists() && !args.force {
-            return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
-        }
+        output::refuse_existing(&path, args.force)?;
         let picture = decode(&image, &name)?;
         let drawn = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
         overlay::save(&drawn, &path)?;

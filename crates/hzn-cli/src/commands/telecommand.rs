@@ -8,7 +8,8 @@ use hzn_flight::messages::{Function, Mode};
 use hzn_flight::packet::{self, Apid};
 use hzn_flight::{Parameters, parameters};
 
-use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::output;
 
 /// Write commands for a flight computer
 ///
@@ -50,11 +51,9 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
     }
     match &args.output {
-        Some(path) if path.exists() && !args.force => {
-            Err(usage(format!("{}: exists already; --force replaces it", path.display())))
-        }
         Some(path) => {
-            std::fs::write(path, out).map_err(|e| failed(format!("{}: {e}", path.display())))?;
+            output::refuse_existing(path, args.force)?;
+            std::fs::write(path, out).map_err(|e| output::cannot(path, &e))?;
             Ok(Exit::Done)
         }
         None => {

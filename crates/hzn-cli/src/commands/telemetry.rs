@@ -86,9 +86,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Stop> {
 }
 
 fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {
-    if path.exists() && !force {
-        return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
-    }
+    output::refuse_existing(path, force)?;
     let mut table = csv::Writer::from_path(path).map_err(|e| failed(format!("{}: {e}", path.display())))?;
     let columns = ["time_s"].into_iter().chain(Housekeeping::FIELDS.iter().copied());
     table.write_record(columns).map_err(failed)?;

@@ -186,6 +186,17 @@ pub(crate) fn advice_of_run(path: &Path, error: &std::io::Error) -> String {
     }
 }
 
+/// Refuses a file that exists, unless it may be replaced.
+///
+/// # Errors
+/// It exists and `force` is false.
+pub(crate) fn refuse_existing(path: &Path, force: bool) -> Result<(), Stop> {
+    if path.exists() && !force {
+        return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
+    }
+    Ok(())
+}
+
 /// A file that cannot be written, and what to do.
 pub(crate) fn cannot(path: &Path, error: &std::io::Error) -> Stop {
     failed(advice(path, error))

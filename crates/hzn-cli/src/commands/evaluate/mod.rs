@@ -58,9 +58,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             "json" | "html" => {}
             _ => return Err(usage(format!("{}: a report ends in .json or .html", path.display()))),
         }
-        if path.exists() && !args.force {
-            return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
-        }
+        output::refuse_existing(path, args.force)?;
     }
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));

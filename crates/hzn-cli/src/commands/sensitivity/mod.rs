@@ -123,9 +123,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             "csv" | "svg" => {}
             _ => return Err(usage(format!("{}: a table ends in .csv, a plot in .svg", path.display()))),
         }
-        if path.exists() && !args.force {
-            return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
-        }
+        output::refuse_existing(path, args.force)?;
     }
     let Finished { table, chart, notes } = match args.what {
         What::Sigma => sigma(args)?,
