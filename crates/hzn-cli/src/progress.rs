@@ -11,6 +11,9 @@ use crate::tell;
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
+/// How often each status was the answer.
+type Counts = [u64; Status::ALL.len()];
+
 /// Counts frames and shows how far the run is.
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,
@@ -18,7 +21,9 @@ pub(crate) struct Progress {
     total: Option<u64>,
     start: Instant,
     last_line: Instant,
-    counts: [u64; Status::ALL.len()],
+    frames: u64,
+    /// What became of each body, by its place in the sensor.toml.
+    bodies: Vec<Counts>,
     /// Frames that were finished before this run.
     before: u64,
 }
@@ -43,18 +48,23 @@ impl Progress {
             bar
         });
         let now = Instant::now();
-        Self { bar, quiet, total, start: now, last_line: now, counts: [0; Status::ALL.len()], before }
+        Self { bar, quiet, total, start: now, last_line: now, frames: 0, bodies: Vec::new(), before }
     }
 
-    pub(crate) fn count(&mut self, status: Status) {
-        if let Some(n) = self.counts.get_mut(status as usize) {
-            *n += 1;
+    /// A frame is finished; `statuses` are those of its bodies.
+    pub(crate) fn count(&mut self, statuses: impl IntoIterator<Item = Status>) {
+        self.frames += 1;
+        for (i, status) in statuses.into_iter().enumerate() {
+            if i == self.bodies.len() {
+                self.bodies.push(Counts::default());
+            }
+            self.bodies[i][status as usize] += 1;
         }
         if let Some(bar) = &self.bar {
             bar.inc(1);
         } else if !self.quiet && self.last_line.elapsed() >= LINE_EVERY {
             self.last_line = Instant::now();
-            let done = self.before + self.frames();
+            let done = self.before + self.frames;
             let of = self.total.map(|n| format!(" of {n}")).unwrap_or_default();
             tell::line(format_args!("{done}{of} frames, {:.1} a second", self.rate()));
         }
@@ -69,27 +79,47 @@ impl Progress {
     }
 
     pub(crate) fn frames(&self) -> u64 {
-        self.counts.iter().sum()
+        self.frames
     }
-    pub(crate) fn of(&self, status: Status) -> u64 {
-        self.counts.get(status as usize).copied().unwrap_or(0)
+    /// Whether a picture could not be read.
+    pub(crate) fn any_unreadable(&self) -> bool {
+        self.bodies.iter().any(|counts| counts[Status::Unreadable as usize] > 0)
     }
     fn rate(&self) -> f64 {
-        self.frames() as f64 / self.start.elapsed().as_secs_f64().max(1e-9)
+        self.frames as f64 / self.start.elapsed().as_secs_f64().max(1e-9)
     }
 
-    /// Takes the bar away and sums up: `123 frames: 120 ok, 2 no-limb, 1 unreadable; 85.2 frames a second`.
-    pub(crate) fn summary(&self) -> String {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-        let present = Status::ALL.into_iter().filter(|s| self.of(*s) > 0);
-        let parts: Vec<String> = present.map(|s| format!("{} {}", self.of(s), s.name())).collect();
-        let frames = match self.frames() {
+    /// Takes the bar away and sums up: `123 frames: 120 ok, 2 no-limb, 1 unreadable; 85.2 frames a second`, and with
+    /// several bodies `4 frames: sun 3 ok, 1 rejected; moon 4 no-limb; 85.2 frames a second`.
+    pub(crate) fn summary(&self, bodies: &[&str]) -> String {
+        self.finish();
+        let frames = match self.frames {
             0 => return "no frames".to_owned(),
             1 => "1 frame".to_owned(),
             n => format!("{n} frames"),
         };
-        format!("{frames}: {}; {:.1} frames a second", parts.join(", "), self.rate())
+        let parts: Vec<String> = self.bodies.iter().map(in_words).collect();
+        let found = match parts.as_slice() {
+            [one] => one.clone(),
+            several => {
+                let named: Vec<String> =
+                    bodies.iter().zip(several).map(|(name, part)| format!("{name} {part}")).collect();
+                named.join("; ")
+            }
+        };
+        format!("{frames}: {found}; {:.1} frames a second", self.rate())
     }
+
+    /// Takes the bar away.
+    pub(crate) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn in_words(counts: &Counts) -> String {
+    let present = Status::ALL.iter().zip(counts).filter(|(_, n)| **n > 0);
+    let parts: Vec<String> = present.map(|(status, n)| format!("{n} {}", status.name())).collect();
+    parts.join(", ")
 }

@@ -127,7 +127,12 @@ pub(crate) fn rows(file: &Path, kind: &str) -> Result<AllRows, Stop> {
     match kind {
         "csv" => {
             let reader = csv::Reader::from_path(file).map_err(failed)?;
-            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| not(i as u64 + 2, e.to_string()));
+            let why = |e: csv::Error| match e.kind() {
+                // The line stands before it already.
+                csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
+                _ => e.to_string(),
+            };
+            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| not(i as u64 + 2, why(e)));
             Ok(whole(Box::new(reader.into_deserialize().enumerate().map(row)), file))
         }
         "jsonl" => {

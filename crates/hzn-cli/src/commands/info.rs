@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use hzn_core::status::Status;
 use hzn_mcap::{Contents, Reader, Row};
 
-use crate::exit::{Exit, Outcome, Stop, failed};
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::input::{self, ending, picture};
 use crate::tell;
 
-/// Summarise a file: results (.mcap, .csv, .jsonl), a sensor.toml, a frames.csv, a picture
+/// Summarise a file: results (.mcap, .csv, .jsonl), a sensor.toml, a frames.csv, a truth.csv, a picture
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file
@@ -83,6 +83,9 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
     let mut summary = Summary::default();
     if kind == "csv" {
         let header = csv::Reader::from_path(file).and_then(|mut r| r.headers().cloned()).map_err(failed)?;
+        if header.iter().any(|column| column == "limb") {
+            return truth(file);
+        }
         if !header.iter().eq(Row::COLUMNS) {
             let frames = hzn_calib::frames::load(file)?;
             let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
@@ -114,6 +117,21 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
     Ok(out)
 }
 
+fn truth(file: &Path) -> Result<String, Stop> {
+    let rows = hzn_sim::truth::load(file).map_err(usage)?;
+    let mut bodies = BTreeMap::<&str, [usize; 2]>::new();
+    for row in &rows {
+        let [seen, all] = bodies.entry(&row.body).or_default();
+        *seen += usize::from(row.has_limb());
+        *all += 1;
+    }
+    let mut out = "truth, for        hzn evaluate RESULTS --truth FILE\n".to_owned();
+    for (body, [seen, all]) in bodies {
+        out.push_str(&format!("{body:<16} limb in view in {seen} of {all} pictures\n"));
+    }
+    Ok(out)
+}
+
 fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     if kind != "toml" {
         return super::camera::describe(&hzn_core::Config::new(hzn_calib::camera_file::load(file, None)?));
@@ -139,9 +157,17 @@ fn one_picture(file: &Path) -> Result<String, Stop> {
 #[derive(Debug, Default)]
 struct Summary {
     frames: u64,
-    statuses: BTreeMap<u8, u64>,
-    bodies: BTreeMap<String, u64>,
+    /// Number of the frame of the last row: one of several bodies has a row a body.
+    last: Option<u64>,
     time: Option<(f64, f64)>,
+    /// By name, in the order in which they come.
+    bodies: Vec<(String, Found)>,
+}
+
+/// How one body was found.
+#[derive(Debug, Default)]
+struct Found {
+    statuses: BTreeMap<u8, u64>,
     sigma_deg: Vec<f64>,
     rms_px: Vec<f64>,
     elapsed_us: Vec<f64>,
@@ -150,15 +176,21 @@ struct Summary {
 
 impl Summary {
     fn add(&mut self, row: &Row) {
-        self.frames += 1;
-        *self.statuses.entry(row.status as u8).or_default() += 1;
-        *self.bodies.entry(row.body.clone()).or_default() += 1;
+        if self.last.replace(row.index) != Some(row.index) {
+            self.frames += 1;
+        }
         let t = row.time_s;
         self.time = Some(self.time.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
-        self.sigma_deg.extend(row.sigma_max_deg);
-        self.rms_px.extend(row.rms_px);
-        self.elapsed_us.extend(row.elapsed_us);
-        self.altitude_km.extend(row.altitude_est_km);
+        let place = self.bodies.iter().position(|(name, _)| *name == row.body).unwrap_or_else(|| {
+            self.bodies.push((row.body.clone(), Found::default()));
+            self.bodies.len() - 1
+        });
+        let found = &mut self.bodies[place].1;
+        *found.statuses.entry(row.status as u8).or_default() += 1;
+        found.sigma_deg.extend(row.sigma_max_deg);
+        found.rms_px.extend(row.rms_px);
+        found.elapsed_us.extend(row.elapsed_us);
+        found.altitude_km.extend(row.altitude_est_km);
     }
 
     fn text(self) -> String {
@@ -167,23 +199,24 @@ impl Summary {
         if let Some((a, b)) = self.time {
             line("time", format!("{a:.3} to {b:.3} s"));
         }
-        if self.frames > 0 {
-            line("body", self.bodies.keys().cloned().collect::<Vec<_>>().join(", "));
-        }
-        for status in Status::ALL {
-            if let Some(n) = self.statuses.get(&(status as u8)) {
-                line(status.name(), format!("{n} ({:.1} %)", 100.0 * *n as f64 / self.frames as f64));
+        for (name, found) in self.bodies {
+            line("body", name);
+            let rows: u64 = found.statuses.values().sum();
+            for status in Status::ALL {
+                if let Some(n) = found.statuses.get(&(status as u8)) {
+                    line(status.name(), format!("{n} ({:.1} %)", 100.0 * *n as f64 / rows as f64));
+                }
             }
-        }
-        for (name, unit, values) in [
-            ("sigma", "deg", self.sigma_deg),
-            ("RMS", "px", self.rms_px),
-            ("altitude found", "km", self.altitude_km),
-            ("processing", "us", self.elapsed_us),
-        ] {
-            if let Some([low, middle, high]) = percentiles(values) {
-                let [low, middle, high] = [low, middle, high].map(three_digits);
-                line(name, format!("{middle} {unit} in the middle, {low} to {high} for 90 %"));
+            for (name, unit, values) in [
+                ("sigma", "deg", found.sigma_deg),
+                ("RMS", "px", found.rms_px),
+                ("altitude found", "km", found.altitude_km),
+                ("processing", "us", found.elapsed_us),
+            ] {
+                if let Some([low, middle, high]) = percentiles(values) {
+                    let [low, middle, high] = [low, middle, high].map(three_digits);
+                    line(name, format!("{middle} {unit} in the middle, {low} to {high} for 90 %"));
+                }
             }
         }
         out

@@ -121,15 +121,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut progress = Progress::new(total, held.frames, args.quiet);
     let stop = stop_flag();
     let mut seen = |frame: &Finished| {
-        // A picture that cannot be read is so for every body; a frame counts by the first that was not found.
+        // A picture that cannot be read is so for every body.
         let statuses = frame.found.iter().map(|f| f.report.as_ref().map_or(Status::Unreadable, |r| r.status));
         if let (Some(Err(why)), false) = (frame.found.iter().map(|f| &f.report).find(|r| r.is_err()), args.quiet) {
             progress.say(&format!("unreadable: {}: {why}", frame.name));
         }
-        progress.count(statuses.fold(Status::Ok, worse));
+        progress.count(statuses);
     };
     let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut seen);
-    let summary = progress.summary();
+    let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
+    let summary = progress.summary(&bodies);
     let end = end?;
     output.finish()?;
     if !args.quiet {
@@ -149,12 +150,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("interrupted after {done}{of} frames{next}"));
         return Ok(Exit::Interrupted);
     }
-    Ok(if progress.of(Status::Unreadable) > 0 { Exit::SomeUnreadable } else { Exit::Done })
-}
-
-/// What a frame of several bodies counts as: unreadable when one is, else as the first that has no answer.
-fn worse(a: Status, b: Status) -> Status {
-    if a == Status::Ok || b == Status::Unreadable { b } else { a }
+    Ok(if progress.any_unreadable() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
 pub(super) fn cores() -> usize {

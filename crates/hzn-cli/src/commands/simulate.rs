@@ -112,10 +112,10 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
         tell::line(format_args!("measuring limb height and noise on other pictures of the scene ..."));
     }
     let progress = Mutex::new(Progress::new(Some(MEASURED.into()), 0, quiet));
-    let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count(Status::Ok)).unwrap_or(());
+    let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
     let fit = Fit::measure(scenario, MEASURED, &seen).map_err(|e| scene::refused(name, &e))?;
     if let Ok(p) = progress.into_inner() {
-        p.summary();
+        p.finish();
     }
     let mut sensor = flight.sensor.clone();
     let how = match fit {
@@ -197,11 +197,11 @@ fn pictures(scenario: &Scenario, flight: &Flight, folder: &Path, args: &Args) ->
         }
         render(scenario, frame, folder)?;
         done.fetch_add(1, Ordering::SeqCst);
-        progress.lock().map(|mut p| p.count(Status::Ok)).unwrap_or(());
+        progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
         Ok::<(), Stop>(())
     })?;
     if let Ok(p) = progress.into_inner() {
-        p.summary();
+        p.finish();
     }
     let done = done.into_inner();
     if done < flight.frames.len() {

@@ -73,9 +73,12 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
         return load(Path::new(path));
     }
     let Some(function) = Function::ALL.iter().copied().find(|f| f.name() == verb) else {
-        let names = Function::ALL.iter().map(|f| f.name()).chain(["load"]);
-        let near = hzn_calib::nearest(verb, names).map(|n| format!("; did you mean {n:?}?"));
-        return Err(bad(&format!("there is no such command{}", near.unwrap_or_default())));
+        let names: Vec<&str> = Function::ALL.iter().map(|f| f.name()).chain(["load"]).collect();
+        let hint = match hzn_calib::nearest(verb, names.iter().copied()) {
+            Some(near) => format!("did you mean {near:?}?"),
+            None => format!("there are {}", names.join(", ")),
+        };
+        return Err(bad(&format!("there is no such command; {hint}")));
     };
     let user = |fill: &mut dyn FnMut(&mut Writer<'_>)| {
         let mut bytes = vec![0; packet::MAX_BYTES];

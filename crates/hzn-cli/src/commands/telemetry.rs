@@ -70,6 +70,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         table.flush()?;
     }
     heard.summary();
+    if heard.packets == 0 && !bytes.is_empty() {
+        let what = "no packet in it; is this what the flight computer sent? (docs/telemetry.md)";
+        return Err(failed(format!("{}: {what}", args.file.display())));
+    }
     Ok(Exit::Done)
 }
 

@@ -42,6 +42,9 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn load(file: &Path) -> Result<Config, Stop> {
     match ending(file).as_str() {
         "yaml" | "yml" => Ok(Config::new(hzn_calib::camera_file::load(file, None)?)),
+        "csv" | "jsonl" | "mcap" => {
+            Err(usage(format!("{}: a sensor.toml or a camera file (.yaml) is expected", file.display())))
+        }
         _ => Ok(hzn_calib::sensor::load(file)?.config),
     }
 }
@@ -115,7 +118,9 @@ fn radius_px(camera: &Camera<f64>, theta: f64) -> f64 {
 }
 
 fn field_of_view(c: &camera::Config, camera: &Camera<f64>) -> String {
-    let (right, bottom) = (f64::from(c.width) - 0.5, f64::from(c.height) - 0.5);
+    // A hair inside: without an image circle the lens ends at the farthest corner.
+    let side = -0.5 + 1e-6;
+    let (right, bottom) = (f64::from(c.width) - 1.0 - side, f64::from(c.height) - 1.0 - side);
     let angle = |a: (f64, f64), b: (f64, f64)| {
         let ray = |(u, v)| camera.unproject(ImagePoint { u, v });
         Some(ray(a)?.angle_rad(&ray(b)?).to_degrees())
@@ -123,9 +128,9 @@ fn field_of_view(c: &camera::Config, camera: &Camera<f64>) -> String {
     let text = |deg: Option<f64>| deg.map_or("beyond the image circle".to_owned(), |d| format!("{d:.2} deg"));
     format!(
         "{} horizontally, {} vertically, {} from corner to corner",
-        text(angle((-0.5, c.cy_px), (right, c.cy_px))),
-        text(angle((c.cx_px, -0.5), (c.cx_px, bottom))),
-        text(angle((-0.5, -0.5), (right, bottom)))
+        text(angle((side, c.cy_px), (right, c.cy_px))),
+        text(angle((c.cx_px, side), (c.cx_px, bottom))),
+        text(angle((side, side), (right, bottom)))
     )
 }
 

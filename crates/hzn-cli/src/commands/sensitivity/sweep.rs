@@ -33,7 +33,7 @@ impl FromStr for Values {
 
 fn range(from: f64, to: f64, step: Option<f64>) -> Result<Vec<f64>, String> {
     if !(to > from) {
-        return Err(format!("{from}:{to}: a range rises"));
+        return Err(format!("{from}:{to}: a range rises, from the lower to the higher value"));
     }
     let step = step.unwrap_or_else(|| nice((to - from) / STEPS));
     let count = ((to - from) / step + 1e-9).floor();
