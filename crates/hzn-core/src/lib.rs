@@ -77,6 +77,8 @@ pub mod region;
 mod rng;
 #[cfg(feature = "dlr")]
 pub mod section;
+#[cfg(any(feature = "horace", feature = "zju"))]
+mod sort;
 pub mod status;
 
 // Stages, in the order of the data's way.

@@ -110,6 +110,12 @@ impl<T: Real> Region<T> {
             let p = window.of_picture(ImagePoint { u, v });
             [p.u, p.v]
         };
+        let mut polygons = heapless::Vec::new();
+        for o in &self.polygons {
+            let mut corners = o.corners.clone();
+            corners.iter_mut().for_each(|c| *c = place(*c));
+            let _ = polygons.push(Outline { low: place(o.low), high: place(o.high), corners });
+        }
         Self {
             width: window.width,
             height: window.height,
@@ -117,15 +123,7 @@ impl<T: Real> Region<T> {
                 let [cx, cy] = place([c.cx, c.cy]);
                 Circle { cx, cy, semi_x: c.semi_x / sx, inv_x: c.inv_x * sx, inv_y: c.inv_y * sy }
             }),
-            polygons: self
-                .polygons
-                .iter()
-                .map(|o| Outline {
-                    low: place(o.low),
-                    high: place(o.high),
-                    corners: o.corners.iter().map(|c| place(*c)).collect(),
-                })
-                .collect(),
+            polygons,
         }
     }
 

@@ -22,6 +22,7 @@ const VOCABULARY: &[&str] = &[
     "error",
     "region",
     "section",
+    "sort",
     "status",
 ];
 const STAGES: &[&str] =

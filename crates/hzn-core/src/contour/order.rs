@@ -3,6 +3,7 @@
 use crate::circle::Circle;
 use crate::pixel::Pixel;
 use crate::real::Real;
+use crate::sort;
 
 /// Sorts by the angle about the circle through all pixels, the widest gap between the last and the first. Pixels on a
 /// line stay in their order.
@@ -16,7 +17,7 @@ pub(super) fn about_their_circle<T: Real>(pixels: &mut [Pixel]) {
         let along = x / (x.abs() + y.abs()).most(T::of(1e-20));
         if y < T::ZERO { T::one() + along } else { T::of(3.0) - along }
     };
-    pixels.sort_unstable_by(|a, b| angle(a).partial_cmp(&angle(b)).unwrap_or(core::cmp::Ordering::Equal));
+    sort::by(pixels, |a, b| angle(a) < angle(b));
     let Some((first, last)) = pixels.first().zip(pixels.last()) else { return };
     let (mut widest, mut start) = (angle(first) + T::of(4.0) - angle(last), 0);
     for (i, pair) in pixels.windows(2).enumerate() {

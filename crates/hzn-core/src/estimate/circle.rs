@@ -22,7 +22,7 @@ use crate::real::Real;
 pub(crate) fn fit<T: Real>(blocks: &[Block<T>], camera: &Camera<T>) -> Option<(V3<T>, T)> {
     let points = blocks.iter().flat_map(|b| {
         (0..LANES)
-            .filter(move |&l| b.weight[l] > T::ZERO)
+            .filter(move |&l| b.weight[l & 7] > T::ZERO)
             .filter_map(move |l| camera.project(&UnitVec3::assume_unit(b.ray(l))))
             .map(|p| camera.in_focal_lengths(p))
     });

@@ -24,7 +24,7 @@ impl Window {
         let copy = match height {
             Some(h) if h < picture[1] => {
                 let (w, h, full) = (u32::from(picture[0]), u32::from(h), u32::from(picture[1]));
-                [((w * h + full / 2) / full).clamp(1, w) as u16, h.max(1) as u16]
+                [((w * h + full / 2) / full).min(w).max(1) as u16, h.max(1) as u16]
             }
             _ => picture,
         };
@@ -84,7 +84,7 @@ impl Window {
         let place = |at: u16, first: u16, k: usize| {
             let at = 2 * (u64::from(at) + u64::from(first)) + 1;
             let last = u64::from(self.full[k]).saturating_sub(1);
-            (at * u64::from(self.full[k]) / (2 * u64::from(self.copy[k]))).min(last) as u16
+            (at * u64::from(self.full[k]) / (2 * u64::from(self.copy[k].max(1)))).min(last) as u16
         };
         Pixel { x: place(x, self.x0, 0), y: place(y, self.y0, 1) }
     }
@@ -105,9 +105,9 @@ impl<'a, P: Pixels> Part<'a, P> {
     /// Bilinear: the centre of the window's pixel (x, y) in the picture, in 1/65536 of a pixel, from the four around.
     fn between(&self, x: u16, y: u16) -> u16 {
         let place = |at: u16, first: u16, k: usize| -> (u16, u16, u64) {
-            let (full, copy) = (i64::from(self.window.full[k]), i64::from(self.window.copy[k]));
+            let (full, copy) = (i64::from(self.window.full[k]), i64::from(self.window.copy[k].max(1)));
             let centre = (2 * (i64::from(at) + i64::from(first)) + 1) * (full << 16) / (2 * copy) - (1 << 15);
-            let centre = centre.clamp(0, (full - 1) << 16);
+            let centre = centre.min((full - 1) << 16).max(0);
             let low = centre >> 16;
             (low as u16, (low + 1).min(full - 1) as u16, (centre & 0xFFFF) as u64)
         };

@@ -197,11 +197,17 @@ fn identity<T: Real, const N: usize>() -> [[T; N]; N] {
 fn sort<T: Real, const N: usize>(values: &mut [T; N], vectors: &mut [[T; N]; N]) {
     for end in 1..N {
         for i in (1..=end).rev() {
-            if !(values[i] < values[i - 1]) {
+            let (Ok([before, value]), Ok(vectors)) =
+                (values.get_disjoint_mut([i - 1, i]), vectors.get_disjoint_mut([i - 1, i]))
+            else {
+                return;
+            };
+            if !(*value < *before) {
                 break;
             }
-            values.swap(i, i - 1);
-            vectors.swap(i, i - 1);
+            core::mem::swap(before, value);
+            let [before, vector] = vectors;
+            core::mem::swap(before, vector);
         }
     }
 }

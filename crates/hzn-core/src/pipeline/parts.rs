@@ -15,6 +15,7 @@ use crate::linalg::{V3, basis, unit};
 use crate::pixel::{ImagePoint, Pixel};
 use crate::real::Real;
 use crate::recover::{Combine, Method};
+use crate::sort;
 use crate::status::{Stage, Status};
 
 /// Most parts that can answer.
@@ -60,7 +61,9 @@ impl<T: Real> Sensor<T> {
         let (status, level) = (report.status, report.level);
         let least = f64::from(whole.area()) * self.config.recover.least_part;
         let mut answers = Answers::<T>::new();
-        let mut waiting: heapless::Vec<Window, WAITING> = whole.halves().into_iter().flatten().collect();
+        let mut waiting = heapless::Vec::<Window, WAITING>::new();
+        // A half at a time: as many wait as there have been halvings.
+        let _ = waiting.extend_from_slice(whole.halves().as_ref().map_or(&[][..], |h| h));
         while let Some(part) = waiting.pop() {
             self.look_through(lists.again(), part, picture, expected, taken, observer, report);
             if let Some(answer) = report.solution.take() {
@@ -70,7 +73,6 @@ impl<T: Real> Sensor<T> {
             }
             let ended = matches!(report.status, Status::TooDark | Status::TooBright);
             if !ended && f64::from(part.area()) >= 2.0 * least {
-                // A half at a time: as many wait as there have been halvings.
                 let _ = waiting.extend_from_slice(part.halves().as_ref().map_or(&[][..], |h| h));
             }
         }
@@ -112,8 +114,11 @@ fn together<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Option<Solut
         Combine::Median => {
             let mut middle = [T::ZERO; 3];
             for (k, m) in middle.iter_mut().enumerate() {
-                let mut values: heapless::Vec<T, ANSWERS> = answers.iter().map(|a| a.axis.v()[k]).collect();
-                values.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(core::cmp::Ordering::Equal));
+                let mut values = heapless::Vec::<T, ANSWERS>::new();
+                for answer in answers.iter() {
+                    let _ = values.push(answer.axis.v()[k]);
+                }
+                sort::by(&mut values, |a, b| a < b);
                 let at = |i: usize| values.get(i).copied().unwrap_or(T::ZERO);
                 let n = values.len();
                 *m = (at(n / 2) + at(n.saturating_sub(1) / 2)) * T::of(0.5);

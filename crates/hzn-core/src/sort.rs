@@ -1,0 +1,70 @@
+//! Sorting without a panic: that of the standard library has one for orders that are none.
+
+use core::mem::swap;
+
+/// Sorts in place by `less` (heap sort: no memory, n log n steps whatever the order). Alike items may change places;
+/// where `less` is no order, so is the result.
+pub(crate) fn by<X>(items: &mut [X], less: impl Fn(&X, &X) -> bool) {
+    let n = items.len();
+    for root in (0..n / 2).rev() {
+        sink(items, root, n, &less);
+    }
+    for end in (1..n).rev() {
+        exchange(items, 0, end);
+        sink(items, 0, end, &less);
+    }
+}
+
+/// Takes the item at `root` down among the first `end` until none below it is larger.
+fn sink<X>(items: &mut [X], mut root: usize, end: usize, less: &impl Fn(&X, &X) -> bool) {
+    loop {
+        let left = 2 * root + 1;
+        if left >= end {
+            return;
+        }
+        let is_less = |a: usize, b: usize| items.get(a).zip(items.get(b)).is_some_and(|(a, b)| less(a, b));
+        let child = if left + 1 < end && is_less(left, left + 1) { left + 1 } else { left };
+        if !is_less(root, child) {
+            return;
+        }
+        exchange(items, root, child);
+        root = child;
+    }
+}
+
+fn exchange<X>(items: &mut [X], a: usize, b: usize) {
+    if let Ok([a, b]) = items.get_disjoint_mut([a, b]) {
+        swap(a, b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    proptest! {
+        #[test]
+        fn as_the_standard_library_sorts(items: Vec<u16>) {
+            let (mut ours, mut theirs) = (items.clone(), items);
+            by(&mut ours, |a, b| a < b);
+            theirs.sort_unstable();
+            prop_assert_eq!(ours, theirs);
+        }
+
+        #[test]
+        fn no_order_is_survived(items: Vec<f32>) {
+            let mut sorted = items.clone();
+            by(&mut sorted, |a, b| a < b || b.is_nan());
+            let bits = |mut v: Vec<u32>| {
+                v.sort_unstable();
+                v
+            };
+            prop_assert_eq!(
+                bits(sorted.iter().map(|x| x.to_bits()).collect()),
+                bits(items.iter().map(|x| x.to_bits()).collect())
+            );
+        }
+    }
+}
