@@ -1,5 +1,6 @@
 //! What the firmware costs in QEMU: instructions by stage, memory. Prints docs/firmware-cost.md; `--check FILE` compares with
-//! an earlier one and fails when anything grew by more than 5 %.
+//! an earlier one and fails when anything grew by more than 5 %. `--search FROM TO`: the most expensive of the pictures made
+//! with these seeds.
 
 use std::process::{Command, ExitCode};
 
@@ -43,54 +44,113 @@ fn lens(width: u16, height: u16) -> camera::Config {
     camera::Config { k, ..camera::Config::ideal(camera::Model::KannalaBrandt, width, height, focal_px) }
 }
 
-/// Pictures that are made to be expensive: much edge, and none of it a limb.
-fn adversaries() -> Vec<Case> {
-    const W: usize = 1920;
-    const H: usize = 1080;
-    let mut sensor = Config::new(lens(W as u16, H as u16));
-    sensor.body.altitude_km = Some(150.0);
-    let paint = |name: String, f: &dyn Fn(usize, usize) -> u8| Case {
-        name,
-        sensor: sensor.clone(),
-        known: Frame::default(),
-        bytes: (0..W * H).map(|i| f(i % W, i / W)).collect(),
+/// A picture that is made to be expensive: much edge, and none of it a limb. Edges of many kinds, sharp and soft, thin and
+/// wide, over noise.
+fn adversary(seed: u32, bare: &Config, masked: &Config) -> Case {
+    let mut draws = 0;
+    let mut draw = |n: u32| {
+        draws += 1;
+        scrambled(seed, draws) % n
     };
-    let noise = |x: usize, y: usize| {
-        let n = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
-        (n ^ n >> 15).wrapping_mul(0x2C1B_3C6D).to_be_bytes()[0]
-    };
-    let mut out = Vec::new();
-    for n in [1, 2, 5, 20, 60] {
-        out.push(paint(format!("checkerboard of {n} px"), &|x, y| 255 * ((x / n + y / n) % 2) as u8));
+    let pattern = PATTERNS[draw(PATTERNS.len() as u32) as usize];
+    // Pixels of one light and one dark stripe, from 2 to 200, and their direction.
+    let period = f64::from(2 * (1 + draw(10)) * [1, 1, 3, 10][draw(4) as usize]);
+    let (sin, cos) = (f64::from(draw(64)) * std::f64::consts::TAU / 64.0).sin_cos();
+    let soft = draw(3) == 0;
+    let noise = [0, 0, 20, 90][draw(4) as usize];
+    let top = [0, 0, 20, 300][draw(4) as usize];
+    // Arches about a limb's own centre, or any.
+    let below = [2100, 2100, 600, 9000][draw(4) as usize];
+    let sensor = if draw(8) == 0 { masked } else { bare };
+    let bytes = (0..W * H)
+        .map(|i| {
+            let (x, y) = (i % W, i / W);
+            if y < top {
+                return 0;
+            }
+            let (u, v) = (x as f64 - W as f64 / 2.0, y as f64 - H as f64 / 2.0);
+            let (along, across) = ((u * cos + v * sin) / period, (v * cos - u * sin) / period);
+            let wave = |phase: f64| {
+                let phase = phase.rem_euclid(1.0);
+                if soft { 0.5 + 0.5 * (phase * std::f64::consts::TAU).cos() } else { f64::from(u8::from(phase < 0.5)) }
+            };
+            let bright = match pattern {
+                Pattern::Comb => wave(along),
+                Pattern::Checkerboard => (wave(along) - wave(across)).abs(),
+                Pattern::Dots => wave(along) * wave(across),
+                Pattern::Spiral => wave(u.hypot(v) / period + v.atan2(u) / std::f64::consts::TAU),
+                Pattern::Arches => wave(u.hypot(v - f64::from(below)) / period),
+                Pattern::Rays => wave(v.atan2(u) * 1000.0 / period),
+                Pattern::Noise => {
+                    f64::from(scrambled((along.floor() as i32 as u32) ^ seed, across.floor() as i32 as u32) % 256)
+                        / 255.0
+                }
+                Pattern::Sea => wave(along + (across * 2.0).sin()) * 0.5 + wave(across) * 0.5,
+            };
+            let grain = scrambled(i as u32, seed) % (noise + 1);
+            ((bright * f64::from(255 - noise)) as u32 + grain) as u8
+        })
+        .collect();
+    let kind = format!("{pattern:?}").to_lowercase();
+    let mask = if std::ptr::eq(sensor, masked) { ", masked" } else { "" };
+    let name = format!("{kind} of {period} px{}{mask} (seed {seed})", if soft { ", soft" } else { "" });
+    Case { name, sensor: sensor.clone(), known: Frame::default(), bytes }
+}
+
+const W: usize = 1920;
+const H: usize = 1080;
+
+#[derive(Debug, Clone, Copy)]
+enum Pattern {
+    Comb,
+    Checkerboard,
+    Dots,
+    Spiral,
+    Arches,
+    Rays,
+    Noise,
+    Sea,
+}
+const PATTERNS: [Pattern; 8] = [
+    Pattern::Comb,
+    Pattern::Checkerboard,
+    Pattern::Dots,
+    Pattern::Spiral,
+    Pattern::Arches,
+    Pattern::Rays,
+    Pattern::Noise,
+    Pattern::Sea,
+];
+
+/// Two numbers to one that has nothing to do with them.
+fn scrambled(a: u32, b: u32) -> u32 {
+    let n = a.wrapping_mul(0x9E37_79B1) ^ b.wrapping_mul(0x85EB_CA77).rotate_left(13);
+    let n = (n ^ n >> 15).wrapping_mul(0x2C1B_3C6D);
+    let n = (n ^ n >> 12).wrapping_mul(0x297A_2D39);
+    n ^ n >> 15
+}
+
+/// The search over them: pictures by seed.
+fn adversaries(seeds: std::ops::Range<u32>) -> Vec<Case> {
+    let mut bare = Config::new(lens(W as u16, H as u16));
+    bare.body.altitude_km = Some(150.0);
+    let mut masked = bare.clone();
+    // A payload in two corners, and an antenna across.
+    for polygon in [
+        vec![[1500.0, 0.0], [1919.0, 0.0], [1919.0, 1079.0], [1450.0, 1079.0]],
+        vec![[0.0, 800.0], [300.0, 900.0], [350.0, 1079.0], [0.0, 1079.0]],
+        vec![[600.0, 0.0], [640.0, 0.0], [900.0, 1079.0], [860.0, 1079.0]],
+    ] {
+        masked.mask.polygons_px.push(polygon.into_iter().collect()).expect("there is room for eight");
     }
-    for n in [2, 7, 30] {
-        out.push(paint(format!("vertical comb of {n} px"), &|x, y| 255 * u8::from(x / n % 2 == 1 && y > 20)));
-        out.push(paint(format!("horizontal comb of {n} px"), &|x, y| 255 * u8::from(y / n % 2 == 1 && x > 20)));
-    }
-    for n in [1, 4, 16] {
-        out.push(paint(format!("noise of {n} px"), &|x, y| noise(x / n, y / n)));
-        out.push(paint(format!("noise of {n} px below a horizon"), &|x, y| {
-            if y > 300 { noise(x / n, y / n) } else { 0 }
-        }));
-    }
-    for n in [6.0, 25.0, 90.0] {
-        out.push(paint(format!("spiral of {n} px"), &|x, y| {
-            let (dx, dy) = (x as f64 - 960.0, y as f64 - 540.0);
-            let turn = dy.atan2(dx) / std::f64::consts::TAU;
-            255 * u8::from((dx.hypot(dy) / n + turn).rem_euclid(1.0) < 0.5)
-        }));
-        out.push(paint(format!("arches of {n} px"), &|x, y| {
-            let (dx, dy) = (x as f64 - 960.0, y as f64 + 3000.0 - 900.0);
-            255 * u8::from((dx.hypot(dy) / n).rem_euclid(1.0) < 0.5)
-        }));
-    }
-    out
+    seeds.map(|seed| adversary(seed, &bare, &masked)).collect()
 }
 
 /// A line of the table: instructions in thousands.
 struct Line {
     name: String,
     total: f64,
+    work: f64,
     stages: Vec<f64>,
 }
 
@@ -100,6 +160,7 @@ fn lines(cases: &[Case], measured: &[Measured]) -> Vec<Line> {
         let line = Line {
             name: case.name.clone(),
             total: m.calls[2] as f64 / 1e3,
+            work: f64::from(m.answer.work) / 1e3,
             stages: m.stages.iter().map(|&n| n as f64 / 1e3).collect(),
         };
         match out.iter_mut().find(|l| l.name == line.name) {
@@ -120,6 +181,23 @@ fn sizes(board: Board, image: &str) -> Option<[u64; 2]> {
     Some([text + data, data + bss])
 }
 
+/// Pictures of the search that the table is made from; `--search` looks at others.
+const SEARCHED: u32 = 64;
+
+/// The most expensive of many pictures, on the M7.
+fn search(seeds: std::ops::Range<u32>) {
+    let mut found = Vec::new();
+    for from in seeds.clone().step_by(16) {
+        let cases = adversaries(from..(from + 16).min(seeds.end));
+        found.extend(lines(&cases, &measure(Board::An500, &cases)));
+    }
+    found.sort_by(|a, b| b.total.total_cmp(&a.total));
+    for line in found.iter().take(20) {
+        let stages: Vec<String> = line.stages.iter().map(|n| format!("{n:.0}")).collect();
+        println!("{:8.0} {:6.0} {}: {}", line.total, line.work, line.name, stages.join(" "));
+    }
+}
+
 fn report() -> Result<String, String> {
     let mut usual = Vec::new();
     for (w, h) in [(640, 480), (1024, 768), (1920, 1080)] {
@@ -127,7 +205,7 @@ fn report() -> Result<String, String> {
             usual.extend(frames(w, h, clean, 3));
         }
     }
-    let hard = adversaries();
+    let hard = adversaries(0..SEARCHED);
     let mut out = HEAD.to_owned();
     for board in Board::ALL {
         let measured = measure(board, &usual);
@@ -137,14 +215,14 @@ fn report() -> Result<String, String> {
                 return Err(format!("{} on {}: other bits than here", case.name, board.core()));
             }
         }
-        out += &format!("\n## {} ({})\n\n| picture | process, thousand |", board.core(), board.name());
+        out += &format!("\n## {} ({})\n\n| picture | process, thousand | work, thousand |", board.core(), board.name());
         Stage::ALL.iter().for_each(|s| out += &format!(" {} |", s.name()));
-        out += &format!("\n|---|---|{}\n", "---|".repeat(Stage::ALL.len()));
+        out += &format!("\n|---|---|---|{}\n", "---|".repeat(Stage::ALL.len()));
         let mut hardest = lines(&hard, &worst);
         hardest.sort_by(|a, b| b.total.total_cmp(&a.total));
         let shown = hardest.into_iter().take(3).map(|l| Line { name: format!("worst found: {}", l.name), ..l });
         for line in lines(&usual, &measured).into_iter().chain(shown) {
-            out += &format!("| {} | {:.0} |", line.name, line.total);
+            out += &format!("| {} | {:.0} | {:.0} |", line.name, line.total, line.work);
             line.stages.iter().for_each(|n| out += &format!(" {n:.0} |"));
             out += "\n";
         }
@@ -185,6 +263,13 @@ fn figures(text: &str) -> Vec<(String, f64)> {
 }
 
 fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    if let [flag, from, to] = &args[..]
+        && let ("--search", Ok(from), Ok(to)) = (flag.as_str(), from.parse(), to.parse())
+    {
+        search(from..to);
+        return ExitCode::SUCCESS;
+    }
     let text = match report() {
         Ok(text) => text,
         Err(e) => {
@@ -193,7 +278,6 @@ fn main() -> ExitCode {
         }
     };
     print!("{text}");
-    let args: Vec<String> = std::env::args().skip(1).collect();
     match &args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["--write", path] => {
             if let Err(e) = std::fs::write(path, text) {

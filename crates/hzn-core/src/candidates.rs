@@ -88,6 +88,8 @@ pub(crate) struct Points {
     pub(crate) count: u32,
     /// Of them, points at the global level, because the local one was not found.
     pub(crate) fallback: u32,
+    /// Border pixels that took longer: beside a mask or the picture's border, or on a wide edge.
+    pub(crate) slow: u32,
 }
 
 /// Fills `blocks` with the points of a border, evenly thinned to `keep_points`. Lanes that stay empty have weight 0.
@@ -104,16 +106,15 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         n => n.min(room),
     };
     let every = border.len().div_ceil(keep.max(1)).max(1);
-    let unmasked = !scene.region.has_mask();
     let mut made = Points::default();
     let mut place = 0;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
         let found = match config.sub_pixel {
             SubPixel::Linear => {
-                if unmasked && scene.region.is_inside_by(pixel.x, pixel.y, MARGIN as u16) {
-                    linear::<T, P, O, true>(scene, pixel)
+                if scene.region.clearance(pixel.x, pixel.y, MARGIN as u16) == MARGIN as u16 {
+                    linear::<T, P, O, true>(scene, pixel, &mut made.slow)
                 } else {
-                    linear::<T, P, O, false>(scene, pixel)
+                    linear::<T, P, O, false>(scene, pixel, &mut made.slow)
                 }
             }
             SubPixel::None => half_pixel(scene, pixel),
@@ -338,6 +339,7 @@ fn place<T: Real>(p: Pixel, dx: i32, dy: i32, towards_dark: T) -> ImagePoint<T> 
 fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     scene: &Scene<'_, T, P, O>,
     p: Pixel,
+    slow: &mut u32,
 ) -> Option<(ImagePoint<T>, Lit, bool)> {
     let around = Around::<T, P, O, FREE>::new(scene, p);
     let near = around.near()?;
@@ -351,6 +353,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
         let (part, fallback) = line.crossing(near.across(lit))?;
         return Some((place(p, dx, dy, part), lit, fallback));
     }
+    *slow += 1;
     let step = (wide / (2 * steep).max(1)).clamp(1, WIDEST);
     in_steps(scene, p, lit, (dx, dy), step)
 }
@@ -543,7 +546,7 @@ mod tests {
         let scene = Scene::new(&grey, &region, 120, &Unobserved);
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
         let mut blocks = [Block::default(); 2];
-        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks), Points { count: 15, fallback: 0 });
+        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks), Points { count: 15, fallback: 0, slow: 0 });
         let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
         assert_eq!((first, last), (22.0, 78.0));
     }

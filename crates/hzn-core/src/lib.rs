@@ -80,6 +80,7 @@ pub mod section;
 #[cfg(any(feature = "horace", feature = "zju"))]
 mod sort;
 pub mod status;
+pub mod work;
 
 // Stages, in the order of the data's way.
 pub mod binarize;

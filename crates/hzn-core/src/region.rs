@@ -171,10 +171,9 @@ impl<T: Real> Region<T> {
         [most, most / 4].into_iter().find(|&n| clear(n)).unwrap_or(0)
     }
 
-    /// Whether there are polygons.
-    #[inline(always)]
-    pub(crate) fn has_mask(&self) -> bool {
-        !self.polygons.is_empty()
+    /// How many polygons there are.
+    pub(crate) fn polygons(&self) -> u32 {
+        self.polygons.len() as u32
     }
 
     /// Whether a polygon covers the pixel.
@@ -237,10 +236,30 @@ impl<T: Real> Circle<T> {
 }
 
 impl<T: Real> Outline<T> {
-    /// Whether it is more than `margin` away, by its bounding box.
+    /// Whether it lies outside of the square of `margin` pixels to each side.
     fn clear(&self, x: u16, y: u16, margin: T) -> bool {
         let p = [T::of_i32(i32::from(x)), T::of_i32(i32::from(y))];
-        (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k])
+        (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k]) || self.clear_within(p, margin)
+    }
+    /// As [`Self::clear`], where the bounding box does not tell: no side crosses the square, and its centre is outside.
+    #[inline(never)]
+    fn clear_within(&self, p: [T; 2], margin: T) -> bool {
+        let Some(&last) = self.corners.last() else { return true };
+        let mut a = last;
+        for &b in &self.corners {
+            let apart = (0..2).any(|k| {
+                let (low, high) = (a[k].least(b[k]), a[k].most(b[k]));
+                p[k] + margin < low || p[k] - margin > high
+            });
+            let d = [b[0] - a[0], b[1] - a[1]];
+            let off = (d[0] * (p[1] - a[1]) - d[1] * (p[0] - a[0])).abs();
+            // Half a pixel more, for rounding.
+            if !apart && !(off > (d[0].abs() + d[1].abs()) * (margin + T::of(0.5))) {
+                return false;
+            }
+            a = b;
+        }
+        !self.covers(p)
     }
     /// Even-odd rule.
     fn covers(&self, [x, y]: [T; 2]) -> bool {
@@ -263,6 +282,29 @@ impl<T: Real> Outline<T> {
 mod tests {
     use super::*;
     use crate::camera::{Config as CameraConfig, Model};
+
+    #[test]
+    fn what_is_clear_is_not_masked() {
+        let camera = Camera::<f32>::try_new(&CameraConfig::ideal(Model::Pinhole, 64, 48, 50.0)).unwrap();
+        let mut config = Config::default();
+        for polygon in [
+            [[5.0, 3.0], [9.0, 3.0], [60.0, 44.0], [56.0, 44.0]],
+            [[50.0, 2.0], [58.0, 8.0], [40.0, 12.0], [49.0, 5.0]],
+        ] {
+            config.polygons_px.push(polygon.into_iter().collect()).unwrap();
+        }
+        let region = Region::new(&config, &camera);
+        let mut clear = 0;
+        for (x, y) in (0..48u16).flat_map(|y| (0..64u16).map(move |x| (x, y))) {
+            let n = region.clearance(x, y, 6);
+            clear += u32::from(n == 6);
+            for (i, j) in (0..=2 * n).flat_map(|j| (0..=2 * n).map(move |i| (i, j))) {
+                assert!(n == 0 || !region.masked(x + i - n, y + j - n), "{x} {y}: {n}");
+            }
+        }
+        // Also between the corners of their bounding boxes, which cover most of the picture.
+        assert!(clear > 400, "{clear}");
+    }
 
     #[test]
     fn polygons_cover_their_inside() {

@@ -21,6 +21,7 @@ use crate::limb::{through_three, through_two};
 use crate::linalg::V3;
 use crate::real::Real;
 use crate::rng::Rng;
+use crate::work::{DRAW, SCORE, Work};
 
 /// How outliers are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -100,9 +101,10 @@ pub(crate) fn keep<T: Real>(
     expected: &Expected<T>,
     focal_px: T,
     config: &Config,
+    work: &mut Work,
 ) -> Option<Consensus<T>> {
     let best = match config.method {
-        Method::TwoPoint => search(blocks, count, expected, focal_px, config)?,
+        Method::TwoPoint => search(blocks, count, expected, focal_px, config, work)?,
         Method::None => {
             let (a, b) = (ray(blocks, 0)?, ray(blocks, count.saturating_sub(1))?);
             let mid = ray(blocks, count / 2)?;
@@ -144,6 +146,7 @@ fn search<T: Real>(
     expected: &Expected<T>,
     focal_px: T,
     config: &Config,
+    work: &mut Work,
 ) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
@@ -155,14 +158,16 @@ fn search<T: Real>(
     let bend = if free { T::ZERO } else { (sigma_alpha * focal_px * T::of(0.05)).least(threshold * T::of(3.0)) };
     let limit2 = (threshold + bend) * (threshold + bend);
     let scored = blocks.len().div_ceil(SCORED).max(1);
-    let points = blocks.iter().step_by(scored).count() as f64 * LANES as f64;
+    let looked_at = blocks.len().div_ceil(scored);
+    let points = looked_at as f64 * LANES as f64;
     let nothing = limit2 * T::of(points);
     let mut best_cost = nothing * T::of(0.95);
     let mut best = None;
     let mut rng = Rng::new(config.seed);
     let mut needed = config.max_draws;
     let mut draws = 0;
-    while draws < needed.max(FEWEST).min(config.max_draws) {
+    let score_cost = looked_at as u32 * SCORE;
+    'draws: while draws < needed.max(FEWEST).min(config.max_draws) && work.spend(DRAW) {
         draws += 1;
         let i = rng.below(count);
         // Far apart for precision, close together for a limb that is a small part of the edge: there, neighbours of a
@@ -188,6 +193,9 @@ fn search<T: Real>(
             };
             if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {
                 continue;
+            }
+            if !work.spend(score_cost) {
+                break 'draws;
             }
             let cost = score(blocks, scored, &e, c, limit2);
             if cost < best_cost {

@@ -24,6 +24,7 @@ const VOCABULARY: &[&str] = &[
     "section",
     "sort",
     "status",
+    "work",
 ];
 const STAGES: &[&str] =
     &["binarize", "contour", "candidates", "undistort", "reject", "estimate", "covariance", "select", "recover"];

@@ -93,6 +93,50 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    /// No picture costs more than it may; a limit that is not reached changes nothing.
+    #[test]
+    fn work_is_bounded(kind in 0u8..10, seed in any::<u64>(), level in any::<u8>(), most in 10_000u32..200_000) {
+        let config = |most| {
+            let mut config = config(Model::Pinhole, false, false, Kind::Earth);
+            config.limits.max_work = Some(most);
+            config
+        };
+        let data = garbage(kind, seed, level);
+        let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
+        let mut host = HostHorizon::boxed(&config(most)).unwrap();
+        let expected = host.expect(&Frame::default()).unwrap();
+        let bounded = host.process(&picture, &expected);
+        sound(&bounded);
+        prop_assert!(bounded.counters.work <= most);
+        host.reconfigure(&config(1_000_000_000)).unwrap();
+        let free = host.process(&picture, &expected);
+        prop_assert!(free.status != Status::Truncated);
+        if free.counters.work * 4 < most {
+            prop_assert_eq!(free.status, bounded.status);
+            prop_assert_eq!(free.counters, bounded.counters);
+        }
+        if bounded.status == Status::Truncated {
+            prop_assert!(free.counters.work > bounded.counters.work);
+        }
+    }
+}
+
+#[test]
+fn a_picture_that_would_cost_too_much_is_truncated() {
+    let mut config = config(Model::Pinhole, false, false, Kind::Earth);
+    config.limits.max_work = Some(10_000);
+    let data = garbage(0, 1, 128);
+    let mut host = HostHorizon::boxed(&config).unwrap();
+    let expected = host.expect(&Frame::default()).unwrap();
+    let report = host.process(&Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap(), &expected);
+    assert_eq!(report.status, Status::Truncated);
+    config.limits.max_work = Some(9_999);
+    let refused = HostHorizon::boxed(&config).unwrap_err();
+    assert_eq!(refused.to_string(), "limits.max_work = 9999: must be between 10000 and 1000000000");
+}
+
 #[test]
 fn a_picture_of_another_size_is_rejected() {
     let mut host = HostHorizon::boxed(&config(Model::Pinhole, false, false, Kind::Earth)).unwrap();

@@ -9,26 +9,6 @@ use crate::bytes::{Reader, Writer};
 
 type Candidates = heapless::Vec<Candidate<f64>, MAX_LISTED>;
 
-/// Every verdict, to find one by its number.
-const VERDICTS: [Verdict; 16] = [
-    Verdict::Chosen,
-    Verdict::Passed,
-    Verdict::NoConsensus,
-    Verdict::FewInliers,
-    Verdict::ShortArc,
-    Verdict::Residuals,
-    Verdict::HalfAngle,
-    Verdict::Uncertain,
-    Verdict::NoFit,
-    Verdict::Unsupported,
-    Verdict::Indistinct,
-    Verdict::NoSky,
-    Verdict::Taken,
-    Verdict::OutOfView,
-    Verdict::Radius,
-    Verdict::Straight,
-];
-
 /// A candidate edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge {
@@ -94,6 +74,8 @@ pub struct Answer {
     pub edge_points: u32,
     /// Draws of the rejection.
     pub draws: u32,
+    /// What the picture cost, in the unit of `limits.max_work`.
+    pub work: u32,
     /// The direction, with status `ok`.
     pub direction: Option<Direction>,
     /// The first candidates.
@@ -142,6 +124,7 @@ impl Answer {
             fallback_points: c.fallback_points,
             edge_points: c.edge_points,
             draws: c.draws,
+            work: c.work,
             direction,
             edges,
         }
@@ -151,7 +134,7 @@ impl Answer {
     pub fn report(&self) -> Option<Report<f64>> {
         let mut candidates = Candidates::default();
         for e in self.edges.iter().flatten() {
-            let verdict = *VERDICTS.iter().find(|&&v| v as u8 == e.verdict)?;
+            let verdict = *Verdict::ALL.get(usize::from(e.verdict))?;
             let candidate = Candidate {
                 length_px: e.length_px,
                 points: e.points,
@@ -191,6 +174,7 @@ impl Answer {
                 fallback_points: self.fallback_points,
                 edge_points: self.edge_points,
                 draws: self.draws,
+                work: self.work,
             },
             candidates,
             solution,
@@ -202,7 +186,8 @@ impl Answer {
         out.u8(self.status);
         out.u8(self.stage);
         out.u16(self.level);
-        for n in [self.followed, self.candidates, self.dropped, self.fallback_points, self.edge_points, self.draws] {
+        let counts = [self.followed, self.candidates, self.dropped, self.fallback_points, self.edge_points, self.draws];
+        for n in counts.into_iter().chain([self.work]) {
             out.u32(n);
         }
         out.u8(u8::from(self.direction.is_some()));
@@ -237,6 +222,7 @@ impl Answer {
             fallback_points: from.u32()?,
             edge_points: from.u32()?,
             draws: from.u32()?,
+            work: from.u32()?,
             direction: None,
             edges: [None; MAX_LISTED],
         };
@@ -311,6 +297,7 @@ mod tests {
             fallback_points: 4,
             edge_points: 600,
             draws: 20,
+            work: 25_000,
             direction: Some(direction),
             edges,
         };

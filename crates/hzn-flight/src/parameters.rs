@@ -165,7 +165,6 @@ parameters! {
     52 "binarize.factor" sensor.binarize.factor;
     53 "binarize.scale" sensor.binarize.scale;
     60 "contour.line_spacing_px" sensor.contour.line_spacing_px;
-    61 "contour.max_steps" sensor.contour.max_steps;
     70 "candidates.min_points" sensor.candidates.min_points;
     71 "candidates.keep_points" sensor.candidates.keep_points;
     72 "candidates.sub_pixel" sensor.candidates.sub_pixel;
@@ -183,6 +182,7 @@ parameters! {
     114 "select.max_sigma_deg" sensor.select.max_sigma_deg;
     115 "select.min_support" sensor.select.min_support;
     116 "select.max_lit_sky" sensor.select.max_lit_sky;
+    120 "limits.max_work" sensor.limits.max_work;
     300 "telemetry.housekeeping_every" housekeeping_every;
 }
 

@@ -186,6 +186,7 @@ impl Told<'_> {
                 ),
             );
         }
+        line("work", format!("{} (limits.max_work bounds it)", c.work));
         line("status", r.status.name().to_owned());
         match &r.solution {
             Some(s) => self.answer(s, &mut line),
@@ -341,7 +342,7 @@ fn advice(r: &Report<f64>, line: &mut impl FnMut(&str, String)) {
         Status::TooDark => tips.push("the picture is darker than gate.min_mean allows: lower it, or expose longer"),
         Status::TooBright => tips.push("the picture is brighter than gate.max_mean allows: raise it, or expose shorter"),
         Status::TooFewPoints => tips.push("edges were found, but all are short: lower candidates.min_points"),
-        Status::Truncated => tips.push("the picture has more edges than the lists hold: raise contour.max_steps, mask structure in view, or set a level above the clouds (binarize.method = \"fixed\")"),
+        Status::Truncated => tips.push("the picture has more edges than it may cost to look at: raise limits.max_work, mask structure in view, or set a level above the clouds (binarize.method = \"fixed\")"),
         Status::Ambiguous => tips.push("two directions fit about equally well: mask structure in view (mask.polygons_px)"),
         _ => {}
     }

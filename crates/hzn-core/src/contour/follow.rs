@@ -16,6 +16,7 @@ use crate::pipeline::Observer;
 use crate::pixel::Pixel;
 use crate::real::Real;
 use crate::region::Region;
+use crate::work;
 
 /// Neighbours counter-clockwise on the screen from east: (dx, dy).
 pub(super) const STEPS: [(i32, i32); 8] = [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
@@ -28,6 +29,8 @@ pub(crate) struct Scene<'a, T, P, O> {
     pub(crate) region: &'a Region<T>,
     pub(crate) level: u16,
     pub(crate) observer: &'a O,
+    /// What a look around costs.
+    look: u32,
     /// Twice around, so that eight directions follow each other from any of the first eight.
     moves: [Move; 16],
 }
@@ -88,7 +91,7 @@ const RUN: usize = 32;
 impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
     pub(crate) fn new(picture: &'a P, region: &'a Region<T>, level: u16, observer: &'a O) -> Self {
         let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
-        Self { picture, region, level, observer, moves }
+        Self { picture, region, level, observer, look: work::look(region.polygons()), moves }
     }
 
     /// Whether a pixel of the region is lit.
@@ -120,7 +123,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
             if *steps == 0 {
                 return End::OutOfSteps;
             }
-            *steps -= 1;
+            *steps = steps.saturating_sub(self.look);
             let home = (away && walk.at == start).then_some(dark);
             away = true;
             match self.look(&walk, home, marks) {

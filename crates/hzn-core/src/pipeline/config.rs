@@ -4,7 +4,7 @@
 use crate::error::between;
 use crate::error::{ConfigError, Limit, require};
 use crate::image::Channel;
-use crate::{binarize, body, camera, candidates, contour, covariance, estimate, recover, region, reject, select};
+use crate::{binarize, body, camera, candidates, contour, covariance, estimate, recover, region, reject, select, work};
 
 /// Most bodies in one picture.
 pub const MAX_BODIES: usize = 3;
@@ -57,6 +57,9 @@ pub struct Config {
     /// When the whole picture gives no answer.
     #[cfg_attr(feature = "serde", serde(default))]
     pub recover: recover::Config,
+    /// What a picture may cost.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub limits: work::Config,
 }
 
 /// `[mount]`: camera to vehicle body.
@@ -99,6 +102,7 @@ impl Config {
             covariance: covariance::Config::default(),
             select: select::Config::default(),
             recover: recover::Config::default(),
+            limits: work::Config::default(),
         }
     }
 
@@ -152,6 +156,7 @@ impl Config {
         self.estimate.check()?;
         self.covariance.check()?;
         self.recover.check()?;
+        self.limits.check()?;
         #[cfg(feature = "horace")]
         if let Some(rows) = self.input.scale_to_height {
             between("input.scale_to_height", f64::from(rows), 16.0, f64::from(self.camera.height.max(16)))?;

@@ -19,6 +19,7 @@ use crate::linalg::basis;
 use crate::pixel::{ImagePoint, Pixel};
 use crate::real::Real;
 use crate::status::Status;
+use crate::work::Work;
 use crate::{candidates, covariance, estimate, reject, undistort};
 use std::vec;
 use std::vec::Vec;
@@ -163,8 +164,8 @@ impl<T: Real> Edges<T> {
 
     /// Rejects outliers.
     pub fn reject(&mut self, expected: &Expected<T>, config: &reject::Config) -> Option<Agreed<T>> {
-        let count = self.points.len() as u32;
-        let found = reject::keep(&mut self.blocks, count, expected, self.focal_px, config)?;
+        let (count, mut work) = (self.points.len() as u32, Work::unlimited());
+        let found = reject::keep(&mut self.blocks, count, expected, self.focal_px, config, &mut work)?;
         let axis = UnitVec3::assume_unit(found.e);
         Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
     }

@@ -18,6 +18,7 @@ use crate::linalg::{V3, basis, invert_spd2, unit};
 use crate::pipeline::edges::Edges;
 use crate::pixel::ImagePoint;
 use crate::real::Real;
+use crate::work::Work;
 use crate::{covariance, reject};
 use serde_json::Value;
 use std::vec::Vec;
@@ -213,7 +214,7 @@ fn solve<T: Real>(
     let mut blocks = blocks(camera, points, lit_towards);
     let config = reject::Config::default();
     let (fx, _) = camera.focal_px();
-    let start = reject::keep(&mut blocks, points.len() as u32, expected, fx, &config)?;
+    let start = reject::keep(&mut blocks, points.len() as u32, expected, fx, &config, &mut Work::unlimited())?;
     let estimate = estimate::Config { half_angle, ..Default::default() };
     let noise = covariance::Config { sigma_px, correlation_px, ..Default::default() };
     let fit = estimate::fit(&mut blocks, &start, expected, camera, T::of(config.threshold_px), &estimate, &noise)?;

@@ -16,6 +16,7 @@ use crate::linalg::basis;
 use crate::pixel::Pixel;
 use crate::real::Real;
 use crate::status::{Stage, Status};
+use crate::work::{self, Work};
 use crate::{binarize, candidates, covariance, estimate, reject, select, undistort};
 
 /// Words that search lines are marked in, at most: more of them find nothing new.
@@ -54,8 +55,8 @@ pub(super) struct Judge<'a, T, O> {
     min_points: u16,
     observer: &'a O,
     blocks: &'a mut [Block<T>],
-    /// Border pixels that may still be followed.
-    steps: u32,
+    /// What may still be done.
+    work: Work,
     best: Option<Best<T>>,
     /// The best score of an answer that points elsewhere.
     rival: Option<T>,
@@ -91,8 +92,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             tracks: config.levels_of(expected.which).method == binarize::Method::Track,
             min_points: config.candidates.min_points.min(select::small(expected.sin, &sensor.camera, 2)),
             observer,
+            work: Work::new(&config.limits, blocks.len() * LANES),
             blocks,
-            steps: config.contour.max_steps,
             best: None,
             rival: None,
             short: 0,
@@ -101,9 +102,9 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
     }
 
-    /// Nothing more to look for: the limb is found, or the picture's steps are used up.
+    /// Nothing more to look for: the limb is found, or the picture may cost no more.
     fn done(&self) -> bool {
-        self.steps == 0 || self.best.as_ref().is_some_and(|b| b.certain)
+        self.work.is_spent() || self.best.as_ref().is_some_and(|b| b.certain)
     }
 
     /// Edges from the border of the picture, the likeliest first, then those that search lines meet.
@@ -148,13 +149,17 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
     /// Every outer border of the picture.
     #[cfg(feature = "horace")]
     pub(super) fn raster<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, border: &mut [Pixel], bits: &mut [u32]) {
-        let mut steps = self.steps;
+        let most = self.work.left();
+        let mut steps = most;
         let ended = contour::raster::each_border(scene, bits, border, &mut steps, |edge| {
             self.piece(scene, edge);
-            true
+            !self.work.is_spent()
         });
-        self.report.counters.followed += self.steps - steps;
-        self.steps = if ended == contour::raster::Scanned::Truncated { 0 } else { steps.max(1) };
+        self.report.counters.followed += most - steps;
+        self.work.pay(most - steps);
+        if ended == contour::raster::Scanned::Truncated {
+            self.work.cut();
+        }
     }
 
     /// Follows one edge and takes it through every stage.
@@ -167,10 +172,11 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         marks: &mut Marks<'_>,
     ) {
         let mut edge = Thinned::new(border);
-        let before = self.steps;
-        let end = scene.follow(pixel, dark, &mut edge, marks, &mut self.steps);
-        let counters = &mut self.report.counters;
-        counters.followed += before - self.steps;
+        if !self.work.spend(work::EDGE) {
+            return;
+        }
+        let end = self.work.on_edge(|steps| scene.follow(pixel, dark, &mut edge, marks, steps));
+        self.report.counters.followed += edge.total();
         if matches!(end, End::Closed { twice_area } if twice_area > 0) {
             // A hole: sky or ground seen through something.
             return;
@@ -184,6 +190,11 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let length = edge.total();
         if length < u32::from(self.min_points) {
             self.short += 1;
+            return;
+        }
+        let keep = u32::from(self.sensor.config.candidates.keep_points);
+        let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
+        if !self.work.spend(points * work::POINT) {
             return;
         }
         let number = counters.candidates;
@@ -218,6 +229,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
 
         self.enter(Stage::Candidates);
         let points = candidates::pick(scene, &config.candidates, border, number, self.blocks);
+        self.work.pay(points.slow * work::slow_point(scene.region.polygons()));
         outcome.points = points.count;
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;
@@ -236,13 +248,17 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
         let (fx, fy) = camera.focal_px();
         let focal = (fx + fy) * T::of(0.5);
-        let Some(consensus) = reject::keep(blocks, points.count, self.expected, focal, &config.reject) else {
+        let Some(consensus) = reject::keep(blocks, points.count, self.expected, focal, &config.reject, &mut self.work)
+        else {
             return (outcome, None);
         };
         self.report.counters.draws += consensus.draws;
 
         enter(self.report, self.observer, Stage::Estimate);
         outcome.verdict = Verdict::NoFit;
+        if !self.work.spend(used as u32 * work::FIT + work::GATES) {
+            return (outcome, None);
+        }
         let fit = estimate::fit(blocks, &consensus, self.expected, camera, threshold, &config.estimate, self.noise);
         let Some(fit) = fit else { return (outcome, None) };
         outcome.inliers = fit.inliers;
@@ -316,6 +332,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
     /// Writes the answer into the report.
     pub(super) fn conclude(self) {
         let report = self.report;
+        report.counters.work = self.work.done();
         if let Some(best) = self.best {
             if !best.certain && self.rival.is_some_and(|r| r < best.score * T::of(RIVAL_SCORE)) {
                 report.status = Status::Ambiguous;
@@ -334,7 +351,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let fitted = report.candidates.iter().any(|c| {
             !matches!(c.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken)
         });
-        report.status = if self.steps == 0 {
+        report.status = if self.work.was_cut() {
             Status::Truncated
         } else if fitted {
             Status::Rejected

@@ -140,7 +140,7 @@ fn horace_2015(config: &mut Config) {
     config.gate.max_mean = 0.9;
     config.binarize.method = binarize::Method::Dynamic;
     config.contour.method = contour::Method::Raster;
-    config.contour.max_steps = 5_000_000;
+    config.limits.max_work = Some(5_000_000);
     config.candidates.sub_pixel = candidates::SubPixel::None;
     config.candidates.min_points = 100;
     config.candidates.keep_points = 0;

@@ -32,7 +32,7 @@ pub struct Report<T> {
 /// Counts of one picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Border pixels followed.
+    /// Border pixels of the edges that were followed, those beside a mask left out.
     pub followed: u32,
     /// Edges with enough points to be candidates.
     pub candidates: u32,
@@ -42,8 +42,10 @@ pub struct Counters {
     pub fallback_points: u32,
     /// Sub-pixel points of the chosen candidate (of all candidates, when none was chosen).
     pub edge_points: u32,
-    /// RANSAC draws.
+    /// RANSAC draws that came to a consensus.
     pub draws: u32,
+    /// What the picture cost, in the unit of `limits.max_work`.
+    pub work: u32,
 }
 
 /// One candidate edge and what became of it.
@@ -61,66 +63,62 @@ pub struct Candidate<T> {
     pub verdict: Verdict,
 }
 
-/// What became of a candidate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Verdict {
-    /// The answer.
-    Chosen = 0,
-    /// Passed every gate, but another fits better.
-    Passed = 1,
-    /// No cone goes through enough of its points.
-    NoConsensus = 2,
-    /// Fewer inliers than `select.min_inliers`.
-    FewInliers = 3,
-    /// The inliers cover less than `select.min_arc_px`.
-    ShortArc = 4,
-    /// The RMS is above `select.max_rms_px`.
-    Residuals = 5,
-    /// The fitted half-angle disagrees with the expected one.
-    HalfAngle = 6,
-    /// The standard deviation is above `select.max_sigma_deg`.
-    Uncertain = 7,
-    /// The fit did not converge or was singular.
-    NoFit = 8,
-    /// The fitted limb goes on where the picture shows none: too small a part of it is edge.
-    Unsupported = 9,
-    /// Many edge points lie close beside the fitted limb: a curve through clutter.
-    Indistinct = 10,
-    /// Too much of what lies beyond the fitted limb is lit.
-    NoSky = 11,
-    /// The edge is the limb of another body, which was found in the same picture before.
-    Taken = 12,
-    /// No part of the limb that is expected about the fitted axis lies in the picture.
-    OutOfView = 13,
-    /// The fitted circle is smaller or larger than the limb can be between the altitude limits.
-    Radius = 14,
-    /// The edge is too short or too rough for its curvature to tell on which side of it the body is.
-    Straight = 15,
-}
-
-impl Verdict {
-    /// The name used in files and messages.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Chosen => "chosen",
-            Self::Passed => "passed",
-            Self::NoConsensus => "no-consensus",
-            Self::FewInliers => "few-inliers",
-            Self::ShortArc => "short-arc",
-            Self::Residuals => "residuals",
-            Self::HalfAngle => "half-angle",
-            Self::Uncertain => "uncertain",
-            Self::NoFit => "no-fit",
-            Self::Unsupported => "unsupported",
-            Self::Indistinct => "indistinct",
-            Self::NoSky => "no-sky",
-            Self::Taken => "taken",
-            Self::OutOfView => "out-of-view",
-            Self::Radius => "radius",
-            Self::Straight => "straight",
+/// One line a verdict: what it is, number, name. So that none can be left out of a list.
+macro_rules! verdicts {
+    ($($(#[$doc:meta])* $variant:ident = $number:literal, $name:literal;)*) => {
+        /// What became of a candidate.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum Verdict {
+            $($(#[$doc])* $variant = $number,)*
         }
-    }
+
+        impl Verdict {
+            /// Every verdict in the order of its number.
+            pub const ALL: &[Self] = &[$(Self::$variant),*];
+
+            /// The name used in files and messages.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)*
+                }
+            }
+        }
+    };
+}
+verdicts! {
+    /// The answer.
+    Chosen = 0, "chosen";
+    /// Passed every gate, but another fits better.
+    Passed = 1, "passed";
+    /// No cone goes through enough of its points.
+    NoConsensus = 2, "no-consensus";
+    /// Fewer inliers than `select.min_inliers`.
+    FewInliers = 3, "few-inliers";
+    /// The inliers cover less than `select.min_arc_px`.
+    ShortArc = 4, "short-arc";
+    /// The RMS is above `select.max_rms_px`.
+    Residuals = 5, "residuals";
+    /// The fitted half-angle disagrees with the expected one.
+    HalfAngle = 6, "half-angle";
+    /// The standard deviation is above `select.max_sigma_deg`.
+    Uncertain = 7, "uncertain";
+    /// The fit did not converge or was singular, or could not be afforded any more.
+    NoFit = 8, "no-fit";
+    /// The fitted limb goes on where the picture shows none: too small a part of it is edge.
+    Unsupported = 9, "unsupported";
+    /// Many edge points lie close beside the fitted limb: a curve through clutter.
+    Indistinct = 10, "indistinct";
+    /// Too much of what lies beyond the fitted limb is lit.
+    NoSky = 11, "no-sky";
+    /// The edge is the limb of another body, which was found in the same picture before.
+    Taken = 12, "taken";
+    /// No part of the limb that is expected about the fitted axis lies in the picture.
+    OutOfView = 13, "out-of-view";
+    /// The fitted circle is smaller or larger than the limb can be between the altitude limits.
+    Radius = 14, "radius";
+    /// The edge is too short or too rough for its curvature to tell on which side of it the body is.
+    Straight = 15, "straight";
 }
 
 /// A direction with its covariance.

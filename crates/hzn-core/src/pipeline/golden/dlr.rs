@@ -4,6 +4,7 @@ use super::*;
 use crate::covariance::braun_barf;
 use crate::estimate::{conic, direct};
 use crate::linalg::{M3, symmetric_eigen};
+use crate::work::Work;
 
 /// `nadir_cases.json`: (24) by scipy, inliers only, pinholes only.
 fn directions<T: Real>(tolerance_deg: f64) {
@@ -366,7 +367,8 @@ fn ransac_leaves_outliers_out() {
     let body = crate::body::Config { altitude_km: Some(120.0), ..Default::default() };
     let expected = crate::body::Expected::new(&body, &crate::body::Frame::default()).unwrap();
     let config = reject::Config { method: reject::Method::Ransac, threshold_px: 1.0, ..Default::default() };
-    let found = reject::keep(&mut blocks, points.len() as u32, &expected, 888.97, &config).unwrap();
+    let found =
+        reject::keep(&mut blocks, points.len() as u32, &expected, 888.97, &config, &mut Work::unlimited()).unwrap();
     assert!(found.draws < config.max_draws);
     for (i, p) in points.iter().enumerate() {
         let near = exact.iter().any(|q| libm::hypot(p.0 - q.0, p.1 - q.1) < 5.0);
@@ -376,7 +378,7 @@ fn ransac_leaves_outliers_out() {
     }
     let (got, got_c) = direct::fit(&blocks).unwrap();
     assert!(UnitVec3::<Cam, f64>::assume_unit(got).angle_rad(&e).to_degrees() < 0.2 && (got_c - c).abs() < 0.01);
-    let few = reject::keep(&mut blocks[..1], 2, &expected, 888.97, &config);
+    let few = reject::keep(&mut blocks[..1], 2, &expected, 888.97, &config, &mut Work::unlimited());
     assert!(few.is_none());
 }
 

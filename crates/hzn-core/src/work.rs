@@ -1,0 +1,117 @@
+//! What a picture may cost: one account that every stage draws on, so that the worst picture has a bound.
+//!
+//! The unit is a step of the border follower, some fifty instructions of a Cortex-M7. Stages pay beforehand what they
+//! cost at most, by what they are about to look at, so that the sum does not depend on the machine. What is bounded by
+//! the picture's size alone is free: the sample for the level, the border, the search lines.
+
+use crate::error::{ConfigError, between};
+
+/// `[limits]` of sensor.toml.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Config {
+    /// What one picture may cost in steps of the border follower, 10 thousand to a billion: the bound on the worst
+    /// picture's time. An ordinary picture takes some 30 thousand. Used up, the best answer so far is taken; without
+    /// one the status is `truncated`. Left out: 120 for each edge point that the lists hold, which is 246 thousand on
+    /// a flight computer and two million on a workstation.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub max_work: Option<u32>,
+}
+
+/// Work for each edge point that the lists hold, where the configuration does not say.
+const A_POINT: u32 = 120;
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        self.max_work.map_or(Ok(()), |n| between("limits.max_work", f64::from(n), 1e4, 1e9))
+    }
+}
+
+/// Beginning to follow an edge.
+pub(crate) const EDGE: u32 = 16;
+/// A step with a look at everything around, under so many polygons of the mask.
+pub(crate) fn look(polygons: u32) -> u32 {
+    2 + 4 * polygons
+}
+/// A sub-pixel point with its ray.
+pub(crate) const POINT: u32 = 16;
+/// What such a point costs more where reads are checked one by one: beside a mask or the border, or on a wide edge.
+pub(crate) fn slow_point(polygons: u32) -> u32 {
+    14 + 14 * polygons
+}
+/// A draw of the rejection, verified on one further point.
+pub(crate) const DRAW: u32 = 10;
+/// A block of eight points compared with a drawn cone.
+pub(crate) const SCORE: u32 = 4;
+/// A block of eight points fitted, and weighed by its covariance.
+pub(crate) const FIT: u32 = 230;
+/// The gates of a fit.
+pub(crate) const GATES: u32 = 1000;
+
+/// What is left.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Work {
+    all: u32,
+    left: u32,
+    cut: bool,
+}
+
+impl Work {
+    /// For lists that hold so many edge points.
+    pub(crate) fn new(config: &Config, points: usize) -> Self {
+        let all = config.max_work.unwrap_or(A_POINT.saturating_mul(points as u32));
+        Self { all, left: all, cut: false }
+    }
+
+    /// For stages on their own.
+    #[cfg(any(test, feature = "_edges"))]
+    pub(crate) fn unlimited() -> Self {
+        Self { all: u32::MAX, left: u32::MAX, cut: false }
+    }
+
+    /// Pays `cost`, if that much is left; otherwise nothing is left from here on.
+    #[inline]
+    pub(crate) fn spend(&mut self, cost: u32) -> bool {
+        let rest = self.left.checked_sub(cost);
+        self.cut |= rest.is_none();
+        self.left = rest.unwrap_or(0);
+        rest.is_some()
+    }
+
+    /// Lets `follow` count down what one edge may cost: three quarters of what is left, so that the edge can be tried.
+    pub(crate) fn on_edge<R>(&mut self, follow: impl FnOnce(&mut u32) -> R) -> R {
+        let mut steps = self.left - self.left / 4;
+        let before = steps;
+        let result = follow(&mut steps);
+        self.left -= before - steps;
+        self.cut |= steps == 0;
+        result
+    }
+
+    /// Pays for what was done already, as far as it goes.
+    pub(crate) fn pay(&mut self, cost: u32) {
+        self.left = self.left.saturating_sub(cost);
+    }
+    /// Whether nothing can be done any more.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.left == 0
+    }
+    /// Nothing more is done.
+    #[cfg(feature = "horace")]
+    pub(crate) fn cut(&mut self) {
+        (self.left, self.cut) = (0, true);
+    }
+    /// Whether something was not done for lack of it.
+    pub(crate) fn was_cut(&self) -> bool {
+        self.cut
+    }
+    /// What is left.
+    #[cfg(feature = "horace")]
+    pub(crate) fn left(&self) -> u32 {
+        self.left
+    }
+    /// What was done.
+    pub(crate) fn done(&self) -> u32 {
+        self.all - self.left
+    }
+}
