@@ -106,12 +106,16 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         n => n.min(room),
     };
     let every = border.len().div_ceil(keep.max(1)).max(1);
+    let (region, margin) = (scene.region, MARGIN as u16);
+    let masked = region.polygons() > 0;
+    let free =
+        |p: Pixel| region.is_inside_by(p.x, p.y, margin) && (!masked || region.clearance(p.x, p.y, margin) == margin);
     let mut made = Points::default();
     let mut place = 0;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
         let found = match config.sub_pixel {
             SubPixel::Linear => {
-                if scene.region.clearance(pixel.x, pixel.y, MARGIN as u16) == MARGIN as u16 {
+                if free(pixel) {
                     linear::<T, P, O, true>(scene, pixel, &mut made.slow)
                 } else {
                     linear::<T, P, O, false>(scene, pixel, &mut made.slow)
