@@ -417,7 +417,7 @@ mod tests {
         let mut p = full();
         let before = p.clone();
         for (id, value) in
-            [(1, 640.5), (1, -1.0), (1, 65536.0), (3, 4.0), (4, f64::NAN), (61, 5e9), (1000 + 2 * 3, 1.0)]
+            [(1, 640.5), (1, -1.0), (1, 65536.0), (3, 4.0), (4, f64::NAN), (120, 5e9), (1000 + 2 * 3, 1.0)]
         {
             assert!(matches!(p.set(id, value), Err(Refused::Value(n, _)) if n == id), "{id} {value}");
         }
