@@ -5,7 +5,7 @@
 //! finer.
 
 use crate::error::{ConfigError, Limit, above, between, require};
-use crate::image::Pixels;
+use crate::image::{self, Pixels};
 use crate::pipeline::Observer;
 use crate::real::Real;
 use crate::region::Region;
@@ -72,6 +72,12 @@ impl Gate {
 }
 
 impl Config {
+    /// For `fixed`: the level in counts.
+    pub(crate) fn fixed_level<T: Real>(&self, full_scale: u16) -> Option<u16> {
+        let unit = if self.level < 1.0 { f64::from(full_scale) } else { 1.0 };
+        (self.method == Method::Fixed).then(|| counts(T::of(self.level * unit)))
+    }
+
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         require(self.level.is_finite(), "binarize.level", self.level, Limit::Finite)?;
         above("binarize.level", self.level, 0.0)?;
@@ -98,6 +104,12 @@ const BINS: usize = 256;
 /// Cells along each side of the first sample and of the second, as powers of two.
 const SIDES_LOG2: [u32; 2] = [4, 6];
 
+/// A level as a number of counts; one of 0 would make everything lit.
+fn counts<T: Real>(level: T) -> u16 {
+    level.to_i32().clamp(1, 65535) as u16
+}
+
+#[derive(Debug)]
 struct Histogram {
     bins: [u16; BINS],
     sum: u64,
@@ -118,65 +130,136 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     seed: u32,
     observer: &O,
 ) -> Result<Level<T>, Status> {
-    let full = u32::from(picture.full_scale());
     for side_log2 in SIDES_LOG2 {
-        let sample = draw(picture, region, side_log2, seed, observer);
-        let Some(mean) = sample.mean::<T>() else { continue };
-        let fraction = mean / T::of(f64::from(full));
-        if fraction < T::of(gate.min_mean) {
-            return Err(Status::TooDark);
+        let mut sample = Sample::new(seed, side_log2, picture.full_scale(), region);
+        while let Some(y) = sample.row() {
+            sample.take(region, observer, |x| picture.at(x, y));
         }
-        if fraction > T::of(gate.max_mean) {
-            return Err(Status::TooBright);
+        if let Some(decided) = sample.decide(gate, config, last, observer) {
+            return decided;
         }
-        let level = match config.method {
-            Method::Fixed if config.level < 1.0 => Some(T::of(config.level * f64::from(full))),
-            Method::Fixed => Some(T::of(config.level)),
-            Method::Dynamic => Some(mean * T::of(config.factor)),
-            Method::Track if last.is_some() => last.map(|l| T::of_i32(i32::from(l))),
-            Method::Otsu | Method::Track => sample.otsu::<T>(full).map(|l| l * T::of(config.scale)),
-        };
-        let Some(level) = level else { continue };
-        // A level of 0 would make everything lit.
-        let level = level.to_i32().clamp(1, 65535) as u16;
-        observer.level(level, mean, sample.count);
-        return Ok(Level { level, mean, samples: sample.count });
     }
     Err(Status::NoLimb)
 }
 
-fn draw<T: Real, P: Pixels, O: Observer<T>>(
-    picture: &P,
-    region: &Region<T>,
-    side_log2: u32,
-    seed: u32,
-    observer: &O,
-) -> Histogram {
-    let shift = (16 - u32::from(picture.full_scale()).leading_zeros().saturating_sub(16)).saturating_sub(8);
-    let mut h = Histogram { bins: [0; BINS], sum: 0, count: 0, shift };
-    let mut rng = Rng::new(seed);
-    let (w, height) = (u32::from(region.width()), u32::from(region.height()));
-    for j in 0..1u32 << side_log2 {
-        // The cells of a row share theirs: each row of a picture is a page of memory away from the next.
-        let y = (((j * height) + ((height * rng.below(65536)) >> 16)) >> side_log2) as u16;
-        for i in 0..1u32 << side_log2 {
-            let x = (((i * w) + ((w * rng.below(65536)) >> 16)) >> side_log2) as u16;
-            if !region.contains(x, y) || region.masked(x, y) {
-                continue;
+/// Both samples of a picture whose rows pass.
+#[derive(Debug)]
+pub(crate) struct Passing([Sample; SIDES_LOG2.len()]);
+
+impl Passing {
+    pub(crate) fn new<T: Real>(seed: u32, full_scale: u16, region: &Region<T>) -> Self {
+        Self(SIDES_LOG2.map(|side_log2| Sample::new(seed, side_log2, full_scale, region)))
+    }
+    /// Takes from row `y` what belongs to the samples; rows come in order.
+    pub(crate) fn row<T: Real, S: image::Sample, O: Observer<T>>(
+        &mut self,
+        region: &Region<T>,
+        y: u16,
+        row: &[S],
+        observer: &O,
+    ) {
+        for sample in &mut self.0 {
+            while sample.row() == Some(y) {
+                sample.take(region, observer, |x| row.get(usize::from(x)).map_or(0, |&s| s.into()));
             }
-            observer.pixel(x, y);
-            let v = picture.at(x, y);
-            if let Some(bin) = h.bins.get_mut(usize::from(v >> shift)) {
-                *bin += 1;
-            }
-            h.sum += u64::from(v);
-            h.count += 1;
         }
     }
-    h
+    /// As [`split`].
+    pub(crate) fn split<T: Real, O: Observer<T>>(
+        &self,
+        gate: &Gate,
+        config: &Config,
+        last: Option<u16>,
+        observer: &O,
+    ) -> Result<Level<T>, Status> {
+        self.0.iter().find_map(|s| s.decide(gate, config, last, observer)).unwrap_or(Err(Status::NoLimb))
+    }
+}
+
+/// A sample in the making: pixels of one row after another.
+#[derive(Debug)]
+struct Sample {
+    histogram: Histogram,
+    rng: Rng,
+    side_log2: u32,
+    full_scale: u16,
+    /// The row of cells that is drawn from, and the row of the picture in it.
+    cells: u32,
+    y: u16,
+}
+
+impl Sample {
+    fn new<T: Real>(seed: u32, side_log2: u32, full_scale: u16, region: &Region<T>) -> Self {
+        let shift = (16 - u32::from(full_scale).leading_zeros().saturating_sub(16)).saturating_sub(8);
+        let histogram = Histogram { bins: [0; BINS], sum: 0, count: 0, shift };
+        let mut sample = Self { histogram, rng: Rng::new(seed), side_log2, full_scale, cells: 0, y: 0 };
+        sample.y = sample.draw(0, region.height());
+        sample
+    }
+
+    /// A place in cell number `cell` of a side of `length` pixels.
+    fn draw(&mut self, cell: u32, length: u16) -> u16 {
+        let length = u32::from(length);
+        ((cell * length + ((length * self.rng.below(65536)) >> 16)) >> self.side_log2) as u16
+    }
+
+    /// The row of the picture that is looked at next; rows come in order.
+    fn row(&self) -> Option<u16> {
+        (self.cells < 1 << self.side_log2).then_some(self.y)
+    }
+
+    /// Looks at that row. The cells of a row share theirs: each row of a picture is a page of memory away from the next.
+    fn take<T: Real, O: Observer<T>>(&mut self, region: &Region<T>, observer: &O, at: impl Fn(u16) -> u16) {
+        for cell in 0..1u32 << self.side_log2 {
+            let x = self.draw(cell, region.width());
+            if !region.contains(x, self.y) || region.masked(x, self.y) {
+                continue;
+            }
+            observer.pixel(x, self.y);
+            self.histogram.count(at(x));
+        }
+        self.cells += 1;
+        self.y = self.draw(self.cells, region.height());
+    }
+
+    /// The level, or why there is none; `None` when a finer sample is to decide.
+    fn decide<T: Real, O: Observer<T>>(
+        &self,
+        gate: &Gate,
+        config: &Config,
+        last: Option<u16>,
+        observer: &O,
+    ) -> Option<Result<Level<T>, Status>> {
+        let (sample, full) = (&self.histogram, u32::from(self.full_scale));
+        let mean = sample.mean::<T>()?;
+        let fraction = mean / T::of(f64::from(full));
+        if fraction < T::of(gate.min_mean) {
+            return Some(Err(Status::TooDark));
+        }
+        if fraction > T::of(gate.max_mean) {
+            return Some(Err(Status::TooBright));
+        }
+        let level = match config.method {
+            Method::Fixed => config.fixed_level::<T>(self.full_scale),
+            Method::Dynamic => Some(counts(mean * T::of(config.factor))),
+            Method::Track if last.is_some() => last,
+            Method::Otsu | Method::Track => sample.otsu::<T>(full).map(|l| counts(l * T::of(config.scale))),
+        };
+        let level = level?;
+        observer.level(level, mean, sample.count);
+        Some(Ok(Level { level, mean, samples: sample.count }))
+    }
 }
 
 impl Histogram {
+    fn count(&mut self, v: u16) {
+        if let Some(bin) = self.bins.get_mut(usize::from(v >> self.shift)) {
+            *bin += 1;
+        }
+        self.sum += u64::from(v);
+        self.count += 1;
+    }
+
     fn mean<T: Real>(&self) -> Option<T> {
         (self.count > 0).then(|| T::of(self.sum as f64) / T::of(f64::from(self.count)))
     }

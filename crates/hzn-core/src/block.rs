@@ -39,11 +39,20 @@ impl Lit {
     }
     /// The other way: a step of one pixel (u, v) towards the light.
     pub(crate) fn step(self) -> [i8; 2] {
+        let (dx, dy) = self.towards_dark();
+        [-dx as i8, -dy as i8]
+    }
+}
+
+impl Lit {
+    /// The step (dx, dy) away from the light.
+    #[inline(always)]
+    pub(crate) fn towards_dark(self) -> (i32, i32) {
         match self {
-            Self::Right => [1, 0],
-            Self::Left => [-1, 0],
-            Self::Below => [0, 1],
-            Self::Above => [0, -1],
+            Self::Right => (-1, 0),
+            Self::Left => (1, 0),
+            Self::Below => (0, -1),
+            Self::Above => (0, 1),
         }
     }
 }

@@ -18,7 +18,7 @@ mod zernike;
 use crate::block::{Block, LANES, Lit};
 use crate::contour::Scene;
 use crate::error::{ConfigError, Limit, require};
-use crate::image::Pixels;
+use crate::image::{Passed, Pixels};
 use crate::pipeline::Observer;
 use crate::pixel::{ImagePoint, Pixel};
 use crate::real::Real;
@@ -90,6 +90,8 @@ pub(crate) struct Points {
     pub(crate) fallback: u32,
     /// Border pixels that took longer: beside a mask or the picture's border, or on a wide edge.
     pub(crate) slow: u32,
+    /// Of a picture that came row by row: points whose plateaus were not within the rows held.
+    pub(crate) cut: u32,
 }
 
 /// Fills `blocks` with the points of a border, evenly thinned to `keep_points`. Lanes that stay empty have weight 0.
@@ -106,26 +108,15 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         n => n.min(room),
     };
     let every = border.len().div_ceil(keep.max(1)).max(1);
-    let (region, margin) = (scene.region, MARGIN as u16);
-    let masked = region.polygons() > 0;
-    let free =
-        |p: Pixel| region.is_inside_by(p.x, p.y, margin) && (!masked || region.clearance(p.x, p.y, margin) == margin);
     let mut made = Points::default();
     let mut place = 0;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
-        let found = match config.sub_pixel {
-            SubPixel::Linear => {
-                if free(pixel) {
-                    linear::<T, P, O, true>(scene, pixel, &mut made.slow)
-                } else {
-                    linear::<T, P, O, false>(scene, pixel, &mut made.slow)
-                }
-            }
-            SubPixel::None => half_pixel(scene, pixel),
-            #[cfg(feature = "erf")]
-            SubPixel::Erf => erf::locate(scene, pixel).and_then(towards_light),
-            #[cfg(feature = "zju")]
-            SubPixel::Zernike => zernike::locate(scene, pixel).and_then(towards_light),
+        let found = if P::PASSED {
+            let found = scene.picture.passed(pixel.x, pixel.y);
+            made.cut += u32::from(found.is_some_and(|f| f.cut));
+            found.map(|f| (point_off(pixel, f.lit.towards_dark(), T::of(f.towards_dark_px.into())), f.lit, f.fallback))
+        } else {
+            locate(scene, config, pixel, &mut made.slow)
         };
         let Some((point, lit, fallback)) = found else { continue };
         let Some(block) = blocks.get_mut(place / LANES) else { break };
@@ -139,6 +130,46 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         made.fallback += u32::from(fallback);
     }
     made
+}
+
+/// The edge point at a border pixel, the side of the light, and whether it stands at the global level.
+#[inline(always)]
+fn locate<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    config: &Config,
+    p: Pixel,
+    slow: &mut u32,
+) -> Option<(ImagePoint<T>, Lit, bool)> {
+    match config.sub_pixel {
+        SubPixel::Linear => {
+            let (region, margin) = (scene.region, MARGIN as u16);
+            let unmasked = region.polygons() == 0;
+            if region.is_inside_by(p.x, p.y, margin) && (unmasked || region.clearance(p.x, p.y, margin) == margin) {
+                linear::<T, P, O, true>(scene, p, slow)
+            } else {
+                linear::<T, P, O, false>(scene, p, slow)
+            }
+        }
+        SubPixel::None => half_pixel(scene, p),
+        #[cfg(feature = "erf")]
+        SubPixel::Erf => erf::locate(scene, p).and_then(towards_light),
+        #[cfg(feature = "zju")]
+        SubPixel::Zernike => zernike::locate(scene, p).and_then(towards_light),
+    }
+}
+
+/// The edge point at a border pixel, to be kept when the picture is not: of the methods that locate it along an axis.
+#[inline(never)]
+pub(crate) fn pass<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    config: &Config,
+    p: Pixel,
+) -> Option<Passed> {
+    let (point, lit, fallback) = locate(scene, config, p, &mut 0)?;
+    // The difference is exact, and so is the sum that makes the point again.
+    let (dx, dy) = lit.towards_dark();
+    let off = (point.u - T::of_i32(p.x.into())) * T::of_i32(dx) + (point.v - T::of_i32(p.y.into())) * T::of_i32(dy);
+    Some(Passed { towards_dark_px: off.f64() as f32, lit, fallback, cut: false })
 }
 
 /// Reads around one border pixel; `None` beyond the region and under the mask. `FREE`: no read within reach needs a
@@ -304,13 +335,15 @@ fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
     if gx == 0 && gy == 0 {
         return None;
     }
-    Some(if gx.abs() >= gy.abs() {
-        if gx > 0 { (Lit::Right, -1, 0) } else { (Lit::Left, 1, 0) }
+    let lit = if gx.abs() >= gy.abs() {
+        if gx > 0 { Lit::Right } else { Lit::Left }
     } else if gy > 0 {
-        (Lit::Below, 0, -1)
+        Lit::Below
     } else {
-        (Lit::Above, 0, 1)
-    })
+        Lit::Above
+    };
+    let (dx, dy) = lit.towards_dark();
+    Some((lit, dx, dy))
 }
 
 /// A point of the methods that know the gradient's direction.
@@ -328,10 +361,10 @@ fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(
 ) -> Option<(ImagePoint<T>, Lit, bool)> {
     let around = Around::<T, P, O, false>::new(scene, p);
     let (lit, dx, dy) = orientation(around.near()?.gradient())?;
-    Some((place(p, dx, dy, T::of(0.5)), lit, false))
+    Some((point_off(p, (dx, dy), T::of(0.5)), lit, false))
 }
 
-fn place<T: Real>(p: Pixel, dx: i32, dy: i32, towards_dark: T) -> ImagePoint<T> {
+fn point_off<T: Real>(p: Pixel, (dx, dy): (i32, i32), towards_dark: T) -> ImagePoint<T> {
     ImagePoint {
         u: T::of_i32(i32::from(p.x)) + T::of_i32(dx) * towards_dark,
         v: T::of_i32(i32::from(p.y)) + T::of_i32(dy) * towards_dark,
@@ -355,7 +388,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     if FREE && wide < 4 * steep {
         let line = Line::new(&around, (dx, dy), 1);
         let (part, fallback) = line.crossing(near.across(lit))?;
-        return Some((place(p, dx, dy, part), lit, fallback));
+        return Some((point_off(p, (dx, dy), part), lit, fallback));
     }
     *slow += 1;
     let step = (wide / (2 * steep).max(1)).clamp(1, WIDEST);
@@ -374,7 +407,7 @@ fn in_steps<T: Real, P: Pixels, O: Observer<T>>(
     let around = Around::<T, P, O, false>::new(scene, p);
     let line = Line::new(&around, (dx, dy), step);
     let (part, fallback) = line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
-    Some((place(p, dx, dy, part * T::of_i32(step)), lit, fallback))
+    Some((point_off(p, (dx, dy), part * T::of_i32(step)), lit, fallback))
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P, O, FREE> {
@@ -550,7 +583,7 @@ mod tests {
         let scene = Scene::new(&grey, &region, 120, &Unobserved);
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
         let mut blocks = [Block::default(); 2];
-        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks), Points { count: 15, fallback: 0, slow: 0 });
+        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks), Points { count: 15, fallback: 0, slow: 0, cut: 0 });
         let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
         assert_eq!((first, last), (22.0, 78.0));
     }

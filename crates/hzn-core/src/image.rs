@@ -9,11 +9,15 @@ mod part;
 
 use core::fmt;
 
+use crate::block::Lit;
+
 #[cfg(feature = "horace")]
 pub(crate) use part::{Part, Window};
 
 /// What the pipeline reads: one brightness per pixel.
 pub trait Pixels {
+    /// The picture is gone, and of its edges only [`Self::passed`] is left.
+    const PASSED: bool = false;
     /// Columns, 1 to 65535.
     fn width(&self) -> u16;
     /// Rows, 1 to 65535.
@@ -33,6 +37,11 @@ pub trait Pixels {
     fn three(&self, index: usize) -> [u16; 3] {
         [0, 1, 2].map(|k| self.read(index + k * self.across()))
     }
+    /// The edge point of a border pixel, of a picture that came row by row: it was measured when the rows around it were
+    /// there.
+    fn passed(&self, _x: u16, _y: u16) -> Option<Passed> {
+        None
+    }
     /// Brightness at column `x`, row `y`. The caller stays within the picture: beyond, it is some pixel or 0.
     #[inline(always)]
     fn at(&self, x: u16, y: u16) -> u16 {
@@ -40,7 +49,23 @@ pub trait Pixels {
     }
 }
 
+/// An edge point as it is kept beside its border pixel, see [`Pixels::passed`].
+#[derive(Debug, Clone, Copy)]
+pub struct Passed {
+    /// From the pixel's centre, away from the light.
+    pub(crate) towards_dark_px: f32,
+    pub(crate) lit: Lit,
+    /// It stands at the global level.
+    pub(crate) fallback: bool,
+    /// Its plateaus were not within what was held.
+    pub(crate) cut: bool,
+}
+
 impl<P: Pixels> Pixels for &P {
+    const PASSED: bool = P::PASSED;
+    fn passed(&self, x: u16, y: u16) -> Option<Passed> {
+        (**self).passed(x, y)
+    }
     fn width(&self) -> u16 {
         (**self).width()
     }
@@ -141,12 +166,16 @@ impl Layout {
 pub trait Sample: Copy + Into<u16> {
     /// Largest number of significant bits.
     const BITS: u8;
+    /// 0.
+    const ZERO: Self;
 }
 impl Sample for u8 {
     const BITS: u8 = 8;
+    const ZERO: Self = 0;
 }
 impl Sample for u16 {
     const BITS: u8 = 16;
+    const ZERO: Self = 0;
 }
 
 /// A picture with one sample a pixel.

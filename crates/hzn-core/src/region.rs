@@ -102,6 +102,11 @@ impl<T: Real> Region<T> {
         Self { width, height, circle: None, polygons: heapless::Vec::new() }
     }
 
+    /// The part of it in the first rows of the picture.
+    pub(crate) fn above(&self, rows: u16) -> Self {
+        Self { height: rows.min(self.height), ..self.clone() }
+    }
+
     /// The region as it lies in a part of the picture, or in a smaller copy.
     #[cfg(feature = "horace")]
     pub(crate) fn through(&self, window: &Window) -> Self {

@@ -175,6 +175,8 @@ impl Answer {
                 edge_points: self.edge_points,
                 draws: self.draws,
                 work: self.work,
+                // No pictures come row by row.
+                cut_points: 0,
             },
             candidates,
             solution,

@@ -233,6 +233,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         outcome.points = points.count;
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;
+        self.report.counters.cut_points += points.cut;
         let used = (points.count as usize).div_ceil(LANES);
         let Some(blocks) = self.blocks.get_mut(..used) else { return (outcome, None) };
 
@@ -307,7 +308,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
         let certain =
             judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
-        let tracks = self.tracks.then(|| select::middle_level(&fused.e, blocks, scene, camera));
+        let tracks = (self.tracks && !P::PASSED).then(|| select::middle_level(&fused.e, blocks, scene, camera));
         (outcome, Some(Best { solution, score: judged.score, certain, level: tracks.flatten() }))
     }
 

@@ -17,6 +17,7 @@ mod parts;
 mod preset;
 mod report;
 mod sensor;
+mod stream;
 mod taken;
 mod workspace;
 
@@ -30,4 +31,5 @@ pub use optional::{OPTIONAL, Optional, lacking};
 pub use preset::Preset;
 pub use report::{Candidate, Counters, MAX_LISTED, Report, Reports, Solution, Verdict};
 pub use sensor::Sensor;
+pub use stream::{HELD, Rows, RowsError, Stream};
 pub use workspace::{FlightWorkspace, HostWorkspace, Workspace};

@@ -19,7 +19,7 @@ pub struct Report<T> {
     pub stage: Stage,
     /// Level between dark and lit in the picture's own counts; 0 when it was not reached.
     pub level: u16,
-    /// For `track`: the level for the next picture, in counts; with an answer only.
+    /// The level for the next picture, in counts: for `track`, with an answer only; of a picture that came row by row, always.
     pub next_level: Option<u16>,
     /// What was seen on the way.
     pub counters: Counters,
@@ -27,6 +27,21 @@ pub struct Report<T> {
     pub candidates: heapless::Vec<Candidate<T>, MAX_LISTED>,
     /// The direction: with status `ok`, and never without.
     pub solution: Option<Solution<T>>,
+}
+
+impl<T> Report<T> {
+    /// Of a picture that was not looked at.
+    pub(super) fn of_nothing() -> Self {
+        Self {
+            status: Status::Rejected,
+            stage: Stage::Binarize,
+            level: 0,
+            next_level: None,
+            counters: Counters::default(),
+            candidates: heapless::Vec::new(),
+            solution: None,
+        }
+    }
 }
 
 /// Counts of one picture.
@@ -42,6 +57,9 @@ pub struct Counters {
     pub fallback_points: u32,
     /// Sub-pixel points of the chosen candidate (of all candidates, when none was chosen).
     pub edge_points: u32,
+    /// Of a picture that came row by row: edge points of candidates with a plateau that was not within the rows
+    /// held.
+    pub cut_points: u32,
     /// RANSAC draws that came to a consensus.
     pub draws: u32,
     /// What the picture cost, in the unit of `limits.max_work`.

@@ -3,7 +3,7 @@
 use super::config::{Config, MAX_BODIES, Mount};
 use super::judge::Judge;
 use super::observer::Observer;
-use super::report::{Counters, Report, Reports};
+use super::report::{Report, Reports};
 use super::taken::Taken;
 use super::workspace::{Lists, Workspace};
 use crate::binarize;
@@ -15,7 +15,7 @@ use crate::frames::{Body, Cam, Rotation};
 use crate::image::Pixels;
 use crate::real::Real;
 use crate::region::Region;
-use crate::status::{Stage, Status};
+use crate::status::Stage;
 
 /// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
 /// that a picture needs are in a [`Workspace`]. [`Horizon`] is both together.
@@ -115,15 +115,7 @@ impl<T: Real> Sensor<T> {
         taken: &[Taken<T>],
         observer: &O,
     ) -> Report<T> {
-        let mut report = Report {
-            status: Status::Rejected,
-            stage: Stage::Binarize,
-            level: 0,
-            next_level: None,
-            counters: Counters::default(),
-            candidates: heapless::Vec::new(),
-            solution: None,
-        };
+        let mut report = Report::of_nothing();
         if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
             #[cfg(feature = "horace")]
             self.look_at_parts(lists, picture, expected, taken, observer, &mut report);

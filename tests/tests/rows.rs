@@ -1,0 +1,148 @@
+//! Pictures that come row by row beside the same pictures in memory: rendered flights and photographs.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use hzn_core::binarize::Method;
+use hzn_core::image::{Grey, Layout, Pixels};
+use hzn_core::pipeline::{HELD, Observer, Rows, Workspace};
+use hzn_core::pixel::ImagePoint;
+use hzn_core::status::Status;
+use hzn_core::{Config, Frame, Report, Sensor};
+use hzn_sim::flight::{leo_infrared, rocket};
+use hzn_tests::real::Photograph;
+
+/// Lists for any of these pictures.
+const WIDEST: usize = 5568;
+type Large = Rows<u8, { HELD as usize * WIDEST }, 3712, 65535, 65535>;
+/// As the flight computer's, for one candidate of 600 points.
+type Lists = Workspace<f32, 16384, 256, 512>;
+
+/// The edge points of each candidate, with every bit.
+#[derive(Default)]
+struct Seen(RefCell<BTreeMap<u32, Vec<[u32; 2]>>>);
+impl Observer<f32> for Seen {
+    fn point(&self, candidate: u32, p: ImagePoint<f32>) {
+        self.0.borrow_mut().entry(candidate).or_default().push([p.u.to_bits(), p.v.to_bits()]);
+    }
+}
+
+struct Case {
+    name: String,
+    sensor: Config,
+    known: Frame<f32>,
+    bytes: Vec<u8>,
+}
+
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    let mut infrared = leo_infrared(6, 2);
+    infrared.frames.iter_mut().for_each(|f| f.scene.detector.bits = 8);
+    let flights = [rocket(640, 480, 8, 1), rocket(960, 540, 6, 2).with_payload(), rocket(1920, 1080, 3, 3), infrared];
+    for flight in flights {
+        for frame in &flight.frames {
+            let case = hzn_tests::emulated::Case::rendered(frame.file.clone(), &flight.sensor, frame);
+            let name = format!("{} {}", flight.name, frame.file);
+            cases.push(Case { name, sensor: case.sensor, known: case.known, bytes: case.bytes });
+        }
+    }
+    for file in ["iss-limb-2020-11-20.jpg", "pluto-pia19948.jpg", "sun-hmi-continuum-2023-01-31.png"] {
+        let photograph = Photograph::load(file);
+        let view = photograph.view();
+        let (w, h) = (view.width(), view.height());
+        let bytes = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| view.at(x, y) as u8).collect();
+        let mut sensor = photograph.sensor.clone();
+        sensor.candidates.keep_points = 600;
+        cases.push(Case { name: file.into(), sensor, known: Frame::default(), bytes });
+    }
+    cases
+}
+
+impl Case {
+    fn whole(&self, sensor: &Sensor<f32>, seen: &Seen) -> Report<f32> {
+        let camera = &self.sensor.camera;
+        let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
+        let picture = Grey::try_new(&self.bytes, layout).unwrap();
+        let expected = sensor.expect(&self.known).unwrap();
+        sensor.process(&mut Box::new(Lists::new()), &picture, &expected, seen)
+    }
+    fn by_rows(&self, sensor: &Sensor<f32>, seen: &Seen) -> Report<f32> {
+        let expected = sensor.expect(&self.known).unwrap();
+        let mut rows = Box::new(Large::new());
+        let mut stream = sensor.rows(&mut rows, 8, &expected).unwrap();
+        for row in self.bytes.chunks(self.sensor.camera.width.into()) {
+            stream.push_row(row).unwrap();
+        }
+        stream.finish(&mut Box::new(Lists::new()), seen)
+    }
+}
+
+#[test]
+fn rows_have_the_points_and_the_answer_of_the_picture() {
+    let (mut ok, mut wide) = (0, 0);
+    let cases = cases();
+    for case in &cases {
+        // The level that the picture itself asks for, told beforehand to both.
+        let own = case.whole(&Sensor::new(&case.sensor).unwrap(), &Seen::default()).level;
+        let mut config = case.sensor.clone();
+        config.binarize.method = Method::Fixed;
+        config.binarize.level = own.max(1).into();
+        let sensor = Sensor::new(&config).unwrap();
+        let (there, here) = (Seen::default(), Seen::default());
+        let (want, got) = (case.whole(&sensor, &there), case.by_rows(&sensor, &here));
+        assert_eq!((want.status, want.level), (got.status, got.level), "{}", case.name);
+        let (there, here) = (there.0.into_inner(), here.0.into_inner());
+        assert_eq!(there.len(), here.len(), "{}: candidates", case.name);
+        let beyond = got.counters.cut_points;
+        if beyond == 0 && got.counters.dropped == want.counters.dropped {
+            assert_eq!(there, here, "{}", case.name);
+        }
+        wide += u32::from(beyond > 0);
+        let mut apart_deg = 0.0;
+        if let (Some(a), Some(b)) = (&want.solution, &got.solution) {
+            ok += 1;
+            let apart: f64 = (0..3).map(|k| f64::from(a.axis.xyz()[k] - b.axis.xyz()[k]).powi(2)).sum();
+            apart_deg = apart.sqrt().to_degrees();
+            if beyond == 0 && got.counters.dropped == want.counters.dropped {
+                assert!(apart_deg < 1e-4, "{}: {apart_deg}", case.name);
+                assert_eq!((a.axis.xyz(), a.covariance.rows()), (b.axis.xyz(), b.covariance.rows()), "{}", case.name);
+            }
+        }
+        let points: usize = there.values().map(Vec::len).sum();
+        println!("{}: {}, {points} points, {beyond} cut, {apart_deg:.6} deg apart", case.name, got.status);
+        // Haze through a long lens, over many more rows than are held and with more pixels on its edges than fit, is another
+        // edge; still the same limb.
+        assert!(apart_deg < 0.1, "{}: {apart_deg}", case.name);
+    }
+    println!("{} pictures, {ok} answers, {wide} with edges wider than the rows held", cases.len());
+    assert!(ok >= 18 && wide * 3 < cases.len() as u32, "{ok} {wide}");
+}
+
+/// What the lists of docs/porting.md take, with their share of a 640×480 picture and of a large one.
+#[test]
+fn memory_without_a_frame() {
+    type Vga = Rows<u8, { HELD as usize * 640 }, 480, 8192, 2560>;
+    type Hd = Rows<u8, { HELD as usize * 1920 }, 1080, 16384, 5120>;
+    type Short = Workspace<f32, 2048, 76, 512>;
+    let (vga, hd, lists) = (size_of::<Vga>(), size_of::<Hd>(), size_of::<Short>());
+    println!("rows of 640×480: {vga} bytes; of 1920×1080: {hd} bytes; workspace for 600 points: {lists} bytes");
+    assert!(vga <= 59_400 && hd <= 139_600 && lists <= 33_500);
+    // They suffice for a flight.
+    let flight = rocket(640, 480, 8, 4);
+    for frame in &flight.frames {
+        let case = hzn_tests::emulated::Case::rendered(frame.file.clone(), &flight.sensor, frame);
+        let mut config = case.sensor.clone();
+        config.binarize.method = Method::Fixed;
+        config.binarize.level = 60.0;
+        let sensor = Sensor::new(&config).unwrap();
+        let expected = sensor.expect(&case.known).unwrap();
+        let mut rows = Box::new(Vga::new());
+        let mut stream = sensor.rows(&mut rows, 8, &expected).unwrap();
+        for row in case.bytes.chunks(640) {
+            stream.push_row(row).unwrap();
+        }
+        let report = stream.finish(&mut Box::new(Short::new()), &hzn_core::pipeline::Unobserved);
+        println!("{}: {} border pixels left out", frame.file, report.counters.dropped);
+        assert_eq!(report.status, Status::Ok, "{:?}", report.counters);
+    }
+}
