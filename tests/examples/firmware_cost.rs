@@ -4,11 +4,12 @@
 
 use std::process::{Command, ExitCode};
 
+use hzn_core::binarize::Method;
 use hzn_core::status::Stage;
 use hzn_core::{Config, Frame, camera};
 use hzn_sim::flight::rocket;
 use hzn_sim::{Disc, FlightFrame, Sky};
-use hzn_tests::emulated::{Board, Case, Measured, bits, measure};
+use hzn_tests::emulated::{Board, Case, Measured, bits, measure, measure_rows};
 
 const HEAD: &str = "# What the firmware costs
 
@@ -206,6 +207,13 @@ fn report() -> Result<String, String> {
         }
     }
     let hard = adversaries(0..SEARCHED);
+    let by_rows = [("clean", true), ("cloudy", false)].map(|(kind, clean)| {
+        let mut cases = frames(640, 480, clean, 3);
+        for case in &mut cases {
+            case.sensor.binarize.method = Method::Fixed;
+        }
+        (kind, cases)
+    });
     let mut out = HEAD.to_owned();
     for board in Board::ALL {
         let measured = measure(board, &usual);
@@ -234,8 +242,16 @@ fn report() -> Result<String, String> {
             measured.iter().chain(&worst).map(|m| m.stack_bytes).max().unwrap_or(0)
         );
         out += "| image | flash, bytes | static RAM, bytes |\n|---|---|---|\n";
-        let [flash, ram] = sizes(board, "flight").ok_or("arm-none-eabi-size cannot be run")?;
-        out += &format!("| flight | {flash} | {ram} |\n");
+        for (image, what) in [("flight", "flight"), ("rows", "row by row, 640×480")] {
+            let [flash, ram] = sizes(board, image).ok_or("arm-none-eabi-size cannot be run")?;
+            out += &format!("| {what} | {flash} | {ram} |\n");
+        }
+        out += "\n| row by row | taking the rows, thousand | the end of the picture, thousand |\n|---|---|---|\n";
+        for (kind, cases) in &by_rows {
+            let measured = measure_rows(board, cases);
+            let most = |call: usize| measured.iter().map(|m| m.calls[call]).max().unwrap_or(0) as f64 / 1e3;
+            out += &format!("| 640×480 {kind} by rows | {:.0} | {:.0} |\n", most(1), most(2));
+        }
     }
     Ok(out)
 }

@@ -151,11 +151,24 @@ pub fn bits(answer: &Answer) -> Vec<u8> {
 /// # Panics
 /// QEMU or the image fails.
 pub fn measure(board: Board, cases: &[Case]) -> Vec<Measured> {
+    run(board, "measure", cases)
+}
+
+/// Runs cases of 640×480 pixels through the image `rows` of a board, row by row. The calls are those of making the
+/// sensor, of taking all rows, and of the end of the picture.
+///
+/// # Panics
+/// QEMU or the image fails.
+pub fn measure_rows(board: Board, cases: &[Case]) -> Vec<Measured> {
+    run(board, "rows", cases)
+}
+
+fn run(board: Board, image: &str, cases: &[Case]) -> Vec<Measured> {
     let dir = tempfile::tempdir().expect("a temporary folder can be made");
     let mut input = Vec::new();
     cases.iter().for_each(|case| case.write(&mut input));
     std::fs::write(dir.path().join("cases.bin"), input).expect("the folder is writable");
-    let status = board.qemu(&board.image("measure"), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
+    let status = board.qemu(&board.image(image), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
     let status = status.expect("qemu-system-arm is installed");
     assert!(status.success(), "{}: the image ended with {status}", board.name());
     let results = std::fs::read(dir.path().join("results.bin")).expect("the image wrote its results");

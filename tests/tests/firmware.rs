@@ -4,12 +4,13 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use hzn_core::binarize;
 use hzn_core::image::Pixels;
 use hzn_core::status::Status;
 use hzn_core::{Config, Frame};
 use hzn_flight::{Parameters, table};
 use hzn_sim::flight::{leo_infrared, rocket};
-use hzn_tests::emulated::{Board, Case, bits, measure};
+use hzn_tests::emulated::{Board, Case, bits, measure, measure_rows};
 use hzn_tests::real::Photograph;
 
 /// Rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and pictures that are none.
@@ -78,6 +79,38 @@ fn same_bits_as_here() {
     }
     println!("{} pictures on two boards, {ok} answers", cases.len());
     assert!(ok as usize >= cases.len(), "most pictures have an answer: {ok} of {}", 2 * cases.len());
+}
+
+/// Row by row, without a frame in memory: the answers of the same pictures in this machine's memory.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn rows_have_the_bits_of_the_picture() {
+    let mut flight = rocket(640, 480, 8, 6);
+    flight.sensor.binarize = binarize::Config { method: binarize::Method::Fixed, level: 60.0, ..Default::default() };
+    let cases: Vec<Case> = flight
+        .frames
+        .iter()
+        .map(|frame| Case {
+            known: Frame { altitude_m: Some(frame.known().altitude_m.unwrap_or(2e5) as f32), ..Frame::default() },
+            ..Case::rendered(frame.file.clone(), &flight.sensor, frame)
+        })
+        .collect();
+    for board in Board::ALL {
+        let mut whole = 0;
+        for (case, there) in cases.iter().zip(measure_rows(board, &cases)) {
+            let here = case.here();
+            assert_eq!((here.status, here.level), (there.answer.status, there.answer.level), "{}", case.name);
+            // Where no list was full the direction has every bit.
+            if there.answer.dropped == here.dropped {
+                whole += 1;
+                assert_eq!(here.direction, there.answer.direction, "{} on {}", case.name, board.core());
+            } else if let (Some(a), Some(b)) = (here.direction, there.answer.direction) {
+                let apart: f32 = a.axis.iter().zip(b.axis).map(|(a, b)| (a - b) * (a - b)).sum();
+                assert!(apart.sqrt().to_degrees() < 0.02, "{}: {}", case.name, apart.sqrt().to_degrees());
+            }
+        }
+        println!("{}: {whole} of {} pictures without a full list", board.core(), cases.len());
+    }
 }
 
 /// The flight image with its files.

@@ -6,6 +6,7 @@ use std::process::Command;
 
 use crate::flight_build::Toolchain;
 use crate::machine::{apt_install, output, root, target};
+use crate::soft_double;
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
 use crate::test::built_with_the_tests;
 
@@ -14,7 +15,7 @@ const BOARDS: [(&str, &str); 2] = [("an386", ""), (M7, M7_FLAGS)];
 const M7: &str = "an500";
 const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
 /// The images of a board.
-const IMAGES: [&str; 2] = ["flight", "measure"];
+const IMAGES: [&str; 3] = ["flight", "measure", "rows"];
 /// Where the costs are written down.
 const COSTS: &str = "docs/firmware-cost.md";
 
@@ -39,11 +40,38 @@ pub(crate) fn build() -> Outcome {
 /// What the tests of the images need is built; then the tests, the costs and the C interface.
 pub(crate) fn test(steps: &mut Steps) -> Outcome {
     build()?;
+    soft_double::look_into(&images("an386").join("measure"))?;
+    looked_over()?;
     built_with_the_tests()?;
     // The whole workspace, so that nothing is built a second time with other features.
     steps.cargo_test(&["--workspace", "--test", "firmware", "--", "--ignored"])?;
     steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
     c_interface()
+}
+
+/// Lints and documents of the workspace, and that the C header is what the library says.
+fn looked_over() -> Outcome {
+    let dir = target().join("firmware/host");
+    let here = ["--package", "hzn-c", "--package", "hzn-fpu"];
+    let on_this_machine = |verb: &str| {
+        let mut command = cargo(&[verb]);
+        command.arg("--target-dir").arg(&dir).args(here);
+        command
+    };
+    steps::run(in_firmware(on_this_machine("test").arg("--quiet"), ""))?;
+    steps::run(in_firmware(on_this_machine("clippy").args(["--all-targets", "--", "-D", "warnings"]), ""))?;
+    steps::run(in_firmware(on_this_machine("doc").arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"), ""))?;
+    let toolchain = Toolchain::find()?;
+    if matches!(toolchain, Toolchain::Debian) {
+        println!("the images' own lints: not with Debian's Rust, which has no clippy for the target");
+        return Ok(());
+    }
+    for (board, flags) in BOARDS {
+        let args = ["--package", "hzn-mps2", "--features", board];
+        let (mut command, _) = toolchain.cargo("clippy", &format!("firmware/{board}"), &args);
+        steps::run(in_firmware(command.args(["--", "-D", "warnings"]), flags))?;
+    }
+    Ok(())
 }
 
 /// `cargo xtask firmware [--write]`: the images, and what they cost.

@@ -14,6 +14,7 @@ mod flight_build;
 mod machine;
 mod python;
 mod reproduce;
+mod soft_double;
 mod steps;
 mod test;
 mod wheel;

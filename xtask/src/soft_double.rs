@@ -1,0 +1,94 @@
+//! On a core without a double-precision unit, a double costs some sixty instructions a sum. The disassembly tells which
+//! functions of a picture's way compute with one: none in a loop over pixels or points.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use crate::machine::output;
+use crate::steps::{Outcome, Trouble};
+
+/// Modules that a picture goes through.
+const STAGES: [&str; 10] = [
+    "binarize",
+    "block",
+    "camera::Camera",
+    "candidates",
+    "contour",
+    "covariance",
+    "estimate",
+    "pipeline::judge",
+    "reject",
+    "select",
+];
+/// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
+/// places where they do.
+const ONCE: [(&str, usize); 6] = [
+    ("hzn_core::binarize::Histogram::otsu", 3),
+    ("hzn_core::reject::keep", 2),
+    ("hzn_core::estimate::fit", 4),
+    ("hzn_core::covariance::fuse", 5),
+    ("hzn_core::select::judge", 7),
+    ("hzn_core::pipeline::judge::Judge<T,O>::edge", 2),
+];
+/// Loops that must be found, or the check would say nothing.
+const LOOPS: [&str; 3] = ["contour::follow", "candidates::", "estimate::pass"];
+
+/// Looks into an image for a core with single precision only.
+pub(crate) fn look_into(image: &Path) -> Outcome {
+    let text = output(Command::new("arm-none-eabi-objdump").args(["-d", "-C", "--no-show-raw-insn"]).arg(image))
+        .ok_or_else(|| Trouble::Failed(format!("{} cannot be disassembled", image.display())))?;
+    let calls = calls_by_function(&text);
+    for part in LOOPS {
+        if !calls.keys().any(|f| f.contains(part)) {
+            return Err(Trouble::Failed(format!("soft double: no function of {part} stands in the image by itself")));
+        }
+    }
+    for (function, &count) in &calls {
+        let staged = STAGES.iter().any(|s| function.contains(&format!("hzn_core::{s}")));
+        let checks = function.contains("Config::check") || function.contains("Camera<T>::try_new");
+        let allowed = ONCE.iter().find(|(f, _)| f == function).map_or(0, |(_, n)| *n);
+        if staged && !checks && count > allowed {
+            return Err(Trouble::Failed(format!(
+                "{function} computes with soft doubles in {count} places, {allowed} are allowed"
+            )));
+        }
+    }
+    println!("soft double: in no loop of a picture's way; {} functions looked into", calls.len());
+    Ok(())
+}
+
+/// Every function, and in how many places it calls the double-precision routines.
+fn calls_by_function(disassembly: &str) -> BTreeMap<String, usize> {
+    let mut calls = BTreeMap::new();
+    let mut function = None;
+    for line in disassembly.lines() {
+        if let Some((_, name)) = line.strip_suffix(">:").and_then(|l| l.split_once(" <")) {
+            function = Some(name.to_owned());
+            calls.entry(name.to_owned()).or_insert(0);
+        } else if let (Some(function), Some((_, target))) = (&function, line.rsplit_once('<'))
+            && is_double(target.trim_end_matches('>'))
+        {
+            *calls.entry(function.clone()).or_insert(0) += 1;
+        }
+    }
+    calls
+}
+
+/// Routines of the run-time ABI with a double in their name: `__aeabi_dadd`, `__aeabi_f2d`, `__aeabi_cdcmple`.
+fn is_double(target: &str) -> bool {
+    target.strip_prefix("__aeabi_").is_some_and(|n| n.starts_with('d') || n.starts_with("cd") || n.ends_with("2d"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calls_are_counted_by_function() {
+        let text = "00000400 <hzn_core::reject::keep>:\n     400:\tbl\t28642 <__aeabi_dmul>\n     404:\tb.w\t100 <__aeabi_f2d>\n\
+                    \n00000500 <other>:\n     500:\tbl\t400 <hzn_core::reject::keep>\n     504:\tbl\t3 <__aeabi_fadd>\n";
+        let calls = calls_by_function(text);
+        assert_eq!(calls, [("hzn_core::reject::keep".to_owned(), 2), ("other".to_owned(), 0)].into());
+    }
+}
