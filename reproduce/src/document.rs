@@ -1,11 +1,11 @@
-//! `docs/reproduction.md`: sections between marks, so that one study can be measured again alone.
+//! Sections of documents between marks, so that one study can be measured again alone.
 
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use hzn_cli::plot::Chart;
 
-use crate::studies::ALL;
+use crate::studies::{ALL, Study};
 
 const HEAD: &str = "# Reproduction
 
@@ -15,6 +15,37 @@ picture follows from its seed and every answer from its picture, so the numbers 
 Sources: **[BB]** Braun & Barf 2022, **[W]** Wang, Wang & Jin 2022, **[B14]** Barf 2014, **[H15]** Barf et al. 2015.
 NEES is the squared error over the covariance (two degrees of freedom): 2 is ideal, more is too sure.
 ";
+
+/// A file that holds sections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Document {
+    /// docs/reproduction.md, which is nothing but sections.
+    Reproduction,
+    /// docs/methods.md, which has places for some.
+    Methods,
+}
+
+impl Document {
+    /// Its name in the docs folder.
+    pub(crate) const fn file(self) -> &'static str {
+        match self {
+            Self::Reproduction => "reproduction.md",
+            Self::Methods => "methods.md",
+        }
+    }
+    /// Its text with the section of `study` in its place.
+    pub(crate) fn put(self, text: &str, study: &Study, section: &str) -> anyhow::Result<String> {
+        match self {
+            Self::Reproduction => Ok(put(text, study.name, section)),
+            Self::Methods => {
+                let old = find(text, study.name).ok_or_else(|| {
+                    anyhow!("{}: no marks {} and {}", self.file(), begin(study.name), end(study.name))
+                })?;
+                Ok(text.replace(old, section))
+            }
+        }
+    }
+}
 
 /// What a study found.
 #[derive(Debug, Default)]
@@ -97,10 +128,10 @@ fn find<'a>(document: &'a str, name: &str) -> Option<&'a str> {
     Some(&rest[..to])
 }
 
-/// The document with this section in its place; the others stay, in the order of the studies.
-pub(crate) fn put(document: &str, name: &str, section: &str) -> String {
+/// docs/reproduction.md with this section in its place; the others stay, in the order of the studies.
+fn put(document: &str, name: &str, section: &str) -> String {
     let mut out = HEAD.to_owned();
-    for study in ALL {
+    for study in ALL.iter().filter(|s| s.document == Document::Reproduction) {
         let text = if study.name == name { Some(section) } else { find(document, study.name) };
         if let Some(text) = text {
             out.push('\n');
@@ -131,14 +162,27 @@ mod tests {
     }
 
     #[test]
-    fn the_document_holds_every_study_and_its_figures() {
+    fn a_section_among_other_text_is_replaced() {
+        let study = ALL.iter().find(|s| s.document == Document::Methods).unwrap();
+        let old = Section::default().markdown(study.name, study.title);
+        let mut new = Section::default();
+        new.text("measured");
+        let new = new.markdown(study.name, study.title);
+        let put = |text: &str| study.document.put(text, study, &new);
+        assert_eq!(put(&format!("before\n{old}after\n")).unwrap(), format!("before\n{new}after\n"));
+        assert!(put("no marks").unwrap_err().to_string().contains(&begin(study.name)));
+    }
+
+    #[test]
+    fn the_documents_hold_every_study_and_its_figures() {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
-        let document = std::fs::read_to_string(docs.join("reproduction.md")).unwrap();
+        let text = |document: Document| std::fs::read_to_string(docs.join(document.file())).unwrap();
         for study in ALL {
+            let document = text(study.document);
             let section = find(&document, study.name).unwrap_or_else(|| panic!("{} was not run", study.name));
             assert!(section.contains(study.title), "{}", study.name);
         }
-        for figure in document.split("](figures/").skip(1) {
+        for figure in text(Document::Reproduction).split("](figures/").skip(1) {
             let file = figure.split(')').next().unwrap();
             assert!(docs.join("figures").join(file).is_file(), "{file}");
         }

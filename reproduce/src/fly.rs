@@ -1,5 +1,7 @@
 //! Flights through sensors: every picture is rendered once and seen by each.
 
+use std::time::Instant;
+
 use anyhow::Context;
 use hzn_core::{Config, HostHorizon};
 use hzn_sim::evaluate::{Answer, Case, Evaluation, Found, pair};
@@ -28,16 +30,29 @@ impl Sensor {
     }
 }
 
+/// What came of a flight through one sensor.
+pub(crate) struct Flown {
+    /// Every picture.
+    pub(crate) cases: Vec<Case>,
+    /// Processing of every picture, µs, while all cores are busy.
+    pub(crate) elapsed_us: Vec<f64>,
+}
+
 /// The pictures of a flight through sensors: cases, one list a sensor.
 pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec<Case>>> {
+    Ok(fly_timed(flight, sensors)?.into_iter().map(|flown| flown.cases).collect())
+}
+
+/// As [`fly`], with times.
+pub(crate) fn fly_timed(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Flown>> {
     let make = || sensors.iter().map(|s| HostHorizon::boxed(&s.config)).collect::<Result<Vec<_>, _>>();
     // Refused here, not in a thread.
     make()?;
-    let seen: Vec<(Truth, Vec<Answer>)> = flight
+    let seen: Vec<(Truth, Vec<(Answer, f64)>)> = flight
         .frames
         .par_iter()
         .map_init(make, |horizons, frame| {
-            let truth = frame.truth()?;
+            let truth = frame.scene.truth_of(flight.sensor.body.kind, &frame.file, frame.time_s)?;
             let picture = frame.render()?;
             let horizons = horizons.as_mut().map_err(|e| *e)?;
             let answers = horizons.iter_mut().zip(sensors);
@@ -48,9 +63,9 @@ pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec
         .collect::<anyhow::Result<_>>()?;
     let truth: Vec<Truth> = seen.iter().map(|(t, _)| t.clone()).collect();
     let of = |i: usize| {
-        let answers: Vec<Answer> = seen.iter().filter_map(|(_, a)| a.get(i).cloned()).collect();
+        let (answers, elapsed_us): (Vec<Answer>, Vec<f64>) = seen.iter().filter_map(|(_, a)| a.get(i).cloned()).unzip();
         let camera = hzn_core::camera::Camera::try_new(&flight.sensor.camera)?;
-        Ok(pair(&answers, &truth, Some(&camera))?)
+        Ok(Flown { cases: pair(&answers, &truth, Some(&camera))?, elapsed_us })
     };
     (0..sensors.len()).map(of).collect()
 }
@@ -61,25 +76,22 @@ fn look(
     frame: &FlightFrame,
     picture: &hzn_sim::Picture,
     truth: &Truth,
-) -> anyhow::Result<Answer> {
+) -> anyhow::Result<(Answer, f64)> {
     let known = match sensor.attitude_sigma_deg {
         Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
         None => frame.known(),
     };
     let expected = horizon.expect(&known).with_context(|| frame.file.clone())?;
+    let begun = Instant::now();
     let report = horizon.process(&picture.view(), &expected);
+    let elapsed_us = begun.elapsed().as_secs_f64() * 1e6;
     let found = report.solution.as_ref().map(|s| Found {
         axis: s.axis.xyz(),
         covariance_rad2: s.covariance.upper_rad2,
         half_angle_deg: Some(s.half_angle_rad.to_degrees()),
     });
-    Ok(Answer {
-        file: frame.file.clone(),
-        time_s: frame.time_s,
-        body: truth.body.clone(),
-        status: report.status,
-        found,
-    })
+    let (file, body) = (frame.file.clone(), truth.body.clone());
+    Ok((Answer { file, time_s: frame.time_s, body, status: report.status, found }, elapsed_us))
 }
 
 /// The one evaluation of cases of one body.

@@ -15,14 +15,14 @@ use clap::Parser;
 
 use studies::{ALL, Effort};
 
-/// Measures again what docs/reproduction.md says, and writes it.
+/// Measures again what docs/reproduction.md and parts of docs/methods.md say, and writes it.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask reproduce")]
 struct Args {
     /// Studies; without one, all
     #[arg(value_name = "STUDY")]
     studies: Vec<String>,
-    /// Frames a scene instead of each study's own number, for a quick look; the document is not written then
+    /// Frames a scene instead of each study's own number, for a quick look; no document is written then
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
     /// Name the studies
@@ -47,8 +47,6 @@ fn main() -> anyhow::Result<()> {
     if args.frames == Some(0) {
         bail!("--frames: must be 1 or more");
     }
-    let path = args.docs.join("reproduction.md");
-    let mut document = std::fs::read_to_string(&path).unwrap_or_default();
     let effort = Effort { frames: args.frames };
     for study in ALL.iter().filter(|s| args.studies.is_empty() || args.studies.iter().any(|n| n == s.name)) {
         println!("{} ...", study.title);
@@ -59,12 +57,14 @@ fn main() -> anyhow::Result<()> {
             continue;
         }
         section.write_figures(&args.docs)?;
-        document = document::put(&document, study.name, &text);
         // After each: what was measured is not lost when a later one is stopped.
-        std::fs::write(&path, &document).with_context(|| path.display().to_string())?;
+        let path = args.docs.join(study.document.file());
+        let document = std::fs::read_to_string(&path).unwrap_or_default();
+        let document = study.document.put(&document, study, &text)?;
+        std::fs::write(&path, document).with_context(|| path.display().to_string())?;
     }
     if args.frames.is_some() {
-        println!("--frames: a quick look; {} is left alone", path.display());
+        println!("--frames: a quick look; the documents are left alone");
     }
     Ok(())
 }

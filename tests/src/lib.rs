@@ -7,13 +7,11 @@
 //! | [`tally`] | errors, sigmas and NEES of many answers |
 //! | [`table`] | accuracy by altitude, noise, visible arc and lens |
 //! | [`disc`] | discs of Sun and Moon |
-//! | [`methods`] | the presets beside each other |
 //! | [`emulated`] | the firmware in QEMU |
 //! | [`real`] | photographs with their sensor.toml, and the fitted limb drawn over them |
 
 pub mod disc;
 pub mod emulated;
-pub mod methods;
 pub mod real;
 pub mod sensors;
 pub mod table;

@@ -74,10 +74,37 @@ fn looked_over() -> Outcome {
     Ok(())
 }
 
-/// `cargo xtask firmware [--write]`: the images, and what they cost.
+/// Features of hzn-core with which the flight image of an M7 is built for [`by_feature`].
+const FEATURES: [&[&str]; 6] = [&[], &["dlr"], &["zju"], &["horace"], &["erf"], &["dlr", "zju", "horace", "erf"]];
+
+/// What the methods of published systems take of flash, as the table of docs/methods.md. That none of them can panic is
+/// shown by the linker.
+fn by_feature() -> Outcome {
+    let toolchain = Toolchain::find()?;
+    let mut table = "| features of hzn-core | flash, bytes |\n|---|---:|\n".to_owned();
+    for features in FEATURES {
+        let named: Vec<String> = features.iter().map(|f| format!("`{f}`")).collect();
+        let chosen: Vec<String> = features.iter().map(|f| format!("hzn-core/{f}")).chain([M7.to_owned()]).collect();
+        let args = ["--package", "hzn-mps2", "--bin", "flight", "--features", &chosen.join(",")];
+        let (mut command, built) = toolchain.cargo("build", &format!("firmware/{M7}"), &args);
+        steps::run(in_firmware(&mut command, M7_FLAGS))?;
+        let size = said(Command::new("arm-none-eabi-size").arg(built.join("flight")))?;
+        let numbers = size.lines().nth(1).unwrap_or_default().split_whitespace().take(2);
+        let flash: u64 = numbers.filter_map(|n| n.parse::<u64>().ok()).sum();
+        let name = if named.is_empty() { "none: the `hzn` chain".to_owned() } else { named.join(", ") };
+        table += &format!("| {name} | {flash} |\n");
+    }
+    println!("{table}");
+    Ok(())
+}
+
+/// `cargo xtask firmware [--write | --by-feature]`: the images, and what they cost.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let go = || -> Outcome {
         std::env::set_current_dir(root())?;
+        if args.iter().any(|a| a == "--by-feature") {
+            return by_feature();
+        }
         build()?;
         let mut table = cargo(&["run", "--quiet", "--release", "--package", "hzn-tests", "--example", "firmware_cost"]);
         let write: &[&str] = if args.iter().any(|a| a == "--write") { &["--write", COSTS] } else { &[] };

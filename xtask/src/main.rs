@@ -31,7 +31,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware> [OPTION]
   bench ransac [--runs N] samplers of outliers beside each other, on simulated edge points
   reproduce [STUDY]... measures again what docs/reproduction.md says, and writes it (see --help there)
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
-                     --write puts the table into docs/firmware-cost.md";
+                     --write puts the table into docs/firmware-cost.md;
+                     --by-feature says instead what the methods of published systems take of flash";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

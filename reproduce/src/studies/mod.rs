@@ -3,13 +3,14 @@
 mod design;
 mod horace;
 mod infrared;
+mod presets;
 mod rocket;
 
 use hzn_core::pipeline::Preset;
 use hzn_core::{Config, body, covariance};
 use hzn_sim::Flight;
 
-use crate::document::Section;
+use crate::document::{Document, Section};
 
 /// How much is done.
 pub(crate) struct Effort {
@@ -30,20 +31,27 @@ pub(crate) struct Study {
     pub(crate) name: &'static str,
     /// The heading.
     pub(crate) title: &'static str,
+    /// Where its section stands.
+    pub(crate) document: Document,
     /// Measures.
     pub(crate) run: fn(&Effort) -> anyhow::Result<Section>,
 }
 
 /// All of them.
 pub(crate) const ALL: &[Study] = &[
-    Study { name: "sensitivity", title: "Covariance by design: [BB] figures 19 to 22", run: design::sensitivity },
-    Study { name: "visibility", title: "Which conic is seen: [BB] figures 6 and 7", run: design::visibility },
-    Study { name: "spherical-earth", title: "Error of a spherical Earth: [BB] figure 8", run: design::spherical_earth },
-    Study { name: "infrared", title: "Infrared Earth sensor: [W] figures 5 to 8", run: infrared::off_nadir },
-    Study { name: "horace", title: "Criteria of HORACE: [B14], [H15]", run: horace::criteria },
-    Study { name: "leo-infrared", title: "Accuracy and honesty: infrared in low orbit", run: infrared::flight },
-    Study { name: "rocket", title: "Accuracy and honesty: sounding rocket", run: rocket::flight },
+    reproduced("sensitivity", "Covariance by design: [BB] figures 19 to 22", design::sensitivity),
+    reproduced("visibility", "Which conic is seen: [BB] figures 6 and 7", design::visibility),
+    reproduced("spherical-earth", "Error of a spherical Earth: [BB] figure 8", design::spherical_earth),
+    reproduced("infrared", "Infrared Earth sensor: [W] figures 5 to 8", infrared::off_nadir),
+    reproduced("horace", "Criteria of HORACE: [B14], [H15]", horace::criteria),
+    reproduced("leo-infrared", "Accuracy and honesty: infrared in low orbit", infrared::flight),
+    reproduced("rocket", "Accuracy and honesty: sounding rocket", rocket::flight),
+    Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compared },
 ];
+
+const fn reproduced(name: &'static str, title: &'static str, run: fn(&Effort) -> anyhow::Result<Section>) -> Study {
+    Study { name, title, document: Document::Reproduction, run }
+}
 
 /// The radical inverse: points that fill 0…1 evenly, the same in every run.
 fn halton(mut index: usize, base: usize) -> f64 {
