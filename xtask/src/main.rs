@@ -5,6 +5,7 @@
 //! cargo xtask bench    hzn-core beside the OpenCV recipe, in one run
 //! cargo xtask reproduce  our numbers beside the published ones, into docs/reproduction.md
 //! cargo xtask firmware the images for the flight computer, and what they cost in instructions
+//! cargo xtask viewer   the picture of the viewer's window in the documents
 //! ```
 #![forbid(unsafe_code)]
 
@@ -17,11 +18,12 @@ mod reproduce;
 mod soft_double;
 mod steps;
 mod test;
+mod viewer;
 mod wheel;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware> [OPTION]...
+const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|viewer> [OPTION]...
 
   test [STEP]...     all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
@@ -32,7 +34,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware> [OPTION]
   reproduce [STUDY]... measures again what docs/reproduction.md says, and writes it (see --help there)
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into docs/firmware-cost.md;
-                     --by-feature says instead what the methods of published systems take of flash";
+                     --by-feature says instead what the methods of published systems take of flash
+  viewer             makes docs/viewer.png anew, after `cargo xtask test demo`";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         "bench" => bench::run(rest),
         "reproduce" => reproduce::run(rest),
         "firmware" => firmware::run(rest),
+        "viewer" => viewer::run(),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");
             Ok(())

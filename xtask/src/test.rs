@@ -6,7 +6,7 @@ use std::process::Command;
 
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
-use crate::{firmware, flight_build, python, wheel};
+use crate::{firmware, flight_build, python, viewer, wheel};
 
 pub(crate) fn run(only: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
@@ -41,6 +41,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("flight build", |_| flight_build::run_step());
     all.step("firmware", firmware::test);
     all.step("demo", |_| demo());
+    all.step("viewer", |_| viewer::test());
     all.step("simulator rendered again", |_| simulator_rendered_again());
     all.step("files read by others", |_| files_read_by_others());
     all.step("wheel", |_| {
@@ -70,7 +71,7 @@ pub(crate) fn built_with_the_tests() -> Outcome {
 }
 
 /// Where the demo's files go.
-fn demo_dir() -> PathBuf {
+pub(crate) fn demo_dir() -> PathBuf {
     target().join("xtask").join("hzn-demo")
 }
 

@@ -9,11 +9,13 @@
 //! [`document`] reads TOML files of other crates, such as scene.toml, in the same way.
 //!
 //! Whatever is wrong with a file comes back as a [`Problem`]: which file, which line, which field, what was expected
-//! and, for a misspelt name, the nearest valid one. [`template`] writes a commented sensor.toml to start from.
+//! and, for a misspelt name, the nearest valid one. [`template`] writes a commented sensor.toml to start from; [`keys`]
+//! is what every key of it means.
 
 pub mod camera_file;
 pub mod document;
 pub mod frames;
+pub mod keys;
 mod located;
 mod nearest;
 mod problem;

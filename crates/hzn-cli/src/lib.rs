@@ -2,8 +2,7 @@
 //!
 //! `main.rs` turns [`main`]'s answer into an exit code. Commands live in [`commands`], one file each; they are put
 //! together from [`input`] (where pictures come from), [`engine`] (all cores, results in order), [`output`] (where
-//! results go) and [`overlay`] and
-//! [`plot`] (what is drawn).
+//! results go), [`overlay`] and [`plot`] (what is drawn) and [`words`] (what is said).
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when nobody reads; `tell` does not")]
 
@@ -18,6 +17,7 @@ mod progress;
 pub mod scene;
 mod setup;
 mod tell;
+pub mod words;
 
 use clap::Parser;
 

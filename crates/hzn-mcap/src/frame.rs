@@ -19,6 +19,8 @@ pub struct FrameRecord {
     pub annotations: Annotations,
     /// Attitude of the camera, when it is known.
     pub attitude: Option<Attitude>,
+    /// What was known about the picture beforehand; with it the same answer can be worked out again.
+    pub given: Given,
     /// Messages about this frame.
     pub log: Vec<LogLine>,
 }
@@ -32,6 +34,7 @@ impl FrameRecord {
             image: None,
             annotations: Annotations::default(),
             attitude: None,
+            given: Given::default(),
             log: Vec::new(),
         }
     }
@@ -146,6 +149,30 @@ pub struct Attitude {
     pub q_ecef_from_camera_wxyz: [f64; 4],
     /// Position of the camera in ECEF, metres; zeros when it is unknown.
     pub position_m: [f64; 3],
+}
+
+/// What was known about a picture before it was looked at: the columns of frames.csv, in numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Given {
+    /// UTC in seconds since 1970.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub utc_s: Option<f64>,
+    /// Altitude, kilometres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub altitude_km: Option<f64>,
+    /// Position in ECEF, kilometres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_km: Option<[f64; 3]>,
+    /// Prior attitude, camera to ECEF, scalar first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub q_ecef_from_camera_wxyz: Option<[f64; 4]>,
+    /// 1-sigma of that attitude, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attitude_sigma_deg: Option<f64>,
+    /// Direction to the Sun in the camera frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sun_camera: Option<[f64; 3]>,
 }
 
 /// How much a message matters.

@@ -75,7 +75,7 @@ impl ImageReader {
 }
 
 /// Which decoder a channel's pictures need; `None` for other messages.
-fn decoder(schema: &str, encoding: &str) -> Option<fn(&str, &[u8]) -> Decoded> {
+pub(crate) fn decoder(schema: &str, encoding: &str) -> Option<fn(&str, &[u8]) -> Decoded> {
     match (schema, encoding) {
         ("foxglove.CompressedImage" | "foxglove.RawImage", "protobuf") => {
             Some(|schema, data| messages::parse_image(schema, data).map(|image| (image, None)))
@@ -86,7 +86,7 @@ fn decoder(schema: &str, encoding: &str) -> Option<fn(&str, &[u8]) -> Decoded> {
         _ => None,
     }
 }
-type Decoded = Result<(EncodedImage, Option<f64>), String>;
+pub(crate) type Decoded = Result<(EncodedImage, Option<f64>), String>;
 
 impl Iterator for ImageReader {
     type Item = Result<InputImage, Error>;

@@ -11,6 +11,7 @@
 //! - [`Writer`] writes a `.part` file that survives the end of the program at any moment and gets its name at the end.
 //! - [`Reader`] gives the frames back, from broken files too; [`recover`] closes one, [`resume`] goes on with one.
 //! - [`ImageReader`] takes pictures out of anybody's MCAP, as an input.
+//! - [`Index`] tells where everything stands without reading pictures, [`Pictures`] then reads any one of them.
 //!
 //! # The file
 //!
@@ -21,7 +22,7 @@
 //!
 //! | topic | schema | encoding |
 //! |---|---|---|
-//! | `/hzn/report` | `hzn.Report`, the row plus `candidate_edges` | JSON |
+//! | `/hzn/report` | `hzn.Report`, the row plus `candidate_edges` and `given` | JSON |
 //! | `/camera/image` | `foxglove.CompressedImage`, or `foxglove.RawImage` for raw frames | protobuf |
 //! | `/camera/calibration` | `foxglove.CameraCalibration`, at the start and at most once a second | protobuf |
 //! | `/camera/annotations` | `foxglove.ImageAnnotations`, pixel corner at integers (+0.5) | protobuf |
@@ -35,6 +36,7 @@ mod container;
 mod error;
 mod frame;
 mod images;
+mod index;
 mod messages;
 mod reader;
 mod recover;
@@ -43,8 +45,11 @@ mod topics;
 mod writer;
 
 pub use error::Error;
-pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
+pub use frame::{
+    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine,
+};
 pub use images::{ImageReader, InputImage};
+pub use index::{Found, Index, Pictures, Place};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, resume};
 pub use row::{Row, RowMeta, body_name, roll_pitch_deg};

@@ -9,7 +9,9 @@ use hzn_core::camera;
 use prost::Message;
 use serde_json::{Map, Value};
 
-use crate::frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
+use crate::frame::{
+    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine,
+};
 use crate::row::Row;
 use crate::topics::Topic;
 
@@ -39,7 +41,7 @@ pub(crate) fn append<M: Message>(message: &M, buffer: &mut Vec<u8>) {
     message.encode_raw(buffer);
 }
 
-/// The JSON of `/hzn/report`: the row without its empty cells, and the candidates.
+/// The JSON of `/hzn/report`: the row without its empty cells, the candidates, and what was known beforehand.
 pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     let mut map = match serde_json::to_value(&frame.row) {
         Ok(Value::Object(map)) => map,
@@ -47,14 +49,19 @@ pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     };
     map.retain(|_, v| !v.is_null());
     map.insert("candidate_edges".into(), serde_json::to_value(&frame.candidates).unwrap_or_default());
+    if frame.given != Given::default() {
+        map.insert("given".into(), serde_json::to_value(frame.given).unwrap_or_default());
+    }
     serde_json::to_vec(&map).unwrap_or_default()
 }
 
-/// The row and candidates of a report.
-pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>), serde_json::Error> {
+/// The row and candidates of a report, and what was known beforehand.
+pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, Given), serde_json::Error> {
     let mut value: Value = serde_json::from_slice(data)?;
-    let edges = value.as_object_mut().and_then(|map| map.remove("candidate_edges")).unwrap_or(Value::Array(Vec::new()));
-    Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?))
+    let mut part = |key: &str| value.as_object_mut().and_then(|map| map.remove(key));
+    let edges = part("candidate_edges").unwrap_or(Value::Array(Vec::new()));
+    let given = part("given").map_or(Ok(Given::default()), serde_json::from_value)?;
+    Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?, given))
 }
 
 /// Appends a picture as a message. The bytes are copied once, straight into the buffer: pictures are nearly all of a

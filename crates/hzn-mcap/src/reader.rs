@@ -183,7 +183,7 @@ impl Reader {
                     logs.entry(m.sequence).or_default().push_back(line);
                 }
                 Topic::Report => {
-                    let (row, candidates) =
+                    let (row, candidates, given) =
                         messages::parse_report(m.data).map_err(|e| broken("report", e.to_string()))?;
                     self.ready.push_back(FrameRecord {
                         row,
@@ -191,6 +191,7 @@ impl Reader {
                         image: take(&mut self.images, m.sequence),
                         annotations: take(&mut annotations, m.sequence).unwrap_or_default(),
                         attitude: take(&mut attitudes, m.sequence),
+                        given,
                         log: logs.remove(&m.sequence).unwrap_or_default().into(),
                     });
                 }

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use hzn_core::camera;
 use hzn_core::status::Status;
 use hzn_mcap::{
-    Annotations, Attitude, CandidateEdge, Contents, EncodedImage, Error, FrameRecord, ImageFormat, ImageReader,
-    LogLevel, LogLine, Options, Reader, Row, RowMeta, Writer, part_path, recover, resume,
+    Annotations, Attitude, CandidateEdge, Contents, EncodedImage, Error, Found, FrameRecord, Given, ImageFormat,
+    ImageReader, Index, LogLevel, LogLine, Options, Place, Reader, Row, RowMeta, Writer, part_path, recover, resume,
 };
 
 const SENSOR: &str = "preset = \"hzn\"\n";
@@ -63,6 +63,7 @@ fn frame(i: u64) -> FrameRecord {
         attitude: i
             .is_multiple_of(2)
             .then_some(Attitude { q_ecef_from_camera_wxyz: [0.5, 0.5, 0.5, 0.5], position_m: [6.6e6, f, 0.0] }),
+        given: Given { altitude_km: Some(230.0), position_km: Some([6601.0, f, 0.1]), ..Given::default() },
         log: vec![LogLine { level: LogLevel::Warning, message: format!("frame {i}") }],
     }
 }
@@ -140,7 +141,7 @@ fn the_schema_names_every_column() {
     let schema: serde_json::Value = serde_json::from_str(hzn_mcap::REPORT_SCHEMA).unwrap();
     let named = schema["properties"].as_object().unwrap();
     assert!(Row::COLUMNS.iter().all(|c| named.contains_key(*c)));
-    assert_eq!(named.len(), Row::COLUMNS.len() + 1);
+    assert_eq!(named.len(), Row::COLUMNS.len() + 2);
 }
 
 /// What a kill leaves: the file cut at any byte. Every frame whose batch was flushed before the cut must come back.
@@ -318,4 +319,87 @@ fn frames_are_finished_within_the_interval() {
     std::thread::sleep(hzn_mcap::FLUSH_INTERVAL);
     writer.flush_if_due().unwrap();
     assert_eq!(read(writer.part()).len(), 1);
+}
+
+/// Everything that an index finds, and whether the file was closed.
+fn index(path: &Path) -> (Vec<Place>, Vec<(Row, Given)>, Index) {
+    let (mut pictures, mut rows) = (vec![], vec![]);
+    let mut index = Index::open(path).unwrap();
+    while let Some(part) = index.next_part().unwrap() {
+        for found in part {
+            match found {
+                Found::Picture(place) => pictures.push(place),
+                Found::Report(row, candidates, given) => {
+                    assert_eq!(candidates, frame(row.index).candidates);
+                    rows.push((*row, given));
+                }
+            }
+        }
+    }
+    (pictures, rows, index)
+}
+
+#[test]
+fn any_picture_is_found_by_its_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = write(&dir.path().join("out.mcap"), 11, 3);
+    let (pictures, rows, found) = index(&path);
+    assert!(found.is_complete());
+    assert_eq!(found.sensor_toml(), Some(SENSOR));
+    assert_eq!(rows, (0..11).map(frame).map(|f| (f.row, f.given)).collect::<Vec<_>>());
+    let mut reader = found.pictures().unwrap();
+    // Backwards: any order will do.
+    for place in pictures.iter().rev() {
+        let expect = frame(place.sequence().into());
+        let image = reader.read(place).unwrap();
+        assert_eq!(image.image.ok(), expect.image);
+        assert!((image.time_s - expect.row.time_s).abs() < 1e-6);
+    }
+    let with_picture = (0..11).filter(|&i| frame(i).image.is_some()).count();
+    assert_eq!(pictures.len(), with_picture);
+}
+
+#[test]
+fn a_cut_recording_is_indexed_as_far_as_it_goes() {
+    let dir = tempfile::tempdir().unwrap();
+    let bytes = fs::read(write(&dir.path().join("out.mcap"), 9, 3)).unwrap();
+    let cut = dir.path().join("cut.mcap");
+    let mut last = 0;
+    for n in (8..bytes.len()).step_by(131) {
+        fs::write(&cut, &bytes[..n]).unwrap();
+        let (pictures, rows, found) = index(&cut);
+        assert_eq!(
+            rows.iter().map(|(row, _)| row.index).collect::<Vec<_>>(),
+            (0..rows.len() as u64).collect::<Vec<_>>()
+        );
+        assert!(rows.len() >= last, "cut at {n}");
+        last = rows.len();
+        let mut reader = found.pictures().unwrap();
+        assert!(pictures.iter().all(|place| reader.read(place).unwrap().image.is_ok()), "cut at {n}");
+    }
+    assert_eq!(last, 9);
+    fs::write(&cut, b"no recording at all").unwrap();
+    assert!(matches!(Index::open(&cut), Err(Error::NotMcap { .. })));
+}
+
+/// Other writers compress pictures together with everything else.
+#[test]
+fn pictures_in_compressed_chunks_are_found_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("theirs.mcap");
+    let mut writer = mcap::Writer::new(std::io::BufWriter::new(fs::File::create(&path).unwrap())).unwrap();
+    let ours = write(&dir.path().join("out.mcap"), 8, 3);
+    let bytes = fs::read(&ours).unwrap();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        writer.write(&message.unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    let (pictures, rows, found) = index(&path);
+    assert_eq!(rows.len(), 8);
+    let mut reader = found.pictures().unwrap();
+    for place in &pictures {
+        assert_eq!(reader.read(place).unwrap().image.ok(), frame(place.sequence().into()).image);
+    }
+    assert_eq!(pictures.len(), index(&ours).0.len());
 }

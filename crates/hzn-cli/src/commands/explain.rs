@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use hzn_calib::FrameData;
-use hzn_core::pipeline::Verdict;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, body};
 use hzn_mcap::Annotations;
@@ -14,7 +13,7 @@ use crate::exit::{Exit, Outcome, usage};
 use crate::input::Picture;
 use crate::setup::{InputArgs, SensorArgs, need_altitude};
 use crate::tell;
-use crate::{output, overlay};
+use crate::{output, overlay, words};
 
 /// Show what happens to one frame: what was kept, what was dropped, and why
 #[derive(Debug, clap::Args)]
@@ -159,7 +158,7 @@ impl Told<'_> {
                         k.points,
                         k.inliers,
                         k.verdict.name(),
-                        self.why(k.verdict)
+                        words::why(k.verdict, &self.config.select)
                     ),
                 );
             }
@@ -255,10 +254,15 @@ impl Told<'_> {
                 z.clamp(-1.0, 1.0).acos().to_degrees()
             ),
         );
-        let (sigma, direction) = principal(s);
+        let (sigma, angle_rad) = words::principal(s);
         line(
             "sigma",
-            format!("{:.5} deg along {}, {:.5} deg across", sigma[0].to_degrees(), direction, sigma[1].to_degrees()),
+            format!(
+                "{:.5} deg along {:.0} deg from image x towards y, {:.5} deg across",
+                sigma[0].to_degrees(),
+                angle_rad.to_degrees(),
+                sigma[1].to_degrees()
+            ),
         );
         if let Some(e) = s.axis_ecef {
             let [x, y, z] = e.xyz();
@@ -282,90 +286,11 @@ impl Told<'_> {
             line("altitude", format!("{:.2} +- {:.2} km from the free fit", h / 1e3, sigma / 1e3));
         }
     }
-
-    fn why(&self, verdict: Verdict) -> String {
-        let s = &self.config.select;
-        match verdict {
-            Verdict::Chosen => "the answer".into(),
-            Verdict::Passed => "passed every gate, but another fits better".into(),
-            Verdict::NoConsensus => "no limb goes through enough of its points".into(),
-            Verdict::FewInliers => format!("fewer than {} inliers (select.min_inliers)", s.min_inliers),
-            Verdict::ShortArc => match s.min_arc_px {
-                Some(px) => format!("inliers cover less than {px} px (select.min_arc_px)"),
-                None => "inliers cover less than a tenth of the picture's diagonal (select.min_arc_px)".into(),
-            },
-            Verdict::Residuals => format!("rms above {} px (select.max_rms_px)", s.max_rms_px),
-            Verdict::HalfAngle => format!(
-                "half-angle more than {} sigma from the expected one (select.max_half_angle_sigma)",
-                s.max_half_angle_sigma
-            ),
-            Verdict::Uncertain => format!("sigma above {} deg (select.max_sigma_deg)", s.max_sigma_deg),
-            Verdict::NoFit => "the fit did not converge".into(),
-            Verdict::Indistinct => {
-                "many of its points lie close beside the fitted limb: a curve through clutter".into()
-            }
-            Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
-            Verdict::Taken => "it is the limb of another body, found before".into(),
-            Verdict::OutOfView => {
-                "the limb that is expected about the fitted axis is not in the picture (select.limb_in_view)".into()
-            }
-            Verdict::Straight => "too short or too rough an edge to tell on which side of it the body is".into(),
-            Verdict::Radius => "the limb is not that wide at any altitude allowed (select.altitude_limits_km)".into(),
-            Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
-        }
-    }
-}
-
-/// Standard deviations along the two principal axes, and the direction of the larger one in the picture.
-fn principal(s: &Solution<f64>) -> ([f64; 2], String) {
-    let [x, y, z] = s.axis.xyz();
-    // Image x and y carried to the axis the short way, as for the rays.
-    let q = 1.0 / (1.0 + z).max(1e-9);
-    let b1 = [1.0 - x * x * q, -x * y * q, -x];
-    let b2 = [-x * y * q, 1.0 - y * y * q, -y];
-    let rows = s.covariance.rows();
-    let form =
-        |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (0..3).map(|j| a[i] * rows[i][j] * b[j]).sum::<f64>()).sum::<f64>();
-    let (p11, p12, p22) = (form(b1, b1), form(b1, b2), form(b2, b2));
-    let half = (p11 + p22) / 2.0;
-    let root = ((p11 - p22) / 2.0).hypot(p12);
-    let angle = (2.0 * p12).atan2(p11 - p22) / 2.0;
-    let direction = format!("{:.0} deg from image x towards y", angle.to_degrees());
-    ([(half + root).max(0.0).sqrt(), (half - root).max(0.0).sqrt()], direction)
 }
 
 /// What to try when there is no answer.
 fn advice(r: &Report<f64>, line: &mut impl FnMut(&str, String)) {
-    let has = |v: Verdict| r.candidates.iter().any(|c| c.verdict == v);
-    let mut tips: Vec<&str> = Vec::new();
-    match r.status {
-        Status::TooDark => tips.push("the picture is darker than gate.min_mean allows: lower it, or expose longer"),
-        Status::TooBright => tips.push("the picture is brighter than gate.max_mean allows: raise it, or expose shorter"),
-        Status::TooFewPoints => tips.push("edges were found, but all are short: lower candidates.min_points"),
-        Status::Truncated => tips.push("the picture has more edges than it may cost to look at: raise limits.max_work, mask structure in view, or set a level above the clouds (binarize.method = \"fixed\")"),
-        Status::Ambiguous => tips.push("two directions fit about equally well: mask structure in view (mask.polygons_px)"),
-        _ => {}
-    }
-    if r.candidates.is_empty() && matches!(r.status, Status::NoLimb) {
-        tips.push(
-            "no edge is long enough: is the limb in view? try another level (binarize.scale, or method = \"fixed\")",
-        );
-    }
-    if has(Verdict::NoConsensus) || has(Verdict::FewInliers) {
-        tips.push("no candidate has the form of the expected limb: check altitude_km, the focal length and the lens model; a larger reject.threshold_px forgives a poor calibration");
-    }
-    if has(Verdict::HalfAngle) {
-        tips.push("a limb was found, but larger or smaller than expected: check altitude and focal length, or raise body.limb_height_sigma_km");
-    }
-    if has(Verdict::Residuals) {
-        tips.push("the edge does not follow the limb closely: check the calibration, or raise select.max_rms_px");
-    }
-    if has(Verdict::ShortArc) || has(Verdict::Uncertain) {
-        tips.push("too little of the limb is in view for a good answer: lower select.min_arc_px or raise select.max_sigma_deg if a poor one will do");
-    }
-    if has(Verdict::Unsupported) {
-        tips.push("an edge fits by chance (cloud, structure): mask what belongs to the vehicle, or try another level");
-    }
+    let mut tips = words::tips(r);
     if tips.is_empty() {
         tips.push("look at the edges that were found: --overlay out.png");
     }

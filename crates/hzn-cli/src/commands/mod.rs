@@ -14,6 +14,7 @@ mod sensitivity;
 mod simulate;
 mod telecommand;
 mod telemetry;
+mod view;
 
 use clap::{Parser, Subcommand};
 
@@ -47,6 +48,7 @@ enum Command {
     Camera(camera::Args),
     Telemetry(telemetry::Args),
     Telecommand(telecommand::Args),
+    View(view::Args),
     Completions(completions::Args),
 }
 
@@ -69,6 +71,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Camera(args) => camera::run(&args),
         Command::Telemetry(args) => telemetry::run(&args),
         Command::Telecommand(args) => telecommand::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Completions(args) => completions::run(&args),
     }
 }

@@ -17,12 +17,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{RecvTimeoutError, bounded};
-use hzn_calib::Frames;
+use hzn_calib::{FrameData, Frames};
 use hzn_core::status::Status;
 use hzn_core::{Config, Report};
 
 pub use sensor::{AnySensor, Processed, prepare};
-pub use trace::{Trace, Traces};
+pub use trace::{Trace, Traces, Watch};
 
 use crate::input::{Item, Source};
 
@@ -56,12 +56,8 @@ pub struct Finished {
     pub name: String,
     /// Time in seconds.
     pub time_s: f64,
-    /// Altitude that frames.csv gives for this frame, kilometres.
-    pub altitude_km: Option<f64>,
-    /// Position in ECEF, kilometres.
-    pub position_km: Option<[f64; 3]>,
-    /// Prior attitude, camera to ECEF, scalar first.
-    pub camera_to_ecef_wxyz: Option<[f64; 4]>,
+    /// What frames.csv says about this frame.
+    pub data: Option<FrameData>,
     /// What came of every body, in order.
     pub found: Vec<Found>,
     /// What is drawn over the picture, when it was asked for.
@@ -243,18 +239,16 @@ fn write_in_order(
 /// Decodes and processes one frame.
 fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
     let Job { index, item } = job;
-    let data = plan.frames.as_ref().and_then(|f| f.get(&item.name));
+    let data = plan.frames.as_ref().and_then(|f| f.get(&item.name)).cloned();
     let size = (u32::from(plan.config.camera.width), u32::from(plan.config.camera.height));
     let decoded = item.payload.decode(Some(size));
     let exif = decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
-    let time_s = data.and_then(|d| d.time_s).or(item.time_s).or(exif).unwrap_or(index as f64 / plan.fps);
+    let time_s = data.as_ref().and_then(|d| d.time_s).or(item.time_s).or(exif).unwrap_or(index as f64 / plan.fps);
     let mut finished = Finished {
         index,
         name: item.name,
         time_s,
-        altitude_km: data.and_then(|d| d.altitude_km),
-        position_km: data.and_then(|d| d.position_km),
-        camera_to_ecef_wxyz: data.and_then(|d| d.camera_to_ecef_wxyz),
+        data,
         found: Vec::new(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
@@ -274,6 +268,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         report: p.report.map_err(|why| why.to_string()),
         elapsed: p.elapsed,
     };
+    let data = finished.data.as_ref();
     finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(found).collect();
     if let Some(traces) = &traces {
         // Here and not in the one thread that writes, which would hold up all the others.

@@ -10,10 +10,10 @@ use hzn_core::frames::{Cov3, Ecef, UnitVec3};
 use hzn_core::image::{ImageView, Pixels};
 use hzn_core::pipeline::Candidate;
 use hzn_core::real::Real;
-use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report, Solution};
+use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Observer, Report, Solution};
 use hzn_sim::ephemeris;
 
-use super::trace::{Clock, Traces};
+use super::trace::{Clock, Traces, Watch};
 
 enum Kind {
     Host(Box<HostHorizon>),
@@ -65,12 +65,9 @@ impl AnySensor {
         data: Option<&FrameData>,
         traces: Option<&Traces>,
     ) -> Vec<Processed> {
-        // Each kind of picture has its own compiled pipeline; behind the enum every pixel would cost a branch.
-        match view {
-            ImageView::Grey8(p) => self.process_pixels(p, data, traces),
-            ImageView::Grey16(p) => self.process_pixels(p, data, traces),
-            ImageView::Colour8(p) => self.process_pixels(p, data, traces),
-            ImageView::Colour16(p) => self.process_pixels(p, data, traces),
+        match traces {
+            Some(traces) => self.process_watched(view, data, traces),
+            None => self.process_watched(view, data, &Clock::default()),
         }
     }
 
@@ -81,9 +78,32 @@ impl AnySensor {
         data: Option<&FrameData>,
         traces: Option<&Traces>,
     ) -> Vec<Processed> {
+        match traces {
+            Some(traces) => self.watch(picture, data, traces),
+            None => self.watch(picture, data, &Clock::default()),
+        }
+    }
+
+    /// As [`Self::process`], with an observer of the caller's own.
+    pub fn process_watched<W: Watch>(
+        &mut self,
+        view: &ImageView<'_>,
+        data: Option<&FrameData>,
+        watch: &W,
+    ) -> Vec<Processed> {
+        // Each kind of picture has its own compiled pipeline; behind the enum every pixel would cost a branch.
+        match view {
+            ImageView::Grey8(p) => self.watch(p, data, watch),
+            ImageView::Grey16(p) => self.watch(p, data, watch),
+            ImageView::Colour8(p) => self.watch(p, data, watch),
+            ImageView::Colour16(p) => self.watch(p, data, watch),
+        }
+    }
+
+    fn watch<P: Pixels, W: Watch>(&mut self, picture: &P, data: Option<&FrameData>, watch: &W) -> Vec<Processed> {
         let mut processed = match &mut self.kind {
-            Kind::Host(h) => run(h, picture, data, traces),
-            Kind::Flight(h) => run(h, picture, data, traces),
+            Kind::Host(h) => run(h, picture, data, watch),
+            Kind::Flight(h) => run(h, picture, data, watch),
         };
         for (&body, processed) in self.bodies.iter().zip(&mut processed) {
             if let (Ok(Report { solution: Some(solution), .. }), Some(direction)) =
@@ -127,22 +147,24 @@ fn frame<T: Real>(data: Option<&FrameData>) -> Frame<T> {
     data.map(|d| d.to_frame(None)).unwrap_or_default()
 }
 
-fn run<P: Pixels, T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+fn run<
+    P: Pixels,
+    T: Real + Into<f64>,
+    W: Watch + Observer<T>,
+    const POINTS: usize,
+    const BLOCKS: usize,
+    const WORDS: usize,
+>(
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
     picture: &P,
     data: Option<&FrameData>,
-    traces: Option<&Traces>,
+    watch: &W,
 ) -> Vec<Processed> {
     let bodies = horizon.config().each_body().len();
     let expected: Vec<_> = (0..bodies).map(|which| horizon.expect_body(which, &frame(data))).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
-    let (reports, times) = match traces {
-        Some(traces) => (horizon.process_each_observed(picture, &known, traces), traces.clock.times()),
-        None => {
-            let clock = Clock::default();
-            (horizon.process_each_observed(picture, &known, &clock), clock.times())
-        }
-    };
+    let reports = horizon.process_each_observed(picture, &known, watch);
+    let times = watch.times();
     let mut done = reports.iter().zip(times);
     // As many reports as bodies of which something could be expected.
     let result = |expected: Result<_, FrameError>| match expected {

@@ -79,16 +79,21 @@ impl Trace {
     }
 }
 
-/// The time spent on each body.
+/// An observer, for either precision, that also takes the time.
+pub trait Watch: Observer<f32> + Observer<f64> {
+    /// The time spent on each body, in their order.
+    fn times(&self) -> Vec<Duration>;
+}
+
+/// The time spent on each body, and nothing else.
 #[derive(Debug, Clone, Default)]
 pub struct Clock {
     since: Cell<Option<Instant>>,
     times: RefCell<Vec<Duration>>,
 }
 
-impl Clock {
-    /// The times in the order of the bodies.
-    pub fn times(&self) -> Vec<Duration> {
+impl Watch for Clock {
+    fn times(&self) -> Vec<Duration> {
         self.times.borrow().clone()
     }
 }
@@ -107,7 +112,7 @@ impl<T> Observer<T> for Clock {
 pub struct Traces {
     /// In the order of the bodies.
     pub each: Vec<Trace>,
-    pub(super) clock: Clock,
+    clock: Clock,
     now: Cell<usize>,
 }
 
@@ -118,6 +123,12 @@ impl Traces {
     }
     fn now(&self) -> Option<&Trace> {
         self.each.get(self.now.get())
+    }
+}
+
+impl Watch for Traces {
+    fn times(&self) -> Vec<Duration> {
+        self.clock.times()
     }
 }
 

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_mcap::{Contents, Options, Reader, part_path};
 
-pub use record::{annotations, answer, limb_lines, records, rows};
+pub use record::{annotations, answer, frame_data, limb_lines, records, rows};
 
 use crate::engine::{Finished, Sink};
 use crate::exit::{Stop, failed, usage};
@@ -202,7 +202,8 @@ pub(crate) fn cannot(path: &Path, error: &std::io::Error) -> Stop {
     failed(advice(path, error))
 }
 
-pub(crate) fn advice(path: &Path, error: &std::io::Error) -> String {
+/// What a write error means, and what to do.
+pub fn advice(path: &Path, error: &std::io::Error) -> String {
     let name = path.display();
     match error.kind() {
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {

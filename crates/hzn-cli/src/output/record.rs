@@ -1,11 +1,13 @@
 //! From a finished frame to the row and the record that files hold.
 
+use hzn_calib::FrameData;
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::{Config, Solution, body};
 use hzn_mcap::{
-    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, Row, RowMeta,
+    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine, Row,
+    RowMeta,
 };
 use hzn_sim::evaluate;
 
@@ -14,15 +16,16 @@ use crate::overlay::limb;
 
 /// The rows of a frame, one for each body.
 pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
+    let data = frame.data.as_ref();
     let of_position =
-        |body: &body::Config| hzn_calib::frames::altitude_at_km(frame.position_km?, body.kind, body.mean_radius_km());
+        |body: &body::Config| hzn_calib::frames::altitude_at_km(data?.position_km?, body.kind, body.mean_radius_km());
     let row = |(body, found): (&body::Config, &Found)| {
         let meta = RowMeta {
             index: frame.index,
             file: frame.name.clone(),
             time_s: frame.time_s,
             body: hzn_mcap::body_name(body.kind).to_owned(),
-            altitude_km: of_position(body).or(frame.altitude_km).or(body.altitude_km),
+            altitude_km: of_position(body).or(data.and_then(|d| d.altitude_km)).or(body.altitude_km),
         };
         match &found.report {
             Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3)),
@@ -37,10 +40,13 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
 pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
     let mut records: Vec<FrameRecord> = rows(frame, config).into_iter().map(FrameRecord::new).collect();
     if let Some(first) = records.first_mut() {
-        first.attitude = frame.camera_to_ecef_wxyz.map(|q| Attitude {
-            q_ecef_from_camera_wxyz: q,
-            position_m: frame.position_km.unwrap_or_default().map(|km| km * 1e3),
-        });
+        if let Some(data) = &frame.data {
+            first.given = given(data);
+            first.attitude = data.camera_to_ecef_wxyz.map(|q| Attitude {
+                q_ecef_from_camera_wxyz: q,
+                position_m: data.position_km.unwrap_or_default().map(|km| km * 1e3),
+            });
+        }
         first.image = frame.picture.take().map(|bytes| {
             let png = matches!(crate::input::picture::format_of(&bytes), Some(image::ImageFormat::Png));
             EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes }
@@ -67,6 +73,33 @@ pub fn answer(row: &Row) -> evaluate::Answer {
         half_angle_deg: row.half_angle_deg,
     });
     evaluate::Answer { file: row.file.clone(), time_s: row.time_s, body: row.body.clone(), status: row.status, found }
+}
+
+/// What a row of frames.csv says, in the form recordings keep it.
+fn given(data: &FrameData) -> Given {
+    Given {
+        utc_s: data.utc_s,
+        altitude_km: data.altitude_km,
+        position_km: data.position_km,
+        q_ecef_from_camera_wxyz: data.camera_to_ecef_wxyz,
+        attitude_sigma_deg: data.attitude_sigma_deg,
+        sun_camera: data.sun_camera,
+    }
+}
+
+/// The row of frames.csv that a recording kept for the picture `file`.
+pub fn frame_data(file: &str, time_s: f64, given: &Given) -> FrameData {
+    FrameData {
+        file: file.to_owned(),
+        line: 0,
+        time_s: Some(time_s),
+        utc_s: given.utc_s,
+        altitude_km: given.altitude_km,
+        position_km: given.position_km,
+        camera_to_ecef_wxyz: given.q_ecef_from_camera_wxyz,
+        attitude_sigma_deg: given.attitude_sigma_deg,
+        sun_camera: given.sun_camera,
+    }
 }
 
 /// What is drawn over a picture.

@@ -1,0 +1,406 @@
+//! Where pictures and reports stand in a recording, so that any one of them can be shown at once.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use crate::container::{Chunk, Fields, MAGIC, MAX_RECORD_BYTES, Message, Op, Record};
+use crate::error::Error;
+use crate::frame::{CandidateEdge, Given};
+use crate::images::{InputImage, decoder};
+use crate::messages;
+use crate::row::Row;
+use crate::topics::Topic;
+use crate::writer::SENSOR_TOML;
+
+/// Where one picture stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Offset of the chunk's record in the file; `None` for a message outside of chunks.
+    chunk: Option<u64>,
+    /// Offset of the message's record: in the file, or in the uncompressed records of a compressed chunk.
+    message: u64,
+    /// Its channel.
+    channel: u16,
+    /// Its log time in nanoseconds.
+    log_time_ns: u64,
+    /// Its sequence number.
+    sequence: u32,
+}
+
+impl Place {
+    /// Sequence number of the message: in our own recordings the frame's index.
+    pub fn sequence(&self) -> u32 {
+        self.sequence
+    }
+    /// Log time in seconds.
+    pub fn log_time_s(&self) -> f64 {
+        self.log_time_ns as f64 * 1e-9
+    }
+}
+
+/// What an index tells, in the order of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Found {
+    /// A picture, which has not been read.
+    Picture(Place),
+    /// The result of one picture and body.
+    Report(Box<Row>, Vec<CandidateEdge>, Given),
+}
+
+/// A channel with pictures, by its schema and encoding.
+#[derive(Debug, Clone)]
+struct Kind {
+    topic: String,
+    schema: String,
+    encoding: String,
+}
+
+/// Goes through a recording of ours, or anybody's with pictures that [`crate::ImageReader`] understands, without reading
+/// the pictures that stand uncompressed. Pictures are those of the first topic that has some. A file that was cut off
+/// tells everything that is whole; [`Index::is_complete`] says so afterwards.
+#[derive(Debug)]
+pub struct Index {
+    file: BufReader<File>,
+    path: PathBuf,
+    position: u64,
+    sensor_toml: Option<String>,
+    schemas: BTreeMap<u16, String>,
+    pictures: BTreeMap<u16, Kind>,
+    reports: Option<u16>,
+    complete: bool,
+    broken_chunks: u64,
+}
+
+impl Index {
+    /// Opens a recording and reads what stands before its first message.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no MCAP.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref().to_path_buf();
+        let read = |source| Error::Read { path: path.clone(), source };
+        let mut file = BufReader::with_capacity(1 << 13, File::open(&path).map_err(read)?);
+        let mut magic = [0; MAGIC.len()];
+        if !fill(&mut file, &mut magic).map_err(read)? || magic != MAGIC {
+            return Err(Error::NotMcap { path });
+        }
+        let mut index = Self {
+            file,
+            path: path.clone(),
+            position: MAGIC.len() as u64,
+            sensor_toml: None,
+            schemas: BTreeMap::new(),
+            pictures: BTreeMap::new(),
+            reports: None,
+            complete: false,
+            broken_chunks: 0,
+        };
+        while let Some((op, length)) = index.head().map_err(read)? {
+            if matches!(op, Op::CHUNK | Op::MESSAGE | Op::DATA_END) {
+                index.file.seek_relative(-9).map_err(read)?;
+                break;
+            }
+            let Some(content) = index.content(length).map_err(read)? else { break };
+            index.outside(op, &content);
+        }
+        Ok(index)
+    }
+
+    /// Text of the attached sensor.toml, where it stands before the first message, as in our own recordings.
+    pub fn sensor_toml(&self) -> Option<&str> {
+        self.sensor_toml.as_deref()
+    }
+    /// At the end: was the recording closed properly?
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+    /// Chunks whose contents were damaged, so far.
+    pub fn broken_chunks(&self) -> u64 {
+        self.broken_chunks
+    }
+
+    /// Are there results in it, as far as it is known by now?
+    pub fn has_reports(&self) -> bool {
+        self.reports.is_some()
+    }
+    /// Number of channels with pictures that are known by now.
+    pub fn channels(&self) -> usize {
+        self.pictures.len()
+    }
+
+    /// What the next part of the file holds, which may be nothing; `None` at the end.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a report cannot be decoded.
+    pub fn next_part(&mut self) -> Result<Option<Vec<Found>>, Error> {
+        let mut found = Vec::new();
+        let more = self.step(&mut found).map_err(|source| Error::Read { path: self.path.clone(), source })??;
+        Ok(more.then_some(found))
+    }
+
+    fn step(&mut self, found: &mut Vec<Found>) -> io::Result<Result<bool, Error>> {
+        let Some((op, length)) = self.head()? else { return Ok(Ok(false)) };
+        match op {
+            Op::DATA_END => {
+                self.complete = true;
+                Ok(Ok(false))
+            }
+            Op::CHUNK => self.chunk(length, found),
+            Op::MESSAGE => {
+                let start = self.position;
+                let Some(content) = self.content(length)? else { return Ok(Ok(false)) };
+                let message = Message::parse(&content);
+                Ok(message.map_or(Ok(()), |m| self.message(&m, None, start, found)).map(|()| true))
+            }
+            _ => {
+                let Some(content) = self.content(length)? else { return Ok(Ok(false)) };
+                self.outside(op, &content);
+                Ok(Ok(true))
+            }
+        }
+    }
+
+    fn chunk(&mut self, length: u64, found: &mut Vec<Found>) -> io::Result<Result<bool, Error>> {
+        let start = self.position;
+        // Times, sizes and CRC, the name of the compression and the length of the records.
+        let mut head = [0; 40];
+        if length < 40 || !fill(&mut self.file, &mut head)? {
+            return Ok(Ok(false));
+        }
+        if head.get(28..32) != Some(&[0; 4]) {
+            self.file.seek_relative(-40)?;
+            let Some(content) = self.content(length)? else { return Ok(Ok(false)) };
+            let Some((chunk, plain)) = Chunk::parse(&Record { op: Op::CHUNK, content }) else {
+                self.broken_chunks += 1;
+                return Ok(Ok(true));
+            };
+            for (op, _, content) in &chunk.index.declared {
+                self.outside(*op, content);
+            }
+            let mut rest = Fields(&plain);
+            while let Some((offset, op, content)) = next_record(&mut rest, plain.len()) {
+                if op == Op::MESSAGE
+                    && let Some(m) = Message::parse(content)
+                    && let Err(e) = self.message(&m, Some(start), offset, found)
+                {
+                    return Ok(Err(e));
+                }
+            }
+            return Ok(Ok(true));
+        }
+        // Plain records: their heads alone are read.
+        let end = start + 9 + length;
+        let mut at = start + 9 + 40;
+        let whole = self.file.get_ref().metadata()?.len() >= end;
+        while whole && at + 9 <= end {
+            let mut head = [0; 9];
+            if !fill(&mut self.file, &mut head)? {
+                break;
+            }
+            let mut f = Fields(&head);
+            let (Some(op), Some(length)) = (f.u8(), f.u64()) else { break };
+            if op == 0 || length > end - at - 9 {
+                self.broken_chunks += 1;
+                break;
+            }
+            let mut skip = length;
+            if op == Op::MESSAGE && length >= 22 {
+                let mut head = [0; 22];
+                if !fill(&mut self.file, &mut head)? {
+                    break;
+                }
+                skip -= 22;
+                let Some(m) = Message::parse(&head) else { break };
+                let mut data = Vec::new();
+                if self.reports == Some(m.channel) {
+                    data.resize(skip as usize, 0);
+                    skip = 0;
+                    if !fill(&mut self.file, &mut data)? {
+                        break;
+                    }
+                }
+                if let Err(e) = self.message(&Message { data: &data, ..m }, Some(start), at, found) {
+                    return Ok(Err(e));
+                }
+            } else if matches!(op, Op::SCHEMA | Op::CHANNEL) {
+                let mut content = vec![0; length as usize];
+                if !fill(&mut self.file, &mut content)? {
+                    break;
+                }
+                self.outside(op, &content);
+                skip = 0;
+            }
+            self.file.seek_relative(skip as i64)?;
+            at += 9 + length;
+        }
+        self.file.seek(SeekFrom::Start(end))?;
+        self.position = end;
+        Ok(Ok(whole))
+    }
+
+    fn message(&mut self, m: &Message<'_>, chunk: Option<u64>, at: u64, found: &mut Vec<Found>) -> Result<(), Error> {
+        if self.reports == Some(m.channel) {
+            let broken = |e: serde_json::Error| Error::Decode {
+                path: self.path.clone(),
+                detail: format!("report of frame {}: {e}", m.sequence),
+            };
+            let (row, candidates, given) = messages::parse_report(m.data).map_err(broken)?;
+            found.push(Found::Report(Box::new(row), candidates, given));
+        } else if self.pictures.contains_key(&m.channel) {
+            let (channel, log_time_ns, sequence) = (m.channel, m.log_time_ns, m.sequence);
+            found.push(Found::Picture(Place { chunk, message: at, channel, log_time_ns, sequence }));
+        }
+        Ok(())
+    }
+
+    /// A reader for the pictures found so far and those to come on the same channels.
+    ///
+    /// # Errors
+    /// The file cannot be opened again.
+    pub fn pictures(&self) -> Result<Pictures, Error> {
+        let file = File::open(&self.path).map_err(|source| Error::Read { path: self.path.clone(), source })?;
+        Ok(Pictures { file, path: self.path.clone(), kinds: self.pictures.clone() })
+    }
+
+    /// A record outside of chunks, or one that a chunk declares.
+    fn outside(&mut self, op: u8, content: &[u8]) {
+        let mut f = Fields(content);
+        match op {
+            Op::SCHEMA => {
+                if let (Some(id), Some(name)) = (f.u16(), f.text()) {
+                    self.schemas.insert(id, name.to_owned());
+                }
+            }
+            Op::CHANNEL => {
+                let (Some(id), Some(schema), Some(topic), Some(encoding)) = (f.u16(), f.u16(), f.text(), f.text())
+                else {
+                    return;
+                };
+                let schema = self.schemas.get(&schema).cloned().unwrap_or_default();
+                if topic == Topic::Report.name() && schema == Topic::Report.schema().0 {
+                    self.reports = Some(id);
+                } else if decoder(&schema, encoding).is_some()
+                    && self.pictures.values().all(|first| first.topic == topic)
+                {
+                    let kind = Kind { topic: topic.to_owned(), schema, encoding: encoding.to_owned() };
+                    self.pictures.insert(id, kind);
+                }
+            }
+            Op::ATTACHMENT => {
+                let text = (|| {
+                    f.bytes(16)?;
+                    let name = f.text()?;
+                    let (_media, size) = (f.text()?, f.u64()?);
+                    let data = f.bytes(usize::try_from(size).ok()?)?;
+                    (name == SENSOR_TOML).then(|| String::from_utf8_lossy(data).into_owned())
+                })();
+                self.sensor_toml = self.sensor_toml.take().or(text);
+            }
+            _ => {}
+        }
+    }
+
+    /// Kind and length of the record at `position`.
+    fn head(&mut self) -> io::Result<Option<(u8, u64)>> {
+        let mut head = [0; 9];
+        if !fill(&mut self.file, &mut head)? {
+            return Ok(None);
+        }
+        let mut f = Fields(&head);
+        let (Some(op), Some(length)) = (f.u8(), f.u64()) else { return Ok(None) };
+        Ok((op != 0 && length <= MAX_RECORD_BYTES).then_some((op, length)))
+    }
+
+    /// The content of the record whose head was read; `None` where the file ends.
+    fn content(&mut self, length: u64) -> io::Result<Option<Vec<u8>>> {
+        let mut content = Vec::new();
+        // No memory is set aside for a length that a broken file only claims to have.
+        (&mut self.file).take(length).read_to_end(&mut content)?;
+        self.position += 9 + length;
+        Ok((content.len() as u64 == length).then_some(content))
+    }
+}
+
+/// The next record of uncompressed records: its offset, kind and content.
+fn next_record<'a>(rest: &mut Fields<'a>, size: usize) -> Option<(u64, u8, &'a [u8])> {
+    let offset = (size - rest.0.len()) as u64;
+    let (op, length) = (rest.u8()?, rest.u64()?);
+    Some((offset, op, rest.bytes(usize::try_from(length).ok()?)?))
+}
+
+fn fill(file: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
+    match file.read_exact(buffer) {
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(e) => Err(e),
+    }
+}
+
+/// Reads pictures of a recording, in any order.
+#[derive(Debug)]
+pub struct Pictures {
+    file: File,
+    path: PathBuf,
+    kinds: BTreeMap<u16, Kind>,
+}
+
+impl Pictures {
+    /// The picture at a place.
+    ///
+    /// # Errors
+    /// The file cannot be read. A picture that is there and cannot be decoded is no error: it says so itself.
+    pub fn read(&mut self, place: &Place) -> Result<InputImage, Error> {
+        let read = |source| Error::Read { path: self.path.clone(), source };
+        let message = match place.chunk {
+            None => record_at(&mut self.file, place.message).map_err(read)?.map(|r| r.content),
+            Some(at) => message_in_chunk(&mut self.file, at, place.message).map_err(read)?,
+        };
+        let broken = |why: &str| InputImage { time_s: place.log_time_s(), image: Err(why.to_owned()) };
+        let Some(message) = message.as_deref().and_then(Message::parse) else {
+            return Ok(broken("the recording does not hold it any more, or is damaged there"));
+        };
+        let kind = self.kinds.get(&place.channel);
+        let Some((kind, decode)) = kind.and_then(|k| Some((k, decoder(&k.schema, &k.encoding)?))) else {
+            return Ok(broken("is on a channel without pictures"));
+        };
+        Ok(match decode(&kind.schema, message.data) {
+            Ok((image, time_s)) => {
+                InputImage { time_s: time_s.unwrap_or_else(|| place.log_time_s()), image: Ok(image) }
+            }
+            Err(why) => broken(&why),
+        })
+    }
+}
+
+fn record_at(file: &mut File, at: u64) -> io::Result<Option<Record>> {
+    file.seek(SeekFrom::Start(at))?;
+    let mut head = [0; 9];
+    if !fill(file, &mut head)? {
+        return Ok(None);
+    }
+    let mut f = Fields(&head);
+    let (Some(op), Some(length)) = (f.u8(), f.u64()) else { return Ok(None) };
+    if length > MAX_RECORD_BYTES {
+        return Ok(None);
+    }
+    let mut content = Vec::new();
+    file.take(length).read_to_end(&mut content)?;
+    Ok((content.len() as u64 == length).then_some(Record { op, content }))
+}
+
+/// Content of the message at an offset of the file, or of the uncompressed records of the compressed chunk at `chunk`.
+fn message_in_chunk(file: &mut File, chunk: u64, message: u64) -> io::Result<Option<Vec<u8>>> {
+    file.seek(SeekFrom::Start(chunk + 9 + 28))?;
+    let mut length = [0; 4];
+    if !fill(file, &mut length)? {
+        return Ok(None);
+    }
+    if length == [0; 4] {
+        return Ok(record_at(file, message)?.map(|r| r.content));
+    }
+    let Some((_, plain)) = record_at(file, chunk)?.as_ref().and_then(Chunk::parse) else { return Ok(None) };
+    let mut rest = Fields(plain.get(message as usize..).unwrap_or_default());
+    Ok(next_record(&mut rest, plain.len()).map(|(_, _, content)| content.to_vec()))
+}

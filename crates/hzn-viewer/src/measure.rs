@@ -1,0 +1,139 @@
+//! How fast the real window is, and how much memory it takes: `hzn-viewer --measure`, for docs/viewer.md.
+
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+
+use crate::model::Look;
+use crate::ui::{Command, Viewer};
+
+/// Changes of a parameter that are timed.
+const CHANGES: usize = 200;
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// From the start of the program to the first frame on the screen.
+    Start,
+    /// From a change of a parameter to the new picture.
+    Tune,
+    /// Memory while all frames are played as fast as they can be.
+    Play,
+}
+
+/// A measurement under way.
+#[derive(Debug)]
+pub struct Measure {
+    kind: Kind,
+    began: Instant,
+    look: Look,
+    changed: Option<Instant>,
+    /// Seen in this pass of the window, which is not on the screen yet.
+    seen: bool,
+    times: Vec<Duration>,
+    frames: usize,
+    shown: Option<usize>,
+}
+
+impl Measure {
+    /// Begins; `began` is the start of the program.
+    pub fn new(kind: Kind, began: Instant) -> Self {
+        let (look, times) = (Look::Colour, Vec::new());
+        Self { kind, began, look, changed: None, seen: false, times, frames: 0, shown: None }
+    }
+
+    /// Before the window is drawn: what was drawn last is on the screen now. True when the measurement is through.
+    pub fn before(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
+        match self.kind {
+            Kind::Start => {
+                if self.seen {
+                    let ms = self.began.elapsed().as_secs_f64() * 1e3;
+                    println!("start to the first frame on the screen: {ms:.0} ms");
+                }
+                self.seen
+            }
+            Kind::Tune => self.tune(viewer),
+            Kind::Play => self.play(viewer, ctx),
+        }
+    }
+
+    /// After the window is drawn.
+    pub fn after(&mut self, viewer: &Viewer, ctx: &egui::Context) {
+        self.seen = viewer.is_settled();
+        if self.seen {
+            // The next pass comes when this one is on the screen.
+            ctx.request_repaint();
+        }
+    }
+
+    fn tune(&mut self, viewer: &mut Viewer) -> bool {
+        if !self.seen {
+            return false;
+        }
+        if let Some(changed) = self.changed.take() {
+            self.times.push(changed.elapsed());
+        }
+        if self.times.len() == CHANGES {
+            self.times.sort();
+            let at = |part: f64| self.times[(part * (CHANGES - 1) as f64) as usize].as_secs_f64() * 1e3;
+            let name = self.look.name();
+            println!(
+                "parameter to new picture on the screen, {name}: median {:.1} ms, 95 % {:.1} ms",
+                at(0.5),
+                at(0.95)
+            );
+            self.times.clear();
+            if self.look == Look::Level {
+                return true;
+            }
+            self.look = Look::Level;
+            viewer.settings_mut().look = Look::Level;
+            self.seen = false;
+            return false;
+        }
+        // A little to and fro, so that every change is one.
+        let scale = 1.0 + 0.002 * (self.times.len() % 100) as f64 + 0.001;
+        if let Some(session) = viewer.session_mut() {
+            session.set("binarize", "scale", 0, Some(scale.into()));
+            session.settle();
+        }
+        (self.changed, self.seen) = (Some(Instant::now()), false);
+        false
+    }
+
+    fn play(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
+        let count = viewer.sequence().len();
+        if self.changed.is_none() {
+            if !self.seen {
+                return false;
+            }
+            (0..8).for_each(|_| viewer.run(Command::Faster, ctx));
+            viewer.run(Command::Play, ctx);
+            self.changed = Some(Instant::now());
+        }
+        let index = viewer.sight().map(|s| s.index);
+        if index != self.shown {
+            (self.shown, self.frames) = (index, self.frames + 1);
+            if self.frames.is_power_of_two() || index == Some(count - 1) {
+                println!(
+                    "{} frames played: {} MB resident, {} MB at most",
+                    self.frames,
+                    memory("VmRSS"),
+                    memory("VmHWM")
+                );
+            }
+        }
+        let through = index == Some(count - 1);
+        if let (true, Some(began)) = (through, self.changed) {
+            println!("{:.1} frames a second", self.frames as f64 / began.elapsed().as_secs_f64());
+        }
+        through
+    }
+}
+
+/// Of this process, in megabytes; 0 where the system does not say.
+fn memory(field: &str) -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix(field)?.strip_prefix(':'));
+    line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).unwrap_or(0) / 1024
+}

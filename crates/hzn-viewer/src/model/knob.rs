@@ -1,0 +1,72 @@
+//! How far a slider goes.
+
+use hzn_calib::keys::Limits;
+
+/// A slider: from, to, and whether its way is logarithmic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Knob {
+    /// Left end.
+    pub low: f64,
+    /// Right end.
+    pub high: f64,
+    /// Logarithmic.
+    pub logarithmic: bool,
+}
+
+impl Knob {
+    /// For a value with these limits that usually is about `usual`; `None` for what is no number. A slider does not reach
+    /// limits that are far from what is usual; they can be typed.
+    pub fn of(limits: &Limits, usual: f64) -> Option<Self> {
+        let Limits::Number { low, above, high } = *limits else { return None };
+        let usual = if usual.abs() > 0.0 { usual.abs() } else { 1.0 };
+        let far = low + usual * 30.0;
+        if high - low <= 40.0 * usual || (high - low <= 1.0) {
+            // A limit that itself is refused is not offered.
+            let low = if above { low + (high - low) * 1e-3 } else { low };
+            return Some(Self { low, high, logarithmic: false });
+        }
+        let high = high.min(far);
+        let low = if above || low > 0.0 { low.max(usual / 30.0) } else { low };
+        Some(Self { low, high, logarithmic: low >= 0.0 })
+    }
+
+    /// A value to begin with, where none counts.
+    pub fn middle(&self) -> f64 {
+        if self.logarithmic && self.low > 0.0 { (self.low * self.high).sqrt() } else { (self.low + self.high) / 2.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(low: f64, above: bool, high: f64) -> Limits {
+        Limits::Number { low, above, high }
+    }
+
+    #[test]
+    fn near_limits_are_reached_and_far_ones_are_not() {
+        let knob = |l: Limits, usual: f64| Knob::of(&l, usual).unwrap();
+        assert_eq!(knob(number(0.0, false, 1.0), 0.15), Knob { low: 0.0, high: 1.0, logarithmic: false });
+        let threshold = knob(number(0.0, true, 1000.0), 3.0);
+        assert_eq!((threshold.low, threshold.high, threshold.logarithmic), (0.1, 90.0, true));
+        let points = knob(number(8.0, false, f64::INFINITY), 40.0);
+        assert_eq!((points.low, points.high), (8.0, 1208.0));
+        let height = knob(number(-50.0, false, 500.0), 10.0);
+        assert!(!height.logarithmic && height.low == -50.0 && height.high <= 500.0);
+        assert!(knob(number(0.0, true, 100.0), 10.0).low > 0.0);
+        assert!(Knob::of(&Limits::Words("words".into()), 1.0).is_none());
+    }
+
+    #[test]
+    fn every_slider_begins_within_its_limits() {
+        for key in hzn_calib::keys::all() {
+            for usual in [0.0, 0.01, 1.0, 300.0] {
+                let Some(knob) = Knob::of(&key.limits, usual) else { continue };
+                let Limits::Number { low, high, .. } = key.limits else { unreachable!() };
+                assert!(knob.low < knob.high && knob.low >= low && knob.high <= high, "{} {knob:?}", key.path());
+                assert!((knob.low..=knob.high).contains(&knob.middle()), "{}", key.path());
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Drawing and editing the mask's polygons with the mouse.
+
+use super::view::Point;
+
+/// Most corners of a polygon, as sensor.toml allows.
+pub const MAX_CORNERS: usize = 16;
+
+/// Polygons, corner by corner.
+pub type Polygons = Vec<Vec<Point>>;
+
+/// A polygon being drawn, or a corner being moved.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MaskEdit {
+    /// Corners of the polygon that is being drawn.
+    pub open: Vec<Point>,
+    grabbed: Option<(usize, usize)>,
+}
+
+fn apart(a: Point, b: Point) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn corner_at(polygons: &Polygons, p: Point, reach: f64) -> Option<(usize, usize)> {
+    let all = polygons.iter().enumerate().flat_map(|(i, c)| (0..c.len()).map(move |j| (i, j)));
+    let near = |&(i, j): &(usize, usize)| apart(polygons[i][j], p);
+    all.min_by(|a, b| near(a).total_cmp(&near(b))).filter(|at| near(at) <= reach)
+}
+
+/// Is the point inside, by the even-odd rule?
+pub fn inside(polygon: &[Point], [x, y]: Point) -> bool {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    edges.filter(|(a, b)| (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0]).count() % 2
+        == 1
+}
+
+impl MaskEdit {
+    /// A corner is set at `p`; on the first one, within `reach`, the polygon is closed. Gives the polygons when one came.
+    pub fn click(&mut self, polygons: &Polygons, p: Point, reach: f64) -> Option<Polygons> {
+        if self.open.len() >= 3 && self.open.first().is_some_and(|first| apart(*first, p) <= reach) {
+            return self.close(polygons);
+        }
+        self.open.push(p);
+        if self.open.len() == MAX_CORNERS { self.close(polygons) } else { None }
+    }
+    /// Closes the polygon, when it is one.
+    pub fn close(&mut self, polygons: &Polygons) -> Option<Polygons> {
+        let new = std::mem::take(&mut self.open);
+        (new.len() >= 3).then(|| polygons.iter().cloned().chain([new]).collect())
+    }
+    /// Takes the last corner back; false when there is none.
+    pub fn back(&mut self) -> bool {
+        self.open.pop().is_some()
+    }
+    /// Takes hold of the corner at `p`, when there is one.
+    pub fn grab(&mut self, polygons: &Polygons, p: Point, reach: f64) -> bool {
+        self.grabbed = corner_at(polygons, p, reach);
+        self.grabbed.is_some()
+    }
+    /// Moves the corner that is held.
+    pub fn drag(&self, polygons: &Polygons, p: Point) -> Option<Polygons> {
+        let (i, j) = self.grabbed?;
+        let mut moved = polygons.clone();
+        *moved.get_mut(i)?.get_mut(j)? = p;
+        Some(moved)
+    }
+    /// Lets the corner go.
+    pub fn release(&mut self) {
+        self.grabbed = None;
+    }
+    /// Is a corner held?
+    pub fn holds(&self) -> bool {
+        self.grabbed.is_some()
+    }
+    /// Removes the corner at `p`, or else the polygon around it. A polygon with fewer than three corners goes.
+    pub fn remove(&self, polygons: &Polygons, p: Point, reach: f64) -> Option<Polygons> {
+        let mut left = polygons.clone();
+        if let Some((i, j)) = corner_at(polygons, p, reach) {
+            left[i].remove(j);
+            if left[i].len() < 3 {
+                left.remove(i);
+            }
+            return Some(left);
+        }
+        let at = polygons.iter().position(|polygon| inside(polygon, p))?;
+        left.remove(at);
+        Some(left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> Polygons {
+        vec![vec![[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]]
+    }
+
+    #[test]
+    fn a_polygon_is_closed_on_its_first_corner() {
+        let mut edit = MaskEdit::default();
+        for p in [[20.0, 20.0], [30.0, 20.0], [30.0, 30.0]] {
+            assert_eq!(edit.click(&square(), p, 2.0), None);
+        }
+        let polygons = edit.click(&square(), [21.0, 20.5], 2.0).unwrap();
+        assert_eq!(polygons.len(), 2);
+        assert_eq!(polygons[1], [[20.0, 20.0], [30.0, 20.0], [30.0, 30.0]]);
+        assert!(edit.open.is_empty());
+        // Two corners are no polygon.
+        edit.click(&square(), [1.0, 1.0], 2.0);
+        edit.click(&square(), [9.0, 1.0], 2.0);
+        assert_eq!(edit.close(&square()), None);
+    }
+
+    #[test]
+    fn the_last_corner_that_can_be_closes_it() {
+        let mut edit = MaskEdit::default();
+        let came: Vec<_> = (0..MAX_CORNERS).filter_map(|i| edit.click(&vec![], [i as f64 * 10.0, 0.0], 2.0)).collect();
+        assert_eq!((came.len(), came[0][0].len()), (1, MAX_CORNERS));
+    }
+
+    #[test]
+    fn corners_are_moved_and_removed() {
+        let mut edit = MaskEdit::default();
+        assert!(!edit.grab(&square(), [5.0, 5.0], 2.0));
+        assert!(edit.grab(&square(), [9.0, 9.0], 2.0));
+        assert_eq!(edit.drag(&square(), [12.0, 13.0]).unwrap()[0][2], [12.0, 13.0]);
+        edit.release();
+        assert_eq!(edit.drag(&square(), [0.0, 0.0]), None);
+        assert_eq!(edit.remove(&square(), [0.5, 0.0], 2.0).unwrap()[0].len(), 3);
+        assert!(edit.remove(&square(), [5.0, 5.0], 2.0).unwrap().is_empty());
+        assert_eq!(edit.remove(&square(), [50.0, 5.0], 2.0), None);
+        let triangle = vec![vec![[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]]];
+        assert!(edit.remove(&triangle, [0.0, 0.0], 1.0).unwrap().is_empty());
+    }
+}

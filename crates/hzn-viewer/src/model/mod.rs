@@ -1,0 +1,23 @@
+//! What the viewer knows and does, without a window: everything here is plain Rust and tested as such.
+
+pub mod knob;
+pub mod mask;
+pub mod plane;
+pub mod playback;
+pub mod rows;
+pub mod sequence;
+pub mod session;
+pub mod settings;
+pub mod sheet;
+pub mod view;
+
+pub use knob::Knob;
+pub use mask::MaskEdit;
+pub use plane::Plane;
+pub use playback::Playback;
+pub use rows::Rows;
+pub use sequence::{Entry, Place, Sequence};
+pub use session::Session;
+pub use settings::{Look, Settings};
+pub use sheet::Sheet;
+pub use view::View;

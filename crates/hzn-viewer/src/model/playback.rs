@@ -1,0 +1,151 @@
+//! Which frame is shown, and playing.
+
+use std::time::Duration;
+
+/// Speeds that can be chosen, times the sequence's own.
+pub const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0];
+/// A sequence without times, or with pauses, is played at this rate at least.
+const SLOWEST_FPS: f64 = 1.0;
+/// Frames a second, at most: more cannot be seen.
+const FASTEST_FPS: f64 = 60.0;
+
+/// The frame that is shown, and how time goes on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Playback {
+    frame: usize,
+    playing: bool,
+    speed: f64,
+    /// Time shown of the frame so far, in the sequence's seconds.
+    spent_s: f64,
+}
+
+impl Default for Playback {
+    fn default() -> Self {
+        Self { frame: 0, playing: false, speed: 1.0, spent_s: 0.0 }
+    }
+}
+
+impl Playback {
+    /// The frame, from 0.
+    pub fn frame(&self) -> usize {
+        self.frame
+    }
+    /// Does time go on by itself?
+    pub fn is_playing(&self) -> bool {
+        self.playing
+    }
+    /// Times the sequence's own speed.
+    pub fn speed(&self) -> f64 {
+        self.speed
+    }
+    /// Goes to a frame; beyond the ends, to the first or last of `count`.
+    pub fn go(&mut self, frame: usize, count: usize) {
+        self.frame = frame.min(count.saturating_sub(1));
+        self.spent_s = 0.0;
+    }
+    /// Steps by some frames, back with a negative number. Playing stops.
+    pub fn step(&mut self, by: isize, count: usize) {
+        self.playing = false;
+        self.go(self.frame.saturating_add_signed(by), count);
+    }
+    /// Starts or stops; at the end it starts over.
+    pub fn toggle(&mut self, count: usize) {
+        self.playing = !self.playing && count > 1;
+        if self.playing && self.frame + 1 >= count {
+            self.go(0, count);
+        }
+    }
+    /// Takes the next faster or slower of [`SPEEDS`].
+    pub fn change_speed(&mut self, faster: bool) {
+        let mut speeds = SPEEDS.iter().copied();
+        let next = if faster { speeds.find(|s| *s > self.speed) } else { speeds.rfind(|s| *s < self.speed) };
+        self.speed = next.unwrap_or(self.speed);
+    }
+    /// Sets the speed.
+    pub fn set_speed(&mut self, speed: f64) {
+        self.speed = speed;
+    }
+
+    /// Time goes on by `elapsed`. `duration_s` gives how long a frame lasts in the sequence's seconds, as far as it is
+    /// known. At most one frame a call: a slow computer plays slower, and shows every frame.
+    pub fn advance(&mut self, elapsed: Duration, count: usize, duration_s: impl Fn(usize) -> Option<f64>) -> bool {
+        if !self.playing {
+            return false;
+        }
+        let known = duration_s(self.frame).filter(|d| *d > 0.0 && d.is_finite());
+        let lasts = known.unwrap_or(1.0).clamp(0.0, self.speed / SLOWEST_FPS).max(self.speed / FASTEST_FPS);
+        self.spent_s += elapsed.as_secs_f64() * self.speed;
+        if self.spent_s < lasts {
+            return false;
+        }
+        // Not more than a frame is owed to the next one.
+        let rest = (self.spent_s - lasts).min(lasts);
+        if self.frame + 1 >= count {
+            self.playing = false;
+            return false;
+        }
+        self.go(self.frame + 1, count);
+        self.spent_s = rest;
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(n: u64) -> Duration {
+        Duration::from_millis(n)
+    }
+
+    #[test]
+    fn frames_last_as_long_as_they_did() {
+        let mut p = Playback::default();
+        p.toggle(10);
+        // 25 frames a second.
+        let frames = (0..100).filter(|_| p.advance(ms(10), 100, |_| Some(0.04))).count();
+        assert_eq!(frames, 25);
+        p.set_speed(0.5);
+        let frames = (0..100).filter(|_| p.advance(ms(10), 1000, |_| Some(0.04))).count();
+        assert!((12..=13).contains(&frames), "{frames}");
+    }
+
+    #[test]
+    fn pauses_and_missing_times_do_not_hold_it_up() {
+        let mut p = Playback::default();
+        p.toggle(10);
+        assert!((0..101).any(|_| p.advance(ms(10), 10, |_| Some(3600.0))));
+        assert!((0..101).any(|_| p.advance(ms(10), 10, |_| None)));
+        assert!((0..101).any(|_| p.advance(ms(10), 10, |_| Some(-5.0))));
+        // Thousands of frames a second: one a call, and a slow call does not make up for it.
+        p.go(0, 1000);
+        p.advance(ms(5000), 1000, |_| Some(1e-6));
+        assert_eq!(p.frame(), 1);
+    }
+
+    #[test]
+    fn it_ends_at_the_end_and_starts_over() {
+        let mut p = Playback::default();
+        p.step(-1, 3);
+        assert_eq!(p.frame(), 0);
+        p.step(100, 3);
+        assert_eq!(p.frame(), 2);
+        p.toggle(3);
+        assert_eq!((p.frame(), p.is_playing()), (0, true));
+        for _ in 0..1000 {
+            p.advance(ms(10), 3, |_| Some(0.1));
+        }
+        assert_eq!((p.frame(), p.is_playing()), (2, false));
+        p.toggle(1);
+        assert!(!p.is_playing(), "a single picture does not play");
+    }
+
+    #[test]
+    fn speeds_end_too() {
+        let mut p = Playback::default();
+        (0..20).for_each(|_| p.change_speed(true));
+        assert_eq!(p.speed(), 20.0);
+        (0..20).for_each(|_| p.change_speed(false));
+        assert_eq!(p.speed(), 0.1);
+    }
+}

@@ -1,0 +1,87 @@
+//! The frames that are there, with what is known about each; it grows while a long recording is still being read.
+
+use std::path::PathBuf;
+
+use hzn_calib::FrameData;
+use hzn_cli::input::Raw;
+
+/// One frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Name of its picture.
+    pub name: String,
+    /// Time in seconds.
+    pub time_s: f64,
+    /// What frames.csv or the recording says about it.
+    pub data: Option<FrameData>,
+    /// Where its picture is.
+    pub place: Place,
+}
+
+/// Where a picture is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Place {
+    /// A picture file.
+    File(PathBuf),
+    /// A headerless file.
+    RawFile(PathBuf, Raw),
+    /// In the recording.
+    Recorded(hzn_mcap::Place),
+    /// The picture of this number in a video.
+    Video(u64),
+    /// The recording was made without pictures, or this one could not be read then.
+    Nowhere,
+}
+
+/// All frames.
+#[derive(Debug, Clone, Default)]
+pub struct Sequence {
+    /// What it is called: a file's or folder's name.
+    pub title: String,
+    /// What was opened.
+    pub inputs: Vec<PathBuf>,
+    /// Folder in which sensor.toml, frames.csv and truth.csv may lie.
+    pub folder: PathBuf,
+    /// Frames, in order.
+    pub entries: Vec<Entry>,
+    /// All frames are there.
+    pub complete: bool,
+}
+
+impl Sequence {
+    /// Number of frames so far.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+    /// No frame yet.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+    /// How long a frame lasts in seconds, until the next one.
+    pub fn duration_s(&self, frame: usize) -> Option<f64> {
+        Some(self.entries.get(frame + 1)?.time_s - self.entries.get(frame)?.time_s)
+    }
+    /// Index of the frame nearest in time.
+    pub fn nearest(&self, time_s: f64) -> Option<usize> {
+        let apart = |e: &Entry| (e.time_s - time_s).abs();
+        let best = self.entries.iter().enumerate().min_by(|(_, a), (_, b)| apart(a).total_cmp(&apart(b)));
+        best.map(|(i, _)| i)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_found_by_their_time() {
+        let entry = |t: f64| Entry { name: format!("{t}"), time_s: t, data: None, place: Place::Nowhere };
+        let s = Sequence { entries: [0.0, 0.5, 2.0].map(entry).to_vec(), ..Sequence::default() };
+        assert_eq!(
+            (s.nearest(-9.0), s.nearest(0.4), s.nearest(1.3), s.nearest(1e9)),
+            (Some(0), Some(1), Some(2), Some(2))
+        );
+        assert_eq!((s.duration_s(1), s.duration_s(2)), (Some(1.5), None));
+        assert_eq!(Sequence::default().nearest(0.0), None);
+    }
+}

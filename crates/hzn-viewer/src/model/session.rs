@@ -1,0 +1,431 @@
+//! The sensor that is being tuned: its text, what it means, and the way back.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use hzn_calib::Problem;
+use hzn_calib::keys::{Key, Limits};
+use hzn_core::{Config, Preset};
+use toml_edit::Value;
+
+use super::sheet::{self, Sheet};
+
+/// Steps that can be undone.
+const MAX_UNDO: usize = 500;
+
+/// A sensor.toml in the making. The text is the truth: a change of a parameter is a change of the text, which is then
+/// read as any sensor.toml is.
+#[derive(Debug, Clone)]
+pub struct Session {
+    /// The file that is written by [`Session::save`]; `None` where the text came out of a recording.
+    path: Option<PathBuf>,
+    /// Named in messages, and a camera `file` is looked for beside it.
+    home: PathBuf,
+    saved: Sheet,
+    sheet: Sheet,
+    undo: Vec<Sheet>,
+    redo: Vec<Sheet>,
+    /// The key whose changes are one step, as long as they follow one another.
+    gesture: Option<String>,
+    config: Option<Arc<Config>>,
+    values: toml::Table,
+    problem: Option<Problem>,
+    changes: u64,
+}
+
+impl Session {
+    /// Begins with a text. `home` is the file that it stands in, or would stand in.
+    pub fn new(text: &str, home: &Path, is_file: bool) -> Self {
+        let sheet = Sheet::new(text);
+        let mut session = Self {
+            path: is_file.then(|| home.to_owned()),
+            home: home.to_owned(),
+            saved: sheet.clone(),
+            sheet,
+            undo: Vec::new(),
+            redo: Vec::new(),
+            gesture: None,
+            config: None,
+            values: toml::Table::new(),
+            problem: None,
+            changes: 0,
+        };
+        session.read();
+        session
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// It cannot be read; what is wrong with its text is a [`Session::problem`].
+    pub fn open(path: &Path) -> Result<Self, Problem> {
+        let text = std::fs::read_to_string(path).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
+        Ok(Self::new(&text, path, true))
+    }
+
+    /// The text.
+    pub fn sheet(&self) -> &Sheet {
+        &self.sheet
+    }
+    /// The text as it was read or last saved.
+    pub fn saved(&self) -> &Sheet {
+        &self.saved
+    }
+    /// The file that it belongs to.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+    /// Where it is saved unless another place is named.
+    pub fn home(&self) -> &Path {
+        &self.home
+    }
+    /// The last configuration that was accepted.
+    pub fn config(&self) -> Option<&Arc<Config>> {
+        self.config.as_ref()
+    }
+    /// What is wrong with the text; the configuration is then that of before.
+    pub fn problem(&self) -> Option<&Problem> {
+        self.problem.as_ref()
+    }
+    /// Number of this version of the configuration: no two have the same, in any session.
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+    /// Are there changes that are not saved?
+    pub fn is_changed(&self) -> bool {
+        self.sheet != self.saved
+    }
+    /// Can a change be taken back?
+    pub fn can_undo(&self) -> bool {
+        !self.undo.is_empty()
+    }
+    /// Can a change that was taken back be made again?
+    pub fn can_redo(&self) -> bool {
+        !self.redo.is_empty()
+    }
+
+    /// The value that counts: the text's, or else the preset's; `None` where there is none. Of a body, its own level and
+    /// edge errors come before the sensor's.
+    pub fn value(&self, section: &str, name: &str, body: usize) -> Option<&toml::Value> {
+        let of_body = match self.values.get("bodies").and_then(toml::Value::as_array) {
+            Some(bodies) => bodies.get(body),
+            None => self.values.get("body"),
+        };
+        if section == "body" {
+            return of_body?.get(name);
+        }
+        let own = of_body.and_then(|b| b.get(section)).filter(|_| matches!(section, "binarize" | "covariance"));
+        own.or_else(|| self.values.get(section))?.get(name)
+    }
+
+    /// A number that counts.
+    pub fn number(&self, section: &str, name: &str, body: usize) -> Option<f64> {
+        match self.value(section, name, body)? {
+            toml::Value::Float(x) => Some(*x),
+            toml::Value::Integer(n) => Some(*n as f64),
+            _ => None,
+        }
+    }
+
+    /// Changes a value, or takes it out of the text. Changes of the same key in a row, without [`Session::settle`]
+    /// between them, are one step.
+    pub fn set(&mut self, section: &str, name: &str, body: usize, value: Option<Value>) {
+        let key = format!("{section}.{name}.{body}");
+        match self.sheet.with(sheet::Key { section, name, body }, value) {
+            Ok(sheet) => self.replace(sheet, Some(key)),
+            Err(why) => self.problem = Some(Problem::new(&self.home, why)),
+        }
+    }
+
+    /// Sets a number as the key holds it: whole where the value that counts is whole.
+    pub fn set_number(&mut self, key: &Key, body: usize, x: f64) {
+        let whole = matches!(self.value(&key.section, &key.name, body), Some(toml::Value::Integer(_)))
+            || (self.value(&key.section, &key.name, body).is_none() && is_whole(key));
+        let value = if whole { Value::from(x.round() as i64) } else { Value::from(tidy(x)) };
+        self.set(&key.section, &key.name, body, Some(value));
+    }
+
+    /// Does the text say something else about a key than the saved one?
+    pub fn differs(&self, section: &str, name: &str, body: usize) -> bool {
+        let key = sheet::Key { section, name, body };
+        self.is_changed() && self.sheet.get(key) != self.saved.get(key)
+    }
+
+    /// What the saved text says about a key, which may be nothing.
+    pub fn restore(&mut self, section: &str, name: &str, body: usize) {
+        let value = self.saved.get(sheet::Key { section, name, body });
+        self.set(section, name, body, value.and_then(|v| v.parse().ok()));
+    }
+
+    /// The mask's polygons in pixels.
+    pub fn set_polygons(&mut self, polygons: &[Vec<[f64; 2]>]) {
+        let corner = |[x, y]: &[f64; 2]| Value::from_iter([tidy_px(*x), tidy_px(*y)]);
+        let polygon = |p: &Vec<[f64; 2]>| Value::from_iter(p.iter().map(corner));
+        self.set("mask", "polygons_px", 0, Some(Value::from_iter(polygons.iter().map(polygon))));
+    }
+
+    /// The mask's polygons in pixels.
+    pub fn polygons(&self) -> Vec<Vec<[f64; 2]>> {
+        let config = self.config.iter();
+        config.flat_map(|c| c.mask.polygons_px.iter().map(|p| p.iter().copied().collect())).collect()
+    }
+
+    /// The text is replaced by another.
+    pub fn set_text(&mut self, text: &str) {
+        self.replace(Sheet::new(text), None);
+    }
+
+    /// The same camera, body and mask, under another preset; what else the text says is left out.
+    pub fn under_preset(&self, preset: Preset) -> Self {
+        const KEPT: [&str; 6] = ["camera", "mount", "body", "bodies", "mask", "input"];
+        let mut table: toml::Table = self.sheet.text().parse().unwrap_or_default();
+        table.retain(|key, _| KEPT.contains(&key));
+        let text = format!("preset = \"{}\"\n{table}", preset.name());
+        Self::new(&text, &self.home, false)
+    }
+
+    /// Ends a step: a slider was let go.
+    pub fn settle(&mut self) {
+        self.gesture = None;
+    }
+
+    /// Takes the last step back.
+    pub fn undo(&mut self) {
+        if let Some(sheet) = self.undo.pop() {
+            self.redo.push(std::mem::replace(&mut self.sheet, sheet));
+            self.settle();
+            self.read();
+        }
+    }
+
+    /// Makes the step again that was taken back last.
+    pub fn redo(&mut self) {
+        if let Some(sheet) = self.redo.pop() {
+            self.undo.push(std::mem::replace(&mut self.sheet, sheet));
+            self.settle();
+            self.read();
+        }
+    }
+
+    /// Back to the text that was read or last saved; this can be undone.
+    pub fn reset(&mut self) {
+        self.replace(self.saved.clone(), None);
+    }
+
+    /// Writes the text to `path`, which is then its file. The file is replaced at once, or not at all.
+    ///
+    /// # Errors
+    /// What the disk says, and what to do.
+    pub fn save(&mut self, path: &Path) -> Result<(), String> {
+        let mut part = path.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let write = || {
+            std::fs::write(&part, self.sheet.text())?;
+            std::fs::rename(&part, path)
+        };
+        write().map_err(|e| {
+            let _ = std::fs::remove_file(&part);
+            hzn_cli::output::advice(path, &e)
+        })?;
+        self.saved = self.sheet.clone();
+        (self.path, self.home) = (Some(path.to_owned()), path.to_owned());
+        self.settle();
+        Ok(())
+    }
+
+    fn replace(&mut self, sheet: Sheet, gesture: Option<String>) {
+        if sheet == self.sheet {
+            return;
+        }
+        let before = std::mem::replace(&mut self.sheet, sheet);
+        self.redo.clear();
+        if gesture.is_none() || gesture != self.gesture {
+            self.undo.push(before);
+            if self.undo.len() > MAX_UNDO {
+                self.undo.remove(0);
+            }
+        }
+        self.gesture = gesture;
+        self.read();
+    }
+
+    fn read(&mut self) {
+        match hzn_calib::sensor::parse(self.sheet.text(), &self.home) {
+            Ok(sensor) => {
+                // What was accepted is TOML again; a table that is not would only leave the sliders without values.
+                self.values = toml::Table::try_from(&sensor.config).unwrap_or_default();
+                self.config = Some(Arc::new(sensor.config));
+                self.problem = None;
+                static VERSIONS: AtomicU64 = AtomicU64::new(1);
+                self.changes = VERSIONS.fetch_add(1, Ordering::Relaxed);
+            }
+            Err(problem) => self.problem = Some(problem),
+        }
+    }
+}
+
+/// Is a key without a value a whole number? Its limits tell, where the unit does not.
+fn is_whole(key: &Key) -> bool {
+    key.name == "line_spacing_px"
+        || key.name == "scale_to_height"
+        || (matches!(key.limits, Limits::Number { .. }) && key.unit().is_empty() && key.name.starts_with("erode"))
+}
+
+/// A number as one would write it: five significant digits.
+fn tidy(x: f64) -> f64 {
+    if x == 0.0 || !x.is_finite() {
+        return x;
+    }
+    let digits = (4 - x.abs().log10().floor() as i32).clamp(0, 9);
+    let scale = 10f64.powi(digits);
+    (x * scale).round() / scale
+}
+
+/// A corner of a mask: tenths of a pixel are enough.
+fn tidy_px(x: f64) -> f64 {
+    (x * 10.0).round() / 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hzn_calib::keys;
+
+    const TEXT: &str = "preset = \"hzn\"\n[camera]\nwidth = 640\nheight = 480\nfx_px = 500.0\nfy_px = 500.0\ncx_px = 319.5\ncy_px = 239.5\nmodel = \"pinhole\"\n[reject]\nthreshold_px = 3.0 # mine\n";
+
+    fn session() -> Session {
+        Session::new(TEXT, Path::new("sensor.toml"), false)
+    }
+
+    fn threshold(s: &Session) -> f64 {
+        s.config().unwrap().reject.threshold_px
+    }
+
+    #[test]
+    fn a_change_counts_and_is_undone() {
+        let mut s = session();
+        assert!(!s.is_changed() && s.problem().is_none());
+        s.set("reject", "threshold_px", 0, Some(5.0.into()));
+        assert_eq!(threshold(&s), 5.0);
+        assert!(s.is_changed() && s.can_undo());
+        s.undo();
+        assert_eq!(threshold(&s), 3.0);
+        assert!(!s.is_changed() && s.can_redo());
+        s.redo();
+        assert_eq!(threshold(&s), 5.0);
+        s.reset();
+        assert_eq!((threshold(&s), s.is_changed()), (3.0, false));
+        s.undo();
+        assert_eq!(threshold(&s), 5.0);
+    }
+
+    #[test]
+    fn one_value_goes_back_to_the_files() {
+        let mut s = session();
+        s.set("reject", "threshold_px", 0, Some(5.0.into()));
+        s.set("gate", "max_mean", 0, Some(0.5.into()));
+        assert!(s.differs("reject", "threshold_px", 0) && !s.differs("reject", "seed", 0));
+        s.restore("reject", "threshold_px", 0);
+        s.restore("gate", "max_mean", 0);
+        assert!(!s.differs("reject", "threshold_px", 0));
+        assert_eq!((threshold(&s), s.config().unwrap().gate.max_mean), (3.0, 0.98));
+    }
+
+    #[test]
+    fn a_drag_is_one_step() {
+        let mut s = session();
+        for x in [3.1, 3.7, 4.4] {
+            s.set("reject", "threshold_px", 0, Some(x.into()));
+        }
+        s.settle();
+        s.set("reject", "threshold_px", 0, Some(9.0.into()));
+        s.set("gate", "max_mean", 0, Some(0.5.into()));
+        s.undo();
+        s.undo();
+        assert_eq!(threshold(&s), 4.4);
+        s.undo();
+        assert_eq!(threshold(&s), 3.0);
+        assert!(!s.can_undo());
+    }
+
+    #[test]
+    fn a_refused_value_is_said_and_the_last_good_one_counts() {
+        let mut s = session();
+        s.set("reject", "threshold_px", 0, Some((-1.0).into()));
+        let what = s.problem().unwrap().to_string();
+        assert!(what.contains("[reject] threshold_px") && what.contains("above 0"), "{what}");
+        assert_eq!(threshold(&s), 3.0);
+        s.undo();
+        assert!(s.problem().is_none());
+    }
+
+    #[test]
+    fn values_are_those_that_count() {
+        let s = session();
+        assert_eq!(s.number("reject", "threshold_px", 0), Some(3.0));
+        assert_eq!(s.number("candidates", "keep_points", 0), Some(600.0), "the preset's");
+        assert_eq!(s.number("select", "min_arc_px", 0), None);
+        assert_eq!(s.value("binarize", "method", 0).unwrap().as_str(), Some("otsu"));
+    }
+
+    #[test]
+    fn whole_numbers_stay_whole() {
+        let mut s = session();
+        let key = |path: &str| keys::all().iter().find(|k| k.path() == path).unwrap();
+        s.set_number(key("candidates.keep_points"), 0, 299.7);
+        s.set_number(key("contour.line_spacing_px"), 0, 4.2);
+        s.set_number(key("reject.threshold_px"), 0, 3.0000001);
+        assert!(s.problem().is_none(), "{:?}", s.problem());
+        let config = s.config().unwrap();
+        assert_eq!((config.candidates.keep_points, config.contour.line_spacing_px), (300, Some(4)));
+        assert_eq!(threshold(&s), 3.0);
+    }
+
+    #[test]
+    fn polygons_go_into_the_text_and_back() {
+        let mut s = session();
+        let polygons = vec![vec![[10.04, 5.0], [20.0, 5.0], [10.0, 15.5]]];
+        s.set_polygons(&polygons);
+        assert_eq!(s.polygons(), [[[10.0, 5.0], [20.0, 5.0], [10.0, 15.5]]]);
+        assert!(s.sheet().text().contains("polygons_px = [[[10.0, 5.0], [20.0, 5.0], [10.0, 15.5]]]"));
+    }
+
+    #[test]
+    fn saved_is_what_is_read_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("sensor.toml");
+        let mut s = session();
+        s.set("reject", "threshold_px", 0, Some(5.0.into()));
+        s.save(&path).unwrap();
+        assert!(!s.is_changed());
+        let again = Session::open(&path).unwrap();
+        assert_eq!(again.config(), s.config());
+        assert_eq!(again.sheet().text(), TEXT.replace("3.0", "5.0"));
+        let nowhere = s.save(&dir.path().join("no").join("sensor.toml")).unwrap_err();
+        assert!(nowhere.contains("the folder does not exist"), "{nowhere}");
+        assert!(Session::open(&dir.path().join("none.toml")).is_err());
+    }
+
+    #[test]
+    fn under_another_preset_the_camera_stays() {
+        let mut s = session();
+        s.set("reject", "threshold_px", 0, Some(5.0.into()));
+        let other = s.under_preset(Preset::Dlr2022);
+        assert!(other.problem().is_none(), "{:?}", other.problem());
+        let (a, b) = (s.config().unwrap(), other.config().unwrap());
+        assert_eq!(a.camera, b.camera);
+        assert_eq!(**b, Config::preset(Preset::Dlr2022, a.camera.clone()));
+    }
+
+    #[test]
+    fn an_unreadable_text_is_no_end() {
+        let mut s = Session::new("preset = ", Path::new("sensor.toml"), false);
+        assert!(s.config().is_none() && s.problem().is_some());
+        s.set_text(TEXT);
+        assert!(s.config().is_some() && s.problem().is_none());
+        assert_eq!(tidy(0.000123456), 0.00012346);
+        assert_eq!(tidy(123456.7), 123457.0);
+    }
+}

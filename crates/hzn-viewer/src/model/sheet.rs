@@ -1,0 +1,202 @@
+//! A sensor.toml as text, changed value by value: comments, order and spacing stay as they are.
+
+use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+
+/// The text of a sensor.toml.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Sheet(String);
+
+/// A key: its section (empty for the top) and its name. With several bodies, `body` says which of them is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Key<'a> {
+    /// Section, such as `reject`.
+    pub section: &'a str,
+    /// Name, such as `threshold_px`.
+    pub name: &'a str,
+    /// Which of several bodies, from 0.
+    pub body: usize,
+}
+
+impl Sheet {
+    /// From text.
+    pub fn new(text: impl Into<String>) -> Self {
+        Self(text.into())
+    }
+    /// The text.
+    pub fn text(&self) -> &str {
+        &self.0
+    }
+
+    /// What the text says about a key, as it is written; `None` where it says nothing.
+    pub fn get(&self, key: Key<'_>) -> Option<String> {
+        let mut document: DocumentMut = self.0.parse().ok()?;
+        let value = table(&mut document, key, false)?.get(key.name)?.as_value()?;
+        Some(value.clone().decorated("", "").to_string())
+    }
+
+    /// The text with a value written, or taken out (`None`), so that the preset's counts again.
+    ///
+    /// # Errors
+    /// The text is not TOML, or a section is something else than a section.
+    pub fn with(&self, key: Key<'_>, value: Option<Value>) -> Result<Self, String> {
+        let mut document: DocumentMut = self.0.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
+        let no_section = || format!("[{}] is no section", key.section);
+        match value {
+            None => {
+                if let Some(table) = table(&mut document, key, false) {
+                    table.remove(key.name);
+                }
+            }
+            Some(mut value) => {
+                let table = table(&mut document, key, true).ok_or_else(no_section)?;
+                match table.get_mut(key.name).and_then(Item::as_value_mut) {
+                    Some(own) => {
+                        // The comment behind a value is part of its decoration.
+                        *value.decor_mut() = own.decor().clone();
+                        *own = value;
+                    }
+                    None => {
+                        table.insert(key.name, Item::Value(value));
+                    }
+                }
+            }
+        }
+        Ok(Self(document.to_string()))
+    }
+
+    /// Lines that differ from `other`, with a `-` for those of `other` and a `+` for ours, and no line for what is equal.
+    pub fn diff(&self, other: &Self) -> Vec<String> {
+        let (old, new): (Vec<&str>, Vec<&str>) = (other.0.lines().collect(), self.0.lines().collect());
+        let mut out = Vec::new();
+        let (mut i, mut j) = (0, 0);
+        for (a, b) in common(&old, &new).into_iter().chain([(old.len(), new.len())]) {
+            out.extend(old.get(i..a).unwrap_or_default().iter().map(|l| format!("-{l}")));
+            out.extend(new.get(j..b).unwrap_or_default().iter().map(|l| format!("+{l}")));
+            (i, j) = (a + 1, b + 1);
+        }
+        out
+    }
+}
+
+/// The places of a longest common subsequence of lines, in both.
+fn common(old: &[&str], new: &[&str]) -> Vec<(usize, usize)> {
+    let width = new.len() + 1;
+    let mut longest = vec![0u32; (old.len() + 1) * width];
+    for i in (0..old.len()).rev() {
+        for j in (0..new.len()).rev() {
+            longest[i * width + j] = if old[i] == new[j] {
+                longest[(i + 1) * width + j + 1] + 1
+            } else {
+                longest[(i + 1) * width + j].max(longest[i * width + j + 1])
+            };
+        }
+    }
+    let (mut i, mut j, mut out) = (0, 0, Vec::new());
+    while i < old.len() && j < new.len() {
+        if old[i] == new[j] {
+            out.push((i, j));
+            (i, j) = (i + 1, j + 1);
+        } else if longest[(i + 1) * width + j] >= longest[i * width + j + 1] {
+            i += 1;
+        } else {
+            j += 1;
+        }
+    }
+    out
+}
+
+/// The table that a key belongs into.
+fn table<'a>(document: &'a mut DocumentMut, key: Key<'_>, create: bool) -> Option<&'a mut dyn TableLike> {
+    let root = document.as_table_mut();
+    if key.section.is_empty() {
+        return Some(root);
+    }
+    let several = root.get("bodies").is_some_and(Item::is_array_of_tables);
+    let of_body = match key.section {
+        "body" => true,
+        // A body's own level and edge errors come before those of the sensor.
+        "binarize" | "covariance" => own_section(root, key, several),
+        _ => false,
+    };
+    if !of_body {
+        return section(root, key.section, create);
+    }
+    let body: &mut dyn TableLike = if several {
+        root.get_mut("bodies")?.as_array_of_tables_mut()?.get_mut(key.body)?
+    } else {
+        section(root, "body", create)?
+    };
+    if key.section == "body" { Some(body) } else { body.get_mut(key.section)?.as_table_like_mut() }
+}
+
+/// Has the body a section of this name of its own?
+fn own_section(root: &Table, key: Key<'_>, several: bool) -> bool {
+    let body: Option<&dyn TableLike> = if several {
+        root.get("bodies").and_then(Item::as_array_of_tables).and_then(|a| a.get(key.body)).map(|t| t as &dyn TableLike)
+    } else {
+        root.get("body").and_then(Item::as_table_like)
+    };
+    body.and_then(|b| b.get(key.section)).is_some_and(Item::is_table_like)
+}
+
+fn section<'a>(root: &'a mut Table, name: &str, create: bool) -> Option<&'a mut dyn TableLike> {
+    if create && !root.contains_key(name) {
+        let mut table = Table::new();
+        table.decor_mut().set_prefix("\n");
+        root.insert(name, Item::Table(table));
+    }
+    root.get_mut(name)?.as_table_like_mut()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "# mine\npreset = \"hzn\"   # best\n\n[reject]  # outliers\nthreshold_px = 3.0     # wide\n\n[body]\nkind = \"earth\"\n";
+
+    fn key<'a>(section: &'a str, name: &'a str) -> Key<'a> {
+        Key { section, name, body: 0 }
+    }
+
+    #[test]
+    fn everything_but_the_value_stays() {
+        let sheet = Sheet::new(TEXT).with(key("reject", "threshold_px"), Some(4.5.into())).unwrap();
+        assert_eq!(sheet.text(), TEXT.replace("3.0", "4.5"));
+        assert_eq!(sheet.diff(&Sheet::new(TEXT)), ["-threshold_px = 3.0     # wide", "+threshold_px = 4.5     # wide"]);
+        let back = sheet.with(key("reject", "threshold_px"), Some(3.0.into())).unwrap();
+        assert_eq!(back.text(), TEXT);
+        assert!(back.diff(&Sheet::new(TEXT)).is_empty());
+        let preset = back.with(key("", "preset"), Some("sun".into())).unwrap();
+        assert_eq!(preset.text(), TEXT.replace("\"hzn\"", "\"sun\""));
+    }
+
+    #[test]
+    fn new_keys_and_sections_are_appended() {
+        let sheet = Sheet::new(TEXT).with(key("reject", "seed"), Some(7.into())).unwrap();
+        assert!(sheet.text().contains("# wide\nseed = 7\n"), "{}", sheet.text());
+        let sheet = sheet.with(key("gate", "max_mean"), Some(0.5.into())).unwrap();
+        assert!(sheet.text().ends_with("kind = \"earth\"\n\n[gate]\nmax_mean = 0.5\n"), "{}", sheet.text());
+        let sheet = sheet.with(key("gate", "max_mean"), None).unwrap();
+        assert!(!sheet.text().contains("max_mean"));
+        // What is not there cannot be taken out, and nothing is put in for it.
+        assert_eq!(Sheet::new(TEXT).with(key("mask", "polygons_px"), None).unwrap().text(), TEXT);
+    }
+
+    #[test]
+    fn a_body_of_several_has_its_own_values() {
+        let text = "[binarize]\nscale = 1.0\n[[bodies]]\nkind = \"earth\"\n[[bodies]]\nkind = \"sun\"\n[bodies.binarize]\nlevel = 0.9\n";
+        let at = |section, name, body, value: f64| {
+            Sheet::new(text).with(Key { section, name, body }, Some(value.into())).unwrap().text().to_owned()
+        };
+        assert!(at("body", "altitude_km", 1, 5.0).contains("kind = \"sun\"\naltitude_km = 5.0\n"));
+        assert_eq!(at("binarize", "level", 1, 0.5), text.replace("0.9", "0.5"));
+        assert_eq!(at("binarize", "scale", 0, 2.0), text.replace("1.0", "2.0"));
+        assert!(Sheet::new("mask = 3").with(key("mask", "x"), Some(1.into())).is_err());
+    }
+
+    #[test]
+    fn inline_tables_are_tables() {
+        let sheet = Sheet::new("reject = { seed = 1 }\n").with(key("reject", "seed"), Some(2.into())).unwrap();
+        assert_eq!(sheet.text(), "reject = { seed = 2 }\n");
+    }
+}

@@ -1,0 +1,205 @@
+//! Where to: a line to type a path into, with the system's own dialog behind a button.
+
+use std::path::{Path, PathBuf};
+
+use crossbeam_channel::{Receiver, bounded};
+use egui::{Key, RichText};
+
+use super::viewer::Viewer;
+use crate::model::sheet::Sheet;
+use crate::work::export;
+
+/// What a path is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    Open,
+    SaveSensor,
+    Compare,
+    Picture,
+    Video,
+    Table,
+    Rerun,
+}
+
+impl Purpose {
+    fn title(self) -> &'static str {
+        match self {
+            Self::Open => "Open",
+            Self::SaveSensor => "Save sensor.toml as",
+            Self::Compare => "Compare with",
+            Self::Picture => "Save picture with overlays",
+            Self::Video => "Save video with overlays",
+            Self::Table => "Save results",
+            Self::Rerun => "Run all frames into a new recording",
+        }
+    }
+    fn hint(self) -> &'static str {
+        match self {
+            Self::Open => "A recording (.mcap), a folder of pictures, a picture, a video, or a sensor.toml",
+            Self::SaveSensor => "Comments are kept",
+            Self::Compare => "Another sensor.toml for the same camera",
+            Self::Picture => "PNG in the picture's own size",
+            Self::Video => "By the ending: .mp4, .mkv, .webm; needs ffmpeg on PATH",
+            Self::Table => ".csv or .jsonl, with the results that are shown",
+            Self::Rerun => ".mcap with the parameters as they are now",
+        }
+    }
+    fn writes(self) -> bool {
+        !matches!(self, Self::Open | Self::Compare)
+    }
+}
+
+/// A path is being asked for.
+pub(super) struct Asking {
+    purpose: Purpose,
+    text: String,
+    /// The system's dialog is open.
+    browsing: Option<Receiver<Option<PathBuf>>>,
+    focus: bool,
+}
+
+impl Asking {
+    pub(super) fn new(purpose: Purpose, start: &Path) -> Self {
+        Self { purpose, text: start.display().to_string(), browsing: None, focus: true }
+    }
+
+    /// The system's dialog, on a thread of its own: it may take as long as the user does.
+    fn browse(&mut self, folder: bool) {
+        let (send, receive) = bounded(1);
+        let (purpose, text) = (self.purpose, PathBuf::from(&self.text));
+        std::thread::spawn(move || {
+            let start = if text.is_dir() { Some(text.as_path()) } else { text.parent() };
+            let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
+            if let Some(start) = start.filter(|p| p.is_dir()) {
+                dialog = dialog.set_directory(start);
+            }
+            let picked = match (purpose.writes(), folder) {
+                (true, _) => {
+                    let name = text.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                    dialog.set_file_name(name).save_file()
+                }
+                (false, true) => dialog.pick_folder(),
+                (false, false) => dialog.pick_file(),
+            };
+            let _ = send.send(picked);
+        });
+        self.browsing = Some(receive);
+    }
+}
+
+/// What the system's dialog has come to.
+pub(super) fn poll(viewer: &mut Viewer) {
+    let Some(asking) = &mut viewer.asking else { return };
+    let Some(answer) = asking.browsing.as_ref().and_then(|b| b.try_recv().ok()) else { return };
+    asking.browsing = None;
+    if let Some(path) = answer {
+        asking.text = path.display().to_string();
+        // A file that is picked is opened; a name to write to can still be looked at.
+        if !asking.purpose.writes() {
+            accept(viewer);
+        }
+    }
+}
+
+pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
+    diff(viewer, ctx);
+    let Some(asking) = &mut viewer.asking else { return };
+    let (mut accepted, mut closed) = (false, false);
+    let response = egui::Modal::new(egui::Id::unique("asking")).show(ctx, |ui| {
+        ui.set_width(560.0);
+        ui.heading(asking.purpose.title());
+        ui.weak(asking.purpose.hint());
+        ui.add_space(6.0);
+        let label = ui.label("Path");
+        let field =
+            ui.add(egui::TextEdit::singleline(&mut asking.text).desired_width(f32::INFINITY)).labelled_by(label.id);
+        if std::mem::take(&mut asking.focus) {
+            field.request_focus();
+        }
+        accepted |= field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+        let exists = Path::new(asking.text.trim()).exists();
+        if asking.purpose.writes() && exists && !Path::new(asking.text.trim()).is_dir() {
+            ui.colored_label(ui.visuals().warn_fg_color, "There is a file of this name; it would be replaced.");
+        } else {
+            ui.label("");
+        }
+        ui.horizontal(|ui| {
+            accepted |= ui.button(if asking.purpose.writes() { "Write" } else { "Open this" }).clicked();
+            closed |= ui.button("Never mind").clicked();
+            ui.separator();
+            let idle = asking.browsing.is_none();
+            if ui.add_enabled(idle, egui::Button::new("Browse…")).clicked() {
+                asking.browse(false);
+            }
+            if asking.purpose == Purpose::Open && ui.add_enabled(idle, egui::Button::new("Browse folders…")).clicked()
+            {
+                asking.browse(true);
+            }
+        });
+    });
+    if asking.browsing.is_some() {
+        ctx.request_repaint_after(std::time::Duration::from_millis(50));
+    }
+    if accepted {
+        accept(viewer);
+    } else if closed || response.should_close() {
+        viewer.asking = None;
+    }
+}
+
+fn accept(viewer: &mut Viewer) {
+    let Some(asking) = viewer.asking.take() else { return };
+    let path = PathBuf::from(asking.text.trim());
+    if path.as_os_str().is_empty() {
+        return;
+    }
+    match asking.purpose {
+        Purpose::Open => viewer.open_paths(vec![path]),
+        Purpose::SaveSensor => {
+            if let Some(session) = &mut viewer.session {
+                match session.save(&path) {
+                    Ok(()) => viewer.say(format!("Saved: {}", path.display())),
+                    Err(why) => viewer.say_bad(why),
+                }
+            }
+        }
+        Purpose::Compare => viewer.compare_with_file(&path),
+        Purpose::Picture => {
+            let layers = if viewer.layers_hidden { Vec::new() } else { viewer.settings.layers.clone() };
+            let result = viewer.sight.as_ref().map(|s| export::picture(s, &layers, &path));
+            match result {
+                Some(Ok(())) => viewer.say(format!("Written: {}", path.display())),
+                Some(Err(why)) => viewer.say_bad(why),
+                None => {}
+            }
+        }
+        Purpose::Video => viewer.export_video(path),
+        Purpose::Table => match export::table(viewer.rows.all(), &path) {
+            Ok(n) => viewer.say(format!("{n} results written: {}", path.display())),
+            Err(why) => viewer.say_bad(why),
+        },
+        Purpose::Rerun => viewer.process_all(Some(path)),
+    }
+}
+
+/// What differs from the file.
+fn diff(viewer: &mut Viewer, ctx: &egui::Context) {
+    if !viewer.showing_diff {
+        return;
+    }
+    let Some(session) = &viewer.session else { return };
+    let lines = Sheet::diff(session.sheet(), session.saved());
+    let mut open = true;
+    egui::Window::new("Changes against the file").open(&mut open).default_width(560.0).show(ctx, |ui| {
+        if lines.is_empty() {
+            ui.label("Nothing has changed.");
+        }
+        egui::ScrollArea::vertical().max_height(400.0).show(ui, |ui| {
+            for line in &lines {
+                let colour = if line.starts_with('+') { super::theme::INLIER } else { super::theme::REJECTED };
+                ui.add(egui::Label::new(RichText::new(line).monospace().color(colour)).wrap());
+            }
+        });
+    });
+    viewer.showing_diff = open;
+}

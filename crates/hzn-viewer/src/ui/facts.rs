@@ -1,0 +1,165 @@
+//! What each stage did, in short lines.
+
+use hzn_core::status::{Stage, Status};
+use hzn_core::{Config, body};
+
+use crate::work::sight::{Answer, Outcome, Sight};
+
+/// A card of the stages' column: its title, the stage that it shows, the sections of sensor.toml that belong to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Card {
+    pub(super) title: &'static str,
+    pub(super) stage: Option<Stage>,
+    pub(super) sections: &'static [&'static str],
+    pub(super) open: bool,
+}
+
+const fn card(title: &'static str, stage: Option<Stage>, sections: &'static [&'static str], open: bool) -> Card {
+    Card { title, stage, sections, open }
+}
+
+/// All cards, in the order of a picture's way.
+pub(super) const CARDS: &[Card] = &[
+    card("Picture", None, &["input", "gate"], false),
+    card("Body", None, &["body"], false),
+    card("Level", Some(Stage::Binarize), &["binarize"], true),
+    card("Mask", None, &["mask"], false),
+    card("Contour", Some(Stage::Contour), &["contour"], false),
+    card("Candidates", Some(Stage::Candidates), &["candidates"], true),
+    card("Undistort", Some(Stage::Undistort), &["camera"], false),
+    card("Reject", Some(Stage::Reject), &["reject"], true),
+    card("Estimate", Some(Stage::Estimate), &["estimate"], false),
+    card("Covariance", Some(Stage::Covariance), &["covariance"], false),
+    card("Select", Some(Stage::Select), &["select"], false),
+    card("Recover", None, &["recover"], false),
+];
+
+/// What went in, what came out, what was dropped.
+pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answer) -> Vec<String> {
+    let Ok(report) = &answer.report else { return Vec::new() };
+    let (c, config) = (report.counters, &outcome.config);
+    let reached = |stage| report.stage >= stage;
+    match card.title {
+        "Picture" => picture(sight, config),
+        "Body" => expected(answer),
+        "Level" => level(answer, config),
+        "Mask" => vec![match config.mask.polygons_px.len() {
+            0 => "nothing is masked".into(),
+            1 => "1 area is masked".into(),
+            n => format!("{n} areas are masked"),
+        }],
+        "Contour" if reached(Stage::Contour) => {
+            let mut out = vec![format!("{} border pixels followed", c.followed)];
+            if let Some(n) = outcome.touched_pixels {
+                let all = f64::from(config.camera.width) * f64::from(config.camera.height);
+                out.push(format!("{n} pixels read, {:.2} % of the picture", 100.0 * n as f64 / all));
+            }
+            if c.dropped > 0 {
+                out.push(format!("{} dropped: a list was full", c.dropped));
+            }
+            out
+        }
+        "Candidates" if reached(Stage::Contour) => {
+            let mut out = vec![format!("{} edges of {} px or more", c.candidates, config.candidates.min_points)];
+            if c.fallback_points > 0 {
+                out.push(format!("{} points stand at the global level", c.fallback_points));
+            }
+            out
+        }
+        "Undistort" if reached(Stage::Undistort) => vec![format!("{} points became rays", c.edge_points)],
+        "Reject" if reached(Stage::Reject) => {
+            let mut out = vec![format!("{} draws", c.draws)];
+            if let Some(edge) = answer.chosen() {
+                let kept = edge.weights.iter().filter(|w| **w > 0.0).count();
+                out.push(format!("{kept} of {} points kept, {} rejected", edge.points.len(), edge.points.len() - kept));
+            }
+            out
+        }
+        "Estimate" => answer.solution().map_or_else(Vec::new, |s| {
+            let mut out = vec![
+                format!("half-angle {:.4}° fitted freely", s.half_angle_rad.to_degrees()),
+                format!(
+                    "{:.4}° fused, {:.4}° expected",
+                    s.fused_half_angle_rad.to_degrees(),
+                    answer.expected_rad.unwrap_or(f64::NAN).to_degrees()
+                ),
+                format!("RMS {:.3} px over {:.0} px of edge", s.rms_px, s.arc_px),
+            ];
+            out.extend(s.altitude_m.map(|(h, sigma)| format!("altitude {:.1} ± {:.1} km", h / 1e3, sigma / 1e3)));
+            out
+        }),
+        "Covariance" => answer.solution().map_or_else(Vec::new, |s| {
+            let ([major, minor], angle) = hzn_cli::words::principal(s);
+            vec![format!(
+                "σ {:.4}° along {:.0}° from image x, {:.4}° across",
+                major.to_degrees(),
+                angle.to_degrees(),
+                minor.to_degrees()
+            )]
+        }),
+        "Select" => match report.status {
+            Status::Ok => vec!["passed every gate".into()],
+            status => {
+                let mut out = vec![format!("{status} at {}", report.stage.name())];
+                out.extend(hzn_cli::words::tips(report).into_iter().map(|tip| format!("Try: {tip}")));
+                out
+            }
+        },
+        _ => Vec::new(),
+    }
+}
+
+fn picture(sight: &Sight, config: &Config) -> Vec<String> {
+    let Ok(picture) = &sight.picture else { return Vec::new() };
+    let l = picture.layout;
+    let form = match l.channels {
+        1 => "grey".to_owned(),
+        n => format!("{n} channels"),
+    };
+    let mut out = vec![format!("{} × {} px, {form}, {} bits", l.width, l.height, l.bits)];
+    if l.channels >= 3 {
+        out.push(format!("brightness: {}", format!("{:?}", config.input.channel).to_lowercase()));
+    }
+    if let Some(time) = sight.decoding {
+        out.push(format!("decoded in {:.1} ms", time.as_secs_f64() * 1e3));
+    }
+    out
+}
+
+fn expected(answer: &Answer) -> Vec<String> {
+    let mut out = vec![hzn_mcap::body_name(answer.kind).to_owned()];
+    if let (Some(rad), false) = (answer.expected_rad, matches!(answer.kind, body::Kind::Sun | body::Kind::Moon)) {
+        out.push(format!("half-angle {:.4}° expected", rad.to_degrees()));
+    }
+    out.extend(answer.row.altitude_km.map(|km| format!("altitude {km:.2} km")));
+    out
+}
+
+fn level(answer: &Answer, config: &Config) -> Vec<String> {
+    let Ok(report) = &answer.report else { return Vec::new() };
+    match (report.status, answer.sample) {
+        (Status::TooDark | Status::TooBright, _) => vec![format!(
+            "mean brightness is outside of {} to {} of full scale",
+            config.gate.min_mean, config.gate.max_mean
+        )],
+        (_, Some((mean, n))) => vec![format!("level {}, mean {mean:.1} of {n} pixels", report.level)],
+        _ => vec![format!("level {}", report.level)],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_section_has_a_card_and_every_stage() {
+        for key in hzn_calib::keys::all() {
+            let elsewhere = ["", "mount", "bodies"];
+            let shown = CARDS.iter().any(|c| c.sections.contains(&key.section.as_str()));
+            assert!(shown || elsewhere.contains(&key.section.as_str()), "{}", key.path());
+        }
+        for stage in Stage::ALL {
+            assert!(CARDS.iter().any(|c| c.stage == Some(stage)), "{}", stage.name());
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The help: every key.
+
+use egui::{RichText, vec2};
+
+use super::command;
+use super::viewer::Viewer;
+
+pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
+    if !viewer.showing_help {
+        return;
+    }
+    let response = egui::Modal::new(egui::Id::unique("help")).show(ctx, |ui| {
+        ui.heading("Keys and mouse");
+        ui.add_space(6.0);
+        ui.horizontal_top(|ui| {
+            let half = command::ALL.len().div_ceil(2);
+            for (n, part) in command::ALL.chunks(half).enumerate() {
+                egui::Grid::new(("keys", n)).num_columns(2).spacing(vec2(14.0, 4.0)).show(ui, |ui| {
+                    for (c, name, ..) in part {
+                        ui.label(RichText::new(c.key(ui.ctx())).monospace().strong());
+                        ui.label(*name);
+                        ui.end_row();
+                    }
+                });
+                ui.add_space(18.0);
+            }
+        });
+        ui.separator();
+        for line in [
+            "Wheel: zoom about the pointer, to single pixels and their values. Drag: move. Double click: in, and back.",
+            "Click in a plot or in the time line: go to that frame. Drag in a plot: move; double click: all of it.",
+            "Hover a candidate in the column of stages: it is pointed out in the picture.",
+            "Drop a recording, a folder, a picture, a video or a sensor.toml on the window: it is opened.",
+        ] {
+            ui.label(line);
+        }
+    });
+    if response.should_close() {
+        viewer.showing_help = false;
+    }
+}

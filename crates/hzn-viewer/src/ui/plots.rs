@@ -1,0 +1,207 @@
+//! Plots over time, and the residuals along the limb of the frame that is shown.
+
+use egui::{Id, RichText, Ui};
+use egui_plot::{Corner, GridInput, GridMark, HLine, HoverPosition, Legend, Line, Plot, PlotPoints, Points, VLine};
+
+use super::theme;
+use super::viewer::Viewer;
+use crate::model::rows::{Of, QUANTITIES, Quantity};
+
+/// Name of the residuals among what can be plotted.
+pub(super) const RESIDUALS: &str = "Residuals";
+
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
+    egui::Panel::bottom("plots").resizable(true).default_size(206.0).size_range(110.0..=600.0).show(ui, |ui| {
+        ui.add_space(4.0);
+        choice(viewer, ui);
+        let chosen: Vec<String> = viewer.settings.plotted.clone();
+        let count = chosen.len().max(1);
+        let gap = ui.spacing().item_spacing.x;
+        let width = (ui.available_width() - gap * (count as f32 - 1.0)) / count as f32;
+        let height = ui.available_height() - 2.0;
+        let mut go = None;
+        ui.horizontal(|ui| {
+            for name in &chosen {
+                ui.allocate_ui(egui::vec2(width, height), |ui| {
+                    ui.vertical(|ui| {
+                        if name == RESIDUALS {
+                            residuals(viewer, ui, height);
+                        } else if let Some(quantity) = QUANTITIES.iter().find(|q| q.name == name) {
+                            go = over_time(viewer, ui, quantity, height).or(go);
+                        }
+                    });
+                });
+            }
+            if chosen.is_empty() {
+                ui.weak("Choose what is plotted above.");
+            }
+        });
+        if let Some(frame) = go {
+            viewer.playback.go(frame, viewer.sequence.len());
+        }
+    });
+}
+
+fn choice(viewer: &mut Viewer, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        for name in QUANTITIES.iter().map(|q| q.name).chain([RESIDUALS]) {
+            if name == "Error" && viewer.truth.is_empty() {
+                continue;
+            }
+            let on = viewer.settings.plotted.iter().any(|p| p == name);
+            if ui.selectable_label(on, RichText::new(name).size(12.5)).clicked() {
+                if on {
+                    viewer.settings.plotted.retain(|p| p != name);
+                } else {
+                    viewer.settings.plotted.push(name.to_owned());
+                }
+            }
+        }
+    });
+}
+
+fn title(quantity: &Quantity) -> String {
+    if quantity.unit.is_empty() { quantity.name.to_owned() } else { format!("{} [{}]", quantity.name, quantity.unit) }
+}
+
+/// A quantity of all frames; gives the frame that was clicked.
+fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, height: f32) -> Option<usize> {
+    let entries = &viewer.sequence.entries;
+    // Times of the day are large numbers: the first frame is zero.
+    let start = entries.first().map_or(0.0, |e| e.time_s);
+    let dark = ui.visuals().dark_mode;
+    let value = |i: usize, of: Of, fresh: bool| {
+        let row = if fresh { viewer.rows.newest(i, viewer.body) } else { viewer.rows.recorded(i, viewer.body) }?;
+        of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())
+    };
+    let changed = viewer.session.as_ref().is_some_and(|s| s.is_changed());
+    let label = title(quantity);
+    let plot = Plot::new(("plot", quantity.name))
+        .height(height)
+        // All of the sequence, whatever part of it has a value.
+        .include_x(0.0)
+        .include_x(entries.last().map_or(1.0, |e| (e.time_s - start).max(1e-3)))
+        .link_cursor(Id::unique("time"), [true, false])
+        .allow_scroll(false)
+        .allow_boxed_zoom(true)
+        .set_margin_fraction(egui::vec2(0.01, 0.12))
+        .y_grid_spacer(ticks)
+        .y_axis_min_width(44.0)
+        .x_axis_label("s")
+        .y_axis_label(label)
+        .legend(Legend::default().position(Corner::RightTop).text_style(egui::TextStyle::Small))
+        .label_formatter(move |at| {
+            let p = match at {
+                HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => position,
+            };
+            Some(format!("{:.3} s\n{:.5}", p.x, p.y))
+        });
+    let response = plot.show(ui, |ui| {
+        for (n, (name, of)) in quantity.lines.iter().enumerate() {
+            let colour = theme::line(n, dark);
+            // What the file says, faint, where the parameters have changed since.
+            if changed {
+                for part in parts(entries.len(), |i| Some([entries.get(i)?.time_s - start, value(i, *of, false)?])) {
+                    ui.line(Line::new("file", part).color(colour.gamma_multiply(0.35)).width(1.0).allow_hover(false));
+                }
+            }
+            let lines = parts(entries.len(), |i| Some([entries.get(i)?.time_s - start, value(i, *of, true)?]));
+            for part in lines {
+                if let [one] = part.as_slice() {
+                    ui.points(Points::new(*name, vec![*one]).color(colour).radius(2.0));
+                } else {
+                    ui.line(Line::new(*name, part).color(colour).width(1.6));
+                }
+            }
+        }
+        if let Some(now) = entries.get(viewer.playback.frame()) {
+            let ink = if dark { egui::Color32::from_white_alpha(150) } else { egui::Color32::from_black_alpha(150) };
+            ui.vline(VLine::new("", now.time_s - start).color(ink).width(1.0).allow_hover(false));
+        }
+        ui.response().clicked().then(|| ui.pointer_coordinate()).flatten()
+    });
+    viewer.sequence.nearest(response.inner?.x + start)
+}
+
+/// Lines across a plot where a person would put them: some four, at 1, 2 or 5 times a power of ten.
+fn ticks(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    let rough = (high - low) / 4.0;
+    if !(rough > 0.0 && rough.is_finite()) {
+        return Vec::new();
+    }
+    let power = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * power).find(|s| *s >= rough).unwrap_or(rough);
+    let first = (low / step).ceil() as i64;
+    (first..first + 12)
+        .map(|i| i as f64 * step)
+        .take_while(|y| *y <= high)
+        .map(|value| GridMark { value, step_size: step })
+        .collect()
+}
+
+/// Points in a row, broken where one is missing.
+fn parts(count: usize, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
+    let mut out = vec![Vec::new()];
+    for i in 0..count {
+        match (point(i), out.last_mut()) {
+            (Some(p), Some(part)) => part.push(p),
+            (None, Some(part)) if !part.is_empty() => out.push(Vec::new()),
+            _ => {}
+        }
+    }
+    out.retain(|part| !part.is_empty());
+    out
+}
+
+/// Distance of the edge's points from the fitted limb, along it.
+fn residuals(viewer: &Viewer, ui: &mut Ui, height: f32) {
+    let threshold = viewer.sight.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.reject.threshold_px);
+    let points = |kept: bool| -> PlotPoints<'_> {
+        let answer = viewer.answer().into_iter().flat_map(|a| &a.residuals);
+        answer.filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
+    };
+    Plot::new("residuals")
+        .height(height)
+        .allow_scroll(false)
+        .set_margin_fraction(egui::vec2(0.01, 0.1))
+        .y_axis_min_width(44.0)
+        .x_axis_label("azimuth about the axis [deg]")
+        .y_axis_label("Residual [px]")
+        .include_y(-1.0)
+        .include_y(1.0)
+        .legend(Legend::default().position(Corner::RightTop).text_style(egui::TextStyle::Small))
+        .show(ui, |ui| {
+            if let Some(px) = threshold {
+                for y in [px, -px] {
+                    ui.hline(HLine::new("threshold", y).color(theme::REJECTED.gamma_multiply(0.5)).allow_hover(false));
+                }
+            }
+            ui.points(Points::new("rejected", points(false)).color(theme::REJECTED).radius(1.8));
+            ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
+        });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        let at = |low: f64, high: f64| -> Vec<f64> {
+            ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }).iter().map(|m| m.value).collect()
+        };
+        assert_eq!(at(0.0, 10.0), [0.0, 5.0, 10.0]);
+        assert_eq!(at(-0.9, 7.2), [0.0, 5.0]);
+        assert_eq!(at(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
+        assert!(at(1.0, 1.0).is_empty() && at(f64::NAN, 1.0).is_empty());
+    }
+
+    #[test]
+    fn lines_are_broken_where_values_are_missing() {
+        let value = |i: usize| (i % 4 != 0).then_some([i as f64, 1.0]);
+        let lengths: Vec<usize> = parts(10, value).iter().map(Vec::len).collect();
+        assert_eq!(lengths, [3, 3, 1]);
+        assert!(parts(3, |_| None).is_empty());
+    }
+}

@@ -1,0 +1,245 @@
+//! The time line: a colour a frame, the place in it, playing.
+
+use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Shape, Stroke, Ui, pos2, vec2};
+use hzn_core::status::Status;
+
+use super::viewer::Viewer;
+use super::{Command, theme};
+use crate::model::playback::SPEEDS;
+
+/// Room for work on the whole sequence.
+const WORK_WIDTH: f32 = 260.0;
+
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
+    egui::Panel::bottom("timeline").resizable(false).show(ui, |ui| {
+        ui.add_space(5.0);
+        controls(viewer, ui);
+        ui.add_space(2.0);
+        strip(viewer, ui);
+        ui.add_space(5.0);
+    });
+}
+
+fn controls(viewer: &mut Viewer, ui: &mut Ui) {
+    let mut command = None;
+    ui.horizontal(|ui| {
+        let hint = |ui: &Ui, c: Command| format!("{} ({})", c.name(), c.key(ui.ctx()));
+        let play = if viewer.playback.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
+        for (c, icon, name) in [
+            (Command::First, Icon::First, "First frame"),
+            (Command::Back, Icon::Back, "Frame before"),
+            (Command::Play, play.0, play.1),
+            (Command::Next, Icon::Next, "Next frame"),
+            (Command::Last, Icon::Last, "Last frame"),
+        ] {
+            if icon_button(ui, icon, name).on_hover_text(hint(ui, c)).clicked() {
+                command = Some(c);
+            }
+        }
+        ui.separator();
+        let speed = viewer.playback.speed();
+        let label = ui.weak("speed");
+        egui::ComboBox::from_id_salt("speed")
+            .selected_text(format!("{speed}×"))
+            .width(58.0)
+            .show_ui(ui, |ui| {
+                for s in SPEEDS {
+                    if ui.selectable_label(s == speed, format!("{s}×")).clicked() {
+                        viewer.playback.set_speed(s);
+                    }
+                }
+            })
+            .response
+            .labelled_by(label.id);
+        ui.separator();
+        for (c, text) in [(Command::NextRefused, "Next refused"), (Command::Worst, "Worst")] {
+            if ui.button(text).on_hover_text(hint(ui, c)).clicked() {
+                command = Some(c);
+            }
+        }
+        ui.separator();
+        place(viewer, ui);
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| work(viewer, ui));
+    });
+    if let Some(command) = command {
+        viewer.run(command, &ui.ctx().clone());
+    }
+}
+
+/// What is drawn on a button of the player.
+#[derive(Clone, Copy)]
+enum Icon {
+    First,
+    Back,
+    Play,
+    Pause,
+    Next,
+    Last,
+}
+
+/// Drawn, because fonts do not have them all.
+fn icon_button(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
+    let (rect, response) = ui.allocate_exact_size(vec2(28.0, 20.0), Sense::click());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, name));
+    let visuals = ui.style().interact(&response);
+    ui.painter().rect_filled(rect, visuals.corner_radius, visuals.weak_bg_fill);
+    let (c, ink) = (rect.center(), visuals.fg_stroke.color);
+    let triangle = |x: f32, way: f32| {
+        let tip = [
+            pos2(c.x + x + 4.5 * way, c.y),
+            pos2(c.x + x - 3.5 * way, c.y - 5.0),
+            pos2(c.x + x - 3.5 * way, c.y + 5.0),
+        ];
+        ui.painter().add(Shape::convex_polygon(tip.to_vec(), ink, Stroke::NONE));
+    };
+    let bar = |x: f32| {
+        let bar = Rect::from_center_size(pos2(c.x + x, c.y), vec2(2.5, 10.0));
+        ui.painter().rect_filled(bar, 0, ink);
+    };
+    match icon {
+        Icon::First => [bar(-6.0), triangle(2.0, -1.0)],
+        Icon::Back => [triangle(-1.0, -1.0), ()],
+        Icon::Play => [triangle(0.0, 1.0), ()],
+        Icon::Pause => [bar(-3.0), bar(3.0)],
+        Icon::Next => [triangle(1.0, 1.0), ()],
+        Icon::Last => [triangle(-2.0, 1.0), bar(6.0)],
+    };
+    response
+}
+
+/// Which frame this is.
+fn place(viewer: &Viewer, ui: &mut Ui) {
+    let count = viewer.sequence.len();
+    if count == 0 {
+        return;
+    }
+    let frame = viewer.playback.frame();
+    let more = if viewer.sequence.complete { "" } else { "…" };
+    ui.label(format!("frame {} of {count}{more}", frame + 1));
+    if let Some(entry) = viewer.sequence.entries.get(frame) {
+        ui.label(RichText::new(format!("{:.3} s", entry.time_s)).monospace().size(12.0));
+        // A long name leaves room for what stands at the right.
+        let room = vec2((ui.available_width() - WORK_WIDTH).max(0.0), 18.0);
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(room, layout, |ui| {
+            ui.add(egui::Label::new(RichText::new(&entry.name).weak()).truncate());
+        });
+    }
+}
+
+/// Work on the whole sequence, with progress.
+fn work(viewer: &mut Viewer, ui: &mut Ui) {
+    if let Some(sweep) = &viewer.sweep {
+        if ui.add_enabled(!sweep.is_stopping(), egui::Button::new("Cancel")).clicked() {
+            sweep.stop();
+        }
+        let part = sweep.done as f32 / sweep.total.max(1) as f32;
+        let what = if sweep.writes { "writing" } else { "processing" };
+        ui.add(
+            egui::ProgressBar::new(part).desired_width(170.0).text(format!("{what} {} of {}", sweep.done, sweep.total)),
+        );
+    } else if let Some(export) = &viewer.export {
+        if ui.button("Cancel").clicked() {
+            export.stop();
+        }
+        let part = export.done() as f32 / export.total.max(1) as f32;
+        ui.add(egui::ProgressBar::new(part).desired_width(170.0).text(format!(
+            "video {} of {}",
+            export.done(),
+            export.total
+        )));
+    } else if viewer.sequence.len() > 1 && viewer.session.is_some() {
+        let hint = format!(
+            "Every frame with the parameters as they are, for the plots ({})",
+            Command::ProcessAll.key(ui.ctx())
+        );
+        if ui.button("Process all").on_hover_text(hint).clicked() {
+            viewer.process_all(None);
+        }
+        let fresh = viewer.rows.fresh();
+        if fresh > 1 {
+            ui.weak(format!("{fresh} new"));
+        }
+    }
+}
+
+/// The worst status among some frames, by how much it needs a look.
+fn worst(statuses: impl Iterator<Item = Status>) -> Option<Status> {
+    let weight = |s: &Status| match s {
+        Status::Ok => 0,
+        Status::NoLimb => 1,
+        Status::TooDark | Status::TooBright | Status::TooFewPoints => 2,
+        Status::Ambiguous | Status::Truncated => 3,
+        Status::Rejected => 4,
+        Status::Unreadable => 5,
+    };
+    statuses.max_by_key(weight)
+}
+
+fn strip(viewer: &mut Viewer, ui: &mut Ui) {
+    let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), 24.0), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Time line"));
+    let rect = response.rect.shrink2(vec2(2.0, 0.0));
+    let band = Rect::from_min_max(rect.min + vec2(0.0, 7.0), rect.max);
+    painter.rect_filled(band, 3, ui.visuals().extreme_bg_color);
+    let count = viewer.sequence.len();
+    if count == 0 {
+        return;
+    }
+    let columns = (band.width().floor() as usize).clamp(1, count);
+    let width = band.width() / columns as f32;
+    let status = |i: usize| viewer.rows.newest(i, viewer.body).map(|r| r.status);
+    let mut first: Option<(usize, Status)> = None;
+    // Neighbours of one colour are one rectangle.
+    let flush = |first: &mut Option<(usize, Status)>, end: usize| {
+        if let Some((from, status)) = first.take() {
+            let x = |c: usize| band.left() + c as f32 * width;
+            let gap = if width > 4.0 && end == from + 1 { 1.0 } else { 0.0 };
+            let cell = Rect::from_min_max(pos2(x(from), band.top()), pos2(x(end) - gap, band.bottom()));
+            painter.rect_filled(cell, 1, theme::status(status));
+        }
+    };
+    for column in 0..columns {
+        let (from, to) = (column * count / columns, ((column + 1) * count / columns).max(column * count / columns + 1));
+        let here = worst((from..to).filter_map(status));
+        if width > 4.0 || here != first.map(|(_, s)| s) {
+            flush(&mut first, column);
+            first = here.map(|s| (column, s));
+        }
+    }
+    flush(&mut first, columns);
+    let x_of = |frame: usize| band.left() + (frame as f32 + 0.5) * band.width() / count as f32;
+    let x = x_of(viewer.playback.frame());
+    let ink = if ui.visuals().dark_mode { Color32::WHITE } else { Color32::BLACK };
+    painter.line_segment([pos2(x, band.top()), pos2(x, band.bottom())], Stroke::new(2.0, ink));
+    let tip = [pos2(x - 5.0, rect.top()), pos2(x + 5.0, rect.top()), pos2(x, rect.top() + 7.0)];
+    painter.add(Shape::convex_polygon(tip.to_vec(), ink, Stroke::NONE));
+    let frame_at = |x: f32| (((x - band.left()) / band.width() * count as f32).max(0.0) as usize).min(count - 1);
+    if let Some(at) = response.interact_pointer_pos() {
+        viewer.playback.go(frame_at(at.x), count);
+    }
+    if let Some(at) = response.hover_pos() {
+        let frame = frame_at(at.x);
+        let status = status(frame).map_or("", Status::name);
+        let text = format!("{} {status}", frame + 1);
+        let align = if at.x > rect.center().x { Align2::RIGHT_CENTER } else { Align2::LEFT_CENTER };
+        let by = if at.x > rect.center().x { -12.0 } else { 12.0 };
+        let place = pos2(at.x + by, band.center().y);
+        let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), Color32::WHITE);
+        let back = align.anchor_size(place, galley.size()).expand2(vec2(5.0, 1.0));
+        painter.rect_filled(back, 3, Color32::from_black_alpha(190));
+        painter.galley(back.min + vec2(5.0, 1.0), galley, Color32::WHITE);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_needs_a_look_is_seen_in_a_crowd() {
+        assert_eq!(worst([Status::Ok, Status::Rejected, Status::NoLimb].into_iter()), Some(Status::Rejected));
+        assert_eq!(worst([Status::Ok, Status::NoLimb].into_iter()), Some(Status::NoLimb));
+        assert_eq!(worst(std::iter::empty()), None);
+    }
+}

@@ -1,0 +1,155 @@
+//! The bar on top: menus, what is open, and what has to be said.
+
+use egui::{RichText, Ui};
+use hzn_core::Preset;
+
+use super::Command;
+use super::dialogs::{Asking, Purpose};
+use super::viewer::{Message, Viewer};
+
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
+    egui::Panel::top("top").show(ui, |ui| {
+        ui.add_space(3.0);
+        ui.horizontal(|ui| {
+            menus(viewer, ui);
+            ui.separator();
+            ui.strong(&viewer.sequence.title);
+            if let Some(session) = &viewer.session {
+                let name = session.path().and_then(|p| p.file_name()).map(|n| n.to_string_lossy().into_owned());
+                let name = name.unwrap_or_else(|| "sensor of the recording".into());
+                let changed = if session.is_changed() { "changed: " } else { "" };
+                ui.weak(format!("{changed}{name}"));
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                for (command, text) in [
+                    (Command::Help, "Help"),
+                    (Command::Theme, if viewer.settings.dark { "Light" } else { "Dark" }),
+                    (Command::Stages, "Stages"),
+                    (Command::Plots, "Plots"),
+                ] {
+                    let on = match command {
+                        Command::Stages => viewer.settings.stages,
+                        Command::Plots => viewer.settings.plots,
+                        Command::Help => viewer.showing_help,
+                        _ => false,
+                    };
+                    let hint = format!("{} ({})", command.name(), command.key(ui.ctx()));
+                    if ui.selectable_label(on, text).on_hover_text(hint).clicked() {
+                        viewer.run(command, &ui.ctx().clone());
+                    }
+                }
+            });
+        });
+        ui.add_space(2.0);
+        messages(viewer, ui);
+    });
+}
+
+fn entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {
+    let button = egui::Button::new(command.name()).shortcut_text(command.key(ui.ctx()));
+    if ui.add_enabled(on, button).clicked() {
+        viewer.run(command, &ui.ctx().clone());
+        ui.close();
+    }
+}
+
+fn menus(viewer: &mut Viewer, ui: &mut Ui) {
+    let (sensor, frames) = (viewer.session.is_some(), !viewer.sequence.is_empty());
+    ui.menu_button("File", |ui| {
+        entry(viewer, ui, Command::Open, true);
+        let recent = viewer.settings.recent.clone();
+        if !recent.is_empty() {
+            ui.menu_button("Opened last", |ui| {
+                for path in recent {
+                    if ui.button(path.display().to_string()).clicked() {
+                        viewer.open_paths(vec![path]);
+                        ui.close();
+                    }
+                }
+            });
+        }
+        ui.separator();
+        entry(viewer, ui, Command::Save, sensor);
+        entry(viewer, ui, Command::SaveAs, sensor);
+    });
+    ui.menu_button("Edit", |ui| {
+        let (undo, redo, changed) =
+            viewer.session.as_ref().map_or((false, false, false), |s| (s.can_undo(), s.can_redo(), s.is_changed()));
+        entry(viewer, ui, Command::Undo, undo);
+        entry(viewer, ui, Command::Redo, redo);
+        entry(viewer, ui, Command::Reset, changed);
+        entry(viewer, ui, Command::Diff, changed);
+        ui.separator();
+        entry(viewer, ui, Command::Mask, sensor);
+    });
+    ui.menu_button("Frames", |ui| {
+        for c in [Command::Play, Command::Next, Command::Back, Command::First, Command::Last] {
+            entry(viewer, ui, c, frames);
+        }
+        ui.separator();
+        for c in [Command::NextRefused, Command::BackRefused, Command::Worst] {
+            entry(viewer, ui, c, frames);
+        }
+        ui.separator();
+        entry(viewer, ui, Command::ProcessAll, sensor && frames && viewer.sweep.is_none());
+        entry(viewer, ui, Command::Rerun, sensor && frames && viewer.sweep.is_none());
+    });
+    ui.menu_button("Compare", |ui| {
+        ui.add_enabled_ui(sensor, |ui| {
+            for preset in Preset::ALL {
+                if ui.button(format!("with preset {}", preset.name())).clicked() {
+                    viewer.compare_with_preset(*preset);
+                    ui.close();
+                }
+            }
+            if ui.button("with another sensor.toml…").clicked() {
+                viewer.asking = Some(Asking::new(Purpose::Compare, &viewer.sequence.folder));
+                ui.close();
+            }
+            ui.separator();
+            if ui.add_enabled(viewer.other.is_some(), egui::Button::new("Stop comparing")).clicked() {
+                viewer.other = None;
+                ui.close();
+            }
+        });
+    });
+    ui.menu_button("Export", |ui| {
+        entry(viewer, ui, Command::ExportPicture, frames);
+        let mut ask = |ui: &mut Ui, text: &str, on: bool, purpose: Purpose, name: &str| {
+            if ui.add_enabled(on, egui::Button::new(text)).clicked() {
+                viewer.asking = Some(Asking::new(purpose, &viewer.sequence.folder.join(name)));
+                ui.close();
+            }
+        };
+        let stem = viewer.sequence.title.trim_end_matches(".mcap").to_owned();
+        let free = viewer.export.is_none();
+        ask(ui, "Save video with overlays…", sensor && frames && free, Purpose::Video, &format!("{stem}.mp4"));
+        ask(ui, "Save results as CSV…", frames, Purpose::Table, &format!("{stem}-viewed.csv"));
+    });
+}
+
+fn messages(viewer: &mut Viewer, ui: &mut Ui) {
+    let mut closed = None;
+    let mut recover = None;
+    for (i, Message { text, bad, recover: path }) in viewer.messages.iter().enumerate() {
+        ui.horizontal(|ui| {
+            if ui.small_button("Close").clicked() {
+                closed = Some(i);
+            }
+            if let Some(path) = path
+                && ui.button("Recover it").on_hover_text("Writes a whole recording beside it, and opens that").clicked()
+            {
+                recover = Some(path.clone());
+                closed = Some(i);
+            }
+            let colour = if *bad { ui.visuals().warn_fg_color } else { ui.visuals().text_color() };
+            ui.add(egui::Label::new(RichText::new(text).color(colour)).wrap());
+        });
+    }
+    if let Some(i) = closed {
+        viewer.messages.remove(i);
+    }
+    if let Some(path) = recover {
+        viewer.recover(&path);
+    }
+}

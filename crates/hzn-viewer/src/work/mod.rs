@@ -1,0 +1,17 @@
+//! What happens beside the window, on threads of its own: opening, decoding, processing, exporting.
+
+pub mod engine;
+pub mod export;
+pub mod open;
+pub mod paint;
+pub mod sight;
+pub mod store;
+pub mod sweep;
+
+pub use engine::{Ask, Engine, Setup};
+pub use sight::{Answer, Sight};
+
+use std::sync::Arc;
+
+/// Called by a thread that has something new to show.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;

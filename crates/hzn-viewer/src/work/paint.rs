@@ -1,0 +1,186 @@
+//! The picture as it is shown: colour, brightness or level, in the camera's plane or a pinhole's.
+
+use egui::{Color32, ColorImage};
+use hzn_cli::input::{Picture, picture::Samples};
+use hzn_core::camera::Camera;
+use hzn_core::image::{Channel, ImageView, Pixels};
+
+use crate::model::{Look, Plane};
+
+/// Lit pixels of the level view.
+const LIT: Color32 = Color32::from_rgb(214, 214, 206);
+/// Dark pixels of the level view.
+const DARK: Color32 = Color32::from_rgb(24, 30, 46);
+
+/// What the shown picture depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recipe {
+    /// How it is shown.
+    pub look: Look,
+    /// The level, for [`Look::Level`].
+    pub level: u16,
+    /// Which channel is brightness.
+    pub channel: Channel,
+    /// The plane it is shown in.
+    pub plane: Plane,
+}
+
+/// Where each pixel of a plane comes from; made once for a camera and plane.
+#[derive(Debug, Default)]
+pub struct Warp {
+    of: Option<(Plane, hzn_core::camera::Config)>,
+    /// Index of the camera's pixel, `u32::MAX` outside of what the lens sees.
+    from: Vec<u32>,
+}
+
+impl Warp {
+    fn prepare(&mut self, plane: &Plane, config: &hzn_core::camera::Config, camera: &Camera<f64>) {
+        let key = (plane.clone(), config.clone());
+        if self.of.as_ref() == Some(&key) {
+            return;
+        }
+        let (w, h) = (u32::from(camera.width()), u32::from(camera.height()));
+        let source = |x: u32, y: u32| -> Option<u32> {
+            let [u, v] = plane.of(camera, [f64::from(x), f64::from(y)])?.map(f64::round);
+            ((0.0..f64::from(w)).contains(&u) && (0.0..f64::from(h)).contains(&v)).then(|| v as u32 * w + u as u32)
+        };
+        self.from = (0..h).flat_map(|y| (0..w).map(move |x| source(x, y).unwrap_or(u32::MAX))).collect();
+        self.of = Some(key);
+    }
+}
+
+/// Paints a picture. Without a camera of its size it stays in its own plane.
+pub fn paint(
+    picture: &Picture,
+    recipe: &Recipe,
+    camera: Option<(&hzn_core::camera::Config, &Camera<f64>)>,
+    warp: &mut Warp,
+) -> ColorImage {
+    let (w, h) = (picture.layout.width as usize, picture.layout.height as usize);
+    let pixels = match (recipe.look, picture.view(recipe.channel)) {
+        (Look::Colour, _) | (_, Err(_)) => colours(picture),
+        (Look::Grey, Ok(view)) => each(&view, |v, full| {
+            let v = (u32::from(v) * 255 / u32::from(full.max(1))) as u8;
+            Color32::from_gray(v)
+        }),
+        (Look::Level, Ok(view)) => each(&view, |v, _| if v >= recipe.level { LIT } else { DARK }),
+    };
+    let pixels = match camera {
+        Some((config, camera))
+            if recipe.plane != Plane::Camera
+                && (usize::from(camera.width()), usize::from(camera.height())) == (w, h) =>
+        {
+            warp.prepare(&recipe.plane, config, camera);
+            warp.from.iter().map(|&i| pixels.get(i as usize).copied().unwrap_or(Color32::BLACK)).collect()
+        }
+        _ => pixels,
+    };
+    ColorImage::new([w, h], pixels)
+}
+
+fn colours(picture: &Picture) -> Vec<Color32> {
+    let n = usize::from(picture.layout.channels);
+    let shift = picture.layout.bits.saturating_sub(8);
+    match &picture.samples {
+        Samples::Bytes(d) if n >= 3 => d.chunks_exact(n).map(|p| Color32::from_rgb(p[0], p[1], p[2])).collect(),
+        Samples::Bytes(d) => d.chunks_exact(n).map(|p| Color32::from_gray(p[0])).collect(),
+        Samples::Words(d) => {
+            let byte = |v: u16| (v >> shift) as u8;
+            let colour = |p: &[u16]| match p {
+                [r, g, b, ..] => Color32::from_rgb(byte(*r), byte(*g), byte(*b)),
+                [v, ..] => Color32::from_gray(byte(*v)),
+                [] => Color32::BLACK,
+            };
+            d.chunks_exact(n).map(colour).collect()
+        }
+    }
+}
+
+fn each(view: &ImageView<'_>, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
+    fn all<P: Pixels>(p: &P, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
+        let full = p.full_scale();
+        (0..p.height())
+            .flat_map(|y| (0..p.width()).map(move |x| (x, y)))
+            .map(|(x, y)| colour(p.at(x, y), full))
+            .collect()
+    }
+    match view {
+        ImageView::Grey8(p) => all(p, colour),
+        ImageView::Grey16(p) => all(p, colour),
+        ImageView::Colour8(p) => all(p, colour),
+        ImageView::Colour16(p) => all(p, colour),
+    }
+}
+
+/// Brightness of a pixel, and its samples, for the read-out.
+pub fn read(picture: &Picture, channel: Channel, x: u16, y: u16) -> Option<(u16, Vec<u16>)> {
+    let layout = picture.layout;
+    if u32::from(x) >= layout.width || u32::from(y) >= layout.height {
+        return None;
+    }
+    let n = usize::from(layout.channels);
+    let at = (usize::from(y) * layout.width as usize + usize::from(x)) * n;
+    let samples: Vec<u16> = match &picture.samples {
+        Samples::Bytes(d) => d.get(at..at + n)?.iter().map(|&v| v.into()).collect(),
+        Samples::Words(d) => d.get(at..at + n)?.to_vec(),
+    };
+    let brightness = match picture.view(channel).ok()? {
+        ImageView::Grey8(p) => p.at(x, y),
+        ImageView::Grey16(p) => p.at(x, y),
+        ImageView::Colour8(p) => p.at(x, y),
+        ImageView::Colour16(p) => p.at(x, y),
+    };
+    Some((brightness, samples))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hzn_core::camera::{Config, Model};
+    use hzn_core::image::Layout;
+
+    fn picture(channels: u8) -> Picture {
+        let data = (0..8 * 6 * u32::from(channels)).map(|i| (i * 5) as u8).collect();
+        Picture { samples: Samples::Bytes(data), layout: Layout::packed(8, 6, channels, 8), exif_time_s: None }
+    }
+
+    fn recipe(look: Look) -> Recipe {
+        Recipe { look, level: 100, channel: Channel::Mean, plane: Plane::Camera }
+    }
+
+    #[test]
+    fn every_look_shows_the_pixels_where_they_are() {
+        let grey = paint(&picture(1), &recipe(Look::Grey), None, &mut Warp::default());
+        assert_eq!(grey.size, [8, 6]);
+        assert_eq!(grey[(3, 1)], Color32::from_gray(55));
+        assert_eq!(paint(&picture(1), &recipe(Look::Colour), None, &mut Warp::default()), grey);
+        let level = paint(&picture(1), &recipe(Look::Level), None, &mut Warp::default());
+        // 100 is reached by the pixel number 20: row 2, column 4.
+        assert_eq!((level[(3, 2)], level[(4, 2)]), (DARK, LIT));
+        let colour = paint(&picture(3), &recipe(Look::Colour), None, &mut Warp::default());
+        assert_eq!(colour[(1, 0)], Color32::from_rgb(15, 20, 25));
+        assert_eq!(read(&picture(3), Channel::Mean, 1, 0), Some((20, vec![15, 20, 25])));
+        assert_eq!(read(&picture(3), Channel::Blue, 1, 0), Some((25, vec![15, 20, 25])));
+        assert_eq!(read(&picture(3), Channel::Mean, 8, 0), None);
+    }
+
+    #[test]
+    fn words_are_shown_by_their_high_bits() {
+        let layout = Layout::packed(2, 1, 1, 12);
+        let p = Picture { samples: Samples::Words(vec![0xfff, 0x080]), layout, exif_time_s: None };
+        let shown = paint(&p, &recipe(Look::Colour), None, &mut Warp::default());
+        assert_eq!((shown[(0, 0)], shown[(1, 0)]), (Color32::from_gray(255), Color32::from_gray(8)));
+        assert_eq!(read(&p, Channel::Mean, 1, 0), Some((0x80, vec![0x80])));
+    }
+
+    #[test]
+    fn a_pinhole_is_not_bent() {
+        let config = Config::ideal(Model::Pinhole, 8, 6, 20.0);
+        let camera = Camera::try_new(&config).unwrap();
+        let plane = Plane::Pinhole(crate::model::plane::Pinhole { focal_px: 20.0, centre: [3.5, 2.5] });
+        let straight = paint(&picture(1), &recipe(Look::Grey), None, &mut Warp::default());
+        let mut warp = Warp::default();
+        let recipe = Recipe { plane, ..recipe(Look::Grey) };
+        assert_eq!(paint(&picture(1), &recipe, Some((&config, &camera)), &mut warp), straight);
+    }
+}

@@ -1,0 +1,140 @@
+//! Pictures on demand, decoded, as many as memory is set aside for.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use hzn_cli::input::{self, Payload, Picture, Source, picture::Samples};
+use hzn_mcap::Pictures;
+
+use crate::model::Place;
+
+/// Decoded pictures that are kept, in bytes. A larger picture is kept alone.
+const KEEP_BYTES: usize = 192 << 20;
+
+/// A decoded picture, or why there is none.
+pub type Decoded = Result<Arc<Picture>, String>;
+
+/// Reads pictures and keeps those that were used last.
+#[derive(Default)]
+pub struct Store {
+    inputs: Vec<PathBuf>,
+    recording: Option<Pictures>,
+    video: Option<(Box<dyn Source>, u64)>,
+    /// The one used last stands last.
+    kept: VecDeque<(usize, Decoded, usize)>,
+}
+
+impl Store {
+    /// Another sequence.
+    pub fn open(&mut self, inputs: Vec<PathBuf>) {
+        *self = Self { inputs, ..Self::default() };
+    }
+    /// How pictures of the recording are read.
+    pub fn recording(&mut self, pictures: Pictures) {
+        self.recording = Some(pictures);
+    }
+    /// Is the picture of this frame at hand?
+    pub fn has(&self, index: usize) -> bool {
+        self.kept.iter().any(|(i, ..)| *i == index)
+    }
+    /// Memory of the pictures that are kept, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.kept.iter().map(|(_, _, bytes)| bytes).sum()
+    }
+
+    /// The picture of a frame.
+    pub fn get(&mut self, index: usize, place: &Place) -> Decoded {
+        if let Some(at) = self.kept.iter().position(|(i, ..)| *i == index)
+            && let Some(kept) = self.kept.remove(at)
+        {
+            let decoded = kept.1.clone();
+            self.kept.push_back(kept);
+            return decoded;
+        }
+        let decoded = self.read(place).map(Arc::new);
+        let bytes = decoded.as_ref().map_or(0, |p| size_of_picture(p));
+        while !self.kept.is_empty() && self.bytes() + bytes > KEEP_BYTES {
+            self.kept.pop_front();
+        }
+        self.kept.push_back((index, decoded.clone(), bytes));
+        decoded
+    }
+
+    fn read(&mut self, place: &Place) -> Result<Picture, String> {
+        let payload = match place {
+            Place::File(path) => Payload::File(path.clone()),
+            Place::RawFile(path, raw) => Payload::RawFile(path.clone(), *raw),
+            Place::Recorded(place) => {
+                let pictures = self.recording.as_mut().ok_or("the recording is not open")?;
+                let read = pictures.read(place).map_err(|e| e.to_string())?;
+                input::recorded(read.image?)
+            }
+            Place::Video(index) => self.of_video(*index)?,
+            Place::Nowhere => return Err("the recording holds no picture of this frame".into()),
+        };
+        payload.decode(None).map(|(picture, _)| picture)
+    }
+
+    /// A video goes forward only; for a picture before, it is begun again.
+    fn of_video(&mut self, index: u64) -> Result<Payload, String> {
+        if self.video.as_ref().is_none_or(|(_, next)| *next > index) {
+            let source = input::open(&self.inputs, None, None).map_err(|stop| format!("{:#}", stop.error))?;
+            self.video = Some((source, 0));
+        }
+        let Some((source, next)) = &mut self.video else { return Err("the video is not open".into()) };
+        loop {
+            let item = source.next().ok_or("the video ends before this frame")?.map_err(|e| format!("{e:#}"))?;
+            *next += 1;
+            if *next > index {
+                return Ok(item.payload);
+            }
+        }
+    }
+}
+
+fn size_of_picture(picture: &Picture) -> usize {
+    match &picture.samples {
+        Samples::Bytes(b) => b.len(),
+        Samples::Words(w) => 2 * w.len(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_bounded_and_what_was_used_last_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = |i: u8| {
+            let path = dir.path().join(format!("{i}.png"));
+            image::GrayImage::from_pixel(4096, 4096, image::Luma([i])).save(&path).unwrap();
+            Place::File(path)
+        };
+        let places: Vec<Place> = (0..14).map(place).collect();
+        let mut store = Store::default();
+        store.open(vec![dir.path().to_owned()]);
+        for (i, place) in places.iter().enumerate() {
+            let Samples::Bytes(b) = &store.get(i, place).unwrap().samples else { panic!() };
+            assert_eq!(b[0], i as u8);
+            store.get(0, &places[0]).unwrap();
+            assert!(store.bytes() <= KEEP_BYTES);
+        }
+        assert!(store.has(0) && store.has(13) && !store.has(1));
+    }
+
+    #[test]
+    fn a_picture_that_cannot_be_read_says_why_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        std::fs::write(&path, b"nothing").unwrap();
+        let mut store = Store::default();
+        let place = Place::File(path.clone());
+        let why = store.get(0, &place).unwrap_err();
+        assert!(why.contains("no picture"), "{why}");
+        assert!(store.has(0));
+        assert_eq!(store.get(1, &Place::File(dir.path().join("b.png"))).unwrap_err(), "no such file");
+        assert!(store.get(2, &Place::Nowhere).is_err());
+    }
+}

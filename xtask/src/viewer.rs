@@ -1,0 +1,126 @@
+//! The viewer's real window, on a display that nobody sees.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use crate::machine::{apt_install, has, root, target};
+use crate::steps::{Outcome, Trouble, show};
+use crate::test::{built_with_the_tests, demo_dir};
+
+/// A display without a screen, OpenGL without a graphics card, and what a window loads when it starts.
+const PACKAGES: &[&str] = &[
+    "xvfb",
+    "libgl1",
+    "libgl1-mesa-dri",
+    "libglx-mesa0",
+    "libx11-6",
+    "libx11-xcb1",
+    "libxcursor1",
+    "libxi6",
+    "libxkbcommon0",
+    "libxkbcommon-x11-0",
+];
+/// The demo's frame that is shown.
+const FRAME: usize = 33;
+
+/// A display without a screen; it ends when this is dropped.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    fn start() -> Result<Self, Trouble> {
+        let mut command = Command::new("Xvfb");
+        // It chooses a free number and tells it.
+        command.args(["-displayfd", "1", "-screen", "0", "1600x1000x24", "-nolisten", "tcp"]);
+        let mut server = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
+        let mut number = String::new();
+        if let Some(out) = server.stdout.take() {
+            BufReader::new(out).read_line(&mut number)?;
+        }
+        let display = Self { server, name: format!(":{}", number.trim()) };
+        if number.trim().is_empty() { Err(Trouble::Failed("Xvfb does not start".into())) } else { Ok(display) }
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// Starts the window with arguments and gives what it prints.
+fn window(display: &Display, arguments: &[&str]) -> Result<String, Trouble> {
+    let mut command = Command::new(target().join("debug/hzn"));
+    command.arg("view").args(arguments).stdin(Stdio::null()).stderr(Stdio::inherit());
+    // Software rendering, so that it is the same on every machine.
+    command.env("DISPLAY", &display.name).env("LIBGL_ALWAYS_SOFTWARE", "1").env_remove("WAYLAND_DISPLAY");
+    show(&command);
+    let out = command.output()?;
+    if !out.status.success() {
+        return Err(Trouble::Failed(format!("hzn-viewer ended with {}", out.status)));
+    }
+    Ok(String::from_utf8_lossy(&out.stdout).trim().to_owned())
+}
+
+/// The demo's recording in the window: its picture, and what it says, which must be what the file says.
+fn shot() -> Result<PathBuf, Trouble> {
+    if !has("Xvfb") {
+        apt_install(PACKAGES)?;
+    }
+    built_with_the_tests()?;
+    let (demo, picture) = (demo_dir(), target().join("xtask").join("viewer.png"));
+    let (recording, table) = (demo.join("flight.mcap"), demo.join("flight.csv"));
+    if !recording.exists() || !table.exists() {
+        return Err(Trouble::Failed("there is no demo: `cargo xtask test demo viewer`".into()));
+    }
+    let _ = fs::remove_file(&picture);
+    let frame = FRAME.to_string();
+    let display = Display::start()?;
+    let arguments = [&recording.to_string_lossy(), "--frame", &frame, "--screenshot", &picture.to_string_lossy()]
+        .map(str::to_owned);
+    let said = window(&display, &arguments.each_ref().map(String::as_str))?;
+    println!("{said}");
+    let expected = expected(&fs::read_to_string(&table)?).ok_or_else(|| Trouble::Failed("no such row".into()))?;
+    if said != expected {
+        return Err(Trouble::Failed(format!("the file says {expected:?}")));
+    }
+    // A window without content is a few kilobytes.
+    match fs::metadata(&picture) {
+        Ok(file) if file.len() > 60_000 => Ok(picture),
+        _ => Err(Trouble::Failed(format!("{} holds no picture of the window", picture.display()))),
+    }
+}
+
+/// What the window must say of the frame: picture, body, status, axis, as the table of the same run has them.
+fn expected(table: &str) -> Option<String> {
+    let column = |name: &str| table.lines().next()?.split(',').position(|c| c == name);
+    let row: Vec<&str> = table.lines().nth(FRAME + 1)?.split(',').collect();
+    let cells: Option<Vec<&str>> = ["index", "file", "body", "status", "axis_x", "axis_y", "axis_z"]
+        .into_iter()
+        .map(|name| row.get(column(name)?).copied())
+        .collect();
+    Some(format!("frame {}", cells?.join(" ")))
+}
+
+/// In `cargo xtask test`.
+pub(crate) fn test() -> Outcome {
+    shot().map(|_| ())
+}
+
+/// `cargo xtask viewer`: the picture in the documents, made anew.
+pub(crate) fn run() -> Result<(), String> {
+    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
+    let told = |t: Trouble| match t {
+        Trouble::Failed(why) | Trouble::Missing(why) => why,
+    };
+    let picture = shot().map_err(told)?;
+    let kept = Path::new("docs/viewer.png");
+    fs::copy(picture, kept).map_err(|e| e.to_string())?;
+    println!("written: {}", kept.display());
+    Ok(())
+}
