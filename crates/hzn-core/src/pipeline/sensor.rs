@@ -18,7 +18,7 @@ use crate::region::Region;
 use crate::status::Stage;
 
 /// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
-/// that a picture needs are in a [`Workspace`]. [`Horizon`] is both together.
+/// that a picture needs are in a [`Workspace`]. [`Horizon`](super::Horizon) is both together.
 #[derive(Debug, Clone)]
 pub struct Sensor<T> {
     pub(super) config: Config,

@@ -32,6 +32,7 @@ pub(super) const CARDS: &[Card] = &[
     card("Covariance", Some(Stage::Covariance), &["covariance"], false),
     card("Select", Some(Stage::Select), &["select"], false),
     card("Recover", None, &["recover"], false),
+    card("Limits", None, &["limits"], false),
 ];
 
 /// What went in, what came out, what was dropped.
@@ -59,6 +60,7 @@ pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answ
             }
             out
         }
+        "Limits" => vec![format!("{} steps of work", c.work)],
         "Candidates" if reached(Stage::Contour) => {
             let mut out = vec![format!("{} edges of {} px or more", c.candidates, config.candidates.min_points)];
             if c.fallback_points > 0 {

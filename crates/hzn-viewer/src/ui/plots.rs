@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn lines_are_broken_where_values_are_missing() {
-        let value = |i: usize| (i % 4 != 0).then_some([i as f64, 1.0]);
+        let value = |i: usize| (!i.is_multiple_of(4)).then_some([i as f64, 1.0]);
         let lengths: Vec<usize> = parts(10, value).iter().map(Vec::len).collect();
         assert_eq!(lengths, [3, 3, 1]);
         assert!(parts(3, |_| None).is_empty());
