@@ -92,9 +92,7 @@ def main():
             name, case = request["case"], Case(folder / request["case"])
             # What the libraries prepare on first use is not the recipe's cost.
             recipe(case, case.frames[0], 128)
-        # The picture is new, the program is not: as in a sequence, it has handled another picture just before.
         flush_caches()
-        recipe(case, case.frames[request["frame"] - 1], request["level"])
         print(json.dumps(recipe(case, case.frames[request["frame"]], request["level"])), flush=True)
 
 

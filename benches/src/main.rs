@@ -1,8 +1,6 @@
 //! hzn-core beside the OpenCV recipe: the same frames, the same level, taking turns in one run.
 //!
-//! Frames are distinct, and no part of one is in a cache when it is measured, because a sensor sees every picture for
-//! the first time: the caches are flushed, then each program handles the frame before it in the sequence, which brings
-//! the program itself back, and then the frame that counts.
+//! Frames are distinct and the caches are flushed before each, because a sensor sees every picture for the first time.
 //! Total times are taken without an observer; stages and pixels in further runs with one.
 //! `cargo xtask bench` prepares Python and starts this; `--help` lists the options.
 #![forbid(unsafe_code)]
@@ -97,9 +95,8 @@ fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<table::Cas
     let mut result = table::CaseResult::new(case);
     for round in 0..rounds {
         for (i, frame) in case.frames.iter().enumerate() {
-            let before = i.checked_sub(1).and_then(|b| case.frames.get(b)).or(case.frames.last()).unwrap_or(frame);
-            let f32_run = single.cold(case, before, frame)?;
-            let f64_run = double.cold(case, before, frame)?;
+            let f32_run = single.cold(case, frame)?;
+            let f64_run = double.cold(case, frame)?;
             let theirs = recipe.measure(&case.name, i, f32_run.level.max(1))?;
             if round == 0 {
                 result.answers(frame, &f32_run, &f64_run, &theirs);
@@ -110,10 +107,10 @@ fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<table::Cas
             for (name, us) in theirs.stages_us {
                 result.opencv.stage(&name, i, us);
             }
-            for (stage, us) in single.stages(case, before, frame)? {
+            for (stage, us) in single.stages(case, frame)? {
                 result.f32.stage(stage, i, us);
             }
-            for (stage, us) in double.stages(case, before, frame)? {
+            for (stage, us) in double.stages(case, frame)? {
                 result.f64.stage(stage, i, us);
             }
             result.warm.total(i, single.warm(case, frame)?);

@@ -56,7 +56,7 @@ impl Recipe {
         serde_json::from_str(&line).map_err(|e| format!("the OpenCV recipe ended or answered nonsense: {e}"))
     }
 
-    /// One frame as in [`crate::sensors`]: in no cache, while the program is.
+    /// One frame with flushed caches.
     pub(crate) fn measure(&mut self, case: &str, frame: usize, level: u16) -> Result<Answer, String> {
         let requests = self.requests.as_mut().ok_or("the recipe takes no requests")?;
         writeln!(requests, "{}", json!({ "case": case, "frame": frame, "level": level })).map_err(|e| e.to_string())?;

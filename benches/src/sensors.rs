@@ -91,10 +91,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         })
     }
 
-    /// As the next frame of a sequence: in no cache, while the program is.
-    pub(crate) fn cold(&mut self, case: &Case, before: &Picture, frame: &Picture) -> Result<Timed, String> {
+    /// With flushed caches.
+    pub(crate) fn cold(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
         self.flush_caches();
-        self.once(case, before)?;
         self.once(case, frame)
     }
 
@@ -110,19 +109,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         Ok(runs.swap_remove(WARM_RUNS / 2))
     }
 
-    /// Microseconds by stage, of a frame as in [`Self::cold`].
-    pub(crate) fn stages(
-        &mut self,
-        case: &Case,
-        before: &Picture,
-        frame: &Picture,
-    ) -> Result<Vec<(&'static str, f64)>, String> {
+    /// Microseconds by stage, with flushed caches.
+    pub(crate) fn stages(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
         self.flush_caches();
-        self.clocked(case, before)?;
-        self.clocked(case, frame)
-    }
-
-    fn clocked(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
         let picture = picture(case, frame)?;
         let expected = self.horizon.expect(&known(frame)).map_err(|e| e.to_string())?;
         let clock = Clock::start();

@@ -168,9 +168,8 @@ impl Results {
         let _ = writeln!(
             s,
             "Written by `cargo xtask bench`. One thread of {}; {}. Each case has {} distinct frames, each measured {} times \
-             with no part of it in a cache (the caches are flushed, then each program handles the frame before it, as in a \
-             sequence), from the level to the covariance, hzn and the recipe taking turns with the same level; of each frame \
-             the best time, of these the median. Load of the machine at the start: {}.\n",
+             with flushed caches, from the level to the covariance, hzn and the recipe taking turns with the same level; of each frame the best time, of \
+             these the median. Load of the machine at the start: {}.\n",
             self.machine, self.versions, self.frames, self.rounds, self.load
         );
         s.push_str(
