@@ -7,7 +7,7 @@ use hzn_cli::scene;
 use hzn_core::camera::Camera as Lens;
 use hzn_core::image::Layout;
 use hzn_sim::evaluate::{Evaluation, pair};
-use hzn_sim::scenario::Fit;
+use hzn_sim::scenario::{Fit, MEASURED};
 use hzn_sim::sensitivity::Design;
 use hzn_sim::{Flight, FlightFrame, Scenario, Truth};
 use pyo3::exceptions::PyIndexError;
@@ -20,9 +20,6 @@ use crate::report::Report;
 use crate::sensor::Sensor;
 use crate::sequence::stopped;
 use crate::{errors, parameters};
-
-/// Pictures that the noise model is measured on, as `hzn simulate` does.
-const MEASURED: u32 = 32;
 
 #[doc = doc!("Simulation")]
 #[pyclass(frozen, module = "hzn")]

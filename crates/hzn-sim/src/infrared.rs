@@ -70,6 +70,12 @@ impl Infrared {
         ((unix_s / 86_400.0 - 195.0) / 365.2425).rem_euclid(1.0) * 360.0
     }
 
+    /// The same with the season of a UTC time (seconds since 1970), where it is left out.
+    #[must_use]
+    pub fn in_season(&self, unix_s: f64) -> Self {
+        Self { season_deg: self.season_deg.or(Some(Self::season_deg(unix_s))), ..self.clone() }
+    }
+
     /// Half level in kilometres at a geodetic latitude.
     pub fn half_level_at_km(&self, latitude_deg: f64) -> f64 {
         let season = libm::cos(self.season_deg.unwrap_or(0.0).to_radians());

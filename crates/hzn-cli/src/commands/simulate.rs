@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
-use hzn_sim::scenario::{BUILTIN, Fit, Format};
+use hzn_sim::scenario::{BUILTIN, Fit, Format, MEASURED};
 use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
 
@@ -15,9 +15,6 @@ use crate::progress::Progress;
 use crate::scene;
 use crate::setup::stop_flag;
 use crate::tell;
-
-/// Pictures that the noise model is measured on.
-const MEASURED: u32 = 32;
 
 /// Render a sequence of pictures with truth, and the sensor.toml that fits it
 ///

@@ -9,7 +9,6 @@ use crate::counter::{Counter, Stream};
 use crate::ephemeris;
 use crate::flight::{Flight, FlightFrame};
 use crate::foreground::Foreground;
-use crate::infrared::Infrared;
 use crate::motion::Motion;
 use crate::scene::{Light, Scene, World};
 use crate::trajectory::Path;
@@ -120,7 +119,7 @@ impl Scenario {
                 if let Some(clouds) = &mut world.clouds {
                     clouds.seed = clouds.seed.wrapping_add(self.seed);
                 }
-                world.season_deg.get_or_insert(Infrared::season_deg(unix_s));
+                *world = world.in_season(unix_s);
                 scene.limb_height_by_latitude_km = world.half_level_by_latitude_km();
             }
             World::Plain => {}

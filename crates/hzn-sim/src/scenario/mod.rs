@@ -9,7 +9,7 @@ mod fly;
 mod noise;
 
 pub use exposure::Exposure;
-pub use noise::Fit;
+pub use noise::{Fit, MEASURED};
 
 use std::path::Path as FilePath;
 
@@ -370,7 +370,12 @@ impl Scenario {
             (World::Infrared(w), _) => w.half_level_km,
             (World::Plain, _) => body::Config::default().limb_height_km,
         };
-        body::Config { kind, limb_height_km, ..body::Config::default() }
+        let by_latitude = match (&self.world, kind) {
+            (World::Infrared(w), Kind::Earth) => w.in_season(self.start_unix_s()).half_level_by_latitude_km(),
+            _ => Vec::new(),
+        };
+        let limb_height_by_latitude_km = by_latitude.into_iter().collect();
+        body::Config { kind, limb_height_km, limb_height_by_latitude_km, ..body::Config::default() }
     }
 }
 

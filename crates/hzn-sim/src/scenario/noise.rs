@@ -19,6 +19,7 @@ use super::{Scenario, ScenarioError};
 use crate::flight::FlightFrame;
 use crate::globe::{Globe, View};
 use crate::picture::Picture;
+use crate::scene::World;
 
 /// What was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +41,8 @@ pub struct Fit {
 /// What is added to the scenario's seed, again and again, for the pictures that are measured; and how many seeds.
 const OTHER_SEED: u64 = 7919;
 const SEEDS: u64 = 4;
+/// Pictures that a [`Fit`] is measured on where nobody says otherwise.
+pub const MEASURED: u32 = 32;
 /// Bins of the autocovariance: width in pixels, and how many.
 const BIN_PX: f64 = 6.0;
 const BINS: usize = 200;
@@ -89,16 +92,18 @@ impl Fit {
         let mut sensor = alone.clone();
         sensor.body.limb_height_sigma_km = 8.0;
         let first = look(scenario, &sensor, seen);
-        let mut errors: Vec<f64> = first.iter().map(|l| l.error_rad).collect();
-        errors.sort_by(f64::total_cmp);
         // Wrong answers would bring points that are not of the limb.
-        let most = 4.0 * errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+        let most = 4.0 * median(first.iter().map(|l| l.error_rad));
         let answered: Vec<&Looked> = first.iter().filter(|l| l.error_rad <= most.min(0.02)).collect();
         if answered.len() < 4 {
             return None;
         }
-        let pictures: Vec<Edge> =
+        let mut pictures: Vec<Edge> =
             answered.iter().filter_map(|l| Edge::of(kind, l, sensor.body.limb_height_km)).collect();
+        // A picture far from all others is an answer on another edge: its direction is right by chance.
+        let middle = median(pictures.iter().map(|p| p.mean_km));
+        let usual = median(pictures.iter().map(|p| (p.mean_km - middle).abs()));
+        pictures.retain(|p| (p.mean_km - middle).abs() <= 6.0 * usual.max(0.1));
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
         let heights: Vec<f64> = pictures.iter().map(|p| p.mean_km).collect();
         let height_km = mean(&heights);
@@ -139,10 +144,13 @@ impl Fit {
 
     /// Writes the model into a sensor.
     pub fn apply(&self, sensor: &mut Config) {
-        // Two digits more than are known.
+        // Two digits more than are known. Rows by latitude go up or down with the mean.
         let digits = |x: f64| (x * 1e3).round() / 1e3;
         for body in sensor.bodies.iter_mut().chain([&mut sensor.body]) {
             if body.kind == Kind::Earth {
+                for row in &mut body.limb_height_by_latitude_km {
+                    row[1] = digits(row[1] + self.limb_height_km - body.limb_height_km);
+                }
                 body.limb_height_km = digits(self.limb_height_km);
                 body.limb_height_sigma_km = digits(self.limb_height_sigma_km);
             }
@@ -152,11 +160,18 @@ impl Fit {
     }
 }
 
+/// The middle value.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
 /// What the sensor says to one picture, beside the truth.
 struct Looked<'a> {
     frame: &'a FlightFrame,
-    /// Edge points of the answer that count, in their order.
-    points: Vec<ImagePoint<f64>>,
+    /// Edge points of the answer with their weights, in their order.
+    points: Weighted,
     error_rad: f64,
     nees: f64,
 }
@@ -187,7 +202,7 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &'a [(&'a FlightFrame, P
         let d = Vector3::from(axis.xyz()) - e;
         out.push(Looked {
             frame,
-            points: points.into_iter().filter(|p| p.1 > 0.0).map(|p| p.0).collect(),
+            points: points.into_iter().filter(|p| p.1 > 0.0).collect(),
             error_rad: solution.axis.angle_rad(&axis),
             nees: full.try_inverse().map_or(f64::NAN, |inverse| d.dot(&(inverse * d))),
         });
@@ -234,8 +249,8 @@ impl Observer<f64> for Watch {
 struct Edge {
     /// Mean height above the assumed limb, kilometres.
     mean_km: f64,
-    /// (point, error along the normal in pixels without the mean), in order along the edge.
-    errors: Vec<(ImagePoint<f64>, f64)>,
+    /// (point, error along the normal in pixels without the mean, weight), in order along the edge.
+    errors: Vec<(ImagePoint<f64>, f64, f64)>,
 }
 
 impl Edge {
@@ -246,11 +261,18 @@ impl Edge {
         let truth = scene.truth_of(kind, "", 0.0).ok()?;
         let axis: UnitVec3<_, f64> = truth.axis()?;
         let disc = matches!(kind, Kind::Sun | Kind::Moon);
-        // (point, off the limb outward, the same a pixel)
-        let off: Vec<(ImagePoint<f64>, f64, f64)> = looked
+        // How much higher the limb is over this latitude than on average, as the scene has it.
+        let higher_km = |up: &Vector3<f64>| match &scene.world {
+            World::Infrared(world) => {
+                world.half_level_at_km(libm::asin(up.z.clamp(-1.0, 1.0)).to_degrees()) - world.half_level_km
+            }
+            World::Plain | World::Visible(_) => 0.0,
+        };
+        // (point, off the limb outward, the same a pixel, weight)
+        let off: Vec<(ImagePoint<f64>, f64, f64, f64)> = looked
             .points
             .iter()
-            .filter_map(|&point| {
+            .filter_map(|&(point, weight)| {
                 let ray = camera.ray(point)?;
                 let jacobian = ray.jacobian();
                 if disc {
@@ -258,18 +280,21 @@ impl Edge {
                     let by: [f64; 2] = [0, 1].map(|c| (0..3).map(|i| jacobian[i][c] * axis.xyz()[i]).sum::<f64>());
                     let angle = s.angle_rad(&axis);
                     let slope = libm::hypot(by[0], by[1]) / libm::sin(angle).max(1e-9);
-                    return Some((point, angle - truth.half_angle_deg.to_radians(), slope));
+                    return Some((point, angle - truth.half_angle_deg.to_radians(), slope, weight));
                 }
                 let sight = view.look(ray.direction().xyz());
                 let [gu, gv] = view.tangent_height_gradient(&sight, &jacobian);
-                Some((point, view.tangent_height_m(&sight) * 1e-3, libm::hypot(gu, gv) * 1e-3))
+                let off_km = view.tangent_height_m(&sight) * 1e-3 - higher_km(&view.normal(&view.point(&sight)));
+                Some((point, off_km, libm::hypot(gu, gv) * 1e-3, weight))
             })
             .collect();
         if off.len() < 20 {
             return None;
         }
-        let mean = off.iter().map(|o| o.1).sum::<f64>() / off.len() as f64;
-        Some(Self { mean_km: mean, errors: off.into_iter().map(|(p, h, g)| (p, (h - mean) / g.max(1e-12))).collect() })
+        let sum: f64 = off.iter().map(|o| o.3).sum();
+        let mean = off.iter().map(|o| o.3 * o.1).sum::<f64>() / sum;
+        let errors = off.into_iter().map(|(p, h, g, w)| (p, (h - mean) / g.max(1e-12), w)).collect();
+        Some(Self { mean_km: mean, errors })
     }
 }
 
@@ -278,19 +303,19 @@ fn autocovariance(pictures: &[Edge]) -> (f64, f64) {
     let (mut sum, mut count) = (vec![0.0f64; BINS], vec![0.0f64; BINS]);
     let (mut square, mut n) = (0.0, 0.0);
     for edge in pictures {
-        for (i, (p, e)) in edge.errors.iter().enumerate() {
-            square += e * e;
-            n += 1.0;
+        for (i, (p, e, w)) in edge.errors.iter().enumerate() {
+            square += w * e * e;
+            n += w;
             let (mut arc, mut last) = (0.0, *p);
-            for (q, f) in &edge.errors[i + 1..] {
+            for (q, f, v) in &edge.errors[i + 1..] {
                 arc += libm::hypot(q.u - last.u, q.v - last.v);
                 last = *q;
                 let bin = (arc / BIN_PX) as usize;
                 if bin >= BINS {
                     break;
                 }
-                sum[bin] += e * f;
-                count[bin] += 1.0;
+                sum[bin] += w * v * e * f;
+                count[bin] += w * v;
             }
         }
     }
