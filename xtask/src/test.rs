@@ -42,6 +42,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("firmware", firmware::test);
     all.step("demo", |_| demo());
     all.step("viewer", |_| viewer::test());
+    all.step("lenses beside OpenCV", |_| lenses_beside_opencv());
     all.step("simulator rendered again", |_| simulator_rendered_again());
     all.step("files read by others", |_| files_read_by_others());
     all.step("wheel", |_| {
@@ -90,16 +91,27 @@ fn demo() -> Outcome {
     Ok(())
 }
 
+/// The lens models beside OpenCV's.
+fn lenses_beside_opencv() -> Outcome {
+    compared_in_python("check_lenses.py", "debug/examples/rays", "lenses")
+}
+
 /// A simulated picture beside what NumPy and OpenCV make of the documented model.
 fn simulator_rendered_again() -> Outcome {
+    compared_in_python("check_simulator.py", "debug/hzn", "simulator")
+}
+
+/// A script of tests/python that is given one of our programs and a folder to make.
+fn compared_in_python(script: &str, program: &str, folder: &str) -> Outcome {
     let python = python::environment("benches", Path::new("benches/requirements.txt"))?;
     built_with_the_tests()?;
-    let dir = target().join("xtask").join("simulator");
+    let dir = target().join("xtask").join(folder);
     if dir.exists() {
         fs::remove_dir_all(&dir)?;
     }
-    let hzn = target().join("debug/hzn");
-    steps::run(Command::new(python).arg("tests/python/check_simulator.py").args([hzn, dir]))
+    fs::create_dir_all(target().join("xtask"))?;
+    let script = Path::new("tests/python").join(script);
+    steps::run(Command::new(python).arg(script).args([target().join(program), dir]))
 }
 
 /// The reference readers on a sample and on what the demo has written.
