@@ -9,7 +9,7 @@ use hzn_core::status::Stage;
 use hzn_core::{Config, Frame, camera};
 use hzn_sim::flight::rocket;
 use hzn_sim::{Disc, FlightFrame, Sky};
-use hzn_tests::emulated::{Board, Case, Measured, bits, measure, measure_rows};
+use hzn_tests::emulated::{Board, Case, Measured, bits, chain, measure, measure_rows};
 
 const HEAD: &str = "# What the firmware costs
 
@@ -242,10 +242,14 @@ fn report() -> Result<String, String> {
             measured.iter().chain(&worst).map(|m| m.stack_bytes).max().unwrap_or(0)
         );
         out += "| image | flash, bytes | static RAM, bytes |\n|---|---|---|\n";
-        for (image, what) in [("flight", "flight"), ("rows", "row by row, 640×480")] {
+        for (image, what) in
+            [("chain", "the sensor alone, 600 points"), ("flight", "flight"), ("rows", "row by row, 640×480")]
+        {
             let [flash, ram] = sizes(board, image).ok_or("arm-none-eabi-size cannot be run")?;
             out += &format!("| {what} | {flash} | {ram} |\n");
         }
+        let stack_bytes = chain(board, &usual[usual.len() - 1].bytes)[10];
+        out += &format!("\nStack of the sensor alone: {stack_bytes} bytes.\n");
         out += "\n| row by row | taking the rows, thousand | the end of the picture, thousand |\n|---|---|---|\n";
         for (kind, cases) in &by_rows {
             let measured = measure_rows(board, cases);

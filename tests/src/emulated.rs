@@ -163,6 +163,21 @@ pub fn measure_rows(board: Board, cases: &[Case]) -> Vec<Measured> {
     run(board, "rows", cases)
 }
 
+/// What the image `chain` of a board answers to a picture: its eleven words, as that image describes them.
+///
+/// # Panics
+/// QEMU or the image fails.
+pub fn chain(board: Board, picture: &[u8]) -> [u32; 11] {
+    let dir = tempfile::tempdir().expect("a temporary folder can be made");
+    std::fs::write(dir.path().join("picture.bin"), picture).expect("the folder is writable");
+    let status = board.qemu(&board.image("chain"), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
+    let status = status.expect("qemu-system-arm is installed");
+    assert!(status.success(), "{}: the image ended with {status}", board.name());
+    let answer = std::fs::read(dir.path().join("answer.bin")).expect("the image wrote its answer");
+    let mut words = answer.as_chunks::<4>().0.iter().map(|w| u32::from_le_bytes(*w));
+    std::array::from_fn(|_| words.next().expect("eleven words are written"))
+}
+
 fn run(board: Board, image: &str, cases: &[Case]) -> Vec<Measured> {
     let dir = tempfile::tempdir().expect("a temporary folder can be made");
     let mut input = Vec::new();

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use hzn_core::binarize;
-use hzn_core::image::Pixels;
+use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::status::Status;
-use hzn_core::{Config, Frame};
+use hzn_core::{Config, FlightHorizon, Frame, camera};
 use hzn_flight::{Parameters, table};
 use hzn_sim::flight::{leo_infrared, rocket};
-use hzn_tests::emulated::{Board, Case, bits, measure, measure_rows};
+use hzn_tests::emulated::{Board, Case, bits, chain, measure, measure_rows};
 use hzn_tests::real::Photograph;
 
 /// Rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and pictures that are none.
@@ -297,4 +297,36 @@ fn a_power_cut_in_the_middle_of_a_parameter_write() {
     assert!(said.contains("started with copy 2 of the parameters, generation 2"), "{said}");
     assert!(said.contains("a copy of the parameters cannot be used (1, 2)"), "{said}");
     assert!(said.contains("parameter 32 body.altitude_km = NaN"), "{said}");
+}
+
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn the_sensor_alone_answers_with_the_same_bits() {
+    // The lens and the altitude that stand in the image.
+    let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
+    let lens = camera::Config { k, ..camera::Config::ideal(camera::Model::KannalaBrandt, 1920, 1080, 1233.0) };
+    let mut sensor = Config::new(lens.clone());
+    sensor.body.altitude_km = Some(150.0);
+    let mut flight = rocket(1920, 1080, 6, 7);
+    flight.frames.iter_mut().for_each(|f| f.scene.camera = lens.clone());
+    let mut ok = 0;
+    for frame in &flight.frames {
+        let case = Case { known: Frame::default(), ..Case::rendered(frame.file.clone(), &sensor, frame) };
+        let mut horizon = Box::new(FlightHorizon::new(&sensor).unwrap());
+        let picture = Grey::try_new(&case.bytes, Layout::packed(1920, 1080, 1, 8)).unwrap();
+        let expected = horizon.expect(&case.known).unwrap();
+        let report = horizon.process(&picture, &expected);
+        let direction = report.solution.as_ref().map_or([0; 9], |s| {
+            let ([x, y, z], [[xx, xy, xz], [_, yy, yz], [_, _, zz]]) = (s.axis.xyz(), s.covariance.rows());
+            [x, y, z, xx, xy, xz, yy, yz, zz].map(f32::to_bits)
+        });
+        for board in Board::ALL {
+            let words = chain(board, &case.bytes);
+            assert_eq!((words[0], &words[1..10]), (report.status as u32, &direction[..]), "{} {board:?}", case.name);
+            // Beside the frame: its lists and its stack. The stack is painted, so that the number is a real one.
+            assert!((4096..65536).contains(&words[10]), "{} bytes of stack", words[10]);
+        }
+        ok += u32::from(report.status == Status::Ok);
+    }
+    assert!(ok >= 3, "{ok} answers");
 }

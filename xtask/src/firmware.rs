@@ -15,7 +15,7 @@ const BOARDS: [(&str, &str); 2] = [("an386", ""), (M7, M7_FLAGS)];
 const M7: &str = "an500";
 const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
 /// The images of a board.
-const IMAGES: [&str; 3] = ["flight", "measure", "rows"];
+const IMAGES: [&str; 4] = ["chain", "flight", "measure", "rows"];
 /// Where the costs are written down.
 const COSTS: &str = "docs/firmware-cost.md";
 

@@ -80,7 +80,8 @@ impl<T: Real> Brown<T> {
     }
 
     /// The ray of the distorted point and its derivative in the tangent basis; `None` where Newton does not arrive.
-    #[inline]
+    // Once in flash, not at every caller.
+    #[inline(never)]
     pub(super) fn ray(&self, xd: T, yd: T) -> Option<(V3<T>, [T; 4])> {
         let (mut x, mut y) = (xd, yd);
         let mut inverse = [T::one(), T::zero(), T::zero(), T::one()];

@@ -220,6 +220,13 @@ impl<T: Real> Camera<T> {
                 return;
             }
         }
+        self.rays_one_by_one(block);
+    }
+
+    /// As [`Self::rays`], for lenses without series.
+    // Once in flash: inlined it would stand there for every lane.
+    #[inline(never)]
+    fn rays_one_by_one(&self, block: &mut Block<T>) {
         for l in 0..LANES {
             match self.ray(block.point(l)).filter(|_| block.weight[l] > T::ZERO) {
                 Some(ray) => block.set_ray(l, &ray),

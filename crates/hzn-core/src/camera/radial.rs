@@ -61,6 +61,7 @@ pub(super) fn monotonic_limit(k: &[f64; 4]) -> Option<f64> {
 }
 
 /// θ with r(θ) = ρ: Newton clamped to 0…θ_max from ρ θ_max/r(θ_max).
+#[inline(never)]
 fn invert<T: Real>(k: &[T; 4], rho: T, theta_max: T, r_max: T) -> T {
     let mut theta = rho * theta_max / r_max;
     for _ in 0..8 {
@@ -192,14 +193,19 @@ impl<T: Real> Radial<T> {
                 let [s, c, d] = horner(terms.get(..*used).unwrap_or_default(), *scale * rho2 - T::one());
                 radial_ray(x, y, s, c, d)
             }
-            Inverse::Newton => {
-                let rho = rho2.sqrt();
-                let theta = invert(&self.k, rho, self.theta_max, self.r_max);
-                let (sin, cos) = theta.sin_cos();
-                let s = if rho > T::of(1e-12) { sin / rho } else { T::one() };
-                radial_ray(x, y, s, cos, T::one() / forward(&self.k, theta).1)
-            }
+            Inverse::Newton => self.ray_by_newton(x, y, rho2),
         }
+    }
+
+    /// As [`Self::ray`], where there are no series.
+    // Once in flash, not at every caller.
+    #[inline(never)]
+    fn ray_by_newton(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
+        let rho = rho2.sqrt();
+        let theta = invert(&self.k, rho, self.theta_max, self.r_max);
+        let (sin, cos) = theta.sin_cos();
+        let s = if rho > T::of(1e-12) { sin / rho } else { T::one() };
+        radial_ray(x, y, s, cos, T::one() / forward(&self.k, theta).1)
     }
 
     /// θ beyond the largest radius, along the tangent there.

@@ -1,0 +1,74 @@
+//! The sensor alone, as small as it gets: one configuration in flash, one picture in external memory, one answer. What of
+//! this image is flash and RAM is what the `hzn` chain takes of a flight computer.
+//!
+//! `picture.bin` is the picture, 1920×1080 bytes. `answer.bin` is what it gave, little-endian: status, axis (3), covariance
+//! (xx, xy, xz, yy, yz, zz), words of which all but the first are singles, and the stack's high-water mark.
+
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+
+use cortex_m_rt::entry;
+use hzn_core::camera::{self, Model};
+use hzn_core::image::{Grey, Layout};
+use hzn_core::pipeline::{Unobserved, Workspace};
+use hzn_core::{Config, Frame, Sensor};
+use hzn_mps2::board::Board;
+use hzn_mps2::host::{File, exit};
+use hzn_mps2::watermark;
+use static_cell::ConstStaticCell;
+
+const WIDTH: u16 = 1920;
+const HEIGHT: u16 = 1080;
+
+/// For 600 points of an edge, which is what the default `candidates.keep_points` asks for.
+type Lists = Workspace<f32, 2048, 76, 512>;
+static WORKSPACE: ConstStaticCell<Lists> = ConstStaticCell::new(Lists::new());
+
+#[entry]
+fn main() -> ! {
+    exit(match run() {
+        Some(()) => 0,
+        None => 1,
+    })
+}
+
+/// The lens of the rocket's flight, 150 km up.
+fn config() -> Config {
+    let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
+    let lens = camera::Config { k, ..camera::Config::ideal(Model::KannalaBrandt, WIDTH, HEIGHT, 1233.0) };
+    let mut config = Config::new(lens);
+    config.body.altitude_km = Some(150.0);
+    // As in `FlightHorizon`, whose lists are longer.
+    config.limits.max_work = Some(245_760);
+    config
+}
+
+fn run() -> Option<()> {
+    let mut board = Board::take()?;
+    let [picture, _] = &mut board.frames;
+    let picture = picture.get_mut(..usize::from(WIDTH) * usize::from(HEIGHT))?;
+    if !File::open(c"picture.bin")?.read(picture) {
+        return None;
+    }
+    let workspace = WORKSPACE.try_take()?;
+    // Seen through, the methods that this configuration does not choose would be left out.
+    let sensor = Sensor::<f32>::new(black_box(&config())).ok()?;
+    let expected = sensor.expect(&Frame::default()).ok()?;
+    let picture = Grey::try_new(&*picture, Layout::packed(WIDTH.into(), HEIGHT.into(), 1, 8)).ok()?;
+    let report = sensor.process(workspace, &picture, &expected, &Unobserved);
+
+    let mut words = [0u32; 11];
+    let [status, direction @ .., stack]: &mut [u32; 11] = &mut words;
+    *status = report.status as u32;
+    if let Some(solution) = &report.solution {
+        let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = solution.covariance.rows();
+        for (word, value) in direction.iter_mut().zip(solution.axis.xyz().into_iter().chain([xx, xy, xz, yy, yz, zz])) {
+            *word = value.to_bits();
+        }
+    }
+    *stack = watermark::stack_bytes();
+    let mut answer = File::create(c"answer.bin")?;
+    words.iter().all(|w| answer.write(&w.to_le_bytes())).then_some(())
+}
