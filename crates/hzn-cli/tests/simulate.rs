@@ -112,6 +112,60 @@ fn what_cannot_be_is_said_before_anything_is_written() {
     assert_eq!((code, stderr.as_str()), (2, "error: rockett: no such scene or file; did you mean rocket?\n"));
 }
 
+/// Radiances with the limb's half level at 30 km over the north pole and 20 km over the south pole all the year.
+fn radiances() -> String {
+    let mut text = String::from("tangent_height_km,latitude_deg,radiance\n");
+    for latitude in [-90.0, 90.0] {
+        for height in [0.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 80.0] {
+            let half_level = if latitude > 0.0 { 30.0 } else { 20.0 };
+            let radiance = 0.4 * f64::clamp(1.0 - (height - half_level) / 10.0, 0.0, 2.0);
+            text.push_str(&format!("{height},{latitude},{radiance:.3}\n"));
+        }
+    }
+    text
+}
+
+#[test]
+fn radiances_of_ones_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let (_, scene, _) = hzn(at, "1", &["simulate", "leo-infrared", "--show"]);
+    let from = scene.find("[world.infrared.clouds]").unwrap();
+    let to = scene.find("[detector]").unwrap();
+    let scene = format!("{}table = \"radiance.csv\"\n\n{}", &scene[..from], &scene[to..]);
+    std::fs::write(at.join("mine.toml"), &scene).unwrap();
+    let simulate = |table: &str| {
+        std::fs::write(at.join("radiance.csv"), table).unwrap();
+        hzn(at, "2", &["simulate", "mine.toml", "-o", "out", "--frames", "24", "-q", "--force"])
+    };
+    let (code, _, stderr) = simulate(&radiances());
+    assert_eq!(code, 0, "{stderr}");
+    let sensor: toml::Table = std::fs::read_to_string(at.join("out/sensor.toml")).unwrap().parse().unwrap();
+    let body = sensor["body"].as_table().unwrap();
+    let height_km = body["limb_height_km"].as_float().unwrap();
+    assert!((height_km - 25.0).abs() < 1.0, "{height_km}");
+    let rows = body["limb_height_by_latitude_km"].as_array().unwrap();
+    let of = |i: usize| rows[i].as_array().unwrap()[1].as_float().unwrap();
+    assert!((of(rows.len() - 1) - of(0) - 10.0).abs() < 0.01, "{rows:?}");
+
+    // The limb stands where the table has it.
+    let (code, _, stderr) = hzn(at, "2", &["run", "out", "-o", "out.csv"]);
+    assert_eq!(code, 0, "{stderr}");
+    let (code, _, stderr) = hzn(at, "1", &["evaluate", "out.csv", "--truth", "out/truth.csv", "-o", "e.json"]);
+    assert_eq!(code, 0, "{stderr}");
+    let known: serde_json::Value = serde_json::from_slice(&std::fs::read(at.join("e.json")).unwrap()).unwrap();
+    let rms_deg = known["evaluations"][0]["errors"]["rms_deg"].as_f64().unwrap();
+    assert!(rms_deg < 0.05, "{rms_deg}");
+
+    let (code, _, stderr) = simulate(&radiances().replace("25,90,0.600", "25,90,6"));
+    assert_eq!(code, 2);
+    let what = "line 15: radiance = 6: must be 0 to 1, a fraction of full scale";
+    assert!(stderr.contains("mine.toml: [world] infrared.table: ") && stderr.contains(what), "{stderr}");
+    std::fs::write(at.join("mine.toml"), scene.replace("table =", "scale_km = 3.0\ntable =")).unwrap();
+    let (code, _, stderr) = simulate(&radiances());
+    assert!(code == 2 && stderr.contains("scale_km belongs to the curves"), "{stderr}");
+}
+
 #[test]
 fn built_in_scenes_can_be_listed_and_printed() {
     let at = tempfile::tempdir().unwrap();

@@ -3,16 +3,18 @@
 //!
 //! The curves of their source are not printed. Ours are analytic: a level of the disc that is a little higher over
 //! warm ground, and a limb that falls off as a logistic curve, whose half level lies at 25 km on average, higher over
-//! the summer hemisphere and lower over the winter one.
+//! the summer hemisphere and lower over the winter one. A user's own come from a file ([`Radiance`]).
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::globe::{Globe, Sight, View};
 use crate::pose::Pose;
+use crate::radiance::{Grid, Radiance, mean_over_globe};
 use crate::texture::{CloudField, Clouds};
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What an infrared camera sees.
@@ -39,6 +41,13 @@ pub struct Infrared {
     pub clouds: Option<Clouds>,
     /// Brightness of space.
     pub space: f64,
+    /// A table of radiances in place of the curves that the five keys after the season describe: a CSV file, see
+    /// [`Radiance::parse`]. The path is relative to the scene.toml.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<PathBuf>,
+    /// The table, read by [`Infrared::read_table`].
+    #[serde(skip)]
+    pub radiance: Option<Arc<Radiance>>,
 }
 
 impl Default for Infrared {
@@ -52,6 +61,8 @@ impl Default for Infrared {
             scale_km: 4.0,
             clouds: None,
             space: 0.03,
+            table: None,
+            radiance: None,
         }
     }
 }
@@ -76,22 +87,82 @@ impl Infrared {
         Self { season_deg: self.season_deg.or(Some(Self::season_deg(unix_s))), ..self.clone() }
     }
 
+    /// Reads the table, if one is named; `folder` is where the path starts.
+    ///
+    /// # Errors
+    /// It cannot be read, or something is wrong with it; also a value for the curves in its place.
+    pub fn read_table(&mut self, folder: &Path) -> Result<(), String> {
+        let Some(table) = &self.table else { return Ok(()) };
+        let own = Self::default();
+        let curves = [
+            ("brightness", self.brightness, own.brightness),
+            ("by_latitude", self.by_latitude, own.by_latitude),
+            ("half_level_km", self.half_level_km, own.half_level_km),
+            ("half_level_season_km", self.half_level_season_km, own.half_level_season_km),
+            ("scale_km", self.scale_km, own.scale_km),
+        ];
+        if let Some((key, ..)) = curves.into_iter().find(|(_, value, default)| value != default) {
+            return Err(format!("{key} belongs to the curves in place of a table: leave it out, or the table"));
+        }
+        let path = folder.join(table);
+        let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let radiance = Radiance::parse(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+        self.radiance = Some(Arc::new(radiance));
+        Ok(())
+    }
+
+    /// The radiances of the season.
+    fn grid(&self) -> Grid {
+        if let Some(radiance) = &self.radiance {
+            return radiance.in_season(self.season_deg.unwrap_or(0.0));
+        }
+        let latitudes_deg = (0..LATITUDES).map(|i| 180.0 * i as f64 / (LATITUDES - 1) as f64 - 90.0).collect();
+        let heights_km = (0..HEIGHTS).map(|i| FIRST_KM + STEP_KM * i as f64).collect();
+        Grid::of(heights_km, latitudes_deg, |height_km, latitude_deg| self.curve(height_km, latitude_deg))
+    }
+
+    /// Half level in kilometres on average over the globe.
+    pub fn mean_half_level_km(&self) -> f64 {
+        match &self.radiance {
+            Some(_) => {
+                let half_level_km = self.half_levels();
+                mean_over_globe(half_level_km)
+            }
+            None => self.half_level_km,
+        }
+    }
+
     /// Half level in kilometres at a geodetic latitude.
     pub fn half_level_at_km(&self, latitude_deg: f64) -> f64 {
+        self.half_levels()(latitude_deg)
+    }
+
+    /// The same for many latitudes.
+    pub(crate) fn half_levels(&self) -> impl Fn(f64) -> f64 {
+        let grid = self.radiance.is_some().then(|| self.grid());
+        let (mean_km, season_km) = (self.half_level_km, self.half_level_season_km);
         let season = libm::cos(self.season_deg.unwrap_or(0.0).to_radians());
-        self.half_level_km + self.half_level_season_km * season * latitude_deg / 90.0
+        move |latitude_deg| match &grid {
+            // Between the latitudes and seasons of a table that has one everywhere there is one too.
+            Some(grid) => grid.half_level_km(latitude_deg).unwrap_or(0.0),
+            None => mean_km + season_km * season * latitude_deg / 90.0,
+        }
     }
 
     /// The half level as rows of (geodetic latitude in degrees, kilometres): what a sensor may be told.
     pub fn half_level_by_latitude_km(&self) -> Vec<[f64; 2]> {
-        if self.half_level_season_km == 0.0 {
-            return Vec::new();
-        }
-        [-90.0, 0.0, 90.0].map(|lat| [lat, self.half_level_at_km(lat)]).to_vec()
+        let half_level_km = self.half_levels();
+        let latitudes_deg: &[f64] = match &self.radiance {
+            Some(_) => &[-90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0],
+            None => &[-90.0, 0.0, 90.0],
+        };
+        let rows: Vec<[f64; 2]> = latitudes_deg.iter().map(|lat| [*lat, half_level_km(*lat)]).collect();
+        let flat = rows.iter().all(|row| row[1] == rows[0][1]);
+        if flat { Vec::new() } else { rows }
     }
 
     /// Radiance at a tangent height and a geodetic latitude, fraction of full scale, without space and clouds.
-    fn radiance(&self, height_km: f64, latitude_deg: f64) -> f64 {
+    fn curve(&self, height_km: f64, latitude_deg: f64) -> f64 {
         let disc = self.brightness * (1.0 + self.by_latitude * libm::cos(2.0 * latitude_deg.to_radians()));
         disc / (1.0 + libm::exp((height_km - self.half_level_at_km(latitude_deg)) / self.scale_km))
     }
@@ -103,7 +174,7 @@ pub(crate) struct Warmth {
     camera: Camera<f64>,
     globe: Globe,
     view: View,
-    table: Arc<Vec<[f32; HEIGHTS]>>,
+    table: Arc<Grid>,
     clouds: Option<Arc<CloudField>>,
     space: f32,
     disc: f32,
@@ -121,18 +192,13 @@ impl Warmth {
         let pixel_rad = 1.0 / fx.min(fy);
         let away_m = Vector3::from(pose.position_m).norm();
         let limb_m = (away_m * away_m - globe.b_m * globe.b_m).max(0.0).sqrt();
-        let table = (0..LATITUDES)
-            .map(|row| {
-                let latitude = 180.0 * row as f64 / (LATITUDES - 1) as f64 - 90.0;
-                core::array::from_fn(|i| world.radiance(FIRST_KM + STEP_KM * i as f64, latitude) as f32)
-            })
-            .collect();
+        let table = world.grid();
         Some(Self {
             near: 2.0 * (1.3e5 + 3.0 * limb_m * pixel_rad) / globe.b_m,
-            table: Arc::new(table),
             clouds: world.clouds.map(|c| Arc::new(CloudField::new(&c, globe.a_m))),
             space: world.space as f32,
-            disc: world.brightness as f32,
+            disc: if world.radiance.is_some() { table.deepest() } else { world.brightness as f32 },
+            table: Arc::new(table),
             camera,
             globe,
             view,
@@ -168,13 +234,7 @@ impl Warmth {
     fn at(&self, sight: &Sight, height_m: f64) -> f32 {
         let point = self.view.point(sight);
         let latitude = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
-        let row = (latitude + 90.0) / 180.0 * (LATITUDES - 1) as f64;
-        let column = (height_m * 1e-3 - FIRST_KM) / STEP_KM;
-        let (r, c) = (row.clamp(0.0, (LATITUDES - 1) as f64 - 1e-9), column.clamp(0.0, (HEIGHTS - 1) as f64 - 1e-9));
-        let ((i, fr), (k, fc)) = ((r as usize, (r - r.floor()) as f32), (c as usize, (c - c.floor()) as f32));
-        let cell = |i: usize, k: usize| self.table.get(i).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
-        let along = |i: usize| cell(i, k) + fc * (cell(i, k + 1) - cell(i, k));
-        let mut light = along(i) + fr * (along(i + 1) - along(i));
+        let mut light = self.table.at(height_m * 1e-3, latitude);
         if sight.miss < 0.0
             && let Some(clouds) = &self.clouds
         {
@@ -201,8 +261,8 @@ mod tests {
         let january = Infrared { season_deg: Some(180.0), ..july.clone() };
         assert_eq!(january.half_level_at_km(90.0), 20.5);
         for lat in [-60.0, 0.0, 45.0] {
-            let deep = july.radiance(-1e3, lat);
-            assert!((july.radiance(july.half_level_at_km(lat), lat) / deep - 0.5).abs() < 1e-12);
+            let deep = july.curve(-1e3, lat);
+            assert!((july.curve(july.half_level_at_km(lat), lat) / deep - 0.5).abs() < 1e-12);
         }
         // 2021-07-15 and 2022-01-14.
         assert!(Infrared::season_deg(1_626_307_200.0) < 2.0);

@@ -11,6 +11,7 @@
 //! | [`texture`] | clouds |
 //! | [`visible`] | the Earth in sunlight: ground, clouds, air, Sun, Moon |
 //! | [`infrared`] | the Earth at 15 µm |
+//! | [`radiance`] | a user's table for it |
 //! | [`optics`] | fall-off and stray light |
 //! | [`motion`] | rotation during a picture |
 //! | [`foreground`] | structure of the vehicle in the picture |
@@ -44,6 +45,7 @@ pub mod optics;
 mod painter;
 pub mod picture;
 pub mod pose;
+pub mod radiance;
 mod render;
 pub mod scenario;
 pub mod scene;

@@ -233,6 +233,9 @@ impl Scenario {
         if let World::Visible(world) = &mut self.world {
             world.ground.read_map(folder).map_err(|e| ScenarioError::new("[world] visible.ground.map", e))?;
         }
+        if let World::Infrared(world) = &mut self.world {
+            world.read_table(folder).map_err(|e| ScenarioError::new("[world] infrared.table", e))?;
+        }
         if let Trajectory::Table(table) = &mut self.trajectory {
             table.read(folder).map_err(|e| ScenarioError::new("[trajectory] table.file", e))?;
         }
@@ -367,7 +370,7 @@ impl Scenario {
         let limb_height_km = match (&self.world, kind) {
             (_, Kind::Sun | Kind::Moon) => 0.0,
             (World::Visible(w), _) => w.air.half_height_km([1.0 / 3.0; 3], EARTH_MEAN_RADIUS_M / 1e3),
-            (World::Infrared(w), _) => w.half_level_km,
+            (World::Infrared(w), _) => w.in_season(self.start_unix_s()).mean_half_level_km(),
             (World::Plain, _) => body::Config::default().limb_height_km,
         };
         let by_latitude = match (&self.world, kind) {

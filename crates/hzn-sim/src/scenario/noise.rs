@@ -262,11 +262,13 @@ impl Edge {
         let axis: UnitVec3<_, f64> = truth.axis()?;
         let disc = matches!(kind, Kind::Sun | Kind::Moon);
         // How much higher the limb is over this latitude than on average, as the scene has it.
-        let higher_km = |up: &Vector3<f64>| match &scene.world {
-            World::Infrared(world) => {
-                world.half_level_at_km(libm::asin(up.z.clamp(-1.0, 1.0)).to_degrees()) - world.half_level_km
-            }
-            World::Plain | World::Visible(_) => 0.0,
+        let levels = match &scene.world {
+            World::Infrared(world) => Some((world.half_levels(), world.mean_half_level_km())),
+            World::Plain | World::Visible(_) => None,
+        };
+        let higher_km = |up: &Vector3<f64>| {
+            let latitude_deg = libm::asin(up.z.clamp(-1.0, 1.0)).to_degrees();
+            levels.as_ref().map_or(0.0, |(half_level_km, mean_km)| half_level_km(latitude_deg) - mean_km)
         };
         // (point, off the limb outward, the same a pixel, weight)
         let off: Vec<(ImagePoint<f64>, f64, f64, f64)> = looked
