@@ -21,6 +21,17 @@ pub enum Kind {
     Play,
 }
 
+/// One change, in parts; all but the last from the change on.
+#[derive(Debug, Clone, Copy, Default)]
+struct Times {
+    /// From the wish to the answer, on the engine's thread.
+    answer: Duration,
+    /// The window with the new picture is laid out and goes to the painter.
+    handed: Duration,
+    /// It is on the screen.
+    screen: Duration,
+}
+
 /// A measurement under way.
 #[derive(Debug)]
 pub struct Measure {
@@ -30,7 +41,9 @@ pub struct Measure {
     changed: Option<Instant>,
     /// Seen in this pass of the window, which is not on the screen yet.
     seen: bool,
-    times: Vec<Duration>,
+    times: Vec<Times>,
+    /// What is known of the change that is on its way to the screen.
+    handed: Times,
     frames: usize,
     shown: Option<usize>,
 }
@@ -39,7 +52,7 @@ impl Measure {
     /// Begins; `began` is the start of the program.
     pub fn new(kind: Kind, began: Instant) -> Self {
         let (look, times) = (Look::Colour, Vec::new());
-        Self { kind, began, look, changed: None, seen: false, times, frames: 0, shown: None }
+        Self { kind, began, look, changed: None, seen: false, times, handed: Times::default(), frames: 0, shown: None }
     }
 
     /// Before the window is drawn: what was drawn last is on the screen now. True when the measurement is through.
@@ -60,6 +73,9 @@ impl Measure {
     /// After the window is drawn.
     pub fn after(&mut self, viewer: &Viewer, ctx: &egui::Context) {
         self.seen = viewer.is_settled();
+        if let (true, Some(changed), Some(sight)) = (self.seen, self.changed, viewer.sight()) {
+            self.handed = Times { answer: sight.latency, handed: changed.elapsed(), screen: Duration::ZERO };
+        }
         if self.seen {
             // The next pass comes when this one is on the screen.
             ctx.request_repaint();
@@ -71,17 +87,20 @@ impl Measure {
             return false;
         }
         if let Some(changed) = self.changed.take() {
-            self.times.push(changed.elapsed());
+            self.times.push(Times { screen: changed.elapsed(), ..self.handed });
         }
         if self.times.len() == CHANGES {
-            self.times.sort();
-            let at = |part: f64| self.times[(part * (CHANGES - 1) as f64) as usize].as_secs_f64() * 1e3;
-            let name = self.look.name();
-            println!(
-                "parameter to new picture on the screen, {name}: median {:.1} ms, 95 % {:.1} ms",
-                at(0.5),
-                at(0.95)
-            );
+            println!("parameter to new picture, {}:", self.look.name());
+            for (what, part) in [
+                ("from the wish to the answer", (|t| t.answer) as fn(&Times) -> Duration),
+                ("from the change to the frame that shows it, laid out", |t| t.handed),
+                ("from the change to the screen, with tessellation and OpenGL", |t| t.screen),
+            ] {
+                let mut each: Vec<Duration> = self.times.iter().map(part).collect();
+                each.sort();
+                let at = |part: f64| each[(part * (CHANGES - 1) as f64) as usize].as_secs_f64() * 1e3;
+                println!("  {what}: median {:.1} ms, 95 % {:.1} ms", at(0.5), at(0.95));
+            }
             self.times.clear();
             if self.look == Look::Level {
                 return true;

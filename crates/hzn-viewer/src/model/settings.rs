@@ -112,6 +112,12 @@ pub struct Settings {
     pub recent: Vec<PathBuf>,
     /// Width and height of the window.
     pub window: [f32; 2],
+    /// Width of the column with the answer.
+    pub side_width: f32,
+    /// Width of the column of stages.
+    pub stages_width: f32,
+    /// Height of the plots.
+    pub plots_height: f32,
 }
 
 impl Default for Settings {
@@ -135,6 +141,9 @@ impl Default for Settings {
             plotted: ["3 sigma", "RMS"].map(str::to_owned).to_vec(),
             recent: Vec::new(),
             window: [1440.0, 900.0],
+            side_width: 208.0,
+            stages_width: 364.0,
+            plots_height: 206.0,
         }
     }
 }

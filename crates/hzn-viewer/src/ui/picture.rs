@@ -473,13 +473,21 @@ fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &Answer) {
     painter.line_segment([back, tip - way * 8.0], Stroke::new(2.5, theme::AXIS));
     painter.add(Shape::convex_polygon(head, theme::AXIS, Stroke::new(1.0, Color32::from_black_alpha(150))));
     let degrees = s.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
-    let align = if way.y > 0.5 { Align2::LEFT_BOTTOM } else { Align2::LEFT_TOP };
     let text = format!("axis, {degrees:.1}° off the optical axis");
-    let place = back + vec2(8.0, if way.y > 0.5 { 6.0 } else { -6.0 });
     let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), theme::AXIS);
-    let rect = align.anchor_size(place, galley.size() + vec2(10.0, 4.0));
-    let by = (frame.right() - rect.right()).min(0.0);
-    let rect = rect.translate(vec2(by, 0.0));
+    // Behind the arrow, on the side that it comes from.
+    let align = match way {
+        w if w.x > 0.4 => Align2::RIGHT_CENTER,
+        w if w.x < -0.4 => Align2::LEFT_CENTER,
+        w if w.y > 0.0 => Align2::CENTER_BOTTOM,
+        _ => Align2::CENTER_TOP,
+    };
+    let rect = align.anchor_size(back - way * 8.0, galley.size() + vec2(10.0, 4.0));
+    let inward = |low: f32, high: f32, min: f32, max: f32| (min - low).max(0.0) - (high - max).max(0.0);
+    let rect = rect.translate(vec2(
+        inward(rect.left(), rect.right(), frame.left(), frame.right()),
+        inward(rect.top(), rect.bottom(), frame.top(), frame.bottom()),
+    ));
     painter.rect_filled(rect, 4, Color32::from_black_alpha(170));
     painter.galley(rect.min + vec2(5.0, 2.0), galley, theme::AXIS);
 }

@@ -11,7 +11,9 @@ use crate::model::rows::{Of, QUANTITIES, Quantity};
 pub(super) const RESIDUALS: &str = "Residuals";
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    egui::Panel::bottom("plots").resizable(true).default_size(206.0).size_range(110.0..=600.0).show(ui, |ui| {
+    let height = viewer.settings.plots_height;
+    let panel = egui::Panel::bottom("plots").resizable(true).default_size(height).size_range(110.0..=600.0);
+    let shown = panel.show(ui, |ui| {
         ui.add_space(4.0);
         choice(viewer, ui);
         let chosen: Vec<String> = viewer.settings.plotted.clone();
@@ -40,6 +42,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             viewer.playback.go(frame, viewer.sequence.len());
         }
     });
+    viewer.settings.plots_height = shown.response.rect.height();
 }
 
 fn choice(viewer: &mut Viewer, ui: &mut Ui) {
@@ -82,10 +85,12 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, height: f32) -> 
         .include_x(0.0)
         .include_x(entries.last().map_or(1.0, |e| (e.time_s - start).max(1e-3)))
         .link_cursor(Id::unique("time"), [true, false])
+        .link_axis(Id::unique("time"), [true, false])
         .allow_scroll(false)
         .allow_boxed_zoom(true)
         .set_margin_fraction(egui::vec2(0.01, 0.12))
         .y_grid_spacer(ticks)
+        .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
         .y_axis_min_width(44.0)
         .x_axis_label("s")
         .y_axis_label(label)
@@ -138,6 +143,14 @@ fn ticks(input: GridInput) -> Vec<GridMark> {
         .take_while(|y| *y <= high)
         .map(|value| GridMark { value, step_size: step })
         .collect()
+}
+
+/// A tick's value with the digits that tell it from its neighbours.
+fn tick_label(value: f64, step: f64) -> String {
+    let digits = (-(step * 1.000_001).log10().floor()).clamp(0.0, 12.0) as usize;
+    // No minus before a zero.
+    let value = if value.abs() < step * 1e-6 { 0.0 } else { value };
+    format!("{value:.digits$}")
 }
 
 /// Points in a row, broken where one is missing.
@@ -195,6 +208,17 @@ mod tests {
         assert_eq!(at(-0.9, 7.2), [0.0, 5.0]);
         assert_eq!(at(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
         assert!(at(1.0, 1.0).is_empty() && at(f64::NAN, 1.0).is_empty());
+    }
+
+    #[test]
+    fn no_two_ticks_read_the_same() {
+        for (low, high) in [(0.08, 0.13), (100.2, 100.3), (0.0, 1.0), (-3e-5, 4e-5), (0.0, 2400.0)] {
+            let marks = ticks(GridInput { bounds: (low, high), base_step_size: 0.0 });
+            let labels: Vec<String> = marks.iter().map(|m| tick_label(m.value, m.step_size)).collect();
+            let distinct: std::collections::HashSet<_> = labels.iter().collect();
+            assert!(labels.len() > 1 && distinct.len() == labels.len(), "{labels:?}");
+        }
+        assert_eq!((tick_label(0.1, 0.02).as_str(), tick_label(-1e-17, 5.0).as_str()), ("0.10", "0"));
     }
 
     #[test]

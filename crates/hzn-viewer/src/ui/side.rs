@@ -10,7 +10,8 @@ use crate::model::settings::{Layer, Look};
 use crate::work::sight::{Answer, Sight};
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    egui::Panel::left("side").default_size(208.0).size_range(180.0..=360.0).show(ui, |ui| {
+    let width = viewer.settings.side_width;
+    let shown = egui::Panel::left("side").default_size(width).size_range(180.0..=360.0).show(ui, |ui| {
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             ui.add_space(6.0);
             answer(viewer, ui);
@@ -20,6 +21,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             layers(viewer, ui);
         });
     });
+    viewer.settings.side_width = shown.response.rect.width();
 }
 
 fn answer(viewer: &Viewer, ui: &mut Ui) {

@@ -9,18 +9,21 @@ use super::facts::{self, CARDS, Card};
 use super::viewer::Viewer;
 use super::{Command, theme};
 use crate::model::{Knob, Session};
-use crate::work::sight::Answer;
+use crate::work::sight::{Answer, Outcome};
 
 /// Width of the parameters' names.
 const NAME_WIDTH: f32 = 136.0;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    egui::Panel::right("stages").default_size(364.0).size_range(300.0..=640.0).show(ui, |ui| {
+    let width = viewer.settings.stages_width;
+    let shown = egui::Panel::right("stages").default_size(width).size_range(300.0..=640.0).show(ui, |ui| {
         head(viewer, ui);
         ui.separator();
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            // Shared, not copied: an answer holds thousands of points.
+            let outcome = viewer.sight.as_ref().and_then(|s| s.answers.first().cloned());
             for card in CARDS {
-                one(viewer, ui, card);
+                one(viewer, ui, card, outcome.as_deref());
             }
             ui.add_space(8.0);
         });
@@ -32,6 +35,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             session.settle();
         }
     });
+    viewer.settings.stages_width = shown.response.rect.width();
 }
 
 /// Preset, undo, redo, reset, save; and what is wrong.
@@ -116,11 +120,10 @@ fn bodies(viewer: &mut Viewer, ui: &mut Ui) {
     });
 }
 
-fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card) {
-    let answer = viewer.answer().cloned();
-    let time = card
-        .stage
-        .and_then(|stage| answer.as_ref()?.times.iter().find(|(s, t)| *s == stage && !t.is_zero()).map(|(_, t)| *t));
+fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>) {
+    let answer = outcome.and_then(|o| o.bodies.get(viewer.body).or(o.bodies.first()));
+    let time =
+        card.stage.and_then(|stage| answer?.times.iter().find(|(s, t)| *s == stage && !t.is_zero()).map(|(_, t)| *t));
     let id = ui.make_persistent_id(("card", card.title));
     let mut state =
         egui::containers::collapsing_header::CollapsingState::load_with_default_open(ui.ctx(), id, card.open);
@@ -129,7 +132,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card) {
         ui.set_width(ui.available_width());
         let header = ui.horizontal(|ui| {
             let (icon, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
-            let dot = reached(card, answer.as_ref());
+            let dot = reached(card, answer);
             ui.painter().circle_filled(icon.center(), 4.5, dot);
             let title = ui.add(
                 egui::Label::new(RichText::new(card.title).strong()).selectable(false).sense(egui::Sense::click()),
@@ -156,15 +159,13 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card) {
         }
         state.store(ui.ctx());
         // What happened is always there; the parameters unfold.
-        if let (Some(sight), Some(answer)) = (&viewer.sight, &answer)
-            && let Some(outcome) = sight.answers.first()
-        {
+        if let (Some(sight), Some(outcome), Some(answer)) = (&viewer.sight, outcome, answer) {
             for line in facts::lines(card, sight, outcome, answer) {
                 ui.add(egui::Label::new(RichText::new(line).size(12.5)).wrap());
             }
         }
         if card.title == "Candidates"
-            && let Some(answer) = &answer
+            && let Some(answer) = answer
         {
             candidates(viewer, ui, answer);
         }

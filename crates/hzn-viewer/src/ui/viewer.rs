@@ -21,6 +21,8 @@ use crate::work::{Ask, Engine, Setup, Sight, Wake};
 
 /// Frames that are decoded beforehand.
 const AHEAD: usize = 4;
+/// The window waits so long at most for an answer, so that it comes with the frame of the change.
+const AT_ONCE: Duration = Duration::from_millis(4);
 
 /// Something to be said, in place, until it is closed.
 #[derive(Debug, Clone, PartialEq)]
@@ -259,6 +261,9 @@ impl Viewer {
         if self.settings.stages {
             stages::show(self, ui);
         }
+        // What was turned just now is in the picture of this very frame, when the answer is quick.
+        self.ask();
+        self.wait(&ctx);
         picture::show(self, ui);
         compare::show(self, &ctx);
         dialogs::show(self, &ctx);
@@ -274,13 +279,7 @@ impl Viewer {
         }
         let sights: Vec<Sight> = self.engine.answers().collect();
         for sight in sights {
-            if let Some(outcome) = sight.answers.first()
-                && self.session.as_ref().is_some_and(|s| s.changes() == sight.changes)
-                && !outcome.bodies.is_empty()
-            {
-                self.rows.refresh(sight.index, outcome.bodies.iter().map(|b| b.row.clone()).collect());
-            }
-            self.sight = Some(sight);
+            self.see(sight);
         }
         self.textures.take(self.sight.as_ref(), ctx);
         let swept = self.sweep.as_mut().map(Sweep::events).unwrap_or_default();
@@ -295,6 +294,33 @@ impl Viewer {
             }
         }
         dialogs::poll(self);
+    }
+
+    /// Waits a moment for the answer to what was asked last; a slow one comes with a later frame.
+    fn wait(&mut self, ctx: &egui::Context) {
+        let until = Instant::now() + AT_ONCE;
+        let mut new = false;
+        while !self.is_settled() && self.asked.is_some() {
+            let Some(sight) = self.engine.wait(until.saturating_duration_since(Instant::now())) else { break };
+            self.see(sight);
+            new = true;
+        }
+        if new {
+            self.textures.take(self.sight.as_ref(), ctx);
+            // The columns were drawn before the answer came.
+            ctx.request_repaint();
+        }
+    }
+
+    /// A frame was looked at.
+    fn see(&mut self, sight: Sight) {
+        if let Some(outcome) = sight.answers.first()
+            && self.session.as_ref().is_some_and(|s| s.changes() == sight.changes)
+            && !outcome.bodies.is_empty()
+        {
+            self.rows.refresh(sight.index, outcome.bodies.iter().map(|b| b.row.clone()).collect());
+        }
+        self.sight = Some(sight);
     }
 
     fn opened(&mut self, event: open::Event) {
