@@ -25,7 +25,8 @@ pub(crate) type Ranked = heapless::Vec<Start, RANKED>;
 
 impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
     /// Calls `found` with every start along the ring, clockwise, until it says to stop. Each open edge has exactly
-    /// one start. The ring is read at every `stride`-th pixel, and at all of them where it changes in between.
+    /// one start. The ring is read at every `stride`-th pixel, and at all of them where it changes in between; where
+    /// it becomes lit also at those before, as noise frays the place where a wide edge begins.
     ///
     /// The first start's stretch does not count what lies beyond the place where the walk begins; the return value
     /// does: the stretch that ends the walk.
@@ -51,18 +52,24 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
         };
         self.region.each_run(|run| {
             let mut k = 0;
+            // The dark pixels that were passed over last: how many, how many of them counted, and what was before.
+            let mut passed = (0, 0, None);
             while k < run.len {
                 let next = (k + stride).min(run.len) - 1;
                 let (x, y) = run.at(next);
                 let lit = self.lit(x, y);
                 match before {
                     Some((_, same)) if same == lit => {
-                        if !lit && !self.region.masked(x, y) {
-                            stretch += u32::from(next + 1 - k);
-                        }
+                        let counted = if lit || self.region.masked(x, y) { 0 } else { u32::from(next + 1 - k) };
+                        stretch += counted;
+                        passed = (if lit { 0 } else { next + 1 - k }, counted, before);
                         before = Some((Pixel { x, y }, lit));
                     }
                     _ => {
+                        let (again, counted, prior) = core::mem::take(&mut passed);
+                        if lit && again > 0 {
+                            (k, stretch, before) = (k - again, stretch - counted, prior);
+                        }
                         for i in k..=next {
                             let (x, y) = run.at(i);
                             let pixel = Pixel { x, y };
