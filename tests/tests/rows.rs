@@ -115,7 +115,7 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         assert!(apart_deg < 0.1, "{}: {apart_deg}", case.name);
     }
     println!("{} pictures, {ok} answers, {wide} with edges wider than the rows held", cases.len());
-    assert!(ok >= 18 && wide * 3 < cases.len() as u32, "{ok} {wide}");
+    assert!(ok >= 18 && wide * 2 < cases.len() as u32, "{ok} {wide}");
 }
 
 /// What the lists of docs/porting.md take, with their share of a 640×480 picture and of a large one.
