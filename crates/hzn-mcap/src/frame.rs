@@ -113,7 +113,7 @@ pub enum ImageFormat {
 
 /// What is drawn over a picture. Points are `[x, y]` in pixels with **pixel centres at integers**, as everywhere in
 /// hzn; the writer moves them by the half pixel that Foxglove counts from the corner, the reader moves them back.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Annotations {
     /// Candidate edges, one line each.
     pub edges: Vec<Vec<[f64; 2]>>,

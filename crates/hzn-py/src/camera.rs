@@ -18,7 +18,7 @@ use crate::{errors, parameters};
 #[derive(Clone)]
 pub(crate) struct Camera {
     pub(crate) config: Config,
-    lens: camera::Camera<f64>,
+    pub(crate) lens: camera::Camera<f64>,
 }
 
 impl Camera {

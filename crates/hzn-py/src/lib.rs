@@ -43,7 +43,7 @@ mod _hzn {
     #[pymodule_export]
     use crate::simulation::{SimulatedFrame, Simulation, design, evaluate};
     #[pymodule_export]
-    use crate::stages::{Cone, Expected, Fit, Rays, borders, fit, fuse, keep, level, pick, rays};
+    use crate::stages::{Cone, Expected, Fit, Rays, borders, fit, fuse, keep, level, pick, rays, withdraw};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's own spelling")]

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use hzn_core::camera::Camera as Lens;
 use hzn_mcap::{Contents, EncodedImage, FrameRecord, Reader, Row};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use serde_json::Value;
 
+use crate::camera::Camera;
 use crate::errors;
 use crate::report::Report;
 use crate::sensor::Sensor;
@@ -51,7 +51,7 @@ pub(crate) fn open_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
     Ok(Recording {
         sensor_toml: text,
         metadata: reader.metadata().clone(),
-        lens: config.and_then(|c| Lens::try_new(&c.config.camera).ok()).map(Arc::new),
+        camera: config.and_then(|c| Camera::of(c.config.camera).ok()).map(Arc::new),
         open: Mutex::new(Some(Open { reader, ahead: None })),
     })
 }
@@ -61,7 +61,7 @@ pub(crate) fn open_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
 pub(crate) struct Recording {
     sensor_toml: Option<String>,
     metadata: BTreeMap<String, String>,
-    lens: Option<Arc<Lens<f64>>>,
+    camera: Option<Arc<Camera>>,
     open: Mutex<Option<Open>>,
 }
 
@@ -120,7 +120,7 @@ impl Recording {
             open.next().map_err(errors::other)
         })??;
         let Some(image) = records.first().map(|first| first.image.clone()) else { return Ok(None) };
-        let reports = records.into_iter().map(|r| Report::recorded(r, self.lens.clone()));
+        let reports = records.into_iter().map(|r| Report::recorded(r, self.camera.clone()));
         Ok(Some(Frame { image, report: Py::new(py, Report::of_bodies(py, reports)?)? }))
     }
     fn __enter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {

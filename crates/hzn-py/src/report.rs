@@ -1,20 +1,26 @@
 //! `hzn.Report`.
 
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hzn_cli::engine::Trace;
-use hzn_core::Solution;
-use hzn_core::camera::Camera;
+use hzn_core::camera;
+use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
 use numpy::ndarray::{Array2, arr1, arr2};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyWeakrefMethods, PyWeakrefReference};
+use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
+use serde::{Deserialize, Serialize};
 
+use crate::camera::Camera;
 use crate::{errors, parameters};
+
+/// What pickle calls, and with what.
+type Reduced = (Py<PyAny>, (Py<PyBytes>, Vec<Py<Report>>));
 
 /// Longest side of a picture in a notebook, pixels.
 const SHOWN_PX: u32 = 960;
@@ -24,43 +30,51 @@ const SHOWN_PX: u32 = 960;
 pub(crate) struct Report {
     pub(crate) row: Row,
     candidates: Vec<CandidateEdge>,
-    lens: Option<Arc<Camera<f64>>>,
-    solution: Option<Solution<f64>>,
+    camera: Option<Arc<Camera>>,
+    /// Of the limb that was fitted.
+    half_angle_rad: Option<f64>,
     /// Edges and points, where they were asked for or recorded.
     detail: Option<Detail>,
     /// What is drawn; the limb in it takes longer to follow than the picture took.
     drawing: OnceLock<Annotations>,
-    stage: &'static str,
+    stage: Cow<'static, str>,
     others: Vec<Py<Self>>,
     /// The picture, as long as somebody else keeps it.
     image: Option<Py<PyWeakrefReference>>,
     bits: Option<u8>,
 }
 
-#[derive(Default)]
+#[derive(Clone, Default, Serialize, Deserialize)]
 struct Detail {
-    stages_us: Vec<(&'static str, f64)>,
+    stages_us: Vec<(Cow<'static, str>, f64)>,
     drawing: Annotations,
+}
+
+/// A report as pickle has it: everything but the picture and the other bodies.
+#[derive(Serialize, Deserialize)]
+struct Pickled {
+    row: Row,
+    candidates: Vec<CandidateEdge>,
+    camera: Option<camera::Config>,
+    half_angle_rad: Option<f64>,
+    detail: Option<Detail>,
+    stage: Cow<'static, str>,
+    bits: Option<u8>,
 }
 
 impl Report {
     /// Of a picture that was processed.
-    pub(crate) fn new(
-        row: Row,
-        report: &hzn_core::Report<f64>,
-        trace: Option<&Trace>,
-        lens: &Arc<Camera<f64>>,
-    ) -> Self {
+    pub(crate) fn new(row: Row, report: &hzn_core::Report<f64>, trace: Option<&Trace>, camera: &Arc<Camera>) -> Self {
         let detail = trace.map(|trace| Detail {
-            stages_us: trace.times().into_iter().map(|(s, t)| (s.name(), t.as_nanos() as f64 / 1e3)).collect(),
-            drawing: hzn_cli::output::annotations(trace, report.solution.as_ref(), lens),
+            stages_us: trace.times().into_iter().map(|(s, t)| (s.name().into(), t.as_nanos() as f64 / 1e3)).collect(),
+            drawing: hzn_cli::output::annotations(trace, report.solution.as_ref(), &camera.lens),
         });
         Self {
             candidates: CandidateEdge::from_report(report),
-            lens: Some(Arc::clone(lens)),
-            solution: report.solution,
+            camera: Some(Arc::clone(camera)),
+            half_angle_rad: report.solution.as_ref().map(|s| s.fused_half_angle_rad),
             detail,
-            stage: report.stage.name(),
+            stage: report.stage.name().into(),
             ..Self::of_row(row)
         }
     }
@@ -70,11 +84,11 @@ impl Report {
         Self {
             row,
             candidates: Vec::new(),
-            lens: None,
-            solution: None,
+            camera: None,
+            half_angle_rad: None,
             detail: None,
             drawing: OnceLock::new(),
-            stage: "",
+            stage: "".into(),
             others: Vec::new(),
             image: None,
             bits: None,
@@ -82,11 +96,11 @@ impl Report {
     }
 
     /// As a recording holds it.
-    pub(crate) fn recorded(record: FrameRecord, lens: Option<Arc<Camera<f64>>>) -> Self {
+    pub(crate) fn recorded(record: FrameRecord, camera: Option<Arc<Camera>>) -> Self {
         let drawing = record.annotations;
         Self {
             candidates: record.candidates,
-            lens,
+            camera,
             detail: (!drawing.is_empty()).then(|| Detail { drawing, ..Detail::default() }),
             ..Self::of_row(record.row)
         }
@@ -124,8 +138,11 @@ impl Report {
             if let Some(detail) = &self.detail {
                 return detail.drawing.clone();
             }
-            let (Some(solution), Some(lens)) = (&self.solution, &self.lens) else { return Annotations::default() };
-            hzn_cli::output::annotations(&Trace::default(), Some(solution), lens)
+            let fitted = || {
+                let axis = UnitVec3::try_new(self.row.axis()?)?;
+                Some(hzn_cli::output::fitted(&axis, self.half_angle_rad?, &self.camera.as_ref()?.lens))
+            };
+            fitted().unwrap_or_default()
         })
     }
 
@@ -194,8 +211,8 @@ impl Report {
     }
     #[doc = doc!("Report.stage")]
     #[getter]
-    fn stage(&self) -> &'static str {
-        self.stage
+    fn stage(&self) -> &str {
+        &self.stage
     }
     #[doc = doc!("Report.detail")]
     #[getter]
@@ -323,7 +340,8 @@ impl Report {
     #[getter]
     fn rays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inliers = &self.detail_of("rays")?.drawing.inliers;
-        let lens = self.lens.as_ref().ok_or_else(|| errors::other("rays: the recording does not say its camera"))?;
+        let missing = || errors::other("rays: the recording does not say its camera");
+        let lens = &self.camera.as_ref().ok_or_else(missing)?.lens;
         let ray = |p: &[f64; 2]| lens.unproject(ImagePoint { u: p[0], v: p[1] }).map_or([f64::NAN; 3], |ray| ray.xyz());
         Ok(table(py, &inliers.iter().map(ray).collect::<Vec<_>>()))
     }
@@ -340,6 +358,44 @@ impl Report {
     #[doc = doc!("Report.to_dict")]
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         parameters::to_python(py, &self.row)
+    }
+
+    /// The picture stays behind.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Reduced> {
+        let (py, this) = (slf.py(), slf.get());
+        let pickled = Pickled {
+            row: this.row.clone(),
+            candidates: this.candidates.clone(),
+            camera: this.camera.as_ref().map(|c| c.config.clone()),
+            half_angle_rad: this.half_angle_rad,
+            detail: this.detail.clone(),
+            stage: this.stage.clone(),
+            bits: this.bits,
+        };
+        let bytes = serde_json::to_vec(&pickled).map_err(errors::other)?;
+        Ok((slf.get_type().getattr("_of")?.unbind(), (PyBytes::new(py, &bytes).unbind(), this.others(py))))
+    }
+    #[staticmethod]
+    fn _of(pickled: &[u8], others: Vec<Py<Self>>) -> PyResult<Self> {
+        let pickled: Pickled = serde_json::from_slice(pickled).map_err(errors::other)?;
+        Ok(Self {
+            candidates: pickled.candidates,
+            camera: pickled.camera.map(Camera::of).transpose()?.map(Arc::new),
+            half_angle_rad: pickled.half_angle_rad,
+            detail: pickled.detail,
+            stage: pickled.stage,
+            others,
+            bits: pickled.bits,
+            ..Self::of_row(pickled.row)
+        })
+    }
+    /// It never changes.
+    fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+    #[pyo3(signature = (_memo, /))]
+    fn __deepcopy__<'py>(slf: PyRef<'py, Self>, _memo: &Bound<'py, PyAny>) -> PyRef<'py, Self> {
+        slf
     }
 
     fn __repr__(&self) -> String {

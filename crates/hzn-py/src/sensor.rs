@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use hzn_calib::{FrameData, sensor};
 use hzn_cli::engine::{AnySensor, Traces};
-use hzn_core::camera::Camera as Lens;
 use hzn_core::{Config, Sensor as CoreSensor};
 use hzn_mcap::{Row, RowMeta};
 use pyo3::prelude::*;
@@ -30,7 +29,7 @@ pub(crate) struct Sensor {
 pub(crate) struct State {
     pub(crate) config: Config,
     pub(crate) flight: bool,
-    pub(crate) lens: Arc<Lens<f64>>,
+    pub(crate) camera: Arc<Camera>,
     /// The same in double precision, for the single stages.
     pub(crate) core: CoreSensor<f64>,
     /// Sensors at rest: each call takes one or makes one, so that threads never wait for each other.
@@ -40,8 +39,8 @@ pub(crate) struct State {
 impl State {
     fn of(config: Config, flight: bool) -> PyResult<Arc<Self>> {
         let core = CoreSensor::new(&config).map_err(errors::config)?;
-        let lens = Arc::new(core.camera().clone());
-        Ok(Arc::new(Self { config, flight, lens, core, idle: Mutex::default() }))
+        let camera = Arc::new(Camera::of(config.camera.clone())?);
+        Ok(Arc::new(Self { config, flight, camera, core, idle: Mutex::default() }))
     }
 
     /// Lends a sensor to `work`. One in which something panicked does not come back.
@@ -98,7 +97,7 @@ impl Sensor {
     #[doc = doc!("Sensor.camera")]
     #[getter]
     fn camera(&self) -> PyResult<Camera> {
-        Camera::of(self.state().config.camera.clone())
+        Ok(Camera::clone(&self.state().camera))
     }
     #[doc = doc!("Sensor.flight")]
     #[getter]
@@ -107,17 +106,18 @@ impl Sensor {
     }
 
     #[doc = doc!("Sensor.expect")]
-    #[pyo3(signature = (*, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
+    #[pyo3(signature = (*, body = 0, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
                         time_s = None))]
     fn expect(
         &self,
+        body: usize,
         altitude_km: Option<f64>,
         position_km: Option<[f64; 3]>,
         attitude: Option<[f64; 4]>,
         attitude_sigma_deg: Option<f64>,
         time_s: Option<f64>,
     ) -> PyResult<Expected> {
-        Expected::of(&self.state(), known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?)
+        Expected::of(&self.state(), known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?, body)
     }
 
     #[doc = doc!("Sensor.process")]
@@ -161,7 +161,7 @@ impl Sensor {
             let found = processed.report.map_err(errors::config)?;
             let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
             let row = Row::from_report(&meta, &found, Some(elapsed_us));
-            Ok(Report::new(row, &found, traces.get(which), &state.lens))
+            Ok(Report::new(row, &found, traces.get(which), &state.camera))
         };
         let reports: Vec<Report> =
             processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<_>>()?;

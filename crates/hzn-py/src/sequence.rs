@@ -115,7 +115,7 @@ fn processed(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: input
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
     let rows = hzn_cli::output::rows(&finished, &plan.config);
     let report = |(row, found): (hzn_mcap::Row, &engine::Found)| match &found.report {
-        Ok(found) => Report::new(row, found, None, &state.lens),
+        Ok(found) => Report::new(row, found, None, &state.camera),
         Err(_) => Report::of_row(row),
     };
     Report::of_bodies(py, rows.into_iter().zip(&finished.found).map(report))

@@ -3,11 +3,10 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use hzn_calib::FrameData;
-use hzn_cli::engine::{AnySensor, Traces};
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pipeline::edges::{Agreed, Edges, Fitted};
 use hzn_core::pixel::{ImagePoint, Pixel};
-use hzn_core::{Config, Expected as CoreExpected, Sensor as CoreSensor, binarize, reject};
+use hzn_core::{Expected as CoreExpected, Sensor as CoreSensor};
 use numpy::ndarray::{Array1, Array2, arr1, arr2};
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, ToPyArray};
 use pyo3::prelude::*;
@@ -27,8 +26,12 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    pub(crate) fn of(state: &State, data: FrameData) -> PyResult<Self> {
-        let core = state.core.expect(&data.to_frame(None)).map_err(errors::config)?;
+    pub(crate) fn of(state: &State, data: FrameData, body: usize) -> PyResult<Self> {
+        let bodies = state.config.each_body().len();
+        if body >= bodies {
+            return Err(errors::config(format!("body: {body} is refused: the sensor's are 0 to {}", bodies - 1)));
+        }
+        let core = state.core.expect_body(body, &data.to_frame(None)).map_err(errors::config)?;
         Ok(Self { data, core })
     }
 }
@@ -43,7 +46,7 @@ impl Expected {
 }
 
 #[doc = doc!("Cone")]
-#[pyclass(frozen, module = "hzn.ransac")]
+#[pyclass(frozen, subclass, module = "hzn.ransac")]
 pub(crate) struct Cone(Agreed<f64>);
 
 #[pymethods]
@@ -80,21 +83,11 @@ impl Cone {
 }
 
 #[doc = doc!("Fit")]
-#[pyclass(frozen, module = "hzn.fit")]
+#[pyclass(frozen, extends = Cone, module = "hzn.fit")]
 pub(crate) struct Fit(Fitted<f64>);
 
 #[pymethods]
 impl Fit {
-    #[doc = doc!("Fit.axis")]
-    #[getter]
-    fn axis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        arr1(&self.0.axis().xyz()).to_pyarray(py)
-    }
-    #[doc = doc!("Fit.cos_half_angle")]
-    #[getter]
-    fn cos_half_angle(&self) -> f64 {
-        self.0.cos_half_angle()
-    }
     #[doc = doc!("Fit.rms_px")]
     #[getter]
     fn rms_px(&self) -> f64 {
@@ -195,32 +188,13 @@ pub(crate) fn borders<'py>(
     bits: Option<u8>,
 ) -> PyResult<Vec<Two<'py>>> {
     let state = sensor.state();
-    state.core()?;
-    let mut every = AnySensor::new(&every_edge(&state.config, level), false).map_err(errors::config)?;
-    let traces = Traces::new(1);
-    with_picture!(image, state, bits, |picture| every.process_pixels(&picture, Some(&expected.data), Some(&traces)));
-    let edges = traces.each.first().map(|t| t.edges().clone()).unwrap_or_default();
-    let table = |edge: &hzn_cli::engine::trace::Edge| {
-        let border = &edge.border;
+    let core = state.core()?;
+    let borders = with_picture!(image, state, bits, |picture| core.borders(&picture, level, &expected.core));
+    let table = |border: &Vec<Pixel>| {
         let cell = |(i, k): (usize, usize)| f64::from(if k == 0 { border[i].x } else { border[i].y });
         Array2::from_shape_fn((border.len(), 2), cell).to_pyarray(py)
     };
-    Ok(edges.iter().map(table).collect())
-}
-
-/// The sensor that goes through every edge of a picture at this level, because it agrees to none.
-fn every_edge(config: &Config, level: u16) -> Config {
-    let mut every = config.clone();
-    if let Some(first) = config.bodies.first() {
-        every.body = first.clone();
-        every.bodies.clear();
-    }
-    every.body.binarize = None;
-    every.binarize = binarize::Config { method: binarize::Method::Fixed, level: f64::from(level), ..config.binarize };
-    every.gate = binarize::Gate { min_mean: 0.0, max_mean: 1.0 };
-    every.reject =
-        reject::Config { method: reject::Method::TwoPoint, threshold_px: 1e-9, max_draws: 1, ..config.reject };
-    every
+    Ok(borders.iter().map(table).collect())
 }
 
 #[pyfunction]
@@ -271,6 +245,14 @@ pub(crate) fn keep(py: Python<'_>, sensor: &Sensor, rays: &Rays, expected: &Expe
 }
 
 #[pyfunction]
+#[pyo3(name = "_withdraw")]
+pub(crate) fn withdraw(sensor: &Sensor, rays: &Rays, found: &Cone) -> PyResult<u32> {
+    let state = sensor.state();
+    state.core()?;
+    Ok(rays.edges().withdraw(&found.0.axis, found.0.cos_half_angle, &state.config.reject))
+}
+
+#[pyfunction]
 #[pyo3(name = "_fit")]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -278,10 +260,13 @@ pub(crate) fn fit(
     rays: &Rays,
     start: &Cone,
     expected: &Expected,
-) -> PyResult<Option<Fit>> {
+) -> PyResult<Option<Py<Fit>>> {
     let state = sensor.state();
     let core = state.core()?;
-    Ok(errors::detached(py, || rays.edges().fit(core, &start.0, &expected.core))?.map(Fit))
+    let fitted = errors::detached(py, || rays.edges().fit(core, &start.0, &expected.core))?;
+    let cone = |f: &Fitted<f64>| Agreed { axis: f.axis(), cos_half_angle: f.cos_half_angle(), ..start.0 };
+    let fit = |f: Fitted<f64>| Py::new(py, PyClassInitializer::from(Cone(cone(&f))).add_subclass(Fit(f)));
+    fitted.map(fit).transpose()
 }
 
 /// Axis, covariance, cos of the half-angle; None where the points do not determine them.
@@ -293,16 +278,15 @@ pub(crate) fn fuse<'py>(
     py: Python<'py>,
     sensor: &Sensor,
     rays: &Rays,
-    fit: &Bound<'py, PyAny>,
+    fit: &Bound<'py, Cone>,
     expected: &Expected,
 ) -> PyResult<Fused<'py>> {
     let state = sensor.state();
     let core = state.core()?;
     let mut edges = rays.edges();
-    let fitted = match (fit.cast::<Fit>(), fit.cast::<Cone>()) {
-        (Ok(fit), _) => Some(fit.get().0),
-        (_, Ok(cone)) => edges.given(&cone.get().0.axis, cone.get().0.cos_half_angle),
-        _ => return Err(errors::config("fit: a Fit of hzn.fit, or a Cone of one's own, is expected")),
+    let fitted = match fit.cast::<Fit>() {
+        Ok(fit) => Some(fit.get().0),
+        Err(_) => edges.given(&fit.get().0.axis, fit.get().0.cos_half_angle),
     };
     let fused = fitted.and_then(|fit| edges.fuse(core, &fit, &expected.core));
     Ok(fused.map(|f| (arr1(&f.axis.xyz()).to_pyarray(py), arr2(&f.covariance.rows()).to_pyarray(py), f.cos_half_angle)))

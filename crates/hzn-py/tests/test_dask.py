@@ -61,7 +61,7 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
         os.kill(victim, signal.SIGKILL)
 
     victim = next(iter(client.run(os.getpid).values()))
-    killer = threading.Thread(target=kill_one)
+    killer = threading.Thread(target=kill_one, daemon=True)
     killer.start()
     result = process_archive(archive, small, client=client, out=str(out), shard_frames=50)
     killer.join()
@@ -99,6 +99,15 @@ def test_mcap_shards_and_what_is_known(client, archive, small, tmp_path):
     assert set(table["altitude_km"]) == {399.0}
     with hzn.open_mcap(first) as recording:
         assert recording.sensor() == small and next(recording).image is None
+
+
+def test_reports_come_from_workers(client, small):
+    images = [np.ascontiguousarray(limb(i)[::4, ::4]) for i in range(4)]
+    sent = client.gather(client.map(small.process, images, detail=True))
+    for image, report in zip(images, sent, strict=True):
+        here = small.process(image, detail=True)
+        assert report.ok and np.array_equal(report.axis, here.axis) and np.array_equal(report.inliers, here.inliers)
+        assert np.array_equal(hzn.overlay(image, report), hzn.overlay(image, here))
 
 
 def test_what_an_archive_refuses(client, archive, small, tmp_path):

@@ -168,6 +168,42 @@ def test_detail_and_overlay(sensor):
     assert "base64" not in report._repr_html_()
 
 
+def test_reports_are_pickled_and_copied(sensor):
+    """Every number and array, to the last bit; of several bodies all."""
+    image = limb()
+    bodies = [{"kind": "earth-sphere", "altitude_km": 400.0}, {"kind": "moon"}]
+    both = hzn.Sensor(camera=sensor.camera, bodies=bodies)
+    dark = np.full((240, 320), 9, np.uint8)
+    reports = [
+        sensor.process(image, detail=True, time_s=0.1 + 0.2),
+        sensor.process(image),
+        hzn.Sensor(**PARAMETERS, flight=True).process(image, detail=True),
+        sensor.process(dark),
+        both.process(image, detail=True),
+    ]
+    for report in reports:
+        for twin in (*(pickle.loads(pickle.dumps(report, p)) for p in range(2, 6)), copy.copy(report), copy.deepcopy(report)):
+            assert everything(twin) == everything(report)
+            assert np.array_equal(hzn.overlay(image, twin), hzn.overlay(image, report))
+    assert "base64" in copy.deepcopy(reports[0])._repr_html_()
+    assert "base64" not in pickle.loads(pickle.dumps(reports[0]))._repr_html_()
+
+
+def everything(report):
+    """What a report says, in a form that can be compared."""
+    found = {"repr": repr(report), "others": [everything(other) for other in report.others]}
+    for name in set(dir(report)) - set(dir(object)) - {"others"}:
+        if not name.startswith("_"):
+            try:
+                value = getattr(report, name)
+            except hzn.HznError as missing:
+                value = str(missing)
+            found[name] = value() if callable(value) else value
+    assert len(found) > 25
+    arrays = lambda v: v.tolist() if isinstance(v, np.ndarray) else [arrays(x) for x in v] if isinstance(v, list) else v
+    return {name: arrays(value) for name, value in found.items()}
+
+
 def test_camera_there_and_back(sensor, tmp_path):
     camera = sensor.camera
     assert (camera.width, camera.height, camera.model) == (320, 240, "pinhole")

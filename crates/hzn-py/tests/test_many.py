@@ -1,13 +1,28 @@
 """Sequences: in order, with bounded memory, interruptible."""
 
-import _thread
+import os
+import signal
 import threading
+import time
 
 import numpy as np
 import pytest
 
 import hzn
 from conftest import PARAMETERS, limb, pgm
+from hzn._many import _TASK_ITEMS, _in_order
+
+
+@pytest.fixture
+def interruptible():
+    """Ctrl-C as a terminal's program has it; one that was started in the background ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def threads_left():
+    return [t.name for t in threading.enumerate() if t.name.startswith("hzn")]
 
 
 def test_arrays_come_out_in_order(sensor):
@@ -24,42 +39,94 @@ def test_what_is_known_of_each_picture(sensor):
     assert [r.altitude_km for r in many] == [390.0, 400.0, 410.0]
 
 
-def test_no_more_is_taken_than_is_worked_on(sensor):
+@pytest.mark.parametrize(("side", "most"), [(16, _TASK_ITEMS), (3000, 1)])
+def test_no_more_is_taken_than_is_worked_on(side, most):
+    camera = dict(width=side, height=side, model="pinhole", fx_px=1e4, fy_px=1e4, cx_px=side / 2, cy_px=side / 2)
+    sensor = hzn.Sensor(**{**PARAMETERS, "camera": camera})
+    image = np.full((side, side), 9, np.uint8)
     taken = 0
 
     def endless():
         nonlocal taken
         while True:
             taken += 1
-            yield limb()
+            yield image
 
     reports = sensor.process_many(endless(), jobs=2)
-    for _ in range(10):
-        assert next(reports).ok
+    for given in range(1, 500 if most > 1 else 20):
+        assert next(reports).status == "no-limb"
+        # Two tasks for each thread, and one more that is handed on.
+        assert given <= taken <= given + most * (2 * 2 + 1)
     reports.close()
-    assert 10 <= taken <= 10 + 2 * 2 + 1
-    assert not [t for t in threading.enumerate() if t.name.startswith("hzn")]
+    assert not threads_left()
 
 
-def test_an_interrupt_ends_it(sensor):
-    taken, at = 0, None
+def test_an_interrupt_ends_it(sensor, interruptible):
+    taken = 0
 
     def endless():
-        nonlocal taken, at
+        nonlocal taken
         while True:
             taken += 1
             if taken == 20:
-                at = taken
-                threading.Thread(target=_thread.interrupt_main).start()
+                signal.raise_signal(signal.SIGINT)
             yield limb()
 
     with pytest.raises(KeyboardInterrupt):
         for report in sensor.process_many(endless(), jobs=2):
             assert report.ok
-    # Not one window later.
-    assert at <= taken <= at + 6
-    assert not [t for t in threading.enumerate() if t.name.startswith("hzn")]
+    assert taken == 20 and not threads_left()
     assert sensor.process(limb()).ok
+
+
+def test_an_interrupt_waits_for_no_more_than_a_picture(interruptible):
+    begun, at = [], 0
+
+    def slow(item):
+        begun.append(item)
+        time.sleep(0.05)
+        return item
+
+    def interrupt():
+        nonlocal at
+        while len(begun) < 5:
+            time.sleep(0.005)
+        at = len(begun)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        list(_in_order(slow, range(10_000), 2))
+    # What the two threads had before them, and one more each until the caller wakes up.
+    assert at <= len(begun) <= at + 4 and not threads_left()
+
+
+def test_pictures_that_come_slowly_are_not_waited_for():
+    """A camera's reports come while it goes on, not when a task is full."""
+    given = []
+
+    def camera():
+        for i in range(12):
+            time.sleep(0.02)
+            yield i
+
+    for i in _in_order(lambda item: given.append(item) or item, camera(), 2):
+        # The one before was through when this one came.
+        assert len(given) <= i + 3
+    assert given == list(range(12))
+
+
+def test_what_comes_after_an_error_of_the_iterable(sensor):
+    def broken():
+        yield limb()
+        yield limb()
+        raise OSError("no more film")
+
+    reports = sensor.process_many(broken(), jobs=2)
+    assert next(reports).ok and next(reports).ok
+    with pytest.raises(OSError, match="film"):
+        next(reports)
+    assert not threads_left()
 
 
 def test_a_picture_that_is_refused_raises_after_those_before(sensor):

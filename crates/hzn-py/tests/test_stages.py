@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hzn
-from conftest import limb
+from conftest import CAMERA, limb
 
 TRUTH = np.array([0.0, np.sin(np.radians(68)), np.cos(np.radians(68))])
 
@@ -31,6 +31,66 @@ def test_the_stages_are_the_pipeline(sensor):
     assert np.array_equal(rays.points[rays.weights > 0], report.inliers)
     fused = hzn.covariance.fuse(sensor, rays, fit, expected)
     assert np.array_equal(fused.axis, report.axis) and np.array_equal(fused.covariance, report.covariance)
+
+
+def disc(image, u, v, radius_px, brightness):
+    """With a disc painted into it, its edge blurred over two pixels."""
+    y, x = np.mgrid[0 : image.shape[0], 0 : image.shape[1]]
+    cover = np.clip(0.5 + (radius_px - np.hypot(x - u, y - v)) / 2, 0, 1)
+    return np.maximum(image, brightness * cover).astype(np.uint8)
+
+
+def test_the_stages_of_each_body():
+    """Of several bodies, each with its own level; the second's edges without those of the first."""
+    camera = dict(CAMERA, fx_px=3000.0, fy_px=3000.0)
+    bodies = [
+        {"radius_km": 100.0, "altitude_km": 3900.0, "binarize": {"method": "fixed", "level": 60}},
+        {"radius_km": 50.0, "altitude_km": 3950.0, "binarize": {"method": "fixed", "level": 90}},
+    ]
+    bodies = [dict(b, kind="sphere", limb_height_km=0.0, limb_height_sigma_km=1.0) for b in bodies]
+    sensor = hzn.Sensor(camera=camera, bodies=bodies)
+    image = disc(disc(np.full((240, 320), 20, np.uint8), 90, 120, 75.05, 210), 250, 110, 37.5, 230)
+    reports = sensor.process(image, detail=True)
+    found = None
+    for body, report in enumerate((reports, *reports.others)):
+        assert report.ok
+        expected = sensor.expect(body=body)
+        level = hzn.binarize.level(sensor, image, expected)
+        assert level == report.level == (60, 90)[body]
+        borders = hzn.contours.find(sensor, image, level, expected)
+        # Both discs are seen by either, and not only as far as the answer.
+        assert len(borders) == 2
+        answers = []
+        for border in borders:
+            rays = hzn.contours.points(sensor, image, level, border)
+            on_another = 0 if found is None else hzn.ransac.withdraw(sensor, rays, found)
+            if 2 * on_another > len(rays):
+                continue
+            start = hzn.ransac.keep(sensor, rays, expected)
+            fit = start and hzn.fit.cone(sensor, rays, start, expected)
+            fused = fit and hzn.covariance.fuse(sensor, rays, fit, expected)
+            answers.append(fused)
+            if fit and (fit.rms_px, fit.inliers) == (report.rms_px, len(report.inliers)):
+                assert isinstance(fit, hzn.ransac.Cone) and fit.draws == start.draws
+                # The report's axis was normalised once more.
+                assert np.allclose(fused.axis, report.axis, rtol=0, atol=1e-15)
+                assert np.array_equal(fused.covariance, report.covariance)
+                own = fused
+        assert len(answers) == 2 - body
+        found = hzn.ransac.Cone(own.axis, own.cos_half_angle)
+    with pytest.raises(hzn.ConfigError, match="0 to 1"):
+        sensor.expect(body=2)
+
+
+def test_find_stops_neither_at_the_limb_nor_at_the_limits(sensor):
+    image = disc(limb(), 160, 40, 12, 220)
+    few = hzn.Sensor(**{**sensor.parameters, "limits": {"max_work": 10_000}})
+    found = hzn.contours.find(sensor, image, 110)
+    assert len(found) == 2 and all(map(np.array_equal, found, hzn.contours.find(few, image, 110)))
+    lit = image >= 110
+    for border in found:
+        x, y = border.astype(int).T
+        assert lit[y, x].all() and (np.abs(np.diff(border, axis=0)).max(axis=1) == 1).all()
 
 
 def test_other_strides_and_a_round_trip_through_arrays(sensor):

@@ -2,6 +2,7 @@
 
 use hzn_calib::FrameData;
 use hzn_core::camera::Camera;
+use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::{Config, Solution, body};
@@ -114,17 +115,20 @@ pub fn annotations(trace: &Trace, solution: Option<&Solution<f64>>, camera: &Cam
         }
     }
     if let Some(s) = solution {
-        out.limb = limb_lines(s, camera);
-        let inside = |p: &ImagePoint<f64>| {
-            (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)
-                && (-0.5..=f64::from(camera.height()) - 0.5).contains(&p.v)
-        };
-        out.axes.extend(camera.project(&s.axis).filter(inside).map(|p| [p.u, p.v]));
+        out.add(fitted(&s.axis, s.fused_half_angle_rad, camera));
     }
     out
 }
 
-/// The fitted limb as lines, broken where it leaves the picture.
-pub fn limb_lines(solution: &Solution<f64>, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
-    limb::lines(solution.axis.xyz(), solution.fused_half_angle_rad, camera)
+/// What is drawn of a cone that was fitted: its limb as lines, broken where it leaves the picture, and its axis.
+pub fn fitted(axis: &UnitVec3<Cam, f64>, half_angle_rad: f64, camera: &Camera<f64>) -> Annotations {
+    let inside = |p: &ImagePoint<f64>| {
+        (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)
+            && (-0.5..=f64::from(camera.height()) - 0.5).contains(&p.v)
+    };
+    Annotations {
+        limb: limb::lines(axis.xyz(), half_angle_rad, camera),
+        axes: camera.project(axis).filter(inside).map(|p| [p.u, p.v]).into_iter().collect(),
+        ..Annotations::default()
+    }
 }

@@ -3,11 +3,14 @@
 //! `_edges`.
 //!
 //! ```text
-//! Sensor::level → (borders) → Edges::pick → reject → fit → fuse
+//! Sensor::level → Sensor::borders → Edges::pick → reject → fit → fuse
 //! ```
 
-use super::observer::Unobserved;
+use super::observer::{Observer, Unobserved};
+use super::report::Report;
 use super::sensor::Sensor;
+use super::taken::Taken;
+use super::workspace::{HOST_POINTS, HOST_WORDS, Lists};
 use crate::binarize::{self, Level};
 use crate::block::{Block, LANES, Lit};
 use crate::body::Expected;
@@ -21,6 +24,7 @@ use crate::real::Real;
 use crate::status::Status;
 use crate::work::Work;
 use crate::{candidates, covariance, estimate, reject, undistort};
+use std::cell::RefCell;
 use std::vec;
 use std::vec::Vec;
 
@@ -86,16 +90,34 @@ impl<T: Real> Sensor<T> {
     /// `too-dark`, `too-bright`, or `no-limb` when there are no two sides.
     pub fn level<P: Pixels>(&self, picture: &P, expected: &Expected<T>) -> Result<Level<T>, Status> {
         let config = self.config();
-        let body = config.each_body().get(usize::from(expected.which));
-        let levels = body.and_then(|b| b.binarize.as_ref()).unwrap_or(&config.binarize);
+        let levels = config.levels_of(expected.which);
         let seed = config.reject.seed;
         binarize::split(picture, self.region(), &config.gate, levels, expected.level, seed, &Unobserved)
     }
 
-    /// The body's noise model, or that of all.
-    fn noise(&self, expected: &Expected<T>) -> &covariance::Config {
-        let body = self.config().each_body().get(usize::from(expected.which));
-        body.and_then(|b| b.covariance.as_ref()).unwrap_or(&self.config().covariance)
+    /// Border pixels of every edge of a picture at a level, in order along each; the edges in the order in which the
+    /// pipeline looks at them. It stops at none, whatever `[limits]` say.
+    pub fn borders<P: Pixels>(&self, picture: &P, level: u16, expected: &Expected<T>) -> Vec<Vec<Pixel>> {
+        let mut unlimited = self.clone();
+        unlimited.config.limits.max_work = Some(u32::MAX);
+        let (mut border, mut marks) = (vec![Pixel { x: 0, y: 0 }; HOST_POINTS], vec![0; HOST_WORDS]);
+        let lists = Lists { border: &mut border, blocks: &mut [], marks: &mut marks };
+        let borders = Borders::default();
+        unlimited.search(lists, picture, level, expected, &[], &borders, &mut Report::of_nothing());
+        borders.0.into_inner()
+    }
+}
+
+/// Collects the edges and lets none go on.
+#[derive(Default)]
+struct Borders(RefCell<Vec<Vec<Pixel>>>);
+
+impl<T> Observer<T> for Borders {
+    fn edge(&self, _: u32, border: impl Iterator<Item = Pixel>, _: u32) {
+        self.0.borrow_mut().push(border.collect());
+    }
+    fn wants(&self, _: u32) -> bool {
+        false
     }
 }
 
@@ -162,6 +184,13 @@ impl<T: Real> Edges<T> {
         self.weights().filter(|w| *w > T::ZERO).count() as u32
     }
 
+    /// Takes out the points on the limb of another body, which was found before; how many there were. The pipeline tries
+    /// an edge no further that has more than half of its points there.
+    pub fn withdraw(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T, config: &reject::Config) -> u32 {
+        let taken = Taken { e: *axis.v(), c: cos_half_angle };
+        taken.withdraw(&mut self.blocks, T::of(config.threshold_px))
+    }
+
     /// Rejects outliers.
     pub fn reject(&mut self, expected: &Expected<T>, config: &reject::Config) -> Option<Agreed<T>> {
         let (count, mut work) = (self.points.len() as u32, Work::unlimited());
@@ -176,7 +205,7 @@ impl<T: Real> Edges<T> {
         let start =
             reject::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
         let threshold = T::of(config.reject.threshold_px);
-        let noise = sensor.noise(expected);
+        let noise = sensor.config.noise_of(expected.which);
         estimate::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise)
             .map(Fitted)
     }
@@ -188,7 +217,7 @@ impl<T: Real> Edges<T> {
 
     /// The covariance of a fit, and the expected half-angle fused with it.
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
-        let noise = sensor.noise(expected);
+        let noise = sensor.config.noise_of(expected.which);
         let fused = covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate)?;
         let (b1, b2) = basis(&fused.e);
         Some(Fused {

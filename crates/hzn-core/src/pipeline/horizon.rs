@@ -4,7 +4,7 @@ use super::config::{Config, MAX_BODIES};
 use super::observer::{Observer, Unobserved};
 use super::report::{Report, Reports};
 use super::sensor::Sensor;
-use super::workspace::Workspace;
+use super::workspace::{HOST_POINTS, HOST_WORDS, Workspace};
 use crate::body::{Expected, Frame, FrameError};
 use crate::camera::Camera;
 use crate::error::ConfigError;
@@ -13,7 +13,7 @@ use crate::real::Real;
 use crate::region::Region;
 
 /// The sensor of a workstation: f64, 16384 points.
-pub type HostHorizon = Horizon<f64, 16384, 2048, 65536>;
+pub type HostHorizon = Horizon<f64, HOST_POINTS, 2048, HOST_WORDS>;
 /// The sensor of a flight computer: f32, 2048 points.
 pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 

@@ -201,6 +201,9 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         counters.candidates += 1;
         counters.dropped += length - length.div_ceil(edge.stride().max(1));
         self.observer.edge(number, edge.pixels().iter().copied(), edge.stride());
+        if !self.observer.wants(number) {
+            return;
+        }
         let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
         // Full: only counted.

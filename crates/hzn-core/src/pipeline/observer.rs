@@ -20,6 +20,12 @@ pub trait Observer<T> {
     fn level(&self, _level: u16, _mean: T, _samples: u32) {}
     /// An edge was followed and is candidate number `candidate`: every `stride`-th of its border pixels, in order.
     fn edge(&self, _candidate: u32, _border: impl Iterator<Item = Pixel>, _stride: u32) {}
+    /// Whether this edge goes on through the stages. Of an observer that always says no every edge is followed, and there is
+    /// no answer.
+    #[inline(always)]
+    fn wants(&self, _candidate: u32) -> bool {
+        true
+    }
     /// A sub-pixel point of a candidate; they come in order, numbered from 0.
     #[inline(always)]
     fn point(&self, _candidate: u32, _point: ImagePoint<T>) {}

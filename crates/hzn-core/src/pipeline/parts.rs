@@ -177,6 +177,9 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
         self.observer.edge(candidate, border.map(|p| self.window.pixel(p.x, p.y)), stride);
     }
+    fn wants(&self, candidate: u32) -> bool {
+        self.observer.wants(candidate)
+    }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
         self.observer.point(candidate, self.window.in_picture(point));
     }

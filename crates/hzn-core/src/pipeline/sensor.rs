@@ -154,6 +154,22 @@ impl<T: Real> Sensor<T> {
             }
         };
         report.level = level;
+        self.search(lists, picture, level, expected, taken, observer, report);
+    }
+
+    /// Everything after the level.
+    #[inline(always)]
+    pub(super) fn search<P: Pixels, O: Observer<T>>(
+        &self,
+        lists: Lists<'_, T>,
+        picture: &P,
+        level: u16,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let config = &self.config;
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
         let scene = Scene::new(picture, &self.region, level, observer);

@@ -4,8 +4,13 @@ use crate::block::Block;
 use crate::pixel::Pixel;
 use crate::real::Real;
 
+/// Border pixels of an edge that a workstation stores.
+pub(super) const HOST_POINTS: usize = 16384;
+/// Words in which it marks search lines.
+pub(super) const HOST_WORDS: usize = 65536;
+
 /// The lists of a workstation.
-pub type HostWorkspace = Workspace<f64, 16384, 2048, 65536>;
+pub type HostWorkspace = Workspace<f64, HOST_POINTS, 2048, HOST_WORDS>;
 /// The lists of a flight computer.
 pub type FlightWorkspace = Workspace<f32, 2048, 256, 512>;
 /// Every list that a picture needs; nothing of it outlives the picture. There is no heap.

@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
 
 _Path: TypeAlias = str | PathLike[str]
 _Image: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]
@@ -254,18 +255,27 @@ class Sensor:
     def expect(
         self,
         *,
+        body: int = 0,
         altitude_km: float | None = None,
         position_km: Sequence[float] | None = None,
         attitude: Sequence[float] | None = None,
         attitude_sigma_deg: float | None = None,
         time_s: float | None = None,
     ) -> Expected:
-        """Work out the cone to expect, for the single stages (`hzn.ransac` and its neighbours). Parameters as in `process`.
+        """Work out the cone to expect, for the single stages (`hzn.ransac` and its neighbours).
+
+        Parameters
+        ----------
+        body
+            Of a sensor of several bodies the number of one, from 0: the stages that are told so work for this one, with its
+            own level and edge errors.
+        altitude_km, position_km, attitude, attitude_sigma_deg, time_s
+            As in `process`.
 
         Raises
         ------
         ConfigError
-            An altitude, position or attitude that cannot be.
+            A body that the sensor does not have; an altitude, position or attitude that cannot be.
         """
 
     def process(
@@ -329,7 +339,8 @@ class Sensor:
         images
             A folder, a pattern, a video or an MCAP, taken as ``hzn run`` takes it, with the frames.csv beside it; or paths
             of pictures; or arrays; or pairs of an array and a dictionary of what `process` is told besides
-            (``altitude_km`` and so on). Of an iterable no more is taken than is being worked on.
+            (``altitude_km`` and so on). Of an iterable no more is taken than is being worked on: by each thread some
+            milliseconds' work or 8 MB, a picture at least.
         jobs
             Threads; without it, one a core. With ``binarize.method = "track"`` there is only one.
         progress
@@ -355,7 +366,8 @@ class Sensor:
 class Report:
     """What was found in one picture. Without an answer the properties of the answer are None.
 
-    A notebook shows it with the picture (the array that was processed, as it is now) and everything drawn over it.
+    A notebook shows it with the picture (the array that was processed, as it is now) and everything drawn over it. It can
+    be pickled; the picture stays behind.
     """
 
     @property
@@ -484,6 +496,9 @@ class Report:
 
     def to_dict(self) -> dict[str, Any]:
         """The row that ``hzn run`` would write, by its columns; None for an empty cell."""
+
+    def __copy__(self) -> Report: ...
+    def __deepcopy__(self, _memo: Any, /) -> Report: ...
 
 def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:
     """Draw what a report stands on over its picture: limb and axis, with ``detail=True`` edges and points too.
@@ -636,7 +651,7 @@ class Expected:
     def half_angle_deg(self) -> float:
         """Its half-angle, degrees."""
 
-@final
+@disjoint_base
 class Cone:
     """A cone of directions: what a method of rejection finds. ``Cone(axis, cos_half_angle)`` makes one's own."""
 
@@ -654,16 +669,8 @@ class Cone:
         """Draws that were made to find it."""
 
 @final
-class Fit:
+class Fit(Cone):
     """A cone that was fitted, from `hzn.fit.cone`."""
-
-    @property
-    def axis(self) -> NDArray[np.float64]:
-        """Unit vector to the body in the camera frame, shape (3,)."""
-
-    @property
-    def cos_half_angle(self) -> float:
-        """cos of the half-angle."""
 
     @property
     def rms_px(self) -> float:
@@ -706,9 +713,10 @@ def _borders(
 def _pick(sensor: Sensor, image: _Image, level: int, border: ArrayLike, bits: int | None = None) -> Rays: ...
 def _rays(sensor: Sensor, points: ArrayLike, lit: ArrayLike) -> Rays: ...
 def _keep(sensor: Sensor, rays: Rays, expected: Expected) -> Cone | None: ...
+def _withdraw(sensor: Sensor, rays: Rays, found: Cone) -> int: ...
 def _fit(sensor: Sensor, rays: Rays, start: Cone, expected: Expected) -> Fit | None: ...
 def _fuse(
-    sensor: Sensor, rays: Rays, fit: Fit | Cone, expected: Expected
+    sensor: Sensor, rays: Rays, fit: Cone, expected: Expected
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float] | None: ...
 @final
 class _Sequence:

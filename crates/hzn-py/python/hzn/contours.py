@@ -27,7 +27,7 @@ def find(
     level
         A pixel is lit at this value or above, in counts.
     expected
-        Sets how far search lines are apart; without it, from the parameters alone.
+        Sets how far search lines are apart; without it, from the parameters alone, for the first body.
     bits
         Significant bits of uint16.
 
@@ -35,7 +35,8 @@ def find(
     -------
     list of numpy.ndarray
         Border pixels (x, y) of each edge in order along it, the lit side on the left, each of shape (n, 2); the edges in
-        the order in which `hzn.Sensor.process` looks at them, the likeliest first.
+        the order in which `hzn.Sensor.process` looks at them, the likeliest first. It stops at none: neither at the limb
+        nor at ``[limits]``.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._hzn import Cone, Expected, Fit, Rays, Sensor, _fuse
+from ._hzn import Cone, Expected, Rays, Sensor, _fuse
 
 
 class Fused(NamedTuple):
@@ -21,7 +21,7 @@ class Fused(NamedTuple):
     """cos of the half-angle."""
 
 
-def fuse(sensor: Sensor, rays: Rays, fit: Fit | Cone, expected: Expected | None = None) -> Fused | None:
+def fuse(sensor: Sensor, rays: Rays, fit: Cone, expected: Expected | None = None) -> Fused | None:
     """Weigh the correlated errors of the edge by the sensor's ``[covariance]``, and fuse the expected half-angle.
 
     Parameters
