@@ -37,7 +37,7 @@ pub struct Config {
     /// Largest standard deviation of an answer in degrees, above 0 to 180.
     pub max_sigma_deg: f64,
     /// Smallest part of the fitted limb in view that must be edge, 0 to 1. A limb goes on where the edge of a mast or
-    /// a cloud ends.
+    /// a cloud ends. The Sun, which has no phases, needs 0.7 where this is above 0: the Moon is no Sun.
     pub min_support: f64,
     /// Largest part of what lies beyond the fitted limb that may be lit, 0 to 1. Beyond a limb is the sky, but for
     /// what stands before it; beyond the edge of a cloud are other clouds.
@@ -150,11 +150,11 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::ShortArc
     } else if !(fit.rms_px <= T::of(config.max_rms_px)) {
         Verdict::Residuals
-    } else if !(fused.chi2 <= chi * chi) || !blooms_to(&fit.c, expected) {
+    } else if !(fused.chi2 <= chi * chi) || !blooms_to(&fit.c, expected, camera) {
         Verdict::HalfAngle
     } else if !(sigma_max_rad <= sigma_limit) {
         Verdict::Uncertain
-    } else if support < T::of(config.min_support) {
+    } else if support < T::of(least_support(config, expected)) {
         Verdict::Unsupported
     } else if fit.nearby * 3 > fit.inliers {
         // A limb stands alone; a curve laid through many edges has others close beside it.
@@ -177,13 +177,27 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
 }
 
-/// Of a blooming body, the half-angles that it may be seen under: from half of its own to twelve times.
+/// A body without phases is a whole disc: of its limb in view so much must be edge. A gibbous Moon has less.
+const WHOLE: f64 = 0.7;
+
+/// The smallest part of the limb in view that must be edge; 0 asks for none of any body.
+fn least_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
+    let whole = config.min_support > 0.0 && !expected.phases;
+    if whole { config.min_support.max(WHOLE) } else { config.min_support }
+}
+
+/// Of a blooming body, the half-angles that it may be seen under: from half of its own to twelve times. A whole disc
+/// blooms but never shrinks, to a pixel; what saturates of a Moon is smaller.
 const BLOOM: [f64; 2] = [0.5, 12.0];
+const WHOLE_BLOOM: f64 = 0.9;
 
 /// Whether a body that blooms can be seen under the half-angle of cosine `c`; others are weighed against the expected.
-fn blooms_to<T: Real>(c: &T, expected: &Expected<T>) -> bool {
+fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>) -> bool {
     let sin = (T::one() - *c * *c).most(T::ZERO).sqrt();
-    let [least, most] = BLOOM.map(|n| expected.sin * T::of(n));
+    let [half, most] = BLOOM.map(|n| expected.sin * T::of(n));
+    let (fx, fy) = camera.focal_px();
+    let whole = expected.sin * T::of(WHOLE_BLOOM) - T::one() / fx.least(fy);
+    let least = if expected.phases { half } else { half.most(whole) };
     !expected.free || (sin >= least && sin <= most.least(T::one()) && *c > T::ZERO)
 }
 
@@ -216,7 +230,8 @@ fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (
 const LOOKS: usize = 12;
 const NEAREST_PX: f64 = 16.0;
 
-/// The part of what lies beyond the limb, outwards to the border of the region, that is lit.
+/// The part of what lies beyond the limb, outwards to the border of the region, that is lit. Air that fades outwards from
+/// the limb is sky, however bright it begins.
 fn lit_beyond<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
@@ -228,18 +243,23 @@ fn lit_beyond<T: Real, P: Pixels, O: Observer<T>>(
         let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
         let [gu, gv] = block.gradient_at(lane, e);
         let norm = (gu * gu + gv * gv).sqrt().most(T::of(1e-20));
-        let mut distance = T::of(NEAREST_PX);
-        for _ in 0..10 {
+        let mut distance = T::ZERO;
+        let mut fading = Some(u16::MAX);
+        for _ in 0..11 {
             let (x, y) = ((from.u - gu / norm * distance).to_i32(), (from.v - gv / norm * distance).to_i32());
             let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { break };
             if !scene.region.contains(x, y) {
                 break;
             }
             if !scene.region.masked(x, y) {
-                looks += 1;
-                lit += i32::from(scene.lit(x, y));
+                let brightness = scene.brightness(x, y);
+                fading = fading.filter(|&before| brightness < before).map(|_| brightness);
+                if distance > T::ZERO {
+                    looks += 1;
+                    lit += i32::from(fading.is_none() && brightness >= scene.level);
+                }
             }
-            distance += distance;
+            distance = (distance + distance).most(T::of(NEAREST_PX));
         }
     }
     T::of_i32(lit) / T::of_i32(looks.max(1))
@@ -263,10 +283,7 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
         let at = |px: f64| {
             let (x, y) = ((from.u + gu / norm * T::of(px)).to_i32(), (from.v + gv / norm * T::of(px)).to_i32());
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            (scene.region.contains(x, y) && !scene.region.masked(x, y)).then(|| {
-                scene.observer.pixel(x, y);
-                u32::from(scene.picture.at(x, y))
-            })
+            (scene.region.contains(x, y) && !scene.region.masked(x, y)).then(|| u32::from(scene.brightness(x, y)))
         };
         if let (Some(d), Some(l)) = (at(-PLATEAU_PX), at(PLATEAU_PX)) {
             (dark, lit, looks) = (dark + d, lit + l, looks + 1);

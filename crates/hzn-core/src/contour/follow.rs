@@ -97,8 +97,14 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
     /// Whether a pixel of the region is lit.
     #[inline(always)]
     pub(crate) fn lit(&self, x: u16, y: u16) -> bool {
+        self.brightness(x, y) >= self.level && !self.region.masked(x, y)
+    }
+
+    /// The brightness of a pixel in counts.
+    #[inline(always)]
+    pub(crate) fn brightness(&self, x: u16, y: u16) -> u16 {
         self.observer.pixel(x, y);
-        self.picture.at(x, y) >= self.level && !self.region.masked(x, y)
+        self.picture.at(x, y)
     }
 
     /// Follows the edge that passes between the lit pixel `start` and its dark neighbour in direction `dark`.
