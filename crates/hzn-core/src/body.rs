@@ -183,6 +183,11 @@ impl Config {
         matches!(self.kind, Kind::Sun | Kind::Moon)
     }
 
+    /// Whether it is a whole disc in a glare of its own: the Sun.
+    pub fn blooms(&self) -> bool {
+        self.kind == Kind::Sun
+    }
+
     /// Whether only the limb that the Sun lights is limb, where its direction is known.
     pub fn is_sunlit(&self) -> bool {
         self.sunlit.unwrap_or(matches!(self.kind, Kind::Moon | Kind::Sphere))

@@ -28,7 +28,8 @@ use crate::real::Real;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum SubPixel {
-    /// Crossing of the mid-level between the plateaus on both sides, in three rows smoothed along the edge.
+    /// Crossing of the mid-level between the plateaus on both sides, in three rows smoothed along the edge; of the Sun, which
+    /// blooms into a glare that is no plateau, crossing of the picture's level.
     #[default]
     Linear,
     /// The border pixel's centre, moved half a pixel to the dark side.
@@ -381,10 +382,16 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let near = around.near()?;
     let gradient = near.gradient();
     let (lit, dx, dy) = orientation(gradient)?;
+    let level = i32::from(scene.level);
+    if scene.blooms {
+        let [_, inner, outer] = near.across(lit);
+        let level4 = (4 * level).max(outer + 1).min(inner);
+        let part = T::of_i32(inner - level4) / T::of_i32((inner - outer).max(1));
+        return (inner > outer).then(|| (point_off(p, (dx, dy), part), lit, false));
+    }
     // The edge fades over level / gradient pixels. A step is half of that, so that air seen from a rocket is read to where
     // it ends; but of haze through a long lens, below which the clouds begin, only a fifth.
     let steep = gradient.0.abs().max(gradient.1.abs());
-    let level = i32::from(scene.level);
     if FREE && 2 * level < steep {
         let line = Line::new(&around, (dx, dy), 1);
         let Crossing { part, fallback, .. } = line.crossing(near.across(lit))?;

@@ -46,6 +46,13 @@ pub struct Expected<T> {
     pub(crate) which: u8,
 }
 
+impl<T> Expected<T> {
+    /// As [`Config::blooms`].
+    pub(crate) fn blooms(&self) -> bool {
+        self.free && !self.phases
+    }
+}
+
 impl<T: Real> Expected<T> {
     /// Expected half-angle in radians.
     pub fn half_angle_rad(&self) -> T {

@@ -29,6 +29,8 @@ pub(crate) struct Scene<'a, T, P, O> {
     pub(crate) region: &'a Region<T>,
     pub(crate) level: u16,
     pub(crate) observer: &'a O,
+    /// The body's disc blooms: its edge is where the picture's level says, as what lies around it is no plateau.
+    pub(crate) blooms: bool,
     /// What a look around costs.
     look: u32,
     /// Twice around, so that eight directions follow each other from any of the first eight.
@@ -91,7 +93,11 @@ const RUN: usize = 32;
 impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
     pub(crate) fn new(picture: &'a P, region: &'a Region<T>, level: u16, observer: &'a O) -> Self {
         let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
-        Self { picture, region, level, observer, look: work::look(region.polygons()), moves }
+        Self { picture, region, level, observer, blooms: false, look: work::look(region.polygons()), moves }
+    }
+
+    pub(crate) fn blooming(self, blooms: bool) -> Self {
+        Self { blooms, ..self }
     }
 
     /// Whether a pixel of the region is lit.

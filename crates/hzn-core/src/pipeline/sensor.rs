@@ -172,7 +172,7 @@ impl<T: Real> Sensor<T> {
         let config = &self.config;
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
-        let scene = Scene::new(picture, &self.region, level, observer);
+        let scene = Scene::new(picture, &self.region, level, observer).blooming(expected.blooms());
         let mut judge = Judge::new(self, expected, taken, observer, lists.blocks, report);
         match config.contour.method {
             contour::Method::BorderFollowing => judge.border_following(&scene, lists.border, lists.marks),

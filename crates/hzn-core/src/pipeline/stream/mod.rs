@@ -253,7 +253,7 @@ impl<T: Real, S: Sample> Stream<'_, T, S> {
         let picture = Memory { runs: &self.runs, points: &self.points, width: region.width(), height: region.height() };
         let lists = workspace.lists();
         if picture.height > 1 {
-            let scene = Scene::new(&picture, &region, 1, observer);
+            let scene = Scene::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
             let mut judge = Judge::new(self.sensor, self.expected, &[], observer, lists.blocks, report);
             judge.border_following(&scene, lists.border, lists.marks);
             judge.conclude();
@@ -271,7 +271,7 @@ impl<T: Real, S: Sample> Stream<'_, T, S> {
     /// Measures the edge points of a row, the rows around which have come.
     fn measure(&mut self, y: u16, level: u16, region: &Region<T>) {
         let config = &self.sensor.config.candidates;
-        let scene = Scene::new(&self.window, region, level, &Unobserved);
+        let scene = Scene::new(&self.window, region, level, &Unobserved).blooming(self.expected.blooms());
         self.runs.each_border(y, |x| {
             if region.contains(x, y)
                 && self.points.wants(x, y)
