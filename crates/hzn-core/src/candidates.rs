@@ -80,6 +80,8 @@ const REACH: i32 = 10;
 const WIDEST: i32 = 6;
 /// Steps from a border pixel within which everything is read.
 const MARGIN: i32 = REACH + 3;
+/// Where an edge that is no wider than four pixels has faded to half of the level, pixels.
+const FADED: i32 = 3;
 /// Stands for a brightness that cannot be read.
 const UNSEEN: i32 = i32::MIN;
 
@@ -389,11 +391,12 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
         let part = T::of_i32(inner - level4) / T::of_i32((inner - outer).max(1));
         return (inner > outer).then(|| (point_off(p, (dx, dy), part), lit, false));
     }
-    // The edge fades over level / gradient pixels. A step is half of that, so that air seen from a rocket is read to where
-    // it ends; but of haze through a long lens, below which the clouds begin, only a fifth.
+    // The edge fades over level / gradient pixels; at the top of a narrow one the gradient says less than how soon it is dark.
+    // A step is half of that, so that air seen from a rocket is read to where it ends; but of haze through a long lens, below
+    // which the clouds begin, only a fifth.
     let steep = gradient.0.abs().max(gradient.1.abs());
-    if FREE && 2 * level < steep {
-        let line = Line::new(&around, (dx, dy), 1);
+    let line = Line::new(&around, (dx, dy), 1);
+    if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
         let Crossing { part, fallback, .. } = line.crossing(near.across(lit))?;
         return Some((point_off(p, (dx, dy), part), lit, fallback));
     }
