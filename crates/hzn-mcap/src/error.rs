@@ -83,6 +83,12 @@ pub enum Error {
         /// Largest size in bytes.
         limit: u64,
     },
+    /// Recovering was stopped by whoever began it.
+    #[error("recovering {} was stopped: nothing was written", path.display())]
+    Stopped {
+        /// The recording that was to be recovered.
+        path: PathBuf,
+    },
     /// An earlier write failed; the recording takes no further frames.
     #[error("an earlier write to {} failed: finished frames are kept there, --resume goes on", path.display())]
     AfterFailure {

@@ -39,11 +39,23 @@ pub struct Resumed {
 /// # Errors
 /// `input` cannot be read or is no MCAP; `output` exists or cannot be written.
 pub fn recover(input: impl AsRef<Path>, output: impl AsRef<Path>) -> Result<Recovered, Error> {
+    recover_while(input, output, |_, _| true)
+}
+
+/// As [`recover`], as long as it is wanted: `wanted` is told how many bytes of how many are through, again and again.
+///
+/// # Errors
+/// As [`recover`]; it is not wanted any more.
+pub fn recover_while(
+    input: impl AsRef<Path>,
+    output: impl AsRef<Path>,
+    mut wanted: impl FnMut(u64, u64) -> bool,
+) -> Result<Recovered, Error> {
     let (input, output) = (input.as_ref(), output.as_ref());
     refuse_existing(output)?;
     let part = part_path(output);
     let mut out = open(&part).map_err(|e| while_writing(&part, e))?;
-    let closed = copy(input, &mut out, &part).and_then(|found| {
+    let closed = copy(input, &mut out, &part, &mut wanted).and_then(|found| {
         out.finish().map_err(|e| while_writing(&part, e))?;
         fs::rename(&part, output).map_err(|e| while_writing(output, e))?;
         Ok(found)
@@ -95,7 +107,7 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     // Errors name the old file: it is the one that has everything until the new one takes its place.
     let failed = |e| while_writing(&part, e);
     let copied = open(&copy_path).map_err(failed).and_then(|mut out| {
-        let found = copy(&part, &mut out, &part)?;
+        let found = copy(&part, &mut out, &part, &mut |_, _| true)?;
         out.flush().map_err(failed)?;
         fs::rename(&copy_path, &part).map_err(failed)?;
         Ok((found, out))
@@ -108,7 +120,12 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
 }
 
 /// Copies the whole records of `input` up to the last finished frame.
-fn copy(input: &Path, out: &mut Container<BufWriter<File>>, part: &Path) -> Result<Recovered, Error> {
+fn copy(
+    input: &Path,
+    out: &mut Container<BufWriter<File>>,
+    part: &Path,
+    wanted: &mut dyn FnMut(u64, u64) -> bool,
+) -> Result<Recovered, Error> {
     let read = |source| Error::Read { path: input.to_path_buf(), source };
     let file = File::open(input).map_err(read)?;
     let size = file.metadata().map_err(read)?.len();
@@ -121,6 +138,9 @@ fn copy(input: &Path, out: &mut Container<BufWriter<File>>, part: &Path) -> Resu
     let mut waiting: Vec<Chunk> = Vec::new();
     let mut kept_to = scanner.position();
     while let Some(record) = scanner.next().map_err(read)? {
+        if !wanted(scanner.position(), size) {
+            return Err(Error::Stopped { path: input.to_path_buf() });
+        }
         match record.op {
             Op::DATA_END => {
                 found.was_complete = true;

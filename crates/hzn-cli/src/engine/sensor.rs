@@ -43,6 +43,21 @@ impl AnySensor {
         Ok(Self { kind, camera, bodies: config.each_body().iter().map(|b| b.kind).collect() })
     }
 
+    /// Takes another configuration, from the next picture on. Refused, everything stays as it was.
+    ///
+    /// # Errors
+    /// The first field out of its limits.
+    pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
+        let camera = Camera::try_new(&config.camera)?;
+        match &mut self.kind {
+            Kind::Host(h) => h.reconfigure(config)?,
+            Kind::Flight(h) => h.reconfigure(config)?,
+        }
+        self.camera = camera;
+        self.bodies = config.each_body().iter().map(|b| b.kind).collect();
+        Ok(())
+    }
+
     /// The lens.
     pub fn camera(&self) -> &Camera<f64> {
         &self.camera

@@ -234,6 +234,14 @@ impl Output {
         }
     }
 
+    /// Leaves no file: what had the name before is as it was.
+    pub fn discard(self) {
+        drop(self.kind);
+        if let Some(path) = self.path {
+            let _ = std::fs::remove_file(part_path(&path));
+        }
+    }
+
     /// Do frames need their edges and points?
     pub fn wants_trace(path: Option<&Path>) -> bool {
         path.is_some_and(|p| ending(p) == "mcap")
@@ -244,14 +252,17 @@ impl Sink for Output {
     fn write(&mut self, frame: &mut Finished) -> anyhow::Result<()> {
         match &mut self.kind {
             Kind::Mcap(writer) => Ok(writer.write_bodies(&records(frame, &self.config))?),
-            Kind::Text(text) => rows(frame, &self.config).iter().try_for_each(|row| text.write(row)),
+            Kind::Text(text) => {
+                let written = rows(frame, &self.config).iter().try_for_each(|row| text.write(row));
+                written.map_err(|e| text.told(e))
+            }
         }
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {
         match &mut self.kind {
             Kind::Mcap(writer) => Ok(writer.flush()?),
-            Kind::Text(text) => text.flush(),
+            Kind::Text(text) => text.flush().map_err(|e| text.told(e)),
         }
     }
 }
@@ -275,7 +286,10 @@ impl Rows {
         let Some(form) = form(target(path)?) else {
             return Err(usage(format!("{}: a table ends in .csv or .jsonl", path.display())));
         };
-        let text = Text::create(path, &part, form).map_err(|e| cannot(&part, &e))?;
+        let text = Text::create(path, &part, form).map_err(|e| {
+            let _ = std::fs::remove_file(&part);
+            cannot(path, &e)
+        })?;
         Ok(Self { text, path: path.to_owned() })
     }
     /// Appends a row.
@@ -283,7 +297,12 @@ impl Rows {
     /// # Errors
     /// The disk.
     pub fn write(&mut self, row: &hzn_mcap::Row) -> anyhow::Result<()> {
-        self.text.write(row)
+        self.text.write(row).map_err(|e| anyhow::anyhow!(advice(&self.path, &e)))
+    }
+    /// Leaves no file: what had the name before is as it was.
+    pub fn discard(self) {
+        drop(self.text);
+        let _ = std::fs::remove_file(part_path(&self.path));
     }
     /// Gives the file its name.
     ///

@@ -69,25 +69,24 @@ impl Text {
         Ok((Self::on(file, path, part, form), held))
     }
 
-    pub(crate) fn write(&mut self, row: &Row) -> anyhow::Result<()> {
+    pub(crate) fn write(&mut self, row: &Row) -> io::Result<()> {
         let line = match self.form {
-            Form::Csv => csv_line(row)?,
+            Form::Csv => csv_line(row).map_err(io::Error::other)?,
             Form::Jsonl => {
                 let mut line = serde_json::to_vec(row)?;
                 line.push(b'\n');
                 line
             }
         };
-        let written = self.out.write_all(&line);
-        written.map_err(|e| self.told(e))
+        self.out.write_all(&line)
     }
 
-    pub(crate) fn flush(&mut self) -> anyhow::Result<()> {
-        let flushed = self.out.flush();
-        flushed.map_err(|e| self.told(e))
+    pub(crate) fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
     }
 
-    fn told(&self, error: io::Error) -> anyhow::Error {
+    /// An error of writing a run's results, and what to do.
+    pub(crate) fn told(&self, error: io::Error) -> anyhow::Error {
         match &self.names {
             Some((_, part)) => anyhow::anyhow!(advice_of_run(part, &error)),
             None if error.kind() == io::ErrorKind::BrokenPipe => error.into(),

@@ -102,10 +102,18 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, tit
 /// # Errors
 /// The file cannot be written.
 pub fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
-    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     // Through memory: the encoder would tell of a full disk in words of its own.
-    let mut bytes = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
-    image.write_with_encoder(encoder).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))?;
+    let bytes = png(image).map_err(|e| e.context(path.display().to_string()))?;
     std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::output::advice(path, &e)))
+}
+
+/// A picture as the bytes of a PNG.
+///
+/// # Errors
+/// It has no pixels.
+pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    let mut bytes = Vec::new();
+    image.write_with_encoder(PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub))?;
+    Ok(bytes)
 }

@@ -10,6 +10,7 @@ pub mod session;
 pub mod settings;
 pub mod sheet;
 pub mod view;
+pub mod whole;
 
 pub use knob::Knob;
 pub use mask::MaskEdit;

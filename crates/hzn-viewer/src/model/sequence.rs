@@ -40,6 +40,8 @@ pub struct Sequence {
     pub title: String,
     /// What was opened.
     pub inputs: Vec<PathBuf>,
+    /// The recording that holds the pictures.
+    pub recording: Option<PathBuf>,
     /// Folder in which sensor.toml, frames.csv and truth.csv may lie.
     pub folder: PathBuf,
     /// Frames, in order.
@@ -57,6 +59,19 @@ impl Sequence {
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
+    /// Where a file that is made of it goes, unless another place is named: beside it. In a folder of pictures, a further
+    /// picture would be a further frame.
+    pub fn beside(&self, name: &str) -> PathBuf {
+        let folder = match self.inputs.as_slice() {
+            [one] if one.is_dir() => std::path::absolute(one).ok().and_then(|p| Some(p.parent()?.to_owned())),
+            _ => None,
+        };
+        folder.as_deref().unwrap_or(&self.folder).join(name)
+    }
+    /// Its name without the ending of a recording.
+    pub fn stem(&self) -> &str {
+        self.title.trim_end_matches(".part").trim_end_matches(".mcap")
+    }
     /// How long a frame lasts in seconds, until the next one.
     pub fn duration_s(&self, frame: usize) -> Option<f64> {
         Some(self.entries.get(frame + 1)?.time_s - self.entries.get(frame)?.time_s)
@@ -72,6 +87,19 @@ impl Sequence {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_made_of_it_lies_beside_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let pictures = dir.path().join("flight");
+        std::fs::create_dir(&pictures).unwrap();
+        let folder = Sequence { inputs: vec![pictures.clone()], folder: pictures, ..Sequence::default() };
+        assert_eq!(folder.beside("flight.mp4"), dir.path().join("flight.mp4"));
+        let file = dir.path().join("flight.mcap");
+        let recording = Sequence { inputs: vec![file], folder: dir.path().to_owned(), ..Sequence::default() };
+        assert_eq!(recording.beside("flight.mp4"), dir.path().join("flight.mp4"));
+        assert_eq!(Sequence { title: "a.mcap.part".into(), ..Sequence::default() }.stem(), "a");
+    }
 
     #[test]
     fn frames_are_found_by_their_time() {

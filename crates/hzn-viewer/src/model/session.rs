@@ -1,15 +1,17 @@
 //! The sensor that is being tuned: its text, what it means, and the way back.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use hzn_calib::Problem;
-use hzn_calib::keys::{Key, Limits};
+use hzn_calib::keys::{self, Key, Limits};
 use hzn_core::{Config, Preset};
 use toml_edit::Value;
 
 use super::sheet::{self, Sheet};
+use super::whole;
 
 /// Steps that can be undone.
 const MAX_UNDO: usize = 500;
@@ -30,6 +32,10 @@ pub struct Session {
     gesture: Option<String>,
     config: Option<Arc<Config>>,
     values: toml::Table,
+    /// The preset that the text names, or else the one that counts without.
+    preset: String,
+    /// Keys about which the text says something else than the saved one, as (section, name, body).
+    differing: HashSet<(&'static str, &'static str, usize)>,
     problem: Option<Problem>,
     changes: u64,
 }
@@ -48,6 +54,8 @@ impl Session {
             gesture: None,
             config: None,
             values: toml::Table::new(),
+            preset: String::new(),
+            differing: HashSet::new(),
             problem: None,
             changes: 0,
         };
@@ -105,6 +113,11 @@ impl Session {
         !self.redo.is_empty()
     }
 
+    /// The preset that counts.
+    pub fn preset(&self) -> &str {
+        &self.preset
+    }
+
     /// The value that counts: the text's, or else the preset's; `None` where there is none. Of a body, its own level and
     /// edge errors come before the sensor's.
     pub fn value(&self, section: &str, name: &str, body: usize) -> Option<&toml::Value> {
@@ -148,8 +161,8 @@ impl Session {
 
     /// Does the text say something else about a key than the saved one?
     pub fn differs(&self, section: &str, name: &str, body: usize) -> bool {
-        let key = sheet::Key { section, name, body };
-        self.is_changed() && self.sheet.get(key) != self.saved.get(key)
+        // The sets are small, and their keys live longer than the question.
+        self.differing.iter().any(|d| *d == (section, name, body))
     }
 
     /// What the saved text says about a key, which may be nothing.
@@ -218,18 +231,9 @@ impl Session {
     /// # Errors
     /// What the disk says, and what to do.
     pub fn save(&mut self, path: &Path) -> Result<(), String> {
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let write = || {
-            std::fs::write(&part, self.sheet.text())?;
-            std::fs::rename(&part, path)
-        };
-        write().map_err(|e| {
-            let _ = std::fs::remove_file(&part);
-            hzn_cli::output::advice(path, &e)
-        })?;
+        whole::write(path, self.sheet.text().as_bytes())?;
         self.saved = self.sheet.clone();
+        self.differing.clear();
         (self.path, self.home) = (Some(path.to_owned()), path.to_owned());
         self.settle();
         Ok(())
@@ -251,7 +255,19 @@ impl Session {
         self.read();
     }
 
+    /// Reads what the text says; once a change, as panels ask in every frame of the window.
     fn read(&mut self) {
+        let table: Option<toml::Table> = self.sheet.text().parse().ok();
+        let named = table.as_ref().and_then(|t| t.get("preset")?.as_str());
+        self.preset = named.unwrap_or(Preset::default().name()).to_owned();
+        self.differing.clear();
+        if self.is_changed() {
+            let bodies = table.as_ref().and_then(|t| t.get("bodies")?.as_array()).map_or(1, |b| b.len().max(1));
+            let of_bodies = |k: &'static Key| (0..bodies).map(move |body| (k, body));
+            let key = |(k, body): (&'static Key, usize)| sheet::Key { section: &k.section, name: &k.name, body };
+            let keys = keys::all().iter().flat_map(of_bodies).map(key);
+            self.differing.extend(self.sheet.differing(&self.saved, keys).iter().map(|k| (k.section, k.name, k.body)));
+        }
         match hzn_calib::sensor::parse(self.sheet.text(), &self.home) {
             Ok(sensor) => {
                 // What was accepted is TOML again; a table that is not would only leave the sliders without values.
@@ -291,7 +307,6 @@ fn tidy_px(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hzn_calib::keys;
 
     const TEXT: &str = "preset = \"hzn\"\n[camera]\nwidth = 640\nheight = 480\nfx_px = 500.0\nfy_px = 500.0\ncx_px = 319.5\ncy_px = 239.5\nmodel = \"pinhole\"\n[reject]\nthreshold_px = 3.0 # mine\n";
 

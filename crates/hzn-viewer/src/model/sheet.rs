@@ -29,9 +29,13 @@ impl Sheet {
 
     /// What the text says about a key, as it is written; `None` where it says nothing.
     pub fn get(&self, key: Key<'_>) -> Option<String> {
-        let mut document: DocumentMut = self.0.parse().ok()?;
-        let value = table(&mut document, key, false)?.get(key.name)?.as_value()?;
-        Some(value.clone().decorated("", "").to_string())
+        written(&mut self.0.parse().ok()?, key)
+    }
+
+    /// Those of some keys about which two texts say something different.
+    pub fn differing<'k>(&self, other: &Self, keys: impl Iterator<Item = Key<'k>>) -> Vec<Key<'k>> {
+        let [mut ours, mut theirs] = [self, other].map(|s| s.0.parse::<DocumentMut>().unwrap_or_default());
+        keys.filter(|key| written(&mut ours, *key) != written(&mut theirs, *key)).collect()
     }
 
     /// The text with a value written, or taken out (`None`), so that the preset's counts again.
@@ -103,6 +107,11 @@ fn common(old: &[&str], new: &[&str]) -> Vec<(usize, usize)> {
         }
     }
     out
+}
+
+fn written(document: &mut DocumentMut, key: Key<'_>) -> Option<String> {
+    let value = table(document, key, false)?.get(key.name)?.as_value()?;
+    Some(value.clone().decorated("", "").to_string())
 }
 
 /// The table that a key belongs into.

@@ -7,7 +7,6 @@ use egui::{Key, RichText};
 
 use super::viewer::Viewer;
 use crate::model::sheet::Sheet;
-use crate::work::export;
 
 /// What a path is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,20 +163,9 @@ fn accept(viewer: &mut Viewer) {
             }
         }
         Purpose::Compare => viewer.compare_with_file(&path),
-        Purpose::Picture => {
-            let layers = if viewer.layers_hidden { Vec::new() } else { viewer.settings.layers.clone() };
-            let result = viewer.sight.as_ref().map(|s| export::picture(s, &layers, &path));
-            match result {
-                Some(Ok(())) => viewer.say(format!("Written: {}", path.display())),
-                Some(Err(why)) => viewer.say_bad(why),
-                None => {}
-            }
-        }
+        Purpose::Picture => viewer.export_picture(path),
         Purpose::Video => viewer.export_video(path),
-        Purpose::Table => match export::table(viewer.rows.all(), &path) {
-            Ok(n) => viewer.say(format!("{n} results written: {}", path.display())),
-            Err(why) => viewer.say_bad(why),
-        },
+        Purpose::Table => viewer.export_table(path),
         Purpose::Rerun => viewer.process_all(Some(path)),
     }
 }

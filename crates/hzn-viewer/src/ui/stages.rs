@@ -52,7 +52,7 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let label = ui.label("preset");
         let key = keys::all().iter().find(|k| k.path() == "preset");
-        let current = preset(session);
+        let current = session.preset().to_owned();
         ComboBox::from_id_salt("preset")
             .selected_text(&current)
             .width(104.0)
@@ -94,12 +94,6 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
     if let Some(command) = command {
         viewer.run(command, &ui.ctx().clone());
     }
-}
-
-fn preset(session: &Session) -> String {
-    let written = session.sheet().text().parse::<toml::Table>().ok();
-    let name = written.as_ref().and_then(|t| t.get("preset")?.as_str());
-    name.unwrap_or(hzn_core::Preset::default().name()).to_owned()
 }
 
 /// Which of several bodies is looked at.

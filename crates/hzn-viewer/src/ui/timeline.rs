@@ -138,16 +138,6 @@ fn work(viewer: &mut Viewer, ui: &mut Ui) {
         ui.add(
             egui::ProgressBar::new(part).desired_width(170.0).text(format!("{what} {} of {}", sweep.done, sweep.total)),
         );
-    } else if let Some(export) = &viewer.export {
-        if ui.button("Cancel").clicked() {
-            export.stop();
-        }
-        let part = export.done() as f32 / export.total.max(1) as f32;
-        ui.add(egui::ProgressBar::new(part).desired_width(170.0).text(format!(
-            "video {} of {}",
-            export.done(),
-            export.total
-        )));
     } else if viewer.sequence.len() > 1 && viewer.session.is_some() {
         let hint = format!(
             "Every frame with the parameters as they are, for the plots ({})",

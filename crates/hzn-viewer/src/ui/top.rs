@@ -1,11 +1,16 @@
 //! The bar on top: menus, what is open, and what has to be said.
 
+use std::time::Duration;
+
 use egui::{RichText, Ui};
 use hzn_core::Preset;
 
 use super::Command;
 use super::dialogs::{Asking, Purpose};
 use super::viewer::{Message, Viewer};
+
+/// What takes no longer needs no bar: it would only make the window jump.
+const NOTICED: Duration = Duration::from_millis(200);
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     egui::Panel::top("top").show(ui, |ui| {
@@ -41,6 +46,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             });
         });
         ui.add_space(2.0);
+        jobs(viewer, ui);
         messages(viewer, ui);
     });
 }
@@ -117,13 +123,12 @@ fn menus(viewer: &mut Viewer, ui: &mut Ui) {
         entry(viewer, ui, Command::ExportPicture, frames);
         let mut ask = |ui: &mut Ui, text: &str, on: bool, purpose: Purpose, name: &str| {
             if ui.add_enabled(on, egui::Button::new(text)).clicked() {
-                viewer.asking = Some(Asking::new(purpose, &viewer.sequence.folder.join(name)));
+                viewer.asking = Some(Asking::new(purpose, &viewer.sequence.beside(name)));
                 ui.close();
             }
         };
-        let stem = viewer.sequence.title.trim_end_matches(".mcap").to_owned();
-        let free = viewer.export.is_none();
-        ask(ui, "Save video with overlays…", sensor && frames && free, Purpose::Video, &format!("{stem}.mp4"));
+        let stem = viewer.sequence.stem().to_owned();
+        ask(ui, "Save video with overlays…", sensor && frames, Purpose::Video, &format!("{stem}.mp4"));
         ask(ui, "Save results as CSV…", frames, Purpose::Table, &format!("{stem}-viewed.csv"));
     });
 }
@@ -150,6 +155,26 @@ fn messages(viewer: &mut Viewer, ui: &mut Ui) {
         viewer.messages.remove(i);
     }
     if let Some(path) = recover {
-        viewer.recover(&path);
+        viewer.recover(path);
+    }
+}
+
+/// Work on files that takes longer than a moment.
+fn jobs(viewer: &Viewer, ui: &mut Ui) {
+    for job in &viewer.jobs {
+        ui.ctx().request_repaint_after(NOTICED);
+        if job.age() < NOTICED {
+            continue;
+        }
+        ui.horizontal(|ui| {
+            let name = format!("Cancel {}", job.name.to_lowercase());
+            let cancel = ui.add_enabled(!job.is_stopping(), egui::Button::new("Cancel").small());
+            cancel.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
+            if cancel.clicked() {
+                job.stop();
+            }
+            ui.label(job.name);
+            ui.add(egui::ProgressBar::new(job.fraction()).desired_width(220.0).show_percentage());
+        });
     }
 }

@@ -189,21 +189,25 @@ impl Looker {
         sight
     }
 
-    /// The sensor number `which`, made anew when its configuration has changed.
+    /// The sensor number `which`, with this configuration.
     fn sensor(
         &mut self,
         which: usize,
         setup: &Setup,
         flight: bool,
     ) -> Result<(Arc<Camera<f64>>, &mut AnySensor), String> {
-        // A sensor that tracks the level remembers the frame before, which may be any one here: it begins anew.
-        let same = |(config, own, _): &(Arc<Config>, bool, AnySensor)| {
-            *config == setup.config && *own == flight && !config.tracks()
-        };
-        if !self.sensors.get(which).is_some_and(same) {
-            let sensor = AnySensor::new(&setup.config, flight).map_err(|e| e.to_string())?;
-            self.sensors.truncate(which);
-            self.sensors.push((Arc::clone(&setup.config), flight, sensor));
+        match self.sensors.get_mut(which).filter(|(_, own, _)| *own == flight) {
+            // A sensor that tracks the level remembers the frame before, which may be any one here: it begins anew.
+            Some((config, _, sensor)) if *config != setup.config || config.tracks() => {
+                sensor.reconfigure(&setup.config).map_err(|e| e.to_string())?;
+                *config = Arc::clone(&setup.config);
+            }
+            Some(_) => {}
+            None => {
+                let sensor = AnySensor::new(&setup.config, flight).map_err(|e| e.to_string())?;
+                self.sensors.truncate(which);
+                self.sensors.push((Arc::clone(&setup.config), flight, sensor));
+            }
         }
         match self.sensors.get_mut(which) {
             Some((.., sensor)) => Ok((Arc::new(sensor.camera().clone()), sensor)),

@@ -1,24 +1,22 @@
-//! Pictures, videos and tables of what is shown.
+//! Files of what is shown: a picture, a video, a table; and a recording that is made whole again.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use crossbeam_channel::{Receiver, bounded};
 use hzn_cli::engine::AnySensor;
 use hzn_cli::input::{Picture, Source};
 use hzn_cli::output::{Existing, Rows as Table};
 use hzn_cli::overlay;
 use hzn_core::Config;
-use hzn_mcap::{Annotations, Pictures, Row};
+use hzn_mcap::{Annotations, Row};
 
-use super::Wake;
+use super::job::{Done, Halt, Progress};
 use super::sight::{self, Outcome, Sight, Subject};
-use super::sweep::Walk;
-use crate::model::Entry;
+use super::walk::Walk;
 use crate::model::settings::Layer;
+use crate::model::{Sequence, whole};
 
 /// What is drawn over a picture, as far as it is shown.
 pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
@@ -63,156 +61,126 @@ fn draw(picture: &Picture, outcome: Option<&Outcome>, layers: &[Layer]) -> image
 /// Writes the picture that is shown, with what is drawn over it, as PNG in its own size.
 ///
 /// # Errors
-/// There is no picture, or the disk says no.
-pub fn picture(sight: &Sight, layers: &[Layer], path: &Path) -> Result<(), String> {
+/// There is no picture, the name is not that of a PNG, or the disk says no.
+pub fn picture(sight: &Sight, layers: &[Layer], path: &Path) -> Result<Done, Halt> {
+    if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+        return Err(Halt::Failed(format!("{}: the picture's ending must be .png", path.display())));
+    }
     let picture = sight.picture.as_ref().map_err(Clone::clone)?;
     let image = draw(picture, sight.answers.first().map(|o| &**o), layers);
-    overlay::save(&image, path).map_err(|e| format!("{e:#}"))
+    let bytes = overlay::png(&image).map_err(|e| format!("{}: {e:#}", path.display()))?;
+    whole::write(path, &bytes)?;
+    Ok(Done::Written(path.to_owned()))
 }
 
 /// Writes results as CSV or JSON Lines, by the ending.
 ///
 /// # Errors
 /// Another ending, or the disk says no.
-pub fn table<'a>(rows: impl Iterator<Item = &'a Row>, path: &Path) -> Result<usize, String> {
+pub fn table(rows: &[Row], path: &Path, progress: &Progress) -> Result<Done, Halt> {
     let told = |stop: hzn_cli::exit::Stop| format!("{:#}", stop.error);
     let mut table = Table::create(path, Existing::Replace).map_err(told)?;
-    let mut count = 0;
-    for row in rows {
-        table.write(row).map_err(|e| format!("{e:#}"))?;
-        count += 1;
+    let total = rows.len() as u64;
+    for (i, row) in (0..).zip(rows) {
+        let written = progress.at(i, total).and_then(|()| table.write(row).map_err(|e| format!("{e:#}").into()));
+        if written.is_err() {
+            table.discard();
+            return written.map(|()| Done::Written(path.to_owned()));
+        }
     }
     table.finish().map_err(told)?;
-    Ok(count)
+    Ok(Done::Written(path.to_owned()))
 }
 
-/// A video that is being written. Dropped, it stops and leaves no file.
-pub struct Export {
-    stop: Arc<AtomicBool>,
-    done: Arc<AtomicUsize>,
-    end: Receiver<Result<String, String>>,
-    /// Frames in all.
-    pub total: usize,
-}
-
-impl Export {
-    /// Begins a video of all frames.
-    pub fn video(
-        entries: Vec<Entry>,
-        inputs: Vec<PathBuf>,
-        pictures: Option<Pictures>,
-        config: Arc<Config>,
-        flight: bool,
-        layers: Vec<Layer>,
-        fps: f64,
-        path: PathBuf,
-        wake: &Wake,
-    ) -> Self {
-        let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
-        let (send, end) = bounded(1);
-        let total = entries.len();
-        let (flag, count, wake) = (Arc::clone(&stop), Arc::clone(&done), Arc::clone(wake));
-        std::thread::spawn(move || {
-            let walk = Walk::new(entries.clone(), inputs, pictures);
-            let film = Film { config, flight, layers, fps };
-            let result = film.write(&entries, walk, &path, &flag, &count, &wake);
-            let _ = send.send(result.map(|()| format!("Written: {}", path.display())));
-            wake();
-        });
-        Self { stop, done, end, total }
-    }
-    /// Frames that are written.
-    pub fn done(&self) -> usize {
-        self.done.load(Ordering::Relaxed)
-    }
-    /// Stops; no file is left.
-    pub fn stop(&self) {
-        self.stop.store(true, Ordering::Relaxed);
-    }
-    /// How it ended, once it has.
-    pub fn end(&mut self) -> Option<Result<String, String>> {
-        self.end.try_recv().ok()
+/// Makes a recording that was cut off whole again, in a file beside it that is not there yet.
+///
+/// # Errors
+/// It cannot be read, or the disk says no.
+pub fn recover(path: &Path, progress: &Progress) -> Result<Done, Halt> {
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = name.trim_end_matches(".part").trim_end_matches(".mcap");
+    let free = |name: String| Some(path.with_file_name(name)).filter(|p| !p.exists());
+    let numbered = || (2..).find_map(|n: u64| free(format!("{stem}-recovered-{n}.mcap")));
+    let out = free(format!("{stem}-recovered.mcap")).or_else(numbered).ok_or_else(|| "no free name".to_owned())?;
+    match hzn_mcap::recover_while(path, &out, |done, total| progress.at(done, total).is_ok()) {
+        Ok(found) => Ok(Done::Recovered { path: out, frames: found.frames }),
+        Err(hzn_mcap::Error::Stopped { .. }) => Err(Halt::Stopped),
+        Err(e) => Err(Halt::Failed(e.to_string())),
     }
 }
 
-impl Drop for Export {
-    fn drop(&mut self) {
-        self.stop();
-    }
-}
-
-struct Film {
-    config: Arc<Config>,
-    flight: bool,
-    layers: Vec<Layer>,
-    fps: f64,
+/// A video of all frames, each with what is drawn over it.
+pub struct Film {
+    /// The frames.
+    pub sequence: Sequence,
+    /// What they are processed with.
+    pub config: Arc<Config>,
+    /// As on the flight computer.
+    pub flight: bool,
+    /// What is drawn.
+    pub layers: Vec<Layer>,
+    /// Frames a second.
+    pub fps: f64,
 }
 
 impl Film {
-    fn write(
-        &self,
-        entries: &[Entry],
-        mut walk: Walk,
-        path: &Path,
-        stop: &AtomicBool,
-        done: &AtomicUsize,
-        wake: &Wake,
-    ) -> Result<(), String> {
-        let ending = path.extension().map_or("mp4".into(), |e| e.to_string_lossy().into_owned());
-        let part = path.with_extension(format!("part.{ending}"));
+    /// Writes it, by ffmpeg.
+    ///
+    /// # Errors
+    /// There is no ffmpeg, it cannot write this, or the sequence cannot be read to its end.
+    pub fn write(self, path: &Path, progress: &Progress) -> Result<Done, Halt> {
+        whole::replace(path, |part| self.shoot(part, path, progress))?;
+        Ok(Done::Written(path.to_owned()))
+    }
+
+    fn shoot(self, part: &Path, path: &Path, progress: &Progress) -> Result<(), Halt> {
         let mut sensor = AnySensor::new(&self.config, self.flight).map_err(|e| e.to_string())?;
         let size = (u32::from(self.config.camera.width), u32::from(self.config.camera.height));
-        let mut pipe = start_ffmpeg(&part, size, self.fps)?;
-        let mut written = || -> Result<(), String> {
-            for (index, entry) in entries.iter().enumerate() {
-                if stop.load(Ordering::Relaxed) {
-                    return Err("The video was stopped; nothing is left of it.".into());
-                }
-                let item =
-                    walk.next().ok_or("the sequence ends before its last frame")?.map_err(|e| format!("{e:#}"))?;
-                // A picture that cannot be read, or has another size, is a black frame: times stay right.
-                let image = match item.payload.decode(Some(size)) {
-                    Ok((picture, _)) => {
-                        let subject = Subject {
-                            index,
-                            name: &entry.name,
-                            time_s: entry.time_s,
-                            data: entry.data.as_ref(),
-                            picture: &picture,
-                        };
-                        let outcome = sight::look(subject, &self.config, &mut sensor, false);
-                        draw(&picture, Some(&outcome), &self.layers)
-                    }
-                    Err(_) => image::RgbImage::new(size.0, size.1),
-                };
-                let input = pipe.stdin.as_mut().ok_or("ffmpeg takes no input")?;
-                if input.write_all(image.as_raw()).is_err() {
-                    // Why, it says itself.
-                    break;
-                }
-                done.fetch_add(1, Ordering::Relaxed);
-                wake();
-            }
-            Ok(())
-        };
-        let fed = written();
+        let mut pipe = start_ffmpeg(part, size, self.fps)?;
+        let fed = self.feed(&mut pipe, &mut sensor, size, progress);
         drop(pipe.stdin.take());
         if fed.is_err() {
             let _ = pipe.kill();
         }
         let end = pipe.wait_with_output().map_err(|e| e.to_string());
-        let result = fed.and_then(|()| {
-            let end = end?;
-            if end.status.success() {
-                return std::fs::rename(&part, path).map_err(|e| hzn_cli::output::advice(path, &e));
+        fed?;
+        let end = end?;
+        let why = String::from_utf8_lossy(&end.stderr);
+        match why.trim().lines().last() {
+            _ if end.status.success() => Ok(()),
+            Some(_) if why.contains("No space left") => {
+                let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+                Err(Halt::Failed(hzn_cli::output::advice(path, &full)))
             }
-            let why = String::from_utf8_lossy(&end.stderr);
-            Err(format!("ffmpeg: {}", why.trim().lines().last().unwrap_or("ended with an error")))
-        });
-        if result.is_err() {
-            let _ = std::fs::remove_file(&part);
+            last => Err(Halt::Failed(format!("{}: ffmpeg: {}", path.display(), last.unwrap_or("ended with an error")))),
         }
-        result
+    }
+
+    fn feed(self, pipe: &mut Child, sensor: &mut AnySensor, size: (u32, u32), progress: &Progress) -> Result<(), Halt> {
+        let known: Vec<_> = self.sequence.entries.iter().map(|e| e.data.clone()).collect();
+        let total = known.len() as u64;
+        let mut walk = Walk::new(self.sequence)?;
+        for (index, data) in known.iter().enumerate() {
+            progress.at(index as u64, total)?;
+            let item = walk.next().ok_or_else(|| "the sequence ends before its last frame".to_owned())?;
+            let item = item.map_err(|e| format!("{e:#}"))?;
+            // A picture that cannot be read, or has another size, is a black frame: times stay right.
+            let image = match item.payload.decode(Some(size)) {
+                Ok((picture, _)) => {
+                    let (name, time_s) = (&*item.name, item.time_s.unwrap_or(0.0));
+                    let subject = Subject { index, name, time_s, data: data.as_ref(), picture: &picture };
+                    let outcome = sight::look(subject, &self.config, sensor, false);
+                    draw(&picture, Some(&outcome), &self.layers)
+                }
+                Err(_) => image::RgbImage::new(size.0, size.1),
+            };
+            let input = pipe.stdin.as_mut().ok_or_else(|| "ffmpeg takes no input".to_owned())?;
+            if input.write_all(image.as_raw()).is_err() {
+                // Why, it says itself.
+                break;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -2,13 +2,16 @@
 
 pub mod engine;
 pub mod export;
+pub mod job;
 pub mod open;
 pub mod paint;
 pub mod sight;
 pub mod store;
 pub mod sweep;
+mod walk;
 
 pub use engine::{Ask, Engine, Setup};
+pub use job::Job;
 pub use sight::{Answer, Sight};
 
 use std::sync::Arc;

@@ -1,0 +1,67 @@
+//! Files that are written whole or not at all.
+
+use std::path::{Path, PathBuf};
+
+/// Lets `write` fill a file beside `path`, which then takes its name. When that fails, nothing is left and what had the
+/// name before is as it was. The ending stays: there are programs that choose a format by it.
+///
+/// # Errors
+/// Those of `write`, or what the disk says and what to do.
+pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
+    let part = part(path);
+    let written = write(&part)
+        .and_then(|()| std::fs::rename(&part, path).map_err(|e| E::from(hzn_cli::output::advice(path, &e))));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&part);
+    }
+    written
+}
+
+/// As [`replace`], with what is at hand already.
+///
+/// # Errors
+/// What the disk says and what to do.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    replace(path, |part| std::fs::write(part, bytes).map_err(|e| hzn_cli::output::advice(path, &e)))
+}
+
+/// `NAME.part.ENDING`.
+fn part(path: &Path) -> PathBuf {
+    match path.extension() {
+        Some(ending) => path.with_extension(format!("part.{}", ending.to_string_lossy())),
+        None => path.with_extension("part"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fails_leaves_what_was() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        write(&path, b"first").unwrap();
+        let half = |part: &Path| {
+            std::fs::write(part, b"ha").unwrap();
+            Err("the pen broke".to_owned())
+        };
+        assert_eq!(replace(&path, half).unwrap_err(), "the pen broke");
+        assert_eq!(std::fs::read(&path).unwrap(), b"first");
+        write(&path, b"second").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"second");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+        let nowhere = write(&dir.path().join("no").join("a.png"), b"").unwrap_err();
+        assert!(nowhere.contains("the folder does not exist"), "{nowhere}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_full_disk_is_said() {
+        let dir = tempfile::tempdir().unwrap();
+        std::os::unix::fs::symlink("/dev/full", dir.path().join("a.part.png")).unwrap();
+        let full = write(&dir.path().join("a.png"), b"picture").unwrap_err();
+        assert!(full.contains("a.png: the disk is full: free some space"), "{full}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,84 @@
+//! The mask's tool: corners by mouse.
+
+use egui::{Align2, Painter, PointerButton, Pos2, Response, Shape, Stroke, Ui, vec2};
+
+use super::REACH;
+use super::read_out::label;
+use super::stage::Stage;
+use crate::model::mask::MaskEdit;
+use crate::ui::theme;
+use crate::ui::viewer::Viewer;
+
+/// The mask's tool; true while it holds a corner.
+pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, stage: &Stage<'_>) -> bool {
+    let (Some(mut tool), Some(session)) = (viewer.mask.take(), viewer.session.as_mut()) else { return false };
+    let polygons = session.polygons();
+    let reach = REACH / stage.scale();
+    let at = response.interact_pointer_pos().or(response.hover_pos()).and_then(|p| stage.picture(p));
+    let mut new = None;
+    if let Some(p) = at {
+        if response.drag_started_by(PointerButton::Primary) {
+            let from = ui.input(|i| i.pointer.press_origin()).and_then(|p| stage.picture(p)).unwrap_or(p);
+            tool.grab(&polygons, from, reach);
+        }
+        if response.dragged_by(PointerButton::Primary) {
+            new = tool.drag(&polygons, p);
+        }
+        if response.clicked_by(PointerButton::Primary) {
+            new = tool.click(&polygons, p, reach);
+        }
+        if response.clicked_by(PointerButton::Secondary) && tool.open.is_empty() {
+            new = tool.remove(&polygons, p, reach);
+        }
+    }
+    let held = tool.holds();
+    if response.drag_stopped() {
+        tool.release();
+        session.settle();
+    }
+    let (enter, back, escape) = ui.input(|i| {
+        (i.key_pressed(egui::Key::Enter), i.key_pressed(egui::Key::Backspace), i.key_pressed(egui::Key::Escape))
+    });
+    if enter {
+        new = new.or_else(|| tool.close(&polygons));
+    }
+    let leave = escape && tool.open.is_empty();
+    if back {
+        tool.back();
+    }
+    if escape {
+        tool.open.clear();
+    }
+    if let Some(new) = new {
+        session.set_polygons(&new);
+        if !held {
+            session.settle();
+        }
+    }
+    viewer.mask = (!leave).then_some(tool);
+    held
+}
+
+pub(super) fn draw(tool: &MaskEdit, viewer: &Viewer, painter: &Painter, stage: &Stage<'_>, ui: &Ui) {
+    let stroke = Stroke::new(2.0, theme::TRUTH);
+    for corner in viewer.session.iter().flat_map(|s| s.polygons()).flatten() {
+        painter.extend(stage.screen(corner).map(|p| Shape::circle_filled(p, 4.5, theme::TRUTH)));
+    }
+    let mut line: Vec<Pos2> = tool.open.iter().filter_map(|p| stage.screen(*p)).collect();
+    painter.extend(line.iter().map(|p| Shape::circle_filled(*p, 4.5, theme::TRUTH)));
+    if !line.is_empty() {
+        line.extend(ui.ctx().pointer_hover_pos());
+    }
+    painter.add(Shape::line(line, stroke));
+    let text = "Mask: click corners, close on the first one or with Enter. Drag a corner to move it; right-click removes a corner or an area. Backspace: one corner back. Esc: done.";
+    let rect = painter.clip_rect();
+    label(painter, rect.center_top() + vec2(0.0, 10.0), Align2::CENTER_TOP, text);
+}
+
+pub(in crate::ui) fn toggle(viewer: &mut Viewer) {
+    viewer.mask = match viewer.mask.take() {
+        Some(_) => None,
+        None if viewer.session.is_some() => Some(MaskEdit::default()),
+        None => None,
+    };
+}

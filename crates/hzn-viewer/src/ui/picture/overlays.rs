@@ -1,0 +1,231 @@
+//! What is drawn over the picture.
+
+use egui::{Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+
+use super::stage::Stage;
+use crate::model::Plane;
+use crate::model::settings::Layer;
+use crate::model::view::Point;
+use crate::ui::theme;
+use crate::ui::viewer::Viewer;
+use crate::work::Sight;
+use crate::work::sight::{Answer, Outcome};
+
+/// Everything that is switched on.
+pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &Sight, outcome: &Outcome, stage: &Stage<'_>) {
+    let on = |layer| viewer.settings.shows(layer);
+    if on(Layer::Mask) {
+        for polygon in &outcome.config.mask.polygons_px {
+            let outline: Vec<Pos2> = polygon.iter().filter_map(|p| stage.screen(*p)).collect();
+            hatch(painter, &outline);
+        }
+    }
+    if on(Layer::Circle)
+        && let Some((centre, a, b)) = stage.camera.and_then(|c| c.image_circle_px())
+        && stage.plane == Plane::Camera
+    {
+        let at = |i: usize| {
+            let (s, c) = (i as f64 * std::f64::consts::TAU / 256.0).sin_cos();
+            stage.screen([centre.u + a * c, centre.v + b * s])
+        };
+        painter.add(Shape::dashed_line(
+            &(0..=256).filter_map(at).collect::<Vec<_>>(),
+            Stroke::new(1.5, theme::CIRCLE),
+            7.0,
+            5.0,
+        ));
+    }
+    for answer in &outcome.bodies {
+        body(viewer, painter, answer, stage);
+    }
+    if on(Layer::Truth) {
+        for truth in viewer.truth.get(&sight.name).into_iter().flatten() {
+            let (Some(camera), Some(axis)) = (stage.camera, truth.axis()) else { continue };
+            let limb = hzn_cli::overlay::limb::lines(axis.xyz(), truth.half_angle_deg.to_radians(), camera);
+            lines(painter, stage, &limb, Stroke::new(1.5, theme::TRUTH));
+            if let Some(p) = camera.project(&axis).and_then(|p| stage.screen([p.u, p.v])) {
+                cross(painter, p, 8.0, Stroke::new(1.5, theme::TRUTH));
+            }
+        }
+    }
+    if on(Layer::Sky) {
+        for (name, at) in sky(viewer, sight, stage) {
+            painter.circle_stroke(at, 11.0, Stroke::new(1.5, theme::SKY));
+            painter.text(at + vec2(14.0, 0.0), Align2::LEFT_CENTER, name, FontId::proportional(12.0), theme::SKY);
+        }
+    }
+}
+
+/// Where Sun and Moon should be: from the time, the position and the attitude, or from frames.csv or the truth.
+fn sky(viewer: &Viewer, sight: &Sight, stage: &Stage<'_>) -> Vec<(&'static str, Pos2)> {
+    let Some(camera) = stage.camera else { return Vec::new() };
+    let mut out = Vec::new();
+    let mut add = |name, direction: Option<[f64; 3]>| {
+        let found = direction.and_then(hzn_core::frames::UnitVec3::try_new).and_then(|d| camera.project(&d));
+        if let Some(at) = found.and_then(|p| stage.screen([p.u, p.v])) {
+            out.push((name, at));
+        }
+    };
+    let truth = viewer.truth.get(&sight.name).and_then(|t| t.first());
+    let given = sight.data.as_ref();
+    let sun = given.and_then(|d| d.sun_camera).or_else(|| Some([truth?.sun_x?, truth?.sun_y?, truth?.sun_z?]));
+    add("Sun", sun.or_else(|| from_ephemeris(given?, hzn_sim::ephemeris::sun)));
+    let moon = truth.and_then(|t| Some([t.moon_x?, t.moon_y?, t.moon_z?]));
+    add("Moon", moon.or_else(|| from_ephemeris(given?, hzn_sim::ephemeris::moon)));
+    out
+}
+
+fn from_ephemeris(data: &hzn_calib::FrameData, place: impl Fn(f64) -> hzn_sim::ephemeris::Place) -> Option<[f64; 3]> {
+    use hzn_core::frames::{Cam, Ecef, Rotation, UnitVec3};
+    let turn = Rotation::<Cam, Ecef, f64>::assume_from_quaternion(data.camera_to_ecef_wxyz?)?.inverse();
+    let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3));
+    Some(turn.apply(&UnitVec3::try_new(seen.direction)?).xyz())
+}
+
+fn body(viewer: &Viewer, painter: &Painter, answer: &Answer, stage: &Stage<'_>) {
+    let on = |layer| viewer.settings.shows(layer);
+    let dot = (stage.scale() as f32 * 0.5).clamp(0.9, 5.0);
+    if on(Layer::Edges) {
+        for edge in &answer.edges {
+            let pointed = viewer.pointed == Some(edge.candidate);
+            let colour = theme::edge(edge.candidate);
+            let radius = if pointed { dot + 1.6 } else { dot };
+            let points = edge.border.iter().map(|p| [f64::from(p.x), f64::from(p.y)]);
+            dots(painter, points.filter_map(|p| stage.screen(p)), radius, colour);
+        }
+    }
+    if on(Layer::Limb) {
+        // A dark line below keeps it visible on clouds.
+        lines(painter, stage, &answer.limb, Stroke::new(6.0, Color32::from_black_alpha(120)));
+        lines(painter, stage, &answer.limb, Stroke::new(3.4, theme::LIMB));
+    }
+    let points = |kept: bool| {
+        answer.residuals.iter().filter(move |r| (r.weight > 0.0) == kept).filter_map(|r| stage.screen(r.at))
+    };
+    if on(Layer::Rejected) {
+        dots(painter, points(false), dot + 0.6, theme::REJECTED);
+    }
+    if on(Layer::Inliers) {
+        // Narrower than the limb's line, so that both are seen.
+        dots(painter, points(true), dot, theme::INLIER);
+    }
+    let inside = |p: &Point| (0..2).all(|i| (-0.5..stage.size[i] - 0.5).contains(&p[i]));
+    if on(Layer::Axis) && answer.axis.filter(inside).is_none() {
+        arrow(painter, stage, answer);
+    }
+    if on(Layer::Axis)
+        && let Some(at) = answer.axis.filter(inside).and_then(|p| stage.screen(p))
+    {
+        cross(painter, at, 13.0, Stroke::new(4.0, Color32::from_black_alpha(140)));
+        cross(painter, at, 12.0, Stroke::new(2.0, theme::AXIS));
+        let outline: Vec<Pos2> = answer.ellipse.iter().filter_map(|p| stage.screen(*p)).collect();
+        if outline.len() > 2 {
+            painter.add(Shape::closed_line(outline, Stroke::new(1.5, theme::AXIS)));
+        }
+    }
+}
+
+/// An axis that is not in the picture: an arrow at its border, towards it.
+fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &Answer) {
+    let (Some(s), Some(camera)) = (answer.solution(), stage.camera) else { return };
+    let [x, y, _] = s.axis.xyz();
+    let length = x.hypot(y);
+    if length < 1e-9 {
+        return;
+    }
+    let way = vec2((x / length) as f32, (y / length) as f32);
+    let centre = camera.principal_point();
+    let from = stage.place([centre.u, centre.v]);
+    let frame = painter.clip_rect().shrink(16.0).intersect(Rect::from_min_max(
+        stage.place([-0.5, -0.5]),
+        stage.place([stage.size[0] - 0.5, stage.size[1] - 0.5]),
+    ));
+    // As far as the frame lets it go.
+    let far = |at: f32, way: f32, low: f32, high: f32| if way > 0.0 { (high - at) / way } else { (low - at) / way };
+    let reach = [far(from.x, way.x, frame.left(), frame.right()), far(from.y, way.y, frame.top(), frame.bottom())];
+    let reach = reach.into_iter().filter(|r| r.is_finite()).fold(f32::INFINITY, f32::min);
+    if !(reach > 0.0 && reach.is_finite()) {
+        return;
+    }
+    let tip = from + way * (reach - 6.0);
+    let (back, side) = (tip - way * 22.0, vec2(-way.y, way.x) * 5.5);
+    let head = vec![tip, tip - way * 10.0 + side, tip - way * 10.0 - side];
+    painter.line_segment([back, tip - way * 8.0], Stroke::new(5.0, Color32::from_black_alpha(150)));
+    painter.line_segment([back, tip - way * 8.0], Stroke::new(2.5, theme::AXIS));
+    painter.add(Shape::convex_polygon(head, theme::AXIS, Stroke::new(1.0, Color32::from_black_alpha(150))));
+    let degrees = s.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
+    let text = format!("axis, {degrees:.1}° off the optical axis");
+    let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), theme::AXIS);
+    // Behind the arrow, on the side that it comes from.
+    let align = match way {
+        w if w.x > 0.4 => Align2::RIGHT_CENTER,
+        w if w.x < -0.4 => Align2::LEFT_CENTER,
+        w if w.y > 0.0 => Align2::CENTER_BOTTOM,
+        _ => Align2::CENTER_TOP,
+    };
+    let rect = align.anchor_size(back - way * 8.0, galley.size() + vec2(10.0, 4.0));
+    let inward = |low: f32, high: f32, min: f32, max: f32| (min - low).max(0.0) - (high - max).max(0.0);
+    let rect = rect.translate(vec2(
+        inward(rect.left(), rect.right(), frame.left(), frame.right()),
+        inward(rect.top(), rect.bottom(), frame.top(), frame.bottom()),
+    ));
+    painter.rect_filled(rect, 4, Color32::from_black_alpha(170));
+    painter.galley(rect.min + vec2(5.0, 2.0), galley, theme::AXIS);
+}
+
+fn cross(painter: &Painter, at: Pos2, arm: f32, stroke: Stroke) {
+    painter.line_segment([at - vec2(arm, 0.0), at + vec2(arm, 0.0)], stroke);
+    painter.line_segment([at - vec2(0.0, arm), at + vec2(0.0, arm)], stroke);
+}
+
+fn lines(painter: &Painter, stage: &Stage<'_>, lines: &[Vec<Point>], stroke: Stroke) {
+    for line in lines {
+        // A point that the plane does not show ends the line.
+        for part in line.split(|p| stage.screen(*p).is_none()) {
+            painter.add(Shape::line(part.iter().filter_map(|p| stage.screen(*p)).collect(), stroke));
+        }
+    }
+}
+
+/// Thousands of points as one mesh of squares.
+fn dots(painter: &Painter, points: impl Iterator<Item = Pos2>, radius: f32, colour: Color32) {
+    let clip = painter.clip_rect().expand(radius);
+    let mut mesh = Mesh::default();
+    for p in points.filter(|p| clip.contains(*p)) {
+        mesh.add_colored_rect(Rect::from_center_size(p, Vec2::splat(2.0 * radius)), colour);
+    }
+    painter.add(mesh);
+}
+
+/// A masked area: its outline, and lines across it.
+fn hatch(painter: &Painter, outline: &[Pos2]) {
+    if outline.len() < 3 {
+        return;
+    }
+    let stroke = Stroke::new(1.0, theme::MASK);
+    let bounds = Rect::from_points(outline).intersect(painter.clip_rect());
+    let polygon: Vec<Point> = outline.iter().map(|p| [p.x.into(), p.y.into()]).collect();
+    let mut y = (bounds.top() - bounds.width()).floor() - (bounds.top() - bounds.width()).floor() % 9.0;
+    while y < bounds.bottom() {
+        // Along a falling diagonal, the parts that are inside.
+        let steps = (bounds.width() / 2.0).max(1.0) as usize;
+        let mut from: Option<Pos2> = None;
+        for i in 0..=steps {
+            let p = pos2(bounds.left() + 2.0 * i as f32, y + 2.0 * i as f32);
+            let inside = bounds.contains(p) && crate::model::mask::inside(&polygon, [p.x.into(), p.y.into()]);
+            match (inside, from) {
+                (true, None) => from = Some(p),
+                (false, Some(start)) => {
+                    painter.line_segment([start, p], stroke);
+                    from = None;
+                }
+                (true, Some(start)) if i == steps => {
+                    painter.line_segment([start, p], stroke);
+                }
+                _ => {}
+            }
+        }
+        y += 9.0;
+    }
+    painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.5, theme::MASK)));
+}

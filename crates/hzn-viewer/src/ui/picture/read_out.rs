@@ -1,0 +1,83 @@
+//! Numbers and words over the picture: what is under the pointer, values of single pixels, what is wrong.
+
+use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, vec2};
+use hzn_core::pixel::ImagePoint;
+
+use super::stage::Stage;
+use crate::model::{Plane, rows};
+use crate::work::paint;
+use crate::work::sight::{Answer, Outcome, Sight};
+
+/// Screen points a picture pixel from which single pixels show their values.
+const VALUES_FROM: f64 = 34.0;
+
+/// Values of single pixels, when they are large enough.
+pub(super) fn values(painter: &Painter, sight: &Sight, stage: &Stage<'_>, rect: Rect) {
+    let (Ok(picture), Plane::Camera) = (&sight.picture, &stage.plane) else { return };
+    if stage.scale() < VALUES_FROM {
+        return;
+    }
+    let channel = sight.answers.first().map_or(Default::default(), |o| o.config.input.channel);
+    let (Some(a), Some(b)) = (stage.picture(rect.min), stage.picture(rect.max)) else { return };
+    for y in (a[1].round().max(0.0) as u16)..=(b[1].round().clamp(0.0, stage.size[1] - 1.0) as u16) {
+        for x in (a[0].round().max(0.0) as u16)..=(b[0].round().clamp(0.0, stage.size[0] - 1.0) as u16) {
+            let Some((value, _)) = paint::read(picture, channel, x, y) else { continue };
+            let bright = f64::from(value) > 0.5 * f64::from((1u32 << picture.layout.bits) - 1);
+            let colour = if bright { Color32::from_black_alpha(200) } else { Color32::from_white_alpha(170) };
+            let at = stage.place([f64::from(x), f64::from(y)]);
+            painter.text(at, Align2::CENTER_CENTER, value.to_string(), FontId::monospace(11.0), colour);
+        }
+    }
+}
+
+/// What is under the pointer.
+pub(super) fn under_pointer(
+    sight: &Sight,
+    outcome: Option<&Outcome>,
+    body: usize,
+    stage: &Stage<'_>,
+    at: Pos2,
+) -> Option<String> {
+    let p = stage.picture(at)?;
+    let (x, y) = (p[0].round(), p[1].round());
+    if !(0.0..stage.size[0]).contains(&x) || !(0.0..stage.size[1]).contains(&y) {
+        return None;
+    }
+    let picture = sight.picture.as_ref().ok()?;
+    let channel = outcome.map_or(Default::default(), |o| o.config.input.channel);
+    let (value, samples) = paint::read(picture, channel, x as u16, y as u16)?;
+    let mut text = format!("({x:.0}, {y:.0})   {value}");
+    if samples.len() > 1 {
+        let each: Vec<String> = samples.iter().map(u16::to_string).collect();
+        text += &format!(" of ({})", each.join(", "));
+    }
+    let ray = stage.camera.and_then(|c| c.unproject(ImagePoint { u: p[0], v: p[1] }));
+    let Some([rx, ry, rz]) = ray.map(|r| r.xyz()) else {
+        return Some(text + if stage.camera.is_some() { "   outside of the image circle" } else { "" });
+    };
+    text += &format!("   ray ({rx:.4}, {ry:.4}, {rz:.4})   {:.3}° off axis", rz.clamp(-1.0, 1.0).acos().to_degrees());
+    if let Some(s) = outcome.and_then(|o| o.bodies.get(body)).and_then(Answer::solution) {
+        let angle = rows::angle_deg([rx, ry, rz], s.axis.xyz());
+        let beyond = angle - s.fused_half_angle_rad.to_degrees();
+        let side = if beyond > 0.0 { "outside of" } else { "inside" };
+        text += &format!("   {angle:.3}° from the body's axis, {:.3}° {side} the limb", beyond.abs());
+    }
+    Some(text)
+}
+
+/// A line of text that can be read on any picture.
+pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
+    let width = painter.clip_rect().width() - 30.0;
+    let galley = painter.layout(text.to_owned(), FontId::proportional(12.5), Color32::from_rgb(236, 238, 242), width);
+    let rect = align.anchor_size(at, galley.size() + vec2(14.0, 8.0));
+    painter.rect_filled(rect, 5, Color32::from_black_alpha(190));
+    painter.galley(rect.min + vec2(7.0, 4.0), galley, Color32::WHITE);
+}
+
+/// Something that is wrong with what is shown, across its middle.
+pub(super) fn notice(painter: &Painter, rect: Rect, text: &str, colour: Color32) {
+    let galley = painter.layout(text.to_owned(), FontId::proportional(14.0), colour, (rect.width() - 60.0).min(640.0));
+    let place = Align2::CENTER_CENTER.anchor_size(rect.center(), galley.size() + vec2(24.0, 16.0));
+    painter.rect_filled(place, 6, Color32::from_black_alpha(210));
+    painter.galley(place.min + vec2(12.0, 8.0), galley, colour);
+}

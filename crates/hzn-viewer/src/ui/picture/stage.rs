@@ -1,0 +1,49 @@
+//! Where a picture lies on the screen, and in which plane.
+
+use egui::{Pos2, Rect, pos2};
+use hzn_core::camera::Camera;
+
+use crate::model::view::{Area, Point};
+use crate::model::{Plane, View};
+
+/// Where a picture of this size lies, and in which plane.
+pub(super) struct Stage<'a> {
+    pub(super) view: View,
+    pub(super) area: Area,
+    pub(super) size: Point,
+    pub(super) plane: Plane,
+    pub(super) camera: Option<&'a Camera<f64>>,
+}
+
+impl Stage<'_> {
+    pub(super) fn screen(&self, p: Point) -> Option<Pos2> {
+        let p = match (&self.plane, self.camera) {
+            (Plane::Camera, _) | (_, None) => p,
+            (plane, Some(camera)) => plane.show(camera, p)?,
+        };
+        Some(self.place(p))
+    }
+    pub(super) fn place(&self, p: Point) -> Pos2 {
+        let [x, y] = self.view.to_screen(self.area, self.size, p);
+        pos2(x as f32, y as f32)
+    }
+    /// The point of the camera's picture under a point of the screen.
+    pub(super) fn picture(&self, at: Pos2) -> Option<Point> {
+        let p = self.view.to_picture(self.area, self.size, [at.x.into(), at.y.into()]);
+        match (&self.plane, self.camera) {
+            (Plane::Camera, _) | (_, None) => Some(p),
+            (plane, Some(camera)) => plane.of(camera, p),
+        }
+    }
+    pub(super) fn scale(&self) -> f64 {
+        self.view.scale(self.area, self.size)
+    }
+}
+
+/// A part of the screen.
+pub(super) fn area(rect: Rect) -> Area {
+    Area {
+        min: [rect.min.x.into(), rect.min.y.into()],
+        size: [rect.width().max(1.0).into(), rect.height().max(1.0).into()],
+    }
+}

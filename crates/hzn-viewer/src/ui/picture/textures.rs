@@ -1,0 +1,49 @@
+//! Pictures on the graphics card.
+
+use std::sync::Arc;
+
+use egui::{ColorImage, TextureFilter, TextureHandle, TextureOptions};
+
+use crate::work::Sight;
+use crate::work::sight::Shown;
+
+/// Pictures on the graphics card.
+#[derive(Default)]
+pub(in crate::ui) struct Textures {
+    pub(super) shown: Option<(Arc<Shown>, TextureHandle)>,
+    pub(super) touched: Option<(Arc<ColorImage>, TextureHandle)>,
+}
+
+impl Textures {
+    /// Takes what is new in the sight.
+    pub(in crate::ui) fn take(&mut self, sight: Option<&Sight>, ctx: &egui::Context) {
+        // Single pixels stay squares, a large picture is smoothed.
+        let smooth = TextureOptions {
+            magnification: TextureFilter::Nearest,
+            minification: TextureFilter::Linear,
+            mipmap_mode: Some(TextureFilter::Linear),
+            ..TextureOptions::LINEAR
+        };
+        match sight.and_then(|s| s.image.as_ref()) {
+            None => self.shown = None,
+            Some(new) => match &mut self.shown {
+                Some((old, _)) if Arc::ptr_eq(old, new) => {}
+                Some((old, texture)) => {
+                    texture.set(Arc::clone(&new.image), smooth);
+                    *old = Arc::clone(new);
+                }
+                none => *none = Some((Arc::clone(new), ctx.load_texture("picture", Arc::clone(&new.image), smooth))),
+            },
+        }
+        match sight.and_then(|s| s.answers.first()?.touched.as_ref()) {
+            None => self.touched = None,
+            Some(new) => match &mut self.touched {
+                Some((old, _)) if Arc::ptr_eq(old, new) => {}
+                slot => {
+                    let options = TextureOptions { mipmap_mode: None, ..smooth };
+                    *slot = Some((Arc::clone(new), ctx.load_texture("touched", Arc::clone(new), options)));
+                }
+            },
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Work on files and on the whole sequence, beside the window.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Viewer;
+use crate::model::settings::Layer;
+use crate::work::export::{self, Film};
+use crate::work::job::{Done, Halt, Job, Progress};
+use crate::work::sweep::{self, Sweep};
+
+impl Viewer {
+    /// All frames, for the plots or into a file.
+    pub(in crate::ui) fn process_all(&mut self, output: Option<PathBuf>) {
+        let Some(session) = &self.session else {
+            self.say("Open a sensor.toml first.");
+            return;
+        };
+        let Some(config) = session.config().map(Arc::clone) else { return };
+        let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+        if let (Some(output), Some(open)) = (&output, &self.sequence.recording)
+            && same(output, open)
+        {
+            self.say_bad(format!("{}: is the recording that is open; write into another file", output.display()));
+            return;
+        }
+        let task = sweep::Task {
+            sequence: self.sequence.clone(),
+            config,
+            changes: session.changes(),
+            sensor_toml: session.sheet().text().to_owned(),
+            flight: self.flight,
+            output,
+        };
+        self.sweep = Some(Sweep::start(task, Arc::clone(&self.wake)));
+    }
+
+    /// The picture with what is drawn over it.
+    pub(in crate::ui) fn export_picture(&mut self, path: PathBuf) {
+        let Some(sight) = self.sight.clone() else { return };
+        let layers = self.layers_drawn();
+        self.begin("Saving the picture", move |_| export::picture(&sight, &layers, &path));
+    }
+
+    /// The newest results of all frames.
+    pub(in crate::ui) fn export_table(&mut self, path: PathBuf) {
+        let rows: Vec<_> = self.rows.all().cloned().collect();
+        self.begin("Saving results", move |progress| export::table(&rows, &path, progress));
+    }
+
+    /// Every frame with everything drawn over it, as a video.
+    pub(in crate::ui) fn export_video(&mut self, path: PathBuf) {
+        let Some(config) = self.session.as_ref().and_then(|s| s.config().map(Arc::clone)) else { return };
+        let fps = self.sequence.duration_s(0).filter(|d| *d > 0.0).map_or(25.0, |d| (1.0 / d).clamp(1.0, 60.0));
+        let (sequence, layers, flight) = (self.sequence.clone(), self.layers_drawn(), self.flight);
+        let film = Film { sequence, config, flight, layers, fps };
+        self.begin("Saving the video", move |progress| film.write(&path, progress));
+    }
+
+    /// Recovers a recording that was cut off, and then opens what came of it.
+    pub(in crate::ui) fn recover(&mut self, path: PathBuf) {
+        self.begin("Recovering the recording", move |progress| export::recover(&path, progress));
+    }
+
+    fn layers_drawn(&self) -> Vec<Layer> {
+        if self.layers_hidden { Vec::new() } else { self.settings.layers.clone() }
+    }
+
+    fn begin(&mut self, name: &'static str, work: impl FnOnce(&Progress) -> Result<Done, Halt> + Send + 'static) {
+        self.jobs.push(Job::start(name, &self.wake, work));
+    }
+
+    /// What has come of the work on files.
+    pub(super) fn ended(&mut self) {
+        let mut ends = Vec::new();
+        self.jobs.retain(|job| job.end().map(|end| ends.push((job.name, end))).is_none());
+        for (name, end) in ends {
+            match end {
+                Ok(Done::Written(path)) => self.say(format!("Written: {}", path.display())),
+                Ok(Done::Recovered { path, frames }) => {
+                    self.open_paths(vec![path.clone()]);
+                    self.say(format!("{frames} frames recovered into {}", path.display()));
+                }
+                Err(Halt::Stopped) => self.say(format!("{name} was stopped; no file was written.")),
+                Err(Halt::Failed(why)) => self.say_bad(why),
+            }
+        }
+    }
+}

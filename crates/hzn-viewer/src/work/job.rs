@@ -1,0 +1,147 @@
+//! Work on a file that takes a while: on a thread of its own, with progress and a way to stop.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, bounded};
+
+use super::Wake;
+
+/// What came of it.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Done {
+    /// A file was written.
+    Written(PathBuf),
+    /// A recording was recovered.
+    Recovered {
+        /// The whole one.
+        path: PathBuf,
+        /// Frames in it.
+        frames: u64,
+    },
+}
+
+/// Why nothing came of it. In either case no file is left.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Halt {
+    /// It was stopped.
+    Stopped,
+    /// It could not be done.
+    Failed(String),
+}
+
+impl From<String> for Halt {
+    fn from(why: String) -> Self {
+        Self::Failed(why)
+    }
+}
+
+/// How far the work is, and whether it is still wanted.
+#[derive(Debug, Default)]
+pub struct Progress {
+    stop: AtomicBool,
+    done: AtomicU64,
+    total: AtomicU64,
+}
+
+impl Progress {
+    /// `done` of `total` parts are done.
+    ///
+    /// # Errors
+    /// The work is not wanted any more.
+    pub fn at(&self, done: u64, total: u64) -> Result<(), Halt> {
+        self.done.store(done, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
+        if self.stop.load(Ordering::Relaxed) { Err(Halt::Stopped) } else { Ok(()) }
+    }
+}
+
+/// Work under way. Dropped, it stops.
+pub struct Job {
+    /// What is done.
+    pub name: &'static str,
+    progress: Arc<Progress>,
+    end: Receiver<Result<Done, Halt>>,
+    began: Instant,
+}
+
+impl Job {
+    /// Begins; `wake` is called at the end.
+    pub fn start(
+        name: &'static str,
+        wake: &Wake,
+        work: impl FnOnce(&Progress) -> Result<Done, Halt> + Send + 'static,
+    ) -> Self {
+        let progress = Arc::new(Progress::default());
+        let (send, end) = bounded(1);
+        let (shared, wake) = (Arc::clone(&progress), Arc::clone(wake));
+        std::thread::spawn(move || {
+            let _ = send.send(work(&shared));
+            wake();
+        });
+        Self { name, progress, end, began: Instant::now() }
+    }
+    /// The part that is done, 0 to 1.
+    pub fn fraction(&self) -> f32 {
+        let [done, total] = [&self.progress.done, &self.progress.total].map(|n| n.load(Ordering::Relaxed));
+        done as f32 / total.max(1) as f32
+    }
+    /// Time since it began.
+    pub fn age(&self) -> Duration {
+        self.began.elapsed()
+    }
+    /// Asks it to stop.
+    pub fn stop(&self) {
+        self.progress.stop.store(true, Ordering::Relaxed);
+    }
+    /// Is it asked to stop?
+    pub fn is_stopping(&self) -> bool {
+        self.progress.stop.load(Ordering::Relaxed)
+    }
+    /// How it ended, once it has.
+    pub fn end(&self) -> Option<Result<Done, Halt>> {
+        self.end.try_recv().ok()
+    }
+}
+
+impl Drop for Job {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn count(upto: u64) -> impl FnOnce(&Progress) -> Result<Done, Halt> {
+        move |progress| {
+            for i in 0..upto {
+                progress.at(i, upto)?;
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            Ok(Done::Written("x".into()))
+        }
+    }
+
+    fn wait(job: &Job) -> Result<Done, Halt> {
+        job.end.recv_timeout(Duration::from_secs(30)).unwrap()
+    }
+
+    #[test]
+    fn it_tells_how_far_it_is_and_ends() {
+        let job = Job::start("count", &(Arc::new(|| {}) as Wake), count(4));
+        assert_eq!(wait(&job), Ok(Done::Written("x".into())));
+        assert_eq!(job.fraction(), 0.75);
+    }
+
+    #[test]
+    fn it_stops_when_asked() {
+        let job = Job::start("count", &(Arc::new(|| {}) as Wake), count(1_000_000));
+        assert_eq!(job.end(), None);
+        job.stop();
+        assert_eq!((wait(&job), job.is_stopping()), (Err(Halt::Stopped), true));
+    }
+}

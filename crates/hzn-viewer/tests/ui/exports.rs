@@ -1,0 +1,253 @@
+//! Everything that is written: pictures, videos, tables, recordings, sensor.toml.
+
+use std::path::Path;
+
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use hzn_core::status::Status;
+
+use crate::window::*;
+
+/// Pictures in a folder of their own, so that what is written lies beside it.
+fn folder() -> (tempfile::TempDir, std::path::PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let pictures = dir.path().join("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    flight(&pictures);
+    (dir, pictures)
+}
+
+/// As [`folder`], with thousands of frames: links to the same few pictures.
+fn long() -> (tempfile::TempDir, std::path::PathBuf) {
+    let (dir, pictures) = folder();
+    for i in 4..3000 {
+        std::fs::hard_link(pictures.join(format!("{}.png", i % 3)), pictures.join(format!("{i:05}.png"))).unwrap();
+    }
+    (dir, pictures)
+}
+
+fn colours(picture: &image::RgbImage) -> usize {
+    picture.pixels().filter(|p| p[0] != p[1] || p[1] != p[2]).count()
+}
+
+#[test]
+fn the_picture_is_saved_as_it_is_shown() {
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    let png = dir.path().join("shown.png");
+    path(&mut window, &png, "Write");
+    said(&mut window, "Written");
+    let saved = image::open(&png).unwrap().to_rgb8();
+    assert_eq!(saved.dimensions(), (WIDTH.into(), HEIGHT.into()));
+    // The fitted limb is drawn where it is.
+    let limb = sight(&window).answers[0].bodies[0].limb.concat();
+    let inside = |p: &&[f64; 2]| p[0] > 2.0 && p[1] > 2.0 && p[0] < 317.0 && p[1] < 237.0;
+    let coloured = |p: &[f64; 2]| {
+        let p = saved.get_pixel(p[0].round() as u32, p[1].round() as u32);
+        p[0] != p[2]
+    };
+    let points: Vec<_> = limb.iter().filter(inside).collect();
+    assert!(points.len() > 10 && points.iter().filter(|p| coloured(p)).count() * 10 > points.len() * 9);
+
+    // With the overlays hidden it is the picture itself, but for the line of text.
+    window.key_press(Key::H);
+    window.run_steps(2);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    let plain = dir.path().join("plain.png");
+    path(&mut window, &plain, "Write");
+    said(&mut window, "plain.png");
+    let plain = image::open(&plain).unwrap().to_rgb8();
+    assert!(colours(&saved) > 200 && colours(&plain) == 0, "{} {}", colours(&saved), colours(&plain));
+
+    // Another ending is no PNG.
+    window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    path(&mut window, &dir.path().join("shown.jpg"), "Write");
+    said(&mut window, "ending must be .png");
+    assert_eq!(files(dir.path()), ["pictures", "plain.png", "shown.png"]);
+}
+
+#[test]
+fn the_table_holds_what_is_shown() {
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    window.get_by_label("Process all").click();
+    window.run_steps(2);
+    until(&mut window, "not processed", |v| v.processed() == 4);
+    let csv = dir.path().join("shown.csv");
+    menu(&mut window, "Export", "Save results as CSV…");
+    path(&mut window, &csv, "Write");
+    said(&mut window, "Written");
+    let (rows, _) = hzn_cli::output::read(&csv).map_err(|stop| stop.error).unwrap();
+    let statuses: Vec<Status> = rows.iter().map(|r| r.status).collect();
+    assert_eq!(statuses, [Status::Ok, Status::Ok, Status::Ok, Status::NoLimb]);
+    assert_eq!(rows[0].axis(), answer(&window).2, "to the last bit");
+}
+
+#[test]
+fn the_video_shows_every_frame_or_nothing_is_left() {
+    if std::process::Command::new("ffmpeg").arg("-version").output().is_err() {
+        eprintln!("skipped: there is no ffmpeg");
+        return;
+    }
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    let film = dir.path().join("flight.mp4");
+    menu(&mut window, "Export", "Save video with overlays…");
+    path(&mut window, &film, "Write");
+    said(&mut window, "Written");
+    let mut watched = self::window();
+    open(&mut watched, &film);
+    until(&mut watched, "the video has frames", |v| v.sequence().complete && v.sight().is_some());
+    assert_eq!(watched.state().sequence().len(), 4);
+    assert_eq!(files(dir.path()), ["flight.mp4", "pictures"]);
+
+    // Stopped, and what had the name before is as it was.
+    let (dir, pictures) = long();
+    let film = dir.path().join("long.mp4");
+    std::fs::write(&film, b"before").unwrap();
+    let mut window = window_on(&pictures);
+    menu(&mut window, "Export", "Save video with overlays…");
+    path(&mut window, &film, "Write");
+    let begin = std::time::Instant::now();
+    while window.query_by_label("Cancel saving the video").is_none() {
+        assert!(begin.elapsed().as_secs() < 60, "there is nothing to cancel");
+        window.step();
+    }
+    window.get_by_label("Cancel saving the video").click();
+    said(&mut window, "Saving the video was stopped");
+    assert_eq!(files(dir.path()), ["long.mp4", "pictures"]);
+    assert_eq!(std::fs::read(&film).unwrap(), b"before");
+    // No kind of video.
+    menu(&mut window, "Export", "Save video with overlays…");
+    path(&mut window, &dir.path().join("long.nothing"), "Write");
+    said(&mut window, "ffmpeg");
+    assert_eq!(files(dir.path()), ["long.mp4", "pictures"]);
+}
+
+#[test]
+fn a_run_that_is_cancelled_leaves_no_recording() {
+    let (dir, pictures) = long();
+    let mut window = window_on(&pictures);
+    let recording = dir.path().join("again.mcap");
+    let run = |window: &mut Window| {
+        window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+        path(window, &recording, "Write");
+        window.get_by_label("Cancel").click();
+        said(window, "Processing was stopped");
+    };
+    run(&mut window);
+    assert_eq!(files(dir.path()), ["pictures"]);
+    std::fs::write(&recording, b"before").unwrap();
+    run(&mut window);
+    assert_eq!(
+        (files(dir.path()), std::fs::read(&recording).unwrap()),
+        (vec!["again.mcap".into(), "pictures".into()], b"before".to_vec())
+    );
+}
+
+#[test]
+fn a_recording_does_not_take_its_own_place() {
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    let recording = dir.path().join("run.mcap");
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+    path(&mut window, &recording, "Write");
+    said(&mut window, "Written");
+    open(&mut window, &recording);
+    settled(&mut window);
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+    path(&mut window, &recording, "Write");
+    said(&mut window, "is the recording that is open");
+}
+
+#[test]
+fn the_sensor_is_saved_elsewhere_with_its_comments() {
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    window.get_by_role_and_label(egui::Role::Slider, "scale").set_value_accesskit(1.5);
+    settled(&mut window);
+    let other = dir.path().join("tuned.toml");
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
+    path(&mut window, &other, "Write");
+    said(&mut window, "Saved");
+    assert_eq!(std::fs::read_to_string(&other).unwrap(), SENSOR.replace("scale = 1.0 ", "scale = 1.5 "));
+    assert_eq!(std::fs::read_to_string(pictures.join("sensor.toml")).unwrap(), SENSOR);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_said_and_the_rest_goes_on() {
+    let (dir, pictures) = folder();
+    // /dev/full takes the place of unfinished files: every write to it says that the disk is full.
+    let full = |name: &str| std::os::unix::fs::symlink("/dev/full", dir.path().join(name)).unwrap();
+    let mut window = window_on(&pictures);
+    let write = |window: &mut Window, name: &str, words: &str| {
+        path(window, &dir.path().join(name), "Write");
+        said(window, words);
+        let bad: Vec<String> = window.state().messages().filter(|m| m.contains(name)).map(str::to_owned).collect();
+        assert!(bad.iter().any(|m| m.contains("full") || m.contains("no space left")), "{bad:?}");
+    };
+
+    full("a.part.png");
+    window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    write(&mut window, "a.png", "a.png: the disk is full");
+    full("b.csv.part");
+    menu(&mut window, "Export", "Save results as CSV…");
+    write(&mut window, "b.csv", "b.csv: the disk is full");
+    full("c.part.toml");
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
+    write(&mut window, "c.toml", "c.toml: the disk is full");
+    if std::process::Command::new("ffmpeg").arg("-version").output().is_ok() {
+        full("d.part.mp4");
+        menu(&mut window, "Export", "Save video with overlays…");
+        write(&mut window, "d.mp4", "d.mp4: the disk is full");
+    }
+    assert_eq!(files(dir.path()), ["pictures"], "nothing is left of what could not be written");
+    // A recording keeps its finished frames, and says where.
+    full("e.mcap.part");
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+    write(&mut window, "e.mcap", "no space left on the disk");
+    assert!(!dir.path().join("e.mcap").exists());
+
+    window.key_press(Key::ArrowRight);
+    settled(&mut window);
+    assert_eq!((sight(&window).index, answer(&window).0), (1, Status::Ok));
+}
+
+/// A recording that is cut off, of this length.
+fn cut(window: &mut Window, dir: &Path) -> std::path::PathBuf {
+    let whole = dir.join("run.mcap");
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+    path(window, &whole, "Write");
+    said(window, "Written");
+    let bytes = std::fs::read(&whole).unwrap();
+    let end = bytes.windows(9).rposition(|w| w == [0x0f, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    let cut = dir.join("cut.mcap");
+    std::fs::write(&cut, &bytes[..end]).unwrap();
+    cut
+}
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_recovered_for_want_of_space_stays_open() {
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    let cut = cut(&mut window, dir.path());
+    open(&mut window, &cut);
+    said(&mut window, "was not closed");
+    settled(&mut window);
+    std::os::unix::fs::symlink("/dev/full", dir.path().join("cut-recovered.mcap.part")).unwrap();
+    window.get_by_label("Recover it").click();
+    said(&mut window, "no space left on the disk");
+    assert_eq!(window.state().sequence().title, "cut.mcap");
+    assert_eq!(files(dir.path()), ["cut.mcap", "pictures", "run.mcap"]);
+    // A second try takes another name where one is taken.
+    open(&mut window, &cut);
+    said(&mut window, "was not closed");
+    settled(&mut window);
+    std::fs::write(dir.path().join("cut-recovered.mcap"), b"mine").unwrap();
+    window.get_by_label("Recover it").click();
+    said(&mut window, "4 frames recovered");
+    until(&mut window, "not opened", |v| v.sequence().title == "cut-recovered-2.mcap");
+}

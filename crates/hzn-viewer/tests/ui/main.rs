@@ -1,0 +1,7 @@
+//! The viewer through its accessibility tree and by mouse, as a user or a screen reader would drive it.
+
+mod exports;
+mod mouse;
+mod tune;
+mod window;
+mod wrong;

@@ -1,0 +1,148 @@
+//! A window with a small flight, and what is done in most tests.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui::{Key, Modifiers, Role};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use hzn_core::camera::{Camera, Config, Model};
+use hzn_core::pixel::ImagePoint;
+use hzn_core::status::Status;
+use hzn_viewer::model::Settings;
+use hzn_viewer::ui::Viewer;
+use hzn_viewer::work::Sight;
+
+pub(crate) const WIDTH: u16 = 320;
+pub(crate) const HEIGHT: u16 = 240;
+/// Half-angle of the Earth from 240 km, with the limb 10 km above the ground.
+const HALF_ANGLE: f64 = 6381.0088 / 6611.0088;
+
+pub(crate) const SENSOR: &str = "# tuned by hand
+preset = \"hzn\"
+
+[camera]
+width = 320
+height = 240
+model = \"pinhole\"
+fx_px = 260.0
+fy_px = 260.0
+cx_px = 159.5
+cy_px = 119.5
+
+[body]
+kind = \"earth-sphere\"   # no positions here
+altitude_km = 240.0
+
+[binarize]
+scale = 1.0     # times Otsu's level
+";
+
+/// Pictures of a limb with a soft edge that turns from frame to frame; the last one is dark.
+pub(crate) fn flight(folder: &Path) {
+    let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, WIDTH, HEIGHT, 260.0)).unwrap();
+    for frame in 0..4 {
+        let (pitch, roll) = (1.15 + 0.03 * f64::from(frame), 0.1 * f64::from(frame));
+        let axis = [pitch.sin() * roll.sin(), pitch.sin() * roll.cos(), pitch.cos()];
+        let picture = image::GrayImage::from_fn(WIDTH.into(), HEIGHT.into(), |x, y| {
+            let ray = camera.unproject(ImagePoint { u: x.into(), v: y.into() }).unwrap().xyz();
+            let cos: f64 = ray.iter().zip(axis).map(|(a, b)| a * b).sum();
+            let inside_px = (HALF_ANGLE.asin() - cos.clamp(-1.0, 1.0).acos()) * 260.0;
+            let light = 1.0 / (1.0 + (-inside_px / 0.6).exp());
+            image::Luma([if frame == 3 { 4 } else { (8.0 + 190.0 * light) as u8 }])
+        });
+        picture.save(folder.join(format!("{frame}.png"))).unwrap();
+    }
+    std::fs::write(folder.join("sensor.toml"), SENSOR).unwrap();
+}
+
+pub(crate) type Window = Harness<'static, Viewer>;
+
+pub(crate) fn window() -> Window {
+    let viewer = Viewer::new(Settings::default(), None, Arc::new(|| {}));
+    let mut window = Harness::builder()
+        .with_size(egui::vec2(1400.0, 1000.0))
+        .with_step_dt(0.02)
+        .build_ui_state(|ui, v: &mut Viewer| v.show(ui), viewer);
+    window.step();
+    window
+}
+
+/// Steps until `ready`, for as long as threads beside the window may take.
+pub(crate) fn until(window: &mut Window, what: &str, ready: impl Fn(&Viewer) -> bool) {
+    let begin = Instant::now();
+    while !ready(window.state()) {
+        assert!(
+            begin.elapsed() < Duration::from_secs(60),
+            "{what}: {:?}",
+            window.state().messages().collect::<Vec<_>>()
+        );
+        std::thread::sleep(Duration::from_millis(2));
+        window.step();
+    }
+    window.run_steps(3);
+}
+
+pub(crate) fn settled(window: &mut Window) {
+    // A step for what was clicked, one for what follows from it.
+    window.run_steps(2);
+    until(window, "the frame is not there", Viewer::is_settled);
+}
+
+/// Types a path where one is asked for.
+pub(crate) fn path(window: &mut Window, path: &Path, accept: &str) {
+    window.run_steps(3);
+    window.get_by_role_and_label(Role::TextInput, "Path").focus();
+    window.run_steps(2);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    window.get_by_role_and_label(Role::TextInput, "Path").type_text(&path.display().to_string());
+    window.run_steps(2);
+    window.get_by_label(accept).click();
+    window.run_steps(2);
+}
+
+/// Opens by typing the path.
+pub(crate) fn open(window: &mut Window, what: &Path) {
+    window.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    path(window, what, "Open this");
+}
+
+/// A window on a folder of pictures.
+pub(crate) fn window_on(folder: &Path) -> Window {
+    let mut window = window();
+    open(&mut window, folder);
+    settled(&mut window);
+    window
+}
+
+/// Chooses from a menu.
+pub(crate) fn menu(window: &mut Window, menu: &str, entry: &str) {
+    window.get_by_label(menu).click();
+    window.run_steps(3);
+    window.get_by_label(entry).click();
+    window.run_steps(2);
+}
+
+/// Waits until something is said that contains these words.
+pub(crate) fn said(window: &mut Window, words: &str) {
+    until(window, words, |v| v.messages().any(|m| m.contains(words)));
+}
+
+/// Names of the files in a folder.
+pub(crate) fn files(folder: &Path) -> Vec<String> {
+    let name = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().to_string_lossy().into_owned();
+    let mut names: Vec<String> = std::fs::read_dir(folder).unwrap().map(name).collect();
+    names.sort();
+    names
+}
+
+pub(crate) fn sight(window: &Window) -> &Sight {
+    window.state().sight().unwrap()
+}
+
+/// Status, level and axis of the frame that is shown.
+pub(crate) fn answer(window: &Window) -> (Status, Option<u16>, Option<[f64; 3]>) {
+    let row = &sight(window).answers[0].bodies[0].row;
+    (row.status, row.level, row.axis())
+}

@@ -1,0 +1,81 @@
+//! Wrong input: it is said in place, and the rest keeps working.
+
+use egui::{Key, Modifiers, Role};
+use egui_kittest::kittest::Queryable;
+use hzn_core::status::Status;
+use hzn_viewer::ui::Viewer;
+
+use crate::window::*;
+
+#[test]
+fn wrong_files_are_said_and_the_rest_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    let mut window = window();
+    open(&mut window, dir.path());
+    settled(&mut window);
+
+    // Not a recording: what was open stays.
+    let bad = dir.path().join("bad.mcap");
+    std::fs::write(&bad, b"no recording").unwrap();
+    open(&mut window, &bad);
+    until(&mut window, "nothing is said", |v| v.messages().any(|m| m.contains("is not an MCAP file")));
+    assert_eq!(window.state().sequence().len(), 4);
+
+    // A picture that cannot be decoded, and one of another size.
+    std::fs::write(dir.path().join("1.png"), b"no picture").unwrap();
+    image::GrayImage::new(40, 30).save(dir.path().join("2.png")).unwrap();
+    open(&mut window, dir.path());
+    settled(&mut window);
+    assert_eq!(answer(&window).0, Status::Ok);
+    window.key_press(Key::ArrowRight);
+    settled(&mut window);
+    assert!(sight(&window).picture.as_ref().is_err_and(|why| why.contains("no picture")));
+    assert!(window.query_by_label("unreadable").is_some());
+    window.key_press(Key::ArrowRight);
+    settled(&mut window);
+    let refused = sight(&window).answers[0].refused.clone().unwrap();
+    assert!(refused.contains("40 x 30") && refused.contains("320 x 240"), "{refused}");
+    window.key_press(Key::ArrowRight);
+    settled(&mut window);
+    assert_eq!(answer(&window).0, Status::NoLimb);
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_recovered() {
+    let dir = tempfile::tempdir().unwrap();
+    let pictures = dir.path().join("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    flight(&pictures);
+    let mut window = window();
+    open(&mut window, &pictures);
+    settled(&mut window);
+
+    // Run into a recording, by the window itself.
+    let whole = dir.path().join("run.mcap");
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+    path(&mut window, &whole, "Write");
+    said(&mut window, "Written");
+    let folder = answer(&window);
+
+    // The recording says the same as the folder.
+    open(&mut window, &whole);
+    settled(&mut window);
+    assert_eq!(answer(&window), folder);
+    assert_eq!(window.state().recorded(0).and_then(|r| r.axis()), folder.2);
+
+    // Cut before the end of its data: every frame is there, and it can be closed.
+    let bytes = std::fs::read(&whole).unwrap();
+    let cut = dir.path().join("cut.mcap");
+    let end = bytes.windows(9).rposition(|w| w == [0x0f, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    std::fs::write(&cut, &bytes[..end]).unwrap();
+    open(&mut window, &cut);
+    until(&mut window, "not said", |v| v.messages().any(|m| m.contains("was not closed")));
+    settled(&mut window);
+    assert_eq!(answer(&window), folder);
+    window.get_by_label("Recover it").click();
+    window.run_steps(2);
+    until(&mut window, "not recovered", |v| v.sequence().title == "cut-recovered.mcap" && v.is_settled());
+    assert_eq!(window.state().sequence().len(), 4);
+    assert_eq!(answer(&window), folder);
+}
