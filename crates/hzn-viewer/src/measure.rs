@@ -13,7 +13,7 @@ const CHANGES: usize = 200;
 /// What is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
-    /// From the start of the program to the first frame on the screen.
+    /// From the start of the program to the first frame on the screen, and until all frames are known.
     Start,
     /// From a change of a parameter to the new picture.
     Tune,
@@ -30,6 +30,10 @@ struct Times {
     handed: Duration,
     /// It is on the screen.
     screen: Duration,
+    /// Processor time of the window's thread until it is laid out.
+    layout_work: Duration,
+    /// Processor time of the window's thread until it is on the screen.
+    screen_work: Duration,
 }
 
 /// A measurement under way.
@@ -39,6 +43,8 @@ pub struct Measure {
     began: Instant,
     look: Look,
     changed: Option<Instant>,
+    /// Processor time of the window's thread at the change.
+    worked: Duration,
     /// Seen in this pass of the window, which is not on the screen yet.
     seen: bool,
     times: Vec<Times>,
@@ -52,19 +58,14 @@ impl Measure {
     /// Begins; `began` is the start of the program.
     pub fn new(kind: Kind, began: Instant) -> Self {
         let (look, times) = (Look::Colour, Vec::new());
-        Self { kind, began, look, changed: None, seen: false, times, handed: Times::default(), frames: 0, shown: None }
+        let (worked, handed) = (Duration::ZERO, Times::default());
+        Self { kind, began, look, changed: None, worked, seen: false, times, handed, frames: 0, shown: None }
     }
 
     /// Before the window is drawn: what was drawn last is on the screen now. True when the measurement is through.
     pub fn before(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
         match self.kind {
-            Kind::Start => {
-                if self.seen {
-                    let ms = self.began.elapsed().as_secs_f64() * 1e3;
-                    println!("start to the first frame on the screen: {ms:.0} ms");
-                }
-                self.seen
-            }
+            Kind::Start => self.start(viewer),
             Kind::Tune => self.tune(viewer),
             Kind::Play => self.play(viewer, ctx),
         }
@@ -72,9 +73,18 @@ impl Measure {
 
     /// After the window is drawn.
     pub fn after(&mut self, viewer: &Viewer, ctx: &egui::Context) {
-        self.seen = viewer.is_settled();
+        self.seen = match self.kind {
+            // A recording is on the screen before all of its frames are known.
+            Kind::Start => viewer.sight().is_some(),
+            _ => viewer.is_settled(),
+        };
         if let (true, Some(changed), Some(sight)) = (self.seen, self.changed, viewer.sight()) {
-            self.handed = Times { answer: sight.latency, handed: changed.elapsed(), screen: Duration::ZERO };
+            self.handed = Times {
+                answer: sight.latency,
+                handed: changed.elapsed(),
+                layout_work: processor_time().saturating_sub(self.worked),
+                ..Times::default()
+            };
         }
         if self.seen {
             // The next pass comes when this one is on the screen.
@@ -82,12 +92,26 @@ impl Measure {
         }
     }
 
+    fn start(&mut self, viewer: &Viewer) -> bool {
+        let ms = self.began.elapsed().as_secs_f64() * 1e3;
+        if self.seen && self.changed.is_none() {
+            println!("start to the first frame on the screen: {ms:.0} ms");
+            self.changed = Some(self.began);
+        }
+        let through = self.changed.is_some() && viewer.sequence().complete;
+        if through {
+            println!("until all {} frames are known: {ms:.0} ms", viewer.sequence().len());
+        }
+        through
+    }
+
     fn tune(&mut self, viewer: &mut Viewer) -> bool {
         if !self.seen {
             return false;
         }
         if let Some(changed) = self.changed.take() {
-            self.times.push(Times { screen: changed.elapsed(), ..self.handed });
+            let screen_work = processor_time().saturating_sub(self.worked);
+            self.times.push(Times { screen: changed.elapsed(), screen_work, ..self.handed });
         }
         if self.times.len() == CHANGES {
             println!("parameter to new picture, {}:", self.look.name());
@@ -101,6 +125,15 @@ impl Measure {
                 let at = |part: f64| each[(part * (CHANGES - 1) as f64) as usize].as_secs_f64() * 1e3;
                 println!("  {what}: median {:.1} ms, 95 % {:.1} ms", at(0.5), at(0.95));
             }
+            // The system counts in steps as long as a frame: only the mean of many is exact.
+            let mean = |part: fn(&Times) -> Duration| {
+                self.times.iter().map(part).sum::<Duration>().as_secs_f64() * 1e3 / CHANGES as f64
+            };
+            println!(
+                "  processor time of the window's thread: laid out {:.1} ms, to the screen {:.1} ms in the mean",
+                mean(|t| t.layout_work),
+                mean(|t| t.screen_work)
+            );
             self.times.clear();
             if self.look == Look::Level {
                 return true;
@@ -110,13 +143,15 @@ impl Measure {
             self.seen = false;
             return false;
         }
+        self.changed = Some(Instant::now());
+        self.worked = processor_time();
         // A little to and fro, so that every change is one.
         let scale = 1.0 + 0.002 * (self.times.len() % 100) as f64 + 0.001;
         if let Some(session) = viewer.session_mut() {
             session.set("binarize", "scale", 0, Some(scale.into()));
             session.settle();
         }
-        (self.changed, self.seen) = (Some(Instant::now()), false);
+        self.seen = false;
         false
     }
 
@@ -148,6 +183,12 @@ impl Measure {
         }
         through
     }
+}
+
+/// Processor time of this thread so far; nothing where the system does not say.
+fn processor_time() -> Duration {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    told.split(' ').next().and_then(|ns| ns.parse().ok()).map_or(Duration::ZERO, Duration::from_nanos)
 }
 
 /// Of this process, in megabytes; 0 where the system does not say.

@@ -90,6 +90,12 @@ impl View {
         }
     }
 
+    /// A point of the picture comes into the middle, with `scale` screen points a pixel or more.
+    pub fn look_at(&mut self, picture: Point, p: Point, scale: f64) {
+        let scale = self.centre.map_or(scale, |(_, now)| now.max(scale));
+        self.centre = Some((hold(p, picture), scale));
+    }
+
     /// One screen point a pixel (or `scale` of them), about the middle of what is shown.
     pub fn set_scale(&mut self, area: Area, picture: Point, scale: f64) {
         let factor = scale / self.scale(area, picture);
@@ -162,6 +168,19 @@ mod tests {
         assert!(view.is_fit());
         view.pan(AREA, PICTURE, [50.0, 50.0]);
         assert!(view.is_fit(), "a whole picture is not moved");
+    }
+
+    #[test]
+    fn what_is_looked_at_comes_into_the_middle() {
+        let mut view = View::FIT;
+        view.look_at(PICTURE, [300.0, 200.0], 8.0);
+        near(view.to_screen(AREA, PICTURE, [300.0, 200.0]), AREA.middle());
+        assert_eq!(view.scale(AREA, PICTURE), 8.0);
+        // What is shown larger already stays so; what lies outside is not gone to.
+        view.set_scale(AREA, PICTURE, 20.0);
+        view.look_at(PICTURE, [9999.0, 100.0], 8.0);
+        near(view.to_picture(AREA, PICTURE, AREA.middle()), [1919.5, 100.0]);
+        assert_eq!(view.scale(AREA, PICTURE), 20.0);
     }
 
     #[test]

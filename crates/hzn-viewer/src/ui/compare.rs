@@ -1,63 +1,83 @@
-//! Two configurations on the same frame: what their answers differ in.
+//! Two configurations on the same frame: what their answers differ in, above their pictures.
 
-use egui::{RichText, vec2};
+use egui::{RichText, Ui, vec2};
 
 use super::viewer::Viewer;
 use crate::model::rows;
 use crate::work::sight::Answer;
 
-pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
+/// A value of both answers, and their difference.
+struct Column {
+    name: &'static str,
+    session: String,
+    other: String,
+    difference: String,
+}
+
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let Some((name, other)) = &viewer.other else { return };
-    let (name, problem) = (name.clone(), other.problem().map(ToString::to_string));
-    let Some(sight) = &viewer.sight else { return };
-    let [a, b] = [0, 1].map(|i| sight.answers.get(i).and_then(|o| o.bodies.get(viewer.body)));
-    let mut open = true;
-    egui::Window::new(format!("Compared with {name}"))
-        .open(&mut open)
-        .resizable(false)
-        .anchor(egui::Align2::CENTER_TOP, vec2(0.0, 46.0))
-        .show(ctx, |ui| {
-            if let Some(problem) = &problem {
-                ui.colored_label(ui.visuals().error_fg_color, problem);
+    let answers = |sight: &crate::work::Sight| [0, 1].map(|i| sight.answers.get(i)?.bodies.get(viewer.body).cloned());
+    let columns = match viewer.sight.as_ref().map(answers) {
+        Some([Some(a), Some(b)]) => columns(&a, &b),
+        _ => Vec::new(),
+    };
+    let mut stop = false;
+    egui::Panel::top("compare").resizable(false).show(ui, |ui| {
+        ui.add_space(4.0);
+        ui.horizontal(|ui| {
+            ui.strong(format!("Compared with {name}"));
+            if let Some(problem) = other.problem() {
+                ui.colored_label(ui.visuals().error_fg_color, problem.to_string());
             }
-            let (Some(a), Some(b)) = (a, b) else { return };
-            egui::Grid::new("compared").num_columns(4).spacing(vec2(16.0, 2.0)).show(ui, |ui| {
-                for head in ["", "session", &name, "difference"] {
-                    ui.weak(head);
-                }
-                ui.end_row();
-                for (what, a, b, difference) in lines(a, b) {
-                    ui.weak(what);
-                    for text in [a, b, difference] {
-                        ui.label(RichText::new(text).monospace().size(12.0));
-                    }
-                    ui.end_row();
-                }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                stop = ui.small_button("Stop").on_hover_text("Stop comparing").clicked();
             });
         });
-    if !open {
+        egui::ScrollArea::horizontal().show(ui, |ui| table(ui, name, &columns));
+        ui.add_space(4.0);
+    });
+    if stop {
         viewer.other = None;
     }
 }
 
-/// Name, both values, their difference.
-fn lines(a: &Answer, b: &Answer) -> Vec<(&'static str, String, String, String)> {
+fn table(ui: &mut Ui, name: &str, columns: &[Column]) {
+    egui::Grid::new("compared").spacing(vec2(12.0, 1.0)).show(ui, |ui| {
+        ui.label("");
+        columns.iter().for_each(|c| {
+            ui.weak(RichText::new(c.name).size(12.0));
+        });
+        ui.end_row();
+        let lines: [(&str, fn(&Column) -> &str); 3] =
+            [("session", |c| &c.session), (name, |c| &c.other), ("difference", |c| &c.difference)];
+        for (head, of) in lines {
+            ui.weak(RichText::new(head).size(12.0));
+            for column in columns {
+                ui.label(RichText::new(of(column)).monospace().size(11.5));
+            }
+            ui.end_row();
+        }
+    });
+}
+
+fn columns(a: &Answer, b: &Answer) -> Vec<Column> {
     let apart = match (a.row.axis(), b.row.axis()) {
         (Some(x), Some(y)) => format!("{:.4}° apart", rows::angle_deg(x, y)),
         _ => String::new(),
     };
-    let mut out = vec![("status", a.row.status.name().to_owned(), b.row.status.name().to_owned(), apart)];
+    let [session, other] = [a, b].map(|answer| answer.row.status.name().to_owned());
+    let mut out = vec![Column { name: "status", session, other, difference: apart }];
     let mut add = |name, digits: usize, unit: &str, of: fn(&hzn_mcap::Row) -> Option<f64>| {
         let text = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.digits$}{unit}"));
         let (x, y) = (of(&a.row), of(&b.row));
         let difference = x.zip(y).map_or_else(String::new, |(x, y)| format!("{:+.digits$}{unit}", y - x));
-        out.push((name, text(x), text(y), difference));
+        out.push(Column { name, session: text(x), other: text(y), difference });
     };
-    add("axis x", 6, "", |r| r.axis_x);
-    add("axis y", 6, "", |r| r.axis_y);
-    add("axis z", 6, "", |r| r.axis_z);
+    add("axis x", 5, "", |r| r.axis_x);
+    add("axis y", 5, "", |r| r.axis_y);
+    add("axis z", 5, "", |r| r.axis_z);
     add("σ", 4, "°", |r| r.sigma_max_deg);
-    add("half-angle", 4, "°", |r| r.half_angle_deg);
+    add("half-angle", 3, "°", |r| r.half_angle_deg);
     add("RMS", 3, " px", |r| r.rms_px);
     add("inliers", 0, "", |r| r.inliers.map(f64::from));
     add("level", 0, "", |r| r.level.map(f64::from));

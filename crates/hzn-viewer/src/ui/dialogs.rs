@@ -191,3 +191,34 @@ fn diff(viewer: &mut Viewer, ctx: &egui::Context) {
     });
     viewer.showing_diff = open;
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::model::Settings;
+
+    /// As if the system's dialog had given this.
+    fn browsed(purpose: Purpose, answer: Option<PathBuf>) -> Viewer {
+        let mut viewer = Viewer::new(Settings::default(), None, Arc::new(|| {}));
+        let (send, receive) = bounded(1);
+        viewer.asking = Some(Asking { browsing: Some(receive), ..Asking::new(purpose, Path::new("/typed")) });
+        poll(&mut viewer);
+        assert!(viewer.asking.as_ref().is_some_and(|a| a.browsing.is_some()), "the user takes time");
+        send.send(answer).unwrap();
+        poll(&mut viewer);
+        viewer
+    }
+
+    #[test]
+    fn what_is_picked_is_opened_and_a_name_to_write_is_looked_at_first() {
+        let picked = PathBuf::from("/picked/flight.mcap");
+        let opened = browsed(Purpose::Open, Some(picked.clone()));
+        assert!(opened.asking.is_none() && opened.settings.recent == [picked.clone()]);
+        let named = browsed(Purpose::Table, Some(picked.clone()));
+        assert!(named.asking.is_some_and(|a| a.text == "/picked/flight.mcap" && a.browsing.is_none()));
+        let left = browsed(Purpose::Open, None);
+        assert!(left.asking.is_some_and(|a| a.text == "/typed") && left.settings.recent.is_empty());
+    }
+}

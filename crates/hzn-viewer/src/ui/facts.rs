@@ -62,7 +62,8 @@ pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answ
         }
         "Limits" => vec![format!("{} steps of work", c.work)],
         "Candidates" if reached(Stage::Contour) => {
-            let mut out = vec![format!("{} edges of {} px or more", c.candidates, config.candidates.min_points)];
+            let edges = if c.candidates == 1 { "edge" } else { "edges" };
+            let mut out = vec![format!("{} {edges} of {} px or more", c.candidates, config.candidates.min_points)];
             if c.fallback_points > 0 {
                 out.push(format!("{} points stand at the global level", c.fallback_points));
             }

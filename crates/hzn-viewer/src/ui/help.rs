@@ -29,6 +29,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         for line in [
             "Wheel: zoom about the pointer, to single pixels and their values. Drag: move. Double click: in, and back.",
             "Click in a plot or in the time line: go to that frame. Drag in a plot: move; double click: all of it.",
+            "Click among the residuals: the nearest point of the edge is shown in the picture.",
             "Hover a candidate in the column of stages: it is pointed out in the picture.",
             "Drop a recording, a folder, a picture, a video or a sensor.toml on the window: it is opened.",
         ] {

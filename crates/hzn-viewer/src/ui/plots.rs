@@ -1,11 +1,12 @@
 //! Plots over time, and the residuals along the limb of the frame that is shown.
 
-use egui::{Id, RichText, Ui};
-use egui_plot::{Corner, GridInput, GridMark, HLine, HoverPosition, Legend, Line, Plot, PlotPoints, Points, VLine};
+use egui::{Color32, Id, Response, RichText, Ui, vec2};
+use egui_plot::{GridInput, GridMark, HLine, HoverPosition, Line, Plot, PlotPoints, Points, VLine};
 
-use super::theme;
 use super::viewer::Viewer;
+use super::{picture, theme};
 use crate::model::rows::{Of, QUANTITIES, Quantity};
+use crate::work::sight::Residual;
 
 /// Name of the residuals among what can be plotted.
 pub(super) const RESIDUALS: &str = "Residuals";
@@ -14,6 +15,8 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let height = viewer.settings.plots_height;
     let panel = egui::Panel::bottom("plots").resizable(true).default_size(height).size_range(110.0..=600.0);
     let shown = panel.show(ui, |ui| {
+        // All of the panel is used: one that its contents do not fill shrinks a little with every frame.
+        ui.expand_to_include_rect(ui.max_rect());
         ui.add_space(4.0);
         choice(viewer, ui);
         let chosen: Vec<String> = viewer.settings.plotted.clone();
@@ -21,15 +24,15 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         let gap = ui.spacing().item_spacing.x;
         let width = (ui.available_width() - gap * (count as f32 - 1.0)) / count as f32;
         let height = ui.available_height() - 2.0;
-        let mut go = None;
+        let (mut go, mut look) = (None, None);
         ui.horizontal(|ui| {
             for name in &chosen {
-                ui.allocate_ui(egui::vec2(width, height), |ui| {
+                ui.allocate_ui(vec2(width, height), |ui| {
                     ui.vertical(|ui| {
                         if name == RESIDUALS {
-                            residuals(viewer, ui, height);
+                            look = residuals(viewer, ui).or(look);
                         } else if let Some(quantity) = QUANTITIES.iter().find(|q| q.name == name) {
-                            go = over_time(viewer, ui, quantity, height).or(go);
+                            go = over_time(viewer, ui, quantity).or(go);
                         }
                     });
                 });
@@ -40,6 +43,9 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         });
         if let Some(frame) = go {
             viewer.playback.go(frame, viewer.sequence.len());
+        }
+        if let Some(point) = look {
+            picture::look_at(viewer, point);
         }
     });
     viewer.settings.plots_height = shown.response.rect.height();
@@ -67,8 +73,25 @@ fn title(quantity: &Quantity) -> String {
     if quantity.unit.is_empty() { quantity.name.to_owned() } else { format!("{} [{}]", quantity.name, quantity.unit) }
 }
 
+/// What is plotted, and which line is which. A legend within the plot would cover what it explains.
+fn head(ui: &mut Ui, title: &str, lines: &[(&str, Color32)]) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(title).size(12.5));
+        for (name, colour) in lines {
+            let (rect, _) = ui.allocate_exact_size(vec2(10.0, 10.0), egui::Sense::hover());
+            ui.painter().rect_filled(rect.shrink(1.0), 2, *colour);
+            ui.weak(RichText::new(*name).size(12.0));
+        }
+    });
+}
+
+/// Says which plot this is, to who does not see it.
+fn named(response: &Response, name: &str) {
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Plot {name}")));
+}
+
 /// A quantity of all frames; gives the frame that was clicked.
-fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, height: f32) -> Option<usize> {
+fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize> {
     let entries = &viewer.sequence.entries;
     // Times of the day are large numbers: the first frame is zero.
     let start = entries.first().map_or(0.0, |e| e.time_s);
@@ -78,9 +101,17 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, height: f32) -> 
         of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())
     };
     let changed = viewer.session.as_ref().is_some_and(|s| s.is_changed());
-    let label = title(quantity);
+    let mut lines: Vec<_> =
+        quantity.lines.iter().zip(0..).map(|((name, _), n)| (*name, theme::line(n, dark))).collect();
+    if lines.len() == 1 {
+        lines.clear();
+    }
+    if changed {
+        lines.push(("as in the file", theme::line(0, dark).gamma_multiply(0.35)));
+    }
+    head(ui, &title(quantity), &lines);
     let plot = Plot::new(("plot", quantity.name))
-        .height(height)
+        .height(ui.available_height())
         // All of the sequence, whatever part of it has a value.
         .include_x(0.0)
         .include_x(entries.last().map_or(1.0, |e| (e.time_s - start).max(1e-3)))
@@ -88,13 +119,11 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, height: f32) -> 
         .link_axis(Id::unique("time"), [true, false])
         .allow_scroll(false)
         .allow_boxed_zoom(true)
-        .set_margin_fraction(egui::vec2(0.01, 0.12))
+        .set_margin_fraction(vec2(0.01, 0.12))
         .y_grid_spacer(ticks)
         .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
         .y_axis_min_width(44.0)
         .x_axis_label("s")
-        .y_axis_label(label)
-        .legend(Legend::default().position(Corner::RightTop).text_style(egui::TextStyle::Small))
         .label_formatter(move |at| {
             let p = match at {
                 HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => position,
@@ -125,6 +154,7 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, height: f32) -> 
         }
         ui.response().clicked().then(|| ui.pointer_coordinate()).flatten()
     });
+    named(&response.response, quantity.name);
     viewer.sequence.nearest(response.inner?.x + start)
 }
 
@@ -167,32 +197,39 @@ fn parts(count: usize, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f6
     out
 }
 
-/// Distance of the edge's points from the fitted limb, along it.
-fn residuals(viewer: &Viewer, ui: &mut Ui, height: f32) {
+/// Distance of the edge's points from the fitted limb, along it; gives the point that was clicked.
+fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
     let threshold = viewer.sight.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.reject.threshold_px);
+    let all = viewer.answer().map(|a| &*a.residuals).unwrap_or_default();
     let points = |kept: bool| -> PlotPoints<'_> {
-        let answer = viewer.answer().into_iter().flat_map(|a| &a.residuals);
-        answer.filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
+        all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
     };
-    Plot::new("residuals")
-        .height(height)
+    head(ui, "Residual [px]", &[("inliers", theme::INLIER), ("rejected", theme::REJECTED)]);
+    let plot = Plot::new("residuals")
+        .height(ui.available_height())
         .allow_scroll(false)
-        .set_margin_fraction(egui::vec2(0.01, 0.1))
+        .set_margin_fraction(vec2(0.01, 0.1))
         .y_axis_min_width(44.0)
         .x_axis_label("azimuth about the axis [deg]")
-        .y_axis_label("Residual [px]")
         .include_y(-1.0)
-        .include_y(1.0)
-        .legend(Legend::default().position(Corner::RightTop).text_style(egui::TextStyle::Small))
-        .show(ui, |ui| {
-            if let Some(px) = threshold {
-                for y in [px, -px] {
-                    ui.hline(HLine::new("threshold", y).color(theme::REJECTED.gamma_multiply(0.5)).allow_hover(false));
-                }
+        .include_y(1.0);
+    let shown = plot.show(ui, |ui| {
+        if let Some(px) = threshold {
+            for y in [px, -px] {
+                ui.hline(HLine::new("threshold", y).color(theme::REJECTED.gamma_multiply(0.5)).allow_hover(false));
             }
-            ui.points(Points::new("rejected", points(false)).color(theme::REJECTED).radius(1.8));
-            ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
-        });
+        }
+        ui.points(Points::new("rejected", points(false)).color(theme::REJECTED).radius(1.8));
+        ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
+    });
+    named(&shown.response, RESIDUALS);
+    let at = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
+    // The point that is nearest on the screen.
+    let apart = |r: &Residual| {
+        let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px].into());
+        p.distance_sq(at)
+    };
+    all.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|r| r.at)
 }
 
 #[cfg(test)]

@@ -117,6 +117,15 @@ pub struct Residual {
     pub at: Point,
 }
 
+impl Residual {
+    /// The rejected one that is nearest to a point of the picture, within `reach_px`.
+    pub fn rejected_at(all: &[Self], p: Point, reach_px: f64) -> Option<&Self> {
+        let apart = |r: &&Self| (r.at[0] - p[0]).hypot(r.at[1] - p[1]);
+        let rejected = all.iter().filter(|r| r.weight <= 0.0 && apart(r) <= reach_px);
+        rejected.min_by(|a, b| apart(a).total_cmp(&apart(b)))
+    }
+}
+
 impl Answer {
     /// The solution, when there is one.
     pub fn solution(&self) -> Option<&Solution<f64>> {
@@ -322,4 +331,17 @@ fn residuals(s: &Solution<f64>, edge: &Edge, camera: &Camera<f64>) -> Vec<Residu
         })
     };
     edge.points.iter().zip(&edge.weights).filter_map(residual).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_rejected_point_is_found() {
+        let at = |x: f64, weight: f64| Residual { azimuth_deg: 0.0, distance_px: x, weight, at: [x, 0.0] };
+        let all = [at(1.0, 0.0), at(2.0, 1.0), at(3.0, 0.0)];
+        let found = |x: f64| Residual::rejected_at(&all, [x, 0.0], 1.5).map(|r| r.distance_px);
+        assert_eq!((found(2.2), found(0.0), found(9.0)), (Some(3.0), Some(1.0), None));
+    }
 }

@@ -1,1 +1,245 @@
-//! By mouse.
+//! By mouse: the mask, files dropped, clicks in plots and in the time line.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use egui::{Key, PointerButton, Pos2, Rect, pos2};
+use egui_kittest::kittest::Queryable;
+use hzn_viewer::model::view::{Area, Point};
+
+use crate::window::*;
+
+const SIZE: Point = [WIDTH as f64, HEIGHT as f64];
+
+fn area(window: &Window) -> Area {
+    let rect = window.get_by_label(&format!("Picture {}", sight(window).name)).rect();
+    Area { min: [rect.min.x.into(), rect.min.y.into()], size: [rect.width().into(), rect.height().into()] }
+}
+
+/// Where a point of the picture is on the screen.
+fn at(window: &Window, p: Point) -> Pos2 {
+    let [x, y] = window.state().view().to_screen(area(window), SIZE, p);
+    pos2(x as f32, y as f32)
+}
+
+fn button(window: &mut Window, pos: Pos2, button: PointerButton, pressed: bool) {
+    window.hover_at(pos);
+    window.event(egui::Event::PointerButton { pos, button, pressed, modifiers: egui::Modifiers::NONE });
+    window.step();
+}
+
+fn click_with(window: &mut Window, pos: Pos2, which: PointerButton) {
+    button(window, pos, which, true);
+    button(window, pos, which, false);
+    // Two clicks in a row are no double click.
+    window.run_steps(30);
+}
+
+fn click(window: &mut Window, pos: Pos2) {
+    click_with(window, pos, PointerButton::Primary);
+}
+
+fn drag(window: &mut Window, from: Pos2, to: Pos2) {
+    button(window, from, PointerButton::Primary, true);
+    for i in 1..=8 {
+        window.hover_at(from + (to - from) * (i as f32 / 8.0));
+        window.step();
+    }
+    button(window, to, PointerButton::Primary, false);
+    window.run_steps(2);
+}
+
+fn polygons(window: &Window) -> Vec<Vec<Point>> {
+    window.state().session().unwrap().polygons()
+}
+
+fn near(a: Point, b: Point) -> bool {
+    (a[0] - b[0]).hypot(a[1] - b[1]) < 0.8
+}
+
+#[test]
+fn the_mask_is_drawn_moved_and_removed() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    let mut window = window_on(dir.path());
+    let before = answer(&window);
+    let edge_points = |w: &Window| sight(w).answers[0].bodies[0].row.edge_points.unwrap();
+    let points = edge_points(&window);
+    // Over the right part of the limb.
+    let limb = sight(&window).answers[0].bodies[0].limb.concat();
+    let middle = limb.iter().filter(|p| p[0] > 220.0 && p[0] < 230.0).map(|p| p[1]).next().unwrap();
+    let corners = [[200.0, middle - 40.0], [300.0, middle - 40.0], [300.0, middle + 40.0], [200.0, middle + 40.0]];
+    window.key_press(Key::M);
+    window.run_steps(2);
+    for corner in corners {
+        let pos = at(&window, corner);
+        click(&mut window, pos);
+    }
+    assert!(polygons(&window).is_empty(), "not closed yet");
+    let first = at(&window, corners[0]);
+    click(&mut window, first);
+    settled(&mut window);
+    let drawn = polygons(&window);
+    assert_eq!(drawn.len(), 1);
+    assert!(drawn[0].iter().zip(corners).all(|(a, b)| near(*a, b)), "{drawn:?}");
+    assert!(edge_points(&window) < points, "masked points are left out");
+    assert!(window.state().session().unwrap().sheet().text().contains("[mask]\npolygons_px = "));
+
+    // A corner is moved: one step to undo.
+    let (from, to) = (at(&window, corners[1]), at(&window, [280.0, middle - 50.0]));
+    drag(&mut window, from, to);
+    settled(&mut window);
+    assert!(near(polygons(&window)[0][1], [280.0, middle - 50.0]), "{:?}", polygons(&window));
+    window.get_by_label("Undo").click();
+    settled(&mut window);
+    assert_eq!(polygons(&window), drawn);
+
+    // A right click on a corner removes it, one within the rest all of it.
+    let corner = at(&window, corners[2]);
+    click_with(&mut window, corner, PointerButton::Secondary);
+    assert_eq!(polygons(&window)[0].len(), 3);
+    let inside = at(&window, [215.0, middle - 20.0]);
+    click_with(&mut window, inside, PointerButton::Secondary);
+    settled(&mut window);
+    assert!(polygons(&window).is_empty());
+    assert_eq!(answer(&window), before);
+    // With the tool put away, a click draws nothing.
+    window.key_press(Key::Escape);
+    window.run_steps(2);
+    for corner in corners {
+        let pos = at(&window, corner);
+        click(&mut window, pos);
+    }
+    window.key_press(Key::Enter);
+    window.run_steps(2);
+    assert!(polygons(&window).is_empty());
+}
+
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        Err("the window reads paths".into())
+    }
+}
+
+fn drop_files(window: &mut Window, paths: &[&Path]) {
+    let handle = |p: &&Path| Arc::new(Dropped(p.to_path_buf())) as egui::DroppedFileHandle;
+    window.input_mut().dropped_files = paths.iter().map(handle).collect();
+    window.step();
+    window.input_mut().dropped_files.clear();
+    window.run_steps(2);
+}
+
+#[test]
+fn what_is_dropped_is_opened() {
+    let dir = tempfile::tempdir().unwrap();
+    let pictures = dir.path().join("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    flight(&pictures);
+    let mut window = window();
+    drop_files(&mut window, &[&pictures]);
+    settled(&mut window);
+    assert_eq!(window.state().sequence().len(), 4);
+    let before = answer(&window);
+
+    // A sensor.toml is for the pictures that are open.
+    let other = dir.path().join("other.toml");
+    std::fs::write(&other, SENSOR.replace("scale = 1.0", "scale = 1.6")).unwrap();
+    drop_files(&mut window, &[&other]);
+    settled(&mut window);
+    assert_eq!(window.state().session().unwrap().path(), Some(&*other));
+    assert!(answer(&window).1 > before.1);
+
+    // Some pictures are a sequence of their own.
+    drop_files(&mut window, &[&pictures.join("1.png"), &pictures.join("2.png")]);
+    until(&mut window, "two pictures", |v| v.sequence().len() == 2 && v.is_settled());
+    assert_eq!(sight(&window).name, "1.png");
+    // Nothing of the kind: what is open stays.
+    drop_files(&mut window, &[&dir.path().join("none.mcap")]);
+    said(&mut window, "no such file");
+    assert_eq!(window.state().sequence().len(), 2);
+}
+
+fn plot(window: &Window, name: &str) -> Rect {
+    window.get_by_label(&format!("Plot {name}")).rect()
+}
+
+#[test]
+fn a_click_in_a_plot_or_the_time_line_goes_to_the_frame() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    let mut window = window_on(dir.path());
+    window.get_by_label("Process all").click();
+    window.run_steps(2);
+    until(&mut window, "not processed", |v| v.processed() == 4);
+    let rect = plot(&window, "RMS");
+    click(&mut window, pos2(rect.right() - 4.0, rect.center().y - 10.0));
+    settled(&mut window);
+    assert_eq!(sight(&window).index, 3);
+    let rect = plot(&window, "3 sigma");
+    // Beyond the numbers at its left.
+    click(&mut window, pos2(rect.left() + 60.0, rect.center().y - 10.0));
+    settled(&mut window);
+    assert_eq!(sight(&window).index, 0);
+
+    let strip = window.get_by_label("Time line").rect();
+    let place = |part: f32| pos2(strip.left() + part * strip.width(), strip.bottom() - 6.0);
+    click(&mut window, place(0.6));
+    settled(&mut window);
+    assert_eq!(sight(&window).index, 2);
+    drag(&mut window, place(0.6), place(0.3));
+    settled(&mut window);
+    assert_eq!(sight(&window).index, 1);
+}
+
+#[test]
+fn a_click_among_the_residuals_shows_the_point() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    let mut window = window_on(dir.path());
+    window.get_by_label("Residuals").click();
+    window.run_steps(4);
+    let rect = plot(&window, "Residuals");
+    click(&mut window, pos2(rect.center().x + 20.0, rect.center().y - 10.0));
+    let view = window.state().view();
+    assert!(view.scale(area(&window), SIZE) >= 8.0);
+    let middle = area(&window);
+    let middle = [middle.min[0] + middle.size[0] / 2.0, middle.min[1] + middle.size[1] / 2.0];
+    let shown = view.to_picture(area(&window), SIZE, middle);
+    let residuals = &sight(&window).answers[0].bodies[0].residuals;
+    assert!(residuals.iter().any(|r| near(r.at, shown)), "{shown:?}");
+}
+
+#[test]
+fn the_wheel_zooms_about_the_pointer_and_a_drag_moves() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    let mut window = window_on(dir.path());
+    let pixel = [80.0, 60.0];
+    let pointer = at(&window, pixel);
+    window.hover_at(pointer);
+    window.step();
+    for _ in 0..6 {
+        window.event(egui::Event::MouseWheel {
+            unit: egui::MouseWheelUnit::Point,
+            delta: egui::vec2(0.0, 120.0),
+            phase: egui::TouchPhase::Move,
+            source: egui::MouseWheelSource::Wheel,
+            modifiers: egui::Modifiers::NONE,
+        });
+        window.run_steps(10);
+    }
+    let view = window.state().view();
+    assert!(view.scale(area(&window), SIZE) > 6.0, "{view:?}");
+    assert!(at(&window, pixel).distance(pointer) < 1.0);
+    drag(&mut window, pointer, pointer + egui::vec2(40.0, 30.0));
+    assert!(at(&window, pixel).distance(pointer + egui::vec2(40.0, 30.0)) < 8.0);
+    window.key_press(Key::Num0);
+    window.run_steps(2);
+    assert!(window.state().view().is_fit());
+}

@@ -1,9 +1,8 @@
 //! Looking, stepping, tuning, saving, comparing.
 
-use egui::{Key, Modifiers, Role};
+use egui::{Key, Role};
 use egui_kittest::kittest::Queryable;
 use hzn_core::status::Status;
-use hzn_viewer::ui::Viewer;
 
 use crate::window::*;
 
@@ -95,6 +94,42 @@ fn two_presets_stand_side_by_side() {
     assert_ne!(a.config, b.config);
     assert_eq!(a.config.camera, b.config.camera);
     assert!(window.query_by_label("Compared with dlr-2022").is_some());
+}
+
+#[test]
+fn two_sensor_files_stand_side_by_side_with_the_difference() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    let other = dir.path().join("other.toml");
+    std::fs::write(&other, SENSOR.replace("scale = 1.0", "scale = 1.6")).unwrap();
+    let mut window = window_on(dir.path());
+    menu(&mut window, "Compare", "with another sensor.toml…");
+    path(&mut window, &other, "Open this");
+    until(&mut window, "not compared", |v| v.sight().is_some_and(|s| s.answers.len() == 2));
+    window.run_steps(3);
+    assert!(window.query_by_label("Compared with other.toml").is_some());
+    let [a, b] = [0, 1].map(|i| sight(&window).answers[i].bodies[0].row.clone());
+    assert_eq!([a.status, b.status], [Status::Ok; 2]);
+    let apart = hzn_viewer::model::rows::angle_deg(a.axis().unwrap(), b.axis().unwrap());
+    assert!(apart > 0.0);
+    assert!(window.query_by_label(&format!("{apart:.4}° apart")).is_some());
+    let level = f64::from(b.level.unwrap()) - f64::from(a.level.unwrap());
+    assert!(level > 0.0 && window.query_by_label(&format!("{level:+.0}")).is_some());
+    // The session goes on being tuned; the other stays.
+    window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(1.6);
+    until(&mut window, "not equal", |v| {
+        v.sight().is_some_and(|s| {
+            s.answers.len() == 2 && s.answers[0].bodies[0].row.axis() == s.answers[1].bodies[0].row.axis()
+        })
+    });
+    // A file that is none is said, and the comparison stays.
+    std::fs::write(&other, "preset = 3").unwrap();
+    menu(&mut window, "Compare", "with another sensor.toml…");
+    path(&mut window, &other, "Open this");
+    said(&mut window, "other.toml");
+    assert_eq!(sight(&window).answers.len(), 2);
+    menu(&mut window, "Compare", "Stop comparing");
+    until(&mut window, "still compared", |v| v.sight().is_some_and(|s| s.answers.len() == 1));
 }
 
 #[test]

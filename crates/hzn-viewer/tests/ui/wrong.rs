@@ -1,9 +1,8 @@
 //! Wrong input: it is said in place, and the rest keeps working.
 
-use egui::{Key, Modifiers, Role};
+use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use hzn_core::status::Status;
-use hzn_viewer::ui::Viewer;
 
 use crate::window::*;
 
@@ -39,6 +38,16 @@ fn wrong_files_are_said_and_the_rest_goes_on() {
     window.key_press(Key::ArrowRight);
     settled(&mut window);
     assert_eq!(answer(&window).0, Status::NoLimb);
+}
+
+#[test]
+fn missing_pictures_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    std::fs::write(dir.path().join("frames.csv"), "file,time_s\n0.png,0\n1.png,1\nlost.png,2\ngone.png,3\n").unwrap();
+    let mut window = window_on(dir.path());
+    said(&mut window, "2 pictures that frames.csv names are not there, the first is lost.png");
+    assert_eq!((window.state().sequence().len(), answer(&window).0), (4, Status::Ok));
 }
 
 #[test]

@@ -31,7 +31,8 @@ fn size_of(sight: &Sight) -> Option<Point> {
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     egui::CentralPanel::no_frame().show(ui, |ui| {
         let rect = ui.max_rect();
-        ui.painter().rect_filled(rect, 0, ui.visuals().extreme_bg_color);
+        let ground = if ui.visuals().dark_mode { ui.visuals().extreme_bg_color } else { Color32::from_gray(214) };
+        ui.painter().rect_filled(rect, 0, ground);
         if viewer.sequence.title.is_empty() {
             return welcome(viewer, ui);
         }
@@ -154,6 +155,20 @@ fn pointer(viewer: &mut Viewer, ui: &Ui, response: &Response, stage: &mut Stage<
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
     }
     stage.view != before
+}
+
+/// Shows a point of the camera's picture, large enough to see single pixels.
+pub(super) fn look_at(viewer: &mut Viewer, p: Point) {
+    const SCALE: f64 = 8.0;
+    let Some(sight) = &viewer.sight else { return };
+    let plane = sight.image.as_ref().map(|s| &s.of.1.plane);
+    let shown = match (plane, sight.camera.as_deref()) {
+        (Some(plane), Some(camera)) => plane.show(camera, p),
+        _ => Some(p),
+    };
+    if let (Some(size), Some(p)) = (size_of(sight), shown) {
+        viewer.view.look_at(size, p, SCALE);
+    }
 }
 
 /// Zoom by key or menu, about the middle of the window.

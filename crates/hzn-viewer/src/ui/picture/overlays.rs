@@ -148,29 +148,36 @@ fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &Answer) {
         return;
     }
     let tip = from + way * (reach - 6.0);
-    let (back, side) = (tip - way * 22.0, vec2(-way.y, way.x) * 5.5);
-    let head = vec![tip, tip - way * 10.0 + side, tip - way * 10.0 - side];
-    painter.line_segment([back, tip - way * 8.0], Stroke::new(5.0, Color32::from_black_alpha(150)));
-    painter.line_segment([back, tip - way * 8.0], Stroke::new(2.5, theme::AXIS));
+    let (back, side) = (tip - way * 32.0, vec2(-way.y, way.x) * 7.5);
+    let head = vec![tip, tip - way * 14.0 + side, tip - way * 14.0 - side];
+    painter.line_segment([back, tip - way * 12.0], Stroke::new(6.5, Color32::from_black_alpha(170)));
+    painter.line_segment([back, tip - way * 12.0], Stroke::new(3.5, theme::AXIS));
     painter.add(Shape::convex_polygon(head, theme::AXIS, Stroke::new(1.0, Color32::from_black_alpha(150))));
     let degrees = s.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
     let text = format!("axis, {degrees:.1}° off the optical axis");
     let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), theme::AXIS);
-    // Behind the arrow, on the side that it comes from.
-    let align = match way {
-        w if w.x > 0.4 => Align2::RIGHT_CENTER,
-        w if w.x < -0.4 => Align2::LEFT_CENTER,
-        w if w.y > 0.0 => Align2::CENTER_BOTTOM,
-        _ => Align2::CENTER_TOP,
-    };
-    let rect = align.anchor_size(back - way * 8.0, galley.size() + vec2(10.0, 4.0));
-    let inward = |low: f32, high: f32, min: f32, max: f32| (min - low).max(0.0) - (high - max).max(0.0);
-    let rect = rect.translate(vec2(
-        inward(rect.left(), rect.right(), frame.left(), frame.right()),
-        inward(rect.top(), rect.bottom(), frame.top(), frame.bottom()),
-    ));
+    let rect = beside(Rect::from_two_pos(back, tip).expand(7.0), way, galley.size() + vec2(10.0, 4.0), frame);
     painter.rect_filled(rect, 4, Color32::from_black_alpha(170));
     painter.galley(rect.min + vec2(5.0, 2.0), galley, theme::AXIS);
+}
+
+/// Where a label of this size stands beside an arrow: as far back as it can without leaving the frame, and never over
+/// the arrow.
+fn beside(arrow: Rect, way: Vec2, size: Vec2, frame: Rect) -> Rect {
+    let c = arrow.center();
+    // Along the border it may move, to stay within.
+    let x = (c.x - size.x / 2.0).min(frame.right() - size.x).max(frame.left());
+    let y = (c.y - size.y / 2.0).min(frame.bottom() - size.y).max(frame.top());
+    let mut places = [
+        pos2(arrow.left() - size.x, y),
+        pos2(arrow.right(), y),
+        pos2(x, arrow.top() - size.y),
+        pos2(x, arrow.bottom()),
+    ]
+    .map(|min| Rect::from_min_size(min, size));
+    let ahead = |r: &Rect| (r.center() - c).dot(way);
+    places.sort_by(|a, b| ahead(a).total_cmp(&ahead(b)));
+    places.into_iter().find(|r| frame.expand(0.5).contains_rect(*r)).unwrap_or(places[0])
 }
 
 fn cross(painter: &Painter, at: Pos2, arm: f32, stroke: Stroke) {
@@ -228,4 +235,25 @@ fn hatch(painter: &Painter, outline: &[Pos2]) {
         y += 9.0;
     }
     painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.5, theme::MASK)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_covers_neither_its_arrow_nor_the_border() {
+        let frame = Rect::from_min_size(pos2(20.0, 30.0), vec2(500.0, 300.0));
+        let size = vec2(180.0, 18.0);
+        for i in 0..72 {
+            let way = Vec2::angled(i as f32 * std::f32::consts::TAU / 72.0);
+            for tip in [pos2(24.0, 34.0), pos2(516.0, 34.0), pos2(516.0, 326.0), pos2(270.0, 326.0), pos2(24.0, 180.0)]
+            {
+                let arrow = Rect::from_two_pos(tip, tip - way * 22.0).expand(7.0);
+                let label = beside(arrow, way, size, frame);
+                assert!(frame.expand(0.5).contains_rect(label), "{way:?} {tip:?} {label:?}");
+                assert!(!label.shrink(0.1).intersects(arrow), "{way:?} {tip:?} {label:?}");
+            }
+        }
+    }
 }

@@ -6,10 +6,13 @@ use hzn_core::pixel::ImagePoint;
 use super::stage::Stage;
 use crate::model::{Plane, rows};
 use crate::work::paint;
-use crate::work::sight::{Answer, Outcome, Sight};
+use crate::work::sight::{Answer, Outcome, Residual, Sight};
 
 /// Screen points a picture pixel from which single pixels show their values.
 const VALUES_FROM: f64 = 34.0;
+
+/// How near the pointer must be to a rejected point, screen points.
+const REJECTED_REACH: f64 = 6.0;
 
 /// Values of single pixels, when they are large enough.
 pub(super) fn values(painter: &Painter, sight: &Sight, stage: &Stage<'_>, rect: Rect) {
@@ -61,6 +64,12 @@ pub(super) fn under_pointer(
         let beyond = angle - s.fused_half_angle_rad.to_degrees();
         let side = if beyond > 0.0 { "outside of" } else { "inside" };
         text += &format!("   {angle:.3}° from the body's axis, {:.3}° {side} the limb", beyond.abs());
+    }
+    if let Some((outcome, answer)) = outcome.and_then(|o| Some((o, o.bodies.get(body)?)))
+        && let Some(r) = Residual::rejected_at(&answer.residuals, p, REJECTED_REACH / stage.scale())
+    {
+        let limit = outcome.config.reject.threshold_px;
+        text += &format!("   rejected point: {:+.2} px from the fitted limb (threshold_px {limit})", r.distance_px);
     }
     Some(text)
 }

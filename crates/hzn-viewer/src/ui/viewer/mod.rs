@@ -182,6 +182,10 @@ impl Viewer {
     pub fn recorded(&self, frame: usize) -> Option<&hzn_mcap::Row> {
         self.rows.recorded(frame, self.body)
     }
+    /// Where the picture lies on the screen.
+    pub fn view(&self) -> View {
+        self.view
+    }
     /// What is said to the user.
     pub fn messages(&self) -> impl Iterator<Item = &str> {
         self.messages.iter().map(|m| m.text.as_str())
@@ -256,8 +260,8 @@ impl Viewer {
         // What was turned just now is in the picture of this very frame, when the answer is quick.
         self.ask();
         self.wait(&ctx);
+        compare::show(self, ui);
         picture::show(self, ui);
-        compare::show(self, &ctx);
         dialogs::show(self, &ctx);
         help::show(self, &ctx);
         self.ask();
