@@ -6,6 +6,9 @@ use super::viewer::Viewer;
 use crate::model::rows;
 use crate::work::sight::Answer;
 
+/// A line of the table: what it shows of a column.
+type Line = fn(&Column) -> &str;
+
 /// A value of both answers, and their difference.
 struct Column {
     name: &'static str,
@@ -48,7 +51,7 @@ fn table(ui: &mut Ui, name: &str, columns: &[Column]) {
             ui.weak(RichText::new(c.name).size(12.0));
         });
         ui.end_row();
-        let lines: [(&str, fn(&Column) -> &str); 3] =
+        let lines: [(&str, Line); 3] =
             [("session", |c| &c.session), (name, |c| &c.other), ("difference", |c| &c.difference)];
         for (head, of) in lines {
             ui.weak(RichText::new(head).size(12.0));
