@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use anyhow::Context;
-use hzn_core::{Config, HostHorizon};
+use hzn_core::body::Kind;
+use hzn_core::{Config, HostHorizon, Report};
 use hzn_sim::evaluate::{Answer, Case, Evaluation, Found, pair};
 use hzn_sim::{Flight, FlightFrame, Truth};
 use rayon::prelude::*;
@@ -38,6 +39,9 @@ pub(crate) struct Flown {
     pub(crate) elapsed_us: Vec<f64>,
 }
 
+/// Of one picture: the truth of each body, and for each sensor an answer a body with the time they took in µs.
+type Seen = (Vec<Truth>, Vec<(Vec<Answer>, f64)>);
+
 /// The pictures of a flight through sensors: cases, one list a sensor.
 pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec<Case>>> {
     Ok(fly_timed(flight, sensors)?.into_iter().map(|flown| flown.cases).collect())
@@ -48,50 +52,60 @@ pub(crate) fn fly_timed(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<V
     let make = || sensors.iter().map(|s| HostHorizon::boxed(&s.config)).collect::<Result<Vec<_>, _>>();
     // Refused here, not in a thread.
     make()?;
-    let seen: Vec<(Truth, Vec<(Answer, f64)>)> = flight
+    let kinds: Vec<Kind> = flight.sensor.each_body().iter().map(|b| b.kind).collect();
+    let seen: Vec<Seen> = flight
         .frames
         .par_iter()
         .map_init(make, |horizons, frame| {
-            let truth = frame.scene.truth_of(flight.sensor.body.kind, &frame.file, frame.time_s)?;
+            let truth_of = |&kind: &Kind| frame.scene.truth_of(kind, &frame.file, frame.time_s);
+            let truths: Vec<Truth> = kinds.iter().map(truth_of).collect::<Result<_, _>>()?;
             let picture = frame.render()?;
             let horizons = horizons.as_mut().map_err(|e| *e)?;
             let answers = horizons.iter_mut().zip(sensors);
-            let answers = answers.map(|(horizon, sensor)| look(horizon, sensor, frame, &picture, &truth));
+            let answers = answers.map(|(horizon, sensor)| look(horizon, sensor, frame, &picture, &truths));
             let answers = answers.collect::<anyhow::Result<_>>()?;
-            anyhow::Ok((truth, answers))
+            anyhow::Ok((truths, answers))
         })
         .collect::<anyhow::Result<_>>()?;
-    let truth: Vec<Truth> = seen.iter().map(|(t, _)| t.clone()).collect();
+    let truth: Vec<Truth> = seen.iter().flat_map(|(t, _)| t.clone()).collect();
     let of = |i: usize| {
-        let (answers, elapsed_us): (Vec<Answer>, Vec<f64>) = seen.iter().filter_map(|(_, a)| a.get(i).cloned()).unzip();
+        let (answers, elapsed_us): (Vec<Vec<Answer>>, Vec<f64>) =
+            seen.iter().filter_map(|(_, a)| a.get(i).cloned()).unzip();
         let camera = hzn_core::camera::Camera::try_new(&flight.sensor.camera)?;
-        Ok(Flown { cases: pair(&answers, &truth, Some(&camera))?, elapsed_us })
+        Ok(Flown { cases: pair(&answers.concat(), &truth, Some(&camera))?, elapsed_us })
     };
     (0..sensors.len()).map(of).collect()
 }
 
+/// One picture through one sensor: an answer a body.
 fn look(
     horizon: &mut HostHorizon,
     sensor: &Sensor,
     frame: &FlightFrame,
     picture: &hzn_sim::Picture,
-    truth: &Truth,
-) -> anyhow::Result<(Answer, f64)> {
+    truths: &[Truth],
+) -> anyhow::Result<(Vec<Answer>, f64)> {
     let known = match sensor.attitude_sigma_deg {
         Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
         None => frame.known(),
     };
-    let expected = horizon.expect(&known).with_context(|| frame.file.clone())?;
+    let expected = (0..truths.len()).map(|which| horizon.expect_body(which, &known)).collect::<Result<Vec<_>, _>>();
+    let expected = expected.with_context(|| frame.file.clone())?;
     let begun = Instant::now();
-    let report = horizon.process(&picture.view(), &expected);
+    let reports = horizon.process_each(&picture.view(), &expected);
     let elapsed_us = begun.elapsed().as_secs_f64() * 1e6;
-    let found = report.solution.as_ref().map(|s| Found {
-        axis: s.axis.xyz(),
-        covariance_rad2: s.covariance.upper_rad2,
-        half_angle_deg: Some(s.half_angle_rad.to_degrees()),
-    });
-    let (file, body) = (frame.file.clone(), truth.body.clone());
-    Ok((Answer { file, time_s: frame.time_s, body, status: report.status, found }, elapsed_us))
+    let answer = |(report, truth): (&Report<f64>, &Truth)| Answer {
+        file: frame.file.clone(),
+        time_s: frame.time_s,
+        body: truth.body.clone(),
+        status: report.status,
+        found: report.solution.as_ref().map(|s| Found {
+            axis: s.axis.xyz(),
+            covariance_rad2: s.covariance.upper_rad2,
+            half_angle_deg: Some(s.half_angle_rad.to_degrees()),
+        }),
+    };
+    Ok((reports.iter().zip(truths).map(answer).collect(), elapsed_us))
 }
 
 /// The one evaluation of cases of one body.
@@ -152,8 +166,17 @@ pub(crate) fn wrong(cases: &[Case]) -> String {
             false => Some(format!("{} (no limb, sigma {sigma:.2}°; {:.0}° off nadir)", c.file, c.off_nadir_deg)),
         }
     });
-    wrong.collect::<Vec<_>>().join(", ")
+    let mut wrong: Vec<String> = wrong.collect();
+    let more = wrong.len().saturating_sub(SHOWN);
+    wrong.truncate(SHOWN);
+    if more > 0 {
+        wrong.push(format!("and {more} more"));
+    }
+    wrong.join(", ")
 }
+
+/// Wrong answers that are told one by one.
+const SHOWN: usize = 4;
 
 /// Larger errors are another curve than the limb, not a limb that is measured badly.
 pub(crate) const GROSS_DEG: f64 = 2.0;

@@ -107,6 +107,12 @@ fn what_cannot_be_is_said_before_anything_is_written() {
     assert!(late.contains("[capture] to_s") && late.contains("after the impact"), "{late}");
     let table = SCENE.replace("[trajectory.rocket]", "[trajectory.table]\nfile = \"way.csv\"");
     assert!(refused(&table).contains("way.csv"));
+    std::fs::write(at.join("way.csv"), "time_s,x_km,y_km,z_km\n0,6383,0,0\n500,6383,0,1\n").unwrap();
+    let inside = refused(&table);
+    assert!(
+        inside.contains("[trajectory]: at 70.0 s the camera is at 4.9 km, inside the Earth or its limb"),
+        "{inside}"
+    );
 
     let (code, _, stderr) = hzn(at, "1", &["simulate", "rockett", "-o", "out"]);
     assert_eq!((code, stderr.as_str()), (2, "error: rockett: no such scene or file; did you mean rocket?\n"));
@@ -157,6 +163,22 @@ fn radiances_of_ones_own() {
     let rms_deg = known["evaluations"][0]["errors"]["rms_deg"].as_f64().unwrap();
     assert!(rms_deg < 0.05, "{rms_deg}");
 
+    // The folder holds all that its scene needs, wherever it is.
+    std::fs::rename(at.join("out"), at.join("moved")).unwrap();
+    std::fs::remove_file(at.join("radiance.csv")).unwrap();
+    let (code, _, stderr) = hzn(at, "2", &["simulate", "moved/scene.toml", "-o", "again", "-q"]);
+    assert_eq!(code, 0, "{stderr}");
+    for file in ["leo-infrared-00011.png", "scene.toml", "scene-radiance.csv", "sensor.toml"] {
+        let read = |folder: &str| std::fs::read(at.join(folder).join(file)).unwrap();
+        assert!(read("moved") == read("again"), "{file}");
+    }
+    std::fs::write(at.join("moved/scene-radiance.csv"), radiances().replace("0.600", "0.650")).unwrap();
+    let (code, _, stderr) = hzn(at, "1", &["simulate", "moved/scene.toml", "-o", "again", "--resume"]);
+    assert!(code == 2 && stderr.contains("again/scene-radiance.csv: is not what the scene names"), "{stderr}");
+
+    let (code, _, stderr) = simulate(&radiances().replacen("0.800", "0.000", 1));
+    let what = "line 2: radiance = 0 at 0 km at latitude -90 and season 0 deg: must be above 0 at the lowest";
+    assert!(code == 2 && stderr.contains(what), "{stderr}");
     let (code, _, stderr) = simulate(&radiances().replace("25,90,0.600", "25,90,6"));
     assert_eq!(code, 2);
     let what = "line 15: radiance = 6: must be 0 to 1, a fraction of full scale";

@@ -17,4 +17,7 @@ pub enum SceneError {
     /// There is no Moon in the scene.
     #[error("the scene has no Moon")]
     Moon,
+    /// The picture cannot be kept as JPEG.
+    #[error("as JPEG: {0}")]
+    Jpeg(String),
 }

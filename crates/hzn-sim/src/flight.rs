@@ -39,6 +39,8 @@ pub struct FlightFrame {
     pub utc: Option<String>,
     /// What is seen.
     pub scene: Scene,
+    /// Quality of the JPEG file that it is kept as, 1 to 100; `None`: without loss.
+    pub jpeg_quality: Option<u8>,
 }
 
 /// A row of frames.csv: what is told about one picture. The fields are the file's columns, in this order.
@@ -90,12 +92,16 @@ impl FlightFrame {
             attitude_sigma_deg: None,
         }
     }
-    /// The picture.
+    /// The picture as who reads its file has it: with the losses of JPEG where it is kept as such.
     ///
     /// # Errors
     /// As [`Scene::render`].
     pub fn render(&self) -> Result<Picture, SceneError> {
-        self.scene.render()
+        let picture = self.scene.render()?;
+        match self.jpeg_quality {
+            Some(quality) => picture.through_jpeg(quality).map_err(|e| SceneError::Jpeg(e.to_string())),
+            None => Ok(picture),
+        }
     }
     /// The truth.
     ///
@@ -223,7 +229,7 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
                 seed: seed_of(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position, look))
             };
-            FlightFrame { file: format!("rocket-{index:04}.png"), time_s, utc: None, scene }
+            FlightFrame { file: format!("rocket-{index:04}.png"), time_s, utc: None, scene, jpeg_quality: None }
         })
         .collect();
     Flight { name: "rocket".into(), sensor, frames }
@@ -255,7 +261,7 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
                 seed: seed_of(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position_m(lat_deg, lon_deg, 600.0), look))
             };
-            FlightFrame { file: format!("leo-infrared-{index:04}.png"), time_s, utc: None, scene }
+            FlightFrame { file: format!("leo-infrared-{index:04}.png"), time_s, utc: None, scene, jpeg_quality: None }
         })
         .collect();
     Flight { name: "leo-infrared".into(), sensor, frames }

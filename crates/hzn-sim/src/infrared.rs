@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::globe::{Globe, Sight, View};
 use crate::pose::Pose;
 use crate::radiance::{Grid, Radiance, mean_over_globe};
-use crate::texture::{CloudField, Clouds};
+use crate::texture::{CloudField, Clouds, Drawn};
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 use std::path::{Path, PathBuf};
@@ -211,18 +211,22 @@ impl Warmth {
     }
 
     pub(crate) fn row(&self, v: f64, weight: f32, row: &mut [f32]) {
+        let drawn = &mut Drawn::default();
         for (x, p) in row.iter_mut().enumerate() {
             let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { continue };
             let sight = self.view.look(ray.direction().xyz());
-            let light = if sight.miss.abs() > self.near {
-                if sight.miss > 0.0 { self.space } else { self.at(&sight, self.view.tangent_height_m(&sight)) }
+            let middle = self.view.tangent_height_m(&sight);
+            let light = if sight.miss > self.near {
+                self.space
+            } else if sight.miss < -self.near {
+                self.under(&sight, drawn).at(middle)
             } else {
+                let under = self.under(&sight, drawn);
                 let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
-                let middle = self.view.tangent_height_m(&sight);
                 let mut sum = 0.0;
                 for (i, j) in (0..SAMPLES).flat_map(|i| (0..SAMPLES).map(move |j| (i, j))) {
                     let [du, dv] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(SAMPLES) - 0.5);
-                    sum += self.at(&sight, middle + gradient[0] * du + gradient[1] * dv);
+                    sum += under.at(middle + gradient[0] * du + gradient[1] * dv);
                 }
                 sum / (SAMPLES * SAMPLES) as f32
             };
@@ -230,23 +234,38 @@ impl Warmth {
         }
     }
 
-    /// Brightness along a ray whose tangent height is taken to be this.
-    fn at(&self, sight: &Sight, height_m: f64) -> f32 {
+    /// What stands where a ray meets or passes the globe.
+    fn under(&self, sight: &Sight, drawn: &mut Drawn) -> Under<'_> {
         let point = self.view.point(sight);
-        let latitude = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
-        let mut light = self.table.at(height_m * 1e-3, latitude);
+        let latitude_deg = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
+        let mut cloud = None;
         if sight.miss < 0.0
             && let Some(clouds) = &self.clouds
         {
             let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
             let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(0.02)) as f32;
-            if let Some((cover, bright)) = clouds.at(&point, footprint_km) {
-                // Clouds drown in the stratosphere's own light towards the limb.
-                let seen = (2.0 * cos * cos).min(1.0) as f32;
-                light += cover * seen * (bright * self.disc - light);
-            }
+            // Clouds drown in the stratosphere's own light towards the limb.
+            let seen = (2.0 * cos * cos).min(1.0) as f32;
+            cloud = clouds.at(&point, footprint_km, drawn).map(|(cover, bright)| (cover * seen, bright * self.disc));
         }
-        self.space + light * (1.0 - self.space)
+        Under { warmth: self, latitude_deg, cloud }
+    }
+}
+
+/// What stands under a ray.
+struct Under<'a> {
+    warmth: &'a Warmth,
+    latitude_deg: f64,
+    /// A cloud's weight and light.
+    cloud: Option<(f32, f32)>,
+}
+
+impl Under<'_> {
+    /// Brightness of a ray whose tangent height is taken to be this.
+    fn at(&self, height_m: f64) -> f32 {
+        let clear = self.warmth.table.at(height_m * 1e-3, self.latitude_deg);
+        let light = self.cloud.map_or(clear, |(weight, cloud)| clear + weight * (cloud - clear));
+        self.warmth.space + light * (1.0 - self.warmth.space)
     }
 }
 

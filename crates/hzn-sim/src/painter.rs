@@ -18,7 +18,7 @@ use crate::height::LimbHeight;
 use crate::pose::Pose;
 use crate::render::beyond_circle;
 use crate::scene::{Band, Profile, Scene, Sky, World};
-use crate::texture::{CloudField, smoothstep};
+use crate::texture::{CloudField, Drawn, smoothstep};
 use crate::visible::air::Prepared;
 
 use edge::Edge;
@@ -128,14 +128,17 @@ impl Painter {
     pub(crate) fn row(&self, v: f64, row: &mut [f32]) {
         let ray = |x: usize| self.camera.ray(ImagePoint { u: x as f64, v }).map(|r| Vector3::from(r.direction().xyz()));
         let mut next = ray(0);
+        let drawn = &mut Drawn::default();
         for (block, pixels) in row.chunks_mut(STRIDE).enumerate() {
             let start = block * STRIDE;
             let (first, last) = (next, ray(start + STRIDE));
             next = last;
             for (i, p) in pixels.iter_mut().enumerate() {
                 *p = match (first, last) {
-                    (Some(a), Some(b)) => self.roughly((a + (b - a) * (i as f64 / STRIDE as f64)).into(), start + i, v),
-                    _ => self.exactly(start + i, v),
+                    (Some(a), Some(b)) => {
+                        self.roughly((a + (b - a) * (i as f64 / STRIDE as f64)).into(), start + i, v, drawn)
+                    }
+                    _ => self.exactly(start + i, v, drawn),
                 };
             }
         }
@@ -143,22 +146,22 @@ impl Painter {
 
     /// A pixel whose ray is about `s`.
     #[inline(always)]
-    fn roughly(&self, s: [f64; 3], x: usize, v: f64) -> f32 {
+    fn roughly(&self, s: [f64; 3], x: usize, v: f64, drawn: &mut Drawn) -> f32 {
         let sight = self.view.look(s);
         if sight.miss.abs() <= self.near {
-            return self.exactly(x, v);
+            return self.exactly(x, v, drawn);
         }
         let cover = if sight.miss <= 0.0 { 1.0 } else { self.edge.at(self.above_limb_m(&sight)) };
-        self.blend(cover, &sight)
+        self.blend(cover, &sight, drawn)
     }
 
     /// A pixel with its own ray, averaged over its area.
-    fn exactly(&self, x: usize, v: f64) -> f32 {
+    fn exactly(&self, x: usize, v: f64, drawn: &mut Drawn) -> f32 {
         // Where the lens sees nothing is sky, so that no dark rim is blurred inward.
         let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { return self.sky };
         let sight = self.view.look(ray.direction().xyz());
         let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
-        self.blend(self.edge.mean(self.above_limb_m(&sight), gradient), &sight)
+        self.blend(self.edge.mean(self.above_limb_m(&sight), gradient), &sight, drawn)
     }
 
     /// Tangent height of a ray above the limb height at its latitude, metres.
@@ -178,15 +181,15 @@ impl Painter {
 
     /// Sky and body, the body with weight `cover`.
     #[inline(always)]
-    fn blend(&self, cover: f32, sight: &Sight) -> f32 {
+    fn blend(&self, cover: f32, sight: &Sight, drawn: &mut Drawn) -> f32 {
         if cover <= 1e-4 {
             return self.sky;
         }
-        self.sky + cover * (self.body(sight) - self.sky)
+        self.sky + cover * (self.body(sight, drawn) - self.sky)
     }
 
     /// Brightness of the body where the ray meets or passes it.
-    fn body(&self, sight: &Sight) -> f32 {
+    fn body(&self, sight: &Sight, drawn: &mut Drawn) -> f32 {
         let point = self.view.point(sight);
         let lit = self.lamp.at(&self.view, sight, &point);
         if lit <= 0.0 {
@@ -201,7 +204,7 @@ impl Painter {
             Some(clouds) if air < 1.0 => {
                 let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
                 let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(1e-3)) as f32;
-                clouds.over(self.surface, &point, footprint_km.min(self.radius_km))
+                clouds.over(self.surface, &point, footprint_km.min(self.radius_km), drawn)
             }
             _ => self.surface,
         };

@@ -96,19 +96,30 @@ impl Picture {
         }
     }
 
-    /// Writes the picture as JPEG with this quality, 1 to 100. More than 8 bits are cut to 8.
+    /// The picture as a JPEG file of this quality, 1 to 100. More than 8 bits are cut to 8.
     ///
     /// # Errors
-    /// The file cannot be written.
-    pub fn save_jpeg(&self, path: &Path, quality: u8) -> Result<(), image::ImageError> {
-        let file = std::io::BufWriter::new(std::fs::File::create(path).map_err(image::ImageError::IoError)?);
-        let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(file, quality.clamp(1, 100));
+    /// The encoder refuses it.
+    pub fn jpeg(&self, quality: u8) -> Result<Vec<u8>, image::ImageError> {
+        let mut file = Vec::new();
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, quality.clamp(1, 100));
         let colour = if self.channels == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
         let bytes: Cow<'_, [u8]> = match &self.samples {
             Samples::Bytes(data) => Cow::Borrowed(data),
             Samples::Words(data) => Cow::Owned(data.iter().map(|v| (v >> (self.bits - 8)) as u8).collect()),
         };
-        encoder.encode(&bytes, self.width.into(), self.height.into(), colour)
+        encoder.encode(&bytes, self.width.into(), self.height.into(), colour)?;
+        Ok(file)
+    }
+
+    /// The picture as it comes back from such a file.
+    ///
+    /// # Errors
+    /// As [`Picture::jpeg`].
+    pub fn through_jpeg(&self, quality: u8) -> Result<Self, image::ImageError> {
+        let read = image::load_from_memory_with_format(&self.jpeg(quality)?, image::ImageFormat::Jpeg)?;
+        let data = if self.channels == 1 { read.into_luma8().into_raw() } else { read.into_rgb8().into_raw() };
+        Ok(Self { bits: 8, samples: Samples::Bytes(data), ..*self })
     }
 }
 
@@ -141,5 +152,19 @@ mod tests {
         assert_eq!(image::open(&path).unwrap().into_luma16().into_raw(), [0, 16, 32, 65503, 65519, 65535]);
         assert_eq!((words.view().full_scale(), words.view().at(2, 1), words.at(2, 1)), (4095, 4095, 4095));
         assert_eq!(words.at(3, 0), 0);
+    }
+
+    #[test]
+    fn jpeg_loses_a_little() {
+        let samples = Samples::Bytes((0..3 * 64 * 48).map(|i| 40 + (i / 3 % 64) as u8 * 3).collect());
+        let picture = Picture { width: 64, height: 48, channels: 3, bits: 8, samples };
+        let worst = |quality| {
+            let back = picture.through_jpeg(quality).unwrap();
+            assert_eq!((back.width, back.height, back.channels, back.bits), (64, 48, 3, 8));
+            let off = |x, y| back.at(x, y).abs_diff(picture.at(x, y));
+            (0..48).flat_map(|y| (0..64).map(move |x| (x, y))).map(|(x, y)| off(x, y)).max().unwrap()
+        };
+        let (fine, coarse) = (worst(95), worst(10));
+        assert!(fine <= 4 && coarse > fine, "{fine} {coarse}");
     }
 }

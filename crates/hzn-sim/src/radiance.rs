@@ -143,6 +143,11 @@ impl Radiance {
         if let Some(missing) = wanted.into_iter().find(|w| have.next() != Some(*w)) {
             return Err(format!("no row for {}: every height is needed at every latitude and season", said(missing)));
         }
+        let lowest = |r: &Row| heights.first() == Some(&r.tangent_height_km);
+        if let Some((line, r)) = rows.iter().find(|(_, r)| lowest(r) && r.radiance <= 0.0) {
+            let rule = "must be above 0 at the lowest tangent height: the limb is where half of it is left";
+            return Err(format!("line {line}: radiance = {} at {}: {rule}", r.radiance, said(key(r))));
+        }
         let each = latitudes.len() * heights.len();
         let table = Self {
             seasons: seasons

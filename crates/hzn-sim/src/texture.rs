@@ -27,98 +27,194 @@ impl Default for Clouds {
     }
 }
 
+/// Octaves computed at once.
+const LANES: usize = 4;
+type Lanes<T> = [T; LANES];
+
+/// Fractal value noise on the unit sphere.
+#[derive(Debug, Clone)]
+struct Fractal {
+    fours: Vec<Octaves>,
+}
+
+/// Neighbouring octaves, from the larger to the smaller; those beyond the last one have size 0.
+#[derive(Debug, Clone, Copy, Default)]
+struct Octaves {
+    size_km: Lanes<f32>,
+    /// Cells across the unit sphere's radius.
+    frequency: Lanes<f32>,
+    amplitude: Lanes<f32>,
+    salt: Lanes<u32>,
+}
+
+/// What was drawn for the last point, an entry for every [`Octaves`]: the next one is most often in the same cells.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Drawn(Vec<Cells>);
+
+/// The cells of one [`Octaves`], by axis, and the random values at their corners: x counts fastest, z slowest.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cells {
+    drawn: bool,
+    floor: [Lanes<i32>; 3],
+    corner: [Lanes<f32>; 8],
+}
+
+impl Fractal {
+    /// Octaves from the largest to the smallest size, each half as large and `rough` times as strong as the one before;
+    /// all together with the standard deviation of one over `unit`.
+    fn new([largest_km, smallest_km]: [f64; 2], rough: f32, unit: f32, radius_m: f64, seed: u64, salt: u32) -> Self {
+        let count = (1 + libm::log2((largest_km / smallest_km).max(1.0)).round() as usize).min(16);
+        let amplitude = |i: usize| rough.powi(i as i32);
+        // Octaves add as squares.
+        let root = (0..count).map(|i| amplitude(i) * amplitude(i)).sum::<f32>().sqrt();
+        let mut fours = vec![Octaves::default(); count.div_ceil(LANES)];
+        for i in 0..count {
+            let size_km = largest_km / f64::from(1u32 << i);
+            let (four, lane) = (&mut fours[i / LANES], i % LANES);
+            four.size_km[lane] = size_km as f32;
+            four.frequency[lane] = (radius_m / 1e3 / size_km) as f32;
+            four.amplitude[lane] = amplitude(i) * (1.0 / (unit * root));
+            four.salt[lane] = hash3([i as i32, seed as i32, (seed >> 32) as i32], salt);
+        }
+        Self { fours }
+    }
+
+    /// Amplitudes from the largest octave on.
+    fn amplitudes(&self) -> impl DoubleEndedIterator<Item = f32> {
+        self.fours.iter().flat_map(|four| four.amplitude)
+    }
+
+    /// Gives `each` the octaves' shares at a point, by number, until it has enough or they are finer than
+    /// `footprint_km`.
+    #[inline(always)]
+    fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn, mut each: impl FnMut(usize, f32) -> bool) {
+        let p = [point.x as f32, point.y as f32, point.z as f32];
+        if drawn.0.len() != self.fours.len() {
+            drawn.0 = vec![Cells::default(); self.fours.len()];
+        }
+        for (n, (four, cells)) in self.fours.iter().zip(&mut drawn.0).enumerate() {
+            let keep = four.size_km.map(|size| (size / footprint_km - 1.0).clamp(0.0, 1.0));
+            if keep[0] <= 0.0 {
+                return;
+            }
+            let noise = four.noise(p, cells);
+            for i in 0..LANES {
+                if keep[i] <= 0.0 || !each(LANES * n + i, keep[i] * four.amplitude[i] * (noise[i] - 0.5)) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+impl Octaves {
+    /// Random values at the corners of cubic lattices, blended smoothly: 0 to 1.
+    #[inline(always)]
+    fn noise(&self, p: [f32; 3], cells: &mut Cells) -> Lanes<f32> {
+        let x: [Lanes<f32>; 3] = p.map(|p| self.frequency.map(|f| p * f));
+        let floor = x.map(|x| {
+            // Truncation corrected below zero: half the cost of the library's floor on targets without its instruction.
+            x.map(|x| {
+                let t = x as i32;
+                t - i32::from((t as f32) > x)
+            })
+        });
+        // In lanes; comparing arrays would call the library.
+        let changed = floor.iter().flatten().zip(cells.floor.iter().flatten()).fold(0, |all, (a, b)| all | (a ^ b));
+        if changed != 0 || !cells.drawn {
+            cells.draw(floor, &self.salt);
+        }
+        let t: [Lanes<f32>; 3] =
+            core::array::from_fn(|axis| core::array::from_fn(|i| smoothstep(x[axis][i] - floor[axis][i] as f32)));
+        let mix = |a: Lanes<f32>, b: Lanes<f32>, t: &Lanes<f32>| -> Lanes<f32> {
+            core::array::from_fn(|i| a[i] + (b[i] - a[i]) * t[i])
+        };
+        let row = |i: usize| mix(cells.corner[i], cells.corner[i + 1], &t[0]);
+        let plane = |i: usize| mix(row(i), row(i + 2), &t[1]);
+        mix(plane(0), plane(4), &t[2]).map(|n| n * (1.0 / 16_777_216.0))
+    }
+}
+
+impl Cells {
+    /// Draws the corners of the cells that have changed.
+    #[inline(never)]
+    fn draw(&mut self, floor: [Lanes<i32>; 3], salt: &Lanes<u32>) {
+        for (i, &salt) in salt.iter().enumerate() {
+            let [x, y, z] = floor.map(|f| f[i]);
+            if self.drawn && self.floor.map(|f| f[i]) == [x, y, z] {
+                continue;
+            }
+            for (corner, value) in self.corner.iter_mut().enumerate() {
+                let [dx, dy, dz] = [0, 1, 2].map(|axis| (corner >> axis & 1) as i32);
+                value[i] = (hash3([x.wrapping_add(dx), y.wrapping_add(dy), z.wrapping_add(dz)], salt) >> 8) as f32;
+            }
+        }
+        (self.drawn, self.floor) = (true, floor);
+    }
+}
+
+/// Standard deviation of value noise in 3-D, about.
+const SIGMA: f64 = 0.17;
+
 /// [`Clouds`], prepared.
 #[derive(Debug, Clone)]
 pub(crate) struct CloudField {
-    octaves: Vec<Octave>,
+    fractal: Fractal,
+    /// The most each octave and all finer ones can add.
+    rest: Vec<f32>,
     threshold: f32,
     edge: f32,
     brightness: f32,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Octave {
-    size_km: f32,
-    /// Cells across the unit sphere's radius.
-    frequency: f32,
-    amplitude: f32,
-    salt: u32,
-    /// The most this octave and all finer ones can add.
-    rest: f32,
-}
-
-/// Octaves from the largest to the smallest size, each half as large and `rough` times as strong as the one before, and
-/// the root of the sum of their squares.
-fn octaves([largest_km, smallest_km]: [f64; 2], rough: f32, radius_m: f64, seed: u64, salt: u32) -> (Vec<Octave>, f32) {
-    let count = 1 + libm::log2((largest_km / smallest_km).max(1.0)).round() as u32;
-    let octaves: Vec<Octave> = (0..count.min(16))
-        .map(|i| {
-            let size_km = largest_km / f64::from(1u32 << i);
-            Octave {
-                size_km: size_km as f32,
-                frequency: (radius_m / 1e3 / size_km) as f32,
-                amplitude: rough.powi(i as i32),
-                salt: hash3([i as i32, seed as i32, (seed >> 32) as i32], salt),
-                rest: 0.0,
-            }
-        })
-        .collect();
-    let sum2: f32 = octaves.iter().map(|o| o.amplitude * o.amplitude).sum();
-    (octaves, sum2.sqrt())
 }
 
 impl CloudField {
     pub(crate) fn new(clouds: &Clouds, radius_m: f64) -> Self {
         let sizes_km = [clouds.largest_km, clouds.smallest_km].map(|km| km.max(1e-3));
         // Slightly rougher than 1/2 an octave: clouds have detail.
-        let (mut octaves, root) = octaves(sizes_km, 0.7, radius_m, clouds.seed, 0x5EED);
-        // Value noise in 3-D has a standard deviation of about 0.17; the octaves add as squares.
-        for o in &mut octaves {
-            o.amplitude *= 1.0 / root;
-        }
-        let mut rest = 0.0;
-        for o in octaves.iter_mut().rev() {
-            rest += 0.5 * o.amplitude;
-            o.rest = rest;
-        }
-        let sigma = 0.17;
+        let fractal = Fractal::new(sizes_km, 0.7, 1.0, radius_m, clouds.seed, 0x5EED);
+        let mut rest: Vec<f32> = fractal
+            .amplitudes()
+            .rev()
+            .scan(0.0, |sum, a| {
+                *sum += 0.5 * a;
+                Some(*sum)
+            })
+            .collect();
+        rest.reverse();
         // Inverse of the logistic curve that stands for the distribution function.
         let cover = clouds.cover.clamp(0.001, 0.999);
-        let threshold = sigma / 1.7 * libm::log((1.0 - cover) / cover);
+        let threshold = SIGMA / 1.7 * libm::log((1.0 - cover) / cover);
         Self {
-            octaves,
+            fractal,
+            rest,
             threshold: threshold as f32,
-            edge: (clouds.softness.max(1e-4) * sigma * 2.0) as f32,
+            edge: (clouds.softness.max(1e-4) * SIGMA * 2.0) as f32,
             brightness: clouds.brightness as f32,
         }
     }
 
     /// Brightness at a point of the unit sphere over a ground of brightness `ground`; `footprint_km` is what one
     /// pixel covers: finer detail is left out, as it would only flicker.
-    pub(crate) fn over(&self, ground: f32, point: &Vector3<f64>, footprint_km: f32) -> f32 {
-        match self.at(point, footprint_km) {
+    pub(crate) fn over(&self, ground: f32, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> f32 {
+        match self.at(point, footprint_km, drawn) {
             Some((cover, bright)) => ground + cover * (bright - ground),
             None => ground,
         }
     }
 
     /// How much of the ground is hidden, 0 to 1, and how bright the cloud is there; `None` under a clear sky.
-    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32) -> Option<(f32, f32)> {
-        let p = [point.x as f32, point.y as f32, point.z as f32];
-        let (mut sum, mut fine) = (0.0f32, 0.0f32);
-        for (i, o) in self.octaves.iter().enumerate() {
-            let keep = (o.size_km / footprint_km - 1.0).clamp(0.0, 1.0);
-            if keep <= 0.0 {
-                break;
-            }
-            if sum + o.rest < self.threshold - self.edge {
-                return None;
-            }
-            let n = keep * o.amplitude * (value_noise(p.map(|x| x * o.frequency), o.salt) - 0.5);
-            sum += n;
+    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> Option<(f32, f32)> {
+        let (mut sum, mut fine, mut clear) = (0.0f32, 0.0f32, false);
+        self.fractal.at(point, footprint_km, drawn, |i, share| {
+            clear = self.rest.get(i).is_some_and(|rest| sum + rest < self.threshold - self.edge);
+            sum += share;
             if i >= 2 {
-                fine += n;
+                fine += share;
             }
+            !clear
+        });
+        if clear {
+            return None;
         }
         let cover = smoothstep(((sum - self.threshold) / self.edge).clamp(-1.0, 1.0) * 0.5 + 0.5);
         // Thick clouds are brighter than their rims, and not smooth.
@@ -129,31 +225,22 @@ impl CloudField {
 
 /// Fractal noise on the unit sphere: about 0 on average, with a standard deviation of 1.
 #[derive(Debug, Clone)]
-pub(crate) struct Relief {
-    octaves: Vec<Octave>,
-}
+pub(crate) struct Relief(Fractal);
 
 impl Relief {
     /// `detail_km` from the largest to the smallest size; `rough` is the amplitude of an octave over the one before.
     pub(crate) fn new(detail_km: [f64; 2], rough: f32, radius_m: f64, seed: u64) -> Self {
-        let (mut octaves, root) = octaves(detail_km, rough, radius_m, seed, 0x6E0D);
-        for o in &mut octaves {
-            o.amplitude /= 0.17 * root;
-        }
-        Self { octaves }
+        Self(Fractal::new(detail_km, rough, SIGMA as f32, radius_m, seed, 0x6E0D))
     }
 
     /// The value at a point, without what is finer than `footprint_km`.
-    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32) -> f32 {
-        let p = [point.x as f32, point.y as f32, point.z as f32];
+    #[inline]
+    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> f32 {
         let mut sum = 0.0;
-        for o in &self.octaves {
-            let keep = (o.size_km / footprint_km - 1.0).clamp(0.0, 1.0);
-            if keep <= 0.0 {
-                break;
-            }
-            sum += keep * o.amplitude * (value_noise(p.map(|x| x * o.frequency), o.salt) - 0.5);
-        }
+        self.0.at(point, footprint_km, drawn, |_, share| {
+            sum += share;
+            true
+        });
         sum
     }
 }
@@ -173,24 +260,6 @@ fn hash3([x, y, z]: [i32; 3], salt: u32) -> u32 {
     h ^ (h >> 15)
 }
 
-/// Random values at the corners of a cubic lattice, blended smoothly: 0 to 1.
-#[inline(always)]
-fn value_noise(p: [f32; 3], salt: u32) -> f32 {
-    let floor = p.map(|x| {
-        // Truncation corrected below zero: half the cost of the library's floor on targets without its instruction.
-        let t = x as i32;
-        t - i32::from((t as f32) > x)
-    });
-    let f: [f32; 3] = core::array::from_fn(|i| smoothstep(p[i] - floor[i] as f32));
-    let at = |dx: i32, dy: i32, dz: i32| {
-        (hash3([floor[0].wrapping_add(dx), floor[1].wrapping_add(dy), floor[2].wrapping_add(dz)], salt) >> 8) as f32
-    };
-    let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
-    let row = |dy: i32, dz: i32| mix(at(0, dy, dz), at(1, dy, dz), f[0]);
-    let plane = |dz: i32| mix(row(0, dz), row(1, dz), f[1]);
-    mix(plane(0), plane(1), f[2]) * (1.0 / 16_777_216.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -207,7 +276,7 @@ mod tests {
                     let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(n);
                     let (s, c) = libm::sincos(f64::from(i) * 2.399_963);
                     let r = (1.0 - z * z).sqrt();
-                    field.over(0.0, &Vector3::new(r * c, r * s, z), 1.0) > 0.25
+                    field.over(0.0, &Vector3::new(r * c, r * s, z), 1.0, &mut Drawn::default()) > 0.25
                 })
                 .count();
             let share = lit as f64 / f64::from(n);
@@ -217,9 +286,23 @@ mod tests {
 
     #[test]
     fn noise_is_continuous_across_cells() {
+        let four = Octaves { frequency: [1.0; LANES], salt: [1, 2, 3, 4], ..Octaves::default() };
+        let at = |x: f32| four.noise([x, 0.3, 0.7], &mut Cells::default());
         for x in [-2.0f32, -1.0, 0.0, 3.0] {
-            let (a, b) = (value_noise([x - 1e-4, 0.3, 0.7], 1), value_noise([x + 1e-4, 0.3, 0.7], 1));
-            assert!((a - b).abs() < 1e-3);
+            let (a, b) = (at(x - 1e-4), at(x + 1e-4));
+            assert!((0..LANES).all(|i| (a[i] - b[i]).abs() < 1e-3));
+        }
+    }
+
+    #[test]
+    fn what_was_drawn_before_does_not_matter() {
+        let relief = Relief::new([700.0, 3.0], 0.7, 6.371e6, 5);
+        let mut drawn = Drawn::default();
+        for i in 0..3000 {
+            let (s, c) = libm::sincos(2e-4 * f64::from(i));
+            let p = Vector3::new(0.6 * c, 0.6 * s, 0.8);
+            let footprint_km = 0.3 + 0.01 * i as f32;
+            assert_eq!(relief.at(&p, footprint_km, &mut drawn), relief.at(&p, footprint_km, &mut Drawn::default()));
         }
     }
 }

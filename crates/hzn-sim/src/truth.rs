@@ -203,7 +203,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
 }
 
 /// The kind's name in sensor.toml.
-pub(crate) fn name(kind: Kind) -> &'static str {
+pub fn name(kind: Kind) -> &'static str {
     match kind {
         Kind::Earth => "earth",
         Kind::EarthSphere => "earth-sphere",

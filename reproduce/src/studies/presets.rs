@@ -1,20 +1,17 @@
 //! The presets on the same pictures.
 
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use hzn_core::HostHorizon;
 use hzn_core::body::Kind;
 use hzn_core::image::Pixels;
 use hzn_core::pipeline::Preset;
 use hzn_sim::evaluate::Case;
-use hzn_sim::scenario::{Fit, Scenario};
 use hzn_sim::{Flight, Picture};
 
-use super::Effort;
+use super::{Effort, simulated};
 use crate::document::Section;
 use crate::fly::{Flown, GROSS_DEG, Sensor, deg, evaluate, fly_timed, two_digits};
 
-/// Pictures from which limb height and noise are measured.
-const MEASURED: u32 = 32;
 /// Pictures from which the fixed threshold is set.
 const LOOKED_AT: usize = 9;
 
@@ -48,10 +45,10 @@ pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
 /// The scenes, each with the sensor that fits it.
 fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     let [rocket, clean, horace, disc] =
-        ["rocket", "rocket-clean", "horace", "full-disc"].map(|name| flight(name, count));
-    let infrared = flight("leo-infrared", 3 * count)?;
+        ["rocket", "rocket-clean", "horace", "full-disc"].map(|name| anyhow::Ok(simulated(name, count)?.0));
+    let (infrared, _) = simulated("leo-infrared", 3 * count)?;
     let third = |k: usize| Flight { frames: infrared.frames[k * count..(k + 1) * count].to_vec(), ..infrared.clone() };
-    let mut sun = flight("sun-moon", count)?;
+    let (mut sun, _) = simulated("sun-moon", count)?;
     sun.sensor.body = sun.sensor.bodies.first().cloned().ok_or_else(|| anyhow!("sun-moon looks for bodies"))?;
     sun.sensor.binarize = sun.sensor.body.binarize.unwrap_or(sun.sensor.binarize);
     sun.sensor.bodies.clear();
@@ -65,17 +62,6 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
         ("full disc", disc?),
         ("Sun, then Moon", sun),
     ])
-}
-
-/// Pictures of a built-in scene, and the sensor that `hzn simulate` writes for them.
-fn flight(name: &str, count: usize) -> anyhow::Result<Flight> {
-    let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
-    scenario.capture.frames = u32::try_from(count)?;
-    let mut flight = scenario.flight().with_context(|| name.to_owned())?;
-    if let Some(fit) = Fit::measure(&scenario, MEASURED, &|_, _| ()).with_context(|| name.to_owned())? {
-        fit.apply(&mut flight.sensor);
-    }
-    Ok(flight)
 }
 
 /// A preset that is told what the scene's own sensor is told.

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
-use hzn_sim::scenario::{BUILTIN, Fit, Format, MEASURED};
+use hzn_sim::scenario::{BUILTIN, Fit, MEASURED};
 use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
 
@@ -66,7 +66,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::result(format_args!("{}\n", scene::source(name)?.1.trim_end()))?;
         return Ok(Exit::Done);
     }
-    let scenario = scene::load(name, args.frames, args.seed)?;
+    let mut scenario = scene::load(name, args.frames, args.seed)?;
+    let files = files(&mut scenario, Path::new(name).parent().unwrap_or(Path::new("")))?;
     let folder = args.output.clone().unwrap_or_default();
     let text = toml::to_string(&scenario).map_err(failed)?;
     let scene_toml = folder.join("scene.toml");
@@ -79,6 +80,12 @@ pub(super) fn run(args: &Args) -> Outcome {
             }
             Err(e) => return Err(usage(format!("{}: {e}; nothing to resume", scene_toml.display()))),
         }
+        let changed =
+            |(file, bytes): &&(String, Vec<u8>)| std::fs::read(folder.join(file)).ok().as_ref() != Some(bytes);
+        if let Some((file, _)) = files.iter().find(changed) {
+            let what = "is not what the scene names any more; --force starts over";
+            return Err(usage(format!("{}: {what}", folder.join(file).display())));
+        }
     } else if folder.exists() && !args.force {
         let what = "exists already; choose another folder, --resume goes on, or --force writes into it";
         return Err(usage(format!("{}: {what}", folder.display())));
@@ -87,19 +94,34 @@ pub(super) fn run(args: &Args) -> Outcome {
     let flight = scenario.flight().map_err(|e| scene::refused(name, &e))?;
     std::fs::create_dir_all(&folder).map_err(|e| output::cannot(&folder, &e))?;
     write(&scene_toml, &text)?;
+    files.iter().try_for_each(|(file, bytes)| write(&folder.join(file), bytes))?;
     let sensor_toml = folder.join("sensor.toml");
     if !(args.resume && sensor_toml.exists()) {
         write(&sensor_toml, &sensor(&scenario, &flight, name, args.quiet)?)?;
     }
     tables(&scenario, &flight, &folder)?;
-    let end = pictures(&scenario, &flight, &folder, args)?;
+    let end = pictures(&flight, &folder, args)?;
     if end == Exit::Done {
         summary(&scenario, &flight, &folder)?;
     }
     Ok(end)
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Stop> {
+/// The files that a scene names (maps, tables) under the names that they get in the folder, where the scene then finds
+/// them.
+fn files(scenario: &mut Scenario, from: &Path) -> Result<Vec<(String, Vec<u8>)>, Stop> {
+    let take = |(what, path): (&str, &mut PathBuf)| {
+        let source = from.join(&*path);
+        let bytes = std::fs::read(&source).map_err(|e| output::cannot(&source, &e))?;
+        let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+        let name = format!("scene-{what}.{ending}");
+        *path = PathBuf::from(&name);
+        Ok((name, bytes))
+    };
+    scenario.files_mut().into_iter().map(take).collect()
+}
+
+fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
     std::fs::write(path, text).map_err(|e| output::cannot(path, &e))
 }
 
@@ -180,7 +202,7 @@ fn tables(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Sto
 }
 
 /// Renders what is missing.
-fn pictures(scenario: &Scenario, flight: &Flight, folder: &Path, args: &Args) -> Outcome {
+fn pictures(flight: &Flight, folder: &Path, args: &Args) -> Outcome {
     let missing: Vec<&FlightFrame> =
         flight.frames.iter().filter(|f| !(args.resume && folder.join(&f.file).exists())).collect();
     let before = flight.frames.len() - missing.len();
@@ -192,7 +214,7 @@ fn pictures(scenario: &Scenario, flight: &Flight, folder: &Path, args: &Args) ->
         if stop.load(Ordering::SeqCst) {
             return Ok(());
         }
-        render(scenario, frame, folder)?;
+        render(frame, folder)?;
         done.fetch_add(1, Ordering::SeqCst);
         progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
         Ok::<(), Stop>(())
@@ -209,13 +231,13 @@ fn pictures(scenario: &Scenario, flight: &Flight, folder: &Path, args: &Args) ->
 }
 
 /// One picture; its name appears when it is whole.
-fn render(scenario: &Scenario, frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
+fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
     let path = folder.join(&frame.file);
     let part = folder.join(format!(".part-{}", frame.file));
-    let picture = frame.render().map_err(failed)?;
-    let saved = match scenario.capture.format {
-        Format::Png => picture.save(&part),
-        Format::Jpeg => picture.save_jpeg(&part, scenario.capture.jpeg_quality),
+    let picture = frame.scene.render().map_err(failed)?;
+    let saved = match frame.jpeg_quality {
+        Some(quality) => picture.jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),
+        None => picture.save(&part),
     };
     saved.map_err(|e| match e {
         image::ImageError::IoError(e) => output::cannot(&path, &e),

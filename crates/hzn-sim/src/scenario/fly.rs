@@ -4,7 +4,7 @@ use hzn_core::Preset;
 use hzn_core::body::Kind;
 use hzn_core::region;
 
-use super::{Scenario, ScenarioError};
+use super::{Format, Scenario, ScenarioError};
 use crate::counter::{Counter, Stream};
 use crate::ephemeris;
 use crate::flight::{Flight, FlightFrame};
@@ -88,6 +88,7 @@ impl Scenario {
                 time_s,
                 utc: Some(utc::iso8601(path.unix_s(time_s))),
                 scene,
+                jpeg_quality: (self.capture.format == Format::Jpeg).then_some(self.capture.jpeg_quality),
             })
             .collect();
         Ok(Flight { name: self.name.clone(), sensor, frames })

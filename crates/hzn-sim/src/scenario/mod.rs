@@ -11,7 +11,7 @@ mod noise;
 pub use exposure::Exposure;
 pub use noise::{Fit, MEASURED};
 
-use std::path::Path as FilePath;
+use std::path::{Path as FilePath, PathBuf};
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera};
@@ -240,6 +240,20 @@ impl Scenario {
             table.read(folder).map_err(|e| ScenarioError::new("[trajectory] table.file", e))?;
         }
         Ok(())
+    }
+
+    /// The paths of those files, each with a word for what it is.
+    pub fn files_mut(&mut self) -> Vec<(&'static str, &mut PathBuf)> {
+        let world = match &mut self.world {
+            World::Visible(world) => world.ground.map.as_mut().map(|map| ("map", map)),
+            World::Infrared(world) => world.table.as_mut().map(|table| ("radiance", table)),
+            World::Plain => None,
+        };
+        let way = match &mut self.trajectory {
+            Trajectory::Table(table) => Some(("trajectory", &mut table.file)),
+            Trajectory::Rocket(_) | Trajectory::Orbit(_) => None,
+        };
+        world.into_iter().chain(way).collect()
     }
 
     /// The first value out of its limits.

@@ -10,7 +10,7 @@ use super::Visible;
 use super::shade::Shader;
 use crate::counter::{Counter, Stream};
 use crate::optics::{GHOSTS, Optics};
-use crate::texture::{Relief, smoothstep};
+use crate::texture::{Drawn, Relief, smoothstep};
 
 /// Rays a side of a pixel of a disc.
 const SAMPLES: i32 = 4;
@@ -95,13 +95,14 @@ impl Shader {
         let Some(sun) = self.view.to_camera(self.sun) else { return };
         let disc = Disc { centre: centre.xyz().into(), half_angle: libm::asin(MOON_RADIUS_KM * 1e3 / to.norm()) };
         let sun = Vector3::from(sun.xyz());
+        let mut drawn = Drawn::default();
         let maria = Relief::new([1500.0, 60.0], 0.6, MOON_RADIUS_KM * 1e3, 5);
         let [a, b] = disc.across();
         self.draw_disc(canvas, weight, &disc, |[x, y], r2| {
             let depth = (1.0 - r2).max(0.0).sqrt();
             let normal = a * x + b * y - disc.centre * depth;
             let (mu0, mu) = (normal.dot(&sun).max(0.0) as f32, depth as f32);
-            let dark = smoothstep((0.5 + 0.4 * maria.at(&normal, 20.0)).clamp(0.0, 1.0));
+            let dark = smoothstep((0.5 + 0.4 * maria.at(&normal, 20.0, &mut drawn)).clamp(0.0, 1.0));
             let albedo = MOON[0] + (MOON[1] - MOON[0]) * dark;
             // Lommel and Seeliger: no darkening towards the limb at full moon.
             let light = albedo * 2.0 * mu0 / (mu0 + mu + 1e-3);
@@ -109,7 +110,13 @@ impl Shader {
         });
     }
 
-    fn draw_disc(&self, canvas: &mut Canvas<'_>, weight: f32, disc: &Disc, light: impl Fn([f64; 2], f64) -> [f32; 3]) {
+    fn draw_disc(
+        &self,
+        canvas: &mut Canvas<'_>,
+        weight: f32,
+        disc: &Disc,
+        mut light: impl FnMut([f64; 2], f64) -> [f32; 3],
+    ) {
         let [a, b] = disc.across();
         let rim: Vec<ImagePoint<f64>> = (0..16)
             .filter_map(|i| {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::texture::{Relief, smoothstep};
+use crate::texture::{Drawn, Relief, smoothstep};
 
 /// The ground without its clouds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -124,7 +124,13 @@ impl Soil {
     }
 
     /// Reflectance by channel, and how much of it is open sea, at a point of the unit sphere with this normal.
-    pub(crate) fn at(&self, point: &Vector3<f64>, normal: &Vector3<f64>, footprint_km: f32) -> ([f32; 3], f32) {
+    pub(crate) fn at(
+        &self,
+        point: &Vector3<f64>,
+        normal: &Vector3<f64>,
+        footprint_km: f32,
+        [continents, plants]: &mut [Drawn; 2],
+    ) -> ([f32; 3], f32) {
         if let Some(texture) = &self.texture {
             let colour = texture.at(libm::atan2(normal.y, normal.x), libm::asin(normal.z.clamp(-1.0, 1.0)));
             // What is dark and blue is taken for water.
@@ -132,8 +138,8 @@ impl Soil {
                 ((colour[2] - 1.2 * colour[0]) * 20.0).clamp(0.0, 1.0) * ((0.25 - colour[0]) * 8.0).clamp(0.0, 1.0);
             return (colour, sea);
         }
-        let height = self.continents.at(point, footprint_km) - self.sea_level;
-        let dry = self.plants.at(point, footprint_km);
+        let height = self.continents.at(point, footprint_km, continents) - self.sea_level;
+        let dry = self.plants.at(point, footprint_km, plants);
         let sin_lat = normal.z.abs() as f32;
         // Deserts lie under the descending air of the horse latitudes.
         let belt = 1.0 - ((sin_lat - 0.40).abs() * 5.0).min(1.0);
@@ -182,7 +188,7 @@ mod tests {
                     let (s, c) = libm::sincos(f64::from(i) * 2.399_963);
                     let r = (1.0 - z * z).sqrt();
                     let p = Vector3::new(r * c, r * s, z);
-                    soil.at(&p, &p, 10.0).1
+                    soil.at(&p, &p, 10.0, &mut Default::default()).1
                 })
                 .sum();
             let share = 1.0 - f64::from(sea) / f64::from(n);

@@ -11,7 +11,7 @@ use super::air::Prepared;
 use super::ground::Soil;
 use crate::globe::{Globe, Sight, View};
 use crate::pose::Pose;
-use crate::texture::CloudField;
+use crate::texture::{CloudField, Drawn};
 
 /// Every how many pixels of a row a ray is asked of the lens; between them it is interpolated, which is good to a
 /// hundredth of a pixel.
@@ -22,6 +22,13 @@ const FINE_M: f64 = 2500.0;
 const CLOUD_TOP_M: f32 = 6000.0;
 /// Light of the whole sky on the ground over that of the Sun.
 const SKYLIGHT: [f32; 3] = [0.03, 0.05, 0.09];
+
+/// What was drawn of the textures for the ray before.
+#[derive(Debug, Default)]
+struct Before {
+    clouds: Drawn,
+    soil: [Drawn; 2],
+}
 
 /// Colour and light of the rays of one camera.
 #[derive(Debug, Clone)]
@@ -85,6 +92,7 @@ impl Shader {
     pub(crate) fn row(&self, v: f64, weight: f32, row: &mut [[f32; 3]]) {
         let ray = |u: f64| self.camera.ray(ImagePoint { u, v }).map(|r| Vector3::from(r.direction().xyz()));
         let mut next = ray(0.0);
+        let before = &mut Before::default();
         for (block, pixels) in row.chunks_mut(STRIDE).enumerate() {
             let start = (block * STRIDE) as f64;
             let (first, last) = (next, ray(start + STRIDE as f64));
@@ -97,9 +105,9 @@ impl Shader {
                 let Some(s) = s else { continue };
                 let sight = self.view.look(s.into());
                 let light = if self.samples > 1 && sight.miss.abs() < self.near {
-                    self.averaged(start + i as f64, v)
+                    self.averaged(start + i as f64, v, before)
                 } else {
-                    self.colour(&s, &sight)
+                    self.colour(&s, &sight, before)
                 };
                 for c in 0..3 {
                     p[c] += weight * light[c];
@@ -109,14 +117,14 @@ impl Shader {
     }
 
     /// The mean over a pixel.
-    fn averaged(&self, u: f64, v: f64) -> [f32; 3] {
+    fn averaged(&self, u: f64, v: f64, before: &mut Before) -> [f32; 3] {
         let mut sum = [0.0; 3];
         let n = self.samples;
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let [du, dv] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(n) - 0.5);
             let Some(ray) = self.camera.ray(ImagePoint { u: u + du, v: v + dv }) else { continue };
             let s = Vector3::from(ray.direction().xyz());
-            let light = self.colour(&s, &self.view.look(s.into()));
+            let light = self.colour(&s, &self.view.look(s.into()), before);
             for c in 0..3 {
                 sum[c] += light[c];
             }
@@ -126,7 +134,7 @@ impl Shader {
 
     /// Light along one ray.
     #[inline]
-    pub(crate) fn colour(&self, s: &Vector3<f64>, sight: &Sight) -> [f32; 3] {
+    fn colour(&self, s: &Vector3<f64>, sight: &Sight, before: &mut Before) -> [f32; 3] {
         let air = &self.air;
         let cos = s.dot(&self.sun_cam) as f32;
         let phase = 0.75 * (1.0 + cos * cos);
@@ -154,11 +162,11 @@ impl Shader {
         let footprint_km = ((range_m * 1e-3 * self.pixel_rad / mu.max(0.02)) as f32).min(self.radius_km);
         let sunlight = air.sunlight(sun_path, 1.0);
         let day = ((mu0 + 0.1) * 3.0).clamp(0.0, 1.0);
-        let cloud = self.clouds.as_ref().and_then(|c| c.at(&point, footprint_km));
+        let cloud = self.clouds.as_ref().and_then(|c| c.at(&point, footprint_km, &mut before.clouds));
         let (cover, bright) = cloud.unwrap_or((0.0, 0.0));
         let mut light = [0.0f32; 3];
         if cover < 0.99 {
-            let (colour, sea) = self.soil.at(&point, &normal, footprint_km);
+            let (colour, sea) = self.soil.at(&point, &normal, footprint_km, &mut before.soil);
             let glint = if sea > 0.0 && mu0 > 0.0 { sea * self.glint(s, &normal, mu as f32) } else { 0.0 };
             for c in 0..3 {
                 let sky = SKYLIGHT[c] * day;

@@ -12,9 +12,9 @@ body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;paddin
 h1{font-size:1.5rem;margin-bottom:.2rem}h2{font-size:1.2rem;border-bottom:1px solid #ddd;margin-top:2rem}\
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.2rem .8rem;text-align:right;border-bottom:1px solid #eee}\
 th:first-child,td:first-child{text-align:left}.sum td{text-align:left}.sub{color:#666}\
-.plots{display:flex;flex-wrap:wrap;gap:1rem}.plots svg{max-width:100%;height:auto;border:1px solid #eee}\
-figure{margin:1rem 0}figure img{max-width:100%}figcaption{color:#444}.worst{display:grid;gap:1rem;\
-grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}";
+.plots,.worst{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}\
+.plots svg{width:100%;height:auto;border:1px solid #eee}\
+figure{margin:1rem 0}figure img{max-width:100%}figcaption{color:#444}";
 
 pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
     let mut body = format!(
