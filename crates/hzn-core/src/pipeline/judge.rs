@@ -303,8 +303,11 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             arc_px: fit.arc_px,
             candidate: number,
         };
-        // The body on the other side of the same edge would have the half-angle π − α: two sigma at least from either.
-        let curved = fused.var_free_cos.is_some_and(|v| v * T::of(4.0) < fused.c * fused.c);
+        // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself asks for
+        // must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of 16 variances, as two sigma from either are.
+        // What is rougher than a limb is so over longer stretches.
+        let rough = (fit.rms_px / T::of(3.0 * self.noise.sigma_px)).most(T::one());
+        let curved = fused.var_free_cos.is_some_and(|v| v * rough * T::of(4.0) < fit.c * self.expected.cos);
         if config.estimate.half_angle == estimate::HalfAngle::Fused && !curved && !self.expected.free {
             outcome.verdict = Verdict::Straight;
             return (outcome, None);
