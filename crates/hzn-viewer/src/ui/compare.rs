@@ -63,6 +63,11 @@ fn table(ui: &mut Ui, name: &str, columns: &[Column]) {
     });
 }
 
+/// With its sign, but where no digit differs.
+fn difference(x: f64, digits: usize) -> String {
+    if x.abs() < 0.5 * 0.1f64.powi(digits as i32) { "0".into() } else { format!("{x:+.digits$}") }
+}
+
 fn columns(a: &Answer, b: &Answer) -> Vec<Column> {
     let apart = match (a.row.axis(), b.row.axis()) {
         (Some(x), Some(y)) => format!("{:.4}° apart", rows::angle_deg(x, y)),
@@ -73,7 +78,7 @@ fn columns(a: &Answer, b: &Answer) -> Vec<Column> {
     let mut add = |name, digits: usize, unit: &str, of: fn(&hzn_mcap::Row) -> Option<f64>| {
         let text = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.digits$}{unit}"));
         let (x, y) = (of(&a.row), of(&b.row));
-        let difference = x.zip(y).map_or_else(String::new, |(x, y)| format!("{:+.digits$}{unit}", y - x));
+        let difference = x.zip(y).map_or_else(String::new, |(x, y)| difference(y - x, digits) + unit);
         out.push(Column { name, session: text(x), other: text(y), difference });
     };
     add("axis x", 5, "", |r| r.axis_x);
@@ -86,4 +91,14 @@ fn columns(a: &Answer, b: &Answer) -> Vec<Column> {
     add("level", 0, "", |r| r.level.map(f64::from));
     add("time", 0, " µs", |r| r.elapsed_us);
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_difference_has_no_sign() {
+        assert_eq!([difference(-4e-4, 3), difference(-6e-4, 3), difference(2.0, 0)], ["0", "-0.001", "+2"]);
+    }
 }

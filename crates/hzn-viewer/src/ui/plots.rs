@@ -209,6 +209,8 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
         .height(ui.available_height())
         .allow_scroll(false)
         .set_margin_fraction(vec2(0.01, 0.1))
+        .y_grid_spacer(ticks)
+        .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
         .y_axis_min_width(44.0)
         .x_axis_label("azimuth about the axis [deg]")
         .include_y(-1.0)

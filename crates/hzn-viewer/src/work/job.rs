@@ -100,6 +100,11 @@ impl Job {
     pub fn is_stopping(&self) -> bool {
         self.progress.stop.load(Ordering::Relaxed)
     }
+    /// Stops it and waits until what it had begun is removed, but not for ever.
+    pub fn abandon(&self) {
+        self.stop();
+        let _ = self.end.recv_timeout(Duration::from_secs(3));
+    }
     /// How it ended, once it has.
     pub fn end(&self) -> Option<Result<Done, Halt>> {
         self.end.try_recv().ok()

@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_calib::Frames;
@@ -84,6 +85,16 @@ impl Sweep {
     /// Stops after the frames that were begun.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
+    }
+    /// Stops it and waits until what it had begun is removed, but not for ever.
+    pub fn abandon(&self) {
+        self.stop();
+        let until = Instant::now() + Duration::from_secs(3);
+        while let Ok(event) = self.events.recv_deadline(until) {
+            if !matches!(event, Event::Frame { .. }) {
+                break;
+            }
+        }
     }
     /// Is it asked to stop?
     pub fn is_stopping(&self) -> bool {

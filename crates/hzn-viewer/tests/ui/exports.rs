@@ -147,6 +147,18 @@ fn a_run_that_is_cancelled_leaves_no_recording() {
 }
 
 #[test]
+fn a_window_that_is_closed_leaves_nothing_half_written() {
+    let (dir, pictures) = long();
+    let mut window = window_on(&pictures);
+    menu(&mut window, "Export", "Save video with overlays…");
+    path(&mut window, &dir.path().join("long.mp4"), "Write");
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+    path(&mut window, &dir.path().join("again.mcap"), "Write");
+    window.state().close();
+    assert_eq!(files(dir.path()), ["pictures"]);
+}
+
+#[test]
 fn a_recording_does_not_take_its_own_place() {
     let (dir, pictures) = folder();
     let mut window = window_on(&pictures);

@@ -157,7 +157,7 @@ fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &Answer) {
     let text = format!("axis, {degrees:.1}° off the optical axis");
     let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), theme::AXIS);
     let rect = beside(Rect::from_two_pos(back, tip).expand(7.0), way, galley.size() + vec2(10.0, 4.0), frame);
-    painter.rect_filled(rect, 4, Color32::from_black_alpha(170));
+    painter.rect_filled(rect, 4, Color32::from_black_alpha(200));
     painter.galley(rect.min + vec2(5.0, 2.0), galley, theme::AXIS);
 }
 

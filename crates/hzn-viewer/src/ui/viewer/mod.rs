@@ -266,8 +266,10 @@ impl Viewer {
         help::show(self, &ctx);
         self.ask();
     }
-    /// Keeps the settings.
+    /// Stops what is being written, and keeps the settings.
     pub fn close(&self) {
+        self.jobs.iter().for_each(Job::abandon);
+        self.sweep.iter().for_each(Sweep::abandon);
         if let Some(place) = &self.store {
             // Nobody is there any more to hear of it.
             let _ = self.settings.store(place);
