@@ -9,16 +9,19 @@
 //! image → binarize → contour → candidates → undistort → reject → estimate → covariance → select → Report
 //! ```
 //!
-//! | stage | from | to |
-//! |---|---|---|
-//! | [`binarize`] | a sparse sample of the picture | the level between dark and lit |
-//! | [`contour`] | pixels at the border, then along the edges | border pixels of one edge after another |
-//! | [`candidates`] | border pixels | sub-pixel points at the local mid-level |
-//! | undistort | points | unit rays with their derivatives |
-//! | [`reject`] | rays | the cone that most agree on |
-//! | [`estimate`] | that cone and the rays | the fitted cone, half-angle free, and weights |
-//! | [`covariance`] | the fit and the noise model | covariance, and the expected half-angle fused |
-//! | [`select`] | the answer | a verdict; the best of all candidates |
+//! | stage | parameters | from | to |
+//! |---|---|---|---|
+//! | [`binarize`] | [`binarize::Config`], [`binarize::Gate`] | a sparse sample of the picture | the level between dark and lit |
+//! | [`contour`] | [`contour::Config`] | pixels at the border, then along the edges | border pixels of one edge after another |
+//! | [`candidates`] | [`candidates::Config`] | border pixels | sub-pixel points at the local mid-level |
+//! | undistort | [`camera::Config`] | points | unit rays with their derivatives |
+//! | [`reject`] | [`reject::Config`] | rays | the cone that most agree on |
+//! | [`estimate`] | [`estimate::Config`] | that cone and the rays | the fitted cone, half-angle free, and weights |
+//! | [`covariance`] | [`covariance::Config`] | the fit and the noise model | covariance, and the expected half-angle fused |
+//! | [`select`] | [`select::Config`] | the answer | a verdict; the best of all candidates |
+//!
+//! Each module begins with its equations and their source; the project's docs/math.md has them in one place. They are tested
+//! beside the code, and against data of other programs (`golden`).
 //!
 //! [`pipeline`] knows them all. Frames and units: [`frames`] (camera x right, y down, z forward), [`pixel`] (pixel
 //! centres at integers); metres, radians and pixels inside, kilometres and degrees in [`Config`].

@@ -128,13 +128,7 @@ impl Reader {
                 }
             }
             Op::ATTACHMENT => {
-                let text = (|| {
-                    f.bytes(16)?;
-                    let name = f.text()?;
-                    let (_media, size) = (f.text()?, f.u64()?);
-                    let data = f.bytes(usize::try_from(size).ok()?)?;
-                    (name == SENSOR_TOML).then(|| String::from_utf8_lossy(data).into_owned())
-                })();
+                let text = f.attached(SENSOR_TOML).map(|data| String::from_utf8_lossy(data).into_owned());
                 self.sensor_toml = self.sensor_toml.take().or(text);
             }
             Op::METADATA => {

@@ -108,6 +108,15 @@ impl<'a> Fields<'a> {
         }
         Some(map)
     }
+    /// The data of an attachment, where it is the one of that name.
+    pub(crate) fn attached(mut self, name: &str) -> Option<&'a [u8]> {
+        // Two times come first.
+        self.bytes(16)?;
+        let is = self.text()? == name;
+        let (_media, size) = (self.text()?, self.u64()?);
+        let data = self.bytes(usize::try_from(size).ok()?)?;
+        is.then_some(data)
+    }
 }
 
 #[cfg(test)]
