@@ -1,11 +1,15 @@
 //! Sun and Moon: discs inside and at the edge of the picture, blooming, lit from the side, beside the Earth.
 
-use hzn_core::camera::{self, Model};
+use hzn_core::body::{self, Kind};
+use hzn_core::camera::{self, Camera, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Grey, Layout};
+use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
 use hzn_core::status::Status;
-use hzn_core::{Config, Frame, Preset};
+use hzn_core::{Config, Frame, HostHorizon, Preset};
+use hzn_sim::pose::position_m;
+use hzn_sim::{Detector, Light, Look, Pose, Scene, Visible, World};
 use hzn_tests::disc::{Disc, apart_px, direction};
 use hzn_tests::sensors::look;
 use hzn_tests::{Answer, Sensors};
@@ -165,4 +169,52 @@ fn the_level_follows_the_limb_of_the_picture_before() {
     let expected = sensors.host.expect(&Frame::default()).unwrap();
     let report = sensors.host.process(&Grey::try_new(&dark, Layout::packed(640, 480, 1, 8)).unwrap(), &expected);
     assert_eq!((report.status, report.next_level), (Status::NoLimb, None));
+}
+
+/// The Moon above the Earth's limb, half lit as the Earth below it: both are answered, from one picture.
+#[test]
+fn earth_and_moon_in_one_picture() {
+    let camera = camera::Config::ideal(Model::Pinhole, 1280, 960, 3600.0);
+    let mut config = Config::preset(Preset::Moon, camera.clone());
+    let of = |kind: Kind, preset: Preset| body::Config {
+        kind,
+        limb_height_km: if kind == Kind::Earth { 18.7 } else { 0.0 },
+        limb_height_sigma_km: if kind == Kind::Earth { 2.0 } else { 0.0 },
+        binarize: Some(Config::preset(preset, camera.clone()).binarize),
+        ..body::Config::default()
+    };
+    let mut moon = of(Kind::Moon, Preset::Moon);
+    // The Moon's ground is dark beside clouds and air.
+    if let Some(own) = &mut moon.binarize {
+        own.level = 0.06;
+    }
+    config.bodies = [of(Kind::Earth, Preset::Hzn), moon].into_iter().collect();
+    let mut horizon = HostHorizon::boxed(&config).unwrap();
+    let lens = Camera::<f64>::try_new(&camera).unwrap();
+    for (n, (u, v)) in [(400.3, 240.6), (860.8, 120.2), (640.1, 560.9)].into_iter().enumerate() {
+        let look = Look { azimuth_rad: 0.7, depression_rad: 17f64.to_radians(), roll_rad: 0.0 };
+        let pose = Pose::looking(position_m(30.0, 20.0, 400.0), look);
+        let ecef = |s: [f64; 3]| pose.cam_to_ecef().unwrap().apply(&UnitVec3::try_new(s).unwrap()).xyz();
+        let moon = ecef(lens.unproject(ImagePoint { u, v }).unwrap().xyz());
+        let mut scene = Scene::new(camera.clone(), pose);
+        scene.world = World::Visible(Box::new(Visible { sun_in_view: false, ..Visible::default() }));
+        scene.body.limb_height_km = 18.7;
+        // To the right of the camera, behind it and above.
+        let sun = [0.5, -0.7, -0.5];
+        scene.light = Light::Sun { direction: ecef(sun), twilight_rad: 0.01 };
+        scene.moon_ecef_m = Some([0, 1, 2].map(|i| pose.position_m[i] + 3.844e8 * moon[i]));
+        scene.detector = Detector { psf_sigma_px: 0.9, read_noise: 0.01, ..Detector::default() };
+        scene.seed = n as u64;
+        let picture = scene.render().unwrap();
+        let known = Frame { position_m: Some(pose.position_m), ..frame(Some(sun)) };
+        let expected = [0, 1].map(|which| horizon.expect_body(which, &known).unwrap());
+        let reports = horizon.process_each(&picture.view(), &expected);
+        for (report, (kind, limit_deg)) in reports.iter().zip([(Kind::Earth, 0.1), (Kind::Moon, 0.016)]) {
+            let truth = scene.truth_of(kind, "", 0.0).unwrap();
+            let solution = report.solution.as_ref().unwrap_or_else(|| panic!("{kind:?} at {u} {v}: {}", report.status));
+            let off_deg = solution.axis.angle_rad(&truth.axis().unwrap()).to_degrees();
+            println!("{kind:?}, Moon at {u} {v}: {off_deg:.4} deg off");
+            assert!(off_deg < limit_deg, "{kind:?} at {u} {v}: {off_deg}");
+        }
+    }
 }

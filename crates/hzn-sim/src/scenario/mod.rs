@@ -4,6 +4,7 @@
 //! come with hzn. Reading a file (with lines and suggestions in errors) is the command line's business; every value is
 //! checked here, by [`Scenario::check`], and whether anything can be seen, by [`Scenario::flight`].
 
+mod check;
 mod exposure;
 mod fly;
 mod noise;
@@ -14,7 +15,7 @@ pub use noise::{Fit, MEASURED};
 use std::path::{Path as FilePath, PathBuf};
 
 use hzn_core::body::{self, Kind};
-use hzn_core::camera::{self, Camera};
+use hzn_core::camera;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 use hzn_core::pipeline::Mount;
 use serde::{Deserialize, Serialize};
@@ -254,104 +255,6 @@ impl Scenario {
             Trajectory::Rocket(_) | Trajectory::Orbit(_) => None,
         };
         world.into_iter().chain(way).collect()
-    }
-
-    /// The first value out of its limits.
-    ///
-    /// # Errors
-    /// Which, and the limit.
-    pub fn check(&self) -> Result<(), ScenarioError> {
-        let refuse =
-            |field: &str, value: f64, rule: &str| Err(ScenarioError::new(field, format!("{value} is refused: {rule}")));
-        if self.name.is_empty() || !self.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
-            return Err(ScenarioError::new("name", "must be letters, digits, - and _: pictures are called after it"));
-        }
-        if utc::unix_s(&self.utc).is_none() {
-            return Err(ScenarioError::new("utc", "must be a UTC date and time such as 2019-06-13T10:30:00Z"));
-        }
-        let c = &self.capture;
-        if !(1..=100_000).contains(&c.frames) {
-            return refuse("[capture] frames", c.frames.into(), "must be 1 to 100000");
-        }
-        if !(c.from_s.is_finite() && c.to_s.is_finite() && c.to_s >= c.from_s && (c.to_s - c.from_s) < 1e7) {
-            return refuse("[capture] to_s", c.to_s, "must be finite and not before from_s");
-        }
-        if !(1..=100).contains(&c.jpeg_quality) {
-            return refuse("[capture] jpeg_quality", c.jpeg_quality.into(), "must be 1 to 100");
-        }
-        Camera::<f64>::try_new(&self.camera).map_err(|e| {
-            let shown = e.to_string();
-            let rule = shown.split_once(": ").map_or(shown.as_str(), |(_, rule)| rule).to_owned();
-            ScenarioError::new(format!("[camera] {}", e.field.trim_start_matches("camera.")), rule)
-        })?;
-        if !matches!(self.bodies.first(), Some(Kind::Earth | Kind::Sun | Kind::Moon))
-            || self.bodies.iter().any(|b| matches!(b, Kind::Sphere | Kind::EarthSphere))
-            || self.bodies.len() > 3
-        {
-            return Err(ScenarioError::new("bodies", "must be one to three of \"earth\", \"sun\", \"moon\""));
-        }
-        let o = &self.optics;
-        let parts = [
-            ("[optics] vignetting", o.vignetting, (0.0..=1.0).contains(&o.vignetting), "must be 0 to 1"),
-            ("[optics] bloom", o.bloom, o.bloom >= 0.0, "must be 0 or more"),
-            ("[optics] veil", o.veil, o.veil >= 0.0, "must be 0 or more"),
-            ("[optics] ghosts", o.ghosts, o.ghosts >= 0.0, "must be 0 or more"),
-            ("[shutter] exposure_s", self.shutter.exposure_s, self.shutter.exposure_s >= 0.0, "must be 0 or more"),
-            ("[shutter] readout_s", self.shutter.readout_s, self.shutter.readout_s >= 0.0, "must be 0 or more"),
-            ("[exposure] gain", self.exposure.gain, self.exposure.gain > 0.0, "must be above 0"),
-            ("[exposure] lag_s", self.exposure.lag_s, self.exposure.lag_s >= 0.0, "must be 0 or more"),
-            (
-                "[detector] psf_sigma_px",
-                self.detector.psf_sigma_px,
-                (0.0..=50.0).contains(&self.detector.psf_sigma_px),
-                "must be 0 to 50",
-            ),
-            (
-                "[detector] read_noise",
-                self.detector.read_noise,
-                (0.0..=1.0).contains(&self.detector.read_noise),
-                "must be 0 to 1, a fraction of full scale",
-            ),
-            ("[detector] bits", self.detector.bits.into(), (8..=16).contains(&self.detector.bits), "must be 8 to 16"),
-            (
-                "[known] position_sigma_km",
-                self.known.position_sigma_km,
-                self.known.position_sigma_km >= 0.0,
-                "must be 0 or more",
-            ),
-        ];
-        if let Some((field, value, _, rule)) = parts.into_iter().find(|p| !(p.2 && p.1.is_finite())) {
-            return refuse(field, value, rule);
-        }
-        if c.format == Format::Jpeg && self.detector.bits != 8 {
-            return refuse("[detector] bits", self.detector.bits.into(), "JPEG has 8 bits; leave it out, or write PNG");
-        }
-        if let Some(part) = self.vehicle.iter().find(|p| !(3..=16).contains(&p.polygon_px.len())) {
-            return refuse("[[vehicle]] polygon_px", part.polygon_px.len() as f64, "must have 3 to 16 corners");
-        }
-        if let Some(mount) = &self.mount {
-            let n2: f64 = mount.q_body_from_camera_wxyz.iter().map(|x| x * x).sum();
-            if !((n2 - 1.0).abs() < 0.01) {
-                return refuse("[mount] q_body_from_camera_wxyz", n2, "its squared length must be 1");
-            }
-        }
-        if let World::Visible(w) = &self.world {
-            let a = &w.air;
-            if !(a.scale_height_km > 0.1 && a.scale_height_km < 100.0) {
-                return refuse("[world] visible.air.scale_height_km", a.scale_height_km, "must be 0.1 to 100");
-            }
-            if a.optical_depth.iter().any(|d| !(0.0..100.0).contains(d)) {
-                return Err(ScenarioError::new("[world] visible.air.optical_depth", "all three must be 0 to 100"));
-            }
-        }
-        if let World::Infrared(w) = &self.world
-            && !(w.scale_km > 0.01 && w.scale_km < 50.0)
-        {
-            return refuse("[world] infrared.scale_km", w.scale_km, "must be 0.01 to 50");
-        }
-        self.imu.map_or(Ok(()), |imu| imu.check())?;
-        self.gnss.map_or(Ok(()), |gnss| gnss.check())?;
-        Ok(())
     }
 
     /// UTC of time 0 in seconds since 1970.

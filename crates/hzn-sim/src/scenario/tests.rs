@@ -34,6 +34,26 @@ fn what_is_refused_is_named() {
     assert_eq!(error(&|s| s.capture.frames = 0), "[capture] frames: 0 is refused: must be 1 to 100000");
     assert_eq!(error(&|s| s.camera.fx_px = -1.0), "[camera] fx_px: must be above 0");
     assert!(error(&|s| s.name = "a/b".into()).starts_with("name: "));
+    let visible = |change: fn(&mut crate::Visible)| {
+        error(&|s| {
+            let World::Visible(world) = &mut s.world else { panic!("tumble is visible") };
+            change(world);
+        })
+    };
+    assert_eq!(visible(|w| w.clouds.cover = 25.0), "[world] visible.clouds.cover: 25 is refused: must be 0 to 1");
+    assert_eq!(
+        visible(|w| w.clouds.smallest_km = 5e3),
+        "[world] visible.clouds.smallest_km: 5000 is refused: must be 0.01 to 900"
+    );
+    assert!(visible(|w| w.air.brightness = f64::NAN).starts_with("[world] visible.air.brightness: NaN is refused"));
+    assert_eq!(
+        error(&|s| s.known.attitude_sigma_deg = Some(-5.0)),
+        "[known] attitude_sigma_deg: -5 is refused: must be above 0, at most 180"
+    );
+    assert_eq!(
+        error(&|s| s.exposure.limits = [3.0, 2.0]),
+        "[exposure] limits: 3 is refused: must be above 0, at most 2"
+    );
     assert!(error(&|s| s.detector.bits = 7).starts_with("[detector] bits: 7 is refused"));
     assert!(error(&|s| s.attitude = Attitude::Spin(Default::default())).contains("belongs to [trajectory.rocket]"));
     let inside = error(&|s| {

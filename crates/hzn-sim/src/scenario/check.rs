@@ -1,0 +1,161 @@
+//! Every value of a scenario against its limits.
+
+use hzn_core::body::Kind;
+use hzn_core::camera::Camera;
+
+use super::{Format, Scenario, ScenarioError};
+use crate::scene::World;
+use crate::texture::Clouds;
+use crate::utc;
+
+/// A key, its value, and the least and the most that it may be.
+struct Limit(String, f64, [f64; 2]);
+
+/// No upper limit.
+const ANY: f64 = f64::INFINITY;
+/// Above 0, for what is divided by.
+const SOME: f64 = 1e-9;
+
+impl Limit {
+    fn new(key: impl Into<String>, value: f64, range: [f64; 2]) -> Self {
+        Self(key.into(), value, range)
+    }
+
+    fn check(self) -> Result<(), ScenarioError> {
+        let Self(key, value, [least, most]) = self;
+        if value.is_finite() && value >= least && value <= most {
+            return Ok(());
+        }
+        let low = if least == SOME { "above 0".to_owned() } else { format!("{least}") };
+        let rule = match (most == ANY, least == SOME) {
+            (true, true) => low,
+            (true, false) => format!("{low} or more"),
+            (false, true) => format!("{low}, at most {most}"),
+            (false, false) => format!("{low} to {most}"),
+        };
+        Err(ScenarioError::new(key, format!("{value} is refused: must be {rule}")))
+    }
+}
+
+impl Scenario {
+    /// The first value out of its limits.
+    ///
+    /// # Errors
+    /// Which, and the limit.
+    pub fn check(&self) -> Result<(), ScenarioError> {
+        if self.name.is_empty() || !self.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+            return Err(ScenarioError::new("name", "must be letters, digits, - and _: pictures are called after it"));
+        }
+        if utc::unix_s(&self.utc).is_none() {
+            return Err(ScenarioError::new("utc", "must be a UTC date and time such as 2019-06-13T10:30:00Z"));
+        }
+        let refuse =
+            |field: &str, value: f64, rule: &str| Err(ScenarioError::new(field, format!("{value} is refused: {rule}")));
+        let c = &self.capture;
+        if !(c.from_s.is_finite() && c.to_s.is_finite() && c.to_s >= c.from_s && (c.to_s - c.from_s) < 1e7) {
+            return refuse("[capture] to_s", c.to_s, "must be finite and not before from_s");
+        }
+        Camera::<f64>::try_new(&self.camera).map_err(|e| {
+            let shown = e.to_string();
+            let rule = shown.split_once(": ").map_or(shown.as_str(), |(_, rule)| rule).to_owned();
+            ScenarioError::new(format!("[camera] {}", e.field.trim_start_matches("camera.")), rule)
+        })?;
+        if !matches!(self.bodies.first(), Some(Kind::Earth | Kind::Sun | Kind::Moon))
+            || self.bodies.iter().any(|b| matches!(b, Kind::Sphere | Kind::EarthSphere))
+            || self.bodies.len() > 3
+        {
+            return Err(ScenarioError::new("bodies", "must be one to three of \"earth\", \"sun\", \"moon\""));
+        }
+        self.limits().into_iter().try_for_each(Limit::check)?;
+        if c.format == Format::Jpeg && self.detector.bits != 8 {
+            return refuse("[detector] bits", self.detector.bits.into(), "JPEG has 8 bits; leave it out, or write PNG");
+        }
+        if let Some(part) = self.vehicle.iter().find(|p| !(3..=16).contains(&p.polygon_px.len())) {
+            return refuse("[[vehicle]] polygon_px", part.polygon_px.len() as f64, "must have 3 to 16 corners");
+        }
+        if let Some(mount) = &self.mount {
+            let n2: f64 = mount.q_body_from_camera_wxyz.iter().map(|x| x * x).sum();
+            if !((n2 - 1.0).abs() < 0.01) {
+                return refuse("[mount] q_body_from_camera_wxyz", n2, "its squared length must be 1");
+            }
+        }
+        self.imu.map_or(Ok(()), |imu| imu.check())?;
+        self.gnss.map_or(Ok(()), |gnss| gnss.check())?;
+        Ok(())
+    }
+
+    /// Limits of single numbers, in the order of the file.
+    fn limits(&self) -> Vec<Limit> {
+        let share = [0.0, 1.0];
+        let Self { capture, optics, shutter, exposure, detector, known, .. } = self;
+        let mut all = vec![
+            Limit::new("[capture] frames", capture.frames.into(), [1.0, 1e5]),
+            Limit::new("[capture] jpeg_quality", capture.jpeg_quality.into(), [1.0, 100.0]),
+            Limit::new("[optics] vignetting", optics.vignetting, share),
+            Limit::new("[optics] bloom", optics.bloom, [0.0, ANY]),
+            Limit::new("[optics] veil", optics.veil, [0.0, ANY]),
+            Limit::new("[optics] ghosts", optics.ghosts, [0.0, ANY]),
+            Limit::new("[shutter] exposure_s", shutter.exposure_s, [0.0, ANY]),
+            Limit::new("[shutter] readout_s", shutter.readout_s, [0.0, ANY]),
+            Limit::new("[exposure] gain", exposure.gain, [SOME, ANY]),
+            Limit::new("[exposure] target_mean", exposure.target_mean.unwrap_or(0.5), [SOME, 1.0]),
+            Limit::new("[exposure] lag_s", exposure.lag_s, [0.0, ANY]),
+            Limit::new("[exposure] limits", exposure.limits[0], [SOME, exposure.limits[1]]),
+            Limit::new("[exposure] limits", exposure.limits[1], [SOME, ANY]),
+            Limit::new("[detector] psf_sigma_px", detector.psf_sigma_px, [0.0, 50.0]),
+            Limit::new("[detector] read_noise", detector.read_noise, share),
+            Limit::new("[detector] full_well_electrons", detector.full_well_electrons.unwrap_or(1.0), [1.0, ANY]),
+            Limit::new("[detector] hot_pixels", detector.hot_pixels, share),
+            Limit::new("[detector] offset_pattern", detector.offset_pattern, share),
+            Limit::new("[detector] gain_pattern", detector.gain_pattern, share),
+            Limit::new("[detector] bits", detector.bits.into(), [8.0, 16.0]),
+            Limit::new("[known] position_sigma_km", known.position_sigma_km, [0.0, ANY]),
+            Limit::new("[known] attitude_sigma_deg", known.attitude_sigma_deg.unwrap_or(1.0), [SOME, 180.0]),
+        ];
+        for part in &self.vehicle {
+            all.push(Limit::new("[[vehicle]] brightness", part.brightness, [0.0, ANY]));
+            let corners = part.polygon_px.iter().flatten();
+            all.extend(corners.map(|x| Limit::new("[[vehicle]] polygon_px", *x, [-1e5, 1e5])));
+        }
+        match &self.world {
+            World::Visible(w) => {
+                let key = |key: &str| format!("[world] visible.{key}");
+                all.extend([
+                    Limit::new(key("star_brightness"), w.star_brightness, [0.0, ANY]),
+                    Limit::new(key("ground.land"), w.ground.land, share),
+                    Limit::new(key("ground.ice_deg"), w.ground.ice_deg, [0.0, 90.0]),
+                    Limit::new(key("air.scale_height_km"), w.air.scale_height_km, [0.1, 100.0]),
+                    Limit::new(key("air.brightness"), w.air.brightness, [0.0, ANY]),
+                ]);
+                all.extend(w.air.optical_depth.map(|d| Limit::new(key("air.optical_depth"), d, [0.0, 100.0])));
+                all.extend(clouds(&key("clouds"), &w.clouds));
+            }
+            World::Infrared(w) => {
+                let key = |key: &str| format!("[world] infrared.{key}");
+                all.extend([
+                    Limit::new(key("season_deg"), w.season_deg.unwrap_or(0.0), [-360.0, 360.0]),
+                    Limit::new(key("brightness"), w.brightness, [SOME, 1.0]),
+                    Limit::new(key("by_latitude"), w.by_latitude, [-0.9, 0.9]),
+                    Limit::new(key("half_level_km"), w.half_level_km, [-100.0, 300.0]),
+                    Limit::new(key("half_level_season_km"), w.half_level_season_km, [-100.0, 100.0]),
+                    Limit::new(key("scale_km"), w.scale_km, [0.01, 50.0]),
+                    Limit::new(key("space"), w.space, [0.0, 0.99]),
+                ]);
+                all.extend(w.clouds.iter().flat_map(|own| clouds(&key("clouds"), own)));
+            }
+            World::Plain => {}
+        }
+        all
+    }
+}
+
+fn clouds(table: &str, clouds: &Clouds) -> Vec<Limit> {
+    let limit = |key: &str, value: f64, range: [f64; 2]| Limit::new(format!("{table}.{key}"), value, range);
+    vec![
+        limit("cover", clouds.cover, [0.0, 1.0]),
+        limit("largest_km", clouds.largest_km, [0.01, 20_000.0]),
+        limit("smallest_km", clouds.smallest_km, [0.01, clouds.largest_km]),
+        limit("softness", clouds.softness, [0.0, 1.0]),
+        limit("brightness", clouds.brightness, [0.0, ANY]),
+    ]
+}
