@@ -149,8 +149,9 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
             }
         }
         if let Some(now) = entries.get(viewer.playback.frame()) {
-            let ink = if dark { egui::Color32::from_white_alpha(150) } else { egui::Color32::from_black_alpha(150) };
-            ui.vline(VLine::new("", now.time_s - start).color(ink).width(1.0).allow_hover(false));
+            // Another colour than the grid's.
+            let ink = if dark { theme::LIMB } else { theme::REJECTED };
+            ui.vline(VLine::new("", now.time_s - start).color(ink).width(1.5).allow_hover(false));
         }
         ui.response().clicked().then(|| ui.pointer_coordinate()).flatten()
     });
