@@ -121,7 +121,8 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
 fn in_firmware<'a>(command: &'a mut Command, flags: &str) -> &'a mut Command {
     command.current_dir(root().join("firmware"));
     if !flags.is_empty() {
-        command.env("RUSTFLAGS", flags);
+        // Beside those of `firmware/.cargo/config.toml`; RUSTFLAGS would stand in their place.
+        command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS", flags);
     }
     command
 }

@@ -23,12 +23,14 @@ const STAGES: [&str; 10] = [
 ];
 /// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
 /// places where they do.
-const ONCE: [(&str, usize); 6] = [
+const ONCE: [(&str, usize); 8] = [
+    ("hzn_core::binarize::Config::fixed_level", 4),
+    ("hzn_core::binarize::Histogram::mean", 2),
     ("hzn_core::binarize::Histogram::otsu", 3),
     ("hzn_core::reject::keep", 2),
     ("hzn_core::estimate::fit", 4),
     ("hzn_core::covariance::fuse", 5),
-    ("hzn_core::select::judge", 7),
+    ("hzn_core::select::judge", 8),
     ("hzn_core::pipeline::judge::Judge<T,O>::edge", 2),
 ];
 /// Loops that must be found, or the check would say nothing.

@@ -99,12 +99,14 @@ pub(crate) struct Points {
 }
 
 /// Fills `blocks` with the points of a border, evenly thinned to `keep_points`. Lanes that stay empty have weight 0.
+/// Ends after `most_slow` points that are slow.
 pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
     scene: &Scene<'_, T, P, O>,
     config: &Config,
     border: &[Pixel],
     candidate: u32,
     blocks: &mut [Block<T>],
+    most_slow: u32,
 ) -> Points {
     let room = blocks.len() * LANES;
     let keep = match usize::from(config.keep_points) {
@@ -115,6 +117,9 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
     let mut made = Points::default();
     let mut place = 0;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
+        if made.slow >= most_slow {
+            break;
+        }
         let found = if P::PASSED {
             let found = scene.picture.passed(pixel.x, pixel.y);
             made.cut += u32::from(found.is_some_and(|f| f.cut));
@@ -297,11 +302,8 @@ fn read<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     (x, y): (i32, i32),
     index: usize,
 ) -> Option<i32> {
-    if !FREE {
-        let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
-        if !scene.region.contains(x, y) || scene.region.masked(x, y) {
-            return None;
-        }
+    if !FREE && !scene.region.counts(x, y) {
+        return None;
     }
     scene.observer.pixel(x as u16, y as u16);
     Some(i32::from(scene.picture.read(index)))
@@ -414,7 +416,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
 #[inline(always)]
 fn is_clear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel, margin: u16) -> bool {
     let region = scene.region;
-    region.is_inside_by(p.x, p.y, margin) && (region.polygons() == 0 || region.clearance(p.x, p.y, margin) == margin)
+    region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || region.clearance(p.x, p.y, margin) == margin)
 }
 
 /// As [`linear`], `step` pixels a step.
@@ -583,7 +585,7 @@ mod tests {
             })
             .collect();
         let mut blocks = [Block::default(); 64];
-        let made = pick(&scene, config, &border, 0, &mut blocks);
+        let made = pick(&scene, config, &border, 0, &mut blocks, u32::MAX);
         assert!(made.count > 30, "{made:?}");
         blocks
             .iter()
@@ -627,7 +629,10 @@ mod tests {
         let scene = Scene::new(&grey, &region, 120, &Unobserved);
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
         let mut blocks = [Block::default(); 2];
-        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks), Points { count: 15, fallback: 0, slow: 0, cut: 0 });
+        assert_eq!(
+            pick(&scene, &config, &border, 0, &mut blocks, u32::MAX),
+            Points { count: 15, fallback: 0, slow: 0, cut: 0 }
+        );
         let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
         assert_eq!((first, last), (22.0, 78.0));
     }

@@ -176,15 +176,26 @@ impl<T: Real> Region<T> {
         [most, most / 4].into_iter().find(|&n| clear(n)).unwrap_or(0)
     }
 
-    /// How many polygons there are.
-    pub(crate) fn polygons(&self) -> u32 {
-        self.polygons.len() as u32
+    /// Whether there is a polygon.
+    pub(crate) fn has_mask(&self) -> bool {
+        !self.polygons.is_empty()
+    }
+    /// What it costs at most to see whether a pixel is masked, in the unit of [`crate::work`], which is four sides.
+    pub(crate) fn mask_cost(&self) -> u32 {
+        self.polygons.iter().map(|p| 1 + p.corners.len() as u32 / 4).sum()
     }
 
     /// Whether a polygon covers the pixel.
     #[inline(always)]
     pub fn masked(&self, x: u16, y: u16) -> bool {
-        !self.polygons.is_empty() && self.covered(x, y)
+        self.has_mask() && self.covered(x, y)
+    }
+
+    /// Whether there is such a pixel, in the region and not masked. For reads that need it seldom: once in flash.
+    #[inline(never)]
+    pub(crate) fn counts(&self, x: i32, y: i32) -> bool {
+        let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
+        self.contains(x, y) && !self.masked(x, y)
     }
 
     #[inline(never)]

@@ -1,8 +1,8 @@
 //! What a picture may cost: one account that every stage draws on, so that the worst picture has a bound.
 //!
 //! The unit is a step of the border follower, some fifty instructions of a Cortex-M7. Stages pay beforehand what they
-//! cost at most, by what they are about to look at, so that the sum does not depend on the machine. What is bounded by
-//! the picture's size alone is free: the sample for the level, the border, the search lines.
+//! cost at most, by what they are about to look at, so that the sum does not depend on the machine. The sample for the
+//! level is free, and so is the border, but for looks at the mask.
 
 use crate::error::{ConfigError, between};
 
@@ -28,16 +28,21 @@ impl Config {
 }
 
 /// Beginning to follow an edge.
-pub(crate) const EDGE: u32 = 16;
-/// A step with a look at everything around, under so many polygons of the mask.
-pub(crate) fn look(polygons: u32) -> u32 {
-    2 + 4 * polygons
+pub(crate) const EDGE: u32 = 20;
+/// A step with a look at everything around, the mask too.
+pub(crate) fn look(mask: u32) -> u32 {
+    2 + mask * 5 / 2
+}
+/// A search line from one column to another: few instructions a pixel, but they are many where a small body is looked
+/// for, with lines on every row.
+pub(crate) fn line(from: u16, to: u16) -> u32 {
+    u32::from(to.saturating_sub(from)) / 10
 }
 /// A sub-pixel point with its ray.
 pub(crate) const POINT: u32 = 16;
 /// What such a point costs more where reads are checked one by one: beside a mask or the border, or on a wide edge.
-pub(crate) fn slow_point(polygons: u32) -> u32 {
-    14 + 14 * polygons
+pub(crate) fn slow_point(mask: u32) -> u32 {
+    18 + 12 * mask
 }
 /// A draw of the rejection, verified on one further point.
 pub(crate) const DRAW: u32 = 10;
@@ -97,7 +102,6 @@ impl Work {
         self.left == 0
     }
     /// Nothing more is done.
-    #[cfg(feature = "horace")]
     pub(crate) fn cut(&mut self) {
         (self.left, self.cut) = (0, true);
     }
@@ -106,7 +110,6 @@ impl Work {
         self.cut
     }
     /// What is left.
-    #[cfg(feature = "horace")]
     pub(crate) fn left(&self) -> u32 {
         self.left
     }

@@ -155,11 +155,7 @@ impl<'a, B: Board> Flight<'a, B> {
     /// nothing is of no use, so this is safe mode.
     fn check(&mut self, parameters: bool) {
         let camera = self.board.camera_answers();
-        // Walking a bit through the transmit buffer finds memory that does not hold.
-        let memory = [0x55u8, 0xAA].iter().all(|&pattern| {
-            self.buffers.line.out.fill(pattern);
-            core::hint::black_box(&self.buffers.line.out).iter().all(|&b| b == pattern)
-        });
+        let memory = holds(&mut self.buffers.line.out, |_| ());
         let failed = u8::from(!camera) | u8::from(!memory) << 1 | u8::from(!parameters) << 2;
         self.state.self_check = failed;
         if failed != 0 {
@@ -532,5 +528,29 @@ impl Observer<f32> for Watch<'_> {
             list.len += 1;
         }
         (list.length, list.candidate, list.stride) = (length, candidate, stride.saturating_mul(every as u32));
+    }
+}
+
+/// Whether memory holds every bit, set and cleared. `meanwhile` is what becomes of what was written, for the tests.
+fn holds(memory: &mut [u8], meanwhile: impl Fn(&mut [u8])) -> bool {
+    [0x55u8, 0xAA].iter().all(|&pattern| {
+        memory.fill(pattern);
+        meanwhile(core::hint::black_box(&mut *memory));
+        core::hint::black_box(&*memory).iter().all(|&b| b == pattern)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bit_that_is_stuck_fails_the_self_check() {
+        let mut memory = [0; MAX_BYTES];
+        assert!(holds(&mut memory, |_| ()));
+        for bit in 0..8 * MAX_BYTES {
+            assert!(!holds(&mut memory, |m| m[bit / 8] |= 1 << (bit % 8)), "bit {bit} stuck at 1");
+            assert!(!holds(&mut memory, |m| m[bit / 8] &= !(1 << (bit % 8))), "bit {bit} stuck at 0");
+        }
     }
 }

@@ -96,7 +96,7 @@ fn by(method: SubPixel) -> impl Fn(&Scene<'_, f64, Grey<'_, u16>, Unobserved>, P
     move |scene, pixel| {
         let mut blocks = [Block::default(); 1];
         let config = Config { sub_pixel: method, keep_points: 0, ..Config::default() };
-        (pick(scene, &config, &[pixel], 0, &mut blocks).count == 1).then(|| blocks[0].point(0))
+        (pick(scene, &config, &[pixel], 0, &mut blocks, u32::MAX).count == 1).then(|| blocks[0].point(0))
     }
 }
 

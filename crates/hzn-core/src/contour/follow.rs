@@ -17,6 +17,7 @@ use crate::pixel::Pixel;
 use crate::real::Real;
 use crate::region::Region;
 use crate::work;
+use core::cell::Cell;
 
 /// Neighbours counter-clockwise on the screen from east: (dx, dy).
 pub(super) const STEPS: [(i32, i32); 8] = [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
@@ -31,8 +32,11 @@ pub(crate) struct Scene<'a, T, P, O> {
     pub(crate) observer: &'a O,
     /// The body's disc blooms: its edge is where the picture's level says, as what lies around it is no plateau.
     pub(crate) blooms: bool,
-    /// What a look around costs.
+    /// What a look at the mask costs, and a look around.
+    mask: u32,
     look: u32,
+    /// Looks at the mask outside of the follower that were not paid for yet.
+    masked: Cell<u32>,
     /// Twice around, so that eight directions follow each other from any of the first eight.
     moves: [Move; 16],
 }
@@ -93,7 +97,8 @@ const RUN: usize = 32;
 impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
     pub(crate) fn new(picture: &'a P, region: &'a Region<T>, level: u16, observer: &'a O) -> Self {
         let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
-        Self { picture, region, level, observer, blooms: false, look: work::look(region.polygons()), moves }
+        let (mask, masked) = (region.mask_cost(), Cell::new(0));
+        Self { picture, region, level, observer, blooms: false, mask, look: work::look(mask), masked, moves }
     }
 
     pub(crate) fn blooming(self, blooms: bool) -> Self {
@@ -103,7 +108,25 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
     /// Whether a pixel of the region is lit.
     #[inline(always)]
     pub(crate) fn lit(&self, x: u16, y: u16) -> bool {
-        self.brightness(x, y) >= self.level && !self.region.masked(x, y)
+        self.brightness(x, y) >= self.level && !self.masked(x, y)
+    }
+    /// Whether a polygon covers the pixel.
+    #[inline(always)]
+    pub(super) fn masked(&self, x: u16, y: u16) -> bool {
+        self.region.has_mask() && self.is_covered(x, y)
+    }
+    #[inline(never)]
+    fn is_covered(&self, x: u16, y: u16) -> bool {
+        self.masked.set(self.masked.get() + 1);
+        self.region.masked(x, y)
+    }
+    /// What a look at the mask costs.
+    pub(crate) fn mask_cost(&self) -> u32 {
+        self.mask
+    }
+    /// What [`Self::lit`] has cost since the last time.
+    pub(crate) fn cost(&self) -> u32 {
+        self.masked.take() * self.mask
     }
 
     /// The brightness of a pixel in counts.

@@ -30,7 +30,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
     ///
     /// The first start's stretch does not count what lies beyond the place where the walk begins; the return value
     /// does: the stretch that ends the walk.
-    pub(crate) fn each_start(&self, stride: u16, mut found: impl FnMut(Start) -> bool) -> u32 {
+    pub(crate) fn each_start(&self, stride: u16, found: &mut dyn FnMut(Start) -> bool) -> u32 {
         let stride = stride.max(1);
         let mut stretch = 0u32;
         let mut before: Option<(Pixel, bool)> = None;
@@ -100,7 +100,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
     pub(crate) fn ranked_starts(&self, stride: u16) -> Ranked {
         let mut ranked = Ranked::new();
         let mut first: Option<Start> = None;
-        let tail = self.each_start(stride, |start| {
+        let tail = self.each_start(stride, &mut |start| {
             if first.is_none() {
                 first = Some(start);
             } else {
@@ -114,35 +114,65 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
         ranked
     }
 
-    /// Calls `found` with every unmarked lit pixel of the search lines whose western neighbour is dark, until it
-    /// says to stop. `found` gets the marks back, for the follower.
+    /// Calls `found` with every unmarked lit pixel of a search line, from column `x0` to `x1` of row `y`, whose western
+    /// neighbour is dark, until it says to stop. `found` gets the marks back, for the follower.
     pub(crate) fn each_crossing<'m>(
         &self,
+        y: u16,
+        (x0, x1): (u16, u16),
         marks: &mut Marks<'m>,
         mut found: impl FnMut(Pixel, u8, &mut Marks<'m>) -> bool,
     ) {
-        for y in marks.rows(self.region.height()) {
-            let Some((x0, x1)) = self.region.span(y) else { continue };
-            let mut lit = self.lit(x0, y);
-            for x in x0 + 1..=x1 {
-                let now = self.lit(x, y);
-                if now && !lit && !marks.get(x, y) && !found(Pixel { x, y }, WEST, marks) {
-                    return;
-                }
-                lit = now;
+        let (mut x, mut lit) = (x0, self.lit(x0, y));
+        while x < x1 {
+            if !self.region.has_mask() {
+                x = self.alike_to(x, y, x1);
             }
+            x += 1;
+            let now = x <= x1 && self.lit(x, y);
+            if now && !lit && !marks.get(x, y) && !found(Pixel { x, y }, WEST, marks) {
+                return;
+            }
+            lit = now;
         }
+    }
+
+    /// From column `x` of row `y` eastwards, up to `end`: a pixel up to which all are as bright or dark, against the level;
+    /// three at a time, so that the last of them may be further.
+    #[inline(never)]
+    fn alike_to(&self, x: u16, y: u16, end: u16) -> u16 {
+        let (first, across) = (self.picture.index(x, y), self.picture.across());
+        let level = u32::from(self.level);
+        // What is alike lies in this range.
+        let (low, span) = if self.picture.read(first) < self.level { (0, level) } else { (level, 1 << 16) };
+        let (mut last, mut index) = (x, first + across);
+        while end - last >= 3 {
+            for dx in 1..4 {
+                self.observer.pixel(last + dx, y);
+            }
+            let three = self.picture.three(index);
+            if three.iter().any(|&v| u32::from(v).wrapping_sub(low) >= span) {
+                break;
+            }
+            last += 3;
+            index += 3 * across;
+        }
+        last
     }
 }
 
 fn insert(ranked: &mut Ranked, start: Start) {
-    let place = ranked.iter().position(|s| s.stretch < start.stretch).unwrap_or(ranked.len());
-    if place < RANKED {
-        if ranked.is_full() {
-            ranked.pop();
-        }
-        // There is room now, so nothing is handed back.
-        let _ = ranked.insert(place, start);
+    if ranked.is_full() && ranked.last().is_some_and(|last| last.stretch < start.stretch) {
+        ranked.pop();
+    }
+    // Full of longer ones: it is none of them.
+    let Ok(()) = ranked.push(start) else { return };
+    let mut upwards = ranked.as_mut_slice();
+    while let [.., longer, new] = &mut *upwards
+        && longer.stretch < new.stretch
+    {
+        core::mem::swap(longer, new);
+        upwards = upwards.split_last_mut().map_or(&mut [], |(_, rest)| rest);
     }
 }
 

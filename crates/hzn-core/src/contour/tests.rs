@@ -42,16 +42,18 @@ impl Bitmap {
         let mut marks = Marks::new(&mut bits, self.w, self.h, spacing, spacing);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
-        scene.each_crossing(&mut marks, |start, dark, marks| {
-            let mut edge = Thinned::new(&mut buffer);
-            match scene.follow(start, dark, &mut edge, marks, &mut steps) {
-                End::Closed { twice_area } => {
-                    edges.push((edge.pixels().iter().map(|p| (p.x, p.y)).collect(), twice_area));
+        for y in marks.rows(self.h) {
+            scene.each_crossing(y, (0, self.w - 1), &mut marks, |start, dark, marks| {
+                let mut edge = Thinned::new(&mut buffer);
+                match scene.follow(start, dark, &mut edge, marks, &mut steps) {
+                    End::Closed { twice_area } => {
+                        edges.push((edge.pixels().iter().map(|p| (p.x, p.y)).collect(), twice_area));
+                    }
+                    other => panic!("{other:?}"),
                 }
-                other => panic!("{other:?}"),
-            }
-            true
-        });
+                true
+            });
+        }
         edges
     }
 
@@ -63,7 +65,7 @@ impl Bitmap {
         let mut marks = Marks::new(&mut bits, self.w, self.h, 1, 1);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
-        scene.each_start(1, |start| {
+        scene.each_start(1, &mut |start| {
             let mut edge = Thinned::new(&mut buffer);
             let end = scene.follow(start.pixel, start.dark, &mut edge, &mut marks, &mut steps);
             assert_eq!(end, End::Open);

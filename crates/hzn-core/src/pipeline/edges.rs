@@ -144,7 +144,7 @@ impl<T: Real> Edges<T> {
     pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
         let scene = Scene::new(picture, sensor.region(), level, &Unobserved).blooming(sensor.config().body.blooms());
         let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
-        let made = candidates::pick(&scene, &sensor.config().candidates, border, 0, &mut blocks);
+        let made = candidates::pick(&scene, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
         let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
         Self::of(sensor.camera(), (0..made.count as usize).map(point).collect())
     }

@@ -124,6 +124,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         // What is narrower on the border than a search line is apart from the next is no limb.
         let stride = spacing.min(width.min(height) / BORDER_LOOKS).max(1);
         let ranked = scene.ranked_starts(stride);
+        self.work.pay(scene.cost());
         for start in &ranked {
             if self.done() {
                 break;
@@ -131,18 +132,27 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             self.edge(scene, start.pixel, start.dark, border, &mut marks);
         }
         if !self.done() {
-            scene.each_start(stride, |start| {
+            scene.each_start(stride, &mut |start| {
                 if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
                     self.edge(scene, start.pixel, start.dark, border, &mut marks);
                 }
+                self.work.pay(scene.cost());
                 !self.done()
             });
         }
-        if self.best.is_none() {
-            scene.each_crossing(&mut marks, |pixel, dark, marks| {
+        if self.best.is_some() {
+            return;
+        }
+        for y in marks.rows(height) {
+            let Some((x0, x1)) = scene.region.span(y) else { continue };
+            if self.done() || !self.work.spend(work::line(x0, x1)) {
+                break;
+            }
+            scene.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
                 self.edge(scene, pixel, dark, border, marks);
                 !self.done()
             });
+            self.work.pay(scene.cost());
         }
     }
 
@@ -231,8 +241,14 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         };
 
         self.enter(Stage::Candidates);
-        let points = candidates::pick(scene, &config.candidates, border, number, self.blocks);
-        self.work.pay(points.slow * work::slow_point(scene.region.polygons()));
+        let slow = work::slow_point(scene.mask_cost());
+        let most_slow = self.work.left() / slow;
+        let points = candidates::pick(scene, &config.candidates, border, number, self.blocks, most_slow);
+        if points.slow == most_slow {
+            self.work.cut();
+            return (outcome, None);
+        }
+        self.work.pay(points.slow * slow);
         outcome.points = points.count;
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;

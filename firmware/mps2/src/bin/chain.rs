@@ -13,7 +13,7 @@ use cortex_m_rt::entry;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::pipeline::{Unobserved, Workspace};
-use hzn_core::{Config, Frame, Sensor};
+use hzn_core::{Config, Frame};
 use hzn_mps2::board::Board;
 use hzn_mps2::host::{File, exit};
 use hzn_mps2::watermark;
@@ -54,8 +54,8 @@ fn run() -> Option<()> {
     }
     let workspace = WORKSPACE.try_take()?;
     // Seen through, the methods that this configuration does not choose would be left out.
-    let sensor = Sensor::<f32>::new(black_box(&config())).ok()?;
-    let expected = sensor.expect(&Frame::default()).ok()?;
+    let sensor = hzn_setup::sensor(black_box(&config())).ok()?;
+    let expected = hzn_setup::expect(&sensor, &Frame::default()).ok()?;
     let picture = Grey::try_new(&*picture, Layout::packed(WIDTH.into(), HEIGHT.into(), 1, 8)).ok()?;
     let report = sensor.process(workspace, &picture, &expected, &Unobserved);
 

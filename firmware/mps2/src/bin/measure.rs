@@ -15,7 +15,7 @@ use cortex_m_rt::entry;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::pipeline::{Observer, Unobserved};
 use hzn_core::status::Stage;
-use hzn_core::{FlightWorkspace, Frame, Sensor};
+use hzn_core::{FlightWorkspace, Frame};
 use hzn_flight::answer::Answer;
 use hzn_flight::bytes::Writer;
 use hzn_flight::table;
@@ -99,9 +99,9 @@ fn run() -> Option<()> {
         let frame = Frame { altitude_m: given(altitude), position_m, ..Frame::default() };
 
         let t0 = timer.ticks();
-        let sensor = Sensor::new(&parameters.sensor).ok()?;
+        let sensor = hzn_setup::sensor(&parameters.sensor).ok()?;
         let t1 = timer.ticks();
-        let expected = sensor.expect(&frame).ok()?;
+        let expected = hzn_setup::expect(&sensor, &frame).ok()?;
         let t2 = timer.ticks();
         let report = sensor.process(workspace, &picture, &expected, &Unobserved);
         let t3 = timer.ticks();
