@@ -31,7 +31,7 @@ const ONCE: [(&str, usize); 8] = [
     ("hzn_core::estimate::fit", 4),
     ("hzn_core::covariance::fuse", 5),
     ("hzn_core::select::judge", 8),
-    ("hzn_core::pipeline::judge::Judge<T,O>::edge", 2),
+    ("hzn_core::pipeline::judge::Judge<T,O>::edge", 4),
 ];
 /// Loops that must be found, or the check would say nothing.
 const LOOPS: [&str; 3] = ["contour::follow", "candidates::", "estimate::pass"];

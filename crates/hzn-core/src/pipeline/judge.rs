@@ -42,6 +42,8 @@ fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u1
 /// is half as large.
 const RIVAL_COS: f64 = 0.9962;
 const RIVAL_SCORE: f64 = 2.0;
+/// An edge whose points scatter by more sigmas than this is rougher than the noise model's limb.
+const ROUGH_SIGMAS: f64 = 3.0;
 
 /// The edges of one picture, judged one by one.
 pub(super) struct Judge<'a, T, O> {
@@ -321,8 +323,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         };
         // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself asks for
         // must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of 16 variances, as two sigma from either are.
-        // What is rougher than a limb is so over longer stretches.
-        let rough = (fit.rms_px / T::of(3.0 * self.noise.sigma_px)).most(T::one());
+        // What is rougher than a limb is so over longer stretches: it says the less of the curvature.
+        let rough = (fit.rms_px / (T::of(self.noise.sigma_px) * T::of(ROUGH_SIGMAS))).most(T::one());
         let curved = fused.var_free_cos.is_some_and(|v| v * rough * T::of(4.0) < fit.c * self.expected.cos);
         if config.estimate.half_angle == estimate::HalfAngle::Fused && !curved && !self.expected.free {
             outcome.verdict = Verdict::Straight;
