@@ -331,7 +331,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             return (outcome, None);
         }
         let certain =
-            judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 6 || fit.rms_px * T::of(4.0) < threshold);
+            judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 8 || fit.rms_px * T::of(4.0) < threshold);
         let tracks = (self.tracks && !P::PASSED).then(|| select::middle_level(&fused.e, blocks, scene, camera));
         (outcome, Some(Best { solution, score: judged.score, certain, level: tracks.flatten() }))
     }
