@@ -30,6 +30,8 @@ struct Times {
     handed: Duration,
     /// It is on the screen.
     screen: Duration,
+    /// Frames of the window that still showed the answer of before.
+    late: u32,
     /// Processor time of the window's thread until it is laid out.
     layout_work: Duration,
     /// Processor time of the window's thread until it is on the screen.
@@ -50,6 +52,7 @@ pub struct Measure {
     times: Vec<Times>,
     /// What is known of the change that is on its way to the screen.
     handed: Times,
+    late: u32,
     frames: usize,
     shown: Option<usize>,
 }
@@ -59,7 +62,7 @@ impl Measure {
     pub fn new(kind: Kind, began: Instant) -> Self {
         let (look, times) = (Look::Colour, Vec::new());
         let (worked, handed) = (Duration::ZERO, Times::default());
-        Self { kind, began, look, changed: None, worked, seen: false, times, handed, frames: 0, shown: None }
+        Self { kind, began, look, changed: None, worked, seen: false, times, handed, late: 0, frames: 0, shown: None }
     }
 
     /// Before the window is drawn: what was drawn last is on the screen now. True when the measurement is through.
@@ -78,8 +81,11 @@ impl Measure {
             Kind::Start => viewer.sight().is_some(),
             _ => viewer.is_settled(),
         };
-        if let (true, Some(changed), Some(sight)) = (self.seen, self.changed, viewer.sight()) {
+        if !self.seen {
+            self.late += 1;
+        } else if let (Some(changed), Some(sight)) = (self.changed, viewer.sight()) {
             self.handed = Times {
+                late: std::mem::take(&mut self.late),
                 answer: sight.latency,
                 handed: changed.elapsed(),
                 layout_work: processor_time().saturating_sub(self.worked),
@@ -125,6 +131,9 @@ impl Measure {
                 let at = |part: f64| each[(part * (CHANGES - 1) as f64) as usize].as_secs_f64() * 1e3;
                 println!("  {what}: median {:.1} ms, 95 % {:.1} ms", at(0.5), at(0.95));
             }
+            let in_time = self.times.iter().filter(|t| t.late == 0).count();
+            let latest = self.times.iter().map(|t| t.late).max().unwrap_or(0);
+            println!("  in the frame of the change: {in_time} of {CHANGES}, {latest} frames later at most");
             // The system counts in steps as long as a frame: only the mean of many is exact.
             let mean = |part: fn(&Times) -> Duration| {
                 self.times.iter().map(part).sum::<Duration>().as_secs_f64() * 1e3 / CHANGES as f64
@@ -143,7 +152,7 @@ impl Measure {
             self.seen = false;
             return false;
         }
-        self.changed = Some(Instant::now());
+        (self.changed, self.late) = (Some(Instant::now()), 0);
         self.worked = processor_time();
         // A little to and fro, so that every change is one.
         let scale = 1.0 + 0.002 * (self.times.len() % 100) as f64 + 0.001;

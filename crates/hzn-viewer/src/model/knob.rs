@@ -23,7 +23,9 @@ impl Knob {
         if high - low <= 40.0 * usual || (high - low <= 1.0) {
             // A limit that itself is refused is not offered.
             let low = if above { low + (high - low) * 1e-3 } else { low };
-            return Some(Self { low, high, logarithmic: false });
+            // On a straight way, what is usual would stand at the very end.
+            let logarithmic = !above && low > 0.0 && high >= 50.0 * low;
+            return Some(Self { low, high, logarithmic });
         }
         let high = high.min(far);
         let low = if above || low > 0.0 { low.max(usual / 30.0) } else { low };
@@ -55,6 +57,8 @@ mod tests {
         let height = knob(number(-50.0, false, 500.0), 10.0);
         assert!(!height.logarithmic && height.low == -50.0 && height.high <= 500.0);
         assert!(knob(number(0.0, true, 100.0), 10.0).low > 0.0);
+        let scale = knob(number(0.1, false, 10.0), 1.0);
+        assert_eq!((scale.logarithmic, scale.middle()), (true, 1.0));
         assert!(Knob::of(&Limits::Words("words".into()), 1.0).is_none());
     }
 

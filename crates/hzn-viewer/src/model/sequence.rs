@@ -87,17 +87,18 @@ impl Sequence {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     #[test]
     fn what_is_made_of_it_lies_beside_it() {
-        let dir = tempfile::tempdir().unwrap();
-        let pictures = dir.path().join("flight");
-        std::fs::create_dir(&pictures).unwrap();
-        let folder = Sequence { inputs: vec![pictures.clone()], folder: pictures, ..Sequence::default() };
-        assert_eq!(folder.beside("flight.mp4"), dir.path().join("flight.mp4"));
-        let file = dir.path().join("flight.mcap");
-        let recording = Sequence { inputs: vec![file], folder: dir.path().to_owned(), ..Sequence::default() };
-        assert_eq!(recording.beside("flight.mp4"), dir.path().join("flight.mp4"));
+        // Any folder that is there.
+        let pictures = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let parent = pictures.parent().unwrap();
+        let folder = Sequence { inputs: vec![pictures.into()], folder: pictures.into(), ..Sequence::default() };
+        assert_eq!(folder.beside("flight.mp4"), parent.join("flight.mp4"));
+        let file = parent.join("flight.mcap");
+        let recording = Sequence { inputs: vec![file], folder: parent.into(), ..Sequence::default() };
+        assert_eq!(recording.beside("flight.mp4"), parent.join("flight.mp4"));
         assert_eq!(Sequence { title: "a.mcap.part".into(), ..Sequence::default() }.stem(), "a");
     }
 

@@ -32,6 +32,8 @@ pub struct Session {
     gesture: Option<String>,
     config: Option<Arc<Config>>,
     values: toml::Table,
+    /// Those of the saved text.
+    saved_values: toml::Table,
     /// The preset that the text names, or else the one that counts without.
     preset: String,
     /// Keys about which the text says something else than the saved one, as (section, name, body).
@@ -54,6 +56,7 @@ impl Session {
             gesture: None,
             config: None,
             values: toml::Table::new(),
+            saved_values: toml::Table::new(),
             preset: String::new(),
             differing: HashSet::new(),
             problem: None,
@@ -121,23 +124,33 @@ impl Session {
     /// The value that counts: the text's, or else the preset's; `None` where there is none. Of a body, its own level and
     /// edge errors come before the sensor's.
     pub fn value(&self, section: &str, name: &str, body: usize) -> Option<&toml::Value> {
-        let of_body = match self.values.get("bodies").and_then(toml::Value::as_array) {
+        Self::find(&self.values, section, name, body)
+    }
+
+    fn find<'a>(values: &'a toml::Table, section: &str, name: &str, body: usize) -> Option<&'a toml::Value> {
+        let of_body = match values.get("bodies").and_then(toml::Value::as_array) {
             Some(bodies) => bodies.get(body),
-            None => self.values.get("body"),
+            None => values.get("body"),
         };
         if section == "body" {
             return of_body?.get(name);
         }
         let own = of_body.and_then(|b| b.get(section)).filter(|_| matches!(section, "binarize" | "covariance"));
-        own.or_else(|| self.values.get(section))?.get(name)
+        own.or_else(|| values.get(section))?.get(name)
     }
 
     /// A number that counts.
     pub fn number(&self, section: &str, name: &str, body: usize) -> Option<f64> {
-        match self.value(section, name, body)? {
-            toml::Value::Float(x) => Some(*x),
-            toml::Value::Integer(n) => Some(*n as f64),
-            _ => None,
+        number(self.value(section, name, body)?)
+    }
+
+    /// About what a number usually is, a power of ten: a slider's reach. It follows what was saved, so that it stays while
+    /// the slider is moved; a key that had no value then goes by the one that counts.
+    pub fn usual(&self, section: &str, name: &str, body: usize) -> f64 {
+        let saved = Self::find(&self.saved_values, section, name, body).and_then(number);
+        match saved.or_else(|| self.number(section, name, body)) {
+            Some(x) if x != 0.0 => 10f64.powf(x.abs().log10().round()),
+            _ => 1.0,
         }
     }
 
@@ -233,6 +246,7 @@ impl Session {
     pub fn save(&mut self, path: &Path) -> Result<(), String> {
         whole::write(path, self.sheet.text().as_bytes())?;
         self.saved = self.sheet.clone();
+        self.saved_values = self.values.clone();
         self.differing.clear();
         (self.path, self.home) = (Some(path.to_owned()), path.to_owned());
         self.settle();
@@ -272,6 +286,9 @@ impl Session {
             Ok(sensor) => {
                 // What was accepted is TOML again; a table that is not would only leave the sliders without values.
                 self.values = toml::Table::try_from(&sensor.config).unwrap_or_default();
+                if !self.is_changed() {
+                    self.saved_values = self.values.clone();
+                }
                 self.config = Some(Arc::new(sensor.config));
                 self.problem = None;
                 static VERSIONS: AtomicU64 = AtomicU64::new(1);
@@ -279,6 +296,14 @@ impl Session {
             }
             Err(problem) => self.problem = Some(problem),
         }
+    }
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    match value {
+        toml::Value::Float(x) => Some(*x),
+        toml::Value::Integer(n) => Some(*n as f64),
+        _ => None,
     }
 }
 
@@ -383,6 +408,22 @@ mod tests {
         assert_eq!(s.number("candidates", "keep_points", 0), Some(600.0), "the preset's");
         assert_eq!(s.number("select", "min_arc_px", 0), None);
         assert_eq!(s.value("binarize", "method", 0).unwrap().as_str(), Some("otsu"));
+    }
+
+    #[test]
+    fn a_slider_reaches_as_far_while_it_is_moved_as_before() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut s = session();
+        let usual = |s: &Session| s.usual("binarize", "scale", 0);
+        assert_eq!(usual(&s), 1.0);
+        s.set("binarize", "scale", 0, Some(0.15.into()));
+        assert_eq!((s.number("binarize", "scale", 0), usual(&s)), (Some(0.15), 1.0));
+        s.save(&dir.path().join("sensor.toml")).unwrap();
+        assert_eq!(usual(&s), 0.1);
+        // Without a value there, the one that counts.
+        assert_eq!(s.usual("select", "min_arc_px", 0), 1.0);
+        s.set("select", "min_arc_px", 0, Some(120.0.into()));
+        assert_eq!(s.usual("select", "min_arc_px", 0), 100.0);
     }
 
     #[test]

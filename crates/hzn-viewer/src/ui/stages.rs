@@ -296,7 +296,7 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
             (Limits::Number { .. }, None) => {
                 // Left out: a click gives it a value to begin with.
                 if ui.button("automatic").on_hover_text(format!("{hint}\nClick to set it.")).clicked()
-                    && let Some(knob) = Knob::of(&key.limits, usual(session, key, body))
+                    && let Some(knob) = Knob::of(&key.limits, session.usual(&key.section, &key.name, body))
                 {
                     session.set_number(key, body, knob.middle());
                     session.settle();
@@ -319,7 +319,8 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
     let before = x;
     let whole = matches!(session.value(&key.section, &key.name, body), Some(toml::Value::Integer(_)));
     let unit = if key.unit().is_empty() { String::new() } else { format!(" {}", key.unit()) };
-    let response = match Knob::of(limits, usual(session, key, body)).filter(|_| key.section != "camera") {
+    let usual = session.usual(&key.section, &key.name, body);
+    let response = match Knob::of(limits, usual).filter(|_| key.section != "camera") {
         Some(knob) => {
             ui.spacing_mut().slider_width = (ui.available_width() - 96.0).max(60.0);
             let mut slider = Slider::new(&mut x, knob.low..=knob.high)
@@ -330,7 +331,7 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
                 slider = slider.integer();
             }
             if knob.logarithmic {
-                slider = slider.smallest_positive((usual(session, key, body) / 100.0).max(1e-4));
+                slider = slider.smallest_positive((usual / 100.0).max(1e-4));
             }
             ui.add(slider)
         }
@@ -345,16 +346,6 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
     }
     if response.lost_focus() {
         session.settle();
-    }
-}
-
-/// About what the value usually is: that of the file.
-fn usual(session: &Session, key: &Key, body: usize) -> f64 {
-    // The saved text would have to be read again for every slider; the value that counts will do where it is not far off.
-    let now = session.number(&key.section, &key.name, body).unwrap_or(1.0);
-    match key.name.as_str() {
-        _ if now == 0.0 => 1.0,
-        _ => 10f64.powf(now.abs().log10().round()),
     }
 }
 

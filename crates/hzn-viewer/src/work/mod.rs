@@ -5,6 +5,7 @@ pub mod export;
 pub mod job;
 pub mod open;
 pub mod paint;
+mod reader;
 pub mod sight;
 pub mod store;
 pub mod sweep;

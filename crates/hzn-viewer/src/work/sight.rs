@@ -69,7 +69,7 @@ pub struct Outcome {
     pub bodies: Vec<Answer>,
     /// Why nothing was made of it: the picture has another size, or the like.
     pub refused: Option<String>,
-    /// Pixels that were read, as a picture that is laid over; only when it was asked for.
+    /// Pixels that were read, white in a transparent picture; only when it was asked for.
     pub touched: Option<Arc<ColorImage>>,
     /// Number of different pixels that were read.
     pub touched_pixels: Option<usize>,
@@ -264,9 +264,6 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
     outcome
 }
 
-/// Colour of pixels that were read.
-const TOUCHED: Color32 = Color32::from_rgb(204, 121, 167);
-
 fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorImage {
     use hzn_core::image::Pixels;
     let (w, h) = match view {
@@ -278,7 +275,7 @@ fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorIma
     let mut image = ColorImage::filled([usize::from(w), usize::from(h)], Color32::TRANSPARENT);
     for &(x, y) in pixels {
         if let Some(pixel) = image.pixels.get_mut(usize::from(y) * usize::from(w) + usize::from(x)) {
-            *pixel = TOUCHED;
+            *pixel = Color32::WHITE;
         }
     }
     image

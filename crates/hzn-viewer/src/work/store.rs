@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use hzn_cli::input::{self, Payload, Picture, Source, picture::Samples};
+use hzn_cli::input::{Picture, picture::Samples};
 use hzn_mcap::Pictures;
 
+use super::reader::Reader;
 use crate::model::Place;
 
 /// Decoded pictures that are kept, in bytes. A larger picture is kept alone.
@@ -18,9 +19,7 @@ pub type Decoded = Result<Arc<Picture>, String>;
 /// Reads pictures and keeps those that were used last.
 #[derive(Default)]
 pub struct Store {
-    inputs: Vec<PathBuf>,
-    recording: Option<Pictures>,
-    video: Option<(Box<dyn Source>, u64)>,
+    reader: Reader,
     /// The one used last stands last.
     kept: VecDeque<(usize, Decoded, usize)>,
 }
@@ -28,11 +27,11 @@ pub struct Store {
 impl Store {
     /// Another sequence.
     pub fn open(&mut self, inputs: Vec<PathBuf>) {
-        *self = Self { inputs, ..Self::default() };
+        *self = Self { reader: Reader::new(inputs, None), ..Self::default() };
     }
     /// How pictures of the recording are read.
     pub fn recording(&mut self, pictures: Pictures) {
-        self.recording = Some(pictures);
+        self.reader.recording = Some(pictures);
     }
     /// Is the picture of this frame at hand?
     pub fn has(&self, index: usize) -> bool {
@@ -52,44 +51,14 @@ impl Store {
             self.kept.push_back(kept);
             return decoded;
         }
-        let decoded = self.read(place).map(Arc::new);
+        let payload = self.reader.payload(place).map_err(|e| format!("{e:#}"));
+        let decoded = payload.and_then(|p| p.decode(None)).map(|(picture, _)| Arc::new(picture));
         let bytes = decoded.as_ref().map_or(0, |p| size_of_picture(p));
         while !self.kept.is_empty() && self.bytes() + bytes > KEEP_BYTES {
             self.kept.pop_front();
         }
         self.kept.push_back((index, decoded.clone(), bytes));
         decoded
-    }
-
-    fn read(&mut self, place: &Place) -> Result<Picture, String> {
-        let payload = match place {
-            Place::File(path) => Payload::File(path.clone()),
-            Place::RawFile(path, raw) => Payload::RawFile(path.clone(), *raw),
-            Place::Recorded(place) => {
-                let pictures = self.recording.as_mut().ok_or("the recording is not open")?;
-                let read = pictures.read(place).map_err(|e| e.to_string())?;
-                input::recorded(read.image?)
-            }
-            Place::Video(index) => self.of_video(*index)?,
-            Place::Nowhere => return Err("the recording holds no picture of this frame".into()),
-        };
-        payload.decode(None).map(|(picture, _)| picture)
-    }
-
-    /// A video goes forward only; for a picture before, it is begun again.
-    fn of_video(&mut self, index: u64) -> Result<Payload, String> {
-        if self.video.as_ref().is_none_or(|(_, next)| *next > index) {
-            let source = input::open(&self.inputs, None, None).map_err(|stop| format!("{:#}", stop.error))?;
-            self.video = Some((source, 0));
-        }
-        let Some((source, next)) = &mut self.video else { return Err("the video is not open".into()) };
-        loop {
-            let item = source.next().ok_or("the video ends before this frame")?.map_err(|e| format!("{e:#}"))?;
-            *next += 1;
-            if *next > index {
-                return Ok(item.payload);
-            }
-        }
     }
 }
 

@@ -1,21 +1,10 @@
 //! Everything that is written: pictures, videos, tables, recordings, sensor.toml.
 
-use std::path::Path;
-
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use hzn_core::status::Status;
 
 use crate::window::*;
-
-/// Pictures in a folder of their own, so that what is written lies beside it.
-fn folder() -> (tempfile::TempDir, std::path::PathBuf) {
-    let dir = tempfile::tempdir().unwrap();
-    let pictures = dir.path().join("pictures");
-    std::fs::create_dir(&pictures).unwrap();
-    flight(&pictures);
-    (dir, pictures)
-}
 
 /// As [`folder`], with thousands of frames: links to the same few pictures.
 fn long() -> (tempfile::TempDir, std::path::PathBuf) {
@@ -163,9 +152,7 @@ fn a_recording_does_not_take_its_own_place() {
     let (dir, pictures) = folder();
     let mut window = window_on(&pictures);
     let recording = dir.path().join("run.mcap");
-    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
-    path(&mut window, &recording, "Write");
-    said(&mut window, "Written");
+    run_into(&mut window, &recording);
     open(&mut window, &recording);
     settled(&mut window);
     window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
@@ -227,25 +214,14 @@ fn a_full_disk_is_said_and_the_rest_goes_on() {
     assert_eq!((sight(&window).index, answer(&window).0), (1, Status::Ok));
 }
 
-/// A recording that is cut off, of this length.
-fn cut(window: &mut Window, dir: &Path) -> std::path::PathBuf {
-    let whole = dir.join("run.mcap");
-    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
-    path(window, &whole, "Write");
-    said(window, "Written");
-    let bytes = std::fs::read(&whole).unwrap();
-    let end = bytes.windows(9).rposition(|w| w == [0x0f, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
-    let cut = dir.join("cut.mcap");
-    std::fs::write(&cut, &bytes[..end]).unwrap();
-    cut
-}
-
 #[cfg(unix)]
 #[test]
 fn what_cannot_be_recovered_for_want_of_space_stays_open() {
     let (dir, pictures) = folder();
     let mut window = window_on(&pictures);
-    let cut = cut(&mut window, dir.path());
+    let whole = dir.path().join("run.mcap");
+    run_into(&mut window, &whole);
+    let cut = cut_off(&whole);
     open(&mut window, &cut);
     said(&mut window, "was not closed");
     settled(&mut window);

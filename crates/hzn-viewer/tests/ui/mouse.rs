@@ -59,9 +59,7 @@ fn near(a: Point, b: Point) -> bool {
 
 #[test]
 fn the_mask_is_drawn_moved_and_removed() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window_on(dir.path());
+    let (_dir, mut window) = window_on_flight();
     let before = answer(&window);
     let edge_points = |w: &Window| sight(w).answers[0].bodies[0].row.edge_points.unwrap();
     let points = edge_points(&window);
@@ -137,10 +135,7 @@ fn drop_files(window: &mut Window, paths: &[&Path]) {
 
 #[test]
 fn what_is_dropped_is_opened() {
-    let dir = tempfile::tempdir().unwrap();
-    let pictures = dir.path().join("pictures");
-    std::fs::create_dir(&pictures).unwrap();
-    flight(&pictures);
+    let (dir, pictures) = folder();
     let mut window = window();
     drop_files(&mut window, &[&pictures]);
     settled(&mut window);
@@ -148,8 +143,7 @@ fn what_is_dropped_is_opened() {
     let before = answer(&window);
 
     // A sensor.toml is for the pictures that are open.
-    let other = dir.path().join("other.toml");
-    std::fs::write(&other, SENSOR.replace("scale = 1.0", "scale = 1.6")).unwrap();
+    let other = another_sensor(dir.path());
     drop_files(&mut window, &[&other]);
     settled(&mut window);
     assert_eq!(window.state().session().unwrap().path(), Some(&*other));
@@ -171,9 +165,7 @@ fn plot(window: &Window, name: &str) -> Rect {
 
 #[test]
 fn a_click_in_a_plot_or_the_time_line_goes_to_the_frame() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window_on(dir.path());
+    let (_dir, mut window) = window_on_flight();
     window.get_by_label("Process all").click();
     window.run_steps(2);
     until(&mut window, "not processed", |v| v.processed() == 4);
@@ -199,9 +191,7 @@ fn a_click_in_a_plot_or_the_time_line_goes_to_the_frame() {
 
 #[test]
 fn a_click_among_the_residuals_shows_the_point() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window_on(dir.path());
+    let (_dir, mut window) = window_on_flight();
     window.get_by_label("Residuals").click();
     window.run_steps(4);
     let rect = plot(&window, "Residuals");
@@ -217,9 +207,7 @@ fn a_click_among_the_residuals_shows_the_point() {
 
 #[test]
 fn the_wheel_zooms_about_the_pointer_and_a_drag_moves() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window_on(dir.path());
+    let (_dir, mut window) = window_on_flight();
     let pixel = [80.0, 60.0];
     let pointer = at(&window, pixel);
     window.hover_at(pointer);

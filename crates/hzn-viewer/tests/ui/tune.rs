@@ -8,11 +8,7 @@ use crate::window::*;
 
 #[test]
 fn open_step_tune_save_and_open_again() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window();
-    open(&mut window, dir.path());
-    settled(&mut window);
+    let (dir, mut window) = window_on_flight();
     assert_eq!(window.state().sequence().len(), 4);
     assert_eq!(answer(&window).0, Status::Ok);
 
@@ -44,9 +40,7 @@ fn open_step_tune_save_and_open_again() {
     assert_eq!(text, SENSOR.replace("scale = 1.0 ", "scale = 1.5 "));
 
     // Opened again by another window, the frame is the same to the last bit.
-    let mut again = self::window();
-    open(&mut again, dir.path());
-    settled(&mut again);
+    let mut again = window_on(dir.path());
     again.get_by_label("Next frame").click();
     settled(&mut again);
     assert_eq!(answer(&again), tuned);
@@ -54,11 +48,7 @@ fn open_step_tune_save_and_open_again() {
 
 #[test]
 fn keys_step_and_find_what_has_no_answer() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window();
-    open(&mut window, dir.path());
-    settled(&mut window);
+    let (_dir, mut window) = window_on_flight();
     window.key_press(Key::ArrowRight);
     settled(&mut window);
     assert_eq!(sight(&window).index, 1);
@@ -80,11 +70,7 @@ fn keys_step_and_find_what_has_no_answer() {
 
 #[test]
 fn two_presets_stand_side_by_side() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window();
-    open(&mut window, dir.path());
-    settled(&mut window);
+    let (_dir, mut window) = window_on_flight();
     window.get_by_label("Compare").click();
     window.run_steps(3);
     window.get_by_label("with preset dlr-2022").click();
@@ -98,11 +84,8 @@ fn two_presets_stand_side_by_side() {
 
 #[test]
 fn two_sensor_files_stand_side_by_side_with_the_difference() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let other = dir.path().join("other.toml");
-    std::fs::write(&other, SENSOR.replace("scale = 1.0", "scale = 1.6")).unwrap();
-    let mut window = window_on(dir.path());
+    let (dir, mut window) = window_on_flight();
+    let other = another_sensor(dir.path());
     menu(&mut window, "Compare", "with another sensor.toml…");
     path(&mut window, &other, "Open this");
     until(&mut window, "not compared", |v| v.sight().is_some_and(|s| s.answers.len() == 2));
@@ -134,11 +117,7 @@ fn two_sensor_files_stand_side_by_side_with_the_difference() {
 
 #[test]
 fn a_refused_value_is_said_in_place() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window();
-    open(&mut window, dir.path());
-    settled(&mut window);
+    let (_dir, mut window) = window_on_flight();
     let before = answer(&window);
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(-3.0);
     settled(&mut window);

@@ -1,6 +1,6 @@
 //! A window with a small flight, and what is done in most tests.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,6 +13,7 @@ use hzn_core::status::Status;
 use hzn_viewer::model::Settings;
 use hzn_viewer::ui::Viewer;
 use hzn_viewer::work::Sight;
+use tempfile::TempDir;
 
 pub(crate) const WIDTH: u16 = 320;
 pub(crate) const HEIGHT: u16 = 240;
@@ -55,6 +56,22 @@ pub(crate) fn flight(folder: &Path) {
         picture.save(folder.join(format!("{frame}.png"))).unwrap();
     }
     std::fs::write(folder.join("sensor.toml"), SENSOR).unwrap();
+}
+
+/// Pictures in a folder of their own, so that what is written lies beside it.
+pub(crate) fn folder() -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let pictures = dir.path().join("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    flight(&pictures);
+    (dir, pictures)
+}
+
+/// A sensor.toml whose level is higher.
+pub(crate) fn another_sensor(folder: &Path) -> PathBuf {
+    let path = folder.join("other.toml");
+    std::fs::write(&path, SENSOR.replace("scale = 1.0", "scale = 1.6")).unwrap();
+    path
 }
 
 pub(crate) type Window = Harness<'static, Viewer>;
@@ -114,6 +131,30 @@ pub(crate) fn window_on(folder: &Path) -> Window {
     open(&mut window, folder);
     settled(&mut window);
     window
+}
+
+/// The same on a flight, which is there as long as its folder is held.
+pub(crate) fn window_on_flight() -> (TempDir, Window) {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    let window = window_on(dir.path());
+    (dir, window)
+}
+
+/// Runs the sequence into a new recording.
+pub(crate) fn run_into(window: &mut Window, recording: &Path) {
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
+    path(window, recording, "Write");
+    said(window, "Written");
+}
+
+/// Beside a recording, one that ends where the end of its data should be.
+pub(crate) fn cut_off(recording: &Path) -> PathBuf {
+    let bytes = std::fs::read(recording).unwrap();
+    let end = bytes.windows(9).rposition(|w| w == [0x0f, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    let cut = recording.with_file_name("cut.mcap");
+    std::fs::write(&cut, &bytes[..end]).unwrap();
+    cut
 }
 
 /// Chooses from a menu.

@@ -1,6 +1,6 @@
 //! Wrong input: it is said in place, and the rest keeps working.
 
-use egui::{Key, Modifiers};
+use egui::Key;
 use egui_kittest::kittest::Queryable;
 use hzn_core::status::Status;
 
@@ -8,11 +8,7 @@ use crate::window::*;
 
 #[test]
 fn wrong_files_are_said_and_the_rest_goes_on() {
-    let dir = tempfile::tempdir().unwrap();
-    flight(dir.path());
-    let mut window = window();
-    open(&mut window, dir.path());
-    settled(&mut window);
+    let (dir, mut window) = window_on_flight();
 
     // Not a recording: what was open stays.
     let bad = dir.path().join("bad.mcap");
@@ -52,19 +48,12 @@ fn missing_pictures_are_named() {
 
 #[test]
 fn a_recording_that_was_cut_off_is_recovered() {
-    let dir = tempfile::tempdir().unwrap();
-    let pictures = dir.path().join("pictures");
-    std::fs::create_dir(&pictures).unwrap();
-    flight(&pictures);
-    let mut window = window();
-    open(&mut window, &pictures);
-    settled(&mut window);
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
 
     // Run into a recording, by the window itself.
     let whole = dir.path().join("run.mcap");
-    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
-    path(&mut window, &whole, "Write");
-    said(&mut window, "Written");
+    run_into(&mut window, &whole);
     let folder = answer(&window);
 
     // The recording says the same as the folder.
@@ -74,10 +63,7 @@ fn a_recording_that_was_cut_off_is_recovered() {
     assert_eq!(window.state().recorded(0).and_then(|r| r.axis()), folder.2);
 
     // Cut before the end of its data: every frame is there, and it can be closed.
-    let bytes = std::fs::read(&whole).unwrap();
-    let cut = dir.path().join("cut.mcap");
-    let end = bytes.windows(9).rposition(|w| w == [0x0f, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
-    std::fs::write(&cut, &bytes[..end]).unwrap();
+    let cut = cut_off(&whole);
     open(&mut window, &cut);
     until(&mut window, "not said", |v| v.messages().any(|m| m.contains("was not closed")));
     settled(&mut window);

@@ -8,8 +8,8 @@ mod textures;
 
 use egui::{Align2, Color32, FontId, PointerButton, Rect, Response, Sense, Ui, Vec2, pos2, vec2};
 
-use super::Command;
 use super::viewer::Viewer;
+use super::{Command, theme};
 use crate::model::Plane;
 use crate::model::View;
 use crate::model::settings::Layer;
@@ -101,7 +101,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, sight: &Sight, rect: Rect, pane: usize)
             && stage.plane == Plane::Camera
             && let Some((_, touched)) = &viewer.textures.touched
         {
-            painter.image(touched.id(), at, uv, Color32::WHITE);
+            painter.image(touched.id(), at, uv, theme::TOUCHED);
         }
     }
     read_out::values(&painter, sight, &stage, rect);

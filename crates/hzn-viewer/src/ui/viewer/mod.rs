@@ -23,8 +23,9 @@ use threads::Asked;
 
 /// Frames that are decoded beforehand.
 const AHEAD: usize = 4;
-/// The window waits so long at most for an answer, so that it comes with the frame of the change.
-const AT_ONCE: Duration = Duration::from_millis(4);
+/// The window waits so long at most for an answer, from the wish on, so that it comes with the frame of the change: what is
+/// left of a displayed frame's 16 ms is enough to lay the window out and to hand it over.
+const AT_ONCE: Duration = Duration::from_millis(10);
 
 /// Something to be said, in place, until it is closed.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,6 +73,8 @@ pub struct Viewer {
     engine: Engine,
     wake: Wake,
     asked: Option<Asked>,
+    /// When that was.
+    asked_at: Instant,
     last: Instant,
     styled: bool,
 }
@@ -109,6 +112,7 @@ impl Viewer {
             engine: Engine::start(Arc::clone(&wake)),
             wake,
             asked: None,
+            asked_at: Instant::now(),
             last: Instant::now(),
             styled: false,
         }
@@ -248,6 +252,8 @@ impl Viewer {
         if self.playback.is_playing() {
             ctx.request_repaint_after(Duration::from_millis(4));
         }
+        // The answer is made while the panels are laid out.
+        self.ask();
         top::show(self, ui);
         timeline::show(self, ui);
         if self.settings.plots {

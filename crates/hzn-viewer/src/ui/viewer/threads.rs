@@ -45,7 +45,7 @@ impl Viewer {
 
     /// Waits a moment for the answer to what was asked last; a slow one comes with a later frame.
     pub(super) fn wait(&mut self, ctx: &egui::Context) {
-        let until = Instant::now() + AT_ONCE;
+        let until = self.asked_at + AT_ONCE;
         let mut new = false;
         while !self.is_settled() && self.asked.is_some() {
             let Some(sight) = self.engine.wait(until.saturating_duration_since(Instant::now())) else { break };
@@ -197,7 +197,7 @@ impl Viewer {
             ahead: (index + 1..=index + AHEAD).filter_map(ahead).collect(),
             since: Instant::now(),
         };
+        (self.asked, self.asked_at) = (Some(asked), ask.since);
         self.engine.ask(ask);
-        self.asked = Some(asked);
     }
 }
