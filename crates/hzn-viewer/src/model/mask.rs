@@ -47,9 +47,9 @@ impl MaskEdit {
         let new = std::mem::take(&mut self.open);
         (new.len() >= 3).then(|| polygons.iter().cloned().chain([new]).collect())
     }
-    /// Takes the last corner back; false when there is none.
-    pub fn back(&mut self) -> bool {
-        self.open.pop().is_some()
+    /// Takes the last corner back.
+    pub fn back(&mut self) {
+        self.open.pop();
     }
     /// Takes hold of the corner at `p`, when there is one.
     pub fn grab(&mut self, polygons: &Polygons, p: Point, reach: f64) -> bool {

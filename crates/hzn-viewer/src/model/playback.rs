@@ -66,14 +66,25 @@ impl Playback {
         self.speed = speed;
     }
 
+    /// How long the frame is shown, in the sequence's seconds.
+    fn lasts_s(&self, duration_s: impl Fn(usize) -> Option<f64>) -> f64 {
+        let known = duration_s(self.frame).filter(|d| *d > 0.0 && d.is_finite());
+        known.unwrap_or(1.0).clamp(0.0, self.speed / SLOWEST_FPS).max(self.speed / FASTEST_FPS)
+    }
+
+    /// Time until the next frame is due; `None` when nothing is played.
+    pub fn due(&self, duration_s: impl Fn(usize) -> Option<f64>) -> Option<Duration> {
+        let left_s = (self.lasts_s(duration_s) - self.spent_s).max(0.0);
+        self.playing.then(|| Duration::from_secs_f64(left_s / self.speed))
+    }
+
     /// Time goes on by `elapsed`. `duration_s` gives how long a frame lasts in the sequence's seconds, as far as it is
     /// known. At most one frame a call: a slow computer plays slower, and shows every frame.
     pub fn advance(&mut self, elapsed: Duration, count: usize, duration_s: impl Fn(usize) -> Option<f64>) -> bool {
         if !self.playing {
             return false;
         }
-        let known = duration_s(self.frame).filter(|d| *d > 0.0 && d.is_finite());
-        let lasts = known.unwrap_or(1.0).clamp(0.0, self.speed / SLOWEST_FPS).max(self.speed / FASTEST_FPS);
+        let lasts = self.lasts_s(duration_s);
         self.spent_s += elapsed.as_secs_f64() * self.speed;
         if self.spent_s < lasts {
             return false;
@@ -138,6 +149,21 @@ mod tests {
         assert_eq!((p.frame(), p.is_playing()), (2, false));
         p.toggle(1);
         assert!(!p.is_playing(), "a single picture does not play");
+    }
+
+    #[test]
+    fn it_tells_when_the_next_frame_is_due() {
+        let mut p = Playback::default();
+        let half = |_| Some(0.5);
+        assert_eq!(p.due(half), None, "nothing is played");
+        p.toggle(10);
+        assert_eq!(p.due(half), Some(ms(500)));
+        p.advance(ms(250), 10, half);
+        assert_eq!((p.frame(), p.due(half)), (0, Some(ms(250))));
+        p.set_speed(2.0);
+        assert_eq!(p.due(half), Some(ms(125)));
+        p.advance(p.due(half).unwrap(), 10, half);
+        assert_eq!((p.frame(), p.due(half)), (1, Some(ms(250))));
     }
 
     #[test]

@@ -70,10 +70,10 @@ impl Rows {
     }
 
     /// Frames from the worst on: refused ones first, then by `badness`, the largest first; frames without are left out.
-    pub fn worst(&self, body: usize, badness: impl Fn(usize, &Row) -> Option<f64>) -> Vec<usize> {
+    pub fn worst(&self, body: usize, badness: impl Fn(&Row) -> Option<f64>) -> Vec<usize> {
         let rate = |i: usize| {
             let row = self.newest(i, body)?;
-            let bad = if row.status == Status::Ok { badness(i, row)? } else { f64::INFINITY };
+            let bad = if row.status == Status::Ok { badness(row)? } else { f64::INFINITY };
             Some((i, bad))
         };
         let mut rated: Vec<(usize, f64)> = (0..self.len()).filter_map(rate).collect();
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn the_worst_come_first() {
-        assert_eq!(rows().worst(0, |_, r| r.sigma_max_deg), [1, 4, 2, 3, 0]);
+        assert_eq!(rows().worst(0, |r| r.sigma_max_deg), [1, 4, 2, 3, 0]);
     }
 
     #[test]

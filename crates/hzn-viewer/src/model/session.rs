@@ -197,11 +197,6 @@ impl Session {
         config.flat_map(|c| c.mask.polygons_px.iter().map(|p| p.iter().copied().collect())).collect()
     }
 
-    /// The text is replaced by another.
-    pub fn set_text(&mut self, text: &str) {
-        self.replace(Sheet::new(text), None);
-    }
-
     /// The same camera, body and mask, under another preset; what else the text says is left out.
     pub fn under_preset(&self, preset: Preset) -> Self {
         const KEPT: [&str; 6] = ["camera", "mount", "body", "bodies", "mask", "input"];
@@ -479,7 +474,7 @@ mod tests {
     fn an_unreadable_text_is_no_end() {
         let mut s = Session::new("preset = ", Path::new("sensor.toml"), false);
         assert!(s.config().is_none() && s.problem().is_some());
-        s.set_text(TEXT);
+        s.replace(Sheet::new(TEXT), None);
         assert!(s.config().is_some() && s.problem().is_none());
         assert_eq!(tidy(0.000123456), 0.00012346);
         assert_eq!(tidy(123456.7), 123457.0);

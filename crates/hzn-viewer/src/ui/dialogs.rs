@@ -154,14 +154,7 @@ fn accept(viewer: &mut Viewer) {
     }
     match asking.purpose {
         Purpose::Open => viewer.open_paths(vec![path]),
-        Purpose::SaveSensor => {
-            if let Some(session) = &mut viewer.session {
-                match session.save(&path) {
-                    Ok(()) => viewer.say(format!("Saved: {}", path.display())),
-                    Err(why) => viewer.say_bad(why),
-                }
-            }
-        }
+        Purpose::SaveSensor => viewer.save_to(&path),
         Purpose::Compare => viewer.compare_with_file(&path),
         Purpose::Picture => viewer.export_picture(path),
         Purpose::Video => viewer.export_video(path),

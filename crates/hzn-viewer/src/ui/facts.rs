@@ -150,9 +150,31 @@ fn level(answer: &Answer, config: &Config) -> Vec<String> {
     }
 }
 
+/// What a row says of a frame without an answer, such as `ended at select: short-arc, short-arc`, with the verdicts that
+/// many edges share said once.
+pub(super) fn in_short(detail: &str) -> String {
+    let Some((stage, verdicts)) = detail.split_once(": ") else { return detail.to_owned() };
+    let mut counted: Vec<(&str, usize)> = Vec::new();
+    for verdict in verdicts.split(", ") {
+        match counted.iter_mut().find(|(v, _)| *v == verdict) {
+            Some((_, n)) => *n += 1,
+            None => counted.push((verdict, 1)),
+        }
+    }
+    let each = counted.iter().map(|(v, n)| if *n > 1 { format!("{v} ×{n}") } else { (*v).to_owned() });
+    format!("{stage}: {}", each.collect::<Vec<_>>().join(", "))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_verdict_of_many_edges_is_said_once() {
+        let long = "ended at select: residuals, short-arc, no-fit, short-arc, short-arc";
+        assert_eq!(in_short(long), "ended at select: residuals, short-arc ×3, no-fit");
+        assert_eq!(in_short("ended at contour"), "ended at contour");
+    }
 
     #[test]
     fn every_section_has_a_card_and_every_stage() {

@@ -1,6 +1,8 @@
 //! Plots over time, and the residuals along the limb of the frame that is shown.
 
-use egui::{Color32, Id, Response, RichText, Ui, vec2};
+use std::ops::RangeInclusive;
+
+use egui::{Color32, Id, Rangef, Response, RichText, Ui, vec2};
 use egui_plot::{GridInput, GridMark, HLine, HoverPosition, Line, Plot, PlotPoints, Points, VLine};
 
 use super::viewer::Viewer;
@@ -18,8 +20,14 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         // All of the panel is used: one that its contents do not fill shrinks a little with every frame.
         ui.expand_to_include_rect(ui.max_rect());
         ui.add_space(4.0);
-        choice(viewer, ui);
-        let chosen: Vec<String> = viewer.settings.plotted.clone();
+        // A single picture has no course of time.
+        let single = viewer.sequence.complete && viewer.sequence.len() == 1;
+        let chosen = if single {
+            vec![RESIDUALS.to_owned()]
+        } else {
+            choice(viewer, ui);
+            viewer.settings.plotted.clone()
+        };
         let count = chosen.len().max(1);
         let gap = ui.spacing().item_spacing.x;
         let width = (ui.available_width() - gap * (count as f32 - 1.0)) / count as f32;
@@ -110,20 +118,15 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
         lines.push(("as in the file", theme::line(0, dark).gamma_multiply(0.35)));
     }
     head(ui, &title(quantity), &lines);
-    let plot = Plot::new(("plot", quantity.name))
-        .height(ui.available_height())
+    let plot = framed(("plot", quantity.name), ui.available_height())
         // All of the sequence, whatever part of it has a value.
         .include_x(0.0)
         .include_x(entries.last().map_or(1.0, |e| (e.time_s - start).max(1e-3)))
         .link_cursor(Id::unique("time"), [true, false])
         .link_axis(Id::unique("time"), [true, false])
-        .allow_scroll(false)
         .allow_boxed_zoom(true)
         .set_margin_fraction(vec2(0.01, 0.12))
-        .y_grid_spacer(ticks)
-        .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
-        .y_axis_min_width(44.0)
-        .x_axis_label("s")
+        .x_axis_formatter(along(" s"))
         .label_formatter(move |at| {
             let p = match at {
                 HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => position,
@@ -131,16 +134,19 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
             Some(format!("{:.3} s\n{:.5}", p.x, p.y))
         });
     let response = plot.show(ui, |ui| {
+        let column = ui.transform().dvalue_dpos()[0].abs();
+        let line = |of: Of, fresh: bool| {
+            parts(entries.len(), column, |i| Some([entries.get(i)?.time_s - start, value(i, of, fresh)?]))
+        };
         for (n, (name, of)) in quantity.lines.iter().enumerate() {
             let colour = theme::line(n, dark);
             // What the file says, faint, where the parameters have changed since.
             if changed {
-                for part in parts(entries.len(), |i| Some([entries.get(i)?.time_s - start, value(i, *of, false)?])) {
+                for part in line(*of, false) {
                     ui.line(Line::new("file", part).color(colour.gamma_multiply(0.35)).width(1.0).allow_hover(false));
                 }
             }
-            let lines = parts(entries.len(), |i| Some([entries.get(i)?.time_s - start, value(i, *of, true)?]));
-            for part in lines {
+            for part in line(*of, true) {
                 if let [one] = part.as_slice() {
                     ui.points(Points::new(*name, vec![*one]).color(colour).radius(2.0));
                 } else {
@@ -159,10 +165,32 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
     viewer.sequence.nearest(response.inner?.x + start)
 }
 
-/// Lines across a plot where a person would put them: some four, at 1, 2 or 5 times a power of ten.
-fn ticks(input: GridInput) -> Vec<GridMark> {
+/// What all plots have in common.
+fn framed<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
+    Plot::new(id)
+        .height(height)
+        .allow_scroll(false)
+        // Few lines, so all of them faint: the curve is what counts.
+        .grid_spacing(Rangef::new(8.0, 1500.0))
+        .x_grid_spacer(|input| ticks(input, 8.0))
+        .y_grid_spacer(|input| ticks(input, 4.0))
+        .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
+        .y_axis_min_width(44.0)
+}
+
+/// Labels along a plot; none at its very end, where the window's border would cut it.
+fn along(unit: &'static str) -> impl Fn(GridMark, &RangeInclusive<f64>) -> String {
+    move |mark, range| {
+        let room = 0.04 * (range.end() - range.start());
+        let label = || tick_label(mark.value, mark.step_size) + unit;
+        if mark.value > range.end() - room { String::new() } else { label() }
+    }
+}
+
+/// Lines across a plot where a person would put them: some `count`, at 1, 2 or 5 times a power of ten.
+fn ticks(input: GridInput, count: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
-    let rough = (high - low) / 4.0;
+    let rough = (high - low) / count;
     if !(rough > 0.0 && rough.is_finite()) {
         return Vec::new();
     }
@@ -184,17 +212,38 @@ fn tick_label(value: f64, step: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// Points in a row, broken where one is missing.
-fn parts(count: usize, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
-    let mut out = vec![Vec::new()];
-    for i in 0..count {
-        match (point(i), out.last_mut()) {
-            (Some(p), Some(part)) => part.push(p),
-            (None, Some(part)) if !part.is_empty() => out.push(Vec::new()),
-            _ => {}
+/// Points in a row, broken where one is missing. Of those within the same `column` (a width, 0 for none) the lowest and the
+/// highest stay: more cannot be seen, and a sequence may have thousands of frames a column.
+fn parts(count: usize, column: f64, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
+    let mut out: Vec<Vec<[f64; 2]>> = Vec::new();
+    let (mut open, mut last, mut in_last) = (false, f64::NAN, 0);
+    for p in (0..count).map(point) {
+        let Some(p) = p else {
+            open = false;
+            continue;
+        };
+        let here = if column > 0.0 { (p[0] / column).floor() } else { f64::NAN };
+        let part = match out.last_mut() {
+            Some(part) if open => part,
+            _ => out.push_mut(Vec::new()),
+        };
+        in_last = if open && here == last { in_last + 1 } else { 1 };
+        (open, last) = (true, here);
+        match part.as_mut_slice() {
+            [.., a, b] if in_last > 2 => {
+                let between =
+                    |x: &[f64; 2], y: [f64; 2], z: [f64; 2]| (x[1].min(z[1])..=x[1].max(z[1])).contains(&y[1]);
+                if between(a, p, *b) {
+                    continue;
+                }
+                if !between(a, *b, p) {
+                    *a = *b;
+                }
+                *b = p;
+            }
+            _ => part.push(p),
         }
     }
-    out.retain(|part| !part.is_empty());
     out
 }
 
@@ -205,15 +254,14 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
     let points = |kept: bool| -> PlotPoints<'_> {
         all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
     };
-    head(ui, "Residual [px]", &[("inliers", theme::INLIER), ("rejected", theme::REJECTED)]);
-    let plot = Plot::new("residuals")
-        .height(ui.available_height())
-        .allow_scroll(false)
+    if all.is_empty() {
+        ui.weak("The residuals along the limb stand here once the frame has an answer.");
+        return None;
+    }
+    head(ui, "Residual [px] by azimuth about the axis", &[("inliers", theme::INLIER), ("rejected", theme::REJECTED)]);
+    let plot = framed("residuals", ui.available_height())
         .set_margin_fraction(vec2(0.01, 0.1))
-        .y_grid_spacer(ticks)
-        .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
-        .y_axis_min_width(44.0)
-        .x_axis_label("azimuth about the axis [deg]")
+        .x_axis_formatter(along("°"))
         .include_y(-1.0)
         .include_y(1.0);
     let shown = plot.show(ui, |ui| {
@@ -242,7 +290,7 @@ mod tests {
     #[test]
     fn ticks_are_round_numbers() {
         let at = |low: f64, high: f64| -> Vec<f64> {
-            ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }).iter().map(|m| m.value).collect()
+            ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0).iter().map(|m| m.value).collect()
         };
         assert_eq!(at(0.0, 10.0), [0.0, 5.0, 10.0]);
         assert_eq!(at(-0.9, 7.2), [0.0, 5.0]);
@@ -253,19 +301,39 @@ mod tests {
     #[test]
     fn no_two_ticks_read_the_same() {
         for (low, high) in [(0.08, 0.13), (100.2, 100.3), (0.0, 1.0), (-3e-5, 4e-5), (0.0, 2400.0)] {
-            let marks = ticks(GridInput { bounds: (low, high), base_step_size: 0.0 });
+            let marks = ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0);
             let labels: Vec<String> = marks.iter().map(|m| tick_label(m.value, m.step_size)).collect();
             let distinct: std::collections::HashSet<_> = labels.iter().collect();
             assert!(labels.len() > 1 && distinct.len() == labels.len(), "{labels:?}");
         }
         assert_eq!((tick_label(0.1, 0.02).as_str(), tick_label(-1e-17, 5.0).as_str()), ("0.10", "0"));
+        let at = |value: f64| along(" s")(GridMark { value, step_size: 10.0 }, &(0.0..=101.0));
+        assert_eq!((at(90.0).as_str(), at(100.0).as_str()), ("90 s", ""));
     }
 
     #[test]
     fn lines_are_broken_where_values_are_missing() {
         let value = |i: usize| (!i.is_multiple_of(4)).then_some([i as f64, 1.0]);
-        let lengths: Vec<usize> = parts(10, value).iter().map(Vec::len).collect();
-        assert_eq!(lengths, [3, 3, 1]);
-        assert!(parts(3, |_| None).is_empty());
+        for column in [0.0, 0.5, f64::NAN] {
+            let lengths: Vec<usize> = parts(10, column, value).iter().map(Vec::len).collect();
+            assert_eq!(lengths, [3, 3, 1]);
+        }
+        assert!(parts(3, 0.0, |_| None).is_empty());
+    }
+
+    #[test]
+    fn what_a_column_cannot_show_is_left_out_and_its_extremes_are_not() {
+        let value = |i: usize| Some([i as f64, ((i * 7919) % 1000) as f64]);
+        let all: Vec<[f64; 2]> = (0..10_000).filter_map(value).collect();
+        let thin = parts(all.len(), 100.0, value).concat();
+        assert_eq!(thin.len(), 200);
+        assert!(thin.is_sorted_by(|a, b| a[0] < b[0]));
+        for (these, those) in all.chunks(100).zip(thin.chunks(2)) {
+            let ends = |points: &[[f64; 2]]| {
+                let y = || points.iter().map(|p| p[1]);
+                (y().fold(f64::INFINITY, f64::min), y().fold(f64::NEG_INFINITY, f64::max))
+            };
+            assert_eq!(ends(these), ends(those));
+        }
     }
 }

@@ -4,7 +4,7 @@ use egui::{Color32, RichText, Ui, vec2};
 use hzn_core::status::Status;
 
 use super::viewer::Viewer;
-use super::{Command, theme};
+use super::{Command, facts, theme};
 use crate::model::rows;
 use crate::model::settings::{Layer, Look};
 use crate::work::sight::{Answer, Sight};
@@ -39,7 +39,9 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
             ui.label(text);
         });
         if status != Status::Ok {
-            ui.add(egui::Label::new(RichText::new(detail(sight, answer)).size(12.0)).wrap());
+            for line in detail(sight, answer) {
+                ui.add(egui::Label::new(RichText::new(line).size(12.0)).wrap());
+            }
         }
     }
     let Some(answer) = answer else { return };
@@ -88,11 +90,16 @@ fn change(recorded: &hzn_mcap::Row, answer: &Answer) -> Option<String> {
     }
 }
 
-fn detail(sight: &Sight, answer: Option<&Answer>) -> String {
+/// Why there is no answer, and what to try first.
+fn detail(sight: &Sight, answer: Option<&Answer>) -> Vec<String> {
     match (&sight.picture, answer) {
-        (Err(why), _) => why.clone(),
-        (_, Some(answer)) => answer.row.detail.clone(),
-        _ => String::new(),
+        (Err(why), _) => vec![why.clone()],
+        (_, Some(answer)) => {
+            let tips = answer.report.as_ref().map(hzn_cli::words::tips).unwrap_or_default();
+            let tip = tips.first().map(|tip| format!("Try: {tip}"));
+            [facts::in_short(&answer.row.detail)].into_iter().chain(tip).collect()
+        }
+        _ => Vec::new(),
     }
 }
 
@@ -123,7 +130,11 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
             }
             ui.horizontal(|ui| {
                 let mut on = viewer.settings.shows(layer);
-                if ui.checkbox(&mut on, layer.name()).changed() {
+                // These two have a place in the camera's own plane alone.
+                let own_plane = matches!(layer, Layer::Touched | Layer::Circle);
+                let drawn = !(own_plane && viewer.settings.undistorted);
+                let switch = ui.add_enabled(drawn, egui::Checkbox::new(&mut on, layer.name()));
+                if switch.on_disabled_hover_text("Only in the camera's own picture, not undistorted").changed() {
                     viewer.settings.show(layer, on);
                 }
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {

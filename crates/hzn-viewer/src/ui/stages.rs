@@ -19,6 +19,9 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let shown = egui::Panel::right("stages").default_size(width).size_range(300.0..=640.0).show(ui, |ui| {
         head(viewer, ui);
         ui.separator();
+        if viewer.session.is_none() {
+            return without(viewer, ui);
+        }
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // Shared, not copied: an answer holds thousands of points.
             let outcome = viewer.sight.as_ref().and_then(|s| s.answers.first().cloned());
@@ -38,13 +41,23 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     viewer.settings.stages_width = shown.response.rect.width();
 }
 
+/// There is no sensor: how to come by one.
+fn without(viewer: &mut Viewer, ui: &mut Ui) {
+    ui.label("What the sensor does with a picture, stage by stage, stands here once there is a sensor.toml.");
+    ui.add_space(4.0);
+    if ui.button("Open a sensor.toml…").clicked() {
+        viewer.run(Command::Open, &ui.ctx().clone());
+    }
+    ui.add_space(4.0);
+    ui.weak("hzn init writes one to start from; it can be dropped on the window, too.");
+}
+
 /// Preset, undo, redo, reset, save; and what is wrong.
 fn head(viewer: &mut Viewer, ui: &mut Ui) {
     ui.add_space(5.0);
     let Some(session) = &mut viewer.session else {
         ui.horizontal(|ui| {
             ui.strong("Stages");
-            ui.weak("no sensor.toml");
         });
         return;
     };

@@ -96,13 +96,17 @@ fn colours(picture: &Picture) -> Vec<Color32> {
     }
 }
 
+/// Each pixel by its value and full scale. A level is turned while one looks: so every value has its colour only once, and
+/// the room is there from the start.
 fn each(view: &ImageView<'_>, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
     fn all<P: Pixels>(p: &P, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
         let full = p.full_scale();
-        (0..p.height())
-            .flat_map(|y| (0..p.width()).map(move |x| (x, y)))
-            .map(|(x, y)| colour(p.at(x, y), full))
-            .collect()
+        let table: Vec<Color32> = (0..=full).map(|v| colour(v, full)).collect();
+        let mut out = Vec::with_capacity(usize::from(p.width()) * usize::from(p.height()));
+        for y in 0..p.height() {
+            out.extend((0..p.width()).map(|x| table.get(usize::from(p.at(x, y))).copied().unwrap_or(Color32::WHITE)));
+        }
+        out
     }
     match view {
         ImageView::Grey8(p) => all(p, colour),

@@ -69,6 +69,25 @@ fn keys_step_and_find_what_has_no_answer() {
 }
 
 #[test]
+fn playing_shows_every_frame_once() {
+    let (_dir, pictures) = folder();
+    lengthen(&pictures, 60);
+    let mut window = window_on(&pictures);
+    for _ in 0..8 {
+        window.key_press(Key::Period);
+    }
+    window.key_press(Key::Space);
+    let mut shown = vec![sight(&window).index];
+    let begin = std::time::Instant::now();
+    while shown.last() != Some(&59) {
+        assert!(begin.elapsed().as_secs() < 60, "{shown:?}");
+        window.step();
+        shown.extend(Some(sight(&window).index).filter(|i| shown.last() != Some(i)));
+    }
+    assert!(shown.iter().copied().eq(0..60), "{shown:?}");
+}
+
+#[test]
 fn two_presets_stand_side_by_side() {
     let (_dir, mut window) = window_on_flight();
     window.get_by_label("Compare").click();

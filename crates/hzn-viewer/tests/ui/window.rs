@@ -67,6 +67,13 @@ pub(crate) fn folder() -> (TempDir, PathBuf) {
     (dir, pictures)
 }
 
+/// Makes a flight longer, by links to its pictures.
+pub(crate) fn lengthen(pictures: &Path, frames: usize) {
+    for i in 4..frames {
+        std::fs::hard_link(pictures.join(format!("{}.png", i % 3)), pictures.join(format!("{i:05}.png"))).unwrap();
+    }
+}
+
 /// A sensor.toml whose level is higher.
 pub(crate) fn another_sensor(folder: &Path) -> PathBuf {
     let path = folder.join("other.toml");

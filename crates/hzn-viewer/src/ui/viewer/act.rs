@@ -1,5 +1,7 @@
 //! What keys, menus and buttons do.
 
+use std::path::Path;
+
 use hzn_core::Preset;
 
 use super::Viewer;
@@ -65,15 +67,21 @@ impl Viewer {
     }
 
     fn save(&mut self) {
-        let Some(session) = &mut self.session else { return };
-        let Some(path) = session.path().map(std::path::Path::to_owned) else {
+        let Some(session) = &self.session else { return };
+        let Some(path) = session.path().map(Path::to_owned) else {
             // Out of a recording: nothing is written where nobody said.
             self.asking = Some(Asking::new(Purpose::SaveSensor, session.home()));
             return;
         };
-        match session.save(&path) {
-            Ok(()) => self.say(format!("Saved: {}", path.display())),
-            Err(why) => self.say_bad(why),
+        self.save_to(&path);
+    }
+
+    /// Saves the sensor.toml into a file, which is its own from then on.
+    pub(in crate::ui) fn save_to(&mut self, path: &Path) {
+        match self.session.as_mut().map(|s| s.save(path)) {
+            Some(Ok(())) => self.say(format!("Saved: {}", path.display())),
+            Some(Err(why)) => self.say_bad(why),
+            None => {}
         }
     }
 
@@ -87,7 +95,7 @@ impl Viewer {
     /// By error where the truth is known, else by sigma.
     fn go_worst(&mut self) {
         let known = !self.truth.is_empty();
-        let badness = |_: usize, row: &hzn_mcap::Row| {
+        let badness = |row: &hzn_mcap::Row| {
             if known {
                 crate::model::rows::error_deg(row, self.truth_of(&row.file, &row.body))
             } else {
@@ -112,7 +120,7 @@ impl Viewer {
         }
     }
 
-    pub(in crate::ui) fn compare_with_file(&mut self, path: &std::path::Path) {
+    pub(in crate::ui) fn compare_with_file(&mut self, path: &Path) {
         match Session::open(path) {
             Ok(session) => {
                 if let Some(problem) = session.problem() {

@@ -27,6 +27,9 @@ const AHEAD: usize = 4;
 /// left of a displayed frame's 16 ms is enough to lay the window out and to hand it over.
 const AT_ONCE: Duration = Duration::from_millis(10);
 
+/// A window that stood still for longer goes on from where it was.
+const LONGEST_PASS: Duration = Duration::from_millis(250);
+
 /// Something to be said, in place, until it is closed.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Message {
@@ -241,17 +244,6 @@ impl Viewer {
         if !dropped.is_empty() {
             self.open_paths(dropped);
         }
-        let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
-        let elapsed = elapsed.min(Duration::from_millis(250));
-        // The picture on the screen comes first: no frame is passed over because it is slow.
-        let shown = self.sight.as_ref().is_none_or(|s| s.index == self.playback.frame());
-        if shown {
-            let sequence = &self.sequence;
-            self.playback.advance(elapsed, sequence.len(), |i| sequence.duration_s(i));
-        }
-        if self.playback.is_playing() {
-            ctx.request_repaint_after(Duration::from_millis(4));
-        }
         // The answer is made while the panels are laid out.
         self.ask();
         top::show(self, ui);
@@ -270,8 +262,23 @@ impl Viewer {
         picture::show(self, ui);
         dialogs::show(self, &ctx);
         help::show(self, &ctx);
+        self.advance(&ctx);
         self.ask();
     }
+
+    /// Time goes on. No frame is passed over because it is slow: each has been drawn before the next one is asked for, which
+    /// is then made while this one is painted.
+    fn advance(&mut self, ctx: &egui::Context) {
+        let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
+        let lasts_s = |frame| self.sequence.duration_s(frame);
+        if self.sight.as_ref().is_none_or(|s| s.index == self.playback.frame()) {
+            self.playback.advance(elapsed.min(LONGEST_PASS), self.sequence.len(), lasts_s);
+        }
+        if let Some(due) = self.playback.due(lasts_s) {
+            ctx.request_repaint_after(due.clamp(Duration::from_millis(4), LONGEST_PASS / 2));
+        }
+    }
+
     /// Stops what is being written, and keeps the settings.
     pub fn close(&self) {
         self.jobs.iter().for_each(Job::abandon);
