@@ -186,18 +186,25 @@ fn least_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
     if whole { config.min_support.max(WHOLE) } else { config.min_support }
 }
 
-/// Of a blooming body, the half-angles that it may be seen under: from half of its own to twelve times. A whole disc
-/// blooms but never shrinks, to a pixel; what saturates of a Moon is smaller.
-const BLOOM: [f64; 2] = [0.5, 12.0];
-const WHOLE_BLOOM: f64 = 0.9;
+/// The least of its half-angle that a body of free half-angle is seen under: what saturates of a Moon is smaller.
+const LEAST: f64 = 0.5;
+/// The Sun never shrinks, to a pixel, and blooms to a multiple of its own.
+const SUN: [f64; 2] = [0.9, 12.0];
+/// The Moon is nearer at times, and blooms by pixels.
+const MOON: f64 = 1.1;
+const MOON_BLOOM_PX: f64 = 10.0;
 
-/// Whether a body that blooms can be seen under the half-angle of cosine `c`; others are weighed against the expected.
+/// Whether a body of free half-angle can be seen under that of cosine `c`; others are weighed against the expected.
 fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>) -> bool {
     let sin = (T::one() - *c * *c).most(T::ZERO).sqrt();
-    let [half, most] = BLOOM.map(|n| expected.sin * T::of(n));
     let (fx, fy) = camera.focal_px();
-    let whole = expected.sin * T::of(WHOLE_BLOOM) - T::one() / fx.least(fy);
-    let least = if expected.phases { half } else { half.most(whole) };
+    let px = T::one() / fx.least(fy);
+    let times = |n: f64| expected.sin * T::of(n);
+    let (least, most) = if expected.blooms() {
+        (times(LEAST).most(times(SUN[0]) - px), times(SUN[1]))
+    } else {
+        (times(LEAST), times(MOON) + px * T::of(MOON_BLOOM_PX))
+    };
     !expected.free || (sin >= least && sin <= most.least(T::one()) && *c > T::ZERO)
 }
 

@@ -59,9 +59,7 @@ impl Simulation {
         let made = self.sensor.get_or_try_init(py, || {
             let fit = errors::detached(py, || Fit::measure(&self.scenario, MEASURED, &|_, _| ()))?;
             let mut config = self.flight.sensor.clone();
-            if let Some(fit) = fit.map_err(errors::config)? {
-                fit.apply(&mut config);
-            }
+            fit.map_err(errors::config)?.iter().for_each(|fit| fit.apply(&mut config));
             Py::new(py, Sensor::of(config, false)?)
         });
         made.map(|sensor| sensor.clone_ref(py))

@@ -22,9 +22,7 @@ fn main() {
     if arguments.iter().any(|a| a == "fit") {
         let fit = Fit::measure(&scenario, 24, &|_, _| ()).expect("the scene is valid");
         println!("{fit:.3?} after {:.1?}", begin.elapsed());
-        if let Some(fit) = fit {
-            fit.apply(&mut sensor);
-        }
+        fit.iter().for_each(|fit| fit.apply(&mut sensor));
     }
     if let Some(body) = sensor.bodies.first().cloned() {
         sensor.body = body;

@@ -8,9 +8,10 @@ mod scenes;
 
 use anyhow::{Context, anyhow};
 use hzn_core::pipeline::Preset;
+use hzn_core::body::Kind;
 use hzn_core::{Config, body, covariance};
 use hzn_sim::scenario::{Fit, MEASURED};
-use hzn_sim::{Flight, Scenario};
+use hzn_sim::{Flight, Scenario, truth};
 
 use crate::document::{Document, Section};
 
@@ -81,17 +82,19 @@ fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
     let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
     scenario.capture.frames = u32::try_from(count)?;
     let mut flight = scenario.flight().with_context(|| name.to_owned())?;
-    let fit = Fit::measure(&scenario, MEASURED, &|_, _| ()).with_context(|| name.to_owned())?;
-    let told = match &fit {
-        Some(f) if f.limb_height_sigma_km > 0.0 => format!(
-            "{:.1} km ± {:.1} km, {:.2} px over {:.0} px",
-            f.limb_height_km, f.limb_height_sigma_km, f.sigma_px, f.correlation_px
-        ),
-        Some(f) => format!("{:.2} px over {:.0} px", f.sigma_px, f.correlation_px),
-        None => "nothing could be measured".to_owned(),
+    let fits = Fit::measure(&scenario, MEASURED, &|_, _| ()).with_context(|| name.to_owned())?;
+    fits.iter().for_each(|fit| fit.apply(&mut flight.sensor));
+    let told = |body: Kind| {
+        let Some(fit) = fits.iter().find(|fit| fit.body == body) else { return "nothing could be measured".to_owned() };
+        let noise = format!("{:.2} px over {:.0} px", fit.sigma_px, fit.correlation_px);
+        let limb = (fit.limb_height_sigma_km > 0.0)
+            .then(|| format!("{:.1} km ± {:.1} km, ", fit.limb_height_km, fit.limb_height_sigma_km));
+        limb.unwrap_or_default() + &noise
     };
-    if let Some(fit) = fit {
-        fit.apply(&mut flight.sensor);
-    }
-    Ok((flight, format!("`{name}` {told}")))
+    let of = |body: &Kind| match scenario.bodies.len() {
+        1 => format!("`{name}` {}", told(*body)),
+        _ => format!("`{name}`, {}: {}", truth::name(*body), told(*body)),
+    };
+    let told: Vec<String> = scenario.bodies.iter().map(of).collect();
+    Ok((flight, told.join("; ")))
 }

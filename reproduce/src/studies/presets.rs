@@ -51,6 +51,7 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     let (mut sun, _) = simulated("sun-moon", count)?;
     sun.sensor.body = sun.sensor.bodies.first().cloned().ok_or_else(|| anyhow!("sun-moon looks for bodies"))?;
     sun.sensor.binarize = sun.sensor.body.binarize.unwrap_or(sun.sensor.binarize);
+    sun.sensor.covariance = sun.sensor.body.covariance.unwrap_or(sun.sensor.covariance);
     sun.sensor.bodies.clear();
     Ok(vec![
         ("rocket, Sun, ghosts and payload in view", rocket?),

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
 use hzn_sim::scenario::{BUILTIN, Fit, MEASURED};
-use hzn_sim::{Flight, FlightFrame, Scenario};
+use hzn_sim::{Flight, FlightFrame, Scenario, truth};
 use rayon::prelude::*;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
@@ -132,25 +132,27 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
     }
     let progress = Mutex::new(Progress::new(Some(MEASURED.into()), 0, quiet));
     let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
-    let fit = Fit::measure(scenario, MEASURED, &seen).map_err(|e| scene::refused(name, &e))?;
+    let fits = Fit::measure(scenario, MEASURED, &seen).map_err(|e| scene::refused(name, &e))?;
     if let Ok(p) = progress.into_inner() {
         p.finish();
     }
     let mut sensor = flight.sensor.clone();
-    let how = match fit {
-        Some(fit) => {
-            fit.apply(&mut sensor);
-            let [answered, of] = fit.frames;
-            format!(
-                "# Limb height and noise model: measured on {of} other pictures of the scene, {answered} of them answered;\n\
-                 # squared errors there are {:.2} times their covariance on average (2 is ideal).\n",
-                fit.nees
-            )
-        }
-        None => {
-            "# Too few pictures were answered to measure limb height and noise: these are the defaults.\n".to_owned()
-        }
-    };
+    let mut how = String::new();
+    for &body in &scenario.bodies {
+        let name = truth::name(body);
+        let Some(fit) = fits.iter().find(|fit| fit.body == body) else {
+            let why = "too few pictures were answered to measure limb height and noise";
+            how += &format!("# The {name}: {why}: these are the defaults.\n");
+            continue;
+        };
+        fit.apply(&mut sensor);
+        let [answered, of] = fit.frames;
+        how += &format!(
+            "# The {name}: limb height and noise model are measured on {of} other pictures of the scene, {answered} of them\n\
+             # answered; squared errors there are {:.2} times their covariance on average (2 is ideal).\n",
+            fit.nees
+        );
+    }
     let mut table = toml::Table::try_from(&sensor).map_err(failed)?;
     let defaults = toml::Table::try_from(hzn_core::Config::new(sensor.camera.clone())).map_err(failed)?;
     let several = table.get("bodies").is_some();

@@ -2,13 +2,14 @@
 
 use std::collections::HashMap;
 
+use hzn_core::body::Kind;
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::status::Status;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use crate::truth::Truth;
+use crate::truth::{Truth, name};
 
 /// What the sensor says about one picture and body.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +73,7 @@ pub struct Miss {
     /// Squared error over covariance on the tangent plane, two degrees of freedom; `None` when the covariance is
     /// singular there.
     pub nees: Option<f64>,
-    /// Half-angle that was found over the true one; `None` when none was given.
+    /// Half-angle that was found over the true one; `None` when none was given, and of the Sun, which blooms.
     pub half_angle_ratio: Option<f64>,
     /// The error of the direction in true half-angles.
     pub half_angles: f64,
@@ -204,7 +205,11 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
             altitude_km: t.altitude_km,
             off_nadir_deg: axis[0].hypot(axis[1]).atan2(axis[2]).to_degrees(),
             limb_in_view_px: camera.map(|c| limb_in_view_px(c, axis, t.half_angle_deg.to_radians())),
-            miss: answer.found.as_ref().and_then(|f| Miss::of(f, axis, t.half_angle_deg)),
+            miss: answer.found.and_then(|f| {
+                // The Sun blooms: its size is no measure.
+                let half_angle_deg = f.half_angle_deg.filter(|_| t.body != name(Kind::Sun));
+                Miss::of(&Found { half_angle_deg, ..f }, axis, t.half_angle_deg)
+            }),
         });
     }
     Ok(cases)

@@ -7,12 +7,12 @@
 
 use core::cell::RefCell;
 
-use hzn_core::body::Kind;
+use hzn_core::body::{self, Kind};
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pipeline::{Candidate, Observer, Solution};
 use hzn_core::pixel::{ImagePoint, Pixel};
-use hzn_core::{Config, HostHorizon};
+use hzn_core::{Config, HostHorizon, covariance};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Scenario, ScenarioError};
@@ -21,9 +21,11 @@ use crate::globe::{Globe, View};
 use crate::picture::Picture;
 use crate::scene::World;
 
-/// What was measured.
+/// What was measured of one body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
+    /// Which.
+    pub body: Kind,
     /// Effective limb height in kilometres; 0 for Sun and Moon.
     pub limb_height_km: f64,
     /// Standard deviation of the pictures' own limb heights, kilometres.
@@ -52,8 +54,8 @@ const LEAST_PX: f64 = 10.0;
 const NEES_MOST: f64 = 20.0;
 
 impl Fit {
-    /// Measures `pictures` pictures of the scenario, spread over four other seeds; `progress` hears of every one.
-    /// `None` when too few of them are answered to say anything.
+    /// Measures `pictures` pictures of the scenario, spread over four other seeds; `progress` hears of every one. One fit a
+    /// body, but for those of which too few pictures are answered to say anything.
     ///
     /// # Errors
     /// As [`crate::Scene::render`].
@@ -61,7 +63,7 @@ impl Fit {
         scenario: &Scenario,
         pictures: u32,
         progress: &dyn Fn(usize, usize),
-    ) -> Result<Option<Self>, ScenarioError> {
+    ) -> Result<Vec<Self>, ScenarioError> {
         let mut flights = Vec::new();
         for i in 1..=SEEDS {
             let mut other = scenario.clone();
@@ -78,17 +80,14 @@ impl Fit {
             progress(seen.len(), total);
         }
         let sensor = scenario.sensor();
-        Ok(Self::of(scenario, &sensor, &seen))
+        let alone = |body: &body::Config| Config { body: body.clone(), bodies: Default::default(), ..sensor.clone() };
+        Ok(sensor.each_body().iter().filter_map(|body| Self::of(scenario, &alone(body), &seen)).collect())
     }
 
-    fn of(scenario: &Scenario, sensor: &Config, seen: &[(&FlightFrame, Picture)]) -> Option<Self> {
-        let kind = scenario.bodies.first().copied().unwrap_or_default();
-        // Of several bodies the first. At first nothing is known of the limb's height, and points scatter by a pixel.
-        let mut alone = sensor.clone();
-        if let Some(body) = alone.bodies.first().cloned() {
-            alone.body = body;
-            alone.bodies.clear();
-        }
+    /// Of the one body that the sensor looks for.
+    fn of(scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, Picture)]) -> Option<Self> {
+        let kind = alone.body.kind;
+        // At first nothing is known of the limb's height, and points scatter by a pixel.
         let mut sensor = alone.clone();
         sensor.body.limb_height_sigma_km = 8.0;
         let first = look(scenario, &sensor, seen);
@@ -117,6 +116,7 @@ impl Fit {
         }
         let disc = matches!(kind, Kind::Sun | Kind::Moon);
         let mut fit = Self {
+            body: kind,
             limb_height_km: if disc { 0.0 } else { sensor.body.limb_height_km + height_km },
             limb_height_sigma_km: if disc { 0.0 } else { spread_km.max(0.2) },
             sigma_px: variance.sqrt().max(0.02),
@@ -142,21 +142,29 @@ impl Fit {
         Some(fit)
     }
 
-    /// Writes the model into a sensor.
+    /// Writes the model of the body into a sensor that looks for it.
     pub fn apply(&self, sensor: &mut Config) {
         // Two digits more than are known. Rows by latitude go up or down with the mean.
         let digits = |x: f64| (x * 1e3).round() / 1e3;
-        for body in sensor.bodies.iter_mut().chain([&mut sensor.body]) {
-            if body.kind == Kind::Earth {
-                for row in &mut body.limb_height_by_latitude_km {
-                    row[1] = digits(row[1] + self.limb_height_km - body.limb_height_km);
-                }
-                body.limb_height_km = digits(self.limb_height_km);
-                body.limb_height_sigma_km = digits(self.limb_height_sigma_km);
+        let noise = covariance::Config {
+            sigma_px: digits(self.sigma_px),
+            correlation_px: digits(self.correlation_px),
+            ..sensor.covariance
+        };
+        let several = !sensor.bodies.is_empty();
+        let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
+        if body.kind == Kind::Earth {
+            for row in &mut body.limb_height_by_latitude_km {
+                row[1] = digits(row[1] + self.limb_height_km - body.limb_height_km);
             }
+            body.limb_height_km = digits(self.limb_height_km);
+            body.limb_height_sigma_km = digits(self.limb_height_sigma_km);
         }
-        sensor.covariance.sigma_px = digits(self.sigma_px);
-        sensor.covariance.correlation_px = digits(self.correlation_px);
+        if several {
+            body.covariance = Some(noise);
+        } else {
+            sensor.covariance = noise;
+        }
     }
 }
 
