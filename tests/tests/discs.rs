@@ -141,6 +141,23 @@ fn the_moon_is_lit_from_the_side() {
 }
 
 #[test]
+fn the_moon_is_no_larger_than_it_blooms() {
+    // By a few pixels, whatever the lens: a disc of twice its size is a glare, a ghost or the Sun.
+    for (focal_px, times, is_moon) in
+        [(6000.0, 1.0, true), (6000.0, 1.2, true), (6000.0, 2.0, false), (800.0, 2.0, true)]
+    {
+        let config = config(Preset::Moon, focal_px);
+        let axis = direction(&config, 300.6, 250.2);
+        let disc = Disc { sun: None, ..sun(axis, 0.2589f64.to_radians() * times) };
+        let data = Disc { halo: 0.0, ..disc }.paint(&config, 5);
+        for answer in both(&mut Sensors::new(&config), &data, None) {
+            assert_eq!(answer.is_ok(), is_moon, "{focal_px} px, {times}: {answer:?}");
+            assert!(answer.is_ok() || matches!(answer, Err(Status::Rejected)), "{answer:?}");
+        }
+    }
+}
+
+#[test]
 fn the_level_follows_the_limb_of_the_picture_before() {
     let mut config = config(Preset::Sun, 800.0);
     config.binarize.method = hzn_core::binarize::Method::Track;

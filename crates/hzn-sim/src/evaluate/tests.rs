@@ -91,6 +91,15 @@ fn a_wrong_radius_is_no_success_of_horace() {
 }
 
 #[test]
+fn the_suns_size_is_no_measure() {
+    let mut a = Answer { body: "sun".into(), ..answer("a", 0.0, 0.0) };
+    a.found.as_mut().unwrap().half_angle_deg = Some(90.0);
+    let cases = pair(&[a], &[Truth { body: "sun".into(), ..truth("a", 1) }], None).unwrap();
+    assert_eq!(cases[0].miss.unwrap().half_angle_ratio, None);
+    assert_eq!(Evaluation::by_body(&cases)[0].horace.success, 1.0);
+}
+
+#[test]
 fn what_does_not_belong_together_is_named() {
     let (t, a) = (truth("a", 1), answer("a", 0.0, 0.0));
     let says = |answers: &[Answer], truths: &[Truth]| pair(answers, truths, None).unwrap_err().to_string();

@@ -2,8 +2,10 @@
 //!
 //! Pictures of the same scenario with other seeds (other clouds, another drift) go through the sensor. Edge points that
 //! it holds for limb are compared with the exact limb: their mean height is the limb height, the scatter of the pictures'
-//! means its sigma; what is left is a process along the limb with a variance and an integral length. At last
-//! both are scaled so that the answers' errors are as large as they are said to be.
+//! means its sigma. What is left is a process along the limb with a variance and an integral length: of the lengths tried
+//! the likeliest, each with the variance that makes the answers' errors as large as they are said to be. (The points
+//! themselves do not tell the length: what turns an answer is alike along the whole limb, and small beside each one's
+//! noise.)
 
 use core::cell::RefCell;
 
@@ -42,14 +44,11 @@ pub struct Fit {
 
 /// What is added to the scenario's seed, again and again, for the pictures that are measured; and how many seeds.
 const OTHER_SEED: u64 = 7919;
-const SEEDS: u64 = 4;
+const SEEDS: u64 = 16;
 /// Pictures that a [`Fit`] is measured on where nobody says otherwise.
 pub const MEASURED: u32 = 32;
-/// Bins of the autocovariance: width in pixels, and how many.
-const BIN_PX: f64 = 6.0;
-const BINS: usize = 200;
-/// Shortest integral length that is told apart from none.
-const LEAST_PX: f64 = 10.0;
+/// Integral lengths that are tried, pixels.
+const LENGTHS_PX: [f64; 7] = [10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0];
 /// A NEES beyond this is a wrong answer, not a noisy one.
 const NEES_MOST: f64 = 20.0;
 
@@ -108,38 +107,46 @@ impl Fit {
         let height_km = mean(&heights);
         let spread_km =
             (heights.iter().map(|h| (h - height_km) * (h - height_km)).sum::<f64>() / heights.len() as f64).sqrt();
-        let (mut variance, mut length) = autocovariance(&pictures);
-        // Only their product counts where the edge is much longer; a length of a few pixels says no more than that.
-        if length < LEAST_PX {
-            variance *= length / LEAST_PX;
-            length = LEAST_PX;
-        }
+        let variance = mean(&pictures.iter().map(|p| p.variance_px2).collect::<Vec<_>>());
         let disc = matches!(kind, Kind::Sun | Kind::Moon);
-        let mut fit = Self {
+        let fit = Self {
             body: kind,
             limb_height_km: if disc { 0.0 } else { sensor.body.limb_height_km + height_km },
             limb_height_sigma_km: if disc { 0.0 } else { spread_km.max(0.2) },
             sigma_px: variance.sqrt().max(0.02),
-            correlation_px: length,
+            correlation_px: f64::NAN,
             nees: f64::NAN,
             frames: [answered.len(), seen.len()],
         };
+        let settled = LENGTHS_PX.map(|length| Self { correlation_px: length, ..fit }.settled(scenario, alone, seen));
+        settled.into_iter().flatten().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(fit, _)| fit)
+    }
+
+    /// With the sigmas at which the answers' errors are as large as they are said to be; and how unlikely these errors are
+    /// then: the mean of the negative log-likelihood, twice, but for a constant.
+    fn settled(mut self, scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, Picture)]) -> Option<(Self, f64)> {
+        let mut unlikely = f64::NAN;
         for _ in 0..4 {
             let mut sensor = alone.clone();
-            fit.apply(&mut sensor);
-            let nees: Vec<f64> =
-                look(scenario, &sensor, seen).iter().map(|l| l.nees.min(NEES_MOST)).filter(|n| n.is_finite()).collect();
-            fit.nees = mean(&nees);
-            let scale = (fit.nees / 2.0).sqrt().clamp(0.5, 2.5);
-            if nees.len() < 4 || (0.85..1.15).contains(&scale) {
+            self.apply(&mut sensor);
+            let looked = look(scenario, &sensor, seen);
+            let usable: Vec<&Looked> = looked.iter().filter(|l| l.nees.is_finite()).collect();
+            if usable.len() < 4 {
+                return None;
+            }
+            let mean = |of: &dyn Fn(&Looked) -> f64| usable.iter().map(|l| of(l)).sum::<f64>() / usable.len() as f64;
+            self.nees = mean(&|l| l.nees.min(NEES_MOST));
+            unlikely = mean(&|l| l.log_det) + self.nees;
+            let scale = (self.nees / 2.0).sqrt().clamp(0.5, 2.5);
+            if (0.85..1.15).contains(&scale) {
                 break;
             }
-            fit.sigma_px *= scale;
-            if !disc {
-                fit.limb_height_sigma_km *= scale.max(1.0);
+            self.sigma_px *= scale;
+            if self.limb_height_sigma_km > 0.0 {
+                self.limb_height_sigma_km *= scale.max(1.0);
             }
         }
-        Some(fit)
+        Some((self, unlikely))
     }
 
     /// Writes the model of the body into a sensor that looks for it.
@@ -182,6 +189,8 @@ struct Looked<'a> {
     points: Weighted,
     error_rad: f64,
     nees: f64,
+    /// Logarithm of the covariance's determinant.
+    log_det: f64,
 }
 
 fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &'a [(&'a FlightFrame, Picture)]) -> Vec<Looked<'a>> {
@@ -213,6 +222,7 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &'a [(&'a FlightFrame, P
             points: points.into_iter().filter(|p| p.1 > 0.0).collect(),
             error_rad: solution.axis.angle_rad(&axis),
             nees: full.try_inverse().map_or(f64::NAN, |inverse| d.dot(&(inverse * d))),
+            log_det: (full.determinant() / scale).ln(),
         });
     }
     out
@@ -257,8 +267,8 @@ impl Observer<f64> for Watch {
 struct Edge {
     /// Mean height above the assumed limb, kilometres.
     mean_km: f64,
-    /// (point, error along the normal in pixels without the mean, weight), in order along the edge.
-    errors: Vec<(ImagePoint<f64>, f64, f64)>,
+    /// Mean square of the errors along the normal without it.
+    variance_px2: f64,
 }
 
 impl Edge {
@@ -278,8 +288,8 @@ impl Edge {
             let latitude_deg = libm::asin(up.z.clamp(-1.0, 1.0)).to_degrees();
             levels.as_ref().map_or(0.0, |(half_level_km, mean_km)| half_level_km(latitude_deg) - mean_km)
         };
-        // (point, off the limb outward, the same a pixel, weight)
-        let off: Vec<(ImagePoint<f64>, f64, f64, f64)> = looked
+        // (off the limb outward, the same a pixel, weight)
+        let off: Vec<(f64, f64, f64)> = looked
             .points
             .iter()
             .filter_map(|&(point, weight)| {
@@ -290,53 +300,20 @@ impl Edge {
                     let by: [f64; 2] = [0, 1].map(|c| (0..3).map(|i| jacobian[i][c] * axis.xyz()[i]).sum::<f64>());
                     let angle = s.angle_rad(&axis);
                     let slope = libm::hypot(by[0], by[1]) / libm::sin(angle).max(1e-9);
-                    return Some((point, angle - truth.half_angle_deg.to_radians(), slope, weight));
+                    return Some((angle - truth.half_angle_deg.to_radians(), slope, weight));
                 }
                 let sight = view.look(ray.direction().xyz());
                 let [gu, gv] = view.tangent_height_gradient(&sight, &jacobian);
                 let off_km = view.tangent_height_m(&sight) * 1e-3 - higher_km(&view.normal(&view.point(&sight)));
-                Some((point, off_km, libm::hypot(gu, gv) * 1e-3, weight))
+                Some((off_km, libm::hypot(gu, gv) * 1e-3, weight))
             })
             .collect();
         if off.len() < 20 {
             return None;
         }
-        let sum: f64 = off.iter().map(|o| o.3).sum();
-        let mean = off.iter().map(|o| o.3 * o.1).sum::<f64>() / sum;
-        let errors = off.into_iter().map(|(p, h, g, w)| (p, (h - mean) / g.max(1e-12), w)).collect();
-        Some(Self { mean_km: mean, errors })
+        let sum: f64 = off.iter().map(|(_, _, w)| w).sum();
+        let mean_km = off.iter().map(|(h, _, w)| w * h).sum::<f64>() / sum;
+        let square_px = |(h, g, w): &(f64, f64, f64)| w * ((h - mean_km) / g.max(1e-12)).powi(2);
+        Some(Self { mean_km, variance_px2: off.iter().map(square_px).sum::<f64>() / sum })
     }
-}
-
-/// Variance in px², and the integral length in pixels: the area under the autocorrelation up to its first zero.
-fn autocovariance(pictures: &[Edge]) -> (f64, f64) {
-    let (mut sum, mut count) = (vec![0.0f64; BINS], vec![0.0f64; BINS]);
-    let (mut square, mut n) = (0.0, 0.0);
-    for edge in pictures {
-        for (i, (p, e, w)) in edge.errors.iter().enumerate() {
-            square += w * e * e;
-            n += w;
-            let (mut arc, mut last) = (0.0, *p);
-            for (q, f, v) in &edge.errors[i + 1..] {
-                arc += libm::hypot(q.u - last.u, q.v - last.v);
-                last = *q;
-                let bin = (arc / BIN_PX) as usize;
-                if bin >= BINS {
-                    break;
-                }
-                sum[bin] += w * v * e * f;
-                count[bin] += w * v;
-            }
-        }
-    }
-    let variance = square / f64::max(n, 1.0);
-    let mut length = 0.0;
-    for (s, c) in sum.iter().zip(&count).filter(|(_, c)| **c > 0.0) {
-        let correlation = s / c / variance.max(1e-12);
-        if correlation <= 0.0 {
-            break;
-        }
-        length += correlation * BIN_PX;
-    }
-    (variance, length)
 }

@@ -24,6 +24,24 @@ fn built_in_scenes_are_valid_and_show_their_bodies() {
 }
 
 #[test]
+fn each_body_has_edge_errors_of_its_own() {
+    let scenario = Scenario::builtin("sun-moon").unwrap();
+    let fits = Fit::measure(&scenario, 8, &|_, _| ()).unwrap();
+    let [sun, moon] = &fits[..] else { panic!("{fits:?}") };
+    assert_eq!((sun.body, moon.body), (Kind::Sun, Kind::Moon));
+    // Half of a disc in light and shade against a whole one.
+    assert!(moon.sigma_px > 3.0 * sun.sigma_px, "{sun:?} {moon:?}");
+    let mut sensor = scenario.sensor();
+    fits.iter().for_each(|fit| fit.apply(&mut sensor));
+    sensor.check().unwrap();
+    for (body, fit) in sensor.bodies.iter().zip(&fits) {
+        let noise = body.covariance.unwrap();
+        assert!((noise.sigma_px - fit.sigma_px).abs() < 6e-4 && noise.correlation_px == fit.correlation_px);
+    }
+    assert_eq!(sensor.covariance, scenario.sensor().covariance);
+}
+
+#[test]
 fn what_is_refused_is_named() {
     let error = |change: &dyn Fn(&mut Scenario)| {
         let mut s = Scenario::builtin("tumble").unwrap();
