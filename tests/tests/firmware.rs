@@ -144,9 +144,13 @@ impl Bench {
     }
     /// Runs until the image ends by itself; gives its exit status and what it sent.
     fn run(&self, line: &[u8]) -> i32 {
+        self.run_at(line, 0)
+    }
+    /// With an instruction that takes `2^shift` ns.
+    fn run_at(&self, line: &[u8], shift: u32) -> i32 {
         std::fs::write(self.path("line.bin"), line).unwrap();
         let sent = std::fs::File::create(self.path("sent.bin")).unwrap();
-        let mut command = self.board.qemu(&self.board.image("flight"), 0);
+        let mut command = self.board.qemu(&self.board.image("flight"), shift);
         let mut child = command
             .args(["-serial", "stdio"])
             .current_dir(self.dir.path())
@@ -297,6 +301,30 @@ fn a_power_cut_in_the_middle_of_a_parameter_write() {
     assert!(said.contains("started with copy 2 of the parameters, generation 2"), "{said}");
     assert!(said.contains("a copy of the parameters cannot be used (1, 2)"), "{said}");
     assert!(said.contains("parameter 32 body.altitude_km = NaN"), "{said}");
+}
+
+/// A turn that never ends: the watchdog starts the program anew, which says so and obeys again.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
+    for board in Board::ALL {
+        let bench = Bench::new(board);
+        bench.copy(1, &rocket(640, 480, 1, 1).sensor, 1);
+        let hangs = [*b"HANG", [0; 4], [0; 4], [0; 4]].concat();
+        std::fs::write(bench.path("frames.bin"), hangs).unwrap();
+        // What was received before the reset is lost with it.
+        let mut args = vec!["telecommand", "-o", "commands.bin", "process-once"];
+        args.extend(["mode shut-down"; 8]);
+        hzn_run(bench.dir.path(), &args);
+        let line = std::fs::read(bench.path("commands.bin")).unwrap();
+        // The watchdog's two seconds are 31 million instructions then.
+        assert_eq!(bench.run_at(&line, 6), 0);
+        let said = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
+        println!("{said}");
+        assert_eq!(said.matches("started with copy 1 of the parameters").count(), 2, "{said}");
+        assert_eq!(said.matches("reset by the watchdog").count(), 1, "{said}");
+        assert!(said.contains("standby to shut-down mode"), "{said}");
+    }
 }
 
 #[test]

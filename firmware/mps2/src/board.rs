@@ -1,6 +1,6 @@
 //! The board: external memory and the timer.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// External memory (PSRAM).
 #[cfg(feature = "an500")]
@@ -111,11 +111,17 @@ impl Uart {
 #[derive(Debug)]
 pub struct Watchdog {
     running: bool,
+    was_reset: bool,
 }
+
+/// That the program was running, in memory that a reset leaves as it is, and power-on does not.
+#[unsafe(link_section = ".uninit.RUNNING")]
+static RUNNING: AtomicU32 = AtomicU32::new(0);
+const WAS_RUNNING: u32 = 0x5AFE_C0DE;
 
 impl Watchdog {
     fn new() -> Self {
-        Self { running: false }
+        Self { running: false, was_reset: RUNNING.swap(WAS_RUNNING, Ordering::Relaxed) == WAS_RUNNING }
     }
 
     /// Starts it, or starts its time anew.
@@ -133,8 +139,9 @@ impl Watchdog {
         }
     }
 
-    /// Whether it caused the last reset: these boards do not tell.
+    /// Whether it caused the last reset. These boards do not tell, but there is nothing else on them that resets a program
+    /// while power stays.
     pub fn was_reset(&self) -> bool {
-        false
+        self.was_reset
     }
 }

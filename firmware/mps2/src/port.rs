@@ -87,6 +87,12 @@ impl Board for Mps2 {
         }
         let word = |i: usize| header.get(4 * i..).and_then(|h| h.first_chunk()).map_or(0, |w| u32::from_le_bytes(*w));
         let (magic, bytes, lost) = (word(0), word(1) as usize, word(2));
+        if magic == u32::from_le_bytes(*b"HANG") {
+            // A wait that never ends: only the watchdog can end it.
+            loop {
+                core::hint::spin_loop();
+            }
+        }
         if magic != u32::from_le_bytes(*b"FRAM") || bytes > FRAME_BYTES {
             return None;
         }
