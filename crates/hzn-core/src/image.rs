@@ -37,6 +37,12 @@ pub trait Pixels {
     fn three(&self, index: usize) -> [u16; 3] {
         [0, 1, 2].map(|k| self.read(index + k * self.across()))
     }
+    /// Of `count` pixels from an index to the right, how many before the first that is not as `lit` says: at `level` or
+    /// brighter.
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()
+    }
     /// The edge point of a border pixel, of a picture that came row by row: it was measured when the rows around it were
     /// there.
     fn passed(&self, _x: u16, _y: u16) -> Option<Passed> {
@@ -94,6 +100,10 @@ impl<P: Pixels> Pixels for &P {
     #[inline(always)]
     fn three(&self, index: usize) -> [u16; 3] {
         (**self).three(index)
+    }
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        (**self).alike(index, count, level, lit)
     }
 }
 
@@ -168,10 +178,38 @@ pub trait Sample: Copy + Into<u16> {
     const BITS: u8;
     /// 0.
     const ZERO: Self;
+    /// How many samples stand before the first that is not as `lit` says: at `level` or above.
+    #[inline(always)]
+    fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
+        samples.iter().take_while(|&&s| (s.into() >= level) == lit).count()
+    }
 }
 impl Sample for u8 {
     const BITS: u8 = 8;
     const ZERO: Self = 0;
+    /// Eight at once. Whether a byte is at the level or above stands in its high bit: its own high bit and that of the rest
+    /// of it less the rest of the level, both of them for a level with a high bit, either for one without.
+    #[inline(always)]
+    fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
+        const EACH: u64 = 0x0101_0101_0101_0101;
+        const HIGH: u64 = 0x80 * EACH;
+        let all = |yes: bool| if yes { u64::MAX } else { 0 };
+        let rest_of_level = u64::from(level & 0x7f) * EACH;
+        let either = all(level < 128);
+        let turn = either ^ all(lit);
+        let (eights, last) = samples.as_chunks();
+        let mut count = 0;
+        for eight in eights {
+            let bytes = u64::from_le_bytes(*eight);
+            let rest = (bytes | HIGH).wrapping_sub(rest_of_level);
+            let others = (((bytes ^ either) & (rest ^ either)) ^ turn) & HIGH;
+            if others != 0 {
+                return count + (others.trailing_zeros() / 8) as usize;
+            }
+            count += 8;
+        }
+        count + last.iter().take_while(|&&s| (u16::from(s) >= level) == lit).count()
+    }
 }
 impl Sample for u16 {
     const BITS: u8 = 16;
@@ -283,6 +321,10 @@ impl<S: Sample> Pixels for Grey<'_, S> {
             _ => [0, 1, 2].map(|k| self.read(index + k)),
         }
     }
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        self.data.get(index..index + count).map_or(0, |samples| S::alike(samples, level, lit))
+    }
 }
 
 impl<S: Sample> Pixels for Colour<'_, S> {
@@ -390,6 +432,28 @@ impl Pixels for ImageView<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn eight_pixels_at_once_are_as_one_by_one() {
+        // Every level, beside samples at it, around it and far from it.
+        for level in 0..=255u16 {
+            for seed in 0..64u32 {
+                let near = |k: usize| match seed.wrapping_mul(0x9E37_79B1).rotate_left(5 * k as u32) % 64 {
+                    0 => 0,
+                    1 => 255,
+                    n => (i32::from(level) + n as i32 / 8 - if seed % 2 == 0 { 7 } else { 0 }).clamp(0, 255) as u8,
+                };
+                let bytes: [u8; 21] = core::array::from_fn(near);
+                let words = bytes.map(u16::from);
+                for lit in [false, true] {
+                    assert_eq!(u8::alike(&bytes, level, lit), u16::alike(&words, level, lit), "{bytes:?} at {level}");
+                }
+            }
+        }
+        // Beyond the picture's end nothing is said.
+        let picture = Grey::try_new(&[9u8; 10], Layout::packed(10, 1, 1, 8)).unwrap();
+        assert_eq!([0, 2, 3, 10].map(|i| picture.alike(i, 8, 5, true)), [8, 8, 0, 0]);
+    }
 
     #[test]
     fn stride_and_channels_are_honoured() {

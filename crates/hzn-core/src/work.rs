@@ -31,13 +31,15 @@ impl Config {
 pub(crate) const EDGE: u32 = 20;
 /// A step with a look at everything around, the mask too.
 pub(crate) fn look(mask: u32) -> u32 {
-    2 + mask * 5 / 2
+    5 + mask * 5 / 2
 }
 /// A search line from one column to another: few instructions a pixel, but they are many where a small body is looked
 /// for, with lines on every row.
 pub(crate) fn line(from: u16, to: u16) -> u32 {
-    u32::from(to.saturating_sub(from)) / 10
+    u32::from(to.saturating_sub(from)) / 15
 }
+/// What such a line costs more each time that it crosses an edge.
+pub(crate) const CROSSING: u32 = 4;
 /// A sub-pixel point with its ray.
 pub(crate) const POINT: u32 = 16;
 /// What such a point costs more where reads are checked one by one: beside a mask or the border, or on a wide edge.

@@ -13,6 +13,8 @@ pub(crate) struct Marks<'a> {
     spacing: u16,
     offset: u16,
     bits: bool,
+    /// The table has no place for more.
+    full: bool,
 }
 
 /// Places of the table that are tried for a crossing.
@@ -35,7 +37,7 @@ impl<'a> Marks<'a> {
         if let Some(words) = words.get_mut(..used) {
             words.fill(0);
         }
-        Self { words, width: u32::from(width), spacing, offset: spacing / 2, bits: found.is_some() }
+        Self { words, width: u32::from(width), spacing, offset: spacing / 2, bits: found.is_some(), full: false }
     }
 
     /// Whether row `y` is a search line.
@@ -71,11 +73,14 @@ impl<'a> Marks<'a> {
             }
             return;
         }
+        if self.full {
+            return;
+        }
         let (key, mut places) = self.key(x, y);
-        if let Some(place) = places.find(|&p| self.words.get(p).is_some_and(|&w| w == 0 || w == key))
-            && let Some(word) = self.words.get_mut(place)
-        {
-            *word = key;
+        let place = places.find(|&p| self.words.get(p).is_some_and(|&w| w == 0 || w == key));
+        match place.and_then(|p| self.words.get_mut(p)) {
+            Some(word) => *word = key,
+            None => self.full = true,
         }
     }
     pub(crate) fn get(&self, x: u16, y: u16) -> bool {
@@ -84,7 +89,8 @@ impl<'a> Marks<'a> {
             return self.words.get(word).is_some_and(|w| w & bit != 0);
         }
         let (key, mut places) = self.key(x, y);
-        places.any(|p| self.words.get(p) == Some(&key))
+        // It would stand in the first place that is empty.
+        places.find_map(|p| self.words.get(p).filter(|&&w| w == 0 || w == key)) == Some(&key)
     }
     /// The rows of the lines within `height`.
     pub(crate) fn rows(&self, height: u16) -> impl Iterator<Item = u16> + use<> {

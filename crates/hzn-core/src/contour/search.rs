@@ -115,49 +115,44 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
     }
 
     /// Calls `found` with every unmarked lit pixel of a search line, from column `x0` to `x1` of row `y`, whose western
-    /// neighbour is dark, until it says to stop. `found` gets the marks back, for the follower.
+    /// neighbour is dark, until it says to stop. `found` gets the marks back, for the follower. Gives how often the line
+    /// was lit after dark.
     pub(crate) fn each_crossing<'m>(
         &self,
         y: u16,
         (x0, x1): (u16, u16),
         marks: &mut Marks<'m>,
         mut found: impl FnMut(Pixel, u8, &mut Marks<'m>) -> bool,
-    ) {
-        let (mut x, mut lit) = (x0, self.lit(x0, y));
+    ) -> u32 {
+        let (mut x, mut lit, mut crossings) = (x0, self.lit(x0, y), 0);
         while x < x1 {
             if !self.region.has_mask() {
-                x = self.alike_to(x, y, x1);
+                x += self.alike_beyond(x, y, x1 - x);
             }
             x += 1;
             let now = x <= x1 && self.lit(x, y);
-            if now && !lit && !marks.get(x, y) && !found(Pixel { x, y }, WEST, marks) {
-                return;
+            if now && !lit {
+                crossings += 1;
+                if !marks.get(x, y) && !found(Pixel { x, y }, WEST, marks) {
+                    break;
+                }
             }
             lit = now;
         }
+        crossings
     }
 
-    /// From column `x` of row `y` eastwards, up to `end`: a pixel up to which all are as bright or dark, against the level;
-    /// three at a time, so that the last of them may be further.
+    /// Of the `count` pixels east of column `x` of row `y`, how many are lit as that one, or dark as it, before the first
+    /// that is not.
     #[inline(never)]
-    fn alike_to(&self, x: u16, y: u16, end: u16) -> u16 {
-        let (first, across) = (self.picture.index(x, y), self.picture.across());
-        let level = u32::from(self.level);
-        // What is alike lies in this range.
-        let (low, span) = if self.picture.read(first) < self.level { (0, level) } else { (level, 1 << 16) };
-        let (mut last, mut index) = (x, first + across);
-        while end - last >= 3 {
-            for dx in 1..4 {
-                self.observer.pixel(last + dx, y);
-            }
-            let three = self.picture.three(index);
-            if three.iter().any(|&v| u32::from(v).wrapping_sub(low) >= span) {
-                break;
-            }
-            last += 3;
-            index += 3 * across;
+    fn alike_beyond(&self, x: u16, y: u16, count: u16) -> u16 {
+        let index = self.picture.index(x, y);
+        let lit = self.picture.read(index) >= self.level;
+        let alike = self.picture.alike(index + self.picture.across(), count.into(), self.level, lit) as u16;
+        for dx in 1..=(alike + 1).min(count) {
+            self.observer.pixel(x + dx, y);
         }
-        last
+        alike
     }
 }
 

@@ -150,11 +150,11 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             if self.done() || !self.work.spend(work::line(x0, x1)) {
                 break;
             }
-            scene.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
+            let crossings = scene.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
                 self.edge(scene, pixel, dark, border, marks);
                 !self.done()
             });
-            self.work.pay(scene.cost());
+            self.work.pay(crossings * work::CROSSING + scene.cost());
         }
     }
 
