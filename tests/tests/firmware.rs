@@ -8,6 +8,7 @@ use hzn_core::binarize;
 use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::status::Status;
 use hzn_core::{Config, FlightHorizon, Frame, camera};
+use hzn_flight::flight::{Buffers, Lists};
 use hzn_flight::{Parameters, table};
 use hzn_sim::flight::{leo_infrared, rocket};
 use hzn_tests::emulated::{Board, Case, bits, chain, measure, measure_rows};
@@ -263,7 +264,10 @@ fn an_exchange_over_the_line() {
         let last: Vec<&str> = housekeeping.lines().last().unwrap().split(',').collect();
         let column = |name: &str| housekeeping.lines().next().unwrap().split(',').position(|c| c == name).unwrap();
         assert_eq!((last[column("pictures")], last[column("lost")], last[column("refused")]), ("10", "3", "1"));
-        println!("{}: most stack {} bytes", board.name(), last[column("stack_bytes")]);
+        // Beside the pictures: the lists, the buffers and the stack.
+        let stack: usize = last[column("stack_bytes")].parse().unwrap();
+        println!("{}: most stack {stack} bytes", board.name());
+        assert!(size_of::<Lists>() + size_of::<Buffers>() + stack < 96 * 1024);
 
         let mut after = before;
         after.reject.threshold_px = 2.5;

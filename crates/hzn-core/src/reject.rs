@@ -112,11 +112,11 @@ pub(crate) fn keep<T: Real>(
             return Some(Consensus { e, c, draws: 1, all: true });
         }
         #[cfg(feature = "dlr")]
-        Method::Ransac => return ransac::keep(blocks, count, config),
+        Method::Ransac => return ransac::keep(blocks, count, config, work),
         #[cfg(feature = "zju")]
-        Method::RansacPreverify => return preverified::keep(blocks, count, config),
+        Method::RansacPreverify => return preverified::keep(blocks, count, config, work),
         #[cfg(feature = "zju")]
-        Method::Mlesac => return mlesac::keep(blocks, count, focal_px, config),
+        Method::Mlesac => return mlesac::keep(blocks, count, focal_px, config, work),
     };
     for block in blocks {
         let g = block.gradient(&best.e);

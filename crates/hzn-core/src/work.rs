@@ -12,14 +12,14 @@ use crate::error::{ConfigError, between};
 pub struct Config {
     /// What one picture may cost in steps of the border follower, 10 thousand to a billion: the bound on the worst
     /// picture's time. An ordinary picture takes some 30 thousand. Used up, the best answer so far is taken; without
-    /// one the status is `truncated`. Left out: 120 for each edge point that the lists hold, which is 246 thousand on
-    /// a flight computer and two million on a workstation.
+    /// one the status is `truncated`. Left out: 120 for each border pixel that the lists hold, which is 246 thousand on
+    /// a flight computer and two million on a workstation; 2120 with `erf`.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub max_work: Option<u32>,
 }
 
-/// Work for each edge point that the lists hold, where the configuration does not say.
-const A_POINT: u32 = 120;
+/// Work for each border pixel that the lists hold, where the configuration does not say.
+const A_PIXEL: u32 = 120;
 
 impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
@@ -40,7 +40,7 @@ pub(crate) fn line(from: u16, to: u16) -> u32 {
 }
 /// What such a line costs more each time that it crosses an edge.
 pub(crate) const CROSSING: u32 = 4;
-/// A sub-pixel point with its ray.
+/// A sub-pixel point with its ray, by the default's method.
 pub(crate) const POINT: u32 = 16;
 /// What such a point costs more where reads are checked one by one: beside a mask or the border, or on a wide edge.
 pub(crate) fn slow_point(mask: u32) -> u32 {
@@ -50,6 +50,25 @@ pub(crate) fn slow_point(mask: u32) -> u32 {
 pub(crate) const DRAW: u32 = 10;
 /// A block of eight points compared with a drawn cone.
 pub(crate) const SCORE: u32 = 4;
+/// Such a block by the likelihood of a mixture, with exponentials and logarithms.
+#[cfg(feature = "zju")]
+pub(crate) const LIKELIHOOD: u32 = 80;
+/// A pixel's gradient: its eight neighbours read, and looked up in the mask.
+#[cfg(feature = "zju")]
+pub(crate) fn gradient(mask: u32) -> u32 {
+    4 + 9 * mask
+}
+/// The pixels of a square counted.
+#[cfg(feature = "horace")]
+pub(crate) fn square(side: u16, mask: u32) -> u32 {
+    u32::from(side) * u32::from(side) * (1 + 2 * mask)
+}
+/// A pixel put in order among those of its edge.
+#[cfg(any(feature = "horace", feature = "zju"))]
+pub(crate) const ORDER: u32 = 20;
+/// A part of a picture, before anything is found in it.
+#[cfg(feature = "horace")]
+pub(crate) const PART: u32 = 1000;
 /// A block of eight points fitted, and weighed by its covariance.
 pub(crate) const FIT: u32 = 230;
 /// The gates of a fit.
@@ -64,9 +83,10 @@ pub(crate) struct Work {
 }
 
 impl Work {
-    /// For lists that hold so many edge points.
-    pub(crate) fn new(config: &Config, points: usize) -> Self {
-        let all = config.max_work.unwrap_or(A_POINT.saturating_mul(points as u32));
+    /// For lists that hold so many border pixels, of which a sub-pixel point costs this.
+    pub(crate) fn new(config: &Config, pixels: usize, point: u32) -> Self {
+        let a_pixel = A_PIXEL - POINT + point;
+        let all = config.max_work.unwrap_or(a_pixel.saturating_mul(pixels as u32));
         Self { all, left: all, cut: false }
     }
 
@@ -106,6 +126,11 @@ impl Work {
     /// Nothing more is done.
     pub(crate) fn cut(&mut self) {
         (self.left, self.cut) = (0, true);
+    }
+    /// Something was not done for lack of room; what is left may serve others.
+    #[cfg(feature = "horace")]
+    pub(crate) fn lack(&mut self) {
+        self.cut = true;
     }
     /// Whether something was not done for lack of it.
     pub(crate) fn was_cut(&self) -> bool {

@@ -97,9 +97,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
     /// No picture costs more than it may; a limit that is not reached changes nothing.
     #[test]
-    fn work_is_bounded(kind in 0u8..10, seed in any::<u64>(), level in any::<u8>(), most in 10_000u32..200_000) {
+    fn work_is_bounded(
+        kind in 0u8..10, seed in any::<u64>(), level in any::<u8>(), most in 10_000u32..200_000,
+        preset in 0..Preset::ALL.len(), mask: bool,
+    ) {
         let config = |most| {
-            let mut config = config(Model::Pinhole, false, false, Kind::Earth);
+            let mut config = config(Model::Pinhole, false, mask, Kind::Earth);
+            config = Config { mask: config.mask, ..Config::preset(Preset::ALL[preset], config.camera) };
+            config.body.altitude_km = Some(300.0);
             config.limits.max_work = Some(most);
             config
         };

@@ -6,7 +6,7 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::pipeline::Observer;
 use hzn_core::pixel::Pixel;
 use hzn_core::status::Status;
-use hzn_core::{FlightWorkspace, Frame, Sensor};
+use hzn_core::{Frame, Sensor, Workspace};
 
 use crate::answer::Answer;
 use crate::board::{Board, Shot};
@@ -45,6 +45,10 @@ impl Line {
     }
 }
 
+/// The lists of a picture: keep them in a `static`. As those of `hzn run --flight` but for the points of an edge, of which
+/// 608 are kept at most, as the default `candidates.keep_points` asks for no more. All that are asked for is as many.
+pub type Lists = Workspace<f32, 2048, 76, 512>;
+
 /// The flight software's memory besides the lists of a picture: keep it in a `static`.
 #[derive(Debug)]
 pub struct Buffers {
@@ -77,7 +81,7 @@ impl Buffers {
 pub struct Flight<'a, B> {
     board: B,
     buffers: &'a mut Buffers,
-    workspace: &'a mut FlightWorkspace,
+    workspace: &'a mut Lists,
     sensor: Sensor<f32>,
     housekeeping_every: u16,
     known: Frame<f32>,
@@ -98,7 +102,7 @@ impl<'a, B: Board> Flight<'a, B> {
     /// defaults are valid, which a test holds.
     // By itself, as are the other large functions: what one needs of the stack, the next one has again.
     #[inline(never)]
-    pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut FlightWorkspace) -> Option<Self> {
+    pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
         let loaded = store::load(&mut board, &mut buffers.table);
         let sensor = Sensor::new(&loaded.parameters.sensor).ok()?;
         let state = Housekeeping {

@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
+use hzn_core::pixel;
 use hzn_core::status::Status;
-use hzn_core::{FlightWorkspace, pixel};
 use hzn_flight::board::{Board, Shot};
 use hzn_flight::bytes::{Reader, Writer};
-use hzn_flight::flight::{Buffers, Flight};
+use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode};
 use hzn_flight::packet::{self, Apid, Scan};
 use hzn_flight::{Parameters, answer::Answer, table};
@@ -109,7 +109,7 @@ fn ready() -> Bench {
 }
 
 fn fly<R>(bench: Bench, turns: impl FnOnce(&mut Flight<'_, Bench>) -> R) -> R {
-    let (mut buffers, mut workspace) = (Box::new(Buffers::new()), Box::new(FlightWorkspace::new()));
+    let (mut buffers, mut workspace) = (Box::new(Buffers::new()), Box::new(Lists::new()));
     turns(&mut Flight::start(bench, &mut buffers, &mut workspace).unwrap())
 }
 
@@ -190,6 +190,25 @@ fn starts_with_the_newer_copy_and_waits() {
         f.board().shots.push_back((limb(), 0));
         f.turn();
         assert_eq!(heard(f).science, [], "standby processes nothing by itself");
+    });
+}
+
+#[test]
+fn all_points_are_as_many_as_there_is_room_for() {
+    fly(ready(), |f| {
+        let keep_all = |w: &mut Writer<'_>| {
+            w.u8(1);
+            w.u16(71);
+            w.f64(0.0);
+        };
+        let h = tell(f, &command(1, Function::SetParameters, keep_all));
+        assert_eq!(h.answers[0].2, Code::Done);
+        f.board().shots.push_back((limb(), 0));
+        let h = tell(f, &command(2, Function::ProcessOnce, |_| ()));
+        let answer = &h.science[0].1;
+        assert_eq!(answer.status, Status::Ok as u8);
+        // The edge has 640 pixels, of which every second one fits.
+        assert!((300..=608).contains(&answer.edge_points), "{}", answer.edge_points);
     });
 }
 

@@ -11,6 +11,7 @@ use crate::image::Pixels;
 use crate::pipeline::Observer;
 use crate::pixel::Pixel;
 use crate::real::Real;
+use crate::work::{self, Work};
 
 /// The edge pixels of the picture, in order about their circle. Beside the end of the region, or a mask, there is no
 /// edge.
@@ -18,19 +19,28 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     scene: &Scene<'_, T, P, O>,
     config: &Config,
     buffer: &'a mut [Pixel],
+    work: &mut Work,
 ) -> Thinned<'a> {
     let mut edge = Thinned::new(buffer);
     let reach = config.erode_size_px / 2;
     let least = config.erode_threshold;
+    let around = work::square(config.erode_size_px, scene.mask_cost());
     for y in 0..scene.region.height() {
         let Some((x0, x1)) = scene.region.span(y) else { continue };
+        // What was looked at of the mask in the row before, too.
+        if !work.spend(u32::from(x1 - x0) + scene.cost()) {
+            break;
+        }
         for x in x0..=x1 {
-            if scene.lit(x, y) && scene.region.is_inside_by(x, y, reach) && is_edge(scene, x, y, reach, least) {
+            let inside = scene.lit(x, y) && scene.region.is_inside_by(x, y, reach);
+            if inside && work.spend(around) && is_edge(scene, x, y, reach, least) {
                 edge.push(Pixel { x, y });
             }
         }
     }
-    about_their_circle::<T>(edge.pixels_mut());
+    if work.spend(edge.pixels().len() as u32 * work::ORDER) {
+        about_their_circle::<T>(edge.pixels_mut());
+    }
     edge
 }
 
@@ -69,7 +79,7 @@ mod tests {
         let scene = Scene::new(&picture, &region, 128, &Unobserved);
         let mut buffer = vec![Pixel::default(); 4096];
         let config = Config { erode_size_px: size, erode_threshold: threshold, ..Config::default() };
-        edges(&scene, &config, &mut buffer).pixels().iter().map(|p| (p.x, p.y)).collect()
+        edges(&scene, &config, &mut buffer, &mut Work::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
     }
 
     #[test]

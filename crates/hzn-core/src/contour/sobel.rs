@@ -13,6 +13,7 @@ use crate::image::Pixels;
 use crate::pipeline::Observer;
 use crate::pixel::Pixel;
 use crate::real::Real;
+use crate::work::{self, Work};
 
 /// Least gradient of an edge over the root mean square of all: its square.
 const LEAST: u64 = 4;
@@ -22,10 +23,12 @@ const LEAST: u64 = 4;
 pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     scene: &Scene<'_, T, P, O>,
     buffer: &'a mut [Pixel],
+    work: &mut Work,
 ) -> Thinned<'a> {
     let mut edge = Thinned::new(buffer);
     let (mut sum, mut count) = (0u64, 0u64);
-    each_pixel(scene, |x, y| {
+    let look = work::gradient(scene.mask_cost());
+    each_pixel(scene, look, work, |x, y, _| {
         if let Some((gx, gy)) = gradient(scene, x, y) {
             sum = sum.saturating_add(square(gx, gy));
             count += 1;
@@ -33,15 +36,18 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     });
     // A picture without any gradient has none above the mean.
     let least = LEAST * (sum / count.max(1));
-    each_pixel(scene, |x, y| {
+    each_pixel(scene, look, work, |x, y, work| {
         if let Some((gx, gy)) = gradient(scene, x, y)
             && square(gx, gy) > least
+            && work.spend(2 * look)
             && is_largest(scene, x, y, gx, gy)
         {
             edge.push(Pixel { x, y });
         }
     });
-    about_their_circle::<T>(edge.pixels_mut());
+    if work.spend(edge.pixels().len() as u32 * work::ORDER) {
+        about_their_circle::<T>(edge.pixels_mut());
+    }
     edge
 }
 
@@ -50,11 +56,19 @@ fn square(gx: i32, gy: i32) -> u64 {
     gx * gx + gy * gy
 }
 
-fn each_pixel<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, mut visit: impl FnMut(u16, u16)) {
+fn each_pixel<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    cost: u32,
+    work: &mut Work,
+    mut visit: impl FnMut(u16, u16, &mut Work),
+) {
     for y in 0..scene.region.height() {
         let Some((x0, x1)) = scene.region.span(y) else { continue };
+        if !work.spend((u32::from(x1 - x0) + 1).saturating_mul(cost)) {
+            break;
+        }
         for x in x0..=x1 {
-            visit(x, y);
+            visit(x, y, work);
         }
     }
 }
@@ -109,7 +123,7 @@ mod tests {
         // No level: every pixel is lit.
         let scene = Scene::new(&picture, &region, 1, &Unobserved);
         let mut buffer = vec![Pixel::default(); 4096];
-        edges(&scene, &mut buffer).pixels().iter().map(|p| (p.x, p.y)).collect()
+        edges(&scene, &mut buffer, &mut Work::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The edges of one picture, one after the other from border to verdict, and which of them is the limb.
 
+use super::account;
 use super::observer::Observer;
 use super::report::{Candidate, Report, Solution, Verdict};
 use super::sensor::Sensor;
@@ -77,13 +78,15 @@ struct Best<T> {
 }
 
 impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
-    /// Nothing looked at yet. `taken` are the bodies found before; `blocks` is the room for one edge's points.
+    /// Nothing looked at yet. `taken` are the bodies found before; `blocks` is the room for one edge's points, `pixels` that
+    /// for its border.
     pub(super) fn new(
         sensor: &'a Sensor<T>,
         expected: &'a Expected<T>,
         taken: &'a [Taken<T>],
         observer: &'a O,
         blocks: &'a mut [Block<T>],
+        pixels: usize,
         report: &'a mut Report<T>,
     ) -> Self {
         let config = &sensor.config;
@@ -94,7 +97,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             tracks: config.levels_of(expected.which).method == binarize::Method::Track,
             min_points: config.candidates.min_points.min(select::small(expected.sin, &sensor.camera, 2)),
             observer,
-            work: Work::new(&config.limits, blocks.len() * LANES),
+            work: account::open(config, pixels),
             blocks,
             best: None,
             rival: None,
@@ -170,8 +173,19 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         self.report.counters.followed += most - steps;
         self.work.pay(most - steps);
         if ended == contour::raster::Scanned::Truncated {
-            self.work.cut();
+            self.work.lack();
         }
+    }
+
+    /// Every edge pixel of the picture as one edge, by a method that finds them so.
+    #[cfg(any(feature = "horace", feature = "zju"))]
+    pub(super) fn whole<'b, P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        edges: impl FnOnce(&mut Work) -> Thinned<'b>,
+    ) {
+        let edge = edges(&mut self.work);
+        self.piece(scene, &edge);
     }
 
     /// Follows one edge and takes it through every stage.
@@ -206,7 +220,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
         let keep = u32::from(self.sensor.config.candidates.keep_points);
         let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
-        if !self.work.spend(points * work::POINT) {
+        let point = account::point(self.sensor.config.candidates.sub_pixel, scene.mask_cost());
+        if !self.work.spend(points.saturating_mul(point)) {
             return;
         }
         let number = counters.candidates;

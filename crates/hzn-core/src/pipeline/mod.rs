@@ -5,6 +5,7 @@
 //! begins at the border, then the closed ones. The picture is done as soon as an edge passes every gate and is beyond
 //! doubt; otherwise the best of all that begin at the border is taken, and closed ones are looked at when none is.
 
+mod account;
 mod config;
 #[cfg(any(test, feature = "_edges"))]
 pub mod edges;

@@ -5,6 +5,7 @@
 //! of it is told in the whole picture's coordinates. (2.39) ends the division where a part is too small *and* too
 //! bright and too dark at once; it ends where a part is too small, or too bright, or too dark.
 
+use super::account;
 use super::taken::Taken;
 use super::workspace::Lists;
 use super::{Candidate, Observer, Report, Sensor, Solution};
@@ -17,6 +18,7 @@ use crate::real::Real;
 use crate::recover::{Combine, Method};
 use crate::sort;
 use crate::status::{Stage, Status};
+use crate::work;
 
 /// Most parts that can answer.
 const ANSWERS: usize = 64;
@@ -40,7 +42,7 @@ impl<T: Real> Sensor<T> {
         if whole.is_all() {
             self.look(lists.again(), picture, expected, taken, observer, report);
         } else {
-            self.look_through(lists.again(), whole, picture, expected, taken, observer, report);
+            self.look_through(lists.again(), whole, picture, expected, taken, observer, None, report);
         }
         let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright);
         if self.config.recover.method == Method::Division && divisible {
@@ -59,13 +61,23 @@ impl<T: Real> Sensor<T> {
         report: &mut Report<T>,
     ) {
         let (status, level) = (report.status, report.level);
+        // What the whole picture left.
+        let mut work = account::open(&self.config, lists.border.len());
+        work.pay(report.counters.work);
+        let mut cut = false;
         let least = f64::from(whole.area()) * self.config.recover.least_part;
         let mut answers = Answers::<T>::new();
         let mut waiting = heapless::Vec::<Window, WAITING>::new();
         // A half at a time: as many wait as there have been halvings.
         let _ = waiting.extend_from_slice(whole.halves().as_ref().map_or(&[][..], |h| h));
         while let Some(part) = waiting.pop() {
-            self.look_through(lists.again(), part, picture, expected, taken, observer, report);
+            if !work.spend(work::PART) {
+                break;
+            }
+            report.counters.work = 0;
+            self.look_through(lists.again(), part, picture, expected, taken, observer, Some(work.left()), report);
+            work.pay(report.counters.work);
+            cut |= report.status == Status::Truncated;
             if let Some(answer) = report.solution.take() {
                 // As many as the smallest parts can be.
                 let _ = answers.push(answer);
@@ -76,7 +88,10 @@ impl<T: Real> Sensor<T> {
                 let _ = waiting.extend_from_slice(part.halves().as_ref().map_or(&[][..], |h| h));
             }
         }
-        (report.status, report.level) = (status, level);
+        (report.status, report.level, report.counters.work) = (status, level, work.done());
+        if cut || work.was_cut() {
+            report.status = Status::Truncated;
+        }
         if let Some(mut answer) = together(&mut answers, self.config.recover.combine) {
             answer.axis_body = self.cam_to_body.as_ref().map(|r| r.apply(&answer.axis));
             report.status = Status::Ok;
@@ -85,7 +100,7 @@ impl<T: Real> Sensor<T> {
         }
     }
 
-    /// Looks at a part with the camera and the region that are its own.
+    /// Looks at a part with the camera and the region that are its own; `left` is what it may cost.
     fn look_through<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
@@ -94,10 +109,13 @@ impl<T: Real> Sensor<T> {
         expected: &Expected<T>,
         taken: &[Taken<T>],
         observer: &O,
+        left: Option<u32>,
         report: &mut Report<T>,
     ) {
+        let mut config = self.config.clone();
+        config.limits.max_work = left.or(config.limits.max_work);
         let part = Sensor {
-            config: self.config.clone(),
+            config,
             camera: self.camera.through(&window),
             region: self.region.through(&window),
             cam_to_body: self.cam_to_body,

@@ -140,7 +140,6 @@ fn horace_2015(config: &mut Config) {
     config.gate.max_mean = 0.9;
     config.binarize.method = binarize::Method::Dynamic;
     config.contour.method = contour::Method::Raster;
-    config.limits.max_work = Some(5_000_000);
     config.candidates.sub_pixel = candidates::SubPixel::None;
     config.candidates.min_points = 100;
     config.candidates.keep_points = 0;
@@ -153,9 +152,10 @@ fn horace_2015(config: &mut Config) {
     config.select.radius_margin = 0.5;
 }
 
-/// Only what every fit must have.
+/// Only what every fit must have, and what these methods cost, of which some look at every pixel and every point.
 #[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
 fn ungated(config: &mut Config) {
+    config.limits.max_work = Some(200_000_000);
     config.select.min_arc_px = Some(0.0);
     config.select.max_rms_px = 1e6;
     config.select.max_half_angle_sigma = 1e6;

@@ -173,21 +173,17 @@ impl<T: Real> Sensor<T> {
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
         let scene = Scene::new(picture, &self.region, level, observer).blooming(expected.blooms());
-        let mut judge = Judge::new(self, expected, taken, observer, lists.blocks, report);
+        let mut judge = Judge::new(self, expected, taken, observer, lists.blocks, lists.border.len(), report);
         match config.contour.method {
             contour::Method::BorderFollowing => judge.border_following(&scene, lists.border, lists.marks),
             #[cfg(feature = "horace")]
             contour::Method::Raster => judge.raster(&scene, lists.border, lists.marks),
             #[cfg(feature = "horace")]
             contour::Method::Erode => {
-                let edge = contour::erode::edges(&scene, &config.contour, lists.border);
-                judge.piece(&scene, &edge);
+                judge.whole(&scene, |work| contour::erode::edges(&scene, &config.contour, lists.border, work));
             }
             #[cfg(feature = "zju")]
-            contour::Method::Sobel => {
-                let edge = contour::sobel::edges(&scene, lists.border);
-                judge.piece(&scene, &edge);
-            }
+            contour::Method::Sobel => judge.whole(&scene, |work| contour::sobel::edges(&scene, lists.border, work)),
         }
         judge.conclude();
     }

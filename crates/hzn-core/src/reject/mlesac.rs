@@ -11,6 +11,7 @@ use crate::block::{Block, LANES, sum};
 use crate::linalg::V3;
 use crate::real::Real;
 use crate::rng::Rng;
+use crate::work::{DRAW, LIKELIHOOD, Work};
 
 /// Steps for the share of inliers.
 const STEPS: usize = 3;
@@ -19,7 +20,13 @@ const SIGMAS: f64 = 1.96;
 
 /// The most likely cone; points farther from it than the threshold lose their weight. `None` with fewer than three
 /// points, or when hardly any is on a cone.
-pub(super) fn keep<T: Real>(blocks: &mut [Block<T>], count: u32, focal_px: T, config: &Config) -> Option<Consensus<T>> {
+pub(super) fn keep<T: Real>(
+    blocks: &mut [Block<T>],
+    count: u32,
+    focal_px: T,
+    config: &Config,
+    work: &mut Work,
+) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
     }
@@ -28,7 +35,8 @@ pub(super) fn keep<T: Real>(blocks: &mut [Block<T>], count: u32, focal_px: T, co
     let mut rng = Rng::new(config.seed);
     let mut best: Option<(V3<T>, T, T)> = None;
     let (mut draws, mut enough) = (0, config.max_draws);
-    while draws < enough.max(FEWEST).min(config.max_draws) {
+    let a_draw = DRAW + blocks.len() as u32 * LIKELIHOOD;
+    while draws < enough.max(FEWEST).min(config.max_draws) && work.spend(a_draw) {
         draws += 1;
         let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
         let (cost, share) = mixture.cost(blocks, &e, c);

@@ -15,6 +15,7 @@ use crate::limb::through_three;
 use crate::linalg::V3;
 use crate::real::Real;
 use crate::rng::Rng;
+use crate::work::{DRAW, SCORE, Work};
 
 /// k_max.
 const HYPOTHESES: u32 = 287;
@@ -23,7 +24,12 @@ const SAMPLE: usize = 5;
 
 /// The accepted cone with the most points near it; the others lose their weight. `None` with fewer than five points,
 /// or when no draw was accepted.
-pub(super) fn keep<T: Real>(blocks: &mut [Block<T>], count: u32, config: &Config) -> Option<Consensus<T>> {
+pub(super) fn keep<T: Real>(
+    blocks: &mut [Block<T>],
+    count: u32,
+    config: &Config,
+    work: &mut Work,
+) -> Option<Consensus<T>> {
     if count < SAMPLE as u32 {
         return None;
     }
@@ -31,11 +37,14 @@ pub(super) fn keep<T: Real>(blocks: &mut [Block<T>], count: u32, config: &Config
     let mut rng = Rng::new(config.seed);
     let (mut best, mut most) = (None, T::ZERO);
     let (mut draws, mut hypotheses) = (0, 0);
-    while draws < config.max_draws && hypotheses < HYPOTHESES {
+    while draws < config.max_draws && hypotheses < HYPOTHESES && work.spend(DRAW) {
         draws += 1;
         let sample = [(); SAMPLE].map(|()| rng.below(count));
         let Some((e, c)) = verified(blocks, sample, limit2) else { continue };
         hypotheses += 1;
+        if !work.spend(blocks.len() as u32 * SCORE) {
+            break;
+        }
         let near = agreeing(blocks, &e, c, limit2);
         if near > most {
             (best, most) = (Some((e, c)), near);

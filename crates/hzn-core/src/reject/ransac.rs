@@ -10,10 +10,16 @@ use super::{Config, Consensus};
 use crate::block::Block;
 use crate::real::Real;
 use crate::rng::Rng;
+use crate::work::{DRAW, SCORE, Work};
 
 /// The cone with the most points near it; the others lose their weight. `None` with fewer than three points, or when
 /// no cone has more points than the three it goes through.
-pub(super) fn keep<T: Real>(blocks: &mut [Block<T>], count: u32, config: &Config) -> Option<Consensus<T>> {
+pub(super) fn keep<T: Real>(
+    blocks: &mut [Block<T>],
+    count: u32,
+    config: &Config,
+    work: &mut Work,
+) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
     }
@@ -21,7 +27,8 @@ pub(super) fn keep<T: Real>(blocks: &mut [Block<T>], count: u32, config: &Config
     let mut rng = Rng::new(config.seed);
     let (mut best, mut most) = (None, T::of(3.5));
     let (mut draws, mut enough) = (0, config.max_draws);
-    while draws < enough.max(FEWEST).min(config.max_draws) {
+    let a_draw = DRAW + blocks.len() as u32 * SCORE;
+    while draws < enough.max(FEWEST).min(config.max_draws) && work.spend(a_draw) {
         draws += 1;
         let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
         let near = agreeing(blocks, &e, c, limit2);

@@ -40,8 +40,6 @@ fn config() -> Config {
     let lens = camera::Config { k, ..camera::Config::ideal(Model::KannalaBrandt, WIDTH, HEIGHT, 1233.0) };
     let mut config = Config::new(lens);
     config.body.altitude_km = Some(150.0);
-    // As in `FlightHorizon`, whose lists are longer.
-    config.limits.max_work = Some(245_760);
     config
 }
 

@@ -9,14 +9,13 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use hzn_core::FlightWorkspace;
-use hzn_flight::flight::{Buffers, Flight};
+use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::Mode;
 use hzn_mps2::host::exit;
 use hzn_mps2::port::Mps2;
 use static_cell::ConstStaticCell;
 
-static WORKSPACE: ConstStaticCell<FlightWorkspace> = ConstStaticCell::new(FlightWorkspace::new());
+static WORKSPACE: ConstStaticCell<Lists> = ConstStaticCell::new(Lists::new());
 static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 
 #[entry]

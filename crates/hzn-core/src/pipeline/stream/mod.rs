@@ -254,7 +254,8 @@ impl<T: Real, S: Sample> Stream<'_, T, S> {
         let lists = workspace.lists();
         if picture.height > 1 {
             let scene = Scene::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
-            let mut judge = Judge::new(self.sensor, self.expected, &[], observer, lists.blocks, report);
+            let pixels = lists.border.len();
+            let mut judge = Judge::new(self.sensor, self.expected, &[], observer, lists.blocks, pixels, report);
             judge.border_following(&scene, lists.border, lists.marks);
             judge.conclude();
         }
