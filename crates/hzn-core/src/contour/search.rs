@@ -149,8 +149,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
         let index = self.picture.index(x, y);
         let lit = self.picture.read(index) >= self.level;
         let alike = self.picture.alike(index + self.picture.across(), count.into(), self.level, lit) as u16;
-        for dx in 1..=(alike + 1).min(count) {
-            self.observer.pixel(x + dx, y);
+        for dx in 0..(alike + 1).min(count) {
+            self.observer.pixel(x + 1 + dx, y);
         }
         alike
     }
