@@ -78,6 +78,31 @@ fn sixteen_bits_are_not_cut_to_eight() {
 }
 
 #[test]
+fn ten_bits_in_the_lower_bits_of_sixteen() {
+    let place = Place::new();
+    let picture = |bits: u32| {
+        let words = limb(320, 240, 0.0).into_raw().into_iter().map(|v| u16::from(v) << (bits - 8)).collect();
+        image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_raw(320, 240, words).unwrap()
+    };
+    picture(10).save(place.path("in/low.png")).unwrap();
+    // Nothing is found, and the reason is told.
+    let ran = place.run(&["run", "in", "-o", "none.csv"]).expect(0);
+    ran.says("note: nothing found in low.png: samples reach").says("bits = 10 in [input] of sensor.toml");
+    let explained = place.run(&["explain", "in/low.png"]).expect(0).out;
+    assert!(explained.contains("bits = 10 in [input] of sensor.toml"), "{explained}");
+    let told = |bits: u8| format!("{}[input]\nbits = {bits}\n", common::SENSOR);
+    place.write("in/sensor.toml", told(10).as_bytes());
+    let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
+    assert!(off < 1e-3, "{off}");
+    // Too few.
+    place.write("in/sensor.toml", told(9).as_bytes());
+    let rows = without_time(&place.run(&["run", "in"]).expect(3).out);
+    assert!(cell(&rows[0], "detail").contains("has more bits than input.bits = 9"), "{rows:?}");
+    place.write("in/sensor.toml", told(17).as_bytes());
+    place.run(&["run", "in"]).expect(2).says("[input] bits: 17 is refused");
+}
+
+#[test]
 fn inks_become_brightness() {
     let place = Place::new();
     place.write("in/cmyk.jpg", include_bytes!("data/cmyk.jpg"));

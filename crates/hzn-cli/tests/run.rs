@@ -94,7 +94,18 @@ fn headerless_pictures() {
     assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("ok", "unreadable"));
     assert_eq!(cell(&rows[1], "detail"), "153600 bytes, but 320x240:mono8 has 76800");
     let ran = place.run(&["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml"]).expect(0);
-    assert_eq!(cell(&without_time(&ran.out)[0], "axis_y")[..4], cell(&rows[0], "axis_y")[..4]);
+    let found = without_time(&ran.out);
+    assert_eq!(cell(&found[0], "axis_y")[..4], cell(&rows[0], "axis_y")[..4]);
+
+    // The recording's own sensor says how many bits its pictures have.
+    let raw = ["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml", "-o", "b.mcap"];
+    place.run(&raw).expect(0);
+    let recorded = hzn_mcap::Reader::open(place.path("b.mcap"), hzn_mcap::Contents::default()).unwrap();
+    place.write("again.toml", recorded.sensor_toml().unwrap().as_bytes());
+    let again = without_time(&place.run(&["run", "b.mcap", "-s", "again.toml"]).expect(0).out);
+    for name in ["status", "axis_x", "axis_y", "axis_z", "level"] {
+        assert_eq!(cell(&again[0], name), cell(&found[0], name), "{name}");
+    }
 }
 
 /// `ffmpeg` and `ffprobe` that give two frames of 320x240, written as shell scripts: what is tested is how they are

@@ -2,6 +2,7 @@
 
 use hzn_cli::input::picture;
 use hzn_core::image::{Channel, ImageView, Layout, Pixels};
+use hzn_core::pipeline::Input;
 use numpy::ndarray::{Array3, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -69,6 +70,11 @@ impl<'py> Array<'py> {
             (Self::Words(_), Some(n)) => return Err(errors::image(format!("bits: {n} is not within 8 to 16"))),
         };
         Ok(Layout::packed(side(width)?, side(height)?, channels, bits))
+    }
+
+    /// The bits of its samples that were given, else those of uint16 that the sensor says.
+    pub(crate) fn bits(&self, given: Option<u8>, input: &Input) -> Option<u8> {
+        given.or(input.bits.filter(|_| matches!(self, Self::Words(_))))
     }
 
     /// The picture for the pipeline, without a copy.

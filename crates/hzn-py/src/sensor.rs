@@ -139,6 +139,7 @@ impl Sensor {
         let state = self.state();
         let array = Array::of(image)?;
         state.check_size(&array)?;
+        let bits = array.bits(bits, &state.config.input);
         let view = array.view(bits, state.config.input.channel)?;
         let bodies = state.config.each_body();
         let (processed, traces) = errors::detached(py, || {

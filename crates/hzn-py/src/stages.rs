@@ -160,7 +160,8 @@ macro_rules! with_picture {
     ($image:expr, $state:expr, $bits:expr, |$picture:ident| $work:expr) => {{
         let array = Array::of($image)?;
         $state.check_size(&array)?;
-        match array.view($bits, $state.config.input.channel)? {
+        let input = &$state.config.input;
+        match array.view(array.bits($bits, input), input.channel)? {
             View::Packed($picture) => $work,
             View::Strided($picture) => $work,
         }

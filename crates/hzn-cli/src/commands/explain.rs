@@ -48,9 +48,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let Some(item) = item else { return Err(usage("the sequence is empty")) };
     let config = &sensor.config;
     let data = frames.as_ref().and_then(|f| f.get(&item.name));
-    let size = (u32::from(config.camera.width), u32::from(config.camera.height));
     let decoding = Instant::now();
-    let picture = match item.payload.decode(Some(size)) {
+    let picture = match item.payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
         Err(why) => {
             tell::result(format_args!("{}: unreadable: {why}\n", item.name))?;
@@ -189,7 +188,7 @@ impl Told<'_> {
         line("status", r.status.name().to_owned());
         match &r.solution {
             Some(s) => self.answer(s, &mut line),
-            None => advice(r, &mut line),
+            None => advice(r, self.picture, &mut line),
         }
         let us = |d: Duration| d.as_nanos() as f64 / 1e3;
         line(
@@ -289,12 +288,13 @@ impl Told<'_> {
 }
 
 /// What to try when there is no answer.
-fn advice(r: &Report<f64>, line: &mut impl FnMut(&str, String)) {
-    let mut tips = words::tips(r);
+fn advice(r: &Report<f64>, picture: &Picture, line: &mut impl FnMut(&str, String)) {
+    let mut tips: Vec<String> = words::tips(r).into_iter().map(str::to_owned).collect();
+    tips.extend(picture.unused_bits());
     if tips.is_empty() {
-        tips.push("look at the edges that were found: --overlay out.png");
+        tips.push("look at the edges that were found: --overlay out.png".to_owned());
     }
-    for (i, tip) in tips.iter().enumerate() {
-        line(if i == 0 { "try" } else { "" }, (*tip).to_owned());
+    for (i, tip) in tips.into_iter().enumerate() {
+        line(if i == 0 { "try" } else { "" }, tip);
     }
 }

@@ -78,7 +78,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut source = args.source.open(&args.input)?;
     let folder = source.folder();
-    let sensor = args.sensor.load(&folder)?;
+    let mut sensor = args.sensor.load(&folder)?;
+    if let Some(bits) = source.bits().filter(|bits| *bits > 8 && sensor.config.input.bits.is_none()) {
+        // Recorded pictures are PNG, which has room for more: who reads them is told by the recorded sensor.
+        sensor.config.input.bits = Some(bits);
+        sensor.text = with_bits(&sensor.text, bits);
+    }
     check_size(source.as_ref(), &sensor)?;
     let frames = args.source.frames(&folder, &sensor, args.sensor.flight)?;
     need_altitude(&sensor, frames.as_ref())?;
@@ -120,7 +125,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut progress = Progress::new(total, held.frames, args.quiet);
     let stop = stop_flag();
+    let mut tipped = args.quiet;
     let mut seen = |frame: &Finished| {
+        if let Some(tip) = frame.tip.as_ref().filter(|_| !tipped) {
+            tipped = true;
+            progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
+        }
         // A picture that cannot be read is so for every body.
         let statuses = frame.found.iter().map(|f| f.report.as_ref().map_or(Status::Unreadable, |r| r.status));
         if let (Some(Err(why)), false) = (frame.found.iter().map(|f| &f.report).find(|r| r.is_err()), args.quiet) {
@@ -151,6 +161,16 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(Exit::Interrupted);
     }
     Ok(if progress.any_unreadable() { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// The text of a sensor.toml with its `input.bits`.
+fn with_bits(text: &str, bits: u8) -> String {
+    let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_owned() };
+    let input = document.entry("input").or_insert_with(toml_edit::table);
+    if let Some(input) = input.as_table_like_mut() {
+        input.insert("bits", toml_edit::value(i64::from(bits)));
+    }
+    document.to_string()
 }
 
 pub(super) fn cores() -> usize {

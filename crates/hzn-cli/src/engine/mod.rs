@@ -64,6 +64,8 @@ pub struct Finished {
     pub drawing: hzn_mcap::Annotations,
     /// The picture as PNG or JPEG, when it was asked for.
     pub picture: Option<Vec<u8>>,
+    /// What to try, where nothing was found and the picture itself suggests something.
+    pub tip: Option<String>,
 }
 
 /// What came of one body in one frame.
@@ -240,8 +242,7 @@ fn write_in_order(
 fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
     let Job { index, item } = job;
     let data = plan.frames.as_ref().and_then(|f| f.get(&item.name)).cloned();
-    let size = (u32::from(plan.config.camera.width), u32::from(plan.config.camera.height));
-    let decoded = item.payload.decode(Some(size));
+    let decoded = item.payload.decode(Some(&plan.config));
     let exif = decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
     let time_s = data.as_ref().and_then(|d| d.time_s).or(item.time_s).or(exif).unwrap_or(index as f64 / plan.fps);
     let mut finished = Finished {
@@ -252,6 +253,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         found: Vec::new(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
+        tip: None,
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
@@ -270,6 +272,9 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     };
     let data = finished.data.as_ref();
     finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(found).collect();
+    if finished.found.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
+        finished.tip = picture.unused_bits();
+    }
     if let Some(traces) = &traces {
         // Here and not in the one thread that writes, which would hold up all the others.
         let drawing = draw(&finished.found, traces, sensor);

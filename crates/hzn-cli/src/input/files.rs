@@ -134,6 +134,9 @@ impl Source for Files {
     fn folder(&self) -> PathBuf {
         self.folder.clone()
     }
+    fn bits(&self) -> Option<u8> {
+        self.raw.map(|raw| raw.bits())
+    }
     fn notes(&self) -> Vec<String> {
         let note = |(ending, n): (&String, &usize)| {
             let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };

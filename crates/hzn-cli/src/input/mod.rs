@@ -11,6 +11,8 @@ mod video;
 
 use std::path::{Path, PathBuf};
 
+use hzn_core::Config;
+
 pub use picture::Picture;
 pub use raw::Raw;
 
@@ -56,6 +58,10 @@ pub trait Source: Send {
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_>;
     /// Folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
+    /// Significant bits of a sample, when they are known before.
+    fn bits(&self) -> Option<u8> {
+        None
+    }
     /// Things that the user should know, such as files left out.
     fn notes(&self) -> Vec<String> {
         Vec::new()
@@ -63,11 +69,21 @@ pub trait Source: Send {
 }
 
 impl Payload {
-    /// The picture, decoded, and the file's own bytes where they are PNG or JPEG and can be kept as they are.
+    /// The picture, decoded, and the file's own bytes where they are PNG or JPEG and can be kept as they are. A sensor says
+    /// which size it must have, and how many bits.
     ///
     /// # Errors
     /// Why it cannot be read, for the record of the frame.
-    pub fn decode(self, expected: Option<(u32, u32)>) -> Result<(Picture, Option<Vec<u8>>), String> {
+    pub fn decode(self, sensor: Option<&Config>) -> Result<(Picture, Option<Vec<u8>>), String> {
+        let expected = sensor.map(|s| (u32::from(s.camera.width), u32::from(s.camera.height)));
+        let (picture, original) = self.decode_as_it_is(expected)?;
+        match sensor {
+            Some(sensor) => Ok((picture.told(&sensor.input)?, original)),
+            None => Ok((picture, original)),
+        }
+    }
+
+    fn decode_as_it_is(self, expected: Option<(u32, u32)>) -> Result<(Picture, Option<Vec<u8>>), String> {
         let encoded = |bytes: Vec<u8>| {
             let picture = picture::decode(&bytes, expected)?;
             let keep = matches!(picture::format_of(&bytes), Some(image::ImageFormat::Png | image::ImageFormat::Jpeg));

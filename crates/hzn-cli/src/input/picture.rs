@@ -4,12 +4,16 @@ use std::io::Cursor;
 use std::path::Path;
 
 use hzn_core::image::{Channel, ImageError, ImageView, Layout};
+use hzn_core::pipeline::Input;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 /// Longest side of a picture that is read, in pixels.
 pub const MAX_SIDE_PX: u32 = 20_000;
 /// Largest decoded picture, in bytes.
 pub const MAX_BYTES: u64 = 512 << 20;
+
+/// So many upper bits are not left unused by chance.
+const UNUSED_BITS: u32 = 2;
 
 /// Samples of a picture, packed.
 #[derive(Debug, Clone)]
@@ -32,6 +36,34 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// With as many bits as a sensor says.
+    ///
+    /// # Errors
+    /// A sample that has more.
+    pub fn told(mut self, input: &Input) -> Result<Self, String> {
+        let (Samples::Words(words), Some(bits)) = (&self.samples, input.bits) else { return Ok(self) };
+        let most = words.iter().copied().max().unwrap_or(0);
+        if u32::from(most) >> bits > 0 {
+            return Err(format!("a sample of {most} has more bits than input.bits = {bits} in sensor.toml says"));
+        }
+        self.layout.bits = bits;
+        Ok(self)
+    }
+
+    /// What to try when nothing is found and the upper bits of all words are unused.
+    pub fn unused_bits(&self) -> Option<String> {
+        let Samples::Words(words) = &self.samples else { return None };
+        let most = words.iter().copied().max()?;
+        let bits = (16 - most.leading_zeros()).max(8);
+        (bits + UNUSED_BITS <= u32::from(self.layout.bits)).then(|| {
+            format!(
+                "samples reach {most} of {}: if the camera has fewer bits than the file has room for, say so with bits = \
+                 {bits} in [input] of sensor.toml",
+                (1u32 << self.layout.bits) - 1
+            )
+        })
+    }
+
     /// The picture for the pipeline.
     ///
     /// # Errors

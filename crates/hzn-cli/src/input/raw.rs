@@ -86,6 +86,16 @@ impl Raw {
         }
     }
 
+    /// Significant bits of a sample.
+    pub fn bits(&self) -> u8 {
+        match self.format {
+            Format::Mono8 | Format::Bayer8 => 8,
+            Format::Words(bits) => bits,
+            Format::Mono10p => 10,
+            Format::Mono12p => 12,
+        }
+    }
+
     /// Width and height of the decoded picture in pixels.
     pub fn size(&self) -> (u32, u32) {
         let cell = if self.format == Format::Bayer8 { 2 } else { 1 };
@@ -101,18 +111,18 @@ impl Raw {
             return Err(format!("{} bytes, but {self} has {}", data.len(), self.bytes()));
         }
         let pixels = self.width as usize * self.height as usize;
-        let (samples, bits) = match self.format {
-            Format::Mono8 => (Samples::Bytes(data.to_vec()), 8),
+        let samples = match self.format {
+            Format::Mono8 => Samples::Bytes(data.to_vec()),
             Format::Words(bits) => {
                 // Bits above the significant ones are noise of the transport.
                 let mask = u16::MAX >> (16 - bits);
-                (Samples::Words(data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]) & mask).collect()), bits)
+                Samples::Words(data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]) & mask).collect())
             }
-            Format::Mono10p => (Samples::Words(unpack(data, 10, pixels)), 10),
-            Format::Mono12p => (Samples::Words(unpack(data, 12, pixels)), 12),
+            Format::Mono10p => Samples::Words(unpack(data, 10, pixels)),
+            Format::Mono12p => Samples::Words(unpack(data, 12, pixels)),
             Format::Bayer8 => return Ok(self.bayer(data)),
         };
-        Ok(Picture { samples, layout: Layout::packed(self.width, self.height, 1, bits), exif_time_s: None })
+        Ok(Picture { samples, layout: Layout::packed(self.width, self.height, 1, self.bits()), exif_time_s: None })
     }
 
     fn bayer(&self, data: &[u8]) -> Picture {

@@ -141,6 +141,9 @@ fn absent(tool: &str, error: &std::io::Error) -> Stop {
 }
 
 impl Source for Video {
+    fn bits(&self) -> Option<u8> {
+        Some(self.bits)
+    }
     fn next(&mut self) -> Option<anyhow::Result<Item>> {
         if self.ended {
             return None;

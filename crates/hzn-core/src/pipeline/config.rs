@@ -76,6 +76,10 @@ pub struct Mount {
 pub struct Input {
     /// Mean of the colours, or one of them.
     pub channel: Channel,
+    /// Significant bits of a sample, 8 to 16, where words have room for more: full scale is theirs. For programs that read
+    /// files, which put it into the picture's [`Layout`](crate::image::Layout). Left out: as the file says.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub bits: Option<u8>,
     /// Rows of a smaller copy of the picture that is looked at instead of it, 16 up to the picture's own. From there on
     /// every length is in the copy's pixels. Left out: the picture as it is.
     #[cfg(feature = "horace")]
@@ -157,6 +161,9 @@ impl Config {
         self.covariance.check()?;
         self.recover.check()?;
         self.limits.check()?;
+        if let Some(bits) = self.input.bits {
+            between("input.bits", f64::from(bits), 8.0, 16.0)?;
+        }
         #[cfg(feature = "horace")]
         if let Some(rows) = self.input.scale_to_height {
             between("input.scale_to_height", f64::from(rows), 16.0, f64::from(self.camera.height.max(16)))?;

@@ -308,7 +308,7 @@ class Sensor:
         time_s
             UTC in seconds since 1970. With a position it gives `Report.axis_ecef` of Sun and Moon.
         bits
-            Significant bits of uint16, 8 to 16; without it, 16.
+            Significant bits of uint16, 8 to 16; without it, the sensor's `input.bits`, else 16.
         detail
             Keep edges, points and times of the stages.
 

@@ -7,8 +7,11 @@ use std::time::Instant;
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_cli::engine::AnySensor;
+use hzn_cli::input::Picture;
+use hzn_cli::input::picture::Samples;
 use hzn_core::Config;
 use hzn_core::camera::Camera;
+use hzn_core::pipeline::Input;
 
 use super::Wake;
 use super::paint::{self, Recipe, Warp};
@@ -99,6 +102,16 @@ struct Looker {
     ahead: VecDeque<(usize, Entry)>,
 }
 
+/// The picture with as many bits as the sensor says.
+fn told(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
+    match (&picture.samples, input.bits) {
+        (Samples::Words(_), Some(bits)) if bits != picture.layout.bits => {
+            Picture::clone(&picture).told(input).map(Arc::new)
+        }
+        _ => Ok(picture),
+    }
+}
+
 impl Looker {
     fn run(&mut self, messages: &Receiver<Message>, sights: &Sender<Sight>, wake: &Wake) {
         loop {
@@ -142,7 +155,10 @@ impl Looker {
     fn look(&mut self, ask: &Ask) -> Sight {
         let begin = Instant::now();
         let at_hand = self.store.has(ask.index);
-        let picture = self.store.get(ask.index, &ask.entry.place);
+        let picture = self.store.get(ask.index, &ask.entry.place).and_then(|p| match ask.setups.first() {
+            Some(setup) => told(p, &setup.config.input),
+            None => Ok(p),
+        });
         let decoding = (!at_hand).then(|| begin.elapsed());
         let mut sight = Sight {
             index: ask.index,

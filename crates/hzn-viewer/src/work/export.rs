@@ -165,7 +165,7 @@ impl Film {
             let item = walk.next().ok_or_else(|| "the sequence ends before its last frame".to_owned())?;
             let item = item.map_err(|e| format!("{e:#}"))?;
             // A picture that cannot be read, or has another size, is a black frame: times stay right.
-            let image = match item.payload.decode(Some(size)) {
+            let image = match item.payload.decode(Some(&self.config)) {
                 Ok((picture, _)) => {
                     let (name, time_s) = (&*item.name, item.time_s.unwrap_or(0.0));
                     let subject = Subject { index, name, time_s, data: data.as_ref(), picture: &picture };

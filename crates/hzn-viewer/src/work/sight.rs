@@ -232,6 +232,7 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
         found: plain.into_iter().map(found).collect(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
+        tip: None,
     };
     let rows = output::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(data);
