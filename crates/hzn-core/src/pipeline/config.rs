@@ -1,8 +1,6 @@
 //! Everything that describes a sensor, as plain values: sensor.toml without the file.
 
-#[cfg(feature = "horace")]
-use crate::error::between;
-use crate::error::{ConfigError, Limit, require};
+use crate::error::{ConfigError, Limit, between, require};
 use crate::image::Channel;
 use crate::{binarize, body, camera, candidates, contour, covariance, estimate, recover, region, reject, select, work};
 
