@@ -7,11 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use hzn_calib::{Frames, Sensor};
 use hzn_core::body;
+use hzn_sim::Truth;
 
 use crate::engine;
 use crate::exit::{Exit, Stop, usage};
 use crate::input::{self, Raw, Source};
-use crate::tell;
+use crate::{output, tell};
 
 /// Which sensor.
 #[derive(Debug, Clone, Args)]
@@ -127,6 +128,19 @@ pub(crate) fn need_altitude(sensor: &Sensor, frames: Option<&Frames>) -> Result<
     }
     let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or a frames.csv with it";
     Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
+}
+
+/// Removes the pictures of the rendering before, which new tables would not know: those that the folder's truth.csv names,
+/// as only rendered pictures have a truth.
+pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
+    let Ok(mut before) = csv::Reader::from_path(folder.join("truth.csv")) else { return Ok(()) };
+    for truth in before.deserialize::<Truth>().map_while(Result::ok) {
+        let path = folder.join(Path::new(&truth.file).file_name().unwrap_or_default());
+        if path.is_file() {
+            std::fs::remove_file(&path).map_err(|e| output::cannot(&path, &e))?;
+        }
+    }
+    Ok(())
 }
 
 /// A folder's name for messages.

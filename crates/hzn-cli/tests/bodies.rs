@@ -49,7 +49,7 @@ fn each_body_has_its_row() {
 fn frames_of_several_bodies_are_kept_whole() {
     let place = earth_and_sun(3);
     for name in ["a.csv", "a.jsonl", "a.mcap"] {
-        place.run(&["run", "in", "-o", name, "--overlay", "drawn"]).expect(0);
+        place.run(&["run", "in", "-o", name, "--overlay", "drawn", "--force"]).expect(0);
     }
     let rows = without_time(&place.read("a.csv"));
     for name in ["a.csv", "a.mcap"] {

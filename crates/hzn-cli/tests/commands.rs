@@ -55,6 +55,28 @@ fn overlays_of_a_run() {
 }
 
 #[test]
+fn overlays_replace_nothing_unasked() {
+    let place = Place::with_pictures(2);
+    let before = std::fs::read(place.path("in/0001.png")).unwrap();
+    place.run(&["run", "in", "--overlay", "in"]).expect(2).says("is where the pictures are");
+    place.run(&["run", "in", "--overlay", "in", "--force"]).expect(2).says("is where the pictures are");
+    std::fs::create_dir(place.path("notes")).unwrap();
+    place.write("notes/mine.txt.png", b"mine");
+    place.run(&["run", "in", "--overlay", "notes"]).expect(2).says("holds files already");
+    place.run(&["run", "in", "--overlay", "notes", "--force"]).expect(0);
+    place.run(&["explain", "in/0001.png", "--overlay", "in/0001.png"]).expect(2).says("is the picture itself");
+    place
+        .run(&["explain", "in/0001.png", "--overlay", "in/0001.png", "--force"])
+        .expect(2)
+        .says("is the picture itself");
+    place.run(&["explain", "in/0001.png", "--overlay", "in/sensor.toml"]).expect(2).says("must be .png");
+    place.run(&["explain", "in/0001.png", "--overlay", "notes/0001.png"]).expect(2).says("--force replaces it");
+    place.run(&["explain", "in/0001.png", "--overlay", "notes/0001.png", "--force"]).expect(0);
+    assert_eq!(std::fs::read(place.path("in/0001.png")).unwrap(), before);
+    assert_eq!(place.read("notes/mine.txt.png"), "mine");
+}
+
+#[test]
 fn completions_for_every_shell() {
     let place = Place::new();
     for shell in ["bash", "zsh", "fish"] {

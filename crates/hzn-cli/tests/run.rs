@@ -160,7 +160,7 @@ fn a_full_disk_is_said_and_finished_frames_stay() {
     std::os::unix::fs::symlink("/dev/full", place.path("a.mcap.part")).unwrap();
     place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(1).says("no space left").says("--resume");
     std::os::unix::fs::symlink("/dev/full", place.path("o.png")).unwrap();
-    place.run(&["explain", "in/0000.png", "--overlay", "o.png"]).expect(1).says("the disk is full");
+    place.run(&["explain", "in/0000.png", "--overlay", "o.png", "--force"]).expect(1).says("the disk is full");
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output = place.command(&["run", "in"]).stdout(full).output().unwrap();
     common::Ran::of(&output, &place.path("")).expect(1).says("cannot be written to stdout");

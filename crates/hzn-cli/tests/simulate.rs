@@ -84,6 +84,21 @@ fn a_scene_becomes_pictures_that_the_sensor_answers() {
 }
 
 #[test]
+fn pictures_of_the_rendering_before_do_not_stay() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    std::fs::write(at.join("my.toml"), SCENE).unwrap();
+    let simulate =
+        |frames: &str| hzn(at, "2", &["simulate", "my.toml", "-o", "out", "--frames", frames, "--force", "-q"]).0;
+    assert_eq!(simulate("3"), 0);
+    // What has no truth is somebody's own.
+    std::fs::write(at.join("out/mine.png"), b"mine").unwrap();
+    assert_eq!(simulate("2"), 0);
+    let there = |name: &str| at.join("out").join(name).exists();
+    assert!(there("small-00001.png") && there("mine.png") && !there("small-00002.png"));
+}
+
+#[test]
 fn what_cannot_be_is_said_before_anything_is_written() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();

@@ -45,7 +45,7 @@ pub(super) fn rocket(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(200);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures a scene of 1920×1080 pixels through a fisheye of 94°, from T+60 s to T+430 s of a flight to 238 km \
+        "{count} pictures a scene of 1920×1080 pixels through a fisheye of 92°, from T+60 s to T+430 s of a flight to 238 km \
          over clouds, sea and land; the limb falls off exponentially (scale 8 km, each colour its own depth), PSF 0.9 px, \
          noise 2 %, 8 bits. `rocket-clean`: no Sun in view; goals: all answered, 0.06° RMS, none above 2°, NEES 1 to 4. \
          `rocket`: Sun, lens ghosts and payload in view, colour, sRGB, JPEG; goals: 98 % answered, none above 2°, none \

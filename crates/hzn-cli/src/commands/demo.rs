@@ -11,6 +11,7 @@ use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::output;
 use crate::overlay;
+use crate::setup::clear_rendered;
 use crate::tell;
 
 const ISS_PICTURE: &[u8] = include_bytes!("../../assets/iss-limb-2020-11-20.jpg");
@@ -44,6 +45,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage("--count: must be 1 or more"));
     }
     let begin = Instant::now();
+    clear_rendered(&folder.join("flight"))?;
     let (flight_dir, iss_dir) = (folder.join("flight"), folder.join("iss"));
     for dir in [&flight_dir, &iss_dir] {
         std::fs::create_dir_all(dir).map_err(|e| output::cannot(dir, &e))?;
@@ -134,7 +136,10 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
 fn process(folder: &Path, out: &Path) -> Result<(), Stop> {
     match sequence::run(&sequence::Args::quietly(folder, out))? {
         Exit::Done => Ok(()),
-        other => Err(failed(format!("{}: ended with {other:?}", folder.display()))),
+        Exit::Interrupted => Err(failed(format!("{}: interrupted", folder.display()))),
+        _ => {
+            Err(failed(format!("{}: some pictures could not be processed; `hzn run` on it says why", folder.display())))
+        }
     }
 }
 

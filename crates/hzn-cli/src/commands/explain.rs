@@ -10,7 +10,7 @@ use hzn_mcap::Annotations;
 
 use crate::engine::{AnySensor, Trace, Traces};
 use crate::exit::{Exit, Outcome, usage};
-use crate::input::Picture;
+use crate::input::{self, Picture};
 use crate::setup::{InputArgs, SensorArgs, need_altitude};
 use crate::tell;
 use crate::{output, overlay, words};
@@ -30,9 +30,24 @@ pub(super) struct Args {
     /// Draw what was found over the picture, as PNG
     #[arg(long, value_name = "PNG")]
     overlay: Option<PathBuf>,
+    /// Replace the PNG if it exists
+    #[arg(long, requires = "overlay")]
+    force: bool,
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
+    if let Some(path) = &args.overlay {
+        if input::ending(path) != "png" {
+            return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
+        }
+        if output::is_same(path, &args.frame) {
+            return Err(usage(format!(
+                "{}: is the picture itself; choose another name for the overlay",
+                path.display()
+            )));
+        }
+        output::refuse_existing(path, args.force)?;
+    }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
     let folder = source.folder();
     let sensor = args.sensor.load(&folder)?;

@@ -91,8 +91,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
         warn_of_missing(frames, &folder, args.source.raw.is_some());
     }
-    if let Some(folder) = &args.overlay {
-        std::fs::create_dir_all(folder).map_err(|e| output::cannot(folder, &e))?;
+    if let Some(drawn) = &args.overlay {
+        std::fs::create_dir_all(drawn).map_err(|e| output::cannot(drawn, &e))?;
+        if output::is_same(drawn, &folder) {
+            let what = "is where the pictures are, which would be replaced; choose another folder";
+            return Err(usage(format!("--overlay {}: {what}", drawn.display())));
+        }
+        let holds = std::fs::read_dir(drawn).map_err(|e| output::cannot(drawn, &e))?.next().is_some();
+        if holds && !(args.force || args.resume) {
+            let what = "holds files already; choose another folder, or --force replaces those of the same name";
+            return Err(usage(format!("--overlay {}: {what}", drawn.display())));
+        }
     }
     let existing = match (args.force, args.resume) {
         (true, _) => Existing::Replace,

@@ -13,7 +13,7 @@ use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::output;
 use crate::progress::Progress;
 use crate::scene;
-use crate::setup::stop_flag;
+use crate::setup::{clear_rendered, stop_flag};
 use crate::tell;
 
 /// Render a sequence of pictures with truth, and the sensor.toml that fits it
@@ -93,6 +93,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     // Everything that can be wrong with the scene is said before anything is written.
     let flight = scenario.flight().map_err(|e| scene::refused(name, &e))?;
     std::fs::create_dir_all(&folder).map_err(|e| output::cannot(&folder, &e))?;
+    if !args.resume {
+        clear_rendered(&folder)?;
+    }
     write(&scene_toml, &text)?;
     files.iter().try_for_each(|(file, bytes)| write(&folder.join(file), bytes))?;
     let sensor_toml = folder.join("sensor.toml");

@@ -186,6 +186,12 @@ pub(crate) fn advice_of_run(path: &Path, error: &std::io::Error) -> String {
     }
 }
 
+/// Whether two paths lead to one file or folder that exists.
+pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
+    let b = if b.as_os_str().is_empty() { Path::new(".") } else { b };
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
 /// Refuses a file that exists, unless it may be replaced.
 ///
 /// # Errors
@@ -281,6 +287,8 @@ impl Rows {
     pub fn create(path: &Path, existing: Existing) -> Result<Self, Stop> {
         let part = part_path(path);
         if existing == Existing::Refuse {
+            // Which no --resume continues.
+            refuse_existing(path, false)?;
             refuse(path, &part)?;
         }
         let Some(form) = form(target(path)?) else {
