@@ -46,6 +46,17 @@ fn each_body_has_its_row() {
 }
 
 #[test]
+fn a_sun_beside_the_earth_has_a_level_of_its_own() {
+    let place = earth_and_sun(1);
+    let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
+    // Left out, it is the same; the Earth's would take the Earth for what shines.
+    let told = place.read("in/sensor.toml").replace("[bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n", "");
+    assert!(!told.contains("bodies.binarize"));
+    place.write("in/sensor.toml", told.as_bytes());
+    assert_eq!(without_time(&place.run(&["run", "in"]).expect(0).out), rows);
+}
+
+#[test]
 fn frames_of_several_bodies_are_kept_whole() {
     let place = earth_and_sun(3);
     for name in ["a.csv", "a.jsonl", "a.mcap"] {

@@ -58,6 +58,15 @@ fn a_sensor_file_brings_camera_body_and_noise() {
     // Of the file: 400 km above a sphere with the limb at 10 km.
     assert!(line.trim_start().starts_with("400") && line.contains("70.46"), "{}", own.out);
     place.run(&["sensitivity", "-s", "in/sensor.toml", "--fov", "60"]).expect(2).says("cannot be used with");
+    // Of several bodies one must be named.
+    let bodies = "[[bodies]]\nkind = \"sun\"\n[[bodies]]\nkind = \"moon\"\n";
+    let sensor = place.read("in/sensor.toml");
+    let (before, after) = sensor.split_once("[body]").unwrap();
+    let rest = after.split_once("\n[").map_or(String::new(), |(_, rest)| format!("[{rest}"));
+    place.write("several.toml", format!("{before}{rest}\n{bodies}").as_bytes());
+    let several = ["sensitivity", "-s", "several.toml", "--altitude", "384400", "--depression", "90"];
+    place.run(&several).expect(2).says("name one with --body");
+    place.run(&[&several[..], &["--body", "moon"]].concat()).expect(0);
 }
 
 #[test]

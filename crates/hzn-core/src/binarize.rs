@@ -48,6 +48,9 @@ impl Default for Config {
     }
 }
 
+/// How the Sun is split from everything else.
+pub(crate) static SUN: Config = Config { method: Method::Fixed, level: 0.9, factor: 1.0, scale: 1.0 };
+
 /// `[gate]` of sensor.toml: a picture too dark or too bright is not looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]

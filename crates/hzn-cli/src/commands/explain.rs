@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use hzn_calib::FrameData;
 use hzn_core::status::{Stage, Status};
-use hzn_core::{Config, Report, Solution, body};
+use hzn_core::{Config, Report, Solution, binarize, body};
 use hzn_mcap::Annotations;
 
 use crate::engine::{AnySensor, Trace, Traces};
@@ -91,6 +91,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             name: &item.name,
             config,
             body,
+            levels: config.levels_of(which as u8),
             data,
             picture: &picture,
             trace,
@@ -114,6 +115,7 @@ struct Told<'a> {
     name: &'a str,
     config: &'a Config,
     body: &'a body::Config,
+    levels: &'a binarize::Config,
     data: Option<&'a FrameData>,
     picture: &'a Picture,
     trace: &'a Trace,
@@ -245,7 +247,7 @@ impl Told<'_> {
     }
 
     fn level(&self) -> String {
-        let method = format!("{:?}", self.body.binarize.unwrap_or(self.config.binarize).method).to_lowercase();
+        let method = format!("{:?}", self.levels.method).to_lowercase();
         let full = (1u32 << self.picture.layout.bits) - 1;
         match (self.trace.level(), self.report.status) {
             (_, Status::TooDark | Status::TooBright) => {

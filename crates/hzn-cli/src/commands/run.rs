@@ -232,7 +232,8 @@ fn warn_of_missing(frames: &Frames, folder: &Path, raw: bool) {
     let picture = |n: &&String| !raw && image::ImageFormat::from_path(n).is_ok() && frames.get(n).is_none();
     let without = names.iter().filter(picture).count();
     if without > 0 {
-        let what = format!("{without} pictures have no row here; the defaults of sensor.toml are used");
+        let have = if without == 1 { "picture has" } else { "pictures have" };
+        let what = format!("{without} {have} no row here: their altitude is body.altitude_km, their time --fps");
         tell::warning(format_args!("{}: {what}", frames.path.display()));
     }
 }

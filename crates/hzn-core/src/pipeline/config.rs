@@ -112,10 +112,15 @@ impl Config {
     pub fn each_body(&self) -> &[body::Config] {
         if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
     }
-    /// How body number `which` is split from the dark: its own values, or those of all.
-    pub(crate) fn levels_of(&self, which: u8) -> &binarize::Config {
-        let own = self.each_body().get(usize::from(which)).and_then(|b| b.binarize.as_ref());
-        own.unwrap_or(&self.binarize)
+    /// How body number `which`, from 0, is split from the dark: its own values, or those of all; of a Sun among several the
+    /// level of the preset `sun`, as what is brighter than the dark beside another body is that body.
+    pub fn levels_of(&self, which: u8) -> &binarize::Config {
+        let body = self.each_body().get(usize::from(which));
+        match body.and_then(|b| b.binarize.as_ref()) {
+            Some(own) => own,
+            None if !self.bodies.is_empty() && body.is_some_and(body::Config::blooms) => &binarize::SUN,
+            None => &self.binarize,
+        }
     }
     /// The errors of body number `which`'s edge points: its own values, or those of all.
     pub(crate) fn noise_of(&self, which: u8) -> &covariance::Config {

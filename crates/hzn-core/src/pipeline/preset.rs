@@ -67,7 +67,7 @@ impl Config {
         match preset {
             Preset::Hzn => {}
             // It saturates any camera that was not made for it; the sky beside it does not.
-            Preset::Sun => disc(&mut config, Kind::Sun, 0.9),
+            Preset::Sun => disc(&mut config, Kind::Sun, binarize::SUN.level),
             Preset::Moon => {
                 disc(&mut config, Kind::Moon, 0.25);
                 // Half of its limb is lit at most, and less of it bright.

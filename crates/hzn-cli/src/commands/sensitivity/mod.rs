@@ -173,10 +173,17 @@ struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     fn of(args: &'a Args) -> Result<Self, Stop> {
-        let sensor = match &args.sensor {
-            Some(path) => Some(hzn_calib::sensor::load(path)?.config),
-            None => None,
-        };
+        let mut sensor = None;
+        if let Some(path) = &args.sensor {
+            let mut config = hzn_calib::sensor::load(path)?.config;
+            match config.bodies.as_slice() {
+                [] => {}
+                [one] => config.body = one.clone(),
+                _ if !args.body.is_empty() => {}
+                _ => return Err(usage(format!("{}: looks for several bodies; name one with --body", path.display()))),
+            }
+            sensor = Some(config);
+        }
         let body = sensor.as_ref().map(|s| &s.body);
         let bodies = match (args.body.is_empty(), body) {
             (false, _) => args.body.clone(),
