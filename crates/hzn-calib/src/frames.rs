@@ -91,6 +91,9 @@ pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Opti
     }
 }
 
+/// No camera of the Earth's limb is farther: twice the Moon's distance.
+const FARTHEST_KM: f64 = 768_800.0;
+
 /// A frames.csv that was read.
 #[derive(Debug, Clone, Default)]
 pub struct Frames {
@@ -115,11 +118,17 @@ impl Frames {
         self.by_file.get(file).and_then(|&i| self.rows.get(i))
     }
 
-    /// Warnings for altitude and position of a row that differ by more than 0.1 km.
+    /// Warnings for altitude and position of a row that differ by more than 0.1 km, and for a position so far off that it
+    /// must be metres.
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
         let odd = |row: &FrameData| {
-            let h = row.altitude_km?;
             let own = altitude_at_km(row.position_km?, kind, radius_km)?;
+            if kind == Kind::Earth && own > FARTHEST_KM {
+                let what =
+                    format!("the position is at {own:.0} km: x_km, y_km, z_km are kilometres, are these metres?");
+                return Some(self.problem(row, what));
+            }
+            let h = row.altitude_km?;
             let what = format!("altitude_km is {h} but the position is at {own:.3} km; the position is used");
             ((own - h).abs() > 0.1).then(|| self.problem(row, what))
         };
@@ -322,5 +331,13 @@ mod tests {
         let odd = f.check_altitudes(Kind::Earth, 6371.0);
         assert_eq!(odd.len(), 1);
         assert!(odd[0].to_string().starts_with("frames.csv:3: b: altitude_km is 401 but"), "{}", odd[0]);
+    }
+
+    #[test]
+    fn metres_are_suspected() {
+        let f = read("file,x_km,y_km,z_km\na,6778137,0,0\nb,6778.137,0,0\n").unwrap();
+        let odd = f.check_altitudes(Kind::Earth, 6371.0);
+        assert_eq!(odd.len(), 1);
+        assert!(odd[0].to_string().contains("are these metres?"), "{}", odd[0]);
     }
 }
