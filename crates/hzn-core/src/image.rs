@@ -193,6 +193,9 @@ impl Sample for u8 {
     fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
         const EACH: u64 = 0x0101_0101_0101_0101;
         const HIGH: u64 = 0x80 * EACH;
+        if level > 255 {
+            return if lit { 0 } else { samples.len() };
+        }
         let all = |yes: bool| if yes { u64::MAX } else { 0 };
         let rest_of_level = u64::from(level & 0x7f) * EACH;
         let either = all(level < 128);
@@ -435,8 +438,8 @@ mod tests {
 
     #[test]
     fn eight_pixels_at_once_are_as_one_by_one() {
-        // Every level, beside samples at it, around it and far from it.
-        for level in 0..=255u16 {
+        // Every level, and one that no byte reaches, beside samples at it, around it and far from it.
+        for level in 0..=300u16 {
             for seed in 0..64u32 {
                 let near = |k: usize| match seed.wrapping_mul(0x9E37_79B1).rotate_left(5 * k as u32) % 64 {
                     0 => 0,

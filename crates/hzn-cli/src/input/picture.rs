@@ -50,16 +50,15 @@ impl Picture {
         Ok(self)
     }
 
-    /// What to try when nothing is found and the upper bits of all words are unused.
+    /// What to try when nothing is found and the upper bits of all words are unused, of which nobody has told.
     pub fn unused_bits(&self) -> Option<String> {
         let Samples::Words(words) = &self.samples else { return None };
         let most = words.iter().copied().max()?;
         let bits = (16 - most.leading_zeros()).max(8);
-        (bits + UNUSED_BITS <= u32::from(self.layout.bits)).then(|| {
+        (self.layout.bits == 16 && bits + UNUSED_BITS <= 16).then(|| {
             format!(
-                "samples reach {most} of {}: if the camera has fewer bits than the file has room for, say so with bits = \
-                 {bits} in [input] of sensor.toml",
-                (1u32 << self.layout.bits) - 1
+                "samples reach {most} of 65535: if the camera has fewer bits than the file has room for, say so with bits = \
+                 {bits} in [input] of sensor.toml"
             )
         })
     }
