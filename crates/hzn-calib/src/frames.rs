@@ -107,12 +107,6 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Rows that come from no file.
-    pub fn of(rows: Vec<FrameData>) -> Self {
-        let by_file = rows.iter().enumerate().map(|(i, row)| (row.file.clone(), i)).collect();
-        Self { path: PathBuf::new(), rows, warnings: Vec::new(), by_file }
-    }
-
     /// What is known about the picture of this name.
     pub fn get(&self, file: &str) -> Option<&FrameData> {
         self.by_file.get(file).and_then(|&i| self.rows.get(i))

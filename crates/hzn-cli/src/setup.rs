@@ -17,10 +17,10 @@ use crate::{output, tell};
 /// Which sensor.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SensorArgs {
-    /// The sensor.toml; without it, the one beside the pictures
+    /// The sensor.toml; without it, the one in the recording or beside the pictures
     #[arg(short, long, value_name = "FILE")]
     pub(crate) sensor: Option<PathBuf>,
-    /// Altitude of the camera where frames.csv gives none, instead of body.altitude_km
+    /// Altitude of the camera where frames.csv or the recording gives none, instead of body.altitude_km
     #[arg(long, value_name = "KM", allow_negative_numbers = true)]
     pub(crate) altitude_km: Option<f64>,
     /// Single precision and 2048 points, as on the flight computer
@@ -31,7 +31,8 @@ pub(crate) struct SensorArgs {
 /// Which pictures.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct InputArgs {
-    /// Table with time, altitude, position, attitude of the pictures; without it, frames.csv beside them
+    /// Table with time, altitude, position, attitude of the pictures; without it, what the recording of an earlier run
+    /// holds, or frames.csv beside the pictures
     #[arg(long, value_name = "FILE")]
     pub(crate) frames: Option<PathBuf>,
     /// Frames a second, where neither frames.csv nor the container nor EXIF gives a time
@@ -47,18 +48,21 @@ pub(crate) struct InputArgs {
 }
 
 impl SensorArgs {
-    /// Reads the sensor; `folder` is where the pictures lie.
-    pub(crate) fn load(&self, folder: &Path) -> Result<Sensor, Stop> {
+    /// Reads the sensor of the pictures.
+    pub(crate) fn load(&self, source: &dyn Source) -> Result<Sensor, Stop> {
+        let folder = source.folder();
         let beside = folder.join("sensor.toml");
-        let path = match &self.sensor {
-            Some(path) => path.clone(),
-            None if beside.exists() => beside,
-            None => {
-                let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", shown(folder));
+        let mut sensor = match (&self.sensor, source.sensor_toml()) {
+            (Some(path), _) => hzn_calib::sensor::load(path)?,
+            // A camera file that it names is looked for beside the recording.
+            (None, Some(text)) => hzn_calib::sensor::parse(text, &beside)
+                .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE takes its place")))?,
+            (None, None) if beside.exists() => hzn_calib::sensor::load(&beside)?,
+            (None, None) => {
+                let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", shown(&folder));
                 return Err(usage(format!("{what} (`hzn init` writes one to start from)")));
             }
         };
-        let mut sensor = hzn_calib::sensor::load(&path)?;
         if let Some(km) = self.altitude_km {
             for body in sensor.config.each_body_mut() {
                 body.altitude_km = Some(km);
@@ -79,11 +83,11 @@ impl InputArgs {
     }
 
     /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings go to stderr.
-    pub(crate) fn frames(&self, folder: &Path, sensor: &Sensor, flight: bool) -> Result<Option<Frames>, Stop> {
-        let beside = folder.join("frames.csv");
+    pub(crate) fn frames(&self, source: &dyn Source, sensor: &Sensor, flight: bool) -> Result<Option<Frames>, Stop> {
+        let beside = source.folder().join("frames.csv");
         let path = match &self.frames {
             Some(path) => path.clone(),
-            None if beside.exists() => beside,
+            None if source.sensor_toml().is_none() && beside.exists() => beside,
             None => return Ok(None),
         };
         let frames = hzn_calib::frames::load(&path)?;
@@ -121,9 +125,10 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
 }
 
 /// Without an altitude from anywhere, every frame would fail.
-pub(crate) fn need_altitude(sensor: &Sensor, frames: Option<&Frames>) -> Result<(), Stop> {
+pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option<&Frames>) -> Result<(), Stop> {
     let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some();
-    if sensor.config.each_body().iter().any(known) || frames.is_some_and(|f| !f.rows.is_empty()) {
+    let rows = frames.map_or(source.sensor_toml().is_some(), |f| !f.rows.is_empty());
+    if rows || sensor.config.each_body().iter().any(known) {
         return Ok(());
     }
     let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or a frames.csv with it";

@@ -64,7 +64,7 @@ fn the_sensor_of_another_camera_is_said_once() {
     let err = place.run(&["run", "in", "-s", "other.toml", "-o", "b.csv"]).expect(2).err;
     insta::assert_snapshot!(err, @"error: the sensor is for pictures of 640 x 480 px, but those here are not: 0000.png is 320 x 240; give the sensor of this camera with --sensor, or set camera.width and height and scale focal lengths and centre with them");
     assert!(!place.path("b.csv.part").exists());
-    place.run(&["run", "a.mcap", "-s", "other.toml"]).expect(2).says("a.mcap#000000 is 320 x 240");
+    place.run(&["run", "a.mcap", "-s", "other.toml"]).expect(2).says("0000.png is 320 x 240");
     place.run(&["run", "p.raw", "-s", "other.toml", "--raw", "320x240:mono8"]).expect(2).says("p.raw is 320 x 240");
     // One that fits is enough: the others are records.
     limb(640, 480, 0.0).save(place.path("in/0003.png")).unwrap();

@@ -53,5 +53,5 @@ pub use index::{Found, Index, Pictures, Place};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, body_name, roll_pitch_deg};
-pub use topics::REPORT_SCHEMA;
+pub use topics::{IMAGE_TOPIC, REPORT_SCHEMA};
 pub use writer::{FLUSH_INTERVAL, Options, Writer, part_path};

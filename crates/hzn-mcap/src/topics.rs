@@ -8,6 +8,9 @@ use foxglove::messages::{
 /// JSON Schema of the messages on `/hzn/report`, named `hzn.Report`. Cells that are empty in a table are left out.
 pub const REPORT_SCHEMA: &str = include_str!("../schema/hzn.Report.json");
 
+/// The topic of the pictures in our recordings.
+pub const IMAGE_TOPIC: &str = "/camera/image";
+
 /// A topic; its number is both its channel's and its schema's id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u16)]
@@ -40,7 +43,7 @@ impl Topic {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Report => "/hzn/report",
-            Self::Image | Self::RawImage => "/camera/image",
+            Self::Image | Self::RawImage => IMAGE_TOPIC,
             Self::Calibration => "/camera/calibration",
             Self::Annotations => "/camera/annotations",
             Self::Axis => "/hzn/axis",

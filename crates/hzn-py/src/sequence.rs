@@ -45,7 +45,8 @@ impl Sequence {
         let (source, frames) = errors::detached(py, || -> PyResult<_> {
             let source = input::open(&inputs, None, None).map_err(stopped)?;
             let beside = source.folder().join("frames.csv");
-            let frames = beside.exists().then(|| hzn_calib::frames::load(&beside)).transpose();
+            let own = source.sensor_toml().is_some();
+            let frames = (!own && beside.exists()).then(|| hzn_calib::frames::load(&beside)).transpose();
             let frames = frames.map_err(errors::config)?;
             engine::prepare(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
             Ok((source, frames))
@@ -92,9 +93,9 @@ pub(crate) fn process_encoded(
 ) -> PyResult<Report> {
     let state = sensor.state();
     let row = FrameData { file: name.clone(), ..expected.data.clone() };
-    let plan = plan(&state, Some(hzn_calib::Frames::of(vec![row])));
+    let plan = plan(&state, None);
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
-    processed(py, &state, &plan, index, input::Item { name, time_s: None, payload })
+    processed(py, &state, &plan, index, input::Item { name, time_s: None, data: Some(row), payload })
 }
 
 fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {

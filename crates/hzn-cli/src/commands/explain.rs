@@ -49,10 +49,9 @@ pub(super) fn run(args: &Args) -> Outcome {
         output::refuse_existing(path, args.force)?;
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
-    let folder = source.folder();
-    let sensor = args.sensor.load(&folder)?;
-    let frames = args.source.frames(&folder, &sensor, args.sensor.flight)?;
-    need_altitude(&sensor, frames.as_ref())?;
+    let sensor = args.sensor.load(source.as_ref())?;
+    let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
+    need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     let mut item = None;
     for n in 0..=args.index {
         item = source.next().transpose()?;
@@ -60,9 +59,10 @@ pub(super) fn run(args: &Args) -> Outcome {
             return Err(usage(format!("--index {}: the sequence has {n} frames, numbered from 0", args.index)));
         }
     }
-    let Some(item) = item else { return Err(usage("the sequence is empty")) };
+    let Some(mut item) = item else { return Err(usage("the sequence is empty")) };
     let config = &sensor.config;
-    let data = frames.as_ref().and_then(|f| f.get(&item.name));
+    let data = item.known(frames.as_ref());
+    let data = data.as_ref();
     let decoding = Instant::now();
     let picture = match item.payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
@@ -232,9 +232,11 @@ impl Told<'_> {
                 let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
                 let km = d.position_km.and_then(at);
                 let at = km.map(|km| format!(" at {km:.2} km")).unwrap_or_default();
-                format!("position{at} from frames.csv")
+                format!("position{at} given with the picture")
             }
-            Some(d) if d.altitude_km.is_some() => format!("altitude {} km from frames.csv", given.unwrap_or_default()),
+            Some(d) if d.altitude_km.is_some() => {
+                format!("altitude {} km given with the picture", given.unwrap_or_default())
+            }
             _ => given.map_or("no altitude needed".to_owned(), |km| format!("altitude {km} km")),
         };
         format!(

@@ -18,7 +18,8 @@ use crate::tell;
 ///
 /// Pictures are PNG, JPEG, TIFF, PNM or BMP, in a folder, as a pattern, or one by one; or headerless (--raw); or a
 /// video (through ffmpeg on PATH); or an MCAP with an image topic. Those of a folder are taken in the order of their
-/// names. A picture that cannot be read becomes a row with status `unreadable`; the run goes on.
+/// names. An MCAP of an earlier run is processed again with its own sensor, names, times and positions. A picture that
+/// cannot be read becomes a row with status `unreadable`; the run goes on.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A folder, a pattern in quotes, pictures, a video, or an MCAP
@@ -78,15 +79,15 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut source = args.source.open(&args.input)?;
     let folder = source.folder();
-    let mut sensor = args.sensor.load(&folder)?;
+    let mut sensor = args.sensor.load(source.as_ref())?;
     if let Some(bits) = source.bits().filter(|bits| *bits > 8 && sensor.config.input.bits.is_none()) {
         // Recorded pictures are PNG, which has room for more: who reads them is told by the recorded sensor.
         sensor.config.input.bits = Some(bits);
         sensor.text = with_bits(&sensor.text, bits);
     }
     check_size(source.as_ref(), &sensor)?;
-    let frames = args.source.frames(&folder, &sensor, args.sensor.flight)?;
-    need_altitude(&sensor, frames.as_ref())?;
+    let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
+    need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     // Not for one picture of many, whose table names all the others.
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
         warn_of_missing(frames, &folder, args.source.raw.is_some());
@@ -152,6 +153,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let summary = progress.summary(&bodies);
     let end = end?;
     output.finish()?;
+    let lost = source.lost().filter(|_| end == End::Complete);
+    lost.iter().for_each(tell::warning);
     if !args.quiet {
         let before = match held.frames {
             0 => String::new(),
@@ -169,7 +172,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("interrupted after {done}{of} frames{next}"));
         return Ok(Exit::Interrupted);
     }
-    Ok(if progress.any_unreadable() { Exit::SomeUnreadable } else { Exit::Done })
+    Ok(if progress.any_unreadable() || lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
 /// The text of a sensor.toml with its `input.bits`.

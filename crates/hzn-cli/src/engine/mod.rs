@@ -35,7 +35,7 @@ pub struct Plan {
     pub flight: bool,
     /// Threads.
     pub threads: usize,
-    /// What frames.csv knows.
+    /// What frames.csv knows, in place of what the source itself knows.
     pub frames: Option<Frames>,
     /// Frames a second, where nothing else gives a time.
     pub fps: f64,
@@ -56,7 +56,7 @@ pub struct Finished {
     pub name: String,
     /// Time in seconds.
     pub time_s: f64,
-    /// What frames.csv says about this frame.
+    /// What frames.csv, or a recording of ours, says about this frame.
     pub data: Option<FrameData>,
     /// What came of every body, in order.
     pub found: Vec<Found>,
@@ -240,8 +240,8 @@ fn write_in_order(
 
 /// Decodes and processes one frame.
 fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
-    let Job { index, item } = job;
-    let data = plan.frames.as_ref().and_then(|f| f.get(&item.name)).cloned();
+    let Job { index, mut item } = job;
+    let data = item.known(plan.frames.as_ref());
     let decoded = item.payload.decode(Some(&plan.config));
     let exif = decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
     let time_s = data.as_ref().and_then(|d| d.time_s).or(item.time_s).or(exif).unwrap_or(index as f64 / plan.fps);
@@ -341,7 +341,7 @@ mod tests {
             self.most.fetch_max(abroad, Ordering::SeqCst);
             let layout = Layout::packed(32, 24, 1, 8);
             let picture = Picture { samples: Samples::Bytes(vec![7; 32 * 24]), layout, exif_time_s: None };
-            Some(Ok(Item { name: self.left.to_string(), time_s: None, payload: Payload::Decoded(picture) }))
+            Some(Ok(Item { name: self.left.to_string(), time_s: None, data: None, payload: Payload::Decoded(picture) }))
         }
         fn total(&self) -> Option<u64> {
             None

@@ -117,7 +117,7 @@ impl Source for Files {
             Some(raw) => Payload::RawFile(path, raw),
             None => Payload::File(path),
         };
-        Some(Ok(Item { name, time_s: None, payload }))
+        Some(Ok(Item { name, time_s: None, data: None, payload }))
     }
     fn total(&self) -> Option<u64> {
         Some(self.paths.len() as u64)

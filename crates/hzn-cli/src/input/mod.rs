@@ -7,10 +7,12 @@ mod files;
 pub mod picture;
 pub mod raw;
 mod recording;
+mod rerun;
 mod video;
 
 use std::path::{Path, PathBuf};
 
+use hzn_calib::{FrameData, Frames};
 use hzn_core::Config;
 
 pub use picture::Picture;
@@ -25,6 +27,8 @@ pub struct Item {
     pub name: String,
     /// Time from the container (video, MCAP) in seconds.
     pub time_s: Option<f64>,
+    /// What the source itself knows about it, as a row of frames.csv: a recording of ours, what it was recorded with.
+    pub data: Option<FrameData>,
     /// The picture.
     pub payload: Payload,
 }
@@ -58,6 +62,11 @@ pub trait Source: Send {
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_>;
     /// Folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
+    /// Text of the sensor.toml that the pictures were recorded with; a source that has one also knows what frames.csv said
+    /// ([`Item::data`]).
+    fn sensor_toml(&self) -> Option<&str> {
+        None
+    }
     /// Significant bits of a sample, when they are known before.
     fn bits(&self) -> Option<u8> {
         None
@@ -65,6 +74,20 @@ pub trait Source: Send {
     /// Things that the user should know, such as files left out.
     fn notes(&self) -> Vec<String> {
         Vec::new()
+    }
+    /// After the last frame: what could not be handed out.
+    fn lost(&self) -> Option<String> {
+        None
+    }
+}
+
+impl Item {
+    /// What is known about it: a frames.csv takes the place of what the source knows.
+    pub fn known(&mut self, frames: Option<&Frames>) -> Option<FrameData> {
+        match frames {
+            Some(frames) => frames.get(&self.name).cloned(),
+            None => self.data.take(),
+        }
     }
 }
 
@@ -114,7 +137,7 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
         && one.is_file()
     {
         match ending(one).as_str() {
-            "mcap" => return Ok(Box::new(recording::Recording::open(one, topic)?)),
+            "mcap" => return open_recording(one, topic),
             e if video::ENDINGS.contains(&e) => return Ok(Box::new(video::Video::open(one)?)),
             _ => {}
         }
@@ -123,6 +146,16 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
         return Err(usage("--topic: only an MCAP has topics; give one as the input, or leave it out"));
     }
     Ok(Box::new(files::Files::open(inputs, raw)?))
+}
+
+/// One of our own is processed again as it was recorded; of any other, and of a further topic, there are the pictures.
+fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, Stop> {
+    if topic.is_none_or(|topic| topic == hzn_mcap::IMAGE_TOPIC)
+        && let Some(ours) = rerun::Rerun::open(path)?
+    {
+        return Ok(Box::new(ours));
+    }
+    Ok(Box::new(recording::Recording::open(path, topic)?))
 }
 
 /// The picture of a recorded message.

@@ -1,4 +1,4 @@
-//! MCAP recordings with image topics.
+//! MCAP recordings of other programs, with image topics.
 
 use std::path::{Path, PathBuf};
 
@@ -59,11 +59,12 @@ impl Recording {
             Ok(image) => payload(image),
             Err(why) => Payload::Broken(why),
         };
-        Some(Ok(Item { name, time_s: Some(image.time_s), payload }))
+        Some(Ok(Item { name, time_s: Some(image.time_s), data: None, payload }))
     }
 }
 
-fn size_of(image: &EncodedImage) -> Option<(u32, u32)> {
+/// Its width and height, where that can be told without decoding it.
+pub(super) fn size_of(image: &EncodedImage) -> Option<(u32, u32)> {
     match image.format {
         ImageFormat::Png | ImageFormat::Jpeg => picture::size_in(std::io::Cursor::new(&image.bytes)),
         ImageFormat::Other(_) => None,

@@ -171,7 +171,7 @@ impl Source for Video {
             Picture { samples, layout: Layout::packed(self.width, self.height, 1, self.bits), exif_time_s: None };
         let (name, time_s) = (format!("{}#{:06}", self.stem, self.index), self.time_s());
         self.index += 1;
-        Some(Ok(Item { name, time_s, payload: Payload::Decoded(picture) }))
+        Some(Ok(Item { name, time_s, data: None, payload: Payload::Decoded(picture) }))
     }
     fn total(&self) -> Option<u64> {
         self.count

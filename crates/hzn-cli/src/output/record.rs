@@ -88,12 +88,12 @@ fn given(data: &FrameData) -> Given {
     }
 }
 
-/// The row of frames.csv that a recording kept for the picture `file`.
-pub fn frame_data(file: &str, time_s: f64, given: &Given) -> FrameData {
+/// The row of frames.csv that a recording kept for a picture.
+pub fn frame_data(row: &Row, given: &Given) -> FrameData {
     FrameData {
-        file: file.to_owned(),
+        file: row.file.clone(),
         line: 0,
-        time_s: Some(time_s),
+        time_s: Some(row.time_s),
         utc_s: given.utc_s,
         altitude_km: given.altitude_km,
         position_km: given.position_km,

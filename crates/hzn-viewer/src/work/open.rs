@@ -258,11 +258,7 @@ impl Gather {
                         continue;
                     }
                     out.extend(self.last.take());
-                    let mut data = hzn_cli::output::frame_data(&row.file, row.time_s, &given);
-                    if given == hzn_mcap::Given::default() {
-                        // Recordings of before kept the altitude only.
-                        data.altitude_km = row.altitude_km;
-                    }
+                    let data = hzn_cli::output::frame_data(&row, &given);
                     let place = self.pending.remove(&(row.index as u32)).map_or(Place::Nowhere, Place::Recorded);
                     let entry = Entry { name: row.file.clone(), time_s: row.time_s, data: Some(data), place };
                     self.last = Some((entry, vec![*row]));
@@ -286,7 +282,7 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
     teller.tell(Event::Opened(Box::new(opened)));
     let mut batch = Vec::new();
     for index in 0u64.. {
-        let Item { name, time_s, payload } = match source.next() {
+        let Item { name, time_s, payload, .. } = match source.next() {
             None => break,
             Some(Ok(item)) => item,
             Some(Err(e)) => {

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
-use hzn_calib::Frames;
 use hzn_cli::engine::{self, End, Finished, Plan, Sink};
 use hzn_cli::output::{self, Existing};
 use hzn_core::Config;
@@ -117,12 +116,11 @@ impl Drop for Sweep {
 fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Result<Event, String> {
     let Task { sequence, config, changes, sensor_toml, flight, output } = task;
     let threads = if config.tracks() { 1 } else { std::thread::available_parallelism().map_or(1, usize::from) };
-    let frames = Frames::of(sequence.entries.iter().filter_map(|e| e.data.clone()).collect());
     let plan = Plan {
         config: (*config).clone(),
         flight,
         threads,
-        frames: Some(frames),
+        frames: None,
         fps: 1.0,
         trace: output.is_some(),
         keep_picture: output.is_some(),

@@ -32,8 +32,8 @@ fn pictures(path: &Path) -> Result<Pictures, String> {
 
 impl Source for Walk {
     fn next(&mut self) -> Option<anyhow::Result<Item>> {
-        let Entry { name, time_s, place, .. } = self.entries.next()?;
-        Some(self.reader.payload(&place).map(|payload| Item { name, time_s: Some(time_s), payload }))
+        let Entry { name, time_s, data, place } = self.entries.next()?;
+        Some(self.reader.payload(&place).map(|payload| Item { name, time_s: Some(time_s), data, payload }))
     }
     fn total(&self) -> Option<u64> {
         Some(self.entries.len() as u64)

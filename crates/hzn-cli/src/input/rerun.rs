@@ -1,0 +1,90 @@
+//! A recording of `hzn run`, to be processed again: its pictures with all that was known about them.
+
+use std::path::{Path, PathBuf};
+
+use hzn_calib::FrameData;
+use hzn_mcap::{Contents, Found, FrameRecord, Index, Reader};
+
+use super::recording::{payload, size_of};
+use super::{Item, Payload, SIZES, Source};
+use crate::exit::{Stop, usage};
+use crate::output;
+
+/// Frames as they were recorded: names, times, what was given, and the sensor.
+pub(super) struct Rerun {
+    reader: Reader,
+    path: PathBuf,
+    /// Number of the last frame: one of several bodies has a record a body.
+    last: Option<u64>,
+}
+
+impl Rerun {
+    /// `None` for a recording of another program.
+    pub(super) fn open(path: &Path) -> Result<Option<Self>, Stop> {
+        let reader = open(path).map_err(usage)?;
+        if reader.sensor_toml().is_none() {
+            return Ok(None);
+        }
+        if !has_pictures(path).map_err(usage)? {
+            let what = "holds results without their pictures; give the pictures themselves";
+            return Err(usage(format!("{}: {what}", path.display())));
+        }
+        Ok(Some(Self { reader, path: path.to_owned(), last: None }))
+    }
+}
+
+fn open(path: &Path) -> Result<Reader, hzn_mcap::Error> {
+    Reader::open(path, Contents::All)
+}
+
+/// Pictures come before the results, so that little is read of a recording that has them.
+fn has_pictures(path: &Path) -> Result<bool, hzn_mcap::Error> {
+    let mut index = Index::open(path)?;
+    while let Some(part) = index.next_part()? {
+        if part.iter().any(|found| matches!(found, Found::Picture(_))) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+fn item(record: FrameRecord) -> Item {
+    let data: FrameData = output::frame_data(&record.row, &record.given);
+    let picture = record.image.map_or_else(|| Payload::Broken("the recording holds no picture of it".into()), payload);
+    Item { name: record.row.file, time_s: data.time_s, data: Some(data), payload: picture }
+}
+
+impl Source for Rerun {
+    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+        loop {
+            match self.reader.next()? {
+                Ok(record) if self.last.replace(record.row.index) == Some(record.row.index) => {}
+                Ok(record) => return Some(Ok(item(record))),
+                Err(e) => return Some(Err(e.into())),
+            }
+        }
+    }
+    fn total(&self) -> Option<u64> {
+        None
+    }
+    fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
+        let Ok(reader) = open(&self.path) else { return Box::new(std::iter::empty()) };
+        let records = reader.map_while(Result::ok).take(SIZES);
+        Box::new(records.filter_map(|r| Some((r.row.file, size_of(r.image.as_ref()?)?))))
+    }
+    fn folder(&self) -> PathBuf {
+        self.path.parent().map(Path::to_owned).unwrap_or_default()
+    }
+    fn sensor_toml(&self) -> Option<&str> {
+        self.reader.sensor_toml()
+    }
+    fn lost(&self) -> Option<String> {
+        let name = self.path.display();
+        match self.reader.broken_chunks() {
+            0 if self.reader.is_complete() => None,
+            0 => Some(format!("{name}: was cut off; its finished frames were processed (`hzn recover` closes it)")),
+            1 => Some(format!("{name}: 1 damaged part was left out; what it held is missing")),
+            n => Some(format!("{name}: {n} damaged parts were left out; what they held is missing")),
+        }
+    }
+}

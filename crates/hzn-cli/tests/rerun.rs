@@ -1,0 +1,83 @@
+//! `hzn run` of a recording of `hzn run`.
+
+mod common;
+
+use common::{Place, SENSOR, cell, without_time};
+
+const TRUTH: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\
+                     moon_y,moon_z,qw,qx,qy,qz\n";
+
+/// Pictures with all that frames.csv can say, recorded as `out.mcap`, in a folder without a sensor.toml.
+fn place() -> Place {
+    let place = Place::with_pictures(4);
+    let mut frames =
+        "file,utc,altitude_km,x_km,y_km,z_km,qw,qx,qy,qz,attitude_sigma_deg,sun_x,sun_y,sun_z\n".to_owned();
+    let mut truth = TRUTH.to_owned();
+    for i in 0..4 {
+        let (sin, cos) = (68.0 + 0.05 * f64::from(i)).to_radians().sin_cos();
+        let place = if i % 2 == 0 { "390,,,,,,,,,,," } else { ",6771.0088,0,0,1,0,0,0,0.5,0,-1,0" };
+        frames.push_str(&format!("{i:04}.png,2020-11-20T08:30:0{i}Z,{place}\n"));
+        truth.push_str(&format!(
+            "{i:04}.png,{},earth-sphere,1,0,{sin},{cos},70.38,400,,,,,,,1,0,0,0\n",
+            1_605_861_000 + i
+        ));
+    }
+    place.write("in/frames.csv", frames.as_bytes());
+    place.write("truth.csv", truth.as_bytes());
+    place.run(&["run", "in", "-o", "out.mcap"]).expect(0);
+    place.run(&["export", "out.mcap", "-o", "out.csv"]).expect(0);
+    place
+}
+
+#[test]
+fn a_recording_is_run_again_with_all_that_it_holds() {
+    let place = place();
+    place.run(&["run", "out.mcap", "-o", "again.mcap"]).expect(0).says("4 frames: 4 ok");
+    place.run(&["export", "again.mcap", "-o", "again.csv"]).expect(0);
+    let rows = without_time(&place.read("out.csv"));
+    assert_eq!((cell(&rows[0], "altitude_km"), &cell(&rows[1], "altitude_km")[..5]), ("390.0", "400.0"));
+    assert_eq!(without_time(&place.read("again.csv")), rows);
+    let evaluated = |results: &str| place.run(&["evaluate", results, "--truth", "truth.csv"]).expect(0).out;
+    assert_eq!(evaluated("again.mcap"), evaluated("out.mcap"));
+    // What is given by hand takes the place of what was recorded.
+    place.write("other.toml", SENSOR.replace("altitude_km = 400.0", "altitude_km = 410.0").as_bytes());
+    place.write("other.csv", b"file,altitude_km\n0001.png,380\n0003.png,\n");
+    let ran = place.run(&["run", "out.mcap", "-s", "other.toml", "--frames", "other.csv"]).expect(0);
+    let altitudes = without_time(&ran.out).iter().map(|r| cell(r, "altitude_km").to_owned()).collect::<Vec<_>>();
+    assert_eq!(altitudes, ["410.0", "380.0", "410.0", "410.0"]);
+    // One frame of it, by its number.
+    let told = place.run(&["explain", "out.mcap", "--index", "1"]).expect(0).out;
+    assert!(told.contains("0001.png: 320 x 240") && told.contains("position at 400.00 km given with"), "{told}");
+}
+
+#[test]
+fn several_bodies_are_one_frame() {
+    let place = place();
+    let bodies = SENSOR.replace("[body]", "[[bodies]]") + "\n[[bodies]]\nkind = \"moon\"\n";
+    place.write("two.toml", bodies.as_bytes());
+    place.run(&["run", "in", "-s", "two.toml", "-o", "two.mcap"]).expect(0).says("4 frames: ");
+    place.run(&["run", "two.mcap", "-o", "again.csv"]).expect(0).says("4 frames: ");
+    place.run(&["export", "two.mcap", "-o", "two.csv"]).expect(0);
+    assert_eq!(without_time(&place.read("again.csv")), without_time(&place.read("two.csv")));
+}
+
+#[test]
+fn what_a_recording_does_not_hold_is_said() {
+    let place = place();
+    place.run(&["run", "in", "-o", "bare.mcap", "--no-images"]).expect(0);
+    place.run(&["run", "bare.mcap"]).expect(2).says("holds results without their pictures");
+    place.write("in/b-empty.png", b"");
+    place.run(&["run", "in", "-o", "one.mcap"]).expect(3);
+    let ran = place.run(&["run", "one.mcap"]).expect(3).says("the recording holds no picture of it");
+    assert_eq!(cell(&without_time(&ran.out)[4], "file"), "b-empty.png");
+    // The bytes of a picture in its chunk are damaged: what they were is not known any more.
+    let whole = std::fs::read(place.path("out.mcap")).unwrap();
+    let picture = std::fs::read(place.path("in/0003.png")).unwrap();
+    let at = whole.windows(picture.len()).position(|w| w == picture).unwrap();
+    let mut damaged = whole.clone();
+    damaged[at + 100] ^= 1;
+    place.write("damaged.mcap", &damaged);
+    place.run(&["run", "damaged.mcap"]).expect(3).says("1 damaged part was left out");
+    place.write("cut.mcap", &whole[..at + picture.len() + 100]);
+    place.run(&["run", "cut.mcap"]).expect(3).says("was cut off").says("no frames");
+}
