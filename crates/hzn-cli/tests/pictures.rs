@@ -249,3 +249,31 @@ fn videos_made_and_read_by_the_real_ffmpeg() {
     let ran = place.run(&["run", "cut.avi", "-s", "in/sensor.toml"]);
     assert!(ran.code != 0 || without_time(&ran.out).len() < 6, "{}", ran.err);
 }
+
+/// A disc that search lines find, after so many lit things along the border that the report has no room for more.
+#[test]
+fn an_edge_that_comes_late_is_listed_as_chosen() {
+    let place = Place::new();
+    let sphere = "kind = \"sphere\"\nradius_km = 1000.0\nlimb_height_km = 0.0\naltitude_km = 1923.8\n";
+    let sensor = common::SENSOR.replace("kind = \"earth-sphere\"\naltitude_km = 400.0\n", sphere);
+    place.write(
+        "in/sensor.toml",
+        sensor.replace("fx_px = 300.0\nfy_px = 300.0", "fx_px = 200.0\nfy_px = 200.0").as_bytes(),
+    );
+    let picture = image::GrayImage::from_fn(320, 240, |x, y| {
+        let off = (f64::from(x) - 159.5).hypot(f64::from(y) - 119.5) - 200.0 * 20f64.to_radians().tan();
+        let thing = x % 30 < 14 && !(18..222).contains(&y);
+        image::Luma([if thing { 220 } else { (10.0 + 210.0 * (0.5 - off).clamp(0.0, 1.0)) as u8 }])
+    });
+    picture.save(place.path("in/0.png")).unwrap();
+    let told = place.run(&["explain", "in/0.png", "--overlay", "o.png"]).expect(0).out;
+    let chosen: Vec<&str> = told.lines().filter(|l| l.contains("chosen: ")).collect();
+    assert!(chosen.len() == 1 && told.contains("further ones that are not listed"), "{told}");
+    let number: u32 = chosen[0].split_whitespace().next().unwrap().parse().unwrap();
+    assert!(number >= 16, "{told}");
+    place.run(&["run", "in", "-o", "a.mcap"]).expect(0).says("1 frame: 1 ok");
+    let mut recorded = hzn_mcap::Reader::open(place.path("a.mcap"), hzn_mcap::Contents::All).unwrap();
+    let frame = recorded.next().unwrap().unwrap();
+    assert_eq!(frame.candidates.iter().filter(|c| c.verdict == "chosen").count(), 1);
+    assert!(frame.annotations.inliers.len() > 50);
+}

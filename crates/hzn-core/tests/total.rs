@@ -7,6 +7,8 @@ use hzn_core::body::{Frame, Kind};
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
+use hzn_core::pipeline::{MAX_LISTED, Verdict};
+use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Preset, Report};
 use proptest::prelude::*;
@@ -27,6 +29,7 @@ fn config(model: Model, circle: bool, mask: bool, kind: Kind) -> Config {
 
 fn sound(report: &Report<f64>) {
     assert_eq!(report.status == Status::Ok, report.solution.is_some());
+    listed(report);
     if let Some(s) = &report.solution {
         let [x, y, z] = s.axis.xyz();
         assert!((x * x + y * y + z * z - 1.0).abs() < 1e-9);
@@ -34,6 +37,41 @@ fn sound(report: &Report<f64>) {
         assert!(s.covariance.sigma_max_rad() > 0.0);
         assert!(s.half_angle_rad.is_finite() && s.rms_px.is_finite() && s.arc_px.is_finite());
     }
+}
+
+/// The chosen candidate, and no other, is listed as chosen, with the numbers of the answer.
+fn listed<T: Real>(report: &Report<T>) {
+    let chosen = report.candidates.iter().filter(|c| c.verdict == Verdict::Chosen);
+    let chosen: Vec<_> = chosen.map(|c| (c.number, c.inliers, c.points)).collect();
+    let answer = report.solution.as_ref().map(|s| (s.candidate, s.inliers, report.counters.edge_points));
+    assert_eq!(chosen, Vec::from_iter(answer));
+}
+
+/// A body in the middle of the picture, and along its border so many lit things that the body's edge comes after all that
+/// a report lists.
+#[test]
+fn the_chosen_edge_is_listed_however_late_it_comes() {
+    let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 300.0));
+    config.body.kind = Kind::Sphere;
+    config.body.radius_km = Some(1000.0);
+    config.body.altitude_km = Some(1923.8);
+    config.body.limb_height_km = 0.0;
+    let lit = |x: u32, y: u32| {
+        let off = (f64::from(x) - 320.0).hypot(f64::from(y) - 240.0) - 300.0 * 20f64.to_radians().tan();
+        let thing = x % 50 < 20 && !(40..440).contains(&y);
+        if thing { 220.0 } else { 10.0 + 210.0 * (0.5 - off).clamp(0.0, 1.0) }
+    };
+    let data: Vec<u8> = (0..640 * 480).map(|i| lit(i % 640, i / 640) as u8).collect();
+    let picture = Grey::try_new(&data, Layout::packed(640, 480, 1, 8)).unwrap();
+    let mut host = HostHorizon::boxed(&config).unwrap();
+    let report = host.process(&picture, &host.expect(&Frame::default()).unwrap());
+    assert!(report.solution.as_ref().is_some_and(|s| s.candidate as usize >= MAX_LISTED), "{report:?}");
+    assert_eq!((report.candidates.len(), report.candidates[15].verdict), (MAX_LISTED, Verdict::Chosen));
+    listed(&report);
+    let mut flight = FlightHorizon::boxed(&config).unwrap();
+    let report = flight.process(&picture, &flight.expect(&Frame::default()).unwrap());
+    assert_eq!(report.candidates[15].verdict, Verdict::Chosen);
+    listed(&report);
 }
 
 proptest! {
@@ -60,6 +98,7 @@ proptest! {
         let mut flight = FlightHorizon::boxed(&config).unwrap();
         let expected: Expected<f32> = flight.expect(&Frame::default()).unwrap();
         let report = flight.process(&picture, &expected);
+        listed(&report);
         if let Some(s) = report.solution {
             prop_assert!(s.axis.xyz().iter().all(|v| v.is_finite()));
             prop_assert!(s.covariance.upper_rad2.iter().all(|v| v.is_finite()));

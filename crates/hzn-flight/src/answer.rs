@@ -78,7 +78,7 @@ pub struct Answer {
     pub work: u32,
     /// The direction, with status `ok`.
     pub direction: Option<Direction>,
-    /// The first candidates.
+    /// The first candidates, and the chosen one.
     pub edges: [Option<Edge>; MAX_LISTED],
 }
 
@@ -133,9 +133,12 @@ impl Answer {
     /// The report in double precision, as a workstation has it; `None` when a number in it means nothing.
     pub fn report(&self) -> Option<Report<f64>> {
         let mut candidates = Candidates::default();
-        for e in self.edges.iter().flatten() {
+        for (place, e) in (0..).zip(self.edges.iter().flatten()) {
             let verdict = *Verdict::ALL.get(usize::from(e.verdict))?;
+            // Numbers are not sent down: only the chosen one may stand in another's place.
+            let own = self.direction.filter(|_| verdict == Verdict::Chosen).map(|d| d.candidate);
             let candidate = Candidate {
+                number: own.unwrap_or(place),
                 length_px: e.length_px,
                 points: e.points,
                 inliers: e.inliers,

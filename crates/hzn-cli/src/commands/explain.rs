@@ -164,12 +164,13 @@ impl Told<'_> {
         }
         if !r.candidates.is_empty() {
             line("", "   #   length   points  inliers   rms px  verdict".into());
-            for (i, k) in r.candidates.iter().enumerate() {
+            for k in &r.candidates {
                 let rms = if k.rms_px.is_finite() { format!("{:.3}", k.rms_px) } else { "-".into() };
                 line(
                     "",
                     format!(
-                        "{i:>4} {:>8} {:>8} {:>8} {rms:>8}  {}: {}",
+                        "{:>4} {:>8} {:>8} {:>8} {rms:>8}  {}: {}",
+                        k.number,
                         k.length_px,
                         k.points,
                         k.inliers,

@@ -204,6 +204,7 @@ fn widen<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
 
 pub(super) fn widen_candidate<T: Real + Into<f64>>(c: &Candidate<T>) -> Candidate<f64> {
     Candidate {
+        number: c.number,
         length_px: c.length_px,
         points: c.points,
         inliers: c.inliers,

@@ -70,6 +70,7 @@ pub(super) struct Judge<'a, T, O> {
 
 struct Best<T> {
     solution: Solution<T>,
+    outcome: Candidate<T>,
     /// Level for the next picture.
     level: Option<u16>,
     score: T,
@@ -233,11 +234,11 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
         let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
-        // Full: only counted.
-        let _ = self.report.candidates.push(outcome);
         if let Some(new) = solution {
             self.weigh(new);
         }
+        // Full: only counted, unless it is chosen in the end.
+        let _ = self.report.candidates.push(outcome);
         self.observer.enter(Stage::Contour);
     }
 
@@ -250,6 +251,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
     ) -> (Candidate<T>, Option<Best<T>>) {
         let Sensor { config, camera, cam_to_body, .. } = self.sensor;
         let mut outcome = Candidate {
+            number,
             length_px: length,
             points: 0,
             inliers: 0,
@@ -348,7 +350,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let certain =
             judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 8 || fit.rms_px * T::of(4.0) < threshold);
         let tracks = (self.tracks && !P::PASSED).then(|| select::middle_level(&fused.e, blocks, scene, camera));
-        (outcome, Some(Best { solution, score: judged.score, certain, level: tracks.flatten() }))
+        (outcome, Some(Best { solution, outcome, score: judged.score, certain, level: tracks.flatten() }))
     }
 
     /// Keeps the better of two answers, and remembers how good the other was if it says something else.
@@ -378,11 +380,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
                 report.status = Status::Ambiguous;
                 return;
             }
-            let chosen = best.solution.candidate;
-            if let Some(candidate) = report.candidates.get_mut(chosen as usize) {
-                candidate.verdict = Verdict::Chosen;
-                report.counters.edge_points = candidate.points;
-            }
+            report.choose(best.outcome);
             report.status = Status::Ok;
             report.next_level = best.level;
             report.solution = Some(best.solution);

@@ -8,7 +8,7 @@
 use super::account;
 use super::taken::Taken;
 use super::workspace::Lists;
-use super::{Candidate, Observer, Report, Sensor, Solution};
+use super::{Candidate, Observer, Report, Sensor, Solution, Verdict};
 use crate::body::Expected;
 use crate::frames::{Cov3, UnitVec3};
 use crate::image::{Part, Pixels, Window};
@@ -67,6 +67,7 @@ impl<T: Real> Sensor<T> {
         let mut cut = false;
         let least = f64::from(whole.area()) * self.config.recover.least_part;
         let mut answers = Answers::<T>::new();
+        let mut chosen = heapless::Vec::<Candidate<T>, ANSWERS>::new();
         let mut waiting = heapless::Vec::<Window, WAITING>::new();
         // A half at a time: as many wait as there have been halvings.
         let _ = waiting.extend_from_slice(whole.halves().as_ref().map_or(&[][..], |h| h));
@@ -81,6 +82,10 @@ impl<T: Real> Sensor<T> {
             if let Some(answer) = report.solution.take() {
                 // As many as the smallest parts can be.
                 let _ = answers.push(answer);
+                if let Some(edge) = report.candidates.iter_mut().find(|c| c.verdict == Verdict::Chosen) {
+                    edge.verdict = Verdict::Passed;
+                    let _ = chosen.push(*edge);
+                }
                 continue;
             }
             let ended = matches!(report.status, Status::TooDark | Status::TooBright);
@@ -96,6 +101,9 @@ impl<T: Real> Sensor<T> {
             answer.axis_body = self.cam_to_body.as_ref().map(|r| r.apply(&answer.axis));
             report.status = Status::Ok;
             report.stage = Stage::Select;
+            if let Some(edge) = chosen.iter().find(|c| c.number == answer.candidate) {
+                report.choose(*edge);
+            }
             report.solution = Some(answer);
         }
     }

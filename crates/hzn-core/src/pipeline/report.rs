@@ -4,7 +4,7 @@ use super::config::MAX_BODIES;
 use crate::frames::{Body, Cam, Cov3, Ecef, UnitVec3};
 use crate::status::{Stage, Status};
 
-/// Most candidates that a report lists; further ones are only counted.
+/// Most candidates that a report lists; further ones are only counted, but for the chosen one.
 pub const MAX_LISTED: usize = 16;
 
 /// Reports of several bodies, in the order in which they were looked for.
@@ -23,7 +23,8 @@ pub struct Report<T> {
     pub next_level: Option<u16>,
     /// What was seen on the way.
     pub counters: Counters,
-    /// The candidates that were looked at, in the order in which they were followed.
+    /// The candidates that were looked at, in the order in which they were followed. The chosen one is always among them: in
+    /// the last place, where it came after those that there is room for.
     pub candidates: heapless::Vec<Candidate<T>, MAX_LISTED>,
     /// The direction: with status `ok`, and never without.
     pub solution: Option<Solution<T>>,
@@ -40,6 +41,16 @@ impl<T> Report<T> {
             counters: Counters::default(),
             candidates: heapless::Vec::new(),
             solution: None,
+        }
+    }
+    /// Lists a candidate as the chosen one, in the last place where there was no room for it.
+    pub(super) fn choose(&mut self, mut chosen: Candidate<T>) {
+        self.counters.edge_points = chosen.points;
+        chosen.verdict = Verdict::Chosen;
+        let place = self.candidates.iter().position(|c| c.number == chosen.number);
+        let place = place.unwrap_or(self.candidates.len().saturating_sub(1));
+        if let Some(listed) = self.candidates.get_mut(place) {
+            *listed = chosen;
         }
     }
 }
@@ -69,6 +80,8 @@ pub struct Counters {
 /// One candidate edge and what became of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate<T> {
+    /// Its place in the order of following, from 0.
+    pub number: u32,
     /// Border pixels of the edge.
     pub length_px: u32,
     /// Sub-pixel points taken from it.
@@ -162,6 +175,6 @@ pub struct Solution<T> {
     pub inliers: u32,
     /// Length of edge that the inliers cover, in pixels.
     pub arc_px: T,
-    /// Which of `Report::candidates` it is, by its place in the order of following.
+    /// Which candidate it is: its number.
     pub candidate: u32,
 }

@@ -468,7 +468,8 @@ class Report:
 
     @property
     def candidates(self) -> list[dict[str, Any]]:
-        """Edges that were looked at: length_px, points, inliers, rms_px, verdict."""
+        """The first 16 edges that were looked at, the chosen one always among them: length_px, points, inliers, rms_px,
+        verdict."""
 
     @property
     def limb(self) -> list[NDArray[np.float64]]:

@@ -216,9 +216,9 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &Answer) {
             ui.weak(RichText::new(head).size(11.5));
         }
         ui.end_row();
-        for (i, c) in report.candidates.iter().enumerate() {
+        for c in &report.candidates {
             let (rect, mut row) = ui.allocate_exact_size(vec2(12.0, 12.0), egui::Sense::hover());
-            ui.painter().rect_filled(rect.shrink(1.0), 2, theme::edge(i as u32));
+            ui.painter().rect_filled(rect.shrink(1.0), 2, theme::edge(c.number));
             let rms = if c.rms_px.is_finite() { format!("{:.2}", c.rms_px) } else { "–".into() };
             for text in [c.length_px.to_string(), c.points.to_string(), c.inliers.to_string(), rms] {
                 row |= ui.label(RichText::new(text).size(12.0));
@@ -226,7 +226,7 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &Answer) {
             let why = select.map(|s| hzn_cli::words::why(c.verdict, &s)).unwrap_or_default();
             row |= ui.label(RichText::new(c.verdict.name()).size(12.0)).on_hover_text(why);
             if row.hovered() || row.contains_pointer() {
-                viewer.pointed = Some(i as u32);
+                viewer.pointed = Some(c.number);
             }
             ui.end_row();
         }
