@@ -96,7 +96,6 @@ fn look(
     let elapsed_us = begun.elapsed().as_secs_f64() * 1e6;
     let answer = |(report, truth): (&Report<f64>, &Truth)| Answer {
         file: frame.file.clone(),
-        time_s: frame.time_s,
         body: truth.body.clone(),
         status: report.status,
         found: report.solution.as_ref().map(|s| Found {

@@ -112,6 +112,11 @@ impl Frames {
         self.by_file.get(file).and_then(|&i| self.rows.get(i))
     }
 
+    /// Does it give any picture a time? It is then the one clock of the sequence.
+    pub fn has_times(&self) -> bool {
+        self.rows.iter().any(|row| row.time_s.is_some())
+    }
+
     /// Warnings for altitude and position of a row that differ by more than 0.1 km, and for a position so far off that it
     /// must be metres.
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {

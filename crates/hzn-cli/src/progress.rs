@@ -81,9 +81,10 @@ impl Progress {
     pub(crate) fn frames(&self) -> u64 {
         self.frames
     }
-    /// Whether a picture could not be read.
-    pub(crate) fn any_unreadable(&self) -> bool {
-        self.bodies.iter().any(|counts| counts[Status::Unreadable as usize] > 0)
+    /// Whether a picture could not be processed.
+    pub(crate) fn any_unprocessed(&self) -> bool {
+        let none = [Status::Unreadable, Status::NoAltitude];
+        self.bodies.iter().any(|counts| none.iter().any(|s| counts[*s as usize] > 0))
     }
     fn rate(&self) -> f64 {
         self.frames as f64 / self.start.elapsed().as_secs_f64().max(1e-9)

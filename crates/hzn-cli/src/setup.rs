@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
-use hzn_calib::{Frames, Sensor};
+use hzn_calib::{FrameData, Frames, Sensor};
 use hzn_core::body;
 use hzn_sim::Truth;
 
@@ -127,7 +127,8 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
 /// Without an altitude from anywhere, every frame would fail.
 pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option<&Frames>) -> Result<(), Stop> {
     let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some();
-    let rows = frames.map_or(source.sensor_toml().is_some(), |f| !f.rows.is_empty());
+    let tells = |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some();
+    let rows = frames.map_or(source.sensor_toml().is_some(), |f| f.rows.iter().any(tells));
     if rows || sensor.config.each_body().iter().any(known) {
         return Ok(());
     }

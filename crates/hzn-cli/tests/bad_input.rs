@@ -44,17 +44,6 @@ fn wrong_rows_of_frames_csv() {
 }
 
 #[test]
-fn a_picture_without_an_altitude_does_not_end_the_run() {
-    let place = Place::with_pictures(2);
-    place.write("in/sensor.toml", common::SENSOR.replace("altitude_km = 400.0", "").as_bytes());
-    place.write("in/frames.csv", b"file,altitude_km\n0001.png,400\n");
-    let ran = place.run(&["run", "in"]).expect(3);
-    let rows = without_time(&ran.out);
-    assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("unreadable", "ok"));
-    assert!(cell(&rows[0], "detail").starts_with("no altitude: set body.altitude_km"));
-}
-
-#[test]
 fn the_sensor_of_another_camera_is_said_once() {
     let place = Place::with_pictures(5);
     let other = common::SENSOR.replace("width = 320", "width = 640").replace("height = 240", "height = 480");

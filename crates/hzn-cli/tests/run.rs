@@ -49,10 +49,44 @@ fn all_outputs_hold_the_same_rows() {
 fn times_and_altitudes_come_from_frames_csv() {
     let place = Place::with_pictures(3);
     place.write("in/frames.csv", b"file,time_s,altitude_km\n0001.png,77.5,390\n");
-    let ran = place.run(&["run", "in", "--fps", "4"]).expect(0).says("2 pictures have no row here");
+    let ran = place.run(&["run", "in", "--fps", "4"]).expect(0);
+    let ran = ran.says("warning: of 3 frames: 2 without a row in in/frames.csv; 2 without a time\n");
     let rows = without_time(&ran.out);
     assert_eq!((cell(&rows[1], "time_s"), cell(&rows[1], "altitude_km")), ("77.5", "390.0"));
-    assert_eq!((cell(&rows[2], "time_s"), cell(&rows[2], "altitude_km")), ("0.5", "400.0"));
+    // The table is the only clock.
+    assert_eq!((cell(&rows[2], "time_s"), cell(&rows[2], "altitude_km")), ("", "400.0"));
+    // Without times in it, it is none.
+    place.write("in/frames.csv", b"file,altitude_km\n0001.png,390\n");
+    let rows = without_time(&place.run(&["run", "in", "--fps", "4"]).expect(0).out);
+    assert_eq!((cell(&rows[1], "time_s"), cell(&rows[2], "time_s")), ("0.25", "0.5"));
+}
+
+#[test]
+fn a_frame_without_altitude_is_a_row_that_says_so() {
+    let place = Place::with_pictures(4);
+    place.write("in/sensor.toml", common::SENSOR.replace("altitude_km = 400.0\n", "").as_bytes());
+    place.write("in/frames.csv", b"file,time_s,altitude_km\n0000.png,10,400\n0001.png,11,\n0003.png,,400\n");
+    for out in ["a.csv", "a.jsonl", "a.mcap"] {
+        let ran = place.run(&["run", "in", "-o", out]).expect(3).says("4 frames: 2 ok, 2 no-altitude");
+        let ran =
+            ran.says("of 4 frames: 1 without a row in in/frames.csv; 2 without a time; 2 without an altitude, not");
+        assert_eq!(ran.err.lines().filter(|l| l.contains("altitude:")).count(), 0, "{}", ran.err);
+        place.run(&["info", out]).expect(0);
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
+        let rows = without_time(&place.read("rows.csv"));
+        let of = |name: &str| rows.iter().map(|r| cell(r, name).to_owned()).collect::<Vec<_>>();
+        assert_eq!(of("status"), ["ok", "no-altitude", "no-altitude", "ok"]);
+        assert_eq!(of("time_s"), ["10.0", "11.0", "", ""]);
+        assert_eq!(of("altitude_km"), ["400.0", "", "", "400.0"]);
+        assert!(of("detail")[1].contains("no altitude: set body.altitude_km"), "{:?}", of("detail"));
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
+    }
+    // Run again, it comes out the same.
+    let again = place.run(&["run", "a.mcap"]).expect(3);
+    assert_eq!(without_time(&again.out), without_time(&place.read("rows.csv")));
+    // No picture could be processed: said before.
+    place.write("in/frames.csv", b"file,altitude_km\n0000.png,\n");
+    place.run(&["run", "in"]).expect(2).says("no altitude: ");
 }
 
 #[test]

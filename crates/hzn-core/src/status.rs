@@ -25,11 +25,13 @@ pub enum Status {
     Truncated = 7,
     /// The picture could not be read (host only).
     Unreadable = 8,
+    /// Nothing gives the altitude that the body's cone follows from (host only).
+    NoAltitude = 9,
 }
 
 impl Status {
     /// Every status in the order of its number.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Ok,
         Self::NoLimb,
         Self::TooDark,
@@ -39,6 +41,7 @@ impl Status {
         Self::Rejected,
         Self::Truncated,
         Self::Unreadable,
+        Self::NoAltitude,
     ];
 
     /// The name used in files, such as `no-limb`.
@@ -53,6 +56,7 @@ impl Status {
             Self::Rejected => "rejected",
             Self::Truncated => "truncated",
             Self::Unreadable => "unreadable",
+            Self::NoAltitude => "no-altitude",
         }
     }
 }
@@ -129,6 +133,7 @@ mod tests {
             "rejected",
             "truncated",
             "unreadable",
+            "no-altitude",
         ];
         for (n, (status, name)) in Status::ALL.iter().zip(names).enumerate() {
             assert_eq!((*status as usize, status.name()), (n, name));

@@ -19,11 +19,11 @@ fn main() -> Result<(), Error> {
         let meta = RowMeta {
             index: i.into(),
             file: format!("{i:03}"),
-            time_s: f64::from(i) * 0.1,
+            time_s: Some(f64::from(i) * 0.1),
             body: "earth".into(),
             altitude_km: Some(230.0),
         };
-        let mut row = Row::unreadable(&meta, "");
+        let mut row = Row::unprocessed(&meta, Status::Unreadable, "");
         row.status = Status::Ok;
         (row.axis_x, row.axis_y, row.axis_z) = (Some(0.0), Some(0.6), Some(0.8));
         let limb: Vec<[f64; 2]> = (0..64).map(|x| [f64::from(x), 20.0 + f64::from(i) * 0.5]).collect();

@@ -14,8 +14,8 @@ pub struct RowMeta {
     pub index: u64,
     /// Name of the picture as it was given.
     pub file: String,
-    /// Time of the picture in seconds, of the sequence's own epoch.
-    pub time_s: f64,
+    /// Time of the picture in seconds, of the sequence's own epoch; `None` where it is not known.
+    pub time_s: Option<f64>,
     /// Name of the body; see [`body_name`].
     pub body: String,
     /// Altitude of the position, or else the one given with the picture or by sensor.toml, kilometres.
@@ -32,8 +32,8 @@ pub struct Row {
     pub index: u64,
     /// Name of the picture.
     pub file: String,
-    /// Time in seconds.
-    pub time_s: f64,
+    /// Time in seconds, where it is known.
+    pub time_s: Option<f64>,
     /// Name of the body: `earth`, `earth-sphere`, `sun`, `moon`, `sphere`.
     pub body: String,
     /// Outcome, by its name such as `no-limb`.
@@ -150,9 +150,9 @@ impl Row {
         row
     }
 
-    /// The row of a picture that could not be read.
-    pub fn unreadable(meta: &RowMeta, reason: impl Into<String>) -> Self {
-        Self { detail: reason.into(), ..Self::empty(meta, Status::Unreadable) }
+    /// The row of a picture that was not processed, such as one that could not be read.
+    pub fn unprocessed(meta: &RowMeta, status: Status, reason: impl Into<String>) -> Self {
+        Self { detail: reason.into(), ..Self::empty(meta, status) }
     }
 
     fn empty(meta: &RowMeta, status: Status) -> Self {
@@ -282,7 +282,7 @@ mod tests {
     use hzn_core::status::Stage;
 
     fn meta() -> RowMeta {
-        RowMeta { index: 3, file: "a,b.png".into(), time_s: 1.5, body: "earth".into(), altitude_km: Some(230.0) }
+        RowMeta { index: 3, file: "a,b.png".into(), time_s: Some(1.5), body: "earth".into(), altitude_km: Some(230.0) }
     }
 
     fn report<T: Real>(status: Status) -> Report<T> {
@@ -336,7 +336,7 @@ mod tests {
             assert_eq!(row.axis().is_some(), status == Status::Ok);
             assert_eq!(row.detail.is_empty(), status == Status::Ok);
         }
-        let row = Row::unreadable(&meta(), "cut off");
+        let row = Row::unprocessed(&meta(), Status::Unreadable, "cut off");
         assert_eq!((row.status, row.axis(), row.edge_points), (Status::Unreadable, None, None));
     }
 
@@ -355,7 +355,7 @@ mod tests {
         let rows = [
             Row::from_report::<f64>(&meta(), &report(Status::Ok), Some(12.5)),
             Row::from_report::<f32>(&meta(), &report(Status::Rejected), None),
-            Row::unreadable(&meta(), "says \"no\",\nand more"),
+            Row::unprocessed(&meta(), Status::Unreadable, "says \"no\",\nand more"),
         ];
         let mut out = csv::Writer::from_writer(Vec::new());
         for row in &rows {

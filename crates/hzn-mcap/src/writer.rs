@@ -55,6 +55,8 @@ pub struct Writer {
     data: ChunkBuilder,
     waiting_since: Option<Instant>,
     last_calibration_ns: Option<u64>,
+    /// Log time of the last frame.
+    last_ns: u64,
     frames: u64,
 }
 
@@ -86,6 +88,7 @@ impl Writer {
             data: ChunkBuilder::default(),
             waiting_since: None,
             last_calibration_ns: None,
+            last_ns: 0,
             frames: 0,
         }
     }
@@ -129,7 +132,9 @@ impl Writer {
         if bytes + (BATCH_IMAGE_BYTES as u64) >= MAX_RECORD_BYTES {
             return Err(Error::TooLarge { bytes, limit: MAX_RECORD_BYTES - BATCH_IMAGE_BYTES as u64 });
         }
-        let ns = messages::time_ns(frame.row.time_s);
+        // A frame without a time stays where it is in the sequence.
+        let ns = frame.row.time_s.map_or(self.last_ns, messages::time_ns);
+        self.last_ns = ns;
         let sequence = frame.row.index as u32;
         let declare = |topic: Topic, container: &mut Container<_>| -> std::io::Result<u16> {
             let id = topic.id();

@@ -191,7 +191,7 @@ impl Report {
     }
     #[doc = doc!("Report.time_s")]
     #[getter]
-    fn time_s(&self) -> f64 {
+    fn time_s(&self) -> Option<f64> {
         self.row.time_s
     }
     #[doc = doc!("Report.body")]

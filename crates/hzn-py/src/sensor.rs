@@ -154,7 +154,7 @@ impl Sensor {
         let report = |(which, (processed, body)): (usize, (hzn_cli::engine::Processed, &hzn_core::body::Config))| {
             let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
             let meta = RowMeta {
-                time_s: data.time_s.unwrap_or(0.0),
+                time_s: Some(data.time_s.unwrap_or(0.0)),
                 body: hzn_mcap::body_name(body.kind).to_owned(),
                 altitude_km: data.position_km.and_then(at).or(data.altitude_km).or(body.altitude_km),
                 ..RowMeta::default()

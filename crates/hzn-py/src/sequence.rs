@@ -92,7 +92,8 @@ pub(crate) fn process_encoded(
     expected: &Expected,
 ) -> PyResult<Report> {
     let state = sensor.state();
-    let row = FrameData { file: name.clone(), ..expected.data.clone() };
+    let time_s = expected.data.time_s.or(Some(index as f64));
+    let row = FrameData { file: name.clone(), time_s, ..expected.data.clone() };
     let plan = plan(&state, None);
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
     processed(py, &state, &plan, index, input::Item { name, time_s: None, data: Some(row), payload })

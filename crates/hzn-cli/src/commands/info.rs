@@ -179,8 +179,9 @@ impl Summary {
         if self.last.replace(row.index) != Some(row.index) {
             self.frames += 1;
         }
-        let t = row.time_s;
-        self.time = Some(self.time.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
+        if let Some(t) = row.time_s {
+            self.time = Some(self.time.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
+        }
         let place = self.bodies.iter().position(|(name, _)| *name == row.body).unwrap_or_else(|| {
             self.bodies.push((row.body.clone(), Found::default()));
             self.bodies.len() - 1

@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     // Not for one picture of many, whose table names all the others.
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
-        warn_of_missing(frames, &folder, args.source.raw.is_some());
+        warn_of_missing(frames, &folder);
     }
     if let Some(drawn) = &args.overlay {
         std::fs::create_dir_all(drawn).map_err(|e| output::cannot(drawn, &e))?;
@@ -136,17 +136,18 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut progress = Progress::new(total, held.frames, args.quiet);
     let stop = stop_flag();
     let mut tipped = args.quiet;
+    let mut gaps = Gaps::default();
     let mut seen = |frame: &Finished| {
+        gaps.count(frame);
         if let Some(tip) = frame.tip.as_ref().filter(|_| !tipped) {
             tipped = true;
             progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
         }
         // A picture that cannot be read is so for every body.
-        let statuses = frame.found.iter().map(|f| f.report.as_ref().map_or(Status::Unreadable, |r| r.status));
-        if let (Some(Err(why)), false) = (frame.found.iter().map(|f| &f.report).find(|r| r.is_err()), args.quiet) {
-            progress.say(&format!("unreadable: {}: {why}", frame.name));
+        if let Some(e) = frame.unreadable().filter(|_| !args.quiet) {
+            progress.say(&format!("unreadable: {}: {e}", frame.name));
         }
-        progress.count(statuses);
+        progress.count(frame.found.iter().map(|f| f.status()));
     };
     let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut seen);
     let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
@@ -155,6 +156,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     output.finish()?;
     let lost = source.lost().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
+    gaps.tell(plan.frames.as_ref());
     if !args.quiet {
         let before = match held.frames {
             0 => String::new(),
@@ -172,7 +174,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("interrupted after {done}{of} frames{next}"));
         return Ok(Exit::Interrupted);
     }
-    Ok(if progress.any_unreadable() || lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+    Ok(if progress.any_unprocessed() || lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
 /// The text of a sensor.toml with its `input.bits`.
@@ -226,17 +228,44 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
     Ok(())
 }
 
-fn warn_of_missing(frames: &Frames, folder: &Path, raw: bool) {
+fn warn_of_missing(frames: &Frames, folder: &Path) {
     for row in frames.rows.iter().filter(|r| !folder.join(&r.file).exists()) {
         tell::warning(frames.problem(row, "no such picture in the folder; the row is not used"));
     }
-    let Ok(list) = std::fs::read_dir(folder) else { return };
-    let names: Vec<String> = list.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
-    let picture = |n: &&String| !raw && image::ImageFormat::from_path(n).is_ok() && frames.get(n).is_none();
-    let without = names.iter().filter(picture).count();
-    if without > 0 {
-        let have = if without == 1 { "picture has" } else { "pictures have" };
-        let what = format!("{without} {have} no row here: their altitude is body.altitude_km, their time --fps");
-        tell::warning(format_args!("{}: {what}", frames.path.display()));
+}
+
+/// Frames of which something is not known, counted so that it is said once.
+#[derive(Default)]
+struct Gaps {
+    frames: u64,
+    no_row: u64,
+    no_time: u64,
+    no_altitude: u64,
+}
+
+impl Gaps {
+    fn count(&mut self, frame: &Finished) {
+        self.frames += 1;
+        self.no_row += u64::from(frame.data.is_none());
+        self.no_time += u64::from(frame.time_s.is_none());
+        self.no_altitude += u64::from(frame.found.iter().any(|f| f.status() == Status::NoAltitude));
+    }
+
+    fn tell(&self, frames: Option<&Frames>) {
+        let mut parts = Vec::new();
+        if let Some(frames) = frames.filter(|_| self.no_row > 0) {
+            parts.push(format!("{} without a row in {}", self.no_row, frames.path.display()));
+        }
+        if self.no_time > 0 {
+            parts.push(format!("{} without a time", self.no_time));
+        }
+        if self.no_altitude > 0 {
+            let what = "without an altitude, not processed (status no-altitude): give it there, as body.altitude_km, or \
+                        by --altitude-km";
+            parts.push(format!("{} {what}", self.no_altitude));
+        }
+        if !parts.is_empty() {
+            tell::warning(format_args!("of {} frames: {}", self.frames, parts.join("; ")));
+        }
     }
 }

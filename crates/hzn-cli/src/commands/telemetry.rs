@@ -229,7 +229,7 @@ impl Heard {
         let meta = RowMeta {
             index: u64::from(exposure.picture).saturating_sub(1),
             file: format!("picture-{:06}", exposure.picture),
-            time_s,
+            time_s: Some(time_s),
             body: Parameters::body(exposure.body).map_or("?", hzn_mcap::body_name).to_owned(),
             altitude_km: (!exposure.altitude_m.is_nan()).then(|| f64::from(exposure.altitude_m) * 1e-3),
         };

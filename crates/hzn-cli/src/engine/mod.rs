@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use hzn_calib::{FrameData, Frames};
+use hzn_core::body::FrameError;
 use hzn_core::status::Status;
 use hzn_core::{Config, Report};
 
@@ -54,8 +55,8 @@ pub struct Finished {
     pub index: u64,
     /// Name of the picture.
     pub name: String,
-    /// Time in seconds.
-    pub time_s: f64,
+    /// Time in seconds, where it is known.
+    pub time_s: Option<f64>,
     /// What frames.csv, or a recording of ours, says about this frame.
     pub data: Option<FrameData>,
     /// What came of every body, in order.
@@ -71,16 +72,51 @@ pub struct Finished {
 /// What came of one body in one frame.
 #[derive(Debug)]
 pub struct Found {
-    /// The answer, or why the picture could not be read.
-    pub report: Result<Report<f64>, String>,
+    /// The answer, or why there is none.
+    pub report: Result<Report<f64>, Unprocessed>,
     /// Time of processing, decoding not included.
     pub elapsed: Duration,
 }
 
+impl Found {
+    /// Outcome.
+    pub fn status(&self) -> Status {
+        self.report.as_ref().map_or_else(|e| e.status, |r| r.status)
+    }
+}
+
+impl From<Processed> for Found {
+    fn from(p: Processed) -> Self {
+        Self { report: p.report.map_err(Into::into), elapsed: p.elapsed }
+    }
+}
+
+/// Why a picture was not processed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unprocessed {
+    /// [`Status::Unreadable`] or [`Status::NoAltitude`].
+    pub status: Status,
+    /// In words.
+    pub why: String,
+}
+
+impl From<FrameError> for Unprocessed {
+    fn from(error: FrameError) -> Self {
+        let status = if error == FrameError::NoAltitude { Status::NoAltitude } else { Status::Unreadable };
+        Self { status, why: error.to_string() }
+    }
+}
+
 impl Finished {
+    /// Why the picture could not be read, if it could not.
+    pub fn unreadable(&self) -> Option<&str> {
+        let errors = self.found.iter().filter_map(|f| f.report.as_ref().err());
+        errors.filter(|e| e.status == Status::Unreadable).map(|e| e.why.as_str()).next()
+    }
     /// A picture that could not be read: so it is with every body.
-    fn unreadable(self, plan: &Plan, why: &str) -> Self {
-        let none = || Found { report: Err(why.to_owned()), elapsed: Duration::ZERO };
+    fn not_read(self, plan: &Plan, why: &str) -> Self {
+        let why = Unprocessed { status: Status::Unreadable, why: why.to_owned() };
+        let none = || Found { report: Err(why.clone()), elapsed: Duration::ZERO };
         Self { found: plan.config.each_body().iter().map(|_| none()).collect(), ..self }
     }
 }
@@ -241,10 +277,14 @@ fn write_in_order(
 /// Decodes and processes one frame.
 fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
     let Job { index, mut item } = job;
+    let timed = item.is_timed(plan.frames.as_ref());
     let data = item.known(plan.frames.as_ref());
     let decoded = item.payload.decode(Some(&plan.config));
     let exif = decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
-    let time_s = data.as_ref().and_then(|d| d.time_s).or(item.time_s).or(exif).unwrap_or(index as f64 / plan.fps);
+    let time_s = match timed {
+        true => data.as_ref().and_then(|d| d.time_s),
+        false => item.time_s.or(exif).or(Some(index as f64 / plan.fps)),
+    };
     let mut finished = Finished {
         index,
         name: item.name,
@@ -257,21 +297,15 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
-        Err(why) => return Ok(finished.unreadable(plan, &why)),
+        Err(why) => return Ok(finished.not_read(plan, &why)),
     };
     let traces = (plan.trace || plan.overlay.is_some()).then(|| Traces::new(plan.config.each_body().len()));
     let view = match picture.view(plan.config.input.channel) {
         Ok(view) => view,
-        Err(why) => return Ok(finished.unreadable(plan, &format!("{why} (input.channel in sensor.toml)"))),
-    };
-    let found = |p: Processed| Found {
-        // Rows of frames.csv were checked before the run: only a picture without a row, where the sensor has no
-        // altitude either, comes this far. The others go on.
-        report: p.report.map_err(|why| why.to_string()),
-        elapsed: p.elapsed,
+        Err(why) => return Ok(finished.not_read(plan, &format!("{why} (input.channel in sensor.toml)"))),
     };
     let data = finished.data.as_ref();
-    finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(found).collect();
+    finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(Found::from).collect();
     if finished.found.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
         finished.tip = picture.unused_bits();
     }
@@ -306,12 +340,11 @@ fn draw(found: &[Found], traces: &Traces, sensor: &AnySensor) -> hzn_mcap::Annot
 
 /// What became of the bodies, in words.
 fn statuses(found: &[Found], plan: &Plan) -> String {
-    let status = |f: &Found| f.report.as_ref().map_or(Status::Unreadable, |r| r.status).name();
     match found {
-        [one] => status(one).to_owned(),
+        [one] => one.status().name().to_owned(),
         several => {
             let bodies = plan.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind));
-            let each: Vec<String> = bodies.zip(several).map(|(body, f)| format!("{body} {}", status(f))).collect();
+            let each: Vec<String> = bodies.zip(several).map(|(body, f)| format!("{body} {}", f.status())).collect();
             each.join(", ")
         }
     }

@@ -232,7 +232,8 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Sol
     })
 }
 
-/// Checks a sensor, and every row of frames.csv against it, before the first frame is processed.
+/// Checks a sensor, and every row of frames.csv against it, before the first frame is processed. A row that leaves the
+/// altitude open is none of these: its picture gets [`Status::NoAltitude`](hzn_core::status::Status::NoAltitude).
 ///
 /// # Errors
 /// The row, the picture and the column that cannot be.
@@ -241,7 +242,10 @@ pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result
     let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
     for row in &frames.rows {
         for half_angle in sensor.expected_half_angles_rad(Some(row)) {
-            half_angle.map_err(|why| frames.problem(row, why))?;
+            match half_angle {
+                Ok(_) | Err(FrameError::NoAltitude) => {}
+                Err(why) => return Err(frames.problem(row, why)),
+            }
         }
     }
     Ok(())

@@ -89,6 +89,11 @@ impl Item {
             None => self.data.take(),
         }
     }
+    /// Is all that can be known of its time in frames.csv, or in what the source knows? A time from elsewhere would have
+    /// another epoch.
+    pub fn is_timed(&self, frames: Option<&Frames>) -> bool {
+        frames.map_or(self.data.is_some(), Frames::has_times)
+    }
 }
 
 impl Payload {

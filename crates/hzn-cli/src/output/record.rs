@@ -30,7 +30,7 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
         };
         match &found.report {
             Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3)),
-            Err(why) => Row::unreadable(&meta, why.clone()),
+            Err(e) => Row::unprocessed(&meta, e.status, e.why.clone()),
         }
     };
     config.each_body().iter().zip(&frame.found).map(row).collect()
@@ -57,7 +57,7 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
     for (record, found) in records.iter_mut().zip(&frame.found) {
         match &found.report {
             Ok(report) => record.candidates = CandidateEdge::from_report(report),
-            Err(why) => record.log.push(LogLine { level: LogLevel::Error, message: why.clone() }),
+            Err(e) => record.log.push(LogLine { level: LogLevel::Error, message: e.why.clone() }),
         }
     }
     records
@@ -73,7 +73,7 @@ pub fn answer(row: &Row) -> evaluate::Answer {
         covariance_rad2: covariance().unwrap_or_default(),
         half_angle_deg: row.half_angle_deg,
     });
-    evaluate::Answer { file: row.file.clone(), time_s: row.time_s, body: row.body.clone(), status: row.status, found }
+    evaluate::Answer { file: row.file.clone(), body: row.body.clone(), status: row.status, found }
 }
 
 /// What a row of frames.csv says, in the form recordings keep it.
@@ -93,7 +93,7 @@ pub fn frame_data(row: &Row, given: &Given) -> FrameData {
     FrameData {
         file: row.file.clone(),
         line: 0,
-        time_s: Some(row.time_s),
+        time_s: row.time_s,
         utc_s: given.utc_s,
         altitude_km: given.altitude_km,
         position_km: given.position_km,

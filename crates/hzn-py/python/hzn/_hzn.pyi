@@ -21,6 +21,7 @@ _Status: TypeAlias = Literal[
     "rejected",
     "truncated",
     "unreadable",
+    "no-altitude",
 ]
 
 __version__: str
@@ -379,8 +380,8 @@ class Report:
         """Name of the picture; empty for an array."""
 
     @property
-    def time_s(self) -> float:
-        """Time of the picture, seconds."""
+    def time_s(self) -> float | None:
+        """Time of the picture, seconds; None where frames.csv gives times, but none of this picture."""
 
     @property
     def body(self) -> str:

@@ -16,8 +16,6 @@ use crate::truth::{Truth, name};
 pub struct Answer {
     /// Name of the picture as the run was given it; a folder before the name does not matter.
     pub file: String,
-    /// Time in seconds.
-    pub time_s: f64,
     /// The body's kind as in sensor.toml.
     pub body: String,
     /// Outcome.

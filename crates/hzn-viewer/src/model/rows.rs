@@ -144,8 +144,8 @@ mod tests {
     use hzn_mcap::RowMeta;
 
     fn row(index: u64, sigma: Option<f64>) -> Row {
-        let meta = RowMeta { index, file: format!("{index}"), time_s: 0.0, body: "earth".into(), altitude_km: None };
-        let mut row = Row::unreadable(&meta, "");
+        let meta = RowMeta { index, file: format!("{index}"), time_s: None, body: "earth".into(), altitude_km: None };
+        let mut row = Row::unprocessed(&meta, Status::Unreadable, "");
         row.status = if sigma.is_some() { Status::Ok } else { Status::NoLimb };
         row.sigma_max_deg = sigma;
         row

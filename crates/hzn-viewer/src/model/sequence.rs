@@ -10,8 +10,8 @@ use hzn_cli::input::Raw;
 pub struct Entry {
     /// Name of its picture.
     pub name: String,
-    /// Time in seconds.
-    pub time_s: f64,
+    /// Time in seconds, where it is known.
+    pub time_s: Option<f64>,
     /// What frames.csv or the recording says about it.
     pub data: Option<FrameData>,
     /// Where its picture is.
@@ -74,12 +74,12 @@ impl Sequence {
     }
     /// How long a frame lasts in seconds, until the next one.
     pub fn duration_s(&self, frame: usize) -> Option<f64> {
-        Some(self.entries.get(frame + 1)?.time_s - self.entries.get(frame)?.time_s)
+        Some(self.entries.get(frame + 1)?.time_s? - self.entries.get(frame)?.time_s?)
     }
     /// Index of the frame nearest in time.
     pub fn nearest(&self, time_s: f64) -> Option<usize> {
-        let apart = |e: &Entry| (e.time_s - time_s).abs();
-        let best = self.entries.iter().enumerate().min_by(|(_, a), (_, b)| apart(a).total_cmp(&apart(b)));
+        let apart = |(i, e): (usize, &Entry)| Some((i, (e.time_s? - time_s).abs()));
+        let best = self.entries.iter().enumerate().filter_map(apart).min_by(|(_, a), (_, b)| a.total_cmp(b));
         best.map(|(i, _)| i)
     }
 }
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn frames_are_found_by_their_time() {
-        let entry = |t: f64| Entry { name: format!("{t}"), time_s: t, data: None, place: Place::Nowhere };
+        let entry = |t: f64| Entry { name: format!("{t}"), time_s: Some(t), data: None, place: Place::Nowhere };
         let s = Sequence { entries: [0.0, 0.5, 2.0].map(entry).to_vec(), ..Sequence::default() };
         assert_eq!(
             (s.nearest(-9.0), s.nearest(0.4), s.nearest(1.3), s.nearest(1e9)),
@@ -112,5 +112,8 @@ mod tests {
         );
         assert_eq!((s.duration_s(1), s.duration_s(2)), (Some(1.5), None));
         assert_eq!(Sequence::default().nearest(0.0), None);
+        let mut s = s;
+        s.entries[1].time_s = None;
+        assert_eq!((s.nearest(0.4), s.duration_s(0), s.duration_s(1)), (Some(0), None, None));
     }
 }

@@ -102,7 +102,7 @@ fn named(response: &Response, name: &str) {
 fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize> {
     let entries = &viewer.sequence.entries;
     // Times of the day are large numbers: the first frame is zero.
-    let start = entries.first().map_or(0.0, |e| e.time_s);
+    let start = entries.iter().find_map(|e| e.time_s).unwrap_or(0.0);
     let dark = ui.visuals().dark_mode;
     let value = |i: usize, of: Of, fresh: bool| {
         let row = if fresh { viewer.rows.newest(i, viewer.body) } else { viewer.rows.recorded(i, viewer.body) }?;
@@ -121,7 +121,7 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
     let plot = framed(("plot", quantity.name), ui.available_height())
         // All of the sequence, whatever part of it has a value.
         .include_x(0.0)
-        .include_x(entries.last().map_or(1.0, |e| (e.time_s - start).max(1e-3)))
+        .include_x(entries.iter().rev().find_map(|e| e.time_s).map_or(1.0, |t| (t - start).max(1e-3)))
         .link_cursor(Id::unique("time"), [true, false])
         .link_axis(Id::unique("time"), [true, false])
         .allow_boxed_zoom(true)
@@ -136,7 +136,7 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
     let response = plot.show(ui, |ui| {
         let column = ui.transform().dvalue_dpos()[0].abs();
         let line = |of: Of, fresh: bool| {
-            parts(entries.len(), column, |i| Some([entries.get(i)?.time_s - start, value(i, of, fresh)?]))
+            parts(entries.len(), column, |i| Some([entries.get(i)?.time_s? - start, value(i, of, fresh)?]))
         };
         for (n, (name, of)) in quantity.lines.iter().enumerate() {
             let colour = theme::line(n, dark);
@@ -154,10 +154,10 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
                 }
             }
         }
-        if let Some(now) = entries.get(viewer.playback.frame()) {
+        if let Some(now_s) = entries.get(viewer.playback.frame()).and_then(|e| e.time_s) {
             // Another colour than the grid's.
             let ink = if dark { theme::LIMB } else { theme::REJECTED };
-            ui.vline(VLine::new("", now.time_s - start).color(ink).width(1.5).allow_hover(false));
+            ui.vline(VLine::new("", now_s - start).color(ink).width(1.5).allow_hover(false));
         }
         ui.response().clicked().then(|| ui.pointer_coordinate()).flatten()
     });

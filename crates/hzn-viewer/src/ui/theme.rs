@@ -59,6 +59,7 @@ pub(super) fn status(status: Status) -> Color32 {
         Status::Rejected => Color32::from_rgb(213, 94, 0),
         Status::Truncated => Color32::from_rgb(150, 130, 220),
         Status::Unreadable => Color32::from_rgb(204, 60, 120),
+        Status::NoAltitude => Color32::from_rgb(140, 86, 75),
     }
 }
 

@@ -117,7 +117,8 @@ fn place(viewer: &Viewer, ui: &mut Ui) {
     let more = if viewer.sequence.complete { "" } else { "…" };
     ui.label(format!("frame {} of {count}{more}", frame + 1));
     if let Some(entry) = viewer.sequence.entries.get(frame) {
-        ui.label(RichText::new(format!("{:.3} s", entry.time_s)).monospace().size(12.0));
+        let time = entry.time_s.map_or("no time".to_owned(), |t| format!("{t:.3} s"));
+        ui.label(RichText::new(time).monospace().size(12.0));
         // A long name leaves room for what stands at the right.
         let room = vec2((ui.available_width() - WORK_WIDTH).max(0.0), 18.0);
         let layout = egui::Layout::left_to_right(egui::Align::Center);
@@ -161,7 +162,7 @@ fn worst(statuses: impl Iterator<Item = Status>) -> Option<Status> {
         Status::TooDark | Status::TooBright | Status::TooFewPoints => 2,
         Status::Ambiguous | Status::Truncated => 3,
         Status::Rejected => 4,
-        Status::Unreadable => 5,
+        Status::Unreadable | Status::NoAltitude => 5,
     };
     statuses.max_by_key(weight)
 }

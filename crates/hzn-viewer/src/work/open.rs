@@ -246,7 +246,10 @@ impl Gather {
                     let name = format!("{}#{:06}", self.name, self.pictures_only);
                     self.pictures_only += 1;
                     let data = self.frames.as_ref().and_then(|f| f.get(&name)).cloned();
-                    let time_s = data.as_ref().and_then(|d| d.time_s).unwrap_or_else(|| place.log_time_s());
+                    let time_s = match &self.frames {
+                        Some(frames) if frames.has_times() => data.as_ref().and_then(|d| d.time_s),
+                        _ => Some(place.log_time_s()),
+                    };
                     out.push((Entry { name, time_s, data, place: Place::Recorded(place) }, Vec::new()));
                 }
                 Found::Report(row, _, given) => {
@@ -282,7 +285,7 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
     teller.tell(Event::Opened(Box::new(opened)));
     let mut batch = Vec::new();
     for index in 0u64.. {
-        let Item { name, time_s, payload, .. } = match source.next() {
+        let mut item = match source.next() {
             None => break,
             Some(Ok(item)) => item,
             Some(Err(e)) => {
@@ -291,13 +294,18 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
                 return Ok(());
             }
         };
+        let timed = item.is_timed(frames.as_ref());
+        let data = item.known(frames.as_ref());
+        let Item { name, time_s, payload, .. } = item;
         let place = match payload {
             Payload::File(path) => Place::File(path),
             Payload::RawFile(path, raw) => Place::RawFile(path, raw),
             _ => Place::Video(index),
         };
-        let data = frames.as_ref().and_then(|f| f.get(&name)).cloned();
-        let time_s = data.as_ref().and_then(|d| d.time_s).or(time_s).unwrap_or(index as f64 / request.fps);
+        let time_s = match timed {
+            true => data.as_ref().and_then(|d| d.time_s),
+            false => time_s.or(Some(index as f64 / request.fps)),
+        };
         let video = matches!(place, Place::Video(_));
         batch.push((Entry { name, time_s, data, place }, Vec::new()));
         // A video is decoded to know its times: what is known by now can be looked at.
@@ -365,7 +373,7 @@ mod tests {
         };
         assert!(opened.sensor.is_none() && opened.notes.iter().any(|n| n.contains("truth.csv")));
         let names: Vec<_> = frames.iter().map(|(e, _)| (e.name.as_str(), e.time_s)).collect();
-        assert_eq!(names, [("a.png", 5.5), ("b.png", 1.0)]);
+        assert_eq!(names, [("a.png", Some(5.5)), ("b.png", None)]);
         assert_eq!(frames[0].0.data.as_ref().unwrap().altitude_km, Some(230.0));
         assert!(note.as_deref().unwrap().contains("c.png"));
     }

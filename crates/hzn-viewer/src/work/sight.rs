@@ -31,8 +31,8 @@ pub struct Sight {
     pub index: usize,
     /// Name of its picture.
     pub name: String,
-    /// Time in seconds.
-    pub time_s: f64,
+    /// Time in seconds, where it is known.
+    pub time_s: Option<f64>,
     /// What was known about it.
     pub data: Option<FrameData>,
     /// The picture, or why there is none.
@@ -189,8 +189,8 @@ pub struct Subject<'a> {
     pub index: usize,
     /// Name of the picture.
     pub name: &'a str,
-    /// Time in seconds.
-    pub time_s: f64,
+    /// Time in seconds, where it is known.
+    pub time_s: Option<f64>,
     /// What is known about it.
     pub data: Option<&'a FrameData>,
     /// The picture.
@@ -222,14 +222,12 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
     let watched = sensor.process_watched(&view, data, &watch);
     // Again for the time alone; but not where the level would come from the first look.
     let plain = if config.tracks() { watched } else { sensor.process(&view, data, None) };
-    let found =
-        |p: hzn_cli::engine::Processed| Found { report: p.report.map_err(|e| e.to_string()), elapsed: p.elapsed };
     let finished = Finished {
         index: index as u64,
         name: name.to_owned(),
         time_s,
         data: data.cloned(),
-        found: plain.into_iter().map(found).collect(),
+        found: plain.into_iter().map(Found::from).collect(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
         tip: None,
@@ -253,7 +251,7 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
             axis: solution.and_then(|s| camera.project(&s.axis)).map(|p| [p.u, p.v]),
             ellipse: solution.map(|s| ellipse(&s, camera)).unwrap_or_default(),
             residuals: solution.zip(chosen).map(|(s, edge)| residuals(&s, edge, camera)).unwrap_or_default(),
-            report: found.report,
+            report: found.report.map_err(|e| e.why),
             edges,
         });
     }

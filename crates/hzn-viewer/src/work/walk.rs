@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use hzn_calib::FrameData;
 use hzn_cli::input::{Item, Source};
 use hzn_mcap::{Index, Pictures};
 
@@ -33,7 +34,9 @@ fn pictures(path: &Path) -> Result<Pictures, String> {
 impl Source for Walk {
     fn next(&mut self) -> Option<anyhow::Result<Item>> {
         let Entry { name, time_s, data, place } = self.entries.next()?;
-        Some(self.reader.payload(&place).map(|payload| Item { name, time_s: Some(time_s), data, payload }))
+        // All that is known of it: nothing is looked for elsewhere.
+        let data = FrameData { file: name.clone(), time_s, ..data.unwrap_or_default() };
+        Some(self.reader.payload(&place).map(|payload| Item { name, time_s, data: Some(data), payload }))
     }
     fn total(&self) -> Option<u64> {
         Some(self.entries.len() as u64)

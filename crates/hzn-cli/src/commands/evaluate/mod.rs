@@ -107,9 +107,10 @@ fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result
 /// Two sequences may have the same names: other times give them away.
 fn warn_of_other_times(rows: &[Row], truth: &[Truth]) {
     let time = |file: &str| truth.iter().find(|t| file.ends_with(t.file.as_str())).map(|t| t.time_s);
-    let other = rows.iter().find_map(|r| time(&r.file).filter(|t| (t - r.time_s).abs() > 1e-3).map(|t| (r, t)));
-    if let Some((row, t)) = other {
+    let apart = |row: &Row| Some((row.time_s?, time(&row.file)?)).filter(|(here, there)| (here - there).abs() > 1e-3);
+    let other = rows.iter().find_map(|row| apart(row).map(|(here, there)| (row, here, there)));
+    if let Some((row, here, there)) = other {
         let what = "if they are not counted from different instants, this is the truth of another sequence";
-        tell::warning(format_args!("{}: at {} s in the results, at {t} s in the truth; {what}", row.file, row.time_s));
+        tell::warning(format_args!("{}: at {here} s in the results, at {there} s in the truth; {what}", row.file));
     }
 }
