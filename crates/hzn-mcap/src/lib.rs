@@ -17,8 +17,10 @@
 //!
 //! First the attachment `sensor.toml` and the metadata `hzn`, then chunks. Pictures stand uncompressed in chunks of
 //! their own, because they are compressed already; everything else is compressed with zstd. A batch is written
-//! pictures first, so a frame whose report is there is there as a whole: a frame counts as finished when its report
-//! is in the file. Every chunk, the data and the summary carry CRCs. Message `sequence` is the frame's index.
+//! pictures first, so a frame whose report is there is there as a whole: a frame counts as finished when the chunk with its
+//! report is whole in the file. A batch is what came within [`FLUSH_INTERVAL`], or 8 MiB of pictures: that much a crash can
+//! cost. A chunk for each frame would cost nothing beside pictures, but ten times the room without them, and a longer summary.
+//! Every chunk, the data and the summary carry CRCs. Message `sequence` is the frame's index.
 //!
 //! | topic | schema | encoding |
 //! |---|---|---|

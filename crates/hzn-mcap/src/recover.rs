@@ -13,7 +13,7 @@ use crate::writer::{Options, Writer, open, part_path, refuse_existing};
 /// What [`recover`] found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Recovered {
-    /// Frames kept. For a recording without `/hzn/report`, 0.
+    /// Records kept, one a frame and body. For a recording without `/hzn/report`, 0.
     pub frames: u64,
     /// The file had been closed properly.
     pub was_complete: bool,
@@ -34,7 +34,7 @@ pub struct Resumed {
     pub writer: Writer,
 }
 
-/// Closes a broken recording: copies every finished frame of `input` to `output`, which must not exist.
+/// Closes a broken recording: copies every finished frame (see the crate's documentation) of `input` to `output`, which must not exist.
 ///
 /// # Errors
 /// `input` cannot be read or is no MCAP; `output` exists or cannot be written.

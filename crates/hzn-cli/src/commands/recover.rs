@@ -9,7 +9,8 @@ use crate::tell;
 
 /// Close a file that a crash left unfinished
 ///
-/// Every finished frame is kept, what was cut off is dropped. To continue the run instead, use `hzn run --resume`.
+/// What is whole in the file is kept: of a recording all batches of frames, of a table all rows. What was cut off is
+/// dropped: at most the frames of the last quarter of a second. To continue the run instead, use `hzn run --resume`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The unfinished file, such as out.mcap.part
@@ -46,15 +47,16 @@ pub(super) fn run(args: &Args) -> Outcome {
             return Err(usage("the output must be another file than the input"));
         }
     }
-    let (frames, lost) = match target {
+    let (rows, lost) = match target {
         output::Target::Mcap => recording(file, &path)?,
         target => output::recover_text(file, &path, target).map_err(|e| match e.kind() {
             std::io::ErrorKind::InvalidData => failed(format!("{}: {e}", file.display())),
             _ => output::cannot(&path, &e),
         })?,
     };
-    let dropped = if lost > 0 { format!(", {lost} bytes of a frame that was cut off dropped") } else { String::new() };
-    tell::line(format_args!("{}: {frames} frames{dropped}", path.display()));
+    let dropped = if lost > 0 { format!(", {lost} bytes of unfinished frames dropped") } else { String::new() };
+    let kept = if rows == 1 { "row" } else { "rows" };
+    tell::line(format_args!("{}: {rows} {kept} kept{dropped}", path.display()));
     if unfinished && args.output.is_none() && file.exists() {
         // Its frames are in the new file, and beside that it would look like another unfinished run.
         std::fs::remove_file(file)?;
@@ -62,6 +64,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
+/// Rows kept, and bytes dropped.
 fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> {
     // The library never replaces a file; so the result is made beside it and then takes its name.
     let beside = path.with_extension("recovering.mcap");
