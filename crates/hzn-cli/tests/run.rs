@@ -235,8 +235,10 @@ fn cut_short(place: &Place, out: &str, end: &str) -> Option<i32> {
     while !grown(&part) && begin.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(2));
     }
-    // Pictures come before results in a recording: give those time to follow.
-    std::thread::sleep(Duration::from_millis(60));
+    if out.ends_with(".mcap") {
+        // Pictures come before results in a recording: give those time to follow.
+        std::thread::sleep(Duration::from_millis(60));
+    }
     let id = child.id().to_string();
     std::process::Command::new("kill").args([end, &id]).status().unwrap();
     child.wait().unwrap().code()
