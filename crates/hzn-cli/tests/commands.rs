@@ -164,3 +164,49 @@ fn the_coefficients_of_braun_and_barf() {
     convert("-1,0,0,0,0").expect(2).says("above 0");
     convert("1000,-900,0,0,0").expect(2).says("monotone");
 }
+
+#[test]
+fn a_telecommand_has_values_that_can_be() {
+    let place = Place::new();
+    let set = |pair: &str| place.command(&["telecommand", &format!("set {pair}")]).output().unwrap();
+    let refused = |pair: &str| {
+        let ran = common::Ran::of(&set(pair), &place.path("")).expect(2);
+        assert!(ran.out.is_empty());
+        ran.err.trim_end().split_once("\": ").unwrap().1.to_owned()
+    };
+    assert_eq!(refused("camera.fx_px nan"), "camera.fx_px cannot be nan: it is a finite number above 0");
+    assert_eq!(refused("gate.max_mean 1.5"), "gate.max_mean cannot be 1.5: it is a finite number from 0 to 1");
+    assert_eq!(refused("binarize.method 7"), "binarize.method cannot be 7: it is one of 0 otsu, 1 fixed, 2 dynamic");
+    assert!(refused("camera.width 640.5").contains("cannot be 640.5: it is a whole number from"));
+    assert!(refused("reject.threshold_px -1").contains("above 0, to 1000"));
+    assert!(refused("camera.theta_max_deg 200").contains("or NaN where it is left out"));
+    assert!(refused("telemetry.housekeeping_every 0").contains("from 1 to 65535"));
+    assert!(refused("select.max_rms_px much").contains("cannot be much: it is"));
+    assert!(refused("200 inf").contains("mask corners cannot be inf"));
+    place.run(&["telecommand", "known -5"]).expect(2).says("the altitude cannot be -5 km: above 0");
+    place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("no finite number of kilometres");
+    // A choice by its name is the same command as by its number, and what may be left out may be NaN.
+    let (named, numbered) = (set("binarize.method fixed"), set("50 1"));
+    assert!(named.status.success() && named.stdout == numbered.stdout);
+    for pair in ["camera.theta_max_deg NaN", "1000 -3.5", "camera.k -0.1", "200 4 201 3 body.kind moon"] {
+        assert!(set(pair).status.success(), "{pair}");
+    }
+}
+
+#[test]
+fn the_farthest_corner_of_any_lens() {
+    let place = Place::new();
+    let corner = |sensor: &str| {
+        place.write("c.toml", sensor.as_bytes());
+        let shown = place.run(&["camera", "show", "c.toml"]).expect(0).out;
+        let text = shown.split("farthest corner ").nth(1).unwrap().split(' ').next().unwrap().to_owned();
+        let last = shown.trim_end().lines().last().unwrap().split_whitespace().next().unwrap().to_owned();
+        assert_eq!(text, last, "{shown}");
+        text.parse::<f64>().unwrap()
+    };
+    // 320 x 240 with a focal length of 300.
+    let exact = (200.0f64 / 300.0).atan().to_degrees();
+    assert!((corner(common::SENSOR) - exact).abs() < 0.006);
+    let brown = common::SENSOR.replace("\"pinhole\"", "\"brown-conrady\"\nk = [0.0, 0.0, 0.0, 0.0, 0.0]");
+    assert!((corner(&brown) - exact).abs() < 0.006);
+}

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use hzn_calib::keys::Limits;
 use hzn_flight::bytes::Writer;
 use hzn_flight::messages::{Function, Mode};
 use hzn_flight::packet::{self, Apid};
@@ -16,6 +17,7 @@ use crate::output;
 /// Each command is one argument:
 ///   "mode standby|flight|safe|shut-down"
 ///   "set NAME VALUE [NAME VALUE]..."   names as in sensor.toml, or numbers; all or none
+///                                      (NaN: left out)
 ///   "load sensor.toml"                 every parameter of a sensor
 ///   "read NAME [NAME]..."
 ///   "known ALTITUDE_KM [X_KM Y_KM Z_KM]"
@@ -104,7 +106,8 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
             }
             let mut pairs = Vec::new();
             for pair in rest.chunks(2) {
-                pairs.push((parameter(pair[0]).map_err(|e| bad(&e))?, number(pair[1])?));
+                let id = parameter(pair[0]).map_err(|e| bad(&e))?;
+                pairs.push((id, value(id, pair[1]).map_err(|e| bad(&e))?));
             }
             user(&mut |w| set(w, &pairs))
         }
@@ -120,6 +123,12 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
         }
         Function::SetKnown => {
             let km = rest.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
+            if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
+                return Err(bad(&format!("{x} is no finite number of kilometres")));
+            }
+            if let Some(h) = km.first().filter(|h| **h <= 0.0) {
+                return Err(bad(&format!("the altitude cannot be {h} km: above 0")));
+            }
             let [h, x, y, z] = match km[..] {
                 [h] => [h, f64::NAN, f64::NAN, f64::NAN],
                 [h, x, y, z] => [h, x, y, z],
@@ -152,6 +161,60 @@ fn parameter(word: &str) -> Result<u16, String> {
         let near = hzn_calib::nearest(word, names).map(|n| format!("; did you mean {n}?"));
         format!("{word} is no parameter{}", near.unwrap_or_default())
     })
+}
+
+/// A value that this parameter can have, as a number or by the name of a choice. Whether it goes together with the others is
+/// seen by the flight computer, which has them.
+fn value(id: u16, word: &str) -> Result<f64, String> {
+    let name = parameters::name(id).unwrap_or("?");
+    let cannot = |what: String| Err(format!("{name} cannot be {word}: it is {what}"));
+    let number = word.parse::<f64>();
+    let taken = |x: f64| Parameters::idle().set(id, x).is_ok();
+    let choices = choices(id, name);
+    if !choices.is_empty() {
+        let named = choices.iter().find(|(choice, _)| choice == word).map(|(_, number)| *number);
+        if let Some(number) = named.or(number.ok().filter(|x| taken(*x))) {
+            return Ok(number);
+        }
+        let each: Vec<String> = choices.iter().map(|(choice, number)| format!("{number} {choice}")).collect();
+        return cannot(format!("one of {}", each.join(", ")));
+    }
+    let limits = match hzn_calib::keys::all().iter().find(|key| key.path() == name).map(|key| &key.limits) {
+        Some(Limits::Number { low, above, high }) => Some((*low, *above, *high)),
+        _ if name == "telemetry.housekeeping_every" => Some((1.0, false, 65535.0)),
+        _ => None,
+    };
+    let within = |x: f64| limits.is_none_or(|(low, above, high)| x <= high && if above { x > low } else { x >= low });
+    // The corners of a mask are set one after another, and those before are not here.
+    let of_mask = name.starts_with("mask");
+    let optional = !of_mask && taken(f64::NAN);
+    match number {
+        Ok(x) if x.is_nan() && optional => return Ok(x),
+        Ok(x) if x.is_finite() && within(x) && (of_mask || taken(x)) => return Ok(x),
+        _ => {}
+    }
+    let kind = if of_mask || taken(0.5) { "a finite number" } else { "a whole number" };
+    let range = match limits {
+        Some((low, true, high)) if high.is_finite() => format!(" above {low}, to {high}"),
+        Some((low, true, _)) => format!(" above {low}"),
+        Some((low, false, high)) if high.is_finite() => format!(" from {low} to {high}"),
+        Some((low, false, _)) => format!(" from {low} on"),
+        None => String::new(),
+    };
+    cannot(format!("{kind}{range}{}", if optional { ", or NaN where it is left out" } else { "" }))
+}
+
+/// The choices of a parameter that has some: names as in sensor.toml, with their numbers.
+fn choices(id: u16, name: &str) -> Vec<(String, f64)> {
+    let of = |number: u8| {
+        let mut parameters = Parameters::idle();
+        parameters.set(id, number.into()).ok()?;
+        let table = toml::Table::try_from(parameters.sensor).ok()?;
+        let (section, key) = name.split_once('.')?;
+        Some((table.get(section)?.get(key)?.as_str()?.to_owned(), number.into()))
+    };
+    // None has as many.
+    (0..16).filter_map(of).collect()
 }
 
 /// Every parameter of a sensor: one command, so that they are taken all or none.

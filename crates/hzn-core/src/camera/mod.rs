@@ -156,7 +156,8 @@ impl<T: Real> Camera<T> {
     pub fn height(&self) -> u16 {
         self.height
     }
-    /// Largest angle off axis in use, radians: the image circle or the farthest corner.
+    /// Largest angle off axis in use, radians: the image circle or the farthest corner; of `brown-conrady` 1 % of the radius
+    /// beyond the corner, which tangential terms move.
     pub fn theta_max_rad(&self) -> T {
         self.theta_max
     }

@@ -65,16 +65,14 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
         line("coefficients", format!("{:?}", c.k.as_slice()));
     }
     line("field of view", field_of_view(c, &camera));
+    let end = end_rad(c, &camera);
     line(
         "image circle",
         match camera.image_circle_px() {
             Some((_, a, b)) => {
                 format!("{:.2} deg off axis, {a:.1} x {b:.1} px about the centre", camera.theta_max_rad().to_degrees())
             }
-            None => format!(
-                "does not cut the picture (farthest corner {:.2} deg off axis)",
-                camera.theta_max_rad().to_degrees()
-            ),
+            None => format!("does not cut the picture (farthest corner {:.2} deg off axis)", end.to_degrees()),
         },
     );
     line(
@@ -96,7 +94,7 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
         }
     }
     out.push_str("\n off axis [deg]   distance from centre [px]   px a degree\n");
-    let theta_max = camera.theta_max_rad();
+    let theta_max = end;
     let steps = 12;
     for i in 0..=steps {
         let theta = theta_max * f64::from(i) / f64::from(steps);
@@ -117,9 +115,22 @@ fn radius_px(camera: &Camera<f64>, theta: f64) -> f64 {
     point.map_or(f64::NAN, |p| (p.u - centre.u).hypot(p.v - centre.v))
 }
 
+/// A hair within the picture's outer corner: without an image circle the lens ends at the farthest one.
+const SIDE_PX: f64 = -0.5 + 1e-6;
+
+/// How far off axis the picture shows anything, radians: the image circle, or the farthest corner.
+fn end_rad(c: &camera::Config, camera: &Camera<f64>) -> f64 {
+    let (right, bottom) = (f64::from(c.width) - 1.0 - SIDE_PX, f64::from(c.height) - 1.0 - SIDE_PX);
+    let corners = [(SIDE_PX, SIDE_PX), (right, SIDE_PX), (SIDE_PX, bottom), (right, bottom)];
+    let off_axis = |(u, v)| camera.unproject(ImagePoint { u, v }).map(|ray| ray.xyz()[2].clamp(-1.0, 1.0).acos());
+    match camera.image_circle_px() {
+        Some(_) => camera.theta_max_rad(),
+        None => corners.into_iter().filter_map(off_axis).reduce(f64::max).unwrap_or(camera.theta_max_rad()),
+    }
+}
+
 fn field_of_view(c: &camera::Config, camera: &Camera<f64>) -> String {
-    // A hair inside: without an image circle the lens ends at the farthest corner.
-    let side = -0.5 + 1e-6;
+    let side = SIDE_PX;
     let (right, bottom) = (f64::from(c.width) - 1.0 - side, f64::from(c.height) - 1.0 - side);
     let angle = |a: (f64, f64), b: (f64, f64)| {
         let ray = |(u, v)| camera.unproject(ImagePoint { u, v });
