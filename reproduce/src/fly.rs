@@ -155,14 +155,14 @@ pub(crate) fn wrong(cases: &[Case]) -> String {
         match c.limb {
             true if m.angle_deg > GROSS_DEG => {
                 let (error, px) = (m.angle_deg, c.limb_in_view_px.unwrap_or(f64::NAN));
-                let place = c.off_nadir_deg;
-                Some(format!(
-                    "{} ({error:.0}° off, sigma {sigma:.2}°; {place:.0}° off nadir, limb of {px:.0} px)",
-                    c.file
-                ))
+                let (place, name) = (c.off_axis_deg, c.off_axis_name());
+                Some(format!("{} ({error:.0}° off, sigma {sigma:.2}°; {place:.0}° {name}, limb of {px:.0} px)", c.file))
             }
             true => None,
-            false => Some(format!("{} (no limb, sigma {sigma:.2}°; {:.0}° off nadir)", c.file, c.off_nadir_deg)),
+            false => {
+                let (place, name) = (c.off_axis_deg, c.off_axis_name());
+                Some(format!("{} (no limb, sigma {sigma:.2}°; {place:.0}° {name})", c.file))
+            }
         }
     });
     let mut wrong: Vec<String> = wrong.collect();

@@ -34,6 +34,8 @@ fn each_body_has_its_row() {
         let body = ["earth-sphere", "sun"][i % 2];
         assert_eq!((cell(row, "index"), cell(row, "body")), ((i / 2).to_string().as_str(), body));
         assert_eq!(cell(row, "status"), "ok", "{row:?}");
+        // There is no altitude above the Sun.
+        assert_eq!(cell(row, "altitude_km"), ["400.0", ""][i % 2]);
     }
     // The sun where it was drawn; its level is at the top of the edge, which looks wide from there.
     let [x, y, z] = ["axis_x", "axis_y", "axis_z"].map(|n| cell(&rows[1], n).parse::<f64>().unwrap());
@@ -88,6 +90,8 @@ fn frames_of_several_bodies_are_kept_whole() {
 fn explain_tells_of_each_body() {
     let place = earth_and_sun(1);
     let told = place.run(&["explain", "in/0000.png", "--overlay", "o.png"]).expect(0).out;
+    assert!(told.contains("half-angle (altitude 400 km, limb at"), "{told}");
+    assert!(told.contains("sun, cone of 0.2665 deg half-angle, as seen from about the Earth\n"), "{told}");
     assert_eq!(told.matches("status      ok").count(), 2, "{told}");
     assert!(told.contains("earth-sphere, cone of") && told.contains("sun, cone of 0.26"), "{told}");
     assert!(told.contains("(fixed)") && told.contains("(otsu)"), "{told}");

@@ -152,11 +152,10 @@ impl Sensor {
         })??;
         let traces = traces.map(|t| t.each).unwrap_or_default();
         let report = |(which, (processed, body)): (usize, (hzn_cli::engine::Processed, &hzn_core::body::Config))| {
-            let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
             let meta = RowMeta {
                 time_s: Some(data.time_s.unwrap_or(0.0)),
                 body: hzn_mcap::body_name(body.kind).to_owned(),
-                altitude_km: data.position_km.and_then(at).or(data.altitude_km).or(body.altitude_km),
+                altitude_km: hzn_cli::output::altitude_km(Some(&data), body),
                 ..RowMeta::default()
             };
             let found = processed.report.map_err(errors::config)?;

@@ -157,7 +157,7 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
     for (sensor, cases) in sensors.iter().zip(&flown) {
         for (name, from, to) in [("0–90°", 0.0, 90.0), ("90–120°", 90.0, 180.0)] {
             let part: Vec<_> =
-                cases.iter().filter(|c| c.off_nadir_deg >= from && c.off_nadir_deg < to).cloned().collect();
+                cases.iter().filter(|c| c.off_axis_deg >= from && c.off_axis_deg < to).cloned().collect();
             let row = vec![sensor.name.clone(), name.to_owned()];
             rows.push(row.into_iter().chain(cells(&evaluate(&part))).collect());
         }

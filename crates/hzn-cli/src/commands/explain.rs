@@ -227,26 +227,17 @@ impl Told<'_> {
 
     fn expected(&self) -> String {
         let body = self.body;
-        let given = self.data.and_then(|d| d.altitude_km).or(body.altitude_km);
-        let from = match self.data {
-            Some(d) if d.position_km.is_some() => {
-                let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
-                let km = d.position_km.and_then(at);
-                let at = km.map(|km| format!(" at {km:.2} km")).unwrap_or_default();
-                format!("position{at} given with the picture")
-            }
-            Some(d) if d.altitude_km.is_some() => {
-                format!("altitude {} km given with the picture", given.unwrap_or_default())
-            }
-            _ => given.map_or("no altitude needed".to_owned(), |km| format!("altitude {km} km")),
+        let cone =
+            format!("{}, cone of {:.4} deg half-angle", hzn_mcap::body_name(body.kind), self.half_angle.to_degrees());
+        let Some(km) = output::altitude_km(self.data, body) else {
+            return format!("{cone}, as seen from about the Earth");
         };
-        format!(
-            "{}, cone of {:.4} deg half-angle ({from}, limb at {} +- {} km)",
-            hzn_mcap::body_name(body.kind),
-            self.half_angle.to_degrees(),
-            body.limb_height_km,
-            body.limb_height_sigma_km
-        )
+        let from = match self.data {
+            Some(d) if d.position_km.is_some() => format!("position at {km:.2} km given with the picture"),
+            Some(d) if d.altitude_km.is_some() => format!("altitude {km} km given with the picture"),
+            _ => format!("altitude {km} km"),
+        };
+        format!("{cone} ({from}, limb at {} +- {} km)", body.limb_height_km, body.limb_height_sigma_km)
     }
 
     fn level(&self) -> String {

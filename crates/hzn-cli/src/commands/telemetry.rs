@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use hzn_core::body::Kind;
 use hzn_flight::answer::Answer;
 use hzn_flight::bytes::Reader;
 use hzn_flight::messages::{
@@ -226,12 +227,14 @@ impl Heard {
         };
         self.answers += 1;
         let Some(sink) = sink else { return Ok(()) };
+        let body = Parameters::body(exposure.body);
+        let altitude_km = (!exposure.altitude_m.is_nan()).then(|| f64::from(exposure.altitude_m) * 1e-3);
         let meta = RowMeta {
             index: u64::from(exposure.picture).saturating_sub(1),
             file: format!("picture-{:06}", exposure.picture),
             time_s: Some(time_s),
-            body: Parameters::body(exposure.body).map_or("?", hzn_mcap::body_name).to_owned(),
-            altitude_km: (!exposure.altitude_m.is_nan()).then(|| f64::from(exposure.altitude_m) * 1e-3),
+            body: body.map_or("?", hzn_mcap::body_name).to_owned(),
+            altitude_km: altitude_km.filter(|_| !matches!(body, Some(Kind::Sun | Kind::Moon))),
         };
         let row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)));
         let mut record = FrameRecord::new(row);

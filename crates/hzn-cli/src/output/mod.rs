@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_mcap::{Contents, Options, Reader, part_path};
 
-pub use record::{annotations, answer, fitted, frame_data, records, rows};
+pub use record::{altitude_km, annotations, answer, fitted, frame_data, records, rows};
 
 use crate::engine::{Finished, Sink};
 use crate::exit::{Stop, failed, usage};

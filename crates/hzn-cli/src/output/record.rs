@@ -15,18 +15,27 @@ use hzn_sim::evaluate;
 use crate::engine::{Finished, Found, Trace};
 use crate::overlay::limb;
 
+/// The altitude above a body, kilometres: that of the position, else as given; of Sun and Moon there is none.
+pub fn altitude_km(data: Option<&FrameData>, body: &body::Config) -> Option<f64> {
+    if body.half_angle_is_free() {
+        return None;
+    }
+    let own = data.and_then(|d| {
+        let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
+        d.position_km.and_then(at).or(d.altitude_km)
+    });
+    own.or(body.altitude_km)
+}
+
 /// The rows of a frame, one for each body.
 pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
-    let data = frame.data.as_ref();
-    let of_position =
-        |body: &body::Config| hzn_calib::frames::altitude_at_km(data?.position_km?, body.kind, body.mean_radius_km());
     let row = |(body, found): (&body::Config, &Found)| {
         let meta = RowMeta {
             index: frame.index,
             file: frame.name.clone(),
             time_s: frame.time_s,
             body: hzn_mcap::body_name(body.kind).to_owned(),
-            altitude_km: of_position(body).or(data.and_then(|d| d.altitude_km)).or(body.altitude_km),
+            altitude_km: altitude_km(frame.data.as_ref(), body),
         };
         match &found.report {
             Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3)),

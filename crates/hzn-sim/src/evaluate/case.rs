@@ -35,6 +35,11 @@ pub struct Found {
     pub half_angle_deg: Option<f64>,
 }
 
+/// Sun and Moon, which have no nadir.
+fn in_the_sky(body: &str) -> bool {
+    body == name(Kind::Sun) || body == name(Kind::Moon)
+}
+
 /// One picture and body: what was there, and what was made of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Case {
@@ -48,14 +53,21 @@ pub struct Case {
     pub limb: bool,
     /// Outcome, by its name.
     pub status: &'static str,
-    /// Altitude in kilometres.
-    pub altitude_km: f64,
+    /// Altitude in kilometres; of Sun and Moon there is none.
+    pub altitude_km: Option<f64>,
     /// Angle of the optical axis from the body's direction in degrees.
-    pub off_nadir_deg: f64,
+    pub off_axis_deg: f64,
     /// Length in pixels of the limb within the picture, lit or not; `None` where the camera is not known.
     pub limb_in_view_px: Option<f64>,
     /// How far off the answer is, where there is one.
     pub miss: Option<Miss>,
+}
+
+impl Case {
+    /// What [`Self::off_axis_deg`] is called with this body.
+    pub fn off_axis_name(&self) -> &'static str {
+        if in_the_sky(&self.body) { "off axis" } else { "off nadir" }
+    }
 }
 
 /// How far an answer is off.
@@ -200,8 +212,8 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
             time_s: t.time_s,
             limb: t.has_limb(),
             status: answer.status.name(),
-            altitude_km: t.altitude_km,
-            off_nadir_deg: axis[0].hypot(axis[1]).atan2(axis[2]).to_degrees(),
+            altitude_km: (!in_the_sky(&t.body)).then_some(t.altitude_km),
+            off_axis_deg: axis[0].hypot(axis[1]).atan2(axis[2]).to_degrees(),
             limb_in_view_px: camera.map(|c| limb_in_view_px(c, axis, t.half_angle_deg.to_radians())),
             miss: answer.found.and_then(|f| {
                 // The Sun blooms: its size is no measure.

@@ -33,7 +33,7 @@ pub struct Evaluation {
     pub honesty: Option<Honesty>,
     /// HORACE's own criteria.
     pub horace: Horace,
-    /// The same by altitude, by angle off nadir, by length of limb in view. One that does not vary is left out.
+    /// The same by altitude, by angle off nadir (of Sun and Moon: off axis), by length of limb in view. One that does not vary is left out.
     pub groups: Vec<Group>,
 }
 
@@ -118,6 +118,7 @@ impl Evaluation {
             *unanswered.entry(case.status).or_default() += 1;
         }
         let hits = with_limb.iter().filter(|c| horace_counts(c)).count();
+        let off_axis = cases.first().map_or("off axis", |c| c.off_axis_name());
         let success = hits as f64 / with_limb.len() as f64;
         Self {
             body: cases.first().map(|c| c.body.clone()).unwrap_or_default(),
@@ -134,8 +135,8 @@ impl Evaluation {
                 false_positives: (without > 0).then(|| false_answers as f64 / without as f64),
             },
             groups: [
-                Group::of("altitude", "km", &with_limb, |c| Some(c.altitude_km)),
-                Group::of("off nadir", "deg", &with_limb, |c| Some(c.off_nadir_deg)),
+                Group::of("altitude", "km", &with_limb, |c| c.altitude_km),
+                Group::of(off_axis, "deg", &with_limb, |c| Some(c.off_axis_deg)),
                 Group::of("limb in view", "px", &with_limb, |c| c.limb_in_view_px),
             ]
             .into_iter()

@@ -43,7 +43,7 @@ fn errors_by_axis_and_their_sigmas() {
     assert!((m.about_deg[0] - 0.1).abs() < 1e-5 && (m.about_deg[2] + 0.4).abs() < 1e-5 && m.about_deg[1].abs() < 1e-5);
     // One sigma about x and two about z: 1 + 4.
     assert!((m.nees.unwrap() - 5.0).abs() < 1e-3 && (m.sigma_max_deg - 0.2).abs() < 1e-5);
-    assert_eq!((m.half_angle_ratio, cases[0].off_nadir_deg), (Some(1.0), 90.0));
+    assert_eq!((m.half_angle_ratio, cases[0].off_axis_deg), (Some(1.0), 90.0));
 }
 
 #[test]
@@ -122,6 +122,9 @@ fn bodies_are_evaluated_apart_and_unasked_ones_passed_over() {
     let cases = pair(&[of("earth", 0.1), of("moon", 0.5)], &[body("earth"), body("sun"), body("moon")], None).unwrap();
     let all = Evaluation::by_body(&cases);
     assert_eq!(all.iter().map(|e| (e.body.as_str(), e.frames)).collect::<Vec<_>>(), [("earth", 1), ("moon", 1)]);
+    // The Moon has no nadir, and a camera no altitude above it.
+    let names: Vec<_> = cases.iter().map(|c| (c.altitude_km.is_some(), c.off_axis_name())).collect();
+    assert_eq!(names, [(true, "off nadir"), (false, "off axis")]);
 }
 
 #[test]

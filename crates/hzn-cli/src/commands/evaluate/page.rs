@@ -83,8 +83,8 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
     out.extend(calibration(&cases));
     for group in &e.groups {
         let x: &dyn Fn(&Case) -> Option<f64> = match group.name {
-            "altitude" => &|c| Some(c.altitude_km),
-            "off nadir" => &|c| Some(c.off_nadir_deg),
+            "altitude" => &|c| c.altitude_km,
+            "off nadir" | "off axis" => &|c| Some(c.off_axis_deg),
             _ => &|c| c.limb_in_view_px,
         };
         out.push(

@@ -150,7 +150,8 @@ pub(super) fn worst_line(case: &Case) -> String {
         (Some(_), false) => "answered without a limb in view".into(),
         (None, _) => format!("not answered: {}", case.status),
     };
-    let place = format!("{:.0} km, {:.0} deg off nadir", case.altitude_km, case.off_nadir_deg);
+    let altitude = case.altitude_km.map(|km| format!("{km:.0} km, ")).unwrap_or_default();
+    let place = format!("{altitude}{:.0} deg {}", case.off_axis_deg, case.off_axis_name());
     format!("{} ({}): {what}; {place}", case.file, case.body)
 }
 
