@@ -81,6 +81,10 @@ impl Progress {
     pub(crate) fn frames(&self) -> u64 {
         self.frames
     }
+    /// Whether anything was found.
+    pub(crate) fn any_answered(&self) -> bool {
+        self.bodies.iter().any(|counts| counts[Status::Ok as usize] > 0)
+    }
     /// Whether a picture could not be processed.
     pub(crate) fn any_unprocessed(&self) -> bool {
         let none = [Status::Unreadable, Status::NoAltitude];

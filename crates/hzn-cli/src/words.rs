@@ -1,7 +1,7 @@
 //! What happened to a picture, in words and numbers for people.
 
 use hzn_core::pipeline::Verdict;
-use hzn_core::status::Status;
+use hzn_core::status::{Stage, Status};
 use hzn_core::{Report, Solution, select};
 
 /// What a verdict means, with the limit that was not met.
@@ -59,12 +59,14 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     match r.status {
         Status::TooDark => tips.push("the picture is darker than gate.min_mean allows: lower it, or expose longer"),
         Status::TooBright => tips.push("the picture is brighter than gate.max_mean allows: raise it, or expose shorter"),
-        Status::TooFewPoints => tips.push("edges were found, but all are short: lower candidates.min_points"),
+        Status::TooFewPoints => tips.push("only short edges were found, as of stars, noise or hot pixels: is the body in view? if it is as small as that, lower candidates.min_points"),
         Status::Truncated => tips.push("the picture has more edges than it may cost to look at: raise limits.max_work, mask structure in view, or set a level above the clouds (binarize.method = \"fixed\")"),
         Status::Ambiguous => tips.push("two directions fit about equally well: mask structure in view (mask.polygons_px)"),
         _ => {}
     }
-    if r.candidates.is_empty() && matches!(r.status, Status::NoLimb) {
+    if r.status == Status::NoLimb && r.stage == Stage::Binarize {
+        tips.push("the picture has one brightness all over: nothing is in view, or the exposure does not show it");
+    } else if r.candidates.is_empty() && r.status == Status::NoLimb {
         tips.push(
             "no edge is long enough: is the limb in view? try another level (binarize.scale, or method = \"fixed\")",
         );

@@ -157,3 +157,35 @@ fn unwritable_folders_are_said() {
     }
     place.run(&["run", "in", "--overlay", "file"]).expect(1);
 }
+
+#[test]
+fn pictures_of_nothing_come_with_advice() {
+    let place = Place::new();
+    image::GrayImage::new(320, 240).save(place.path("in/black.png")).unwrap();
+    let mut stars = image::GrayImage::from_pixel(320, 240, image::Luma([2]));
+    (0..60u32).for_each(|i| stars.put_pixel(i * 97 % 320, i * 53 % 240, image::Luma([200])));
+    stars.save(place.path("in/stars.png")).unwrap();
+    let told = |name: &str| place.run(&["explain", name]).expect(0).out;
+    assert!(told("in/black.png").contains("one brightness all over: nothing is in view"));
+    assert!(told("in/stars.png").contains("as of stars, noise or hot pixels"), "{}", told("in/stars.png"));
+    place.run(&["run", "in"]).expect(0).says("nothing was found in any picture").says("hzn explain in/black.png\n");
+    limb(320, 240, 0.0).save(place.path("in/z.png")).unwrap();
+    assert!(!place.run(&["run", "in"]).expect(0).err.contains("nothing was found"));
+}
+
+#[test]
+fn the_length_of_headerless_pictures_is_told() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("raw")).unwrap();
+    for (name, bytes) in [("short", 76_000), ("three", 230_400), ("more", 76_812)] {
+        place.write(&format!("raw/{name}.raw"), &vec![0; bytes]);
+    }
+    let ran = place.run(&["run", "raw", "--raw", "320x240:mono8", "-s", "in/sensor.toml"]).expect(3);
+    for text in [
+        "short.raw: 76000 bytes, but a picture of 320x240:mono8 has 76800: 800 less",
+        "three.raw: 230400 bytes, but a picture of 320x240:mono8 has 76800: these are 3 pictures",
+        "more.raw: 76812 bytes, but a picture of 320x240:mono8 has 76800: 12 bytes more",
+    ] {
+        assert!(ran.err.contains(text), "{text} in {}", ran.err);
+    }
+}

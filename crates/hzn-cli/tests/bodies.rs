@@ -67,7 +67,7 @@ fn frames_of_several_bodies_are_kept_whole() {
     let rows = without_time(&place.read("a.csv"));
     for name in ["a.csv", "a.mcap"] {
         let info = place.run(&["info", name]).expect(0).out;
-        assert!(info.starts_with("frames           3\n"), "{info}");
+        assert!(info.contains("frames           3\n"), "{info}");
         assert_eq!(info.matches("ok               3 (100.0 %)").count(), 2, "{info}");
     }
     place.run(&["export", "a.mcap", "-o", "b.csv"]).expect(0);

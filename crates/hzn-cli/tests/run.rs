@@ -33,7 +33,7 @@ fn all_outputs_hold_the_same_rows() {
     assert_eq!(rows.len(), 6);
     assert_eq!(without_time(&place.read("b.csv")), rows);
     assert_eq!(without_time(&place.read("c.csv")), rows);
-    place.run(&["export", "a.mcap", "--images", "pics", "--overlay", "drawn"]).expect(0).says("6 pictures");
+    place.run(&["export", "a.mcap", "--images", "pics", "--overlay", "drawn"]).expect(0).says("6 pictures, 6 overlays");
     assert_eq!(std::fs::read(place.path("pics/0000.png")).unwrap(), std::fs::read(place.path("in/0000.png")).unwrap());
     assert!(place.path("drawn/0005.png").exists());
     let info = place.run(&["info", "a.mcap"]).expect(0).out;
@@ -126,7 +126,10 @@ fn headerless_pictures() {
     let ran = place.run(&["run", "raw", "--raw", "320x240:mono8", "-s", "in/sensor.toml"]).expect(3);
     let rows = without_time(&ran.out);
     assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("ok", "unreadable"));
-    assert_eq!(cell(&rows[1], "detail"), "153600 bytes, but 320x240:mono8 has 76800");
+    assert_eq!(
+        cell(&rows[1], "detail"),
+        "153600 bytes, but a picture of 320x240:mono8 has 76800: these are 2 pictures; give each a file of its own; it fits mono10, mono12, mono16"
+    );
     let ran = place.run(&["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml"]).expect(0);
     let found = without_time(&ran.out);
     assert_eq!(cell(&found[0], "axis_y")[..4], cell(&rows[0], "axis_y")[..4]);

@@ -60,6 +60,23 @@ fn a_scene_becomes_pictures_that_the_sensor_answers() {
     let sensor = std::fs::read_to_string(at.join("out/sensor.toml")).unwrap();
     assert!(sensor.contains("measured on 32 other pictures") && sensor.contains("sigma_px"), "{sensor}");
 
+    // Every file says what it is.
+    for (file, kind, more) in [
+        ("scene.toml", "scene, for `hzn simulate FILE`", "5, at "),
+        ("sensor.toml", "sensor.toml", "lens "),
+        ("imu.csv", "imu.csv, rates and accelerations", "rows             3501\n"),
+        ("gnss.csv", "gnss.csv, fixes", "rows             351\n"),
+        ("frames.csv", "frames.csv, what is known", "pictures         5\n"),
+        ("truth.csv", "truth of pictures", "limb in view in 5 of 5"),
+        ("small-00000.png", "PNG picture of", "1 channel of 8 bits"),
+    ] {
+        let (code, told, stderr) = hzn(at, "1", &["info", &format!("out/{file}")]);
+        assert_eq!(code, 0, "{file}: {stderr}");
+        assert!(told.starts_with(&format!("file             {kind}")) && told.contains(more), "{file}: {told}");
+    }
+    std::fs::write(at.join("any.csv"), "a,b\n1,2\n").unwrap();
+    assert!(hzn(at, "1", &["info", "any.csv"]).1.starts_with("file             table that is none of hzn's"));
+
     // The sensor takes them as they are.
     let (code, stdout, stderr) = hzn(at, "2", &["run", "out"]);
     assert_eq!((code, stdout.lines().count()), (0, 6), "{stderr}");

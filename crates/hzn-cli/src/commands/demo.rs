@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     for dir in [&flight_dir, &iss_dir] {
         std::fs::create_dir_all(dir).map_err(|e| output::cannot(dir, &e))?;
     }
-    tell::line(format_args!("rendering {} pictures of a rocket flight ...", args.count));
+    tell::line(format_args!("rendering {} of a rocket flight ...", tell::counted(args.count.into(), "picture")));
     let flight = hzn_sim::flight::rocket(1280, 720, usize::from(args.count), 1);
     let truth = write_flight(&flight, &flight_dir)?;
 

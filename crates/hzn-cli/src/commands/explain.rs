@@ -139,8 +139,12 @@ impl Told<'_> {
         line(
             "picture",
             format!(
-                "{}: {} x {} px, {} channel(s) of {} bits{colours}",
-                self.name, l.width, l.height, l.channels, l.bits
+                "{}: {} x {} px, {} of {} bits{colours}",
+                self.name,
+                l.width,
+                l.height,
+                tell::counted(l.channels.into(), "channel"),
+                l.bits
             ),
         );
         line("expected", self.expected());
@@ -251,6 +255,7 @@ impl Told<'_> {
             (Some((level, mean, n)), _) => {
                 format!("level {level} of {full} ({method}), mean {mean:.1} over a sample of {n} pixels")
             }
+            (None, Status::NoLimb) if self.report.level == 0 => format!("all alike: no level ({method})"),
             (None, _) => format!("level {} of {full} ({method})", self.report.level),
         }
     }

@@ -77,8 +77,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(table) = table {
         table.finish()?;
     }
-    let with = if pictures { format!(", {images} pictures") } else { String::new() };
-    tell::line(format_args!("{rows} rows{with}"));
+    let mut written: Vec<String> = args.output.iter().map(|_| tell::counted(rows, "row")).collect();
+    written.extend(args.images.iter().map(|_| tell::counted(images, "picture")));
+    written.extend(args.overlay.iter().map(|_| tell::counted(images, "overlay")));
+    tell::line(written.join(", "));
     Ok(Exit::Done)
 }
 

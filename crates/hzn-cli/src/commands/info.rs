@@ -5,12 +5,16 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::status::Status;
 use hzn_mcap::{Contents, Reader, Row};
+use hzn_sim::Scenario;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::input::{self, ending, picture};
 use crate::tell;
 
-/// Summarise a file: results (.mcap, .csv, .jsonl), a sensor.toml, a frames.csv, a truth.csv, a picture
+/// Say what a file is, and what is in it
+///
+/// Results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, frames.csv, truth.csv, imu.csv, gnss.csv, a
+/// picture.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file
@@ -39,7 +43,7 @@ fn recording(file: &Path) -> Result<String, Stop> {
     if summary.frames == 0 && reader.sensor_toml().is_none() {
         return foreign(file);
     }
-    let mut out = summary.text();
+    let mut out = what("recording of hzn run") + &summary.text();
     for (key, value) in reader.metadata() {
         out.push_str(&format!("{key:<16} {value}\n"));
     }
@@ -69,7 +73,7 @@ fn foreign(file: &Path) -> Result<String, Stop> {
         count += 1;
         span = Some(span.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
     }
-    let mut out = format!("no results of hzn in this recording\npictures         {count}\n");
+    let mut out = what("recording without results of hzn") + &format!("pictures         {count}\n");
     if let (Some(topic), Some((a, b))) = (reader.topic(), span) {
         out.push_str(&format!("topic            {topic}\ntime             {a:.3} to {b:.3} s\n"));
     }
@@ -86,10 +90,14 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
         if header.iter().any(|column| column == "limb") {
             return truth(file);
         }
+        if !header.iter().any(|column| column == "file") {
+            return series(file, &header);
+        }
         if !header.iter().eq(Row::COLUMNS) {
             let frames = hzn_calib::frames::load(file)?;
             let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
-            let mut out = format!("pictures         {}\n", frames.rows.len());
+            let mut out = what("frames.csv, what is known of pictures");
+            out.push_str(&format!("pictures         {}\n", frames.rows.len()));
             for (name, n) in [
                 ("time", with(|r| r.time_s.is_some())),
                 ("UTC", with(|r| r.utc_s.is_some())),
@@ -110,7 +118,7 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
     for row in super::export::rows(file, kind)? {
         summary.add(&row?);
     }
-    let mut out = summary.text();
+    let mut out = what("results of hzn run") + &summary.text();
     if ending(file) == "part" {
         out.push_str(&unfinished(file));
     }
@@ -125,18 +133,73 @@ fn truth(file: &Path) -> Result<String, Stop> {
         *seen += usize::from(row.has_limb());
         *all += 1;
     }
-    let mut out = "truth, for        hzn evaluate RESULTS --truth FILE\n".to_owned();
+    let mut out = what("truth of pictures, for `hzn evaluate RESULTS --truth FILE`");
     for (body, [seen, all]) in bodies {
         out.push_str(&format!("{body:<16} limb in view in {seen} of {all} pictures\n"));
     }
     Ok(out)
 }
 
+/// A table of measurements over time: of `hzn simulate`'s instruments, or of something else.
+fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
+    let has = |name: &str| header.iter().position(|column| column == name);
+    let mut out = what(match () {
+        () if has("gyro_x_radps").is_some() => "imu.csv, rates and accelerations of a simulated vehicle",
+        () if has("x_m").is_some() && has("vx_mps").is_some() => "gnss.csv, fixes of a simulated satellite receiver",
+        () => "table that is none of hzn's (results, frames.csv, truth.csv, imu.csv, gnss.csv)",
+    });
+    let number = |row: &csv::StringRecord, name: &str| has(name).and_then(|i| row.get(i)?.parse::<f64>().ok());
+    let (mut rows, mut span, mut saturated) = (0u64, None::<(f64, f64)>, 0u64);
+    for row in csv::Reader::from_path(file).map_err(failed)?.records() {
+        let row = row.map_err(|e| failed(format!("{}: {e}", file.display())))?;
+        rows += 1;
+        if let Some(t) = number(&row, "time_s") {
+            span = Some(span.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
+        }
+        saturated += u64::from(number(&row, "saturated") == Some(1.0));
+    }
+    out.push_str(&format!("rows             {rows}\n"));
+    if let Some((a, b)) = span {
+        out.push_str(&format!("time             {a:.3} to {b:.3} s\n"));
+    }
+    if has("saturated").is_some() {
+        out.push_str(&format!("saturated        {saturated}\n"));
+    }
+    out.push_str(&format!("columns          {}\n", header.iter().collect::<Vec<_>>().join(", ")));
+    Ok(out)
+}
+
+/// The first line: what the file is.
+fn what(kind: &str) -> String {
+    format!("file             {kind}\n")
+}
+
 fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     if kind != "toml" {
-        return super::camera::describe(&hzn_core::Config::new(hzn_calib::camera_file::load(file, None)?));
+        let camera = hzn_calib::camera_file::load(file, None)?;
+        return Ok(what("camera file") + &super::camera::describe(&hzn_core::Config::new(camera))?);
     }
-    super::camera::describe(&hzn_calib::sensor::load(file)?.config)
+    let text = std::fs::read_to_string(file).map_err(|e| failed(format!("{}: cannot be read: {e}", file.display())))?;
+    // What is wrong with the text is said by whoever reads it.
+    let table = text.parse::<toml::Table>().unwrap_or_default();
+    if table.contains_key("trajectory") && table.contains_key("capture") {
+        return scene(&crate::scene::parse(&text, file, None, None)?);
+    }
+    Ok(what("sensor.toml") + &super::camera::describe(&hzn_calib::sensor::load(file)?.config)?)
+}
+
+fn scene(scenario: &Scenario) -> Result<String, Stop> {
+    let mut out = what("scene, for `hzn simulate FILE`");
+    let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
+    let (capture, camera) = (&scenario.capture, &scenario.camera);
+    line("name", scenario.name.clone());
+    line("pictures", format!("{}, at {} to {} s from {}", capture.frames, capture.from_s, capture.to_s, scenario.utc));
+    line("camera", format!("{} x {} px, {}", camera.width, camera.height, camera.model.name()));
+    line("bodies", scenario.bodies.iter().map(|b| hzn_mcap::body_name(*b)).collect::<Vec<_>>().join(", "));
+    let instruments = [("imu.csv", scenario.imu.is_some()), ("gnss.csv", scenario.gnss.is_some())];
+    let written: Vec<&str> = instruments.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
+    line("instruments", if written.is_empty() { "none".to_owned() } else { written.join(", ") });
+    Ok(out)
 }
 
 fn one_picture(file: &Path) -> Result<String, Stop> {
@@ -145,8 +208,13 @@ fn one_picture(file: &Path) -> Result<String, Stop> {
     let p = picture::decode(&bytes, None).map_err(named)?;
     let format = picture::format_of(&bytes).map(|f| format!("{f:?}").to_uppercase()).unwrap_or_default();
     let l = p.layout;
-    let mut out =
-        format!("{format} picture of {} x {} px, {} channel(s) of {} bits\n", l.width, l.height, l.channels, l.bits);
+    let mut out = what(&format!(
+        "{format} picture of {} x {} px, {} of {} bits",
+        l.width,
+        l.height,
+        tell::counted(l.channels.into(), "channel"),
+        l.bits
+    ));
     if let Some(t) = p.exif_time_s {
         out.push_str(&format!("EXIF time        {t:.3} s since 1970, taken as UTC\n"));
     }

@@ -55,8 +55,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         })?,
     };
     let dropped = if lost > 0 { format!(", {lost} bytes of unfinished frames dropped") } else { String::new() };
-    let kept = if rows == 1 { "row" } else { "rows" };
-    tell::line(format_args!("{}: {rows} {kept} kept{dropped}", path.display()));
+    tell::line(format_args!("{}: {} kept{dropped}", path.display(), tell::counted(rows, "row")));
     if unfinished && args.output.is_none() && file.exists() {
         // Its frames are in the new file, and beside that it would look like another unfinished run.
         std::fs::remove_file(file)?;

@@ -137,8 +137,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     let stop = stop_flag();
     let mut tipped = args.quiet;
     let mut gaps = Gaps::default();
+    let mut unanswered = None;
     let mut seen = |frame: &Finished| {
         gaps.count(frame);
+        if unanswered.is_none() && frame.found.iter().all(|f| f.report.is_ok()) {
+            unanswered = Some(frame.name.clone());
+        }
         if let Some(tip) = frame.tip.as_ref().filter(|_| !tipped) {
             tipped = true;
             progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
@@ -163,6 +167,12 @@ pub(super) fn run(args: &Args) -> Outcome {
             n => format!(" (after {n} that were finished before)"),
         };
         tell::line(format_args!("{summary}{before}"));
+        if let Some(name) = unanswered.filter(|_| !progress.any_answered() && held.frames == 0) {
+            let picture = args.input.iter().find(|p| p.ends_with(&name)).or(args.input.first());
+            let shown = picture.map(|p| if p.is_dir() { p.join(&name) } else { p.clone() }).unwrap_or_default();
+            let what = "nothing was found in any picture; what happens to one, and what to try:";
+            tell::line(format_args!("note: {what} hzn explain {}", shown.display()));
+        }
     }
     let done = held.frames + progress.frames();
     if end == End::Interrupted && total.is_none_or(|n| done < n) {

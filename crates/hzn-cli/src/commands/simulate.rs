@@ -253,7 +253,8 @@ fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
 
 fn summary(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {
     let shown = folder.display();
-    tell::result(format_args!("{shown}: {} pictures of {}\n", flight.frames.len(), scenario.name))?;
+    let pictures = tell::counted(flight.frames.len() as u64, "picture");
+    tell::result(format_args!("{shown}: {pictures} of {}\n", scenario.name))?;
     for &kind in &scenario.bodies {
         let mut seen = 0;
         let mut body = String::new();

@@ -57,7 +57,12 @@ impl FromStr for Raw {
         };
         let names = || FORMATS.iter().map(|(n, _)| *n);
         let Some((_, format)) = FORMATS.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)) else {
-            let hint = hzn_calib::nearest(name, names()).map(|n| format!("; did you mean {n}?")).unwrap_or_default();
+            // A number of bits without a format of its own has room in the next larger one.
+            let bits = name.strip_prefix("mono").and_then(|n| n.parse::<u8>().ok()).filter(|n| (9..16).contains(n));
+            let hint = match bits {
+                Some(bits) => format!("; did you mean mono16, with bits = {bits} in [input] of sensor.toml?"),
+                None => hzn_calib::nearest(name, names()).map(|n| format!("; did you mean {n}?")).unwrap_or_default(),
+            };
             return Err(format!("no format {name:?}{hint} (there are {})", names().collect::<Vec<_>>().join(", ")));
         };
         if *format == Format::Bayer8 && (width % 2 != 0 || height % 2 != 0) {
@@ -102,13 +107,27 @@ impl Raw {
         (self.width / cell, self.height / cell)
     }
 
+    fn wrong_length(&self, length: usize) -> String {
+        let one = self.bytes();
+        let left = match (length / one, length % one) {
+            (0, _) => format!("{} less", one - length),
+            (n, 0) => format!("these are {n} pictures; give each a file of its own"),
+            (1, more) => format!("{more} bytes more"),
+            (n, more) => format!("these are {n} pictures and {more} bytes more"),
+        };
+        let other = FORMATS.iter().map(|(name, format)| (name, Self { format: *format, ..*self }));
+        let other: Vec<&str> = other.filter(|(_, raw)| raw.bytes() == length).map(|(name, _)| *name).collect();
+        let hint = if other.is_empty() { String::new() } else { format!("; it fits {}", other.join(", ")) };
+        format!("{length} bytes, but a picture of {self} has {one}: {left}{hint}")
+    }
+
     /// The picture in these bytes, of which there must be exactly as many as it has.
     ///
     /// # Errors
     /// Another number of bytes.
     pub fn decode(&self, data: &[u8]) -> Result<Picture, String> {
         if data.len() != self.bytes() {
-            return Err(format!("{} bytes, but {self} has {}", data.len(), self.bytes()));
+            return Err(self.wrong_length(data.len()));
         }
         let pixels = self.width as usize * self.height as usize;
         let samples = match self.format {
@@ -185,10 +204,16 @@ mod tests {
         let error = |t: &str| t.parse::<Raw>().unwrap_err();
         assert!(error("1920").contains("1920x1080:mono12"));
         assert!(error("2x2:mono21").contains("did you mean mono12?"));
+        assert!(error("2x2:mono13").contains("did you mean mono16, with bits = 13 in [input]"));
         assert!(error("0x2:mono8").contains("1 to 20000"));
         assert!(error("3x2:bayer8").contains("even"));
         assert!(
-            "2x2:mono16".parse::<Raw>().unwrap().decode(&[0; 7]).unwrap_err().contains("7 bytes, but 2x2:mono16 has 8")
+            "2x2:mono16"
+                .parse::<Raw>()
+                .unwrap()
+                .decode(&[0; 7])
+                .unwrap_err()
+                .contains("7 bytes, but a picture of 2x2:mono16 has 8: 1 less")
         );
     }
 }
