@@ -11,6 +11,8 @@ use crate::real::Real;
 
 /// Lanes of a block.
 pub(crate) const LANES: usize = 8;
+/// Lanes in which many sums are kept at once: eight of each would not stay in registers.
+pub(crate) const HALF: usize = LANES / 2;
 
 /// Where the lit side lies: the direction of the brightness gradient along the axis on which the edge was located.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,7 +12,7 @@ pub(crate) mod braun_barf;
 mod elliptic;
 mod uneven;
 
-use crate::block::{Block, LANES, exp_neg, sum};
+use crate::block::{Block, HALF, LANES, exp_neg};
 use crate::body::Expected;
 use crate::error::{ConfigError, above, between};
 use crate::estimate::{self, Fit};
@@ -183,7 +183,7 @@ pub(crate) fn correlated<T: Real>(
     mean: [T; 2],
     length_px: T,
 ) -> [T; 6] {
-    let mut sums = [[T::ZERO; LANES]; 6];
+    let mut sums = [[T::ZERO; HALF]; 6];
     // c for the errors in u and in v.
     let mut c = [[T::ZERO; 3]; 2];
     let per_length = if length_px > T::ZERO { T::one() / length_px } else { T::ZERO };
@@ -201,27 +201,36 @@ pub(crate) fn correlated<T: Real>(
             if per_length > T::ZERO { exp_neg(&block.step_px.map(|step| step * per_length)) } else { [T::ZERO; LANES] };
         // Each step closes the point before with 1 − ρ², then carries on: only the carrying is one lane after another.
         let gap = rho.map(|r| T::one() - r * r);
-        for (c, g) in c.iter_mut().zip(&g) {
-            let mut before = [[T::ZERO; LANES]; 3];
+        let mut before = [[[T::ZERO; LANES]; 3]; 2];
+        for (before, (c, g)) in before.iter_mut().zip(c.iter_mut().zip(&g)) {
             for i in 0..3 {
                 for l in 0..LANES {
                     before[i][l] = c[i];
                     c[i] = rho[l] * c[i] + q[i][l] * g[l];
                 }
             }
-            let [c1, c2, c3] = &before;
-            for l in 0..LANES {
-                let (g1, g2, g3) = (gap[l] * c1[l], gap[l] * c2[l], gap[l] * c3[l]);
-                sums[0][l] += g1 * c1[l];
-                sums[1][l] += g1 * c2[l];
-                sums[2][l] += g1 * c3[l];
-                sums[3][l] += g2 * c2[l];
-                sums[4][l] += g2 * c3[l];
-                sums[5][l] += g3 * c3[l];
+        }
+        let [[u1, u2, u3], [v1, v2, v3]] = &before;
+        for l in 0..HALF {
+            let terms = |l: usize| {
+                let (g1, g2, g3) = (gap[l] * u1[l], gap[l] * u2[l], gap[l] * u3[l]);
+                let (h1, h2, h3) = (gap[l] * v1[l], gap[l] * v2[l], gap[l] * v3[l]);
+                [
+                    g1 * u1[l] + h1 * v1[l],
+                    g1 * u2[l] + h1 * v2[l],
+                    g1 * u3[l] + h1 * v3[l],
+                    g2 * u2[l] + h2 * v2[l],
+                    g2 * u3[l] + h2 * v3[l],
+                    g3 * u3[l] + h3 * v3[l],
+                ]
+            };
+            let (one, other) = (terms(l), terms(l + HALF));
+            for (sum, (a, b)) in sums.iter_mut().zip(one.iter().zip(&other)) {
+                sum[l] += *a + *b;
             }
         }
     }
-    let mut x = sums.map(|lanes| sum(&lanes));
+    let mut x = sums.map(|[a, b, c, d]| (a + b) + (c + d));
     for [c1, c2, c3] in c {
         x[0] += c1 * c1;
         x[1] += c1 * c2;

@@ -19,7 +19,7 @@ pub(crate) mod direct;
 #[cfg(feature = "zju")]
 mod quadric;
 
-use crate::block::{Block, LANES, sum};
+use crate::block::{Block, HALF, LANES, sum};
 use crate::body::Expected;
 use crate::camera::Camera;
 use crate::covariance;
@@ -561,9 +561,6 @@ pub(crate) enum Weights<T> {
     /// Tukey's, which the points then keep.
     Last { cutoff2: T },
 }
-
-/// Lanes of the sums: half of a block's, as eight of each would not stay in registers.
-const HALF: usize = LANES / 2;
 
 /// One pass: sums at (e, k), about `mean`.
 pub(crate) fn pass<T: Real>(
