@@ -2,6 +2,8 @@
 
 mod ring;
 
+pub(crate) use ring::Run;
+
 use crate::camera::{self, Camera};
 use crate::error::{ConfigError, Limit, between, require};
 #[cfg(feature = "horace")]

@@ -6,6 +6,7 @@ use crate::image::Pixels;
 use crate::pipeline::Observer;
 use crate::pixel::Pixel;
 use crate::real::Real;
+use crate::region::Run;
 
 /// Most starts that are ranked.
 pub(crate) const RANKED: usize = 4;
@@ -56,7 +57,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
             let mut passed = (0, 0, None);
             while k < run.len {
                 let next = (k + stride).min(run.len) - 1;
-                let (x, y) = run.at(next);
+                let Pixel { x, y } = run.at(next);
                 let lit = self.lit(x, y);
                 match before {
                     Some((_, same)) if same == lit => {
@@ -64,6 +65,17 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
                         stretch += counted;
                         passed = (if lit { 0 } else { next + 1 - k }, counted, before);
                         before = Some((Pixel { x, y }, lit));
+                        let leaps = if self.region.has_mask() { 0 } else { self.leaps(&run, next, stride, lit) };
+                        if leaps > 0 {
+                            let at = |leaps: u16| Some((run.at(next + leaps * stride), lit));
+                            if !lit {
+                                stretch += u32::from(leaps) * u32::from(stride);
+                                passed = (stride, stride.into(), at(leaps - 1));
+                            }
+                            before = at(leaps);
+                            k = next + leaps * stride + 1;
+                            continue;
+                        }
                     }
                     _ => {
                         let (again, counted, prior) = core::mem::take(&mut passed);
@@ -71,9 +83,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
                             (k, stretch, before) = (k - again, stretch - counted, prior);
                         }
                         for i in k..=next {
-                            let (x, y) = run.at(i);
-                            let pixel = Pixel { x, y };
-                            let lit = if i == next { lit } else { self.lit(x, y) };
+                            let pixel = run.at(i);
+                            let lit = if i == next { lit } else { self.lit(pixel.x, pixel.y) };
                             if first.is_none() {
                                 first = Some((pixel, lit));
                             }
@@ -94,6 +105,26 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
             return 0;
         }
         stretch
+    }
+
+    /// How many times `stride` pixels can be passed over from number `k` of a run and what is there is lit, or dark, as it.
+    #[inline(always)]
+    fn leaps(&self, run: &Run, k: u16, stride: u16, lit: bool) -> u16 {
+        let Pixel { x, y } = run.at(k);
+        let (dx, dy) = run.step();
+        let leap = (dx as isize * self.picture.across() as isize + dy as isize * self.picture.down() as isize)
+            * stride as isize;
+        let mut index = self.picture.index(x, y);
+        let most = (run.len - 1 - k).checked_div(stride).unwrap_or(0);
+        for leaps in 0..most {
+            index = index.wrapping_add_signed(leap);
+            let there = run.at(k + (leaps + 1) * stride);
+            self.observer.pixel(there.x, there.y);
+            if (self.picture.read(index) >= self.level) != lit {
+                return leaps;
+            }
+        }
+        most
     }
 
     /// The ranked starts.

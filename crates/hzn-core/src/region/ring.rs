@@ -1,5 +1,6 @@
 //! The way around a region along its outermost pixels.
 
+use crate::pixel::Pixel;
 use crate::real::Real;
 
 use super::Region;
@@ -135,9 +136,13 @@ pub(crate) struct Run {
 
 impl Run {
     #[inline(always)]
-    pub(crate) fn at(&self, i: u16) -> (u16, u16) {
+    pub(crate) fn at(&self, i: u16) -> Pixel {
         let i = i32::from(i);
-        ((i32::from(self.x) + self.dx * i) as u16, (i32::from(self.y) + self.dy * i) as u16)
+        Pixel { x: (i32::from(self.x) + self.dx * i) as u16, y: (i32::from(self.y) + self.dy * i) as u16 }
+    }
+    /// From a pixel to the next, (dx, dy).
+    pub(crate) fn step(&self) -> (i32, i32) {
+        (self.dx, self.dy)
     }
 }
 
@@ -152,7 +157,7 @@ mod tests {
     fn ring(region: &Region<f64>) -> Vec<(u16, u16)> {
         let mut ring = Vec::new();
         region.each_run(|run| {
-            ring.extend((0..run.len).map(|i| run.at(i)));
+            ring.extend((0..run.len).map(|i| run.at(i)).map(|p| (p.x, p.y)));
             true
         });
         ring
