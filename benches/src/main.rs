@@ -91,17 +91,20 @@ fn run(options: &Options) -> Result<(), String> {
 /// One case: every frame by every program in turn, round after round.
 fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<table::CaseResult, String> {
     let mut single = sensors::flight(&case.sensor)?;
+    let mut fewer = sensors::fewer_points(&case.sensor)?;
     let mut double = sensors::host(&case.sensor)?;
     let mut result = table::CaseResult::new(case);
     for round in 0..rounds {
         for (i, frame) in case.frames.iter().enumerate() {
             let f32_run = single.cold(case, frame)?;
+            let fewer_run = fewer.cold(case, frame)?;
             let f64_run = double.cold(case, frame)?;
             let theirs = recipe.measure(&case.name, i, f32_run.level.max(1))?;
             if round == 0 {
-                result.answers(frame, &f32_run, &f64_run, &theirs);
+                result.answers(frame, [&f32_run, &fewer_run, &f64_run], &theirs);
             }
             result.f32.total(i, f32_run.elapsed_us);
+            result.fewer.total(i, fewer_run.elapsed_us);
             result.f64.total(i, f64_run.elapsed_us);
             result.opencv.total(i, theirs.total_us);
             for (name, us) in theirs.stages_us {

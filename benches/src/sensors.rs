@@ -16,6 +16,9 @@ const FLUSH_BYTES: usize = 64 << 20;
 /// Repetitions of a warm measurement, of which the median counts.
 const WARM_RUNS: usize = 9;
 
+/// Points that are kept where they are to be fewer.
+pub(crate) const FEWER: u16 = 200;
+
 /// A sensor and the memory that flushes the caches.
 pub(crate) struct Sensor<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
     horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>,
@@ -34,6 +37,13 @@ pub(crate) struct Timed {
 /// f32 with the lists of a flight computer.
 pub(crate) fn flight(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
     Ok(Sensor::on(Box::new(FlightHorizon::new(config).map_err(|e| e.to_string())?)))
+}
+
+/// The same with fewer points, as for a flight computer that is short of time.
+pub(crate) fn fewer_points(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
+    let mut config = config.clone();
+    config.candidates.keep_points = FEWER;
+    flight(&config)
 }
 
 /// f64 with the lists of a workstation.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::cases::{Case, Picture};
 use crate::opencv::{Answer, Recipe};
-use crate::sensors::Timed;
+use crate::sensors::{FEWER, Timed};
 
 /// Everything that was measured.
 #[derive(Serialize)]
@@ -26,12 +26,13 @@ pub(crate) struct Results {
 pub(crate) struct CaseResult {
     name: String,
     pub(crate) f32: Times,
+    pub(crate) fewer: Times,
     pub(crate) f64: Times,
     pub(crate) warm: Times,
     pub(crate) opencv: Times,
     frames: usize,
-    answered: [usize; 3],
-    error_deg: [Vec<f64>; 3],
+    answered: [usize; 4],
+    error_deg: [Vec<f64>; 4],
     pixels_percent: Vec<f64>,
     /// Nanoseconds a point, warm, with every point kept.
     pub(crate) ns_a_point: Vec<f64>,
@@ -107,21 +108,22 @@ impl CaseResult {
         Self {
             name: case.name.clone(),
             f32: Times::default(),
+            fewer: Times::default(),
             f64: Times::default(),
             warm: Times::default(),
             opencv: Times::default(),
             frames: case.frames.len(),
-            answered: [0; 3],
+            answered: [0; 4],
             error_deg: Default::default(),
             pixels_percent: Vec::new(),
             ns_a_point: Vec::new(),
         }
     }
 
-    /// What the three programs answered to a frame.
-    pub(crate) fn answers(&mut self, frame: &Picture, single: &Timed, double: &Timed, theirs: &Answer) {
-        let hzn = |t: &Timed| t.axis.filter(|_| t.status == Status::Ok);
-        let axes = [hzn(single), hzn(double), theirs.axis];
+    /// What was answered to a frame: hzn in f32, with fewer points, in f64, and the recipe.
+    pub(crate) fn answers(&mut self, frame: &Picture, hzn: [&Timed; 3], theirs: &Answer) {
+        let [single, fewer, double] = hzn.map(|t| t.axis.filter(|_| t.status == Status::Ok));
+        let axes = [single, fewer, double, theirs.axis];
         for ((axis, count), errors) in axes.into_iter().zip(&mut self.answered).zip(&mut self.error_deg) {
             if let Some(axis) = axis {
                 *count += 1;
@@ -134,8 +136,8 @@ impl CaseResult {
         self.pixels_percent.push(read as f64 * 100.0 / all as f64);
     }
 
-    fn errors(&self) -> [String; 3] {
-        [0, 1, 2].map(|i| {
+    fn errors(&self) -> [String; 4] {
+        [0, 1, 2, 3].map(|i| {
             let worst = self.error_deg[i].iter().copied().fold(f64::NAN, f64::max);
             format!("{:.3} / {worst:.3} ({} of {})", median(&self.error_deg[i]), self.answered[i], self.frames)
         })
@@ -172,17 +174,21 @@ impl Results {
              these the median. Load of the machine at the start: {}.\n",
             self.machine, self.versions, self.frames, self.rounds, self.load
         );
-        s.push_str(
-            "| case | hzn f32, µs | hzn f64, µs | recipe, µs | ratio f32 | ratio f64 | f32 warm, µs | pixels read, % | \
-             all points, warm, ns a point |\n|---|---|---|---|---|---|---|---|---|\n",
+        let _ = writeln!(
+            s,
+            "| case | hzn f32, µs | f32, {FEWER} points kept, µs | hzn f64, µs | recipe, µs | ratio f32 | ratio f32, \
+             {FEWER} points | ratio f64 | f32 warm, µs | pixels read, % | all points, warm, ns a point |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|"
         );
         for c in &self.cases {
-            let (single, double, theirs) = (c.f32.median(), c.f64.median(), c.opencv.median());
+            let (single, fewer, double) = (c.f32.median(), c.fewer.median(), c.f64.median());
+            let theirs = c.opencv.median();
             let _ = writeln!(
                 s,
-                "| {} | {single:.0} | {double:.0} | {theirs:.0} | {:.1} | {:.1} | {:.0} | {:.2} | {:.0} |",
+                "| {} | {single:.0} | {fewer:.0} | {double:.0} | {theirs:.0} | {:.1} | {:.1} | {:.1} | {:.0} | {:.2} | {:.0} |",
                 c.name,
                 theirs / single,
+                theirs / fewer,
                 theirs / double,
                 c.warm.median(),
                 median(&c.pixels_percent),
@@ -190,7 +196,7 @@ impl Results {
             );
         }
         s.push_str("\nAngle between answer and truth in degrees, median / worst (frames answered):\n\n");
-        s.push_str("| case | hzn f32 | hzn f64 | recipe |\n|---|---|---|---|\n");
+        let _ = writeln!(s, "| case | hzn f32 | f32, {FEWER} points | hzn f64 | recipe |\n|---|---|---|---|---|");
         for c in &self.cases {
             let _ = writeln!(s, "| {} | {} |", c.name, c.errors().join(" | "));
         }
