@@ -65,8 +65,24 @@ fn a_sensor_file_brings_camera_body_and_noise() {
     let rest = after.split_once("\n[").map_or(String::new(), |(_, rest)| format!("[{rest}"));
     place.write("several.toml", format!("{before}{rest}\n{bodies}").as_bytes());
     let several = ["sensitivity", "-s", "several.toml", "--altitude", "384400", "--depression", "90"];
-    place.run(&several).expect(2).says("name one with --body");
+    place.run(&several).expect(2).says("looks for several bodies (sun, moon); name one with --body");
     place.run(&[&several[..], &["--body", "moon"]].concat()).expect(0);
+}
+
+/// The commands that docs/evaluation.md shows, with a sensor as `hzn simulate` writes it: its altitude is in frames.csv.
+#[test]
+fn the_examples_of_the_docs_run() {
+    let place = Place::new();
+    place.write("sensor.toml", common::SENSOR.replace("altitude_km = 400.0\n", "").as_bytes());
+    let docs = include_str!("../../../docs/evaluation.md");
+    let examples: Vec<&str> = docs.lines().filter(|l| l.starts_with("hzn sensitivity")).collect();
+    assert!(examples.len() >= 5, "{examples:?}");
+    for example in examples {
+        let words: Vec<&str> = example.split('#').next().unwrap().split_whitespace().skip(1).collect();
+        let ran = place.run(&words);
+        assert_eq!(ran.code, 0, "{example}: {}", ran.err);
+    }
+    assert!(place.path("plot.svg").exists() && place.path("table.csv").exists());
 }
 
 #[test]

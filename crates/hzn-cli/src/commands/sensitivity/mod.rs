@@ -180,7 +180,11 @@ impl<'a> Grid<'a> {
                 [] => {}
                 [one] => config.body = one.clone(),
                 _ if !args.body.is_empty() => {}
-                _ => return Err(usage(format!("{}: looks for several bodies; name one with --body", path.display()))),
+                several => {
+                    let names: Vec<&str> = several.iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
+                    let what = format!("looks for several bodies ({}); name one with --body", names.join(", "));
+                    return Err(usage(format!("{}: {what}", path.display())));
+                }
             }
             sensor = Some(config);
         }
