@@ -4,7 +4,7 @@ use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
 use hzn_core::{Config, Frame, HostHorizon, covariance};
 use hzn_sim::pose::position_m;
-use hzn_sim::sensitivity::{Design, Sigmas};
+use hzn_sim::sensitivity::{Design, Sigmas, reference};
 use hzn_sim::{Look, Pose, Scene};
 
 /// 1920×1080, pinhole, level, 200 km, R = 1 px², L = 300 px.
@@ -51,27 +51,14 @@ fn row(design: &Design, [roll, pitch, known, bound]: [f64; 4]) {
 
 #[test]
 fn altitudes() {
-    for (altitude_km, expected) in [
-        (50.0, [0.1298, 0.5744, 0.0978, 3.76]),
-        (100.0, [0.1280, 0.5662, 0.0964, 2.65]),
-        (200.0, [0.1247, 0.5506, 0.0936, 1.856]),
-        (300.0, [0.1215, 0.5357, 0.0910, 1.502]),
-        (500.0, [0.1155, 0.5077, 0.0861, 1.142]),
-    ] {
+    for (altitude_km, expected) in reference::BY_ALTITUDE_KM {
         row(&Design { altitude_km, ..design(94.4) }, expected);
     }
 }
 
 #[test]
 fn fields_of_view_and_their_optimum() {
-    for (fov_deg, expected) in [
-        (66.0, [0.1242, 0.7197, 0.0562, 2.72]),
-        (82.0, [0.1244, 0.6039, 0.0753, 2.16]),
-        (98.0, [0.1248, 0.5400, 0.0998, 1.78]),
-        (114.0, [0.1252, 0.5166, 0.1337, 1.51]),
-        (130.0, [0.1257, 0.5400, 0.1865, 1.32]),
-        (146.0, [0.1262, 0.6500, 0.2849, 1.22]),
-    ] {
+    for (fov_deg, expected) in reference::BY_FOV_DEG {
         row(&design(fov_deg), expected);
     }
     let pitch = |d: &Design| sigmas(d).braun_barf.unwrap().pitch_deg;
@@ -91,14 +78,12 @@ fn resolutions_and_limb_heights() {
         let f_px = f64::from(rows) / 2.0 / (94.4f64 / 2.0).to_radians().tan();
         pinhole(rows * 16 / 9, rows, f_px)
     };
-    for (rows, roll, pitch) in [(270, 0.507, 1.93), (540, 0.270, 1.06), (1080, 0.1255, 0.526), (2160, 0.0512, 0.227)] {
+    for (rows, [roll, pitch]) in reference::BY_ROWS {
         let s = sigmas(&vertical(rows)).braun_barf.unwrap();
         near(s.roll_deg, roll);
         near(s.pitch_deg, pitch);
     }
-    for (limb_height_km, roll, pitch) in
-        [(0.0, 0.1255, 0.5262), (5.0, 0.1256, 0.5271), (10.0, 0.1258, 0.5279), (20.0, 0.1261, 0.5293)]
-    {
+    for (limb_height_km, [roll, pitch]) in reference::BY_LIMB_HEIGHT_KM {
         let s = sigmas(&Design { limb_height_km, ..vertical(1080) }).braun_barf.unwrap();
         near(s.roll_deg, roll);
         near(s.pitch_deg, pitch);

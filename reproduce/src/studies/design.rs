@@ -3,7 +3,7 @@
 use hzn_cli::plot::{Chart, Series, Style};
 use hzn_core::camera::{self, Model};
 use hzn_sim::sensitivity::chart::{Vertical, Visibility};
-use hzn_sim::sensitivity::{Design, Sigmas};
+use hzn_sim::sensitivity::{Design, Sigmas, reference};
 
 use super::Effort;
 use crate::document::Section;
@@ -59,23 +59,10 @@ pub(super) fn sensitivity(_: &Effort) -> anyhow::Result<Section> {
         Ok(std::iter::once(name).chain(ours.into_iter().zip(r).map(|(a, b)| beside(a, b))).collect())
     };
     let mut rows = Vec::new();
-    for (km, r) in [
-        (50.0, [0.1298, 0.5744, 0.0978, 3.76]),
-        (100.0, [0.1280, 0.5662, 0.0964, 2.65]),
-        (200.0, [0.1247, 0.5506, 0.0936, 1.856]),
-        (300.0, [0.1215, 0.5357, 0.0910, 1.502]),
-        (500.0, [0.1155, 0.5077, 0.0861, 1.142]),
-    ] {
+    for (km, r) in reference::BY_ALTITUDE_KM {
         rows.push(row(format!("{km} km, 94.4° wide"), &Design { altitude_km: km, ..by_fov(94.4) }, r)?);
     }
-    for (fov, r) in [
-        (66.0, [0.1242, 0.7197, 0.0562, 2.72]),
-        (82.0, [0.1244, 0.6039, 0.0753, 2.16]),
-        (98.0, [0.1248, 0.5400, 0.0998, 1.78]),
-        (114.0, [0.1252, 0.5166, 0.1337, 1.51]),
-        (130.0, [0.1257, 0.5400, 0.1865, 1.32]),
-        (146.0, [0.1262, 0.6500, 0.2849, 1.22]),
-    ] {
+    for (fov, r) in reference::BY_FOV_DEG {
         rows.push(row(format!("200 km, {fov}° wide"), &by_fov(fov), r)?);
     }
     s.table(head, rows);
@@ -84,12 +71,10 @@ pub(super) fn sensitivity(_: &Effort) -> anyhow::Result<Section> {
         Ok(vec![name, beside(paper.roll_deg, roll), beside(paper.pitch_deg, pitch)])
     };
     let mut rows = Vec::new();
-    for (px, roll, pitch) in [(270, 0.507, 1.93), (540, 0.270, 1.06), (1080, 0.1255, 0.526), (2160, 0.0512, 0.227)] {
+    for (px, [roll, pitch]) in reference::BY_ROWS {
         rows.push(pair(format!("{px} rows, 94.4° high"), &by_vertical_fov(px, 94.4), roll, pitch)?);
     }
-    for (km, roll, pitch) in
-        [(0.0, 0.1255, 0.5262), (5.0, 0.1256, 0.5271), (10.0, 0.1258, 0.5279), (20.0, 0.1261, 0.5293)]
-    {
+    for (km, [roll, pitch]) in reference::BY_LIMB_HEIGHT_KM {
         let d = Design { limb_height_km: km, ..by_vertical_fov(1080, 94.4) };
         rows.push(pair(format!("limb height {km} km, 94.4° high"), &d, roll, pitch)?);
     }

@@ -5,7 +5,7 @@
 //! expectation and maximisation. The hypothesis with the least −Σ ln(γ N(d; σ) + (1 − γ)/ν) wins. Every point is looked
 //! at several times in every draw, with an exponential each.
 
-use super::sampled::{FEWEST, distances2, drawn, leave_out, needed};
+use super::sampled::{FEWEST, conclude, distances2, drawn, needed};
 use super::{Config, Consensus};
 use crate::block::{Block, LANES, sum};
 use crate::linalg::V3;
@@ -45,9 +45,8 @@ pub(super) fn keep<T: Real>(
             enough = needed(share);
         }
     }
-    let (e, c, _) = best?;
-    leave_out(blocks, &e, c, T::of(config.threshold_px * config.threshold_px));
-    Some(Consensus { e, c, draws, all: false })
+    let cone = best.map(|(e, c, _)| (e, c));
+    conclude(blocks, cone, T::of(config.threshold_px * config.threshold_px), draws)
 }
 
 /// Inliers and outliers: standard deviation of the ones, range of the others, in pixels.

@@ -8,7 +8,7 @@
 //! the limb, which needs 7195 draws for the same p. With 286 draws in all, 8.7 % of such pictures are solved. Draws are
 //! bounded by `max_draws`.
 
-use super::sampled::{agreeing, distances2, leave_out, point};
+use super::sampled::{agreeing, conclude, distances2, point};
 use super::{Config, Consensus};
 use crate::block::{Block, LANES};
 use crate::limb::through_three;
@@ -53,9 +53,7 @@ pub(super) fn keep<T: Real>(
             }
         }
     }
-    let (e, c) = best?;
-    leave_out(blocks, &e, c, limit2);
-    Some(Consensus { e, c, draws, all: false })
+    conclude(blocks, best, limit2, draws)
 }
 
 /// The cone through the first three points, if the others lie on it too.

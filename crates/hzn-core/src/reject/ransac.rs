@@ -5,7 +5,7 @@
 //! the half-angle nor on which side of the edge the light is, and every draw looks at every point: that is what the
 //! default, `two-point`, is better at.
 
-use super::sampled::{FEWEST, agreeing, drawn, leave_out, needed};
+use super::sampled::{FEWEST, agreeing, conclude, drawn, needed};
 use super::{Config, Consensus};
 use crate::block::Block;
 use crate::real::Real;
@@ -37,7 +37,5 @@ pub(super) fn keep<T: Real>(
             enough = needed(near / T::of(f64::from(count)));
         }
     }
-    let (e, c) = best?;
-    leave_out(blocks, &e, c, limit2);
-    Some(Consensus { e, c, draws, all: false })
+    conclude(blocks, best, limit2, draws)
 }

@@ -1,5 +1,6 @@
 //! What the published samplers share: cones through three points, compared with every point.
 
+use super::Consensus;
 use crate::block::{Block, LANES, sum};
 use crate::limb::through_three;
 use crate::linalg::V3;
@@ -57,8 +58,20 @@ pub(super) fn agreeing<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit2: T)
     sum(&n)
 }
 
+/// The consensus on the cone that was found; the points beyond the threshold lose their weight.
+pub(super) fn conclude<T: Real>(
+    blocks: &mut [Block<T>],
+    cone: Option<(V3<T>, T)>,
+    limit2: T,
+    draws: u32,
+) -> Option<Consensus<T>> {
+    let (e, c) = cone?;
+    leave_out(blocks, &e, c, limit2);
+    Some(Consensus { e, c, draws, all: false })
+}
+
 /// Takes the weight from the points beyond the threshold.
-pub(super) fn leave_out<T: Real>(blocks: &mut [Block<T>], e: &V3<T>, c: T, limit2: T) {
+fn leave_out<T: Real>(blocks: &mut [Block<T>], e: &V3<T>, c: T, limit2: T) {
     for block in blocks {
         let d2 = distances2(block, e, c);
         for (w, d2) in block.weight.iter_mut().zip(d2) {

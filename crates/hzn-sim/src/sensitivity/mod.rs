@@ -5,10 +5,12 @@
 //! |---|---|
 //! | [`design`] | camera, body and place; the limb as points one pixel apart |
 //! | [`sigmas`] | the covariance that such points have with correlated errors |
+//! | [`reference`] | published results, worked out apart from this program |
 //! | [`chart`] | which conic is seen from where; what a sphere for the Earth costs |
 
 pub mod chart;
 pub mod design;
+pub mod reference;
 pub mod sigmas;
 
 pub use design::{Design, DesignError};
