@@ -5,7 +5,7 @@
 //! |---|---|
 //! | [`design`] | camera, body and place; the limb as points one pixel apart |
 //! | [`sigmas`] | the covariance that such points have with correlated errors |
-//! | [`reference`] | published results, worked out apart from this program |
+//! | [`mod@reference`] | published results, worked out apart from this program |
 //! | [`chart`] | which conic is seen from where; what a sphere for the Earth costs |
 
 pub mod chart;
