@@ -270,12 +270,12 @@ impl Gaps {
             parts.push(format!("{} without a time", self.no_time));
         }
         if self.no_altitude > 0 {
-            let what = "without an altitude, not processed (status no-altitude): give it there, as body.altitude_km, or \
+            let what = "without an altitude, not processed (status no-altitude): give it in frames.csv, as body.altitude_km, or \
                         by --altitude-km";
             parts.push(format!("{} {what}", self.no_altitude));
         }
         if !parts.is_empty() {
-            tell::warning(format_args!("of {} frames: {}", self.frames, parts.join("; ")));
+            tell::warning(format_args!("of {}: {}", tell::counted(self.frames, "frame"), parts.join("; ")));
         }
     }
 }
