@@ -106,8 +106,6 @@ pub struct Level<T> {
 const BINS: usize = 256;
 /// Cells along each side of the first sample and of the second, as powers of two.
 const SIDES_LOG2: [u32; 2] = [4, 6];
-/// Places that are drawn before the first of them is looked at.
-const PLACES: usize = 256;
 
 /// A level as a number of counts; one of 0 would make everything lit.
 fn counts<T: Real>(level: T) -> u16 {
@@ -137,20 +135,8 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
 ) -> Result<Level<T>, Status> {
     for side_log2 in SIDES_LOG2 {
         let mut sample = Sample::new(seed, side_log2, picture.full_scale(), region);
-        while sample.row().is_some() {
-            // The places first, and then the pixels: they come from memory, many at once when nothing stands between.
-            let mut places = heapless::Vec::<_, PLACES>::new();
-            while let Some(y) = sample.row()
-                && places.len() + (1 << side_log2) <= PLACES
-            {
-                sample.draw_row(region, |_, x| {
-                    let _ = places.push((x, y));
-                });
-            }
-            for &(x, y) in &places {
-                observer.pixel(x, y);
-                sample.histogram.count(picture.at(x, y));
-            }
+        while let Some(y) = sample.row() {
+            sample.take(region, observer, |x| picture.at(x, y));
         }
         if let Some(decided) = sample.decide(gate, config, last, observer) {
             return decided;
@@ -177,10 +163,7 @@ impl Passing {
     ) {
         for sample in &mut self.0 {
             while sample.row() == Some(y) {
-                sample.draw_row(region, |histogram, x| {
-                    observer.pixel(x, y);
-                    histogram.count(row.get(usize::from(x)).map_or(0, |&s| s.into()));
-                });
+                sample.take(region, observer, |x| row.get(usize::from(x)).map_or(0, |&s| s.into()));
             }
         }
     }
@@ -228,15 +211,15 @@ impl Sample {
         (self.cells < 1 << self.side_log2).then_some(self.y)
     }
 
-    /// The columns of that row that are looked at. The cells of a row share theirs: each row of a picture is a page of
-    /// memory away from the next.
-    fn draw_row<T: Real>(&mut self, region: &Region<T>, mut each: impl FnMut(&mut Histogram, u16)) {
+    /// Looks at that row. The cells of a row share theirs: each row of a picture is a page of memory away from the next.
+    fn take<T: Real, O: Observer<T>>(&mut self, region: &Region<T>, observer: &O, at: impl Fn(u16) -> u16) {
         for cell in 0..1u32 << self.side_log2 {
             let x = self.draw(cell, region.width());
             if !region.contains(x, self.y) || region.masked(x, self.y) {
                 continue;
             }
-            each(&mut self.histogram, x);
+            observer.pixel(x, self.y);
+            self.histogram.count(at(x));
         }
         self.cells += 1;
         self.y = self.draw(self.cells, region.height());
