@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 Url: TypeAlias = str | tuple[str, Mapping[str, Any]]
 
 _TEXTS = ("file", "body", "status", "detail")
+_UNPROCESSED = ("unreadable", "no-altitude")
 _COUNTS = ("index", "edge_points", "inliers", "candidates", "dropped", "level")
 
 
@@ -44,7 +45,8 @@ class Archive:
     skipped: int
     """Shards that were there already."""
     failed: list[dict[str, Any]] = field(repr=False)
-    """Pictures that could not be read: ``file`` and ``detail``. They have a row with status ``unreadable`` in their shard."""
+    """Pictures that were not processed: ``file`` and ``detail``. They have a row with status ``unreadable`` or
+    ``no-altitude`` in their shard."""
 
 
 def process_archive(
@@ -120,7 +122,7 @@ def process_archive(
         shards=[filesystem.unstrip_protocol(name) for name in names],
         frames=len(pictures),
         skipped=len(names) - len(tasks),
-        failed=[row for name in names for row in _unreadable(filesystem, name)],
+        failed=[row for name in names for row in _unprocessed(filesystem, name)],
     )
 
 
@@ -174,7 +176,7 @@ def _table(reports: Sequence[Report]) -> Any:
     return pyarrow.Table.from_pylist(rows, schema=schema)
 
 
-def _unreadable(filesystem: Any, name: str) -> list[dict[str, Any]]:
+def _unprocessed(filesystem: Any, name: str) -> list[dict[str, Any]]:
     if name.endswith(".mcap"):
         from ._hzn import read_mcap
 
@@ -187,4 +189,4 @@ def _unreadable(filesystem: Any, name: str) -> list[dict[str, Any]]:
         with filesystem.open(name, "rb") as file:
             columns = pyarrow.parquet.read_table(file, columns=["status", "file", "detail"])
         rows = zip(*(columns[c].to_pylist() for c in ("status", "file", "detail")), strict=True)
-    return [{"file": file, "detail": detail} for status, file, detail in rows if status == "unreadable"]
+    return [{"file": file, "detail": detail} for status, file, detail in rows if status in _UNPROCESSED]
