@@ -241,7 +241,8 @@ fn an_exchange_over_the_line() {
         let mut commands =
             vec!["set reject.threshold_px 2.5 covariance.sigma_px 0.2", "read reject.threshold_px", "dump-edges"];
         commands.extend(["process-once"; 11]);
-        commands.extend(["set camera.fx_px -1", "mode shut-down"]);
+        // More than gate.max_mean, which only the flight computer knows.
+        commands.extend(["set gate.min_mean 0.99", "mode shut-down"]);
         let mut args = vec!["telecommand", "-o", "commands.bin"];
         args.extend(commands);
         hzn_run(dir, &args);

@@ -35,11 +35,13 @@
 
 mod cdr;
 mod container;
+mod drawing;
 mod error;
 mod frame;
 mod images;
 mod index;
 mod messages;
+pub mod palette;
 mod reader;
 mod recover;
 mod row;
@@ -57,3 +59,7 @@ pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, body_name, roll_pitch_deg};
 pub use topics::{IMAGE_TOPIC, REPORT_SCHEMA};
 pub use writer::{FLUSH_INTERVAL, Options, Writer, part_path};
+
+/// A layout of Foxglove's panels for our topics, to be imported there: the picture with what was found, plots over time,
+/// status, log, the report and the axis.
+pub const LAYOUT: &str = include_str!("../foxglove-layout.json");

@@ -1,17 +1,15 @@
-//! Frames to Foxglove's messages and back. The only module that knows Foxglove's conventions.
+//! Frames to Foxglove's messages and back. What is drawn over a picture: `drawing`. No other module knows Foxglove's
+//! conventions.
 
-use foxglove::messages::points_annotation::Type;
 use foxglove::messages::{
-    CameraCalibration, Color, CompressedImage, FrameTransform, ImageAnnotations, KeyValuePair, Log, Point2,
-    PointsAnnotation, Pose, PoseInFrame, Quaternion, RawImage, Timestamp, Vector3, log::Level,
+    CameraCalibration, CompressedImage, FrameTransform, Log, Pose, PoseInFrame, Quaternion, RawImage, Timestamp,
+    Vector3, log::Level,
 };
 use hzn_core::camera;
 use prost::Message;
 use serde_json::{Map, Value};
 
-use crate::frame::{
-    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine,
-};
+use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine};
 use crate::row::Row;
 use crate::topics::Topic;
 
@@ -19,10 +17,6 @@ use crate::topics::Topic;
 const CAMERA: &str = "camera";
 /// The frame that the camera's attitude is given in.
 const ECEF: &str = "ecef";
-/// Foxglove counts pixels from the corner of the top-left pixel, hzn from its centre.
-const CENTRE_TO_CORNER_PX: f64 = 0.5;
-/// Half the length of the cross at the axis, pixels.
-const CROSS_PX: f64 = 15.0;
 
 /// Log time in nanoseconds. Times before 0 and after the year 2106 are not representable in Foxglove's messages: they
 /// are held at the limit; the row keeps the exact one.
@@ -32,7 +26,7 @@ pub(crate) fn time_ns(time_s: f64) -> u64 {
     (time_s.clamp(0.0, MAX_S) * 1e9).round() as u64
 }
 
-fn stamp(ns: u64) -> Option<Timestamp> {
+pub(crate) fn stamp(ns: u64) -> Option<Timestamp> {
     Timestamp::new_checked(u32::try_from(ns / 1_000_000_000).ok()?, (ns % 1_000_000_000) as u32)
 }
 
@@ -180,71 +174,6 @@ pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Result<EncodedImage, Str
     }
 }
 
-/// What an annotation's lines and points mean; written as its metadata `kind`.
-#[derive(Debug, Clone, Copy)]
-struct Style {
-    kind: &'static str,
-    shape: Type,
-    color: [f64; 3],
-    thickness: f64,
-}
-const EDGE: Style = Style { kind: "edge", shape: Type::LineStrip, color: [0.6, 0.6, 0.6], thickness: 1.0 };
-const INLIER: Style = Style { kind: "inlier", shape: Type::Points, color: [0.1, 0.9, 0.2], thickness: 3.0 };
-const REJECTED: Style = Style { kind: "rejected", shape: Type::Points, color: [1.0, 0.2, 0.1], thickness: 3.0 };
-const LIMB: Style = Style { kind: "limb", shape: Type::LineStrip, color: [1.0, 0.85, 0.0], thickness: 1.5 };
-const AXIS: Style = Style { kind: "axis", shape: Type::LineList, color: [0.0, 0.8, 1.0], thickness: 2.0 };
-
-pub(crate) fn annotations(a: &Annotations, ns: u64) -> ImageAnnotations {
-    let mut points = Vec::new();
-    let mut draw = |style: Style, xy: &[[f64; 2]]| {
-        if xy.is_empty() {
-            return;
-        }
-        let [r, g, b] = style.color;
-        let color = Some(Color { r, g, b, a: 1.0 });
-        points.push(PointsAnnotation {
-            timestamp: stamp(ns),
-            r#type: style.shape as i32,
-            points: xy
-                .iter()
-                .map(|&[x, y]| Point2 { x: x + CENTRE_TO_CORNER_PX, y: y + CENTRE_TO_CORNER_PX })
-                .collect(),
-            outline_color: color,
-            fill_color: color.filter(|_| style.shape == Type::Points),
-            thickness: style.thickness,
-            metadata: vec![KeyValuePair { key: "kind".into(), value: style.kind.into() }],
-            ..PointsAnnotation::default()
-        });
-    };
-    a.edges.iter().for_each(|line| draw(EDGE, line));
-    a.limb.iter().for_each(|line| draw(LIMB, line));
-    draw(REJECTED, &a.rejected);
-    draw(INLIER, &a.inliers);
-    for &[x, y] in &a.axes {
-        draw(AXIS, &[[x - CROSS_PX, y], [x + CROSS_PX, y], [x, y - CROSS_PX], [x, y + CROSS_PX]]);
-    }
-    ImageAnnotations { timestamp: stamp(ns), points, ..ImageAnnotations::default() }
-}
-
-pub(crate) fn parse_annotations(data: &[u8]) -> Result<Annotations, prost::DecodeError> {
-    let message = ImageAnnotations::decode(data)?;
-    let mut a = Annotations::default();
-    for p in message.points {
-        let kind = p.metadata.iter().find(|m| m.key == "kind").map_or("", |m| m.value.as_str());
-        let mut xy: Vec<[f64; 2]> =
-            p.points.iter().map(|p| [p.x - CENTRE_TO_CORNER_PX, p.y - CENTRE_TO_CORNER_PX]).collect();
-        match kind {
-            "edge" => a.edges.push(xy),
-            "limb" => a.limb.push(xy),
-            "inlier" => a.inliers.append(&mut xy),
-            "rejected" => a.rejected.append(&mut xy),
-            "axis" => a.axes.extend(xy.first().map(|&[x, y]| [x + CROSS_PX, y])),
-            _ => {}
-        }
-    }
-    Ok(a)
-}
-
 /// The axis as a pose at the camera whose x points along it.
 pub(crate) fn axis([x, y, z]: [f64; 3], ns: u64) -> PoseInFrame {
     // The short way from +x to the axis: (1 + x, +x × axis), normalised; half a turn about z when they are opposite.
@@ -277,6 +206,7 @@ pub(crate) fn parse_transform(data: &[u8]) -> Result<Option<Attitude>, prost::De
         .map(|(q, t)| Attitude { q_ecef_from_camera_wxyz: [q.w, q.x, q.y, q.z], position_m: [t.x, t.y, t.z] }))
 }
 
+/// A log line. Its message begins with the picture's name: the panel does not show `file`.
 pub(crate) fn log(line: &LogLine, file: &str, ns: u64) -> Log {
     let level = match line.level {
         LogLevel::Info => Level::Info,
@@ -286,7 +216,7 @@ pub(crate) fn log(line: &LogLine, file: &str, ns: u64) -> Log {
     Log {
         timestamp: stamp(ns),
         level: level as i32,
-        message: line.message.clone(),
+        message: format!("{file}: {}", line.message),
         name: "hzn".into(),
         file: file.into(),
         line: 0,
@@ -300,7 +230,8 @@ pub(crate) fn parse_log(data: &[u8]) -> Result<LogLine, prost::DecodeError> {
         Level::Warning => LogLevel::Warning,
         _ => LogLevel::Info,
     };
-    Ok(LogLine { level, message: m.message })
+    let own = m.message.strip_prefix(&m.file).and_then(|rest| rest.strip_prefix(": "));
+    Ok(LogLine { level, message: own.map(str::to_owned).unwrap_or(m.message) })
 }
 
 /// The calibration. Its principal point keeps hzn's pixel centres at integers, as ROS has them.
@@ -326,24 +257,6 @@ pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn foxglove_counts_from_the_corner() {
-        // The centre of the top-left pixel is (0, 0) here and (0.5, 0.5) there.
-        let a = Annotations {
-            edges: vec![vec![[0.0, 0.0], [1.0, 2.25]]],
-            inliers: vec![[10.0, 20.0]],
-            rejected: vec![[3.5, -0.5]],
-            limb: vec![vec![[5.0, 5.0], [6.0, 5.5]], vec![[7.0, 8.0], [9.0, 9.0]]],
-            axes: vec![[7.0, 8.0], [100.0, 50.0]],
-        };
-        let m = annotations(&a, 0);
-        assert_eq!(m.points.first().unwrap().points, [Point2 { x: 0.5, y: 0.5 }, Point2 { x: 1.5, y: 2.75 }]);
-        let cross = &m.points.last().unwrap().points;
-        let mid = |f: fn(&Point2) -> f64| cross.iter().map(f).sum::<f64>() / 4.0;
-        assert_eq!((mid(|p| p.x), mid(|p| p.y)), (100.5, 50.5));
-        assert_eq!(parse_annotations(&m.encode_to_vec()).unwrap(), a);
-    }
 
     #[test]
     fn the_pose_turns_x_to_the_axis() {

@@ -6,6 +6,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use crate::container::{Chunk, Fields, Message, Op, Record, Scanner};
+use crate::drawing;
 use crate::error::Error;
 use crate::frame::{Annotations, Attitude, EncodedImage, FrameRecord, LogLine};
 use crate::messages;
@@ -165,7 +166,7 @@ impl Reader {
                     self.images.entry(m.sequence).or_default().push_back(image);
                 }
                 Topic::Annotations => {
-                    let a = messages::parse_annotations(m.data).map_err(|e| broken("annotations", e.to_string()))?;
+                    let a = drawing::parse(m.data).map_err(|e| broken("annotations", e.to_string()))?;
                     annotations.entry(m.sequence).or_default().push_back(a);
                 }
                 Topic::Transform => {

@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use hzn_core::camera;
+use hzn_core::status::Status;
 
 use crate::container::{ChunkBuilder, Container, MAX_RECORD_BYTES};
+use crate::drawing;
 use crate::error::{Error, while_writing};
 use crate::frame::FrameRecord;
 use crate::messages;
@@ -116,8 +118,15 @@ impl Writer {
     /// # Errors
     /// As [`Self::write`].
     pub fn write_bodies(&mut self, records: &[FrameRecord]) -> Result<(), Error> {
-        for record in records {
-            self.push(record)?;
+        let several = records.len() > 1;
+        let caption = |record: &FrameRecord| {
+            let text = drawing::caption(&record.row);
+            if several { format!("{}  {text}", record.row.body) } else { text }
+        };
+        let captions: Vec<String> = records.iter().map(caption).collect();
+        for (i, record) in records.iter().enumerate() {
+            // Picture and drawing stand in the first.
+            self.push(record, if i == 0 { &captions } else { &[] })?;
         }
         self.waiting_since.get_or_insert_with(Instant::now);
         if self.images.len() >= BATCH_IMAGE_BYTES || self.data.len() >= BATCH_DATA_BYTES {
@@ -126,12 +135,13 @@ impl Writer {
         self.flush_if_due()
     }
 
-    fn push(&mut self, frame: &FrameRecord) -> Result<(), Error> {
+    fn push(&mut self, frame: &FrameRecord, captions: &[String]) -> Result<(), Error> {
         let Some(container) = &mut self.container else { return Err(Error::AfterFailure { path: self.part.clone() }) };
         let bytes = frame.image.as_ref().map_or(0, |i| i.bytes.len() as u64);
         if bytes + (BATCH_IMAGE_BYTES as u64) >= MAX_RECORD_BYTES {
             return Err(Error::TooLarge { bytes, limit: MAX_RECORD_BYTES - BATCH_IMAGE_BYTES as u64 });
         }
+        let pen_px = drawing::pen_px(self.camera.as_ref());
         // A frame without a time stays where it is in the sequence.
         let ns = frame.row.time_s.map_or(self.last_ns, messages::time_ns);
         self.last_ns = ns;
@@ -163,9 +173,11 @@ impl Writer {
                 push(Topic::Calibration, &mut |b| messages::append(&messages::calibration(camera, ns), b))?;
             }
         }
-        if frame.image.is_some() || !frame.annotations.is_empty() {
-            // Also without anything to draw: the viewer would keep the last frame's lines otherwise.
-            push(Topic::Annotations, &mut |b| messages::append(&messages::annotations(&frame.annotations, ns), b))?;
+        let unprocessed = matches!(frame.row.status, Status::Unreadable | Status::NoAltitude);
+        if frame.image.is_some() || !frame.annotations.is_empty() || (unprocessed && !captions.is_empty()) {
+            // Also without anything to draw: the last frame's picture and lines would stay as if they were this one's.
+            let drawing = drawing::annotations(&frame.annotations, captions, pen_px, ns);
+            push(Topic::Annotations, &mut |b| messages::append(&drawing, b))?;
         }
         if let Some(axis) = frame.row.axis() {
             push(Topic::Axis, &mut |b| messages::append(&messages::axis(axis, ns), b))?;

@@ -74,6 +74,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let iss_mcap = folder.join("iss.mcap");
     process(&iss_dir, &iss_mcap)?;
     let iss = self::rows(&iss_mcap)?;
+    let layout = folder.join("foxglove-layout.json");
+    std::fs::write(&layout, hzn_mcap::LAYOUT).map_err(|e| output::cannot(&layout, &e))?;
     let overlays = folder.join("overlay");
     std::fs::create_dir_all(&overlays).map_err(|e| output::cannot(&overlays, &e))?;
     let shown = draw(&flight_mcap, &overlays, 5)? + draw(&iss_mcap, &overlays, 1)?;
@@ -87,9 +89,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         (place(&flight_csv), "the same results as a table"),
         (place(&iss_dir), "a photograph from the ISS with its sensor.toml"),
         (place(&iss_mcap), "its result"),
+        (place(&layout), "panels for these results, to be imported in Foxglove"),
         (place(&overlays), &format!("{shown} pictures with everything drawn over them")),
     ] {
-        out.push_str(&format!("  {name:<24} {what}\n"));
+        out.push_str(&format!("  {name:<31} {what}\n"));
     }
     let picture = place(&iss_dir.join("iss-limb-2020-11-20.jpg"));
     out.push_str(&format!("\nNext:  hzn explain {picture} --overlay out.png\n"));

@@ -1,6 +1,6 @@
 //! Pictures with everything drawn over them that led to the answer.
 //!
-//! The colours are those of Okabe and Ito, which stay apart for colour-blind eyes.
+//! The colours are those of a recording's annotations.
 
 mod canvas;
 pub mod limb;
@@ -10,12 +10,8 @@ use std::path::Path;
 use image::RgbImage;
 
 use canvas::{Canvas, Colour};
+use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
 
-const EDGE: Colour = [86, 180, 233];
-const INLIER: Colour = [0, 158, 115];
-const REJECTED: Colour = [213, 94, 0];
-const LIMB: Colour = [240, 228, 66];
-const AXIS: Colour = [204, 121, 167];
 const TRUTH: Colour = [230, 159, 0];
 
 /// Name of the overlay of a picture.
