@@ -83,7 +83,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut out = format!("{}\n{}\n", flight_text(&rows, &truth)?, iss_text(iss.first()));
     let place = |p: &Path| p.display().to_string();
     out.push_str(&format!("Files, after {:.1} s:\n", begin.elapsed().as_secs_f64()));
-    for (name, what) in [
+    let files = [
         (place(&flight_dir), "rendered pictures with sensor.toml, frames.csv (positions) and truth.csv"),
         (place(&flight_mcap), "results with pictures, for Foxglove"),
         (place(&flight_csv), "the same results as a table"),
@@ -91,8 +91,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         (place(&iss_mcap), "its result"),
         (place(&layout), "panels for these results, to be imported in Foxglove"),
         (place(&overlays), &format!("{shown} pictures with everything drawn over them")),
-    ] {
-        out.push_str(&format!("  {name:<31} {what}\n"));
+    ];
+    let wide = files.iter().map(|(name, _)| name.len()).max().unwrap_or_default();
+    for (name, what) in files {
+        out.push_str(&format!("  {name:<wide$}  {what}\n"));
     }
     let picture = place(&iss_dir.join("iss-limb-2020-11-20.jpg"));
     out.push_str(&format!("\nNext:  hzn explain {picture} --overlay out.png\n"));
