@@ -65,6 +65,8 @@ pub(super) struct Judge<'a, T, O> {
     rival: Option<T>,
     /// Edges with too few points.
     short: u32,
+    /// An edge was fitted, whatever became of it.
+    fitted: bool,
     report: &'a mut Report<T>,
 }
 
@@ -103,6 +105,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             best: None,
             rival: None,
             short: 0,
+            fitted: false,
             report,
             sensor,
         }
@@ -237,6 +240,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         if let Some(new) = solution {
             self.weigh(new);
         }
+        self.fitted |=
+            !matches!(outcome.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken);
         // Full: only counted, unless it is chosen in the end.
         let _ = self.report.candidates.push(outcome);
         self.observer.enter(Stage::Contour);
@@ -386,12 +391,9 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             report.solution = Some(best.solution);
             return;
         }
-        let fitted = report.candidates.iter().any(|c| {
-            !matches!(c.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken)
-        });
         report.status = if self.work.was_cut() {
             Status::Truncated
-        } else if fitted {
+        } else if self.fitted {
             Status::Rejected
         } else if report.counters.candidates == 0 && self.short > 0 {
             Status::TooFewPoints
