@@ -48,6 +48,23 @@ fn each_body_has_its_row() {
 }
 
 #[test]
+fn recover_keeps_no_part_of_a_frame() {
+    let place = earth_and_sun(3);
+    for out in ["rows.csv", "rows.jsonl"] {
+        place.run(&["run", "in", "-o", out]).expect(0);
+        let whole = place.read(out);
+        let rows: Vec<&str> = whole.split_inclusive('\n').collect();
+        // The Sun's row of the last frame is not there, and then neither a part of it.
+        for cut in [&rows[rows.len() - 1][..0], &rows[rows.len() - 1][..9]] {
+            let part = rows[..rows.len() - 1].concat() + cut;
+            place.write(&format!("{out}.part"), part.as_bytes());
+            place.run(&["recover", &format!("{out}.part"), "--force"]).expect(0).says("4 rows kept");
+            assert_eq!(place.read(out), rows[..rows.len() - 2].concat());
+        }
+    }
+}
+
+#[test]
 fn a_sun_beside_the_earth_has_a_level_of_its_own() {
     let place = earth_and_sun(1);
     let rows = without_time(&place.run(&["run", "in"]).expect(0).out);

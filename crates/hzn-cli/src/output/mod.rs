@@ -46,6 +46,8 @@ enum Kind {
 pub struct Held {
     /// How many.
     pub frames: u64,
+    /// Their rows: one for each body.
+    pub rows: u64,
     /// The last one's row.
     pub last: Option<hzn_mcap::Row>,
 }
@@ -151,7 +153,7 @@ fn options(config: &Config, sensor_toml: &str, force: bool) -> Options {
 fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml: &str) -> Result<(Kind, Held), Stop> {
     match form(target) {
         Some(form) => {
-            let resumed = Text::resume(path, part, form, config.each_body().len()).map_err(|e| match e.kind() {
+            let resumed = Text::resume(path, part, form, Some(config.each_body().len())).map_err(|e| match e.kind() {
                 std::io::ErrorKind::InvalidData => usage(format!("{}: {e}; --force starts over", part.display())),
                 _ => cannot(part, &e),
             });
@@ -165,7 +167,7 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
                 e => failed(e),
             })?;
             let frames = resumed.frames / config.each_body().len() as u64;
-            let held = Held { frames, last: last.filter(|_| resumed.frames > 0) };
+            let held = Held { frames, rows: resumed.frames, last: last.filter(|_| resumed.frames > 0) };
             Ok((Kind::Mcap(Box::new(resumed.writer)), held))
         }
     }
@@ -352,12 +354,12 @@ pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result
     if file != part {
         std::fs::copy(file, &part)?;
     }
-    let resumed = Text::resume(path, &part, form, 1);
+    let resumed = Text::resume(path, &part, form, None);
     if resumed.is_err() && file != part {
         // Half a copy helps nobody.
         let _ = std::fs::remove_file(&part);
     }
     let (text, held) = resumed?;
     text.finish()?;
-    Ok((held.frames, size.saturating_sub(std::fs::metadata(path)?.len())))
+    Ok((held.rows, size.saturating_sub(std::fs::metadata(path)?.len())))
 }

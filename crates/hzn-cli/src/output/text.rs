@@ -47,18 +47,16 @@ impl Text {
         Ok(text)
     }
 
-    /// Goes on after the last frame that has all of its `bodies` rows; without an unfinished file, begins one.
-    pub(crate) fn resume(path: &Path, part: &Path, form: Form, bodies: usize) -> io::Result<(Self, Held)> {
+    /// Goes on after the last frame that has all of its `bodies` rows, or as many as the first frame; without an unfinished
+    /// file, begins one.
+    pub(crate) fn resume(path: &Path, part: &Path, form: Form, bodies: Option<usize>) -> io::Result<(Self, Held)> {
         if !part.exists() {
             return Ok((Self::create(path, part, form)?, Held::default()));
         }
         let mut file = OpenOptions::new().read(true).write(true).open(part)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        let (held, end) = match form {
-            Form::Csv => whole_csv(&bytes, bodies)?,
-            Form::Jsonl => whole_jsonl(&bytes, bodies),
-        };
+        let (held, end) = whole(&bytes, form, bodies)?;
         if end == 0 {
             drop(file);
             return Ok((Self::create(path, part, form)?, Held::default()));
@@ -110,48 +108,63 @@ pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
     writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))
 }
 
-/// Whole frames of `bodies` rows each, and where they end.
-fn whole_csv(bytes: &[u8], bodies: usize) -> io::Result<(Held, usize)> {
-    let header = header();
-    if header.as_bytes().starts_with(bytes) {
-        return Ok((Held::default(), 0));
-    }
-    if !bytes.starts_with(header.as_bytes()) {
-        let what = "has other columns than the results of this version";
-        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
-    }
-    let (mut held, mut end, mut rows) = (Held::default(), header.len(), 0);
-    // A row may hold line breaks within quotes, so that only the reader knows where it ends.
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(&bytes[header.len()..]);
-    let mut record = csv::StringRecord::new();
-    while let Ok(true) = reader.read_record(&mut record) {
-        let to = header.len() + reader.position().byte() as usize;
-        let whole = to > 0 && bytes.get(to - 1) == Some(&b'\n');
-        let Ok(row) = record.deserialize::<Row>(None) else { break };
-        if !whole {
-            break;
+/// Whole frames of `bodies` rows each, and where they end. Where the number of bodies is not known, the first frame has them
+/// all.
+fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, usize)> {
+    let bodies = match bodies {
+        Some(bodies) => bodies,
+        None => {
+            let mut first = Vec::new();
+            each_row(bytes, form, |row, _| {
+                let same = first.first().is_none_or(|index| *index == row.index);
+                first.extend(same.then_some(row.index));
+                same
+            })?;
+            first.len().max(1)
         }
+    };
+    let (mut held, mut end, mut rows) = (Held::default(), 0, 0);
+    each_row(bytes, form, |row, to| {
         rows += 1;
         if rows % bodies == 0 {
-            held = Held { frames: held.frames + 1, last: Some(row) };
+            held = Held { frames: held.frames + 1, rows: rows as u64, last: Some(row) };
             end = to;
         }
-    }
+        true
+    })?;
     Ok((held, end))
 }
 
-fn whole_jsonl(bytes: &[u8], bodies: usize) -> (Held, usize) {
-    let (mut held, mut end, mut to, mut rows) = (Held::default(), 0, 0, 0);
-    for line in bytes.split_inclusive(|&b| b == b'\n') {
-        if !line.ends_with(b"\n") {
+/// Gives every whole row and where it ends, until `visit` says to stop or a row is cut off.
+fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<()> {
+    if form == Form::Jsonl {
+        let mut to = 0;
+        for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|line| line.ends_with(b"\n")) {
+            to += line.len();
+            let Ok(row) = serde_json::from_slice::<Row>(line) else { break };
+            if !visit(row, to) {
+                break;
+            }
+        }
+        return Ok(());
+    }
+    let header = header();
+    if header.as_bytes().starts_with(bytes) {
+        return Ok(());
+    }
+    let Some(rest) = bytes.strip_prefix(header.as_bytes()) else {
+        let what = "has other columns than the results of this version";
+        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+    };
+    // A row may hold line breaks within quotes, so that only the reader knows where it ends.
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(rest);
+    let mut record = csv::StringRecord::new();
+    while let Ok(true) = reader.read_record(&mut record) {
+        let to = header.len() + reader.position().byte() as usize;
+        let Ok(row) = record.deserialize::<Row>(None) else { break };
+        if bytes.get(to - 1) != Some(&b'\n') || !visit(row, to) {
             break;
         }
-        let Ok(row) = serde_json::from_slice::<Row>(line) else { break };
-        (to, rows) = (to + line.len(), rows + 1);
-        if rows % bodies == 0 {
-            held = Held { frames: held.frames + 1, last: Some(row) };
-            end = to;
-        }
     }
-    (held, end)
+    Ok(())
 }
