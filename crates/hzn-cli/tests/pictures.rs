@@ -3,7 +3,8 @@
 mod common;
 
 use common::{Place, cell, limb, without_time};
-use image::{DynamicImage, GrayImage, ImageFormat};
+use image::codecs::jpeg::JpegEncoder;
+use image::{DynamicImage, GrayImage, ImageEncoder, ImageFormat};
 
 /// The axis of each row; every frame must have been answered.
 #[track_caller]
@@ -276,4 +277,45 @@ fn an_edge_that_comes_late_is_listed_as_chosen() {
     let frame = recorded.next().unwrap().unwrap();
     assert_eq!(frame.candidates.iter().filter(|c| c.verdict == "chosen").count(), 1);
     assert!(frame.annotations.inliers.len() > 50);
+}
+
+/// EXIF that holds `DateTimeOriginal`, 19 characters, and nothing else.
+fn exif(stamp: &str) -> Vec<u8> {
+    // One entry of the first directory leads to the second, whose one entry leads to the text.
+    let entry = |tag: u16, kind: u16, count: u32, value: u32| {
+        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
+    };
+    let directory = |entry: Vec<u8>| [&1u16.to_le_bytes()[..], &entry, &0u32.to_le_bytes()].concat();
+    let head = [b"II*\0".as_slice(), &8u32.to_le_bytes()].concat();
+    let text = [stamp.as_bytes(), b"\0"].concat();
+    [head, directory(entry(0x8769, 4, 1, 26)), directory(entry(0x9003, 2, text.len() as u32, 44)), text].concat()
+}
+
+#[test]
+fn pictures_go_by_one_clock() {
+    let place = Place::new();
+    let jpeg = |name: &str, stamp: Option<&str>| {
+        let mut bytes = Vec::new();
+        let mut encoder = JpegEncoder::new(&mut bytes);
+        if let Some(stamp) = stamp {
+            encoder.set_exif_metadata(exif(stamp)).unwrap();
+        }
+        limb(320, 240, 0.0).write_with_encoder(encoder).unwrap();
+        place.write(&format!("in/{name}"), &bytes);
+    };
+    let times = || {
+        let rows = without_time(&place.run(&["run", "in", "--fps", "4"]).expect(0).out);
+        rows.iter().map(|r| cell(r, "time_s").to_owned()).collect::<Vec<_>>()
+    };
+    jpeg("b.jpg", Some("1970:01:02 00:00:01"));
+    jpeg("c.jpg", None);
+    // The camera's clock, which did not say when it took the second: not 0.25 s.
+    assert_eq!(times(), ["86401.0", ""]);
+    // What the first picture does not know, the others are not asked for.
+    jpeg("a.jpg", None);
+    assert_eq!(times(), ["0.0", "0.25", "0.5"]);
+    // One that cannot be read says nothing of the clock.
+    place.write("in/a.jpg", b"no picture");
+    let rows = without_time(&place.run(&["run", "in", "--fps", "4"]).expect(3).out);
+    assert_eq!(rows.iter().map(|r| cell(r, "time_s")).collect::<Vec<_>>(), ["", "86401.0", ""]);
 }

@@ -96,7 +96,7 @@ pub(crate) fn process_encoded(
     let row = FrameData { file: name.clone(), time_s, ..expected.data.clone() };
     let plan = plan(&state, None);
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
-    processed(py, &state, &plan, index, input::Item { name, time_s: None, data: Some(row), payload })
+    processed(py, &state, &plan, index, input::Item { name, time: input::TimeSource::Table, data: Some(row), payload })
 }
 
 fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {

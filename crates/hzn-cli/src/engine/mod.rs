@@ -277,14 +277,11 @@ fn write_in_order(
 /// Decodes and processes one frame.
 fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
     let Job { index, mut item } = job;
-    let timed = item.is_timed(plan.frames.as_ref());
+    let time = item.time_source(plan.frames.as_ref());
     let data = item.known(plan.frames.as_ref());
     let decoded = item.payload.decode(Some(&plan.config));
-    let exif = decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
-    let time_s = match timed {
-        true => data.as_ref().and_then(|d| d.time_s),
-        false => item.time_s.or(exif).or(Some(index as f64 / plan.fps)),
-    };
+    let exif = || decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
+    let time_s = time.time_s(data.as_ref(), exif, index, plan.fps);
     let mut finished = Finished {
         index,
         name: item.name,
@@ -358,7 +355,7 @@ mod tests {
     use hzn_core::image::Layout;
 
     use super::*;
-    use crate::input::{Payload, Picture, picture::Samples};
+    use crate::input::{Payload, Picture, TimeSource, picture::Samples};
 
     /// Counts the frames that were handed out and not written yet.
     struct Counted<'a> {
@@ -374,7 +371,12 @@ mod tests {
             self.most.fetch_max(abroad, Ordering::SeqCst);
             let layout = Layout::packed(32, 24, 1, 8);
             let picture = Picture { samples: Samples::Bytes(vec![7; 32 * 24]), layout, exif_time_s: None };
-            Some(Ok(Item { name: self.left.to_string(), time_s: None, data: None, payload: Payload::Decoded(picture) }))
+            Some(Ok(Item {
+                name: self.left.to_string(),
+                time: TimeSource::Count,
+                data: None,
+                payload: Payload::Decoded(picture),
+            }))
         }
         fn total(&self) -> Option<u64> {
             None

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Item, Payload, Raw, SIZES, Source, ending, picture, video};
+use super::{Item, Payload, Raw, SIZES, Source, TimeSource, ending, picture, video};
 use crate::exit::{Stop, usage};
 
 /// Endings of pictures that are read.
@@ -17,6 +17,7 @@ pub(super) struct Files {
     given: usize,
     folder: PathBuf,
     raw: Option<Raw>,
+    time: TimeSource,
     /// Names are given with their folder, because the files lie in several.
     with_folder: bool,
     left_out: BTreeMap<String, usize>,
@@ -77,8 +78,14 @@ impl Files {
         let first = paths.first().map(parent).unwrap_or_default();
         let with_folder = paths.iter().any(|p| parent(p) != first);
         let folder = folder.unwrap_or(first);
-        Ok(Self { paths, given: 0, folder, raw, with_folder, left_out })
+        let time = if raw.is_none() && tell_their_time(&paths) { TimeSource::Exif } else { TimeSource::Count };
+        Ok(Self { paths, given: 0, folder, raw, time, with_folder, left_out })
     }
+}
+
+/// Whether the camera wrote the time into the pictures: the first that can be read speaks for all.
+fn tell_their_time(paths: &[PathBuf]) -> bool {
+    paths.iter().take(SIZES).find_map(|p| picture::exif_of(p)).flatten().is_some()
 }
 
 fn in_folder(folder: &Path, raw: bool, left_out: &mut BTreeMap<String, usize>) -> Result<Vec<PathBuf>, Stop> {
@@ -117,7 +124,7 @@ impl Source for Files {
             Some(raw) => Payload::RawFile(path, raw),
             None => Payload::File(path),
         };
-        Some(Ok(Item { name, time_s: None, data: None, payload }))
+        Some(Ok(Item { name, time: self.time, data: None, payload }))
     }
     fn total(&self) -> Option<u64> {
         Some(self.paths.len() as u64)

@@ -25,12 +25,44 @@ use crate::exit::{Stop, usage};
 pub struct Item {
     /// Its name in results and in frames.csv.
     pub name: String,
-    /// Time from the container (video, MCAP) in seconds.
-    pub time_s: Option<f64>,
+    /// Where its time comes from, unless [`Self::time_source`] knows better.
+    pub time: TimeSource,
     /// What the source itself knows about it, as a row of frames.csv: a recording of ours, what it was recorded with.
     pub data: Option<FrameData>,
     /// The picture.
     pub payload: Payload,
+}
+
+/// Where the time of a picture comes from. All pictures of a sequence go by one clock: times from two would be counted from
+/// different instants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimeSource {
+    /// frames.csv, or what a recording of ours says.
+    Table,
+    /// The container (video, MCAP): seconds.
+    Container(f64),
+    /// What the camera wrote into the picture.
+    Exif,
+    /// The picture's number, at so many frames a second.
+    Count,
+}
+
+impl TimeSource {
+    /// Seconds, where they are known. `exif` is what the camera wrote into the picture.
+    pub fn time_s(
+        self,
+        data: Option<&FrameData>,
+        exif: impl FnOnce() -> Option<f64>,
+        index: u64,
+        fps: f64,
+    ) -> Option<f64> {
+        match self {
+            Self::Table => data.and_then(|d| d.time_s),
+            Self::Container(time_s) => Some(time_s),
+            Self::Exif => exif(),
+            Self::Count => Some(index as f64 / fps),
+        }
+    }
 }
 
 /// Pictures whose headers [`Source::sizes`] reads at most.
@@ -89,10 +121,10 @@ impl Item {
             None => self.data.take(),
         }
     }
-    /// Is all that can be known of its time in frames.csv, or in what the source knows? A time from elsewhere would have
-    /// another epoch.
-    pub fn is_timed(&self, frames: Option<&Frames>) -> bool {
-        frames.map_or(self.data.is_some(), Frames::has_times)
+    /// The clock it goes by: a frames.csv with times, or what the source knows, takes the place of every other.
+    pub fn time_source(&self, frames: Option<&Frames>) -> TimeSource {
+        let timed = frames.map_or(self.data.is_some(), Frames::has_times);
+        if timed { TimeSource::Table } else { self.time }
     }
 }
 
@@ -161,6 +193,11 @@ fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, S
         return Ok(Box::new(ours));
     }
     Ok(Box::new(recording::Recording::open(path, topic)?))
+}
+
+/// When the camera exposed a picture file, by its EXIF, seconds since 1970.
+pub fn exif_time_s(path: &Path) -> Option<f64> {
+    picture::exif_of(path).flatten()
 }
 
 /// The picture of a recorded message.

@@ -131,6 +131,12 @@ pub(super) fn size_of(path: &Path) -> Option<(u32, u32)> {
     size_in(std::io::BufReader::new(std::fs::File::open(path).ok()?))
 }
 
+/// When the camera exposed, if it wrote that into the file; `None` for a file whose header cannot be read.
+pub(super) fn exif_of(path: &Path) -> Option<Option<f64>> {
+    let mut decoder = ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?;
+    Some(decoder.exif_metadata().ok().flatten().and_then(super::exif::time_s))
+}
+
 /// As [`size_of`], from the file's contents.
 pub(super) fn size_in(contents: impl std::io::BufRead + std::io::Seek) -> Option<(u32, u32)> {
     ImageReader::new(contents).with_guessed_format().ok()?.into_dimensions().ok()

@@ -6,7 +6,7 @@ use hzn_core::image::Layout;
 use hzn_mcap::{EncodedImage, ImageFormat, ImageReader};
 
 use super::picture::{self, Picture, Samples};
-use super::{Item, Payload, SIZES, Source};
+use super::{Item, Payload, SIZES, Source, TimeSource};
 use crate::exit::{Stop, usage};
 
 /// Frames of one topic. They are named after the recording: `flight.mcap#000012`.
@@ -59,7 +59,7 @@ impl Recording {
             Ok(image) => payload(image),
             Err(why) => Payload::Broken(why),
         };
-        Some(Ok(Item { name, time_s: Some(image.time_s), data: None, payload }))
+        Some(Ok(Item { name, time: TimeSource::Container(image.time_s), data: None, payload }))
     }
 }
 

@@ -6,7 +6,7 @@ use hzn_calib::FrameData;
 use hzn_mcap::{Contents, Found, FrameRecord, Index, Reader};
 
 use super::recording::{payload, size_of};
-use super::{Item, Payload, SIZES, Source};
+use super::{Item, Payload, SIZES, Source, TimeSource};
 use crate::exit::{Stop, usage};
 use crate::output;
 
@@ -51,7 +51,7 @@ fn has_pictures(path: &Path) -> Result<bool, hzn_mcap::Error> {
 fn item(record: FrameRecord) -> Item {
     let data: FrameData = output::frame_data(&record.row, &record.given);
     let picture = record.image.map_or_else(|| Payload::Broken("the recording holds no picture of it".into()), payload);
-    Item { name: record.row.file, time_s: data.time_s, data: Some(data), payload: picture }
+    Item { name: record.row.file, time: TimeSource::Table, data: Some(data), payload: picture }
 }
 
 impl Source for Rerun {

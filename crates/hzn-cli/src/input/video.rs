@@ -10,7 +10,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 use hzn_core::image::Layout;
 
 use super::picture::{Picture, Samples, check_size};
-use super::{Item, Payload, Source};
+use super::{Item, Payload, Source, TimeSource};
 use crate::exit::{Stop, failed, usage};
 
 pub(super) const ENDINGS: &[&str] = &[
@@ -169,9 +169,10 @@ impl Source for Video {
         };
         let picture =
             Picture { samples, layout: Layout::packed(self.width, self.height, 1, self.bits), exif_time_s: None };
-        let (name, time_s) = (format!("{}#{:06}", self.stem, self.index), self.time_s());
+        let name = format!("{}#{:06}", self.stem, self.index);
+        let time = self.time_s().map_or(TimeSource::Count, TimeSource::Container);
         self.index += 1;
-        Some(Ok(Item { name, time_s, data: None, payload: Payload::Decoded(picture) }))
+        Some(Ok(Item { name, time, data: None, payload: Payload::Decoded(picture) }))
     }
     fn total(&self) -> Option<u64> {
         self.count

@@ -167,7 +167,7 @@ impl Film {
             // A picture that cannot be read, or has another size, is a black frame: times stay right.
             let image = match item.payload.decode(Some(&self.config)) {
                 Ok((picture, _)) => {
-                    let (name, time_s) = (&*item.name, item.time_s);
+                    let (name, time_s) = (&*item.name, item.data.as_ref().and_then(|d| d.time_s));
                     let subject = Subject { index, name, time_s, data: data.as_ref(), picture: &picture };
                     let outcome = sight::look(subject, &self.config, sensor, false);
                     draw(&picture, Some(&outcome), &self.layers)

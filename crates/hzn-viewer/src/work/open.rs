@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_calib::Frames;
-use hzn_cli::input::{self, Item, Payload, Raw};
+use hzn_cli::input::{self, Item, Payload, Raw, TimeSource};
 use hzn_mcap::{Found, Index, Row};
 use hzn_sim::truth::{self, Truth};
 
@@ -294,22 +294,23 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
                 return Ok(());
             }
         };
-        let timed = item.is_timed(frames.as_ref());
+        let time = item.time_source(frames.as_ref());
         let data = item.known(frames.as_ref());
-        let Item { name, time_s, payload, .. } = item;
+        let Item { name, payload, .. } = item;
         let place = match payload {
             Payload::File(path) => Place::File(path),
             Payload::RawFile(path, raw) => Place::RawFile(path, raw),
             _ => Place::Video(index),
         };
-        let time_s = match timed {
-            true => data.as_ref().and_then(|d| d.time_s),
-            false => time_s.or(Some(index as f64 / request.fps)),
+        let exif = || match &place {
+            Place::File(path) => input::exif_time_s(path),
+            _ => None,
         };
-        let video = matches!(place, Place::Video(_));
+        let time_s = time.time_s(data.as_ref(), exif, index, request.fps);
+        let takes_long = time == TimeSource::Exif || matches!(place, Place::Video(_));
         batch.push((Entry { name, time_s, data, place }, Vec::new()));
-        // A video is decoded to know its times: what is known by now can be looked at.
-        if video && batch.len() >= 25 && !teller.tell(Event::Frames(std::mem::take(&mut batch))) {
+        // A video is decoded, and a file opened, to know its time: what is known by now can be looked at.
+        if takes_long && batch.len() >= 25 && !teller.tell(Event::Frames(std::mem::take(&mut batch))) {
             return Ok(());
         }
     }
@@ -376,5 +377,22 @@ mod tests {
         assert_eq!(names, [("a.png", Some(5.5)), ("b.png", None)]);
         assert_eq!(frames[0].0.data.as_ref().unwrap().altitude_km, Some(230.0));
         assert!(note.as_deref().unwrap().contains("c.png"));
+    }
+
+    #[test]
+    fn pictures_have_the_time_that_the_camera_wrote() {
+        let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/real/full");
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::copy(full.join("iss-limb-2020-11-20.jpg"), dir.path().join("a.jpg")).unwrap();
+        image::GrayImage::new(8, 6).save(dir.path().join("b.png")).unwrap();
+        let times: Vec<_> = all(of(dir.path()))
+            .iter()
+            .flat_map(|event| match event {
+                Event::Frames(frames) => frames.iter().map(|(e, _)| e.time_s).collect(),
+                _ => Vec::new(),
+            })
+            .collect();
+        // 2020-11-20, and a picture without a camera.
+        assert!(matches!(times.as_slice(), [Some(t), None] if (t / 86400.0).floor() == 18_586.0), "{times:?}");
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hzn_calib::FrameData;
-use hzn_cli::input::{Item, Source};
+use hzn_cli::input::{Item, Source, TimeSource};
 use hzn_mcap::{Index, Pictures};
 
 use super::reader::Reader;
@@ -36,7 +36,12 @@ impl Source for Walk {
         let Entry { name, time_s, data, place } = self.entries.next()?;
         // All that is known of it: nothing is looked for elsewhere.
         let data = FrameData { file: name.clone(), time_s, ..data.unwrap_or_default() };
-        Some(self.reader.payload(&place).map(|payload| Item { name, time_s, data: Some(data), payload }))
+        Some(self.reader.payload(&place).map(|payload| Item {
+            name,
+            time: TimeSource::Table,
+            data: Some(data),
+            payload,
+        }))
     }
     fn total(&self) -> Option<u64> {
         Some(self.entries.len() as u64)
