@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod cases;
+mod goals;
 mod observers;
 mod opencv;
 mod sensors;

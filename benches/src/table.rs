@@ -6,6 +6,7 @@ use hzn_core::status::Status;
 use serde::Serialize;
 
 use crate::cases::{Case, Picture};
+use crate::goals;
 use crate::opencv::{Answer, Recipe};
 use crate::sensors::{FEWER, Timed};
 
@@ -24,7 +25,7 @@ pub(crate) struct Results {
 /// One case.
 #[derive(Serialize)]
 pub(crate) struct CaseResult {
-    name: String,
+    pub(crate) name: String,
     pub(crate) f32: Times,
     pub(crate) fewer: Times,
     pub(crate) f64: Times,
@@ -33,7 +34,7 @@ pub(crate) struct CaseResult {
     frames: usize,
     answered: [usize; 4],
     error_deg: [Vec<f64>; 4],
-    pixels_percent: Vec<f64>,
+    pub(crate) pixels_percent: Vec<f64>,
     /// Nanoseconds a point, warm, with every point kept.
     pub(crate) ns_a_point: Vec<f64>,
 }
@@ -61,7 +62,7 @@ impl Times {
             }
         }
     }
-    fn median(&self) -> f64 {
+    pub(crate) fn median(&self) -> f64 {
         median(&self.total_us)
     }
     fn stages(&self) -> String {
@@ -86,7 +87,7 @@ fn keep_best(list: &mut Vec<f64>, frame: usize, us: f64) {
     }
 }
 
-fn median(list: &[f64]) -> f64 {
+pub(crate) fn median(list: &[f64]) -> f64 {
     let mut sorted = list.to_vec();
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len();
@@ -195,6 +196,13 @@ impl Results {
                 median(&c.ns_a_point)
             );
         }
+        let _ = writeln!(
+            s,
+            "\nWarm is the same picture once more, in the caches. What lies between that and the first column is memory: the \
+             picture, of which each row that the limb crosses lies elsewhere, and the program, which flushed caches do not \
+             hold either.\n\nOur goals, and what is reached of them:\n\n{}",
+            goals::table(&self.cases)
+        );
         s.push_str("\nAngle between answer and truth in degrees, median / worst (frames answered):\n\n");
         let _ = writeln!(s, "| case | hzn f32 | f32, {FEWER} points | hzn f64 | recipe |\n|---|---|---|---|---|");
         for c in &self.cases {

@@ -1,0 +1,45 @@
+//! What hzn-core wants to reach, beside what was measured.
+
+use std::fmt::Write;
+
+use crate::sensors::FEWER;
+use crate::table::{CaseResult, median};
+
+/// How many times as fast as the recipe.
+const FACTORS: [(&str, f64); 5] = [
+    ("clean-640x480", 10.0),
+    ("clean-1920x1080", 20.0),
+    ("cloudy-1920x1080", 40.0),
+    ("clean-4096x3072", 60.0),
+    ("cloudy-4096x3072", 60.0),
+];
+/// How many times as long a picture with six times the pixels may take.
+const GROWTH: (&str, &str, f64) = ("clean-1920x1080", "clean-4096x3072", 2.0);
+/// Nanoseconds a point and percent of the pixels, of this case.
+const OF_CLEAN: (&str, f64, f64) = ("clean-1920x1080", 30.0, 1.0);
+
+/// The table of goals; of cases that were not measured there is no row.
+pub(crate) fn table(cases: &[CaseResult]) -> String {
+    let case = |name: &str| cases.iter().find(|c| c.name == name);
+    let mut s = format!("| goal | reached | with {FEWER} points kept |\n|---|---|---|\n");
+    for (name, factor) in FACTORS {
+        let Some(c) = case(name) else { continue };
+        let [ours, fewer] = [&c.f32, &c.fewer].map(|t| c.opencv.median() / t.median());
+        let _ = writeln!(s, "| {name}: {factor} times as fast as the recipe | {ours:.1} | {fewer:.1} |");
+    }
+    let (small, large, most) = GROWTH;
+    if let (Some(small), Some(large)) = (case(small), case(large)) {
+        let ours = large.f32.median() / small.f32.median();
+        let fewer = large.fewer.median() / small.fewer.median();
+        let _ =
+            writeln!(s, "| {}: at most {most} times as long as {} | {ours:.1} | {fewer:.1} |", large.name, small.name);
+    }
+    let (name, ns, percent) = OF_CLEAN;
+    if let Some(c) = case(name) {
+        let point = median(&c.ns_a_point);
+        let _ = writeln!(s, "| {name}, every point kept, warm: at most {ns} ns a point | {point:.0} | |");
+        let read = median(&c.pixels_percent);
+        let _ = writeln!(s, "| {name}: at most {percent} % of the pixels read | {read:.2} | |");
+    }
+    s
+}
