@@ -75,6 +75,12 @@ pub enum Error {
         /// The unfinished file.
         path: PathBuf,
     },
+    /// The file to go on with is none that we began.
+    #[error("{} is no recording of hzn: choose another name for the output", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
     /// A picture or an annotation list is too large for a record.
     #[error("a record of {bytes} bytes is too large for a recording (at most {limit})")]
     TooLarge {

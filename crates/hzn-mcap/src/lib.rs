@@ -42,6 +42,7 @@ mod images;
 mod index;
 mod messages;
 pub mod palette;
+mod part;
 mod reader;
 mod recover;
 mod row;
@@ -54,11 +55,12 @@ pub use frame::{
 };
 pub use images::{ImageReader, InputImage};
 pub use index::{Found, Index, Pictures, Place};
+pub use part::{create_part, open_part, part_path};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, body_name, roll_pitch_deg};
 pub use topics::{IMAGE_TOPIC, REPORT_SCHEMA};
-pub use writer::{FLUSH_INTERVAL, Options, Writer, part_path};
+pub use writer::{FLUSH_INTERVAL, Options, Writer};
 
 /// A layout of Foxglove's panels for our topics, to be imported there: the picture with what was found, plots over time,
 /// status, log, the report and the axis.

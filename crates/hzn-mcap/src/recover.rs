@@ -1,14 +1,15 @@
 //! Closing and continuing recordings that were cut off.
 
 use std::fs::{self, File};
-use std::io::{BufReader, BufWriter};
+use std::io::{BufReader, BufWriter, Read};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Container, Fields, Op, Scanner};
+use crate::container::{Chunk, Container, Fields, MAGIC, Op, Scanner};
 use crate::error::{Error, while_writing};
+use crate::part::{open_part, part_path};
 use crate::reader::{Contents, Reader, reports};
 use crate::topics::Topic;
-use crate::writer::{Options, Writer, open, part_path, refuse_existing};
+use crate::writer::{LIBRARY, Options, Writer, open, refuse_existing};
 
 /// What [`recover`] found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -86,14 +87,24 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     if !part.exists() {
         return fresh();
     }
-    let mut reader = match Reader::open(&part, Contents::WithoutImages) {
-        Ok(reader) => reader,
-        // Cut off before the magic bytes were out: nothing is lost.
-        Err(Error::NotMcap { .. }) => return fresh(),
-        Err(e) => return Err(e),
-    };
+    // Until its frames are in the new file, it is nobody else's.
+    let held = open_part(&part).map_err(|e| while_writing(&part, e))?;
+    match origin(&held).map_err(|source| Error::Read { path: part.clone(), source })? {
+        Origin::Ours => {}
+        // Nothing is lost.
+        Origin::Cut => {
+            drop(held);
+            return fresh();
+        }
+        Origin::Other => return Err(Error::Foreign { path: part }),
+    }
+    let mut reader = Reader::open(&part, Contents::WithoutImages)?;
     match reader.sensor_toml() {
-        None => return fresh(),
+        // Cut off before it was out.
+        None => {
+            drop(held);
+            return fresh();
+        }
         Some(text) if text != options.sensor_toml => return Err(Error::OtherSensor { path: part }),
         Some(_) => {}
     }
@@ -117,6 +128,31 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     }
     let (found, out) = copied?;
     Ok(Resumed { frames: found.frames, last_index, writer: Writer::on(out, path, &part, options) })
+}
+
+/// Who began a file.
+enum Origin {
+    Ours,
+    /// Cut off before that can be told: there is nothing in it yet.
+    Cut,
+    Other,
+}
+
+fn origin(mut file: &File) -> std::io::Result<Origin> {
+    let mut beginning = Vec::new();
+    file.by_ref().take(256).read_to_end(&mut beginning)?;
+    let mut fields = Fields(&beginning);
+    let magic = fields.bytes(MAGIC.len());
+    Ok(match magic {
+        None if MAGIC.starts_with(&beginning) => Origin::Cut,
+        Some(magic) if magic == MAGIC => match (fields.u8(), fields.u64(), fields.text(), fields.text()) {
+            (Some(Op::HEADER), _, _, Some(library)) if library.starts_with(LIBRARY) => Origin::Ours,
+            // A header of ours is shorter than what was read.
+            (.., None) if beginning.len() < 64 => Origin::Cut,
+            _ => Origin::Other,
+        },
+        _ => Origin::Other,
+    })
 }
 
 /// Copies the whole records of `input` up to the last finished frame.

@@ -1,7 +1,7 @@
 //! Writes a recording that survives the end of the program at any moment.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -14,6 +14,7 @@ use crate::drawing;
 use crate::error::{Error, while_writing};
 use crate::frame::FrameRecord;
 use crate::messages;
+use crate::part::{create_part, part_path};
 use crate::topics::Topic;
 
 /// Longest time that a frame waits to be finished while frames keep coming.
@@ -35,13 +36,6 @@ pub struct Options {
     pub camera: Option<camera::Config>,
     /// Replace an output, or the remains of a run, that is there already.
     pub force: bool,
-}
-
-/// The name a recording has until it is finished: `out.mcap.part`.
-pub fn part_path(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    name.into()
 }
 
 /// A recording that is being written. Dropped without [`Writer::finish`] it leaves its `.part` file with every frame
@@ -266,10 +260,13 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     if path.exists() { Err(Error::Exists { path: path.to_path_buf() }) } else { Ok(()) }
 }
 
+/// What our recordings name as the library that wrote them, before its version.
+pub(crate) const LIBRARY: &str = "hzn";
+
 /// Opens a file for a container, empty.
 pub(crate) fn open(part: &Path) -> std::io::Result<Container<BufWriter<File>>> {
-    let file = OpenOptions::new().write(true).create(true).truncate(true).open(part)?;
-    Container::try_new(BufWriter::with_capacity(1 << 16, file), concat!("hzn ", env!("CARGO_PKG_VERSION")))
+    let file = create_part(part)?;
+    Container::try_new(BufWriter::with_capacity(1 << 16, file), &format!("{LIBRARY} {}", env!("CARGO_PKG_VERSION")))
 }
 
 fn begin(part: &Path, options: &Options) -> std::io::Result<Container<BufWriter<File>>> {

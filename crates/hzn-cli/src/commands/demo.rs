@@ -115,10 +115,7 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
     // Pictures are rendered on all cores already, one after the other.
     for frame in &flight.frames {
         let path = folder.join(&frame.file);
-        frame.render().map_err(failed)?.save(&path).map_err(|e| match e {
-            image::ImageError::IoError(e) => output::cannot(&path, &e),
-            e => failed(e),
-        })?;
+        frame.render().map_err(failed)?.save(&path).map_err(|e| output::not_saved(&path, &e))?;
     }
     let mut known = String::from("file,time_s,x_km,y_km,z_km\n");
     for frame in &flight.frames {
@@ -130,11 +127,15 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
 
     let truth: Vec<Truth> = flight.frames.iter().map(|f| f.truth()).collect::<Result<_, _>>().map_err(failed)?;
     let path = folder.join("truth.csv");
-    let mut table = csv::Writer::from_path(&path).map_err(failed)?;
+    let written = |e: csv::Error| match e.into_kind() {
+        csv::ErrorKind::Io(e) => output::cannot(&path, &e),
+        other => failed(format!("{}: {other:?}", path.display())),
+    };
+    let mut table = csv::Writer::from_path(&path).map_err(written)?;
     for row in &truth {
-        table.serialize(row).map_err(failed)?;
+        table.serialize(row).map_err(written)?;
     }
-    table.flush()?;
+    table.flush().map_err(|e| output::cannot(&path, &e))?;
     Ok(truth)
 }
 

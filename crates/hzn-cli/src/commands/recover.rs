@@ -70,7 +70,17 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
     if beside.exists() {
         std::fs::remove_file(&beside)?;
     }
-    let found = hzn_mcap::recover(file, &beside).map_err(failed)?;
+    let found = hzn_mcap::recover(file, &beside).map_err(|e| match e {
+        hzn_mcap::Error::DiskFull { folder, .. } => {
+            let what = "free some, or choose another folder with -o";
+            failed(format!(
+                "no space left on the disk of {}: {what}; {} is as it was",
+                folder.display(),
+                file.display()
+            ))
+        }
+        e => failed(e),
+    })?;
     std::fs::rename(&beside, path)?;
     if found.broken_chunks > 0 {
         tell::warning(format_args!("{} damaged parts were left out; their frames are missing", found.broken_chunks));

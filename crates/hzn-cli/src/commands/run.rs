@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::Frames;
 use hzn_core::status::Status;
-use hzn_mcap::Row;
+use hzn_mcap::{Row, part_path};
 
 use crate::engine::{self, AnySensor, End, Finished, Plan};
 use crate::exit::{Exit, Outcome, Stop, usage};
@@ -73,6 +73,12 @@ impl Args {
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.output {
         output::target(path)?;
+    }
+    if let Some(path) = &args.output
+        && let Some(input) =
+            args.input.iter().find(|i| output::is_same(path, i) || output::is_same(&part_path(path), i))
+    {
+        return Err(usage(format!("{}: is the input itself; choose another name for the output", input.display())));
     }
     if args.no_images && args.output.as_deref().is_none_or(|p| ending(p) != "mcap") {
         return Err(usage("--no-images: only an MCAP holds pictures; give -o out.mcap, or leave it out"));

@@ -244,10 +244,7 @@ fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
         Some(quality) => picture.jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),
         None => picture.save(&part),
     };
-    saved.map_err(|e| match e {
-        image::ImageError::IoError(e) => output::cannot(&path, &e),
-        e => failed(e),
-    })?;
+    saved.map_err(|e| output::not_saved(&path, &e))?;
     std::fs::rename(&part, &path).map_err(|e| output::cannot(&path, &e))
 }
 

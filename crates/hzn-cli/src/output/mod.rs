@@ -109,6 +109,8 @@ pub fn open(
                     .and_then(|(kind, held)| output(kind, held));
             }
             if path.exists() {
+                // Not left, but still being written.
+                hzn_mcap::open_part(&part).map_err(|e| cannot(&part, &e))?;
                 let what = "exists beside what an unfinished run left; remove one of the two";
                 return Err(usage(format!("{}: {what} ({})", path.display(), part.display())));
             }
@@ -163,7 +165,7 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
         None => {
             let last = last_frame(part);
             let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(|e| match e {
-                hzn_mcap::Error::OtherSensor { .. } => usage(e),
+                hzn_mcap::Error::OtherSensor { .. } | hzn_mcap::Error::Foreign { .. } => usage(e),
                 e => failed(e),
             })?;
             let frames = resumed.frames / config.each_body().len() as u64;
@@ -210,6 +212,18 @@ pub(crate) fn cannot(path: &Path, error: &std::io::Error) -> Stop {
     failed(advice(path, error))
 }
 
+/// A picture that cannot be written, and what to do.
+pub(crate) fn not_saved(path: &Path, error: &image::ImageError) -> Stop {
+    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(e) = cause {
+        if let Some(e) = e.downcast_ref::<std::io::Error>() {
+            return cannot(path, e);
+        }
+        cause = e.source();
+    }
+    failed(format!("{}: {error}", path.display()))
+}
+
 /// What a write error means, and what to do.
 pub fn advice(path: &Path, error: &std::io::Error) -> String {
     let name = path.display();
@@ -223,6 +237,7 @@ pub fn advice(path: &Path, error: &std::io::Error) -> String {
         std::io::ErrorKind::FileTooLarge => {
             format!("{name}: larger than files may be here (ulimit -f): raise the limit, or write elsewhere")
         }
+        std::io::ErrorKind::ResourceBusy => format!("{name}: {error}"),
         std::io::ErrorKind::NotFound => format!("{name}: the folder does not exist; create it first"),
         _ => format!("{name}: cannot be written: {error}"),
     }

@@ -1,6 +1,6 @@
 //! Results as text: CSV and JSON Lines.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -22,6 +22,9 @@ pub(crate) struct Text {
     names: Option<(PathBuf, PathBuf)>,
 }
 
+/// How a row of JSON Lines begins.
+const JSON_HEAD: &[u8] = b"{\"index\":";
+
 fn header() -> String {
     Row::COLUMNS.join(",") + "\n"
 }
@@ -39,7 +42,7 @@ impl Text {
     }
 
     pub(crate) fn create(path: &Path, part: &Path, form: Form) -> io::Result<Self> {
-        let mut text = Self::on(File::create(part)?, path, part, form);
+        let mut text = Self::on(hzn_mcap::create_part(part)?, path, part, form);
         if form == Form::Csv {
             text.out.write_all(header().as_bytes())?;
             text.out.flush()?;
@@ -53,7 +56,7 @@ impl Text {
         if !part.exists() {
             return Ok((Self::create(path, part, form)?, Held::default()));
         }
-        let mut file = OpenOptions::new().read(true).write(true).open(part)?;
+        let mut file = hzn_mcap::open_part(part)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         let (held, end) = whole(&bytes, form, bodies)?;
@@ -137,7 +140,14 @@ fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, u
 
 /// Gives every whole row and where it ends, until `visit` says to stop or a row is cut off.
 fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<()> {
+    let other = || {
+        let what = "has other columns than the results of this version";
+        Err(io::Error::new(io::ErrorKind::InvalidData, what))
+    };
     if form == Form::Jsonl {
+        if !(bytes.starts_with(JSON_HEAD) || JSON_HEAD.starts_with(bytes)) {
+            return other();
+        }
         let mut to = 0;
         for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|line| line.ends_with(b"\n")) {
             to += line.len();
@@ -153,8 +163,7 @@ fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool)
         return Ok(());
     }
     let Some(rest) = bytes.strip_prefix(header.as_bytes()) else {
-        let what = "has other columns than the results of this version";
-        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+        return other();
     };
     // A row may hold line breaks within quotes, so that only the reader knows where it ends.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(rest);
