@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
 use crate::Problem;
-use crate::located::{meaning, places, syntax};
+use crate::located::{meaning, places, syntax, too_long};
 use crate::sensor::camera_from_file;
 
 /// Reads `text` as a `T`. `path` is named in messages, and a camera `file` is looked for beside it. `check` says what is
@@ -22,6 +22,7 @@ pub fn parse<T: DeserializeOwned>(
 ) -> Result<T, Problem> {
     let mut table = DeTable::parse(text).map_err(|e| syntax(&e, text, path))?;
     let places = places(table.get_ref());
+    too_long(text, path, &places)?;
     let camera = match camera_from_file(table.get_mut(), text, path)? {
         Some(camera) => toml::to_string(&camera).unwrap_or_default(),
         None => String::new(),

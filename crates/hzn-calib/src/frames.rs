@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use hzn_core::Frame;
-use hzn_core::body::Kind;
+use hzn_core::body::{FrameError, Kind};
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use hzn_core::frames::{Rotation, UnitVec3};
 use hzn_core::real::Real;
@@ -132,6 +132,18 @@ impl Frames {
             ((own - h).abs() > 0.1).then(|| self.problem(row, what))
         };
         self.rows.iter().filter_map(odd).collect()
+    }
+
+    /// A row that hzn-core refused, with the value that was given.
+    pub fn refused(&self, row: &FrameData, error: FrameError) -> Problem {
+        let given = match error {
+            FrameError::Altitude => row.altitude_km.map(|h| format!("{h}")),
+            FrameError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
+            FrameError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
+            FrameError::NoAltitude | FrameError::NoBody => None,
+        };
+        let given = given.map(|given| format!(", not {given}")).unwrap_or_default();
+        self.problem(row, format!("{error}{given}"))
     }
 
     /// A problem with one row, naming it and its picture.

@@ -58,6 +58,18 @@ pub fn of(section: &str) -> impl Iterator<Item = &'static Key> {
     all().iter().filter(move |key| key.section == section)
 }
 
+/// The key of a path such as `reject`, `threshold_px`; that of one of several bodies has its number within.
+pub(crate) fn at(path: &[String]) -> Option<&'static Key> {
+    let names: Vec<&str> = path.iter().map(String::as_str).filter(|part| part.parse::<usize>().is_err()).collect();
+    let section = match names[..] {
+        ["body" | "bodies", section, _] => section,
+        ["bodies", _] => "body",
+        [section, _] => section,
+        _ => "",
+    };
+    of(section).find(|key| names.last() == Some(&key.name.as_str()))
+}
+
 fn table(text: &str) -> Vec<Key> {
     let mut keys = Vec::new();
     let mut section = String::new();

@@ -3,18 +3,23 @@
 use std::ops::Range;
 use std::path::Path;
 
-use hzn_core::error::ConfigError;
+use hzn_core::body::MAX_LATITUDES;
+use hzn_core::error::{ConfigError, Limit};
 use hzn_core::pipeline::lacking;
+use hzn_core::region::{MAX_CORNERS, MAX_POLYGONS};
 use toml::de::{DeTable, DeValue};
 
 use crate::Problem;
+use crate::keys::{self, Limits};
 use crate::nearest::suggestion;
 
-/// A key with where it stands: the dotted path, the key's bytes, the value's bytes.
+/// A key, or a list within a list, with where it stands: the dotted path, the key's bytes, the value's bytes.
 pub(crate) struct Place {
     pub(crate) path: Vec<String>,
     pub(crate) key: Range<usize>,
     value: Range<usize>,
+    /// What a list holds, 0 for what is none.
+    items: usize,
 }
 
 impl Place {
@@ -24,33 +29,43 @@ impl Place {
 }
 
 /// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`; of the second of several tables
-/// `[[bodies]] 2 radius_km`.
+/// `[[bodies]] 2 radius_km`; the third of several lists `[mask] polygons_px 3`.
 fn field_name(path: &[String]) -> String {
+    let nth = |place: &String| place.parse::<usize>().ok().map(|n| n + 1);
+    let key = |rest: &[String]| match rest.split_last() {
+        Some((last, before @ [_, ..])) if let Some(nth) = nth(last) => format!("{} {nth}", before.join(".")),
+        _ => rest.join("."),
+    };
     match path {
         [] => String::new(),
         [one] => one.clone(),
-        [section, place, rest @ ..] if place.parse::<usize>().is_ok() => {
-            let nth = place.parse::<usize>().map_or(0, |n| n + 1);
-            format!("[[{section}]] {nth} {}", rest.join(".")).trim_end().to_owned()
+        [section, place, rest @ ..] if let Some(nth) = nth(place) => {
+            format!("[[{section}]] {nth} {}", key(rest)).trim_end().to_owned()
         }
-        [section, rest @ ..] => format!("[{section}] {}", rest.join(".")),
+        [section, rest @ ..] => format!("[{section}] {}", key(rest)),
     }
 }
 
-/// Every key of the file, those of inner tables too.
+/// Every key of the file, those of inner tables too, and the lists within lists.
 pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<Place>) {
         for (key, value) in table {
             path.push(key.get_ref().to_string());
-            out.push(Place { path: path.clone(), key: key.span(), value: value.span() });
+            let items = value.get_ref().as_array().map_or(0, |items| items.len());
+            out.push(Place { path: path.clone(), key: key.span(), value: value.span(), items });
             match value.get_ref() {
                 DeValue::Table(inner) => walk(inner, path, out),
                 DeValue::Array(items) => {
                     for (i, item) in items.iter().enumerate() {
-                        let DeValue::Table(inner) = item.get_ref() else { continue };
+                        let items = item.get_ref().as_array().map_or(0, |items| items.len());
+                        if !(item.get_ref().is_table() || item.get_ref().is_array()) {
+                            continue;
+                        }
                         path.push(i.to_string());
-                        out.push(Place { path: path.clone(), key: item.span(), value: item.span() });
-                        walk(inner, path, out);
+                        out.push(Place { path: path.clone(), key: item.span(), value: item.span(), items });
+                        if let DeValue::Table(inner) = item.get_ref() {
+                            walk(inner, path, out);
+                        }
                         path.pop();
                     }
                 }
@@ -63,6 +78,28 @@ pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     walk(table, &mut Vec::new(), &mut out);
     out
 }
+
+/// The first list that holds more than a sensor has room for, which serde would tell without its number.
+pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), Problem> {
+    for place in places {
+        let parts: Vec<&str> = place.path.iter().map(String::as_str).collect();
+        let (most, what) = match parts[..] {
+            ["camera", "k"] => (MAX_COEFFICIENTS, "numbers"),
+            ["mask", "polygons_px"] => (MAX_POLYGONS, "polygons"),
+            ["mask", "polygons_px", _] => (MAX_CORNERS, "corners"),
+            ["body", ROWS] | ["bodies", _, ROWS] => (MAX_LATITUDES, "rows"),
+            _ => continue,
+        };
+        if place.items > most {
+            let what = format!("{} {what}, at most {most} can be given", place.items);
+            return Err(Problem::new(path, what).at_offset(text, place.key.start).in_field(place.field()));
+        }
+    }
+    Ok(())
+}
+/// Of a lens: those of `brown-conrady`.
+const MAX_COEFFICIENTS: usize = 5;
+const ROWS: &str = "limb_height_by_latitude_km";
 
 /// The innermost key whose name or value holds the byte `offset`.
 fn place_of(places: &[Place], offset: usize) -> Option<&Place> {
@@ -128,22 +165,47 @@ pub(crate) fn meaning(
         };
         Problem::new(path, what).in_field(field_name(&p))
     } else {
-        let what = message
-            .replace("expected f64", "expected a number")
-            .replace("expected u16", "expected a whole number from 0 to 65535")
-            .replace("expected u32", "expected a whole number, 0 or more")
-            .replace("floating point `", "number `")
-            .replace('\n', "; ");
+        let what = whole_number(message, place).unwrap_or_else(|| {
+            message
+                .replace("expected f64", "expected a number")
+                .replace("floating point `", "number `")
+                .replace('\n', "; ")
+        });
         let problem = Problem::new(path, what);
         if own.is_empty() { problem } else { problem.in_field(own) }
     };
     attach(problem)
 }
 
+/// What is wrong with the value of a key that takes whole numbers, with that key's own limits. `None` for other keys.
+fn whole_number(message: &str, place: Option<&Place>) -> Option<String> {
+    let (given, expected) = message.split_once(", expected ")?;
+    let most = match expected {
+        "u8" => f64::from(u8::MAX),
+        "u16" => f64::from(u16::MAX),
+        "u32" => f64::from(u32::MAX),
+        _ => return None,
+    };
+    let key = place.and_then(|p| keys::at(&p.path));
+    let rule = match key.map(|key| &key.limits) {
+        Some(Limits::Number { low, high, .. }) => format!("between {low} and {}", high.min(most)),
+        Some(Limits::Words(words)) if words.contains(" to ") => words.clone(),
+        _ => format!("between 0 and {most}"),
+    };
+    Some(match given.strip_prefix("invalid value: integer `").and_then(|n| n.strip_suffix('`')) {
+        Some(number) => format!("{number} is refused: must be {rule}"),
+        None => format!("{}: must be a whole number, {rule}", given.replace("floating point `", "number `")),
+    })
+}
+
 /// A value that hzn-core refused, with the place where it was given.
 pub(crate) fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Place]) -> Problem {
-    let rule = error.limit;
-    let what = if error.value.is_nan() { rule.to_string() } else { format!("{} is refused: {rule}", error.value) };
+    let what = match error.limit {
+        // A value that is missing.
+        rule @ Limit::Rule(_) if error.value.is_nan() => rule.to_string(),
+        rule if error.value.is_nan() => format!("nan is refused: {rule}"),
+        rule => format!("{} is refused: {rule}", error.value),
+    };
     let mut parts: Vec<String> = error.field.split('.').map(str::to_owned).collect();
     if let Some(which) = error.body {
         // Core says `body.` for the body's own keys, and no more for its level and its edge errors.

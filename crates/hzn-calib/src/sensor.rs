@@ -14,7 +14,7 @@ use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
-use crate::located::{meaning, places, refused, syntax, unbuilt};
+use crate::located::{meaning, places, refused, syntax, too_long, unbuilt};
 use crate::nearest::suggestion;
 use crate::{Problem, camera_file};
 
@@ -67,6 +67,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
             return Err(wrong(&what));
         }
     }
+    too_long(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
         // `Config` wants a camera; this one stands in until the file's own is put in below.
@@ -291,7 +292,25 @@ mod tests {
             error("[reject]\nthreshold_px = -3\n"),
             "sensor.toml:10: [reject] threshold_px: -3 is refused: must be above 0"
         );
-        assert_eq!(error("[body]\naltitude_km = nan\n"), "sensor.toml:10: [body] altitude_km: must be a finite number");
+        assert_eq!(
+            error("[body]\naltitude_km = nan\n"),
+            "sensor.toml:10: [body] altitude_km: nan is refused: must be a finite number"
+        );
+        assert_eq!(
+            error("[body]\naltitude_km = -inf\n"),
+            "sensor.toml:10: [body] altitude_km: -inf is refused: must be a finite number"
+        );
+        let camera =
+            |from: &str, to: &str| parse(&CAMERA.replace(from, to), Path::new("s.toml")).unwrap_err().to_string();
+        assert_eq!(
+            camera("fx_px = 500.0", "fx_px = nan"),
+            "s.toml:5: [camera] fx_px: nan is refused: must be a finite number"
+        );
+        // A value that is missing has no number to be told.
+        assert_eq!(
+            error("[body]\nkind = \"sphere\"\naltitude_km = 9\n"),
+            "sensor.toml:9: [body] radius_km: a sphere needs its radius in km"
+        );
         assert_eq!(
             error("[reject]\nthreshold_px = \"3\"\n"),
             "sensor.toml:10: [reject] threshold_px: invalid type: string \"3\", expected a number"
@@ -299,6 +318,62 @@ mod tests {
         let twisted = CAMERA.replace("pinhole", "kannala-brandt") + "k = [-0.9]\n";
         let message = parse(&twisted, Path::new("s.toml")).unwrap_err().to_string();
         assert!(message.starts_with("s.toml:9: [camera] k: ") || message.contains("monotone"), "{message}");
+    }
+
+    #[test]
+    fn whole_numbers_bring_the_limits_of_their_key() {
+        let width = |value: &str| {
+            let text = CAMERA.replace("width = 640", &format!("width = {value}"));
+            parse(&text, Path::new("s.toml")).unwrap_err().to_string()
+        };
+        for value in ["70000", "-5"] {
+            let want = format!("s.toml:2: [camera] width: {value} is refused: must be between 2 and 65535");
+            assert_eq!(width(value), want);
+        }
+        assert_eq!(width("1"), "s.toml:2: [camera] width: 1 is refused: must be at least 2");
+        assert_eq!(
+            width("640.5"),
+            "s.toml:2: [camera] width: invalid type: number `640.5`: must be a whole number, between 2 and 65535"
+        );
+        for (text, what) in [
+            ("[candidates]\nkeep_points = 99999\n", "keep_points: 99999 is refused: must be 0 (all) or 16 to 65535"),
+            ("[candidates]\nmin_points = -1\n", "min_points: -1 is refused: must be between 8 and 65535"),
+            ("[select]\nmin_inliers = 65536\n", "min_inliers: 65536 is refused: must be between 8 and 65535"),
+            ("[reject]\nseed = -1\n", "seed: -1 is refused: must be between 0 and 4294967295"),
+            ("[reject]\nmax_draws = 5000000000\n", "max_draws: 5000000000 is refused: must be between 1 and 100000"),
+            ("[input]\nbits = 300\n", "bits: 300 is refused: must be between 8 and 16"),
+        ] {
+            assert!(error(text).ends_with(what), "{}", error(text));
+        }
+    }
+
+    #[test]
+    fn lists_that_are_too_long_bring_their_number_and_the_limit() {
+        let list = |item: &str, n: usize| format!("[{}]", vec![item; n].join(", "));
+        let k = parse(&format!("{CAMERA}k = {}\n", list("0.0", 12)), Path::new("s.toml")).unwrap_err();
+        assert_eq!(k.to_string(), "s.toml:9: [camera] k: 12 numbers, at most 5 can be given");
+        let polygon = |corners: usize| list("[1, 2]", corners);
+        assert_eq!(
+            error(&format!("[mask]\npolygons_px = {}\n", list(&polygon(3), 50))),
+            "sensor.toml:10: [mask] polygons_px: 50 polygons, at most 8 can be given"
+        );
+        assert_eq!(
+            error(&format!("[mask]\npolygons_px = [\n{},\n{}]\n", polygon(3), polygon(100))),
+            "sensor.toml:12: [mask] polygons_px 2: 100 corners, at most 16 can be given"
+        );
+        let rows = format!("limb_height_by_latitude_km = {}\n", list("[0, 20]", 17));
+        assert_eq!(
+            error(&format!("[body]\n{rows}")),
+            "sensor.toml:10: [body] limb_height_by_latitude_km: 17 rows, at most 16 can be given"
+        );
+        assert_eq!(
+            error(&format!("[[bodies]]\nkind = \"sun\"\n[[bodies]]\n{rows}")),
+            "sensor.toml:12: [[bodies]] 2 limb_height_by_latitude_km: 17 rows, at most 16 can be given"
+        );
+        // What is just full is taken.
+        assert!(parse(&format!("{CAMERA}k = {}\n", list("0.0", 5)), Path::new("s.toml")).is_ok());
+        let full = format!("{CAMERA}[mask]\npolygons_px = {}\n", list(&polygon(16), 8));
+        assert!(parse(&full, Path::new("s.toml")).is_ok());
     }
 
     #[test]

@@ -15,6 +15,13 @@ fn wrong_keys_and_values_of_the_sensor() {
     insta::assert_snapshot!(with("[reject]\nthreshold_pxx = 3.0\n"), @"error: in/sensor.toml:16: [reject] threshold_pxx: unknown key; did you mean threshold_px?");
     insta::assert_snapshot!(with("[reject]\nthreshold_px = -1\n"), @"error: in/sensor.toml:16: [reject] threshold_px: -1 is refused: must be above 0");
     insta::assert_snapshot!(with("[binarize]\nmethod = \"otzu\"\n"), @r#"error: in/sensor.toml:16: [binarize] method: "otzu" is not a valid value; did you mean otsu?"#);
+    let camera = |from: &str, to: &str| {
+        place.write("in/sensor.toml", common::SENSOR.replace(from, to).as_bytes());
+        place.run(&["run", "in"]).expect(2).err
+    };
+    insta::assert_snapshot!(camera("fx_px = 300.0", "fx_px = nan"), @"error: in/sensor.toml:7: [camera] fx_px: nan is refused: must be a finite number");
+    insta::assert_snapshot!(camera("width = 320", "width = 70000"), @"error: in/sensor.toml:4: [camera] width: 70000 is refused: must be between 2 and 65535");
+    insta::assert_snapshot!(camera("cx_px", "k = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]\ncx_px"), @"error: in/sensor.toml:9: [camera] k: 12 numbers, at most 5 can be given");
     place.write("in/sensor.toml", common::SENSOR.replace("\"pinhole\"", "\"kannala-brandt\"\nk = [-0.9]").as_bytes());
     place.run(&["run", "in"]).expect(2).says("monotone");
     place.write("in/sensor.toml", common::SENSOR.replace("altitude_km = 400.0", "").as_bytes());
@@ -35,8 +42,11 @@ fn wrong_rows_of_frames_csv() {
     let err = with("file,altitude_km\n0000.png,NaN\n").expect(2).err;
     insta::assert_snapshot!(err, @r#"error: in/frames.csv:2: 0000.png altitude_km: "NaN" is not a finite number; leave the cell empty if it is not known"#);
     let err = with("file,altitude_km\n0000.png,400\n0001.png,-3\n").expect(2).err;
-    insta::assert_snapshot!(err, @"error: in/frames.csv:3: 0001.png: altitude_km must be a finite number above 0");
-    with("file,x_km,y_km,z_km\n0000.png,6000,0,0\n").expect(2).says("frames.csv:2: 0000.png: x_km, y_km, z_km must be");
+    insta::assert_snapshot!(err, @"error: in/frames.csv:3: 0001.png: altitude_km must be a finite number above 0, not -3");
+    let err = with("file,x_km,y_km,z_km\n0000.png,6000,0,-0.5\n").expect(2).err;
+    insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres), not 6000, 0, -0.5");
+    let err = with("file,altitude_km,attitude_sigma_deg\n0000.png,400,-1\n").expect(2).err;
+    insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: attitude_sigma_deg must be a finite number, 0 or more, not -1");
     with("name,altitude_km\n0000.png,400\n").expect(2).says("the column `file` is missing");
     let ran = with("file,altitude_km\n0000.png,400\n0001.png,400\n0009.png,400\n").expect(0);
     assert_eq!(without_time(&ran.out).len(), 2);

@@ -244,7 +244,7 @@ pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result
         for half_angle in sensor.expected_half_angles_rad(Some(row)) {
             match half_angle {
                 Ok(_) | Err(FrameError::NoAltitude) => {}
-                Err(why) => return Err(frames.problem(row, why)),
+                Err(why) => return Err(frames.refused(row, why)),
             }
         }
     }
