@@ -316,7 +316,7 @@ fn plain<T: Real>(
 #[test]
 fn fits_equal_scipy() {
     nadir::<f64>(1e-6);
-    nadir::<f32>(1e-4);
+    nadir::<f32>(1e-5);
 }
 
 /// `covariance.json`: dense matrices. `tangent` is evaluated at the true nadir with the rays themselves.
@@ -362,6 +362,87 @@ fn covariance_equals_the_dense_product() {
     sandwich::<f32>(1e-4);
 }
 
+/// P = N⁻¹ (Hᵀ W G R Gᵀ W H) N⁻¹ by whole matrices, R the correlation of every pair of points: (δ₁, δ₂, δc), and δ₁₂ with
+/// c held.
+fn dense<T: Real>(
+    blocks: &[Block<T>],
+    count: usize,
+    [e, b1, b2]: [&V3<T>; 3],
+    length_px: f64,
+) -> (nalgebra::Matrix3<f64>, nalgebra::Matrix2<f64>) {
+    use nalgebra::{DMatrix, Matrix2, Matrix3};
+    let lane = |i: usize| (&blocks[i / LANES], i % LANES);
+    let mut along = 0.0;
+    let arc: Vec<f64> = (0..count)
+        .map(|i| {
+            let (block, l) = lane(i);
+            along += if i == 0 { 0.0 } else { block.step_px[l].f64() };
+            along
+        })
+        .collect();
+    // Rows w h of both parts of every point's error, (u, v).
+    let mut wh = [DMatrix::<f64>::zeros(count, 3), DMatrix::<f64>::zeros(count, 3)];
+    let mut n = Matrix3::<f64>::zeros();
+    for i in 0..count {
+        let (block, l) = lane(i);
+        let g = block.gradient_at(l, e).map(Real::f64);
+        let s = block.ray(l);
+        let h = nalgebra::Vector3::new(s.dot(b1).f64(), s.dot(b2).f64(), -1.0);
+        let w = block.weight[l].f64() / (g[0] * g[0] + g[1] * g[1]);
+        n += h * h.transpose() * w;
+        for k in 0..2 {
+            wh[k].set_row(i, &(h * (w * g[k])).transpose());
+        }
+    }
+    let r = DMatrix::from_fn(count, count, |i, j| libm::exp(-(arc[i] - arc[j]).abs() / length_px));
+    let x = wh.iter().map(|b| b.transpose() * &r * b).fold(DMatrix::zeros(3, 3), |a, b| a + b);
+    let x = Matrix3::from_iterator(x.iter().copied());
+    let inverse = n.try_inverse().unwrap();
+    let known: Matrix2<f64> = n.fixed_view::<2, 2>(0, 0).into_owned().try_inverse().unwrap();
+    (inverse * x * inverse, known * x.fixed_view::<2, 2>(0, 0) * known)
+}
+
+/// The recursion over an edge as long as those of real pictures, against the dense product of the same numbers.
+fn recursion<T: Real>(tolerance: f64) {
+    let (camera, e) = rocket_camera();
+    let c = 0.157;
+    // Steps of one pixel and more, as a thinned border has them.
+    let mut rng = crate::rng::Rng::new(11);
+    let points: Vec<_> = limb(&camera, &e, c, 1.0).into_iter().filter(|_| rng.below(3) > 0).collect();
+    let camera =
+        Camera::<T>::try_new(&CameraConfig::ideal(Model::Pinhole, camera.width(), camera.height(), 888.97)).unwrap();
+    let e = direction::<T>(e.xyz());
+    let (b1, b2) = basis(e.v());
+    for length_px in [3.0, 300.0, 1e4] {
+        let mut blocks = blocks(&camera, &points, &e);
+        let mean = estimate::means(&blocks, &b1, &b2);
+        let weights = estimate::Weights::Kept;
+        let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, T::of(1.0 - c), mean, &weights, None);
+        let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::of(length_px));
+        let free = covariance::sandwich_free(&sums, &x, mean, T::one()).unwrap();
+        let [a, b, d] = covariance::sandwich_known(&sums, &x, mean, T::one()).unwrap();
+        let (want, want_known) = dense(&blocks, points.len(), [e.v(), &b1, &b2], length_px);
+        let mut worst: f64 = 0.0;
+        for i in 0..3 {
+            for j in 0..3 {
+                let scale = libm::sqrt(want[(i, i)] * want[(j, j)]);
+                worst = worst.max((free[(i, j)].f64() - want[(i, j)]).abs() / scale);
+            }
+        }
+        let scale = want_known.trace();
+        for (got, want) in [(a, want_known[(0, 0)]), (b, want_known[(0, 1)]), (d, want_known[(1, 1)])] {
+            worst = worst.max((got.f64() - want).abs() / scale);
+        }
+        assert!(worst < tolerance, "{} points, {length_px} px: {worst:e}", points.len());
+    }
+}
+
+#[test]
+fn the_recursion_equals_the_dense_product() {
+    recursion::<f64>(1e-10);
+    recursion::<f32>(1e-4);
+}
+
 /// Gaussian numbers for the Monte Carlo, by the sum of twelve.
 struct Gauss(crate::rng::Rng);
 impl Gauss {
@@ -374,13 +455,20 @@ impl Gauss {
 fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> Vec<(f64, f64)> {
     let (b1, b2) = basis(e.v());
     let s = libm::sqrt(1.0 - c * c);
+    in_view(camera, step_px, |azimuth| {
+        let (sp, cp) = libm::sincos(azimuth);
+        UnitVec3::assume_unit(e.v() * c + (b1 * cp + b2 * sp) * s)
+    })
+}
+
+/// Those of the rays of all azimuths that are in view, one per `step_px` along them, in order.
+fn in_view(camera: &Camera<f64>, step_px: f64, ray: impl Fn(f64) -> UnitVec3<Cam, f64>) -> Vec<(f64, f64)> {
     let inside = |p: &ImagePoint<f64>| {
         p.u >= 0.0 && p.v >= 0.0 && p.u <= f64::from(camera.width()) - 1.0 && p.v <= f64::from(camera.height()) - 1.0
     };
     let mut points: Vec<(f64, f64)> = Vec::new();
     for i in 0..40_000 {
-        let (sp, cp) = libm::sincos(f64::from(i) * core::f64::consts::TAU / 40_000.0);
-        let d = UnitVec3::assume_unit(e.v() * c + (b1 * cp + b2 * sp) * s);
+        let d = ray(f64::from(i) * core::f64::consts::TAU / 40_000.0);
         let Some(p) = camera.project(&d).filter(inside) else { continue };
         let far = points.last().is_none_or(|q| libm::hypot(p.u - q.0, p.v - q.1) >= step_px);
         if far {
@@ -404,7 +492,39 @@ fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> V
 
 struct Statistics {
     rms_deg: f64,
+    /// The same as the covariances tell it.
+    told_deg: f64,
     nees: f64,
+}
+
+/// Errors of many fits.
+#[derive(Default)]
+struct Errors {
+    runs: u32,
+    squares: f64,
+    told: f64,
+    nees: f64,
+}
+
+impl Errors {
+    fn add<T: Real>(&mut self, answer: &Answer<T>, truth: &UnitVec3<Cam, f64>) {
+        let axis = V3::from(answer.axis.xyz().map(Real::f64));
+        let (b1, b2) = basis(&axis);
+        let off = V3::from(truth.xyz()) - axis;
+        let (x, y) = (off.dot(&b1), off.dot(&b2));
+        let p = answer.p.map(Real::f64);
+        let [a, b, d] = invert_spd2(p).expect("a covariance");
+        self.runs += 1;
+        self.squares += x * x + y * y;
+        self.told += p[0] + p[2];
+        self.nees += a * x * x + 2.0 * b * x * y + d * y * y;
+        assert!(answer.covariance.sigma_max_rad() > T::ZERO);
+    }
+    fn statistics(&self) -> Statistics {
+        let n = f64::from(self.runs);
+        let rms_deg = |sum: f64| libm::sqrt(sum / n).to_degrees();
+        Statistics { rms_deg: rms_deg(self.squares), told_deg: rms_deg(self.told), nees: self.nees / n }
+    }
 }
 
 /// Errors of `runs` fits with Gauss-Markov (or white, `length_px` = 0) pixel errors.
@@ -422,7 +542,7 @@ fn monte_carlo(
     let (body, frame) = sphere(altitude_m, radius, limb_sigma_km);
     let expected = Expected::new(&body, &frame).unwrap();
     let mut gauss = Gauss(crate::rng::Rng::new(7));
-    let (mut squares, mut nees) = (0.0, 0.0);
+    let mut errors = Errors::default();
     for _ in 0..runs {
         // The limb height is what the prior says, give or take its sigma.
         let d = gauss.next() * limb_sigma_km * 1e3;
@@ -437,16 +557,9 @@ fn monte_carlo(
             (du, dv) = (rho * du + fresh * gauss.next(), rho * dv + fresh * gauss.next());
         }
         let answer = solve(camera, &points, e, &expected, half_angle, sigma_px, length_px).expect("a fit");
-        squares += answer.axis.angle_rad(e).powi(2);
-        let (b1, b2) = basis(answer.axis.v());
-        let off = V3::from(e.xyz()) - answer.axis.v();
-        let (x, y) = (off.dot(&b1), off.dot(&b2));
-        let [a, b, d] = invert_spd2(answer.p).expect("a covariance");
-        nees += a * x * x + 2.0 * b * x * y + d * y * y;
-        assert!(answer.covariance.sigma_max_rad() > 0.0);
+        errors.add(&answer, e);
     }
-    let n = f64::from(runs);
-    Statistics { rms_deg: libm::sqrt(squares / n).to_degrees(), nees: nees / n }
+    errors.statistics()
 }
 
 /// 1920×1080, 94.4° horizontal, 20° below the horizontal: the camera of math §5.1.
@@ -471,10 +584,10 @@ fn bound_deg(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, altitude_m: f64, sigm
 fn white_errors_reach_the_bound() {
     let (camera, e) = rocket_camera();
     for (altitude, sigma) in [(60e3, 0.1), (60e3, 1.0), (240e3, 0.5)] {
-        let got = monte_carlo(&camera, &e, altitude, 0.0, sigma, 0.0, HalfAngle::Known, 200);
+        let got = monte_carlo(&camera, &e, altitude, 0.0, sigma, 0.0, HalfAngle::Known, 1000);
         let bound = bound_deg(&camera, &e, altitude, sigma);
-        // 1.1 and the spread of 200 runs of two degrees of freedom (3.5 % 1-sigma); Tukey's weights cost 2.6 %.
-        assert!(got.rms_deg / bound < 1.12, "{altitude} {sigma}: {} of the bound", got.rms_deg / bound);
+        // Tukey's weights cost 2.6 %, and 1000 runs of two degrees of freedom spread by 2 %.
+        assert!(got.rms_deg / bound < 1.1, "{altitude} {sigma}: {} of the bound", got.rms_deg / bound);
         assert!((1.6..2.5).contains(&got.nees), "{altitude} {sigma}: NEES {}", got.nees);
     }
 }
@@ -483,13 +596,92 @@ fn white_errors_reach_the_bound() {
 fn correlated_errors_are_told_honestly() {
     let (camera, e) = rocket_camera();
     for (altitude, limb_sigma) in [(80e3, 0.5), (120e3, 0.05), (120e3, 0.5), (120e3, 2.0), (240e3, 0.5), (240e3, 8.0)] {
-        let got = monte_carlo(&camera, &e, altitude, limb_sigma, 1.0, 300.0, HalfAngle::Fused, 200);
+        let runs = if altitude < 100e3 { 800 } else { 200 };
+        let got = monte_carlo(&camera, &e, altitude, limb_sigma, 1.0, 300.0, HalfAngle::Fused, runs);
         assert!((1.6..2.5).contains(&got.nees), "{altitude} {limb_sigma}: NEES {} RMS {}", got.nees, got.rms_deg);
         if limb_sigma <= 0.5 {
             // Against 0.16 to 0.21° of the estimators that leave the half-angle free. At 80 km half a kilometre of limb
-            // height alone is 0.028°.
-            let limit = if altitude < 100e3 { 0.070 } else { 0.065 };
+            // height is 0.03° of the half-angle, which no estimator sees, on top of 0.055°: 3200 runs give 0.0648°, and
+            // what few runs are off by, 1/√(2n) of it, is allowed.
+            let statistical = 1.0 + 1.0 / libm::sqrt(2.0 * f64::from(runs));
+            let limit = if altitude < 100e3 { 0.065 * statistical } else { 0.065 };
             assert!(got.rms_deg < limit, "{altitude} {limb_sigma}: {}", got.rms_deg);
+            assert!(got.told_deg < 0.065, "{altitude} {limb_sigma}: told {}", got.told_deg);
+        }
+    }
+}
+
+/// Errors with a panoramic lens of 92 px/rad at 600 km above the ellipsoid: white errors of 0.2 px, the attitude about
+/// the axis known to 5°, places and attitudes all around.
+fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
+    use crate::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic};
+    use core::f64::consts::{PI, TAU};
+    const SIGMA_PX: f64 = 0.2;
+    const YAW_SIGMA_RAD: f64 = PI / 36.0;
+    let config = CameraConfig { theta_max_deg: Some(90.0), ..CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0) };
+    let (camera, own) = (Camera::<f64>::try_new(&config).unwrap(), Camera::<T>::try_new(&config).unwrap());
+    let body = body::Config {
+        altitude_sigma_km: 0.0,
+        limb_height_km: 0.0,
+        limb_height_sigma_km: 0.1,
+        ..body::Config::default()
+    };
+    let mut rng = crate::rng::Rng::new(21);
+    let mut gauss = Gauss(crate::rng::Rng::new(22));
+    let mut errors = Errors::default();
+    for _ in 0..runs {
+        let mut even = || f64::from(rng.below(1 << 24)) / f64::from(1 << 24);
+        let latitude = libm::asin(2.0 * even() - 1.0);
+        let position = from_geodetic(latitude, TAU * even(), 600e3, WGS84_A_M, WGS84_B_M);
+        let truth = LimbCone::<f64>::try_new(position, WGS84_A_M, WGS84_B_M).unwrap().axis;
+        // Camera axes in ECEF: z so far off the limb axis, in any direction and with any roll.
+        let (b1, b2) = basis(truth.v());
+        let (turn, roll) = (TAU * even(), TAU * even());
+        let side = b1 * libm::cos(turn) + b2 * libm::sin(turn);
+        let z = truth.v() * libm::cos(off_nadir_deg.to_radians()) + side * libm::sin(off_nadir_deg.to_radians());
+        let (c1, c2) = basis(&z);
+        let x = c1 * libm::cos(roll) + c2 * libm::sin(roll);
+        let y = z.cross(&x);
+        let to_camera = |v: V3<f64>| direction::<f64>([v.dot(&x), v.dot(&y), v.dot(&z)]);
+        // Where rays touch the ellipsoid: a circle, once the axes are scaled to one.
+        let scaled = V3::new(position[0] / WGS84_A_M, position[1] / WGS84_A_M, position[2] / WGS84_B_M);
+        let k2 = scaled.norm_squared();
+        let (t1, t2) = basis(&unit(&scaled).unwrap());
+        let points = in_view(&camera, 1.0, |azimuth| {
+            let (s, c) = libm::sincos(azimuth);
+            let t = scaled * (1.0 / k2) + (t1 * c + t2 * s) * libm::sqrt(1.0 - 1.0 / k2);
+            to_camera(V3::new(t.x * WGS84_A_M, t.y * WGS84_A_M, t.z * WGS84_B_M) - V3::from(position))
+        });
+        let points: Vec<_> =
+            points.iter().map(|(u, v)| (u + SIGMA_PX * gauss.next(), v + SIGMA_PX * gauss.next())).collect();
+        // The attitude that is known is turned about the limb axis.
+        let turned = nalgebra::Rotation3::from_axis_angle(
+            &nalgebra::Unit::new_normalize(nalgebra::Vector3::from(truth.xyz())),
+            YAW_SIGMA_RAD * gauss.next(),
+        );
+        let columns = [x, y, z].map(|axis| turned * nalgebra::Vector3::new(axis.x, axis.y, axis.z));
+        let attitude: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]));
+        let frame = Frame::<T> {
+            position_m: Some(position.map(T::of)),
+            cam_to_ecef: Rotation::assume_from_quaternion(quaternion(&attitude).map(T::of)),
+            attitude_sigma_rad: Some(T::of(YAW_SIGMA_RAD)),
+            ..Frame::default()
+        };
+        let expected = Expected::new(&body, &frame).unwrap();
+        let truth = to_camera(*truth.v());
+        let towards = direction::<T>(truth.xyz());
+        let answer = solve(&own, &points, &towards, &expected, HalfAngle::Fused, SIGMA_PX, 0.0).expect("a fit");
+        errors.add(&answer, &truth);
+    }
+    errors.statistics()
+}
+
+#[test]
+fn a_panoramic_lens_in_low_orbit() {
+    for (off_nadir_deg, limit_deg) in [(0.0, 0.011), (120.0, 0.017)] {
+        for got in [panorama::<f64>(off_nadir_deg, 200), panorama::<f32>(off_nadir_deg, 200)] {
+            assert!(got.rms_deg <= limit_deg, "{off_nadir_deg}: {}", got.rms_deg);
+            assert!((1.6..2.5).contains(&got.nees), "{off_nadir_deg}: NEES {}", got.nees);
         }
     }
 }
