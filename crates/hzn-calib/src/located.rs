@@ -29,12 +29,13 @@ impl Place {
 }
 
 /// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`; of the second of several tables
-/// `[[bodies]] 2 radius_km`; the third of several lists `[mask] polygons_px 3`.
+/// `[[bodies]] 2 radius_km`; the third of several lists `[mask] polygons_px 3`, and the second in that `polygons_px 3.2`.
 fn field_name(path: &[String]) -> String {
     let nth = |place: &String| place.parse::<usize>().ok().map(|n| n + 1);
-    let key = |rest: &[String]| match rest.split_last() {
-        Some((last, before @ [_, ..])) if let Some(nth) = nth(last) => format!("{} {nth}", before.join(".")),
-        _ => rest.join("."),
+    let key = |rest: &[String]| {
+        let names = rest.iter().take_while(|part| nth(part).is_none()).count();
+        let places: Vec<String> = rest.iter().filter_map(nth).map(|n| n.to_string()).collect();
+        format!("{} {}", rest.get(..names).unwrap_or_default().join("."), places.join(".")).trim_end().to_owned()
     };
     match path {
         [] => String::new(),
@@ -51,27 +52,25 @@ pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<Place>) {
         for (key, value) in table {
             path.push(key.get_ref().to_string());
-            let items = value.get_ref().as_array().map_or(0, |items| items.len());
-            out.push(Place { path: path.clone(), key: key.span(), value: value.span(), items });
-            match value.get_ref() {
-                DeValue::Table(inner) => walk(inner, path, out),
-                DeValue::Array(items) => {
-                    for (i, item) in items.iter().enumerate() {
-                        let items = item.get_ref().as_array().map_or(0, |items| items.len());
-                        if !(item.get_ref().is_table() || item.get_ref().is_array()) {
-                            continue;
-                        }
+            enter(value.get_ref(), [key.span(), value.span()], path, out);
+            path.pop();
+        }
+    }
+    fn enter(value: &DeValue<'_>, [key, span]: [Range<usize>; 2], path: &mut Vec<String>, out: &mut Vec<Place>) {
+        let items = value.as_array().map_or(0, |items| items.len());
+        out.push(Place { path: path.clone(), key, value: span, items });
+        match value {
+            DeValue::Table(inner) => walk(inner, path, out),
+            DeValue::Array(items) => {
+                for (i, item) in items.iter().enumerate() {
+                    if matches!(item.get_ref(), DeValue::Table(_) | DeValue::Array(_)) {
                         path.push(i.to_string());
-                        out.push(Place { path: path.clone(), key: item.span(), value: item.span(), items });
-                        if let DeValue::Table(inner) = item.get_ref() {
-                            walk(inner, path, out);
-                        }
+                        enter(item.get_ref(), [item.span(), item.span()], path, out);
                         path.pop();
                     }
                 }
-                _ => {}
             }
-            path.pop();
+            _ => {}
         }
     }
     let mut out = Vec::new();
@@ -79,15 +78,23 @@ pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     out
 }
 
-/// The first list that holds more than a sensor has room for, which serde would tell without its number.
+/// The first list that holds more than a sensor has room for: serde would tell of some without their number, and take the
+/// first values of others.
 pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), Problem> {
+    const ROWS: &str = "limb_height_by_latitude_km";
     for place in places {
         let parts: Vec<&str> = place.path.iter().map(String::as_str).collect();
         let (most, what) = match parts[..] {
-            ["camera", "k"] => (MAX_COEFFICIENTS, "numbers"),
+            // Those of `brown-conrady`.
+            ["camera", "k"] => (5, "numbers"),
+            ["mount", "q_body_from_camera_wxyz"] => (4, "numbers"),
             ["mask", "polygons_px"] => (MAX_POLYGONS, "polygons"),
             ["mask", "polygons_px", _] => (MAX_CORNERS, "corners"),
             ["body", ROWS] | ["bodies", _, ROWS] => (MAX_LATITUDES, "rows"),
+            ["mask", "polygons_px", _, _]
+            | ["body", ROWS, _]
+            | ["bodies", _, ROWS, _]
+            | ["select", "altitude_limits_km"] => (2, "numbers"),
             _ => continue,
         };
         if place.items > most {
@@ -97,9 +104,6 @@ pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), 
     }
     Ok(())
 }
-/// Of a lens: those of `brown-conrady`.
-const MAX_COEFFICIENTS: usize = 5;
-const ROWS: &str = "limb_height_by_latitude_km";
 
 /// The innermost key whose name or value holds the byte `offset`.
 fn place_of(places: &[Place], offset: usize) -> Option<&Place> {

@@ -370,6 +370,21 @@ mod tests {
             error(&format!("[[bodies]]\nkind = \"sun\"\n[[bodies]]\n{rows}")),
             "sensor.toml:12: [[bodies]] 2 limb_height_by_latitude_km: 17 rows, at most 16 can be given"
         );
+        // Of these serde would take the first numbers and forget the others.
+        for (text, what) in [
+            (
+                "[mount]\nq_body_from_camera_wxyz = [1, 0, 0, 0, 0]\n",
+                "[mount] q_body_from_camera_wxyz: 5 numbers, at most 4",
+            ),
+            ("[mask]\npolygons_px = [[[1, 2], [3, 4, 5], [5, 6]]]\n", "[mask] polygons_px 1.2: 3 numbers, at most 2"),
+            (
+                "[body]\nlimb_height_by_latitude_km = [[0, 20, 1]]\n",
+                "[body] limb_height_by_latitude_km 1: 3 numbers, at most 2",
+            ),
+            ("[select]\naltitude_limits_km = [1, 2, 3]\n", "[select] altitude_limits_km: 3 numbers, at most 2"),
+        ] {
+            assert_eq!(error(text), format!("sensor.toml:10: {what} can be given"));
+        }
         // What is just full is taken.
         assert!(parse(&format!("{CAMERA}k = {}\n", list("0.0", 5)), Path::new("s.toml")).is_ok());
         let full = format!("{CAMERA}[mask]\npolygons_px = {}\n", list(&polygon(16), 8));
