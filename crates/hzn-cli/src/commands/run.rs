@@ -133,6 +133,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     if !args.quiet {
         source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }
+    if held.frames > 0 && plan.overlay.is_some() && !args.quiet {
+        tell::line(format_args!("note: what was finished before ({} frames) is not drawn again", held.frames));
+    }
     let total = source.total();
     if let Err(stop) = skip(source.as_mut(), &held, &plan, path) {
         // The output keeps what it has, under its name.

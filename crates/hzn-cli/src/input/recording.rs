@@ -34,9 +34,11 @@ impl Recording {
                         format!("no pictures on topic {topic}; there are some on {}", others.join(", "))
                     }
                     (Some(topic), true) => format!("no pictures on topic {topic}, nor on any other"),
-                    (None, _) => "no pictures in this recording (foxglove.CompressedImage, foxglove.RawImage, \
-                                  sensor_msgs/msg/Image and CompressedImage are understood)"
-                        .to_owned(),
+                    (None, _) => {
+                        "no pictures in this recording (understood are foxglove.CompressedImage and RawImage in \
+                                  protobuf, sensor_msgs/msg/Image and CompressedImage in CDR)"
+                            .to_owned()
+                    }
                 };
                 return Err(usage(format!("{}: {what}", path.display())));
             }
