@@ -2,28 +2,9 @@
 
 mod common;
 
-use common::{Place, cell, limb, without_time};
+use common::{Place, angle_deg, axes, cell, limb, without_time};
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, GrayImage, ImageEncoder, ImageFormat};
-
-/// The axis of each row; every frame must have been answered.
-#[track_caller]
-fn axes(place: &Place, args: &[&str]) -> Vec<[f64; 3]> {
-    let rows = without_time(&place.run(args).expect(0).out);
-    let number = |r: &[(String, String)], name: &str| cell(r, name).parse::<f64>().unwrap();
-    rows.iter()
-        .map(|r| {
-            assert_eq!(cell(r, "status"), "ok", "{r:?}");
-            ["axis_x", "axis_y", "axis_z"].map(|name| number(r, name))
-        })
-        .collect()
-}
-
-fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let cross =
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]].map(|v| v * v).iter().sum();
-    f64::sqrt(cross).asin().to_degrees()
-}
 
 /// The direction that the limb of `shift` is seen in, from a plain 8-bit PNG.
 fn plain(shift: f64) -> [f64; 3] {
@@ -192,63 +173,6 @@ fn of_an_animation_the_first_picture_is_taken() {
     let axis = axes(&place, &["run", "in"])[0];
     assert_eq!(axis, plain(0.0));
     assert!(angle_deg(axis, plain(40.0)) > 1.0);
-}
-
-/// The decoders of videos, found on PATH; without them the test named `what` is passed over, but never in CI.
-fn decoder(what: &str) -> bool {
-    let there = ["ffmpeg", "ffprobe"].iter().all(|tool| {
-        let started = std::process::Command::new(tool).arg("-version").stdout(std::process::Stdio::null()).status();
-        started.is_ok_and(|s| s.success())
-    });
-    if !there {
-        assert!(std::env::var("CI").as_deref() != Ok("true"), "{what} needs ffmpeg and ffprobe on PATH");
-        eprintln!("{what} left out: no ffmpeg and ffprobe on PATH");
-    }
-    there
-}
-
-#[test]
-fn videos_made_and_read_by_the_real_ffmpeg() {
-    if !decoder("videos_made_and_read_by_the_real_ffmpeg") {
-        return;
-    }
-    let place = Place::with_pictures(6);
-    let pictures = axes(&place, &["run", "in"]);
-    let make = |name: &str, coding: &[&str]| {
-        let made = std::process::Command::new("ffmpeg")
-            .args(["-nostdin", "-v", "error", "-framerate", "4", "-i"])
-            .arg(place.path("in/%04d.png"))
-            .args(coding)
-            .arg(place.path(name))
-            .status();
-        assert!(made.unwrap().success(), "{name}");
-    };
-    // Lossless, 10 bits of luma; lossy, 8 bits of limited range; lossless, without a luma plane.
-    make("deep.mkv", &["-c:v", "ffv1", "-pix_fmt", "yuv420p10le"]);
-    make("lossy.mp4", &["-c:v", "mpeg4", "-q:v", "2", "-pix_fmt", "yuv420p"]);
-    make("colour.avi", &["-c:v", "rawvideo", "-pix_fmt", "bgr24"]);
-    for (name, within_deg) in [("deep.mkv", 0.01), ("lossy.mp4", 0.05), ("colour.avi", 0.01)] {
-        let ran = place.run(&["run", name, "-s", "in/sensor.toml"]).expect(0);
-        let rows = without_time(&ran.out);
-        let named: Vec<_> = rows.iter().map(|r| (cell(r, "file").to_owned(), cell(r, "time_s").to_owned())).collect();
-        let expected: Vec<_> = ["0.0", "0.25", "0.5", "0.75", "1.0", "1.25"]
-            .iter()
-            .zip(0..)
-            .map(|(t, i)| (format!("{name}#{i:06}"), (*t).to_owned()))
-            .collect();
-        assert_eq!(named, expected);
-        for (found, of_picture) in axes(&place, &["run", name, "-s", "in/sensor.toml"]).iter().zip(&pictures) {
-            let off = angle_deg(*found, *of_picture);
-            assert!(off < within_deg, "{name}: {off}");
-        }
-    }
-    // A file that only has the ending of a video, and one that breaks off.
-    place.write("text.mp4", b"this is no video");
-    place.run(&["run", "text.mp4", "-s", "in/sensor.toml"]).expect(2).says("ffprobe cannot read it");
-    let whole = std::fs::read(place.path("colour.avi")).unwrap();
-    place.write("cut.avi", &whole[..whole.len() / 2]);
-    let ran = place.run(&["run", "cut.avi", "-s", "in/sensor.toml"]);
-    assert!(ran.code != 0 || without_time(&ran.out).len() < 6, "{}", ran.err);
 }
 
 /// A disc that search lines find, after so many lit things along the border that the report has no room for more.

@@ -115,6 +115,24 @@ fn patterns_and_single_pictures() {
     place.run(&["run", "nowhere"]).expect(2).says("nowhere: no such file or folder");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_link_to_nothing_is_a_picture_that_cannot_be_read() {
+    let place = Place::with_pictures(2);
+    std::os::unix::fs::symlink("/nonexistent/0.png", place.path("in/0000a.png")).unwrap();
+    std::fs::create_dir(place.path("in/9.png")).unwrap();
+    for input in [&["in"][..], &["in/*.png"], &["in/0000.png", "in/0000a.png", "in/0001.png"]] {
+        let ran = place.run(&[&["run"], input].concat()).expect(3);
+        assert_eq!(ran.err.contains("note: 1 folder ending in .png left out"), input.len() == 1, "{}", ran.err);
+        let rows = without_time(&ran.out);
+        let of = |name: &str| rows.iter().map(|r| cell(r, name).to_owned()).collect::<Vec<_>>();
+        assert_eq!(of("file"), ["0000.png", "0000a.png", "0001.png"], "{input:?}");
+        assert_eq!(of("status"), ["ok", "unreadable", "ok"], "{input:?}");
+        assert_eq!(of("detail")[1], "is a link to /nonexistent/0.png, which is not there");
+    }
+    place.run(&["run", "in/0000a.png"]).expect(2).says("in/0000a.png: no such file");
+}
+
 #[test]
 fn headerless_pictures() {
     let place = Place::new();
@@ -143,35 +161,6 @@ fn headerless_pictures() {
     for name in ["status", "axis_x", "axis_y", "axis_z", "level"] {
         assert_eq!(cell(&again[0], name), cell(&found[0], name), "{name}");
     }
-}
-
-/// `ffmpeg` and `ffprobe` that give two frames of 320x240, written as shell scripts: what is tested is how they are
-/// called and read, not the decoding.
-#[cfg(unix)]
-#[test]
-fn video_through_ffmpeg_on_the_path() {
-    use std::os::unix::fs::PermissionsExt;
-    let place = Place::new();
-    let frames: Vec<u8> = [0.0, 5.0].iter().flat_map(|&s| common::limb(320, 240, s).into_raw()).collect();
-    place.write("frames.gray", &frames);
-    place.write("in/film.mp4", b"not looked at");
-    std::fs::create_dir(place.path("bin")).unwrap();
-    let probe = "#!/bin/sh\ncase \"$*\" in *best_effort*) printf '0.04\\n0.12\\n';; \
-                 *) printf 'width=320\\nheight=240\\npix_fmt=yuv420p\\nnb_frames=2\\n';; esac\n";
-    let ffmpeg = "#!/bin/sh\ncase \"$*\" in *extractplanes=y*passthrough*|*passthrough*extractplanes=y*) \
-                  /bin/cat frames.gray;; *) exit 1;; esac\n";
-    for (name, script) in [("bin/ffprobe", probe), ("bin/ffmpeg", ffmpeg)] {
-        place.write(name, script.as_bytes());
-        std::fs::set_permissions(place.path(name), std::fs::Permissions::from_mode(0o755)).unwrap();
-    }
-    let output = place.command(&["run", "in/film.mp4"]).env("PATH", place.path("bin")).output().unwrap();
-    let ran = common::Ran::of(&output, &place.path("")).expect(0);
-    let rows = without_time(&ran.out);
-    assert_eq!(rows.len(), 2);
-    assert_eq!((cell(&rows[1], "file"), cell(&rows[1], "time_s")), ("film.mp4#000001", "0.12"));
-    assert_eq!(cell(&rows[1], "status"), "ok");
-    let output = place.command(&["run", "in/film.mp4"]).env("PATH", place.path("in")).output().unwrap();
-    common::Ran::of(&output, &place.path("")).expect(2).says("install ffmpeg");
 }
 
 #[test]

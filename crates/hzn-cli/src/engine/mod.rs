@@ -217,7 +217,7 @@ pub fn run(
         let read = source_end.join().unwrap_or_else(|_| Err(anyhow::anyhow!("reading the input failed")));
         written?;
         if stop.load(Ordering::Relaxed) {
-            // A decoder that runs beside us gets the same Ctrl-C; that it broke off is no error then.
+            // What breaks off by the same Ctrl-C is no error then.
             return Ok(End::Interrupted);
         }
         read?;

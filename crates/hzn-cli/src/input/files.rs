@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Item, Payload, Raw, SIZES, Source, TimeSource, ending, picture, video};
 use crate::exit::{Stop, usage};
+use crate::tell;
 
 /// Endings of pictures that are read.
 const PICTURES: &[&str] = &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp"];
@@ -20,12 +21,45 @@ pub(super) struct Files {
     time: TimeSource,
     /// Names are given with their folder, because the files lie in several.
     with_folder: bool,
-    left_out: BTreeMap<String, usize>,
+    left_out: LeftOut,
+}
+
+/// Files and other things that were left out, counted by what they are and by their ending.
+type LeftOut = BTreeMap<(Kind, String), usize>;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    File,
+    Folder,
+    /// A device, a pipe, a socket.
+    Special,
+}
+
+impl Kind {
+    /// What cannot be looked at is a picture that cannot be read, such as a link into an archive that is not mounted.
+    fn of(path: &Path) -> Self {
+        match std::fs::metadata(path) {
+            Ok(meta) if meta.is_dir() => Self::Folder,
+            Ok(meta) if !meta.is_file() => Self::Special,
+            _ => Self::File,
+        }
+    }
+}
+
+/// Leaves out what is no file.
+fn only_files(paths: &mut Vec<PathBuf>, left_out: &mut LeftOut) {
+    paths.retain(|p| {
+        let kind = Kind::of(p);
+        if kind != Kind::File {
+            *left_out.entry((kind, ending(p))).or_default() += 1;
+        }
+        kind == Kind::File
+    });
 }
 
 impl Files {
     pub(super) fn open(inputs: &[PathBuf], raw: Option<Raw>) -> Result<Self, Stop> {
-        let mut left_out = BTreeMap::new();
+        let mut left_out = LeftOut::new();
         let mut paths = Vec::new();
         let mut folder = None;
         for input in inputs {
@@ -38,7 +72,7 @@ impl Files {
                 }
                 folder = Some(input.clone());
                 paths.extend(in_folder(input, raw.is_some(), &mut left_out)?);
-            } else if input.exists() {
+            } else if input.exists() || (inputs.len() > 1 && input.is_symlink()) {
                 if inputs.len() > 1 && (ending(input) == "mcap" || video::ENDINGS.contains(&ending(input).as_str())) {
                     return Err(usage(format!("{text}: a video or recording is a sequence of its own; give it alone")));
                 }
@@ -52,8 +86,12 @@ impl Files {
                 paths.push(input.clone());
             } else if text.contains(['*', '?', '[']) {
                 let matches = glob::glob(&text).map_err(|e| usage(format!("{text}: not a valid pattern: {e}")))?;
-                let mut found: Vec<PathBuf> = matches.flatten().filter(|p| p.is_file()).collect();
-                found.retain(|p| raw.is_some() || !COMPANIONS.contains(&ending(p).as_str()));
+                let mut found: Vec<PathBuf> = matches.flatten().collect();
+                found.retain(|p| match Kind::of(p) {
+                    Kind::File => raw.is_some() || !COMPANIONS.contains(&ending(p).as_str()),
+                    _ => PICTURES.contains(&ending(p).as_str()),
+                });
+                only_files(&mut found, &mut left_out);
                 if found.is_empty() {
                     return Err(usage(format!("{text}: no picture matches")));
                 }
@@ -66,10 +104,10 @@ impl Files {
         if paths.is_empty() {
             let what = if raw.is_some() { "no headerless files" } else { "no pictures (PNG, JPEG, TIFF, PNM, BMP)" };
             let hint = match left_out.keys().next() {
-                Some(e) => {
+                Some((Kind::File, e)) => {
                     format!("; there are files ending in .{e}: convert them, or use --raw if they are headerless")
                 }
-                None => String::new(),
+                _ => String::new(),
             };
             let name = inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
             return Err(usage(format!("{name}: {what} in this folder{hint}")));
@@ -88,19 +126,21 @@ fn tell_their_time(paths: &[PathBuf]) -> bool {
     paths.iter().take(SIZES).find_map(|p| picture::exif_of(p)).flatten().is_some()
 }
 
-fn in_folder(folder: &Path, raw: bool, left_out: &mut BTreeMap<String, usize>) -> Result<Vec<PathBuf>, Stop> {
-    let list = std::fs::read_dir(folder).map_err(|e| usage(format!("{}: cannot be listed: {e}", folder.display())))?;
-    let mut paths: Vec<PathBuf> = list.flatten().map(|e| e.path()).filter(|p| p.is_file()).collect();
+fn in_folder(folder: &Path, raw: bool, left_out: &mut LeftOut) -> Result<Vec<PathBuf>, Stop> {
+    let cannot = |e: std::io::Error| usage(format!("{}: cannot be listed: {e}", folder.display()));
+    let list = std::fs::read_dir(folder).map_err(cannot)?;
+    let mut paths = list.map(|e| Ok(e.map_err(cannot)?.path())).collect::<Result<Vec<PathBuf>, Stop>>()?;
     paths.retain(|p| {
         let e = ending(p);
         let hidden = p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
         let (picture, companion) = (PICTURES.contains(&e.as_str()), COMPANIONS.contains(&e.as_str()) || hidden);
         let take = if raw { !picture && !companion } else { picture };
-        if !take && !companion {
-            *left_out.entry(e).or_default() += 1;
+        if !take && !companion && Kind::of(p) == Kind::File {
+            *left_out.entry((Kind::File, e)).or_default() += 1;
         }
         take
     });
+    only_files(&mut paths, left_out);
     // By name, so that the order does not depend on the file system.
     paths.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     Ok(paths)
@@ -145,9 +185,14 @@ impl Source for Files {
         self.raw.map(|raw| raw.bits())
     }
     fn notes(&self) -> Vec<String> {
-        let note = |(ending, n): (&String, &usize)| {
+        let note = |((kind, ending), n): (&(Kind, String), &usize)| {
+            let what = match kind {
+                Kind::File => "file",
+                Kind::Folder => "folder",
+                Kind::Special => "special file",
+            };
             let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };
-            format!("{n} file{} {name} left out", if *n == 1 { "" } else { "s" })
+            format!("{} {name} left out", tell::counted(*n as u64, what))
         };
         self.left_out.iter().map(note).collect()
     }

@@ -39,8 +39,8 @@ pub struct Item {
 pub enum TimeSource {
     /// frames.csv, or what a recording of ours says.
     Table,
-    /// The container (video, MCAP): seconds.
-    Container(f64),
+    /// The container (video, MCAP): seconds, where it has some for this picture.
+    Container(Option<f64>),
     /// What the camera wrote into the picture.
     Exif,
     /// The picture's number, at so many frames a second.
@@ -58,7 +58,7 @@ impl TimeSource {
     ) -> Option<f64> {
         match self {
             Self::Table => data.and_then(|d| d.time_s),
-            Self::Container(time_s) => Some(time_s),
+            Self::Container(time_s) => time_s,
             Self::Exif => exif(),
             Self::Count => Some(index as f64 / fps),
         }

@@ -148,7 +148,10 @@ pub(super) fn size_in(contents: impl std::io::BufRead + std::io::Seek) -> Option
 /// Why it cannot be read, for the record of the frame.
 pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
     let told = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::NotFound => "no such file".to_owned(),
+        std::io::ErrorKind::NotFound => match std::fs::read_link(path) {
+            Ok(there) => format!("is a link to {}, which is not there", there.display()),
+            Err(_) => "no such file".to_owned(),
+        },
         _ => format!("cannot be read: {e}"),
     };
     let meta = std::fs::metadata(path).map_err(told)?;

@@ -61,7 +61,7 @@ impl Recording {
             Ok(image) => payload(image),
             Err(why) => Payload::Broken(why),
         };
-        Some(Ok(Item { name, time: TimeSource::Container(image.time_s), data: None, payload }))
+        Some(Ok(Item { name, time: TimeSource::Container(Some(image.time_s)), data: None, payload }))
     }
 }
 

@@ -124,3 +124,23 @@ impl Ran {
         self
     }
 }
+
+/// The axis of each row; every frame must have been answered.
+#[track_caller]
+pub fn axes(place: &Place, args: &[&str]) -> Vec<[f64; 3]> {
+    let rows = without_time(&place.run(args).expect(0).out);
+    let number = |r: &[(String, String)], name: &str| cell(r, name).parse::<f64>().unwrap();
+    rows.iter()
+        .map(|r| {
+            assert_eq!(cell(r, "status"), "ok", "{r:?}");
+            ["axis_x", "axis_y", "axis_z"].map(|name| number(r, name))
+        })
+        .collect()
+}
+
+/// The angle between two directions.
+pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let cross =
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]].map(|v| v * v).iter().sum();
+    f64::sqrt(cross).asin().to_degrees()
+}

@@ -316,7 +316,7 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
     }
     teller.tell(Event::Frames(batch));
     let missing = frames.as_ref().and_then(|f| missing_note(f, request, &source.folder()));
-    teller.tell(Event::End { cut_off: false, note: missing });
+    teller.tell(Event::End { cut_off: false, note: source.lost().or(missing) });
     Ok(())
 }
 

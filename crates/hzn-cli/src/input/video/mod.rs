@@ -2,20 +2,34 @@
 //!
 //! Brightness is the luma plane as it stands in the stream (`extractplanes=y`): converting to grey would stretch
 //! limited range. Times are every frame's own, from ffprobe, which runs alongside; a constant rate is never assumed.
+//!
+//! That the end is missing is known by what ffmpeg says and by the sizes in an AVI. A y4m, or a stream such as MPEG-TS that was cut
+//! between two frames, does not tell.
 
-use std::io::{BufRead, BufReader, Read};
+mod riff;
+mod times;
+mod tool;
+
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::Stdio;
+use std::thread::JoinHandle;
 
 use hzn_core::image::Layout;
 
 use super::picture::{Picture, Samples, check_size};
-use super::{Item, Payload, Source, TimeSource};
-use crate::exit::{Stop, failed, usage};
+use super::{Item, Payload, Source};
+use crate::exit::{Stop, usage};
+use crate::tell;
+use times::Times;
+use tool::{Running, Said, absent, tool};
 
 pub(super) const ENDINGS: &[&str] = &[
     "mp4", "m4v", "mov", "avi", "mkv", "webm", "mpg", "mpeg", "ts", "mts", "m2ts", "wmv", "flv", "y4m", "mjpeg", "mj2",
 ];
+
+/// What ffmpeg ends with when a signal stops it.
+const STOPPED: i32 = 255;
 
 pub(super) struct Video {
     path: PathBuf,
@@ -24,13 +38,15 @@ pub(super) struct Video {
     height: u32,
     /// Significant bits of a sample.
     bits: u8,
-    frames: Child,
-    pixels: BufReader<ChildStdout>,
-    stamps: Child,
-    times: BufReader<ChildStdout>,
+    frames: Running,
+    pixels: BufReader<Box<dyn Read + Send>>,
+    /// What ffmpeg says, while it runs.
+    said: Option<JoinHandle<Said>>,
+    times: Times,
     index: u64,
     count: Option<u64>,
     ended: bool,
+    lost: Option<String>,
 }
 
 impl Video {
@@ -71,23 +87,15 @@ impl Video {
         } else {
             "extractplanes=y"
         };
-        let mut frames = tool("ffmpeg")
+        let mut command = tool("ffmpeg");
+        command
             .args(["-nostdin", "-noautorotate", "-i"])
             .arg(path)
             .args(["-map", "0:v:0", "-fps_mode", "passthrough", "-vf", filter, "-pix_fmt", &out_format])
             .args(["-f", "rawvideo", "-"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(|e| absent("ffmpeg", &e))?;
-        let mut stamps = tool("ffprobe")
-            .args(["-select_streams", "v:0", "-show_entries", "frame=best_effort_timestamp_time", "-of", "csv=p=0"])
-            .arg(path)
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(|e| absent("ffprobe", &e))?;
-        let (Some(pixels), Some(times)) = (frames.stdout.take(), stamps.stdout.take()) else {
-            return Err(failed("ffmpeg gave no output"));
-        };
+            .stderr(Stdio::piped());
+        let (mut frames, pixels) = Running::start("ffmpeg", &mut command)?;
+        let said = frames.listen();
         Ok(Self {
             path: path.to_owned(),
             stem: path.file_name().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
@@ -95,48 +103,39 @@ impl Video {
             height,
             bits,
             frames,
-            pixels: BufReader::with_capacity(1 << 20, pixels),
-            stamps,
-            times: BufReader::new(times),
+            pixels: BufReader::with_capacity(1 << 20, Box::new(pixels)),
+            said: Some(said),
+            times: Times::start(path)?,
             index: 0,
             count: entry("nb_frames").and_then(|n| n.trim().parse().ok()),
             ended: false,
+            lost: None,
         })
     }
 
-    fn time_s(&mut self) -> Option<f64> {
-        let mut line = String::new();
-        self.times.read_line(&mut line).ok()?;
-        line.trim().trim_end_matches(',').parse().ok()
-    }
-
-    /// What ffmpeg said at the end of its output.
+    /// Nothing more comes. What is missing at the end of a video, or was lost in it, is told by [`Source::lost`]; a video of
+    /// which nothing came, and an ffmpeg that was ended from outside, are errors.
     fn end(&mut self, rest: usize) -> Option<anyhow::Result<Item>> {
         self.ended = true;
-        let status = self.frames.wait();
-        if rest > 0 {
-            let what = format!("{}: the video ends in the middle of frame {}", self.path.display(), self.index);
-            return Some(Err(anyhow::anyhow!(what)));
+        let name = self.path.display();
+        let code = self.frames.wait().ok().and_then(|status| status.code());
+        let said = self.said.take().and_then(|said| said.join().ok()).unwrap_or_default().summary();
+        let frames = tell::counted(self.index, "frame");
+        let Some(code) = code.filter(|code| *code != STOPPED) else {
+            return Some(Err(anyhow::anyhow!("{name}: ffmpeg was ended from outside after {frames}")));
+        };
+        let missing = riff::missing_bytes(&self.path).map(|n| format!("{n} bytes are missing at its end"));
+        let said = said.map(|said| format!("ffmpeg: {said}"));
+        let bad = || (rest > 0 || code != 0).then(|| format!("ffmpeg ended with code {code}"));
+        let why = missing.or(said).or_else(bad);
+        if self.index == 0 {
+            let why = why.map(|why| format!(": {why}")).unwrap_or_default();
+            return Some(Err(anyhow::anyhow!("{name}: no frame of this video can be decoded{why}")));
         }
-        match status {
-            Ok(status) if status.success() => None,
-            _ => Some(Err(anyhow::anyhow!("{}: ffmpeg failed after {} frames", self.path.display(), self.index))),
-        }
-    }
-}
-
-fn tool(name: &str) -> Command {
-    let mut command = Command::new(name);
-    command.args(["-v", "error"]).stdin(Stdio::null());
-    command
-}
-
-fn absent(tool: &str, error: &std::io::Error) -> Stop {
-    match error.kind() {
-        std::io::ErrorKind::NotFound => usage(format!(
-            "videos need `{tool}` on PATH, and it is not there; install ffmpeg, or extract the frames as pictures"
-        )),
-        _ => failed(format!("{tool} cannot be started: {error}")),
+        self.lost = why.map(|why| {
+            format!("{name}: was cut off or is damaged ({why}); {frames} could be decoded and were processed")
+        });
+        None
     }
 }
 
@@ -170,7 +169,7 @@ impl Source for Video {
         let picture =
             Picture { samples, layout: Layout::packed(self.width, self.height, 1, self.bits), exif_time_s: None };
         let name = format!("{}#{:06}", self.stem, self.index);
-        let time = self.time_s().map_or(TimeSource::Count, TimeSource::Container);
+        let time = self.times.next();
         self.index += 1;
         Some(Ok(Item { name, time, data: None, payload: Payload::Decoded(picture) }))
     }
@@ -183,14 +182,7 @@ impl Source for Video {
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
     }
-}
-
-impl Drop for Video {
-    fn drop(&mut self) {
-        // Both end by themselves when their pipe closes; waiting for them would not.
-        for child in [&mut self.frames, &mut self.stamps] {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
+    fn lost(&self) -> Option<String> {
+        self.lost.clone()
     }
 }
