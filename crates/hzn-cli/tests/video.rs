@@ -181,7 +181,7 @@ fn how_ffmpeg_ends_is_told() {
         "warning: in/film.mp4: was cut off or is damaged (ffmpeg: File ended prematurely); 3 frames could be decoded";
     ran.says(told);
     ends("exit 69").expect(3).says("ffmpeg ended with code 69");
-    ends("/bin/cat bin/ffmpeg").expect(3).says("was cut off or is damaged");
+    ends("echo x").expect(3).says("(it ends in the middle of a frame)");
     // As others would end it; what is written can be continued.
     ends("kill -9 $$").expect(1).says("ffmpeg was ended from outside after 3 frames");
     ends("exit 255").expect(1).says("ffmpeg was ended from outside after 3 frames");

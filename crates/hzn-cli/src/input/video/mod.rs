@@ -126,8 +126,9 @@ impl Video {
         };
         let missing = riff::missing_bytes(&self.path).map(|n| format!("{n} bytes are missing at its end"));
         let said = said.map(|said| format!("ffmpeg: {said}"));
-        let bad = || (rest > 0 || code != 0).then(|| format!("ffmpeg ended with code {code}"));
-        let why = missing.or(said).or_else(bad);
+        let bad = (code != 0).then(|| format!("ffmpeg ended with code {code}"));
+        let torn = (rest > 0).then(|| "it ends in the middle of a frame".to_owned());
+        let why = missing.or(said).or(bad).or(torn);
         if self.index == 0 {
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
             return Some(Err(anyhow::anyhow!("{name}: no frame of this video can be decoded{why}")));
