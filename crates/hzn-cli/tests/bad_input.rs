@@ -161,11 +161,13 @@ fn unwritable_folders_are_said() {
     let place = Place::with_pictures(1);
     // A file in the way of the folder; permissions would not stop a test that runs as root.
     place.write("file", b"");
-    for out in ["file/out.csv", "file/out.mcap"] {
-        let ran = place.run(&["run", "in", "-o", out]);
-        assert!(ran.code == 1 && ran.err.contains("file"), "{}", ran.err);
-    }
-    place.run(&["run", "in", "--overlay", "file"]).expect(1);
+    let told = |option: &str, path: &str| place.run(&["run", "in", option, path]).expect(1).err;
+    insta::assert_snapshot!(told("-o", "file/out.csv"), @"error: file/out.csv.part: a part of this path is a file, not a folder; choose another folder for the output");
+    insta::assert_snapshot!(told("-o", "file/out.mcap"), @"error: cannot write into the folder file: Not a directory (os error 20); make it writable or choose another with -o");
+    insta::assert_snapshot!(told("-o", "nowhere/out.csv"), @"error: nowhere/out.csv.part: the folder does not exist; create it first");
+    insta::assert_snapshot!(told("--overlay", "file"), @"error: file: is a file, not a folder; choose another name");
+    insta::assert_snapshot!(told("--overlay", "file/drawn"), @"error: file/drawn: a part of this path is a file, not a folder; choose another folder for the output");
+    assert_eq!(place.read("file"), "");
 }
 
 #[test]

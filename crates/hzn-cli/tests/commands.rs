@@ -3,6 +3,49 @@
 mod common;
 
 use common::Place;
+use hzn_mcap::palette;
+use image::{GrayImage, Luma, RgbImage};
+
+/// The row in which a column crosses the limb of [`common::limb`].
+fn true_row(x: f64) -> f64 {
+    let (s, c) = 68f64.to_radians().sin_cos();
+    let (u, cos) = ((x - 159.5) / 300.0, 70.38f64.to_radians().cos());
+    // v s + c = cos √(1 + u² + v²); the root hardly moves with v.
+    let v = (0..30).fold(0.0f64, |v, _| (cos * (1.0 + u * u + v * v).sqrt() - c) / s);
+    119.5 + 300.0 * v
+}
+
+/// Where the axis of [`disc`] meets the picture, pixels.
+const AXIS_PX: [f64; 2] = [159.5 + 300.0 * 0.05, 119.5 + 300.0 * 0.08];
+
+/// How far a place of the picture lies beyond the rim of [`disc`], pixels of the picture's middle.
+fn beyond_px([x, y]: [f64; 2]) -> f64 {
+    let ray = |[x, y]: [f64; 2]| [(x - 159.5) / 300.0, (y - 119.5) / 300.0, 1.0];
+    let (a, b) = (ray([x, y]), ray(AXIS_PX));
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let cos = dot(a, b) / (dot(a, a) * dot(b, b)).sqrt();
+    300.0 * (cos.clamp(-1.0, 1.0).acos() - 15f64.to_radians())
+}
+
+/// A folder with the picture of a bright disc of 15° half-angle.
+fn disc() -> Place {
+    let place = Place::new();
+    let body = "kind = \"sphere\"\nradius_km = 1000.0\nlimb_height_km = 0.0\naltitude_km = 2863.7033";
+    let sensor = common::SENSOR.replace("kind = \"earth-sphere\"\naltitude_km = 400.0", body);
+    place.write("in/sensor.toml", sensor.as_bytes());
+    let picture = GrayImage::from_fn(320, 240, |x, y| {
+        let inside_px = -beyond_px([f64::from(x), f64::from(y)]);
+        Luma([(20.0 + 180.0 * (0.5 + inside_px / 2.0).clamp(0.0, 1.0)) as u8])
+    });
+    picture.save(place.path("in/disc.png")).unwrap();
+    place
+}
+
+/// The pixels of a colour that lie below the legend.
+fn places(drawn: &RgbImage, colour: [u8; 3]) -> Vec<[f64; 2]> {
+    let below = drawn.enumerate_pixels().filter(|(_, y, p)| *y > 75 && p.0 == colour);
+    below.map(|(x, y, _)| [f64::from(x), f64::from(y)]).collect()
+}
 
 #[test]
 fn init_writes_what_run_takes() {
@@ -50,8 +93,63 @@ fn overlays_of_a_run() {
     let place = Place::with_pictures(2);
     place.run(&["run", "in", "--overlay", "drawn", "-q"]).expect(0);
     let drawn = image::open(place.path("drawn/0000.png")).unwrap().into_rgb8();
-    // The fitted limb's colour, somewhere.
-    assert!(drawn.pixels().any(|p| p.0 == [240, 228, 66]));
+    let (limb, inliers) = (places(&drawn, palette::LIMB), places(&drawn, palette::INLIER));
+    for [x, y] in limb.iter().chain(&inliers) {
+        assert!((y - true_row(*x)).abs() <= 2.0, "{x}, {y}: the limb is in row {}", true_row(*x));
+    }
+    // From one side to the other, and the points on it.
+    for x in (0..320).step_by(16).map(f64::from) {
+        assert!(limb.iter().any(|p| p[0] == x), "no limb in column {x}");
+        assert!(inliers.iter().any(|p| (p[0] - x).abs() <= 2.0), "no inliers about column {x}");
+    }
+    assert!(places(&drawn, palette::AXIS).is_empty());
+}
+
+#[test]
+fn the_axis_is_marked_where_it_is() {
+    let place = disc();
+    place.run(&["run", "in", "--overlay", "drawn", "-q"]).expect(0);
+    let drawn = image::open(place.path("drawn/disc.png")).unwrap().into_rgb8();
+    let mark = places(&drawn, palette::AXIS);
+    for k in 0..2 {
+        let (low, high) = mark.iter().fold((f64::MAX, f64::MIN), |(low, high), p| (low.min(p[k]), high.max(p[k])));
+        assert!(((low + high) / 2.0 - AXIS_PX[k]).abs() <= 1.0, "{k}: {low} to {high}");
+        assert!((20.0..40.0).contains(&(high - low)), "{k}: {low} to {high}");
+    }
+    let limb = places(&drawn, palette::LIMB);
+    assert!(limb.len() > 300 && limb.iter().all(|p| beyond_px(*p).abs() <= 2.5), "{}", limb.len());
+}
+
+/// Foxglove counts pixels from the corner of the first: what it gets is the truth and half a pixel.
+#[test]
+fn annotations_count_from_the_corner() {
+    use prost::Message;
+    let place = disc();
+    place.run(&["run", "in", "-o", "out.mcap", "-q"]).expect(0);
+    let bytes = std::fs::read(place.path("out.mcap")).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let of_ours =
+        |m: &mcap::Message<'_>| m.channel.schema.as_ref().is_some_and(|s| s.name.ends_with("ImageAnnotations"));
+    let drawn: Vec<_> = messages
+        .filter(of_ours)
+        .flat_map(|m| foxglove::messages::ImageAnnotations::decode(&*m.data).unwrap().points)
+        .collect();
+    let of = |kind: &str| -> Vec<[f64; 2]> {
+        let own = drawn.iter().filter(|p| p.metadata.iter().any(|m| m.key == "kind" && m.value == kind));
+        own.flat_map(|p| p.points.iter().map(|p| [p.x - 0.5, p.y - 0.5])).collect()
+    };
+    // Left and right, above and below: a shift along either axis shows.
+    for kind in ["inlier", "limb"] {
+        let points = of(kind);
+        assert!(points.len() > 200, "{} of {kind}", points.len());
+        let worst = points.iter().map(|p| beyond_px(*p).abs()).fold(0.0, f64::max);
+        assert!(worst < 0.15, "{kind}: {worst} px");
+    }
+    let cross = of("axis");
+    for k in 0..2 {
+        let mean = cross.iter().map(|p| p[k]).sum::<f64>() / cross.len() as f64;
+        assert!((mean - AXIS_PX[k]).abs() < 0.3, "axis: {mean}, not {}", AXIS_PX[k]);
+    }
 }
 
 #[test]

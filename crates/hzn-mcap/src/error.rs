@@ -122,9 +122,10 @@ pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
                 "larger than files may be here (ulimit -f); finished frames are kept, and --resume goes on with them";
             Error::Write { path: path.to_path_buf(), source: io::Error::new(io::ErrorKind::FileTooLarge, what) }
         }
-        io::ErrorKind::PermissionDenied | io::ErrorKind::NotFound | io::ErrorKind::ReadOnlyFilesystem => {
-            Error::Folder { folder: folder_of(path), source }
-        }
+        io::ErrorKind::PermissionDenied
+        | io::ErrorKind::NotFound
+        | io::ErrorKind::NotADirectory
+        | io::ErrorKind::ReadOnlyFilesystem => Error::Folder { folder: folder_of(path), source },
         _ => Error::Write { path: path.to_path_buf(), source },
     }
 }

@@ -239,6 +239,11 @@ pub fn advice(path: &Path, error: &std::io::Error) -> String {
         }
         std::io::ErrorKind::ResourceBusy => format!("{name}: {error}"),
         std::io::ErrorKind::NotFound => format!("{name}: the folder does not exist; create it first"),
+        std::io::ErrorKind::NotADirectory => {
+            format!("{name}: a part of this path is a file, not a folder; choose another folder for the output")
+        }
+        // Of a folder that is to be made.
+        std::io::ErrorKind::AlreadyExists => format!("{name}: is a file, not a folder; choose another name"),
         _ => format!("{name}: cannot be written: {error}"),
     }
 }
