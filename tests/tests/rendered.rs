@@ -78,6 +78,42 @@ fn rocket_flight_with_payload_in_view() {
     known_limits(&flown);
 }
 
+/// An evenly bright Earth with white noise, the same picture again and again: the error against the bound of Cramér and
+/// Rao for a known half-angle and independent edge points, each as wrong as the points of the picture are. Beyond the
+/// points' own errors noise moves the level and with it all points alike, and what is a border pixel is chosen by noise
+/// too: hundredths of a pixel, which the bound does not know of and `covariance.bias_px` is there for. They show the more
+/// the noisier the picture is.
+#[test]
+fn white_noise_against_the_bound() {
+    let camera = Camera::ideal(Model::Pinhole, 320, 240, 277.0);
+    let mut sensor = hzn_core::Config::new(camera.clone());
+    sensor.body.kind = hzn_core::body::Kind::EarthSphere;
+    sensor.estimate.half_angle = hzn_core::estimate::HalfAngle::Known;
+    // Less than any edge point is wrong by, so that the covariance goes by the residuals.
+    (sensor.covariance.sigma_px, sensor.covariance.correlation_px) = (1e-3, 0.0);
+    let look = Look { azimuth_rad: 0.3, depression_rad: 0.25, roll_rad: 0.2 };
+    let mut scene = hzn_sim::Scene::new(camera, Pose::looking(position_m(20.0, 10.0, 240.0), look));
+    scene.body = sensor.body.clone();
+    for (noise, limit) in [(0.005, 1.15), (0.02, 1.7)] {
+        (scene.detector.psf_sigma_px, scene.detector.read_noise) = (1.0, noise);
+        let mut sensors = Sensors::new(&sensor);
+        let (mut tally, mut bound_deg2) = (Tally::default(), 0.0);
+        let truth = scene.truth("", 0.0).unwrap();
+        for seed in 0..200 {
+            scene.seed = seed;
+            let answer =
+                hzn_tests::sensors::look(&mut sensors.host, &scene.render().unwrap().view(), &hzn_tests::known(&scene))
+                    .unwrap();
+            tally.add(Some(&answer), [truth.axis_x, truth.axis_y, truth.axis_z]);
+            let p = answer.covariance_rad2;
+            bound_deg2 += (p[0][0] + p[1][1] + p[2][2]).sqrt().to_degrees().powi(2) / 200.0;
+        }
+        let ratio = tally.rms_deg() / bound_deg2.sqrt();
+        println!("noise {noise}: {tally}, {ratio:.3} of the bound");
+        assert!((0.9..=limit).contains(&ratio), "noise {noise}: {ratio}");
+    }
+}
+
 /// The frames of a flight that swings from 0° to 120° off nadir, up to 90° and beyond.
 fn halves(flight: Flight) -> [Flight; 2] {
     let (mut near, mut far) = (flight.clone(), flight);
