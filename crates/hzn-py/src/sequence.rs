@@ -1,5 +1,6 @@
 //! Pictures from files, as `hzn run` takes them.
 
+use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,6 +9,7 @@ use hzn_calib::FrameData;
 use hzn_cli::engine::{self, Finished, Plan};
 use hzn_cli::exit::{Exit, Stop};
 use hzn_cli::input::{self, Payload, Source};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -64,8 +66,20 @@ impl Sequence {
         slf
     }
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Item>> {
-        let next = || self.source.lock().unwrap_or_else(PoisonError::into_inner).next();
-        let Some(item) = errors::detached(py, next)? else { return Ok(None) };
+        let next = || {
+            let mut source = self.source.lock().unwrap_or_else(PoisonError::into_inner);
+            source.next().ok_or_else(|| source.lost())
+        };
+        let item = match errors::detached(py, next)? {
+            Ok(item) => item,
+            Err(lost) => {
+                // A recording or video that was cut off ends sooner than it should.
+                if let Some(text) = lost.and_then(|text| CString::new(text).ok()) {
+                    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+                }
+                return Ok(None);
+            }
+        };
         let item = item.map_err(|e| errors::other(format!("{e:#}")))?;
         Ok(Some(Item { index: self.next.fetch_add(1, Ordering::Relaxed), item: Mutex::new(Some(item)) }))
     }

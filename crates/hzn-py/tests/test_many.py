@@ -148,6 +148,14 @@ def test_files_as_the_command_line_takes_them(sensor, folder, recording):
     assert [r.file for r in sensor.process_many(folder)][:2] == ["00.pgm", "01.pgm"]
 
 
+def test_a_recording_that_was_cut_is_told(sensor, recording, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recording.read_bytes()[:-20_000])
+    with pytest.warns(UserWarning, match="was cut off"):
+        reports = list(sensor.process_many(cut))
+    assert 0 < len(reports) < 50
+
+
 def test_a_table_beside_the_pictures_and_a_file_that_is_cut(sensor, tmp_path):
     for i in range(3):
         (tmp_path / f"{i}.pgm").write_bytes(pgm(limb(i))[: None if i != 1 else 999])
