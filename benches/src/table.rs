@@ -196,7 +196,7 @@ impl Results {
                 median(&c.ns_a_point)
             );
         }
-        let _ = writeln!(
+        let _ = write!(
             s,
             "\nWarm is the same picture once more, in the caches. What lies between that and the first column is memory: the \
              picture, of which each row that the limb crosses lies elsewhere, and the program, which flushed caches do not \
