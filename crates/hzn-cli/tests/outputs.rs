@@ -18,6 +18,7 @@ fn resume_goes_on_with_nothing_that_is_not_ours() {
     let place = Place::with_pictures(2);
     for (name, bytes) in [
         ("notes.jsonl", b"my notes\n".to_vec()),
+        ("before.jsonl", b"{\"index\":0,\"name\":\"of another version\"}\n".to_vec()),
         ("notes.csv", b"my,notes\n1,2\n".to_vec()),
         ("noise.mcap", (0..200_000u32).map(|i| (i * 7 % 251) as u8).collect()),
         ("other.mcap", foreign()),

@@ -150,8 +150,14 @@ fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool)
         }
         let mut to = 0;
         for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|line| line.ends_with(b"\n")) {
+            let begins = to == 0;
             to += line.len();
-            let Ok(row) = serde_json::from_slice::<Row>(line) else { break };
+            let row = match serde_json::from_slice::<Row>(line) {
+                Ok(row) => row,
+                // A whole row that is none of ours.
+                Err(_) if begins => return other(),
+                Err(_) => break,
+            };
             if !visit(row, to) {
                 break;
             }
