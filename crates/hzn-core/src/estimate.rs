@@ -530,6 +530,11 @@ impl<T: Real> Sums<T> {
         ]
     }
 
+    /// Weighted RMS of |g|: by how much cos α changes when every point moves by one pixel across the limb, 1/px.
+    pub(crate) fn cos_per_px(&self) -> T {
+        (self.weight / self.n[5].most(T::of(1e-20))).sqrt()
+    }
+
     /// The means of Bᵀs, from the sums about the old ones.
     pub(crate) fn means(&self, [m1, m2]: [T; 2]) -> [T; 2] {
         let w = self.n[5].most(T::of(1e-20));

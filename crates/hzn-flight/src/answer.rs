@@ -158,6 +158,7 @@ impl Answer {
                 half_angle_rad: d.half_angle_rad.into(),
                 fused_half_angle_rad: d.fused_half_angle_rad.into(),
                 altitude_m: (!d.altitude_m.is_nan()).then(|| (d.altitude_m.into(), d.altitude_sigma_m.into())),
+                free: None,
                 rms_px: d.rms_px.into(),
                 inliers: d.inliers,
                 arc_px: d.arc_px.into(),

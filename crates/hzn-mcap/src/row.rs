@@ -295,6 +295,7 @@ mod tests {
             half_angle_rad: of(1.3),
             fused_half_angle_rad: of(1.3),
             altitude_m: Some((of(240e3), of(1e3))),
+            free: None,
             rms_px: of(f64::NAN),
             inliers: 500,
             arc_px: of(900.0),

@@ -8,7 +8,7 @@ use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
 use hzn_core::frames::{Cov3, Ecef, UnitVec3};
 use hzn_core::image::{ImageView, Pixels};
-use hzn_core::pipeline::Candidate;
+use hzn_core::pipeline::{Candidate, Free};
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Observer, Report, Solution};
 use hzn_sim::ephemeris;
@@ -225,10 +225,20 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Sol
         half_angle_rad: s.half_angle_rad.into(),
         fused_half_angle_rad: s.fused_half_angle_rad.into(),
         altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),
+        free: s.free.as_ref().and_then(widen_free),
         rms_px: s.rms_px.into(),
         inliers: s.inliers,
         arc_px: s.arc_px.into(),
         candidate: s.candidate,
+    })
+}
+
+fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
+    Some(Free {
+        axis: UnitVec3::try_new(f.axis.xyz().map(Into::into))?,
+        cos: f.cos.into(),
+        var_cos: f.var_cos.into(),
+        cos_per_px: f.cos_per_px.into(),
     })
 }
 

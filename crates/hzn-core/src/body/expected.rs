@@ -183,6 +183,20 @@ impl<T: Real> Expected<T> {
         Some((distance - self.radius_m, variance.sqrt()))
     }
 
+    /// Limb height in metres that a measured cos α asks for at the expected altitude, and how it changes with cos α:
+    /// d = (R + H) sin α − R, ∂d/∂cos = −(R + H) cot α, m. With the body's limb raised to d, the expected half-angle is the
+    /// measured one. `None` when the half-angle says nothing about the distance.
+    pub fn limb_height_m(&self, cos: T) -> Option<(T, T)> {
+        let sin = (T::one() - cos * cos).sqrt();
+        if self.free || !(sin > T::zero() && cos > T::zero()) {
+            return None;
+        }
+        let distance = (self.radius_m + self.limb_m) / self.sin;
+        // The difference of the sines, so that single precision keeps the metres.
+        let height = self.limb_m + distance * (self.cos - cos) * (self.cos + cos) / (sin + self.sin);
+        Some((height, -distance * cos / sin))
+    }
+
     /// The axis in ECEF, when the position is known.
     pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
         self.ellipsoid.as_ref().map(|c| c.axis)
@@ -192,6 +206,25 @@ impl<T: Real> Expected<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cone_of_a_raised_limb_asks_for_its_height() {
+        let frame = Frame { altitude_m: Some(400e3), ..Frame::default() };
+        let at = |km: f64| {
+            Expected::<f64>::new(&Config { limb_height_km: km, kind: Kind::EarthSphere, ..Config::default() }, &frame)
+                .unwrap()
+        };
+        let (told, raised) = (at(10.0), at(25.0));
+        let (height, slope) = told.limb_height_m(raised.cos).unwrap();
+        assert!((height - 25e3).abs() < 1e-6, "{height}");
+        let (higher, _) = told.limb_height_m(raised.cos - 1e-6).unwrap();
+        assert!(((higher - height) / -1e-6 / slope - 1.0).abs() < 1e-4);
+        let single = Expected::<f32>::new(
+            &Config { kind: Kind::EarthSphere, ..Config::default() },
+            &Frame { altitude_m: Some(400e3), ..Frame::default() },
+        );
+        assert!((single.unwrap().limb_height_m(raised.cos as f32).unwrap().0 - 25e3).abs() < 10.0);
+    }
 
     #[test]
     fn a_better_attitude_leaves_less_of_the_shape_open() {

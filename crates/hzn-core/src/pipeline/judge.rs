@@ -2,7 +2,7 @@
 
 use super::account;
 use super::observer::Observer;
-use super::report::{Candidate, Report, Solution, Verdict};
+use super::report::{Candidate, Free, Report, Solution, Verdict};
 use super::sensor::Sensor;
 use super::taken::Taken;
 use crate::block::{Block, LANES};
@@ -338,6 +338,12 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             half_angle_rad: half_angle(fit.k),
             fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
             altitude_m: fused.var_free_cos.and_then(|v| self.expected.altitude(fit.c, v)),
+            free: fused.var_free_cos.map(|var_cos| Free {
+                axis: UnitVec3::assume_unit(fit.e),
+                cos: fit.c,
+                var_cos,
+                cos_per_px: fit.sums.cos_per_px(),
+            }),
             rms_px: fit.rms_px,
             inliers: fit.inliers,
             arc_px: fit.arc_px,

@@ -30,7 +30,7 @@ pub use horizon::{FlightHorizon, Horizon, HostHorizon};
 pub use observer::{Observer, Unobserved};
 pub use optional::{OPTIONAL, Optional, lacking};
 pub use preset::Preset;
-pub use report::{Candidate, Counters, MAX_LISTED, Report, Reports, Solution, Verdict};
+pub use report::{Candidate, Counters, Free, MAX_LISTED, Report, Reports, Solution, Verdict};
 pub use sensor::Sensor;
 pub use stream::{HELD, Rows, RowsError, Stream};
 pub use workspace::{FlightWorkspace, HostWorkspace, Workspace};

@@ -152,6 +152,20 @@ verdicts! {
     Straight = 15, "straight";
 }
 
+/// The half-angle that the limb itself shows: what the fit finds before the expected one is fused.
+#[derive(Debug, Clone, Copy)]
+pub struct Free<T> {
+    /// Axis of the freely fitted cone in the camera frame.
+    pub axis: UnitVec3<Cam, T>,
+    /// cos of the half-angle.
+    pub cos: T,
+    /// Variance of `cos`: every term of the covariance except the expected half-angle's own.
+    pub var_cos: T,
+    /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of |∂(s·e)/∂(u, v)|
+    /// over the points that carry the fit.
+    pub cos_per_px: T,
+}
+
 /// A direction with its covariance.
 #[derive(Debug, Clone, Copy)]
 pub struct Solution<T> {
@@ -169,6 +183,8 @@ pub struct Solution<T> {
     pub fused_half_angle_rad: T,
     /// Altitude estimate of the half-angle-free fit and its 1-sigma, metres; `None` for Sun and Moon.
     pub altitude_m: Option<(T, T)>,
+    /// The half-angle-free fit in cosines; `None` when the half-angle was not fitted, and of an answer that came by telemetry.
+    pub free: Option<Free<T>>,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,
     /// Edge points that carry the answer.
