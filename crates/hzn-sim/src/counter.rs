@@ -29,6 +29,8 @@ pub(crate) enum Stream {
     Imu,
     /// Errors of a satellite receiver.
     Gnss,
+    /// Artefacts in the picture.
+    Artefact,
 }
 
 /// A sequence of random numbers, read by index.

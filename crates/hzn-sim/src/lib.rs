@@ -15,6 +15,7 @@
 //! | [`optics`] | fall-off and stray light |
 //! | [`motion`] | rotation during a picture |
 //! | [`foreground`] | structure of the vehicle in the picture |
+//! | [`artefact`] | pictures with flares, windows, panels or ground instead of a limb |
 //! | `height` | the limb's height by latitude |
 //! | `render` | light on every pixel |
 //! | [`detector`] | blur, noise, quantisation |
@@ -29,6 +30,7 @@
 //! | [`sensitivity`] | covariances by design, without rendering |
 //! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
 
+pub mod artefact;
 mod counter;
 pub mod detector;
 pub mod ephemeris;

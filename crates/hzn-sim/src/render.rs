@@ -37,7 +37,7 @@ impl Scene {
     }
 
     /// Light on every pixel before blur and exposure: one plane, or three for colours.
-    fn light(&self) -> Result<Vec<Plane>, SceneError> {
+    pub(crate) fn light(&self) -> Result<Vec<Plane>, SceneError> {
         let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
         let camera = beyond_circle(&self.camera)?;
         let (fx, fy) = camera.focal_px();
@@ -194,7 +194,7 @@ pub(crate) fn beyond_circle(config: &camera::Config) -> Result<Camera<f64>, Scen
 }
 
 /// No light reaches what is beyond the image circle.
-fn through_circle(mut light: Plane, camera: &Camera<f64>) -> Plane {
+pub(crate) fn through_circle(mut light: Plane, camera: &Camera<f64>) -> Plane {
     if let Some((c, a, b)) = camera.image_circle_px() {
         let w = light.width;
         light.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {

@@ -1,5 +1,6 @@
 //! The studies, in the order of the document.
 
+mod artefacts;
 mod design;
 mod horace;
 mod infrared;
@@ -50,6 +51,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("leo-infrared", "Accuracy and honesty: infrared in low orbit", infrared::flight),
     reproduced("rocket", "Accuracy and honesty: sounding rocket", scenes::rocket),
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
+    reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
     Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compared },
 ];
 

@@ -1,0 +1,116 @@
+//! Rings and discs: circles of the picture.
+
+use super::dice::Dice;
+use super::shape::{Canvas, Shape, Spot, step};
+
+/// A circle of the picture, filled or as a ring.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Circle {
+    middle: [f32; 2],
+    radius: f32,
+    /// Width of a ring in pixels; `None` is a disc.
+    width: Option<f32>,
+    /// Blur of the outer edge and of a ring's inner one, pixels.
+    soft: [f32; 2],
+    light: f32,
+    /// Light at a disc's edge over that in its middle, less one.
+    rim: f32,
+    /// Share of the light that changes once around, and the direction where it is least.
+    uneven: f32,
+    faint: [f32; 2],
+}
+
+/// A circle of this radius in pixels whose edge passes through a place inside the picture.
+fn through(dice: &mut Dice, canvas: &Canvas, radius: f64) -> [f32; 2] {
+    let (x, y) = (dice.between(0.08, 0.92) * canvas.width, dice.between(0.08, 0.92) * canvas.height);
+    let (sin, cos) = libm::sincos(dice.turn());
+    [(x + radius * cos) as f32, (y + radius * sin) as f32]
+}
+
+impl Circle {
+    /// A ring: radius 0.15 to 3 diagonals, 4 to 60 px wide, blurred by 0.5 to 6 px on each side on its own, light 0.1 to 1,
+    /// fading by up to 90 % towards one side.
+    pub(super) fn ring(dice: &mut Dice, canvas: &Canvas) -> Self {
+        let radius = dice.between_log(0.15, 3.0) * canvas.diagonal;
+        let middle = through(dice, canvas, radius);
+        let (sin, cos) = libm::sincos(dice.turn());
+        Self {
+            middle,
+            radius: radius as f32,
+            width: Some(dice.between_log(4.0, 60.0) as f32),
+            soft: [dice.between_log(0.5, 6.0) as f32, dice.between_log(0.5, 6.0) as f32],
+            light: dice.between_log(0.1, 1.0) as f32,
+            rim: 0.0,
+            uneven: if dice.chance(0.5) { dice.between(0.0, 0.9) as f32 } else { 0.0 },
+            faint: [cos as f32, sin as f32],
+        }
+    }
+
+    /// A ghost disc: radius 0.1 to 3 diagonals, blurred by 0.5 to 6 px, light 0.1 to 1, its rim up to twice as bright as its
+    /// middle or down to half, fading by up to 70 % towards one side.
+    pub(super) fn disc(dice: &mut Dice, canvas: &Canvas) -> Self {
+        Self::ghost(dice, canvas, 0.1, 3.0)
+    }
+
+    /// As [`Circle::disc`], with a radius of 1 to 12 diagonals.
+    pub(super) fn far_disc(dice: &mut Dice, canvas: &Canvas) -> Self {
+        Self::ghost(dice, canvas, 1.0, 12.0)
+    }
+
+    fn ghost(dice: &mut Dice, canvas: &Canvas, low: f64, high: f64) -> Self {
+        let radius = dice.between_log(low, high) * canvas.diagonal;
+        let middle = through(dice, canvas, radius);
+        Self::filled(dice, middle, radius, (0.1, 1.0))
+    }
+
+    /// A disc at a place.
+    pub(super) fn filled(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
+        let (sin, cos) = libm::sincos(dice.turn());
+        Self {
+            middle,
+            radius: radius_px as f32,
+            width: None,
+            soft: [dice.between_log(0.5, 6.0) as f32, 1.0],
+            light: dice.between_log(light.0, light.1) as f32,
+            rim: if dice.chance(0.5) { dice.between(-0.5, 1.0) as f32 } else { 0.0 },
+            uneven: if dice.chance(0.4) { dice.between(0.0, 0.7) as f32 } else { 0.0 },
+            faint: [cos as f32, sin as f32],
+        }
+    }
+
+    /// A ring at a place.
+    pub(super) fn drawn_around(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
+        Self {
+            width: Some(dice.between_log(3.0, 30.0) as f32),
+            rim: 0.0,
+            ..Self::filled(dice, middle, radius_px, light)
+        }
+    }
+
+    /// Middle and radius in pixels.
+    pub(super) fn place(&self) -> ([f64; 2], f64) {
+        (self.middle.map(f64::from), f64::from(self.radius))
+    }
+}
+
+impl Shape for Circle {
+    fn at(&self, x: f32, y: f32) -> Spot {
+        let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
+        // Written so that large radii keep their digits in single precision.
+        let radius = self.radius;
+        let distance = (dx * dx + dy * dy).sqrt();
+        let inside = radius - distance;
+        let cover = match self.width {
+            Some(width) => step(inside, self.soft[0]) * step(width - inside, self.soft[1]),
+            None => step(inside, self.soft[0]),
+        };
+        if cover <= 0.0 {
+            return Spot::default();
+        }
+        let ratio = distance / radius;
+        let ratio4 = (ratio * ratio * ratio * ratio).min(1.0);
+        let aside = ((dx * self.faint[0] + dy * self.faint[1]) / radius).clamp(-1.0, 1.0);
+        let even = 1.0 - self.uneven * 0.5 * (1.0 + aside);
+        Spot { light: self.light * cover * even * (1.0 + self.rim * ratio4), cover: 0.0 }
+    }
+}

@@ -1,0 +1,81 @@
+//! Which artefacts there are.
+
+/// What a picture shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A flare ring: bright along a circle of the picture, dark on both sides.
+    Ring,
+    /// A ghost: a disc of the picture, larger than a tenth of it.
+    Disc,
+    /// The image of an iris with 5 to 9 corners, its blades straight or slightly curved.
+    Polygon,
+    /// A soft curved streak, or the edge of a veil.
+    Streak,
+    /// The edge of a ghost whose middle lies far outside the picture, through fisheye lenses.
+    FarDisc,
+    /// Several ghosts on a line through the principal point, with the source of light in or beside the picture.
+    Chain,
+    /// Stray light around a source in or beside the picture.
+    Glare,
+    /// Straight parts of the vehicle.
+    Panel,
+    /// The frame of a window around the sky, with round corners or as a porthole.
+    Window,
+    /// The Moon, with a phase and a halo.
+    Moon,
+    /// Clouds, fronts and coasts seen from above, without a limb.
+    Clouds,
+    /// Cities, roads and lightning at night, without a limb.
+    Lights,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: &[Self] = &[
+        Self::Ring,
+        Self::Disc,
+        Self::Polygon,
+        Self::Streak,
+        Self::FarDisc,
+        Self::Chain,
+        Self::Glare,
+        Self::Panel,
+        Self::Window,
+        Self::Moon,
+        Self::Clouds,
+        Self::Lights,
+    ];
+
+    /// Name in tables and on command lines.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ring => "ring",
+            Self::Disc => "disc",
+            Self::Polygon => "polygon",
+            Self::Streak => "streak",
+            Self::FarDisc => "far-disc",
+            Self::Chain => "chain",
+            Self::Glare => "glare",
+            Self::Panel => "panel",
+            Self::Window => "window",
+            Self::Moon => "moon",
+            Self::Clouds => "clouds",
+            Self::Lights => "lights",
+        }
+    }
+
+    /// The kind of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|k| k.name() == name)
+    }
+
+    /// Whether its edges are those of discs, which can have the very half-angle that is expected.
+    pub const fn is_disc(self) -> bool {
+        matches!(self, Self::Disc | Self::FarDisc | Self::Chain)
+    }
+
+    /// Whether the camera looks down on the body, from too near for its limb to be in view.
+    pub const fn is_ground(self) -> bool {
+        matches!(self, Self::Clouds | Self::Lights)
+    }
+}

@@ -1,0 +1,127 @@
+//! What a sensor says of a trial, and whether that is false.
+
+use hzn_core::body::Expected;
+use hzn_core::pipeline::{Candidate, Observer};
+use hzn_core::status::Status;
+use hzn_core::{Config, HostHorizon};
+
+use super::trial::Trial;
+use crate::error::SceneError;
+use crate::evaluate::{self, Miss};
+use crate::globe::Globe;
+use crate::picture::Picture;
+
+/// An answer on a limb that is farther off than this is false whatever it claims, degrees.
+pub const GROSS_DEG: f64 = 2.0;
+/// An answer that is farther off than this many of its sigmas is false.
+pub const FALSE_SIGMAS: f64 = 5.0;
+
+/// What is told about a picture besides the position.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Told {
+    /// Error of the attitude, 1σ about each axis in degrees; `None`: no attitude is told.
+    pub attitude_sigma_deg: Option<f64>,
+}
+
+/// An answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// How far off it is.
+    pub miss: Miss,
+    /// Direction in the camera.
+    pub axis: [f64; 3],
+    /// Half-angle of the answer, radians.
+    pub half_angle_rad: f64,
+    /// RMS of the inliers, pixels.
+    pub rms_px: f64,
+    /// Inliers.
+    pub inliers: u32,
+    /// Length of edge that they cover, pixels.
+    pub arc_px: f64,
+}
+
+/// What a sensor said of a trial.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The status.
+    pub status: Status,
+    /// The answer, with status `ok`.
+    pub found: Option<Found>,
+    /// What became of each edge that was looked at.
+    pub candidates: Vec<Candidate<f64>>,
+    /// Whether one of the picture's discs has the expected half-angle within three of its sigmas.
+    pub matching_disc: bool,
+    /// Whether there was a limb to be found.
+    pub limb: bool,
+}
+
+impl Outcome {
+    /// Whether an answer was given that is not the limb's: there is none, or it is more than 5σ or 2° away.
+    pub fn is_false(&self) -> bool {
+        self.found.is_some_and(|f| !self.limb || !is_right(&f.miss))
+    }
+    /// Whether the limb in the picture was answered.
+    pub fn is_right(&self) -> bool {
+        self.limb && self.found.is_some_and(|f| is_right(&f.miss))
+    }
+}
+
+fn is_right(miss: &Miss) -> bool {
+    let sigmas2 = miss.nees.unwrap_or(f64::INFINITY);
+    miss.angle_deg <= GROSS_DEG && sigmas2 <= FALSE_SIGMAS * FALSE_SIGMAS
+}
+
+/// Looks at the picture of a trial with a sensor of this configuration.
+///
+/// # Errors
+/// A configuration that is refused, or a position that cannot be.
+pub fn look(
+    horizon: &mut HostHorizon,
+    config: &Config,
+    trial: &Trial,
+    picture: &Picture,
+    told: Told,
+    observer: &impl Observer<f64>,
+) -> Result<Outcome, SceneError> {
+    horizon.reconfigure(config)?;
+    let known = trial.known(told.attitude_sigma_deg);
+    let expected = horizon.expect(&known).map_err(|_| SceneError::Pose)?;
+    let report = horizon.process_observed(&picture.view(), &expected, observer);
+    let truth = &trial.truth;
+    let found = report.solution.as_ref().and_then(|s| {
+        let found = evaluate::Found {
+            axis: s.axis.xyz(),
+            covariance_rad2: s.covariance.upper_rad2,
+            half_angle_deg: Some(s.half_angle_rad.to_degrees()),
+        };
+        Some(Found {
+            miss: Miss::of(&found, [truth.axis_x, truth.axis_y, truth.axis_z], truth.half_angle_deg)?,
+            axis: s.axis.xyz(),
+            half_angle_rad: s.fused_half_angle_rad,
+            rms_px: s.rms_px,
+            inliers: s.inliers,
+            arc_px: s.arc_px,
+        })
+    });
+    Ok(Outcome {
+        status: report.status,
+        found,
+        candidates: report.candidates.iter().copied().collect(),
+        matching_disc: has_matching_disc(trial, config, &expected),
+        limb: trial.limb,
+    })
+}
+
+/// The told sigma of the half-angle: sin α = (R + d)/(R + H), so cos α dα = (dd − sin α dH)/(R + H).
+fn half_angle_sigma_rad(trial: &Trial, config: &Config, expected: &Expected<f64>) -> f64 {
+    let (sin, cos) = libm::sincos(expected.half_angle_rad());
+    let globe = Globe::of(&config.body);
+    let distance_km = (globe.a_m + globe.altitude_m(trial.scene.pose.position_m)) * 1e-3;
+    let (limb, altitude) = (config.body.limb_height_sigma_km, sin * config.body.altitude_sigma_km);
+    libm::hypot(limb, altitude) / (distance_km * cos)
+}
+
+fn has_matching_disc(trial: &Trial, config: &Config, expected: &Expected<f64>) -> bool {
+    let sigma = half_angle_sigma_rad(trial, config, expected);
+    trial.disc_half_angles_rad.iter().any(|a| (a - expected.half_angle_rad()).abs() <= 3.0 * sigma)
+}

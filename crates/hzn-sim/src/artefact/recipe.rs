@@ -1,0 +1,83 @@
+//! The figures of a kind.
+
+use super::circle::Circle;
+use super::clouds::Clouds;
+use super::dice::Dice;
+use super::glare::Glare;
+use super::kind::Kind;
+use super::lights::Lights;
+use super::moon::Moon;
+use super::panel::Panel;
+use super::polygon::Polygon;
+use super::shape::{Canvas, Shape};
+use super::streak::Streak;
+use super::window::Window;
+
+/// Figures, and the circles among them (middle and radius in pixels).
+#[derive(Default)]
+pub(super) struct Figures {
+    pub(super) shapes: Vec<Box<dyn Shape>>,
+    pub(super) discs: Vec<([f64; 2], f64)>,
+}
+
+impl Figures {
+    /// Whether something can be seen of them: light or cover at one place in a hundred of the picture.
+    pub(super) fn is_seen(&self, canvas: &Canvas) -> bool {
+        let place = |i: u32| {
+            let (x, y) = (f64::from(i % 20) + 0.5, f64::from(i / 20) + 0.5);
+            ((x / 20.0 * canvas.width) as f32, (y / 20.0 * canvas.height) as f32)
+        };
+        let bright = |(x, y)| self.shapes.iter().map(|s| s.at(x, y)).any(|s| s.light > 0.05 || s.cover > 0.5);
+        self.shapes.is_empty() || (0..400).filter(|&i| bright(place(i))).count() >= 4
+    }
+
+    fn add(&mut self, shape: impl Shape + 'static) {
+        self.shapes.push(Box::new(shape));
+    }
+    fn disc(&mut self, circle: Circle) {
+        self.discs.push(circle.place());
+        self.add(circle);
+    }
+}
+
+/// Draws the figures of a kind: one, or for one in four two of the flares; chains have three to eight.
+pub(super) fn draw(kind: Kind, seed: u64, dice: &mut Dice, canvas: &Canvas) -> Figures {
+    let mut out = Figures::default();
+    let flare = matches!(kind, Kind::Ring | Kind::Disc | Kind::Polygon | Kind::Streak);
+    for _ in 0..if flare && dice.chance(0.25) { 2 } else { 1 } {
+        match kind {
+            Kind::Ring => out.add(Circle::ring(dice, canvas)),
+            Kind::Disc => out.disc(Circle::disc(dice, canvas)),
+            Kind::Polygon => out.add(Polygon::draw(dice, canvas)),
+            Kind::Streak => out.add(Streak::draw(dice, canvas)),
+            Kind::FarDisc => out.disc(Circle::far_disc(dice, canvas)),
+            Kind::Chain => chain(&mut out, dice, canvas),
+            Kind::Glare => out.add(Glare::draw(dice, canvas)),
+            Kind::Panel => out.add(Panel::draw(dice, canvas)),
+            Kind::Window => out.add(Window::draw(dice, canvas)),
+            Kind::Moon => out.add(Moon::draw(dice, canvas)),
+            Kind::Clouds => out.add(Clouds::draw(dice, canvas, seed)),
+            Kind::Lights => out.add(Lights::draw(dice, canvas)),
+        }
+    }
+    out
+}
+
+/// Three to eight discs, rings and polygons of 0.01 to 0.6 diagonals on the line from a source of light through the
+/// principal point, as the surfaces of a lens reflect it; light 0.03 to 0.6 each.
+fn chain(out: &mut Figures, dice: &mut Dice, canvas: &Canvas) {
+    let source = [dice.between(-0.4, 1.4) * canvas.width, dice.between(-0.4, 1.4) * canvas.height];
+    let [cx, cy] = canvas.centre;
+    for _ in 0..dice.count(3, 8) {
+        let along = dice.between(-1.8, 0.9);
+        let middle = [(cx + along * (source[0] - cx)) as f32, (cy + along * (source[1] - cy)) as f32];
+        let radius = dice.between_log(0.01, 0.6) * canvas.diagonal;
+        let light = (0.03, 0.6);
+        match dice.count(0, 3) {
+            0 => out.add(Circle::drawn_around(dice, middle, radius, light)),
+            1 => out.add(Polygon::placed(dice, middle, radius, light)),
+            _ => out.disc(Circle::filled(dice, middle, radius, light)),
+        }
+    }
+    out.add(Glare::source(dice, canvas, source.map(|v| v as f32)));
+}

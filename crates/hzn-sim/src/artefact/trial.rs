@@ -1,0 +1,323 @@
+//! A picture with its truth.
+
+use core::f64::consts::PI;
+
+use hzn_core::Frame;
+use hzn_core::camera::{self, Camera};
+use hzn_core::ellipsoid::LimbCone;
+use hzn_core::frames::UnitVec3;
+use hzn_core::pixel::ImagePoint;
+use nalgebra::{Matrix3, Vector3};
+
+use super::dice::Dice;
+use super::kind::Kind;
+use super::lens;
+use super::lights::Lights;
+use super::recipe::{self, Figures};
+use super::shape::{Canvas, Shape};
+use crate::detector::{Detector, Plane};
+use crate::error::SceneError;
+use crate::globe::Globe;
+use crate::limb::EdgeNoise;
+use crate::picture::Picture;
+use crate::pose::{Look, Pose, position_m};
+use crate::render::through_circle;
+use crate::scene::{Disc, Profile, Scene, Sky};
+use crate::texture::Clouds;
+use crate::truth::Truth;
+
+/// What is drawn for a trial, each with random numbers of its own.
+#[derive(Clone, Copy)]
+enum Part {
+    Lens = 1,
+    Place,
+    Detector,
+    Attitude,
+    /// The first of as many as are tried.
+    Figures = 16,
+}
+
+impl Part {
+    fn dice(self, kind: Kind, seed: u64) -> Dice {
+        self.nth(kind, seed, 0)
+    }
+    fn nth(self, kind: Kind, seed: u64, index: u64) -> Dice {
+        let kind = Kind::ALL.iter().position(|&k| k == kind).unwrap_or_default() as u64;
+        Dice::new(seed.wrapping_mul(64).wrapping_add(kind), self as u64 + index)
+    }
+}
+
+/// How far a limb stays out of a picture that must not show it, degrees.
+const MARGIN_DEG: f64 = 3.0;
+/// Figures tried until one leaves the limb alone.
+const TRIES: u64 = 60;
+/// Light of a figure at the limb from which it disturbs it, and the share of the limb that may be disturbed.
+const DISTURBED: f32 = 0.03;
+const SHARE: f64 = 0.1;
+/// Places along the limb where that is looked at, and pixels around them.
+const PLACES: usize = 120;
+const AROUND_PX: f32 = 12.0;
+
+/// One picture of an artefact, with everything that is true of it.
+pub struct Trial {
+    /// What it shows.
+    pub kind: Kind,
+    /// Its seed. Equal kinds and seeds give equal pictures on any number of threads.
+    pub seed: u64,
+    /// The lens, position, body, limb and detector; where [`Trial::limb`] is false the body is not drawn.
+    pub scene: Scene,
+    /// Whether a limb is in the picture.
+    pub limb: bool,
+    /// What is true of it.
+    pub truth: Truth,
+    /// Half-angles in radians of the cones that fit the discs of the picture best, of those with edge in view.
+    pub disc_half_angles_rad: Vec<f64>,
+    figures: Figures,
+    stars: Option<Lights>,
+}
+
+impl core::fmt::Debug for Trial {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "Trial({} {}, limb: {})", self.kind.name(), self.seed, self.limb)
+    }
+}
+
+impl Trial {
+    /// The artefact alone, from 60 to 600 km: the camera looks away from the body, so that its limb stays at least 3°
+    /// outside the picture, or for kinds of ground down onto it.
+    ///
+    /// # Errors
+    /// A scene that cannot be, which would be a mistake of the ranges.
+    pub fn without_limb(kind: Kind, seed: u64) -> Result<Self, SceneError> {
+        let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
+        let dice = &mut Part::Place.dice(kind, seed);
+        let position = place(dice);
+        let half_angle = cone(position, 30.0)?.half_angles_rad();
+        let corner_rad = farthest_rad(&camera)?;
+        let off_nadir = if kind.is_ground() {
+            let most = half_angle.0.min(half_angle.1) - corner_rad - (MARGIN_DEG + 1.5).to_radians();
+            dice.between(0.0, most.max(0.0))
+        } else {
+            let least = half_angle.0.max(half_angle.1) + corner_rad + MARGIN_DEG.to_radians();
+            dice.between(least.min(PI), PI)
+        };
+        let (azimuth, roll) = (dice.turn(), dice.turn());
+        let mut scene = Scene::new(camera, Pose::looking(position, Look::off_nadir(off_nadir, azimuth, roll)));
+        finish(&mut scene, kind, seed);
+        let canvas = canvas_of(&scene.camera);
+        let dice = &mut Part::Figures.dice(kind, seed);
+        let figures = recipe::draw(kind, seed, dice, &canvas);
+        let stars = (!kind.is_ground()).then(|| Lights::stars(dice, &canvas));
+        Self::drawn(kind, seed, scene, false, figures, stars)
+    }
+
+    /// A clean limb with the artefact next to it: the body is lit all along, the limb crosses the picture over at least
+    /// half its width, and the artefact leaves at least 90 % of it alone. Kinds of ground become the texture inside the
+    /// limb. `None` where no such picture was found for this seed.
+    ///
+    /// # Errors
+    /// As [`Trial::without_limb`].
+    pub fn beside_limb(kind: Kind, seed: u64) -> Result<Option<Self>, SceneError> {
+        let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
+        let dice = &mut Part::Place.dice(kind, seed);
+        let position = place(dice);
+        let limb_height_km = dice.between(12.0, 22.0);
+        let cone = cone(position, limb_height_km)?;
+        let lens = Camera::<f64>::try_new(&camera)?;
+        let (w, h) = (f64::from(camera.width), f64::from(camera.height));
+        // Through a place well inside the picture, in any direction.
+        let (u, v) = (dice.between(0.25, 0.75) * w, dice.between(0.25, 0.75) * h);
+        let Some(ray) = lens.unproject(ImagePoint { u, v }) else { return Ok(None) };
+        let axis = aside(Vector3::from(ray.xyz()), cone.mean_half_angle_rad(), dice.turn());
+        let pose = pointing(position, axis, Vector3::from(cone.axis.xyz()), dice.turn());
+        let mut scene = Scene::new(camera, pose);
+        scene.body.limb_height_km = limb_height_km;
+        scene.profile = Profile::Exponential { scale_km: dice.between(4.0, 8.0) };
+        scene.disc = Disc { surface: dice.between(0.35, 0.85), clouds: None, band: None };
+        finish(&mut scene, kind, seed);
+        if kind.is_ground() {
+            let clouds = Clouds { cover: 0.5, largest_km: 600.0, seed, ..Clouds::default() };
+            scene.disc.clouds = Some(clouds);
+        }
+        let limb = scene.limb_points(PLACES, EdgeNoise::None)?;
+        let length_px = scene.visible_limb_px()?;
+        if length_px < 0.5 * w {
+            return Ok(None);
+        }
+        let canvas = canvas_of(&scene.camera);
+        for attempt in 0..TRIES {
+            let figures = match kind.is_ground() {
+                true => Figures::default(),
+                false => recipe::draw(kind, seed, &mut Part::Figures.nth(kind, seed, attempt), &canvas),
+            };
+            let hurt = |p: &&crate::limb::LimbPoint| {
+                let (x, y) = (p.exact.u as f32, p.exact.v as f32);
+                let around = [(0.0, 0.0), (AROUND_PX, 0.0), (-AROUND_PX, 0.0), (0.0, AROUND_PX), (0.0, -AROUND_PX)];
+                around.iter().any(|(dx, dy)| {
+                    let spots = figures.shapes.iter().map(|s| s.at(x + dx, y + dy));
+                    let (light, cover) = spots.fold((0.0, 0.0f32), |(l, c), s| (l + s.light, c.max(s.cover)));
+                    light > DISTURBED || cover > DISTURBED
+                })
+            };
+            if limb.iter().filter(hurt).count() as f64 <= SHARE * limb.len() as f64 && figures.is_seen(&canvas) {
+                return Self::drawn(kind, seed, scene, true, figures, None).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    fn drawn(
+        kind: Kind,
+        seed: u64,
+        scene: Scene,
+        limb: bool,
+        figures: Figures,
+        stars: Option<Lights>,
+    ) -> Result<Self, SceneError> {
+        let truth = scene.truth(&format!("{}-{seed}.png", kind.name()), 0.0)?;
+        let disc_half_angles_rad = half_angles_rad(&Camera::try_new(&scene.camera)?, &figures.discs);
+        Ok(Self { kind, seed, scene, limb, truth, disc_half_angles_rad, figures, stars })
+    }
+
+    /// The same without the artefact.
+    #[must_use]
+    pub fn cleaned(self) -> Self {
+        Self { figures: Figures::default(), stars: None, disc_half_angles_rad: Vec::new(), ..self }
+    }
+
+    /// The picture, 8 bits.
+    ///
+    /// # Errors
+    /// As [`Scene::render`].
+    pub fn render(&self) -> Result<Picture, SceneError> {
+        let lens = Camera::<f64>::try_new(&self.scene.camera)?;
+        let (w, h) = (usize::from(self.scene.camera.width), usize::from(self.scene.camera.height));
+        let mut plane = match self.limb {
+            true => self.scene.light()?.into_iter().next().unwrap_or(Plane { width: w, data: vec![0.0; w * h] }),
+            false => Plane { width: w, data: vec![self.scene.sky.brightness as f32; w * h] },
+        };
+        if let Some(stars) = &self.stars {
+            stars.paint(&mut plane);
+        }
+        for shape in &self.figures.shapes {
+            shape.paint(&mut plane);
+        }
+        let plane = through_circle(plane.blurred(self.scene.detector.psf_sigma_px), &lens);
+        Ok(self.scene.detector.expose(&[plane], self.scene.seed))
+    }
+
+    /// What a navigation system would tell: the position; with `attitude_sigma_deg` an attitude too, which is wrong by as
+    /// much about each axis (1σ).
+    pub fn known(&self, attitude_sigma_deg: Option<f64>) -> Frame<f64> {
+        let pose = &self.scene.pose;
+        let dice = &mut Part::Attitude.dice(self.kind, self.seed);
+        let sigma_rad = attitude_sigma_deg.map(f64::to_radians);
+        Frame {
+            altitude_m: Some(Globe::of(&self.scene.body).altitude_m(pose.position_m)),
+            position_m: Some(pose.position_m),
+            cam_to_ecef: sigma_rad.and_then(|s| pose.disturbed([0; 3].map(|_| s * dice.normal())).cam_to_ecef()),
+            attitude_sigma_rad: sigma_rad,
+            ..Frame::default()
+        }
+    }
+}
+
+/// Anywhere over the Earth, 60 to 600 km high, lower ones as often as higher ones by ratio.
+fn place(dice: &mut Dice) -> [f64; 3] {
+    let lat_deg = libm::asin(dice.between(-1.0, 1.0)).to_degrees();
+    position_m(lat_deg, dice.between(-180.0, 180.0), dice.between_log(60.0, 600.0))
+}
+
+/// The limb's cone for a limb height in kilometres.
+fn cone(position_m: [f64; 3], limb_height_km: f64) -> Result<LimbCone<f64>, SceneError> {
+    let globe = Globe::of(&hzn_core::body::Config::default()).raised(limb_height_km * 1e3);
+    LimbCone::try_new(position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)
+}
+
+/// The largest angle off axis in a picture, radians.
+fn farthest_rad(camera: &camera::Config) -> Result<f64, SceneError> {
+    let lens = Camera::<f64>::try_new(camera)?;
+    let (w, h) = (f64::from(camera.width) - 1.0, f64::from(camera.height) - 1.0);
+    let corner = |(u, v)| lens.unproject(ImagePoint { u, v }).map(|s| libm::acos(s.xyz()[2].clamp(-1.0, 1.0)));
+    let corners = [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|c| corner(c).unwrap_or(lens.theta_max_rad()));
+    Ok(corners.into_iter().fold(0.0, f64::max))
+}
+
+fn canvas_of(camera: &camera::Config) -> Canvas {
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let diagonal = libm::hypot(width, height);
+    Canvas { width, height, diagonal, centre: [camera.cx_px, camera.cy_px], focal_px: camera.fx_px }
+}
+
+/// Detector, sky and noise: blur 0.5 to 1.4 px, noise 0.2 to 2.5 % of full scale, sky up to 6 % bright.
+fn finish(scene: &mut Scene, kind: Kind, seed: u64) {
+    let dice = &mut Part::Detector.dice(kind, seed);
+    let full_well = dice.chance(0.5).then(|| dice.between_log(1e3, 3e4));
+    scene.detector = Detector {
+        psf_sigma_px: dice.between(0.5, 1.4),
+        read_noise: dice.between_log(0.002, 0.025),
+        full_well_electrons: full_well,
+        ..Detector::default()
+    };
+    scene.sky = Sky { brightness: dice.between(0.0, 0.06), ..Sky::default() };
+    scene.seed = seed.wrapping_mul(977).wrapping_add(kind as u64);
+}
+
+/// A unit vector at an angle from another, in a direction about it.
+fn aside(from: Vector3<f64>, angle_rad: f64, turn_rad: f64) -> Vector3<f64> {
+    let [a, b] = across(from);
+    let (sin, cos) = libm::sincos(turn_rad);
+    from * libm::cos(angle_rad) + (a * cos + b * sin) * libm::sin(angle_rad)
+}
+
+/// Two unit vectors across a third, right-handed with it.
+fn across(e: Vector3<f64>) -> [Vector3<f64>; 2] {
+    let a = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
+    [a, e.cross(&a)]
+}
+
+/// A camera whose `axis` (camera frame) points along `to` (ECEF), turned about it.
+fn pointing(position_m: [f64; 3], axis: Vector3<f64>, to: Vector3<f64>, turn_rad: f64) -> Pose {
+    let frame = |e: Vector3<f64>, turn: f64| {
+        let [a, b] = across(e);
+        let (sin, cos) = libm::sincos(turn);
+        Matrix3::from_columns(&[e, a * cos + b * sin, b * cos - a * sin])
+    };
+    let cam_to_ecef = frame(to, turn_rad) * frame(axis, 0.0).transpose();
+    Pose::from_axes(position_m, [0, 1, 2].map(|i| cam_to_ecef.column(i).into_owned().into()))
+}
+
+/// Half-angles of the cones that fit discs of the picture (middle and radius in pixels).
+fn half_angles_rad(lens: &Camera<f64>, discs: &[([f64; 2], f64)]) -> Vec<f64> {
+    let (w, h) = (f64::from(lens.width()), f64::from(lens.height()));
+    let half_angle = |&(middle, radius): &([f64; 2], f64)| {
+        let steps = 6_000;
+        let rays: Vec<Vector3<f64>> = (0..steps)
+            .filter_map(|i| {
+                let (sin, cos) = libm::sincos(2.0 * PI * f64::from(i) / f64::from(steps));
+                let (u, v) = (middle[0] + radius * cos, middle[1] + radius * sin);
+                let inside = u >= 0.0 && v >= 0.0 && u <= w - 1.0 && v <= h - 1.0;
+                inside.then(|| lens.unproject(ImagePoint { u, v })).flatten().map(|s| Vector3::from(s.xyz()))
+            })
+            .collect();
+        if rays.len() < 12 {
+            return None;
+        }
+        // The plane through the rays' ends: its normal has the least spread.
+        let mean = rays.iter().sum::<Vector3<f64>>() / rays.len() as f64;
+        let spread: Matrix3<f64> = rays.iter().map(|r| (r - mean) * (r - mean).transpose()).sum();
+        let eigen = spread.symmetric_eigen();
+        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        // The axis is on the side where the disc is lit.
+        let towards = |r: &Vector3<f64>| {
+            let p = lens.project(&UnitVec3::try_new((r + normal * 0.01).into())?)?;
+            let at = |p: ImagePoint<f64>| libm::hypot(p.u - middle[0], p.v - middle[1]);
+            let own = lens.project(&UnitVec3::try_new((*r).into())?)?;
+            Some(at(p) < at(own))
+        };
+        let middle_ray = rays.get(rays.len() / 2)?;
+        let sign = if towards(middle_ray)? { 1.0 } else { -1.0 };
+        Some(libm::acos((sign * normal.dot(&mean)).clamp(-1.0, 1.0)))
+    };
+    discs.iter().filter_map(half_angle).collect()
+}

@@ -1,0 +1,219 @@
+//! Pictures without a limb: how often an artefact is taken for one, and whether limbs next to artefacts are still found.
+
+use std::collections::BTreeMap;
+
+use hzn_core::pipeline::{Unobserved, Verdict};
+use hzn_core::{Config, HostHorizon};
+use hzn_sim::artefact::{FALSE_SIGMAS, GROSS_DEG, Kind, Outcome, Told, Trial, look};
+use rayon::prelude::*;
+
+use super::Effort;
+use crate::document::Section;
+
+/// Values of `reject.threshold_px` besides the default.
+const THRESHOLDS_PX: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0];
+/// Error of the attitude that is told, 1σ about each axis in degrees.
+const ATTITUDE_DEG: f64 = 5.0;
+/// Pictures of each kind.
+const OF_EACH: usize = 200;
+/// The first seed: no gate was developed on these pictures.
+const FIRST_SEED: u64 = 7_000_000;
+/// False answers that are listed one by one.
+const LISTED: usize = 24;
+
+/// A sensor with default settings but for its threshold; `None` is the default.
+fn sensor(trial: &Trial, threshold_px: Option<f64>) -> Config {
+    let mut config = Config::new(trial.scene.camera.clone());
+    if let Some(px) = threshold_px {
+        config.reject.threshold_px = px;
+    }
+    config
+}
+
+/// What was told and how the sensor was set.
+#[derive(Clone, Copy, PartialEq)]
+struct Setting {
+    threshold_px: Option<f64>,
+    attitude: bool,
+}
+
+impl Setting {
+    const DEFAULT: Self = Self { threshold_px: None, attitude: false };
+
+    fn all() -> Vec<Self> {
+        let thresholds = || std::iter::once(None).chain(THRESHOLDS_PX.map(Some));
+        let with = |attitude| thresholds().map(move |threshold_px| Self { threshold_px, attitude });
+        with(false).chain(with(true)).collect()
+    }
+    fn name(self) -> String {
+        let px = self.threshold_px.map_or("default".into(), |px| format!("{px} px"));
+        if self.attitude { format!("{px}, attitude") } else { px }
+    }
+}
+
+/// A picture through a sensor in several settings.
+fn seen(horizon: &mut HostHorizon, trial: &Trial, settings: &[Setting]) -> anyhow::Result<Vec<Outcome>> {
+    let picture = trial.render()?;
+    let one = |s: &Setting| {
+        let told = Told { attitude_sigma_deg: s.attitude.then_some(ATTITUDE_DEG) };
+        Ok(look(horizon, &sensor(trial, s.threshold_px), trial, &picture, told, &Unobserved)?)
+    };
+    settings.iter().map(one).collect()
+}
+
+/// Something of every trial, over all cores; trials that cannot be drawn are left out.
+fn each<T: Send>(
+    trials: Vec<(Kind, u64)>,
+    of: impl Fn(&mut HostHorizon, Kind, u64) -> anyhow::Result<Option<T>> + Sync,
+) -> anyhow::Result<Vec<T>> {
+    let make = || HostHorizon::boxed(&Config::new(hzn_core::camera::Config::ideal(Default::default(), 64, 48, 60.0)));
+    make()?;
+    let all: Vec<Option<T>> = trials
+        .into_par_iter()
+        .map_init(make, |horizon, (kind, seed)| of(horizon.as_mut().map_err(|e| *e)?, kind, seed))
+        .collect::<anyhow::Result<_>>()?;
+    Ok(all.into_iter().flatten().collect())
+}
+
+fn seeds(count: usize) -> Vec<(Kind, u64)> {
+    Kind::ALL.iter().flat_map(|&kind| (0..count as u64).map(move |i| (kind, FIRST_SEED + i))).collect()
+}
+
+pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
+    let count = effort.frames(OF_EACH);
+    let mut s = Section::default();
+    s.text(format!(
+        "{} pictures without a limb, {count} of each kind, of 480×360 to 1280×960 pixels through pinholes (27° to 110° wide), \
+         equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 bits, with noise of \
+         0.2 to 2.5 % of full scale; the ranges of each kind stand in `hzn_sim::artefact`. Told: the camera and the position, \
+         for the lower half of the table also an attitude that is wrong by {ATTITUDE_DEG}° (1σ about each axis). Every \
+         setting but `reject.threshold_px` has its default. Counted: pictures that are answered. Discs whose half-angle \
+         lies within three told sigmas of the expected one cannot be told from a limb by their shape and have a row of \
+         their own.",
+        Kind::ALL.len() * count
+    ));
+    skies(&mut s, count)?;
+    limbs(&mut s, count)?;
+    Ok(s)
+}
+
+/// Pictures without a limb.
+fn skies(s: &mut Section, count: usize) -> anyhow::Result<()> {
+    let settings = Setting::all();
+    let all = each(seeds(count), |horizon, kind, seed| {
+        let trial = Trial::without_limb(kind, seed)?;
+        Ok(Some((kind, seed, seen(horizon, &trial, &settings)?)))
+    })?;
+    let head = |first: &'static str| {
+        [first.to_owned(), "pictures".into()].into_iter().chain(settings.iter().take(7).map(|s| s.name()))
+    };
+    let matching = |o: &[Outcome]| o.iter().any(|o| o.matching_disc);
+    let counts = |attitude: bool, of: &dyn Fn(Kind, &[Outcome]) -> bool| {
+        let chosen: Vec<&Vec<Outcome>> = all.iter().filter(|(k, _, o)| of(*k, o)).map(|(.., o)| o).collect();
+        let at = |i: usize| chosen.iter().filter(|o| o.get(i).is_some_and(Outcome::is_false)).count().to_string();
+        let columns = settings.iter().enumerate().filter(|(_, s)| s.attitude == attitude).map(|(i, _)| at(i));
+        std::iter::once(chosen.len().to_string()).chain(columns).collect::<Vec<_>>()
+    };
+    for (attitude, title) in [(false, "no attitude"), (true, "with attitude")] {
+        let row = |name: &str, cells: Vec<String>| std::iter::once(name.to_owned()).chain(cells).collect();
+        let mut rows: Vec<Vec<String>> = Vec::new();
+        for &kind in Kind::ALL {
+            rows.push(row(kind.name(), counts(attitude, &|k, o| k == kind && !matching(o))));
+        }
+        rows.push(row("**all of these**", counts(attitude, &|_, o| !matching(o))));
+        rows.push(row("discs of the expected half-angle", counts(attitude, &|_, o| matching(o))));
+        s.table(head(title), rows);
+    }
+    let discs = all.iter().filter(|(k, ..)| k.is_disc()).count();
+    let own = |i: usize| all.iter().filter(|(_, _, o)| matching(o) && o.get(i).is_some_and(Outcome::is_false)).count();
+    let worst = (0..THRESHOLDS_PX.len() + 1).map(own).max().unwrap_or(0);
+    s.text(format!(
+        "Discs of the expected half-angle that are answered, at the worst threshold and without an attitude: {worst} of \
+         {discs} pictures with discs ({:.1} %).",
+        100.0 * worst as f64 / discs.max(1) as f64
+    ));
+    let mut listed: Vec<String> = Vec::new();
+    for (kind, seed, outcomes) in all.iter().filter(|(.., o)| !matching(o)) {
+        let wrong = settings.iter().zip(outcomes).filter(|(_, o)| o.is_false());
+        let mut at: Vec<String> = wrong.map(|(s, _)| s.name()).collect();
+        at.dedup();
+        if !at.is_empty() {
+            listed.push(format!("{} {seed} ({})", kind.name(), at.join("; ")));
+        }
+    }
+    let more = listed.len().saturating_sub(LISTED);
+    listed.truncate(LISTED);
+    if !listed.is_empty() {
+        let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
+        s.text(format!("False answers by kind and seed: {}{rest}.", listed.join(", ")));
+    }
+    let rows = Kind::ALL.iter().map(|&kind| {
+        let mut refused: BTreeMap<&str, usize> = BTreeMap::new();
+        let at_default = all.iter().filter(|(k, ..)| *k == kind).filter_map(|(.., o)| o.first());
+        for candidate in at_default.flat_map(|o| &o.candidates) {
+            if !matches!(candidate.verdict, Verdict::Chosen | Verdict::Passed) {
+                *refused.entry(candidate.verdict.name()).or_default() += 1;
+            }
+        }
+        let mut by: Vec<(usize, &str)> = refused.into_iter().map(|(name, n)| (n, name)).collect();
+        by.sort_by(|a, b| b.cmp(a));
+        let by: Vec<String> = by.into_iter().map(|(n, name)| format!("{name} {n}")).collect();
+        vec![kind.name().to_owned(), by.join(", ")]
+    });
+    s.table(["kind", "verdicts on its edges at the default"], rows);
+    Ok(())
+}
+
+/// Clean limbs next to the same artefacts.
+fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
+    let of_each = count.div_ceil(2);
+    let settings = [Setting::DEFAULT, Setting { attitude: true, ..Setting::DEFAULT }];
+    // Not every seed has room for both: others are tried.
+    let all = each(seeds(of_each + of_each / 2), |horizon, kind, seed| {
+        let Some(trial) = Trial::beside_limb(kind, seed)? else { return Ok(None) };
+        let with = seen(horizon, &trial, &settings)?;
+        let alone = seen(horizon, &trial.cleaned(), &settings[..1])?;
+        Ok(Some((kind, with, alone)))
+    })?;
+    s.text(format!(
+        "Clean limbs with the same artefacts next to them: the body is lit all along, the limb crosses the picture over at \
+         least half its width at a height of 12 to 22 km and falls off exponentially; the artefact leaves at least 90 % of \
+         it alone. An answer more than {FALSE_SIGMAS}σ or {GROSS_DEG}° from the truth is false. Alone: the same pictures \
+         without the artefact."
+    ));
+    let row = |name: &str, of: &dyn Fn(Kind) -> bool| {
+        let chosen: Vec<_> = all.iter().filter(|(k, ..)| of(*k)).collect();
+        let n = chosen.len();
+        let share = |of: &dyn Fn(&(Kind, Vec<Outcome>, Vec<Outcome>)) -> bool| {
+            format!("{:.1} %", 100.0 * chosen.iter().filter(|c| of(c)).count() as f64 / n.max(1) as f64)
+        };
+        let at = |o: &[Outcome], i: usize, of: fn(&Outcome) -> bool| o.get(i).is_some_and(of);
+        let answered = |o: &Outcome| o.found.is_some();
+        vec![
+            name.to_owned(),
+            n.to_string(),
+            share(&|(_, _, alone)| at(alone, 0, answered)),
+            share(&|(_, with, _)| at(with, 0, answered)),
+            share(&|(_, with, _)| at(with, 1, answered)),
+            chosen.iter().filter(|(_, _, alone)| at(alone, 0, Outcome::is_false)).count().to_string(),
+            chosen.iter().filter(|(_, with, _)| at(with, 0, Outcome::is_false)).count().to_string(),
+            chosen.iter().filter(|(_, with, _)| at(with, 1, Outcome::is_false)).count().to_string(),
+        ]
+    };
+    let mut rows: Vec<Vec<String>> = Kind::ALL.iter().map(|&kind| row(kind.name(), &|k| k == kind)).collect();
+    rows.push(row("**all**", &|_| true));
+    s.table(
+        [
+            "limb next to",
+            "pictures",
+            "answered alone",
+            "answered",
+            "answered, attitude told",
+            "false alone",
+            "false",
+            "false, attitude told",
+        ],
+        rows,
+    );
+    Ok(())
+}

@@ -1,0 +1,55 @@
+//! Dark skies with artefacts instead of a limb are not answered, and limbs next to artefacts are. The campaign with ten
+//! times as many pictures is `cargo xtask reproduce artefacts`.
+
+use hzn_core::pipeline::Unobserved;
+use hzn_core::{Config, HostHorizon, camera};
+use hzn_sim::artefact::{Kind, Outcome, Told, Trial, look};
+
+/// Pictures of each kind, and the first seed: others than those of the campaign.
+const OF_EACH: u64 = 15;
+const FIRST_SEED: u64 = 5_000_000;
+
+fn horizon() -> Box<HostHorizon> {
+    HostHorizon::boxed(&Config::new(camera::Config::ideal(camera::Model::Pinhole, 64, 48, 60.0))).unwrap()
+}
+
+/// The picture of a trial at each threshold, `None` for the default.
+fn outcomes(horizon: &mut HostHorizon, trial: &Trial, thresholds_px: &[Option<f64>], told: Told) -> Vec<Outcome> {
+    let picture = trial.render().unwrap();
+    let mut at = |threshold_px: &Option<f64>| {
+        let mut config = Config::new(trial.scene.camera.clone());
+        config.reject.threshold_px = threshold_px.unwrap_or(config.reject.threshold_px);
+        look(horizon, &config, trial, &picture, told, &Unobserved).unwrap()
+    };
+    thresholds_px.iter().map(&mut at).collect()
+}
+
+#[test]
+fn no_artefact_is_taken_for_a_limb() {
+    let mut horizon = horizon();
+    let mut wrong = Vec::new();
+    for (kind, seed) in Kind::ALL.iter().flat_map(|&k| (FIRST_SEED..FIRST_SEED + OF_EACH).map(move |s| (k, s))) {
+        let trial = Trial::without_limb(kind, seed).unwrap();
+        for o in outcomes(&mut horizon, &trial, &[None, Some(1.0), Some(1.5)], Told::default()) {
+            if o.is_false() && !o.matching_disc {
+                wrong.push(format!("{} {seed}: {:?}", kind.name(), o.found.map(|f| f.miss.angle_deg)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} false answers: {wrong:#?}", wrong.len());
+}
+
+#[test]
+fn limbs_next_to_artefacts_are_found() {
+    let mut horizon = horizon();
+    let (mut pictures, mut answered) = (0, 0);
+    for (kind, seed) in Kind::ALL.iter().flat_map(|&k| (FIRST_SEED..FIRST_SEED + OF_EACH).map(move |s| (k, s))) {
+        let Some(trial) = Trial::beside_limb(kind, seed).unwrap() else { continue };
+        for o in outcomes(&mut horizon, &trial, &[None], Told { attitude_sigma_deg: Some(5.0) }) {
+            pictures += 1;
+            answered += u32::from(o.found.is_some());
+            assert!(!o.is_false(), "{} {seed}: {:?}", kind.name(), o.found);
+        }
+    }
+    assert!(pictures >= 80 && f64::from(answered) >= 0.96 * f64::from(pictures), "{answered} of {pictures}");
+}
