@@ -58,6 +58,9 @@ pub struct Config {
     /// By how much the radius may lie beyond its limits, as a part of them, 0 or more.
     #[cfg(feature = "horace")]
     pub radius_margin: f64,
+    /// With `altitude_limits_km`: by how much more the radius may lie beyond its limits, in pixels, 0 to 1e6; 0 by default.
+    /// HORACE gives its margin so, 5000 px (Barf 2014, (2.35)). Only a build with the feature `horace` reads it.
+    pub radius_margin_px: f64,
 }
 
 impl Default for Config {
@@ -78,6 +81,7 @@ impl Default for Config {
             altitude_limits_km: None,
             #[cfg(feature = "horace")]
             radius_margin: 0.1,
+            radius_margin_px: 0.0,
         }
     }
 }
@@ -100,6 +104,7 @@ impl Config {
             }
             between("select.radius_margin", self.radius_margin, 0.0, 1e3)?;
         }
+        between("select.radius_margin_px", self.radius_margin_px, 0.0, 1e6)?;
         above("select.max_rms_px", self.max_rms_px, 0.0)?;
         above("select.max_half_angle_sigma", self.max_half_angle_sigma, 0.0)?;
         above("select.max_sigma_deg", self.max_sigma_deg, 0.0)?;
@@ -171,7 +176,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     };
     #[cfg(feature = "horace")]
     let verdict = match verdict {
-        Verdict::Passed => horace::verdict(fit, expected, config),
+        Verdict::Passed => horace::verdict(fit, expected, camera, config),
         failed => failed,
     };
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }

@@ -27,7 +27,10 @@ fn config(preset: Preset, scale: u16) -> Config {
     config.body.altitude_km = Some(1923.8);
     config.body.limb_height_km = 0.0;
     config.candidates.min_points = 30;
+    // HORACE's own numbers are for its camera and rocket.
+    config.input.scale_to_height = None;
     config.select.altitude_limits_km = Some([1800.0, 2000.0]);
+    (config.select.radius_margin, config.select.radius_margin_px) = (0.5, 0.0);
     config
 }
 
@@ -194,6 +197,29 @@ fn halves_answer_where_the_whole_does_not() {
     assert_eq!(watch.levels.get(), 3);
 }
 
+/// HORACE's own values, for its camera: limits 100 and 20 km, 5000 px of 768 rows.
+#[test]
+fn the_radius_check_of_horace_is_in_pixels() {
+    let camera = camera::Config::ideal(Model::Pinhole, 1024, 768, 2133.3);
+    let own = Config::preset(Preset::Horace2015, camera);
+    assert_eq!(own.binarize.factor, 0.75);
+    assert_eq!((own.select.altitude_limits_km, own.input.scale_to_height), (Some([20.0, 100.0]), Some(240)));
+    assert!((own.select.radius_margin_px * 768.0 / 240.0 - 5000.0).abs() < 1e-9);
+    // The disc's radius is 87.4 px; limits that begin 3 px above it refuse it, unless the margin is wider.
+    let mut config = config(Preset::Horace2015, 4);
+    config.recover.method = recover::Method::None;
+    let data = disc(&config, 191.5, 127.5, 240.0 * 20f64.to_radians().tan());
+    let altitude_of = |radius_px: f64| 1000.0 / (radius_px / 240.0).atan().sin() - 1000.0;
+    config.select.radius_margin = 0.0;
+    config.select.altitude_limits_km = Some([altitude_of(110.0), altitude_of(90.4)]);
+    for (margin_px, passes) in [(0.0, false), (1.5, false), (5.0, true)] {
+        config.select.radius_margin_px = margin_px;
+        let report = answer(&config, &data, &Watch::default());
+        assert_eq!(report.solution.is_some(), passes, "{margin_px} {:?}", report.candidates);
+        assert!(passes || report.candidates.iter().any(|c| c.verdict == Verdict::Radius), "{:?}", report.candidates);
+    }
+}
+
 /// (2.39) as printed divides on unless a part is too bright and too dark at once.
 #[test]
 fn division_ends_at_pictures_that_are_too_dark_or_too_bright() {
@@ -241,6 +267,7 @@ fn limits_are_checked_by_name() {
     assert_eq!(refused(&|c| c.select.altitude_limits_km = Some([5.0, 4.0])), "select.altitude_limits_km");
     assert_eq!(refused(&|c| c.select.altitude_limits_km = Some([-1.0, 4.0])), "select.altitude_limits_km");
     assert_eq!(refused(&|c| c.select.radius_margin = f64::NAN), "select.radius_margin");
+    assert_eq!(refused(&|c| c.select.radius_margin_px = -1.0), "select.radius_margin_px");
     assert_eq!(refused(&|c| c.select.max_section_residual = Some(0.0)), "select.max_section_residual");
     assert_eq!(refused(&|c| c.recover.least_part = 0.001), "recover.least_part");
     assert_eq!(refused(&|c| c.input.scale_to_height = Some(8)), "input.scale_to_height");

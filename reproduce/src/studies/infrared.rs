@@ -9,7 +9,7 @@ use hzn_sim::pose::position_m;
 use hzn_sim::scenario::MEASURED;
 use hzn_sim::{Flight, Look, Pose};
 
-use super::{Effort, halton, preset, simulated};
+use super::{Effort, OTHER_SEEDS, halton, preset, simulated};
 use crate::document::Section;
 use crate::fly::{GROSS_DEG, HEADS, Sensor, cells, deg, evaluate, fly, two_digits};
 
@@ -77,6 +77,7 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
          ± {LIMB_SIGMA_KM} km, or that height by latitude ± {LEFT_KM} km, and that all edge points may be shifted by {BIAS_PX} px. RMS error of the axis, errors above \
          2° counted apart as wrong, pictures without an answer by their status; [W] as they print it.",
     ));
+    s.text("**In-sample**: limb height, its sigma, the common shift and the edge noise are those of the scene.");
     let mut rows = Vec::new();
     let mut curves: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut names = Vec::new();
@@ -152,6 +153,7 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
          pictures of other seeds and told to the sensor: {told}; where it is told one height, ± {LIMB_SIGMA_KM} km. The \
          sensor.toml of the scene has the height by latitude."
     ));
+    s.text(OTHER_SEEDS);
     let flown = fly(&flight, &sensors)?;
     let mut rows = Vec::new();
     for (sensor, cases) in sensors.iter().zip(&flown) {

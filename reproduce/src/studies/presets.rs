@@ -8,7 +8,7 @@ use hzn_core::pipeline::Preset;
 use hzn_sim::evaluate::Case;
 use hzn_sim::{Flight, Picture};
 
-use super::{Effort, simulated};
+use super::{Effort, OTHER_SEEDS, simulated};
 use crate::document::Section;
 use crate::fly::{Flown, GROSS_DEG, Sensor, deg, evaluate, fly_timed, two_digits};
 
@@ -30,6 +30,7 @@ pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
          medians, two pictures at once.",
         3 * count,
     ));
+    s.text(format!("{OTHER_SEEDS} The level of `dlr-2022` is in-sample: it comes from these very pictures."));
     let mut rows = Vec::new();
     for (name, flight) in scenes(count)? {
         let level = usual_level(&flight)?;
@@ -45,7 +46,7 @@ pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
 /// The scenes, each with the sensor that fits it.
 fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     let [rocket, clean, horace, disc] =
-        ["rocket", "rocket-clean", "horace", "full-disc"].map(|name| anyhow::Ok(simulated(name, count)?.0));
+        ["rocket", "rocket-clean", "horace-wide", "full-disc"].map(|name| anyhow::Ok(simulated(name, count)?.0));
     let (infrared, _) = simulated("leo-infrared", 3 * count)?;
     let third = |k: usize| Flight { frames: infrared.frames[k * count..(k + 1) * count].to_vec(), ..infrared.clone() };
     let (mut sun, _) = simulated("sun-moon", count)?;
@@ -59,7 +60,7 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
         ("infrared, 0° to 40° off nadir", third(0)),
         ("infrared, 40° to 80°", third(1)),
         ("infrared, 80° to 120°", third(2)),
-        ("HORACE", horace?),
+        ("HORACE's flight, 59° wide", horace?),
         ("full disc", disc?),
         ("Sun, then Moon", sun),
     ])

@@ -5,7 +5,7 @@ use hzn_sim::Flight;
 use hzn_sim::evaluate::Case;
 use hzn_sim::scenario::MEASURED;
 
-use super::{Effort, preset, simulated};
+use super::{Effort, OTHER_SEEDS, preset, simulated};
 use crate::document::Section;
 use crate::fly::{HEADS, Sensor, cells, evaluate, fly, wrong};
 
@@ -31,7 +31,10 @@ fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight)
         }
     }
     s.table(["scene", "sensor"].into_iter().chain(HEADS), rows);
-    s.text(format!("Measured on {MEASURED} pictures of other seeds and told to the sensor: {}.", told.join("; ")));
+    s.text(format!(
+        "{OTHER_SEEDS} Measured on {MEASURED} pictures of other seeds and told to the sensor: {}.",
+        told.join("; ")
+    ));
     if !bad.is_empty() {
         s.text(format!("Wrong answers: {}.", bad.join("; ")));
     }
@@ -78,6 +81,6 @@ pub(super) fn others(effort: &Effort) -> anyhow::Result<Section> {
          height a pixel) and has limb, Sun and nothing in view by turns: an answer without a limb is false. {BY_HAND}"
     ));
     let hzn = |flight: &Flight| vec![Sensor::new("hzn", flight.sensor.clone())];
-    rows(&mut s, &["horace", "full-disc", "tumble", "sun-moon"], count, hzn)?;
+    rows(&mut s, &["horace-wide", "full-disc", "tumble", "sun-moon"], count, hzn)?;
     Ok(s)
 }

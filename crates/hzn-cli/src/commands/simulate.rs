@@ -21,7 +21,7 @@ use crate::tell;
 /// Writes pictures, frames.csv (what the sensor is told), truth.csv, imu.csv and gnss.csv where the scene has such
 /// instruments, scene.toml, and sensor.toml, whose limb height and noise model are measured on other pictures of the scene.
 ///
-/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, full-disc, sun-moon, tumble. `hzn simulate SCENE --show`
+/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble. `hzn simulate SCENE --show`
 /// prints one, to be changed and given as a file.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {

@@ -130,16 +130,24 @@ fn zju_2022(config: &mut Config) {
     ungated(config);
 }
 
-/// HORACE: brightness gate, dynamic threshold, outer borders of the whole picture, a circle through each, the radius
-/// check, and halves of the picture where that gives nothing. The theses' own numbers belong to their camera; these are
-/// for any.
+/// HORACE: brightness gate, dynamic threshold, a smaller copy, outer borders of the whole picture, a circle through each,
+/// the radius check, and halves of the picture where that gives nothing.
+///
+/// Its own numbers: 0.75 times the mean; the limb's radius from 100 to 20 km, give or take 5000 px of its picture of 768
+/// rows; a pixel that at most γ = 5 of its eight neighbours light is edge, for whom chooses `erode` (counted here with
+/// the pixel itself, and from 0: fewer than 7). Ours: the copy's height, the brightness gate, the shortest edge.
 #[cfg(feature = "horace")]
 fn horace_2015(config: &mut Config) {
     use crate::{candidates, contour, estimate, recover, reject};
     config.gate.min_mean = 0.02;
     config.gate.max_mean = 0.9;
     config.binarize.method = binarize::Method::Dynamic;
+    config.binarize.factor = 0.75;
+    // Lengths are in pixels of the copy.
+    let rows = config.camera.height.min(HORACE_ROWS);
+    config.input.scale_to_height = (rows < config.camera.height).then_some(rows);
     config.contour.method = contour::Method::Raster;
+    config.contour.erode_threshold = 7;
     config.candidates.sub_pixel = candidates::SubPixel::None;
     config.candidates.min_points = 100;
     config.candidates.keep_points = 0;
@@ -148,9 +156,14 @@ fn horace_2015(config: &mut Config) {
     config.estimate.half_angle = estimate::HalfAngle::Free;
     config.recover.method = recover::Method::Division;
     ungated(config);
-    config.select.altitude_limits_km = Some([1.0, 1000.0]);
-    config.select.radius_margin = 0.5;
+    config.select.altitude_limits_km = Some([20.0, 100.0]);
+    config.select.radius_margin = 0.0;
+    config.select.radius_margin_px = 5000.0 * f64::from(rows) / 768.0;
 }
+
+/// Rows of the copy that `horace-2015` looks at.
+#[cfg(feature = "horace")]
+const HORACE_ROWS: u16 = 240;
 
 /// Only what every fit must have, and what these methods cost, of which some look at every pixel and every point.
 #[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]

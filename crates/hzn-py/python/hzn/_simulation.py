@@ -22,8 +22,8 @@ def simulate(
     Parameters
     ----------
     scene
-        A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``horace``, ``full-disc``, ``sun-moon``,
-        ``tumble``), the path of a scene.toml, or its sections and keys as a dictionary.
+        A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``horace``, ``horace-wide``,
+        ``full-disc``, ``sun-moon``, ``tumble``), the path of a scene.toml, or its sections and keys as a dictionary.
     frames
         Number of pictures, instead of the scene's.
     seed

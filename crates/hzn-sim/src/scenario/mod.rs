@@ -28,7 +28,7 @@ use crate::trajectory::{Attitude, Path, Trajectory};
 use crate::utc;
 
 /// Scenes that come with hzn: name, what it is, its scene.toml.
-pub const BUILTIN: [(&str, &str, &str); 7] = [
+pub const BUILTIN: [(&str, &str, &str); 8] = [
     (
         "rocket",
         "sounding rocket with the Sun, lens ghosts and payload in view, colour JPEG 1920x1080",
@@ -40,7 +40,16 @@ pub const BUILTIN: [(&str, &str, &str); 7] = [
         "infrared Earth sensor in low orbit, from nadir to 120 degrees off it, 384x288",
         include_str!("builtin/leo-infrared.toml"),
     ),
-    ("horace", "spinning rocket with motion blur and auto-exposure, grey 640x480", include_str!("builtin/horace.toml")),
+    (
+        "horace",
+        "HORACE's camera on a spinning rocket, motion blur and auto-exposure, 27 degrees wide, grey 1024x768",
+        include_str!("builtin/horace.toml"),
+    ),
+    (
+        "horace-wide",
+        "the same flight through a lens of 59 degrees, grey 640x480",
+        include_str!("builtin/horace-wide.toml"),
+    ),
     (
         "full-disc",
         "the whole Earth from a high orbit, with its phases, 1024x1024",

@@ -149,4 +149,32 @@ mod tests {
         // Continuous at the horizon.
         assert!((air.sun_path(1e-6) / air.sun_path(-1e-6) - 1.0).abs() < 1e-4);
     }
+
+    /// docs/methods.md tells users how high the limb stands in their band.
+    #[test]
+    fn half_levels_by_wavelength_are_those_of_the_documents() {
+        let text = include_str!("../../../../docs/methods.md");
+        let (_, table) = text.split_once("| wavelength | τ₀ |").unwrap();
+        let rows: Vec<&str> = table.lines().skip(2).take_while(|l| l.starts_with('|')).collect();
+        assert!(rows.len() >= 6, "{rows:?}");
+        let (scale_km, radius_km) = (7.5, 6371.0f64);
+        for row in rows {
+            let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+            let um = cells[1].split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-3;
+            let depth = 0.008569 * um.powi(-4) * (1.0 + 0.0113 * um.powi(-2) + 0.00013 * um.powi(-4));
+            let height_km = |level: f64| {
+                let grazing = depth * (core::f64::consts::TAU * radius_km / scale_km).sqrt();
+                scale_km * (grazing / -(1.0 - level).ln()).ln()
+            };
+            let words = |text: &str| text.trim_end_matches(" km").replace('−', "-");
+            let numbers = |text: &str| words(text).split(" to ").map(|n| n.parse().unwrap()).collect::<Vec<f64>>();
+            for (cell, level) in numbers(cells[4]).into_iter().zip([0.75, 0.25]).chain([(numbers(cells[3])[0], 0.5)]) {
+                assert!((cell - height_km(level)).abs() < 0.06, "{row}: {}", height_km(level));
+            }
+            assert!((numbers(cells[2])[0] - depth).abs() < 0.0006, "{row}: {depth}");
+            // The simulator's air has the same half level.
+            let air = Air { optical_depth: [depth; 3], scale_height_km: scale_km, ..Air::default() };
+            assert!((air.half_height_km([1.0 / 3.0; 3], radius_km) - height_km(0.5)).abs() < 1e-6);
+        }
+    }
 }
