@@ -1,16 +1,17 @@
 //! Barf 2014 and Barf et al. 2015: HORACE's own criteria.
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use hzn_core::camera::{self, Model};
 use hzn_core::pipeline::Preset;
 use hzn_core::{Config, body};
 use hzn_sim::evaluate::Evaluation;
 use hzn_sim::flight::rocket;
 use hzn_sim::pose::position_m;
+use hzn_sim::scenario::MEASURED;
 use hzn_sim::trajectory::Attitude;
 use hzn_sim::{Flight, Look, Pose, Scenario};
 
-use super::{Effort, halton, preset, simulated_as};
+use super::{Effort, halton, preset, simulated};
 use crate::document::Section;
 use crate::fly::{Sensor, deg, evaluate, fly, two_digits, wrong};
 
@@ -136,22 +137,25 @@ fn untold(flight: &Flight) -> Config {
 
 /// The scene `horace` and its requirements: P-S-04, P-S-09, P-S-10.
 fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
-    let count = effort.frames(120);
+    let count = effort.frames(60);
+    let (scene, told) = simulated("horace", count)?;
     s.text(format!(
         "**HORACE's own camera**: {count} pictures each of `hzn simulate horace`, 8 mm before pixels of 3.75 µm, 1024×768, \
          27.0°×20.4°, T+75 s to T+215 s of a flight to 90 km, exposed for 1 ms, at 0.2, 1 and 2 turns a second; and at 2 with the \
-         Sun 4° above the horizontal, so that it passes through the picture. Position told. `hzn` is told nothing else; `hzn, told` \
-         the limb height and the edge errors that were measured on other seeds of the same scene, so that its figures are \
-         in-sample for the scene and out of sample for the clouds. `horace-2015` is told as much and has its own camera now."
+         Sun 4° above the horizontal, so that it passes through the picture. Position told. `hzn` is told nothing else, which is \
+         **out of sample**. `hzn, told` and `horace-2015` are told what was measured at one turn a second on {MEASURED} \
+         pictures of other seeds, {told}: **in-sample** for the scene, out of sample for the pictures."
     ));
     let mut rows = Vec::new();
     let mut right = Vec::new();
     for turning in &TURNING {
-        let (flight, _) = simulated_as(&turning.scenario()?, count)?;
+        let mut scenario = turning.scenario()?;
+        scenario.capture.frames = u32::try_from(count)?;
+        let flight = scenario.flight().context("horace")?;
         let sensors = [
             Sensor::new("hzn", untold(&flight)),
-            Sensor::new("hzn, told", flight.sensor.clone()),
-            Sensor::new("horace-2015", preset(Preset::Horace2015, &flight, flight.sensor.body.clone())),
+            Sensor::new("hzn, told", scene.sensor.clone()),
+            Sensor::new("horace-2015", preset(Preset::Horace2015, &scene, scene.sensor.body.clone())),
         ];
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
             let e = evaluate(&cases);

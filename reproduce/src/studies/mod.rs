@@ -85,12 +85,7 @@ fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
 /// A scene as `hzn simulate` makes it, JPEG where it is kept as such, with the sensor.toml that comes with it: limb height
 /// and noise measured on other seeds. What was measured, in a cell's words.
 fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
-    simulated_as(&Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?, count)
-}
-
-/// As [`simulated`], of a scene that may differ from the one that comes with hzn.
-fn simulated_as(scenario: &Scenario, count: usize) -> anyhow::Result<(Flight, String)> {
-    let (mut scenario, name) = (scenario.clone(), scenario.name.as_str());
+    let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
     scenario.capture.frames = u32::try_from(count)?;
     let mut flight = scenario.flight().with_context(|| name.to_owned())?;
     let fits = Fit::measure(&scenario, MEASURED, &|_, _| ()).with_context(|| name.to_owned())?;
