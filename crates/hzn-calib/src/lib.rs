@@ -8,6 +8,8 @@
 //!
 //! [`document`] reads TOML files of other crates, such as scene.toml, in the same way.
 //!
+//! [`start`] writes a sensor.toml for a camera that nobody calibrated.
+//!
 //! Whatever is wrong with a file comes back as a [`Problem`]: which file, which line, which field, what was expected
 //! and, for a misspelt name, the nearest valid one. [`template`] writes a commented sensor.toml to start from; [`keys`]
 //! is what every key of it means.
@@ -20,6 +22,7 @@ mod located;
 mod nearest;
 mod problem;
 pub mod sensor;
+pub mod start;
 pub mod template;
 pub mod time;
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::Place;
+use common::{Place, cell};
 use hzn_mcap::palette;
 use image::{GrayImage, Luma, RgbImage};
 
@@ -50,8 +50,9 @@ fn places(drawn: &RgbImage, colour: [u8; 3]) -> Vec<[f64; 2]> {
 #[test]
 fn init_writes_what_run_takes() {
     let place = Place::new();
-    place.run(&["init", "new.toml"]).expect(0);
-    place.run(&["init", "new.toml"]).expect(2).says("exists already");
+    place.run(&["init", "-o", "new.toml"]).expect(0);
+    place.run(&["init", "-o", "new.toml"]).expect(2).says("exists already");
+    place.run(&["init", "other.toml"]).expect(2).says("hzn init -o other.toml");
     let shown = place.run(&["camera", "show", "new.toml"]).expect(0).out;
     assert!(shown.contains("1920 x 1080 px") && shown.contains("field of view"), "{shown}");
     assert!(shown.contains("half-angle 70.459"), "{shown}");
@@ -307,4 +308,71 @@ fn the_farthest_corner_of_any_lens() {
     assert!((corner(common::SENSOR) - exact).abs() < 0.006);
     let brown = common::SENSOR.replace("\"pinhole\"", "\"brown-conrady\"\nk = [0.0, 0.0, 0.0, 0.0, 0.0]");
     assert!((corner(&brown) - exact).abs() < 0.006);
+}
+
+/// A JPEG of the limb in which a camera wrote its focal length, in millimetres and as on 35 mm film.
+fn jpeg_with_exif(focal_mm: u32, on_film_mm: u16) -> Vec<u8> {
+    let mut jpeg = std::io::Cursor::new(Vec::new());
+    common::limb(320, 240, 0.0).write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+    let jpeg = jpeg.into_inner();
+    // One directory with the model and the way to another: FocalLength (a fraction at its end), FocalLengthIn35mmFilm.
+    let entry = |tag: u16, kind: u16, count: u32, value: u32| {
+        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
+    };
+    let directory =
+        |entries: &[Vec<u8>]| [&(entries.len() as u16).to_le_bytes()[..], &entries.concat(), &[0; 4]].concat();
+    let model = u32::from_le_bytes(*b"X-1\0");
+    let tiff = [
+        &b"II*\0\x08\0\0\0"[..],
+        &directory(&[entry(0x110, 2, 4, model), entry(0x8769, 4, 1, 38)]),
+        &directory(&[entry(0x920a, 5, 1, 68), entry(0xa405, 3, 1, on_film_mm.into())]),
+        &(10 * focal_mm).to_le_bytes(),
+        &10u32.to_le_bytes(),
+    ]
+    .concat();
+    let length = u16::try_from(tiff.len() + 8).unwrap().to_be_bytes();
+    [&jpeg[..2], &[0xff, 0xe1], &length, b"Exif\0\0", &tiff, &jpeg[2..]].concat()
+}
+
+#[test]
+fn init_from_a_field_of_view_works_at_once() {
+    let place = Place::with_pictures(2);
+    // 300 px through a pinhole, as the pictures were drawn.
+    let says = "320 x 240 px, pinhole, 56.1 degrees wide, f = 300 px";
+    place.run(&["init", "in", "--fov", "56.145", "--altitude", "400", "-o", "s.toml"]).expect(0).says(says);
+    assert!(place.read("s.toml").contains("focal_sigma_percent"), "{}", place.read("s.toml"));
+    place.run(&["run", "in", "--sensor", "s.toml", "-o", "r.csv"]).expect(0);
+    for row in place.rows("r.csv") {
+        let number = |name: &str| cell(&row, name).parse::<f64>().unwrap();
+        assert_eq!(cell(&row, "status"), "ok", "{row:?}");
+        assert!((number("axis_y").atan2(number("axis_z")).to_degrees() - 68.0).abs() < 3.0 * number("sigma_max_deg"));
+    }
+    place.run(&["init", "in", "-o", "s.toml"]).expect(2).says("exists already");
+    place.run(&["init", "in", "-o", "t.toml"]).expect(2).says("--fov");
+    place.run(&["init", "in", "--fov", "92", "-o", "t.toml"]).expect(2).says("--lens");
+    place.run(&["init", "in", "--fov", "92", "--lens", "fisheye", "-o", "t.toml"]).expect(0).says("needs an altitude");
+    assert!(place.read("t.toml").contains("model = \"equidistant\""));
+    place.run(&["init", "--fov", "92"]).expect(2);
+}
+
+#[test]
+fn init_reads_the_focal_length_that_the_camera_wrote() {
+    let place = Place::new();
+    // 40 mm on film of 36 x 24 mm: over the diagonal of 43.27 mm.
+    place.write("in/a.jpg", &jpeg_with_exif(10, 40));
+    let says = "pinhole, 46.8 degrees wide, f = 370 px";
+    place.run(&["init", "in/a.jpg", "-o", "s.toml"]).expect(0).says(says);
+    let text = place.read("s.toml");
+    assert!(text.contains("# X-1\n") && text.contains("as 40 mm on 35 mm film"), "{text}");
+    // A field of view that it contradicts.
+    place.run(&["init", "in/a.jpg", "--fov", "80", "-o", "t.toml"]).expect(0).says("warning").says("contradicts");
+}
+
+#[test]
+fn init_wants_pictures_of_one_size() {
+    let place = Place::with_pictures(1);
+    common::limb(160, 120, 0.0).save(place.path("in/small.png")).unwrap();
+    let ran = place.run(&["init", "in", "--fov", "56", "-o", "s.toml"]).expect(2);
+    ran.says("320x240").says("small.png").says("160x120");
+    assert!(!place.path("s.toml").exists());
 }

@@ -332,7 +332,7 @@ fn nobody_listening_is_no_crash() {
     for (args, code) in [
         (&["run", "in", "-o", "a.csv"][..], 0),
         (&["run", "in", "-o", "a.csv"], 2),
-        (&["init", "s.toml"], 0),
+        (&["init", "-o", "s.toml"], 0),
         (&["export", "a.csv", "-o", "b.jsonl"], 0),
         (&["frobnicate"], 2),
     ] {

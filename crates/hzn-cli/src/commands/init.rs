@@ -2,29 +2,135 @@
 
 use std::path::PathBuf;
 
-use crate::exit::{Exit, Outcome, usage};
+use hzn_calib::start::{self, Known};
+use hzn_core::camera::Model;
+
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::input::{self, Payload, Source};
 use crate::output;
 use crate::tell;
 
-/// Write a commented sensor.toml to start from
+/// Write a sensor.toml to start from
 ///
-/// Every key stands in it with its default, so that only the camera must be filled in.
+/// With pictures: for the camera that took them, from a field of view (--fov) or from the focal length in their EXIF. Its
+/// sigmas say how little that is; with an altitude it works at once. Without pictures: every key with its default and a
+/// comment, so that only the camera must be filled in.
+///
+/// Examples:
+///   hzn init                                                        all keys, into sensor.toml
+///   hzn init flight/ --fov 92 --lens fisheye -o flight/sensor.toml  a fisheye that sees 92 degrees over the width
+///   hzn init IMG_0001.JPG --altitude 418                            the lens as EXIF has it, all pictures from 418 km
 #[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
 pub(super) struct Args {
+    /// Pictures of the camera: files, a folder, a glob, a video, a recording
+    #[arg(value_name = "PICTURE")]
+    pictures: Vec<PathBuf>,
+    /// Field of view over the whole width, degrees
+    #[arg(long, value_name = "DEG", requires = "pictures")]
+    fov: Option<f64>,
+    /// Kind of lens [default: pinhole, up to a field of view of 90 degrees]
+    #[arg(long, requires = "pictures")]
+    lens: Option<Lens>,
+    /// Altitude of all pictures above WGS-84, kilometres, where no frames.csv gives one
+    #[arg(long, value_name = "KM", requires = "pictures")]
+    altitude: Option<f64>,
     /// The file to write
-    #[arg(default_value = "sensor.toml")]
-    file: PathBuf,
+    #[arg(short, long, value_name = "FILE", default_value = "sensor.toml")]
+    output: PathBuf,
     /// Replace a file that exists
     #[arg(long)]
     force: bool,
 }
 
-pub(super) fn run(args: &Args) -> Outcome {
-    let name = args.file.display();
-    if args.file.exists() && !args.force {
-        return Err(usage(format!("{name}: exists already; choose another name, or --force replaces it")));
+/// How angles become radii.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Lens {
+    /// Straight lines stay straight
+    Pinhole,
+    /// Equidistant: the angle off axis grows evenly with the radius
+    Fisheye,
+}
+
+impl From<Lens> for Model {
+    fn from(lens: Lens) -> Self {
+        match lens {
+            Lens::Pinhole => Self::Pinhole,
+            Lens::Fisheye => Self::Equidistant,
+        }
     }
-    std::fs::write(&args.file, hzn_calib::template::SENSOR_TOML).map_err(|e| output::cannot(&args.file, &e))?;
-    tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if let Some(file) = args.pictures.iter().find(|p| input::ending(p) == "toml") {
+        let name = file.display();
+        return Err(usage(format!("{name}: is a file to write, not a picture; name it with -o:  hzn init -o {name}")));
+    }
+    let name = args.output.display();
+    if args.output.exists() && !args.force {
+        return Err(usage(format!("{name}: exists already; choose another name with -o, or --force replaces it")));
+    }
+    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| output::cannot(&args.output, &e));
+    if args.pictures.is_empty() {
+        write(hzn_calib::template::SENSOR_TOML)?;
+        tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
+        return Ok(Exit::Done);
+    }
+    let known = known(args)?;
+    let start = start::sensor_toml(&known).map_err(usage)?;
+    write(&start.text)?;
+    start.warnings.iter().for_each(tell::warning);
+    if known.exif.turned {
+        tell::warning(
+            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the picture as it is stored",
+        );
+    }
+    tell::line(format_args!(
+        "{name} written: {} x {} px, {}, {:.1} degrees wide, f = {:.0} px +- {:.1} %",
+        known.size_px[0],
+        known.size_px[1],
+        start.lens.name(),
+        start.fov_deg,
+        start.focal_px,
+        start.focal_sigma_percent
+    ));
+    if known.altitude_km.is_none() {
+        tell::line(
+            "every picture needs an altitude: from a frames.csv beside them (columns file, altitude_km), or from --altitude KM",
+        );
+    }
     Ok(Exit::Done)
+}
+
+/// What the pictures and the command line say of the camera.
+fn known(args: &Args) -> Result<Known, Stop> {
+    let mut source = input::open(&args.pictures, None, None)?;
+    source.notes().iter().for_each(tell::warning);
+    let size_px = one_size(source.as_ref())?;
+    if let Some(km) = args.altitude.filter(|km| !(*km > 0.0 && km.is_finite())) {
+        return Err(usage(format!("--altitude {km}: must be above 0 km")));
+    }
+    let exif = match source.next().transpose()?.map(|item| item.payload) {
+        Some(Payload::File(path)) => input::exif_lens(&path).unwrap_or_default(),
+        _ => start::Exif::default(),
+    };
+    let size_px = [size_px.0, size_px.1];
+    Ok(Known { size_px, fov_deg: args.fov, lens: args.lens.map(Model::from), exif, altitude_km: args.altitude })
+}
+
+/// The size that all pictures have.
+fn one_size(source: &dyn Source) -> Result<(u32, u32), Stop> {
+    let mut sizes = source.sizes();
+    let Some((first, size)) = sizes.next() else {
+        return Err(usage("none of the pictures can be read, so that their size is not known"));
+    };
+    let word = |(w, h): (u32, u32)| format!("{w}x{h}");
+    match sizes.find(|(_, other)| *other != size) {
+        Some((name, other)) => Err(usage(format!(
+            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give those of one camera and mode",
+            word(size),
+            word(other)
+        ))),
+        None => Ok(size),
+    }
 }

@@ -1,6 +1,7 @@
-//! The time of exposure that a camera wrote into the picture.
+//! What a camera wrote into the picture: the time of exposure, and its lens.
 
 use exif::{In, Tag, Value};
+use hzn_calib::start;
 
 /// `DateTimeOriginal` with its fraction, in seconds since 1970. EXIF rarely has a time zone: UTC is assumed.
 pub(super) fn time_s(block: Vec<u8>) -> Option<f64> {
@@ -14,4 +15,39 @@ pub(super) fn time_s(block: Vec<u8>) -> Option<f64> {
     let whole = hzn_calib::time::unix_seconds(&format!("{}T{clock}", date.replace(':', "-")))?;
     let fraction = text(Tag::SubSecTimeOriginal).and_then(|t| format!("0.{t}").parse::<f64>().ok()).unwrap_or(0.0);
     Some(whole + fraction)
+}
+
+/// The camera and its lens.
+pub(super) fn lens(block: Vec<u8>) -> Option<start::Exif> {
+    let exif = exif::Reader::new().read_raw(block).ok()?;
+    let number = |tag: Tag| match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Rational(v) => v.first().map(exif::Rational::to_f64),
+        other => other.get_uint(0).map(f64::from),
+    };
+    let text = |tag: Tag| match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Ascii(parts) => {
+            Some(String::from_utf8_lossy(parts.first()?).trim().to_owned()).filter(|t| !t.is_empty())
+        }
+        _ => None,
+    };
+    // Millimetres in the unit of the resolution: 2 inches, which is also what a missing one means; 3 centimetres; and what
+    // some programs write, 4 millimetres and 5 micrometres.
+    let unit_mm = match number(Tag::FocalPlaneResolutionUnit).unwrap_or(2.0) as u32 {
+        3 => 10.0,
+        4 => 1.0,
+        5 => 1e-3,
+        _ => 25.4,
+    };
+    Some(start::Exif {
+        camera: match (text(Tag::Model), text(Tag::LensModel)) {
+            (Some(camera), Some(lens)) => Some(format!("{camera}, {lens}")),
+            (camera, lens) => camera.or(lens),
+        },
+        focal_mm: number(Tag::FocalLength),
+        focal_35mm_mm: number(Tag::FocalLengthIn35mmFilm),
+        plane_px_per_mm: number(Tag::FocalPlaneXResolution).map(|n| n / unit_mm),
+        columns: number(Tag::PixelXDimension),
+        digital_zoom: number(Tag::DigitalZoomRatio),
+        turned: number(Tag::Orientation).is_some_and(|o| (5.0..=8.0).contains(&o)),
+    })
 }

@@ -200,6 +200,11 @@ pub fn exif_time_s(path: &Path) -> Option<f64> {
     picture::exif_of(path).flatten()
 }
 
+/// What the camera wrote of its lens into a picture file's EXIF.
+pub fn exif_lens(path: &Path) -> Option<hzn_calib::start::Exif> {
+    picture::lens_of(path)
+}
+
 /// The picture of a recorded message.
 pub fn recorded(image: hzn_mcap::EncodedImage) -> Payload {
     recording::payload(image)

@@ -137,6 +137,12 @@ pub(super) fn exif_of(path: &Path) -> Option<Option<f64>> {
     Some(decoder.exif_metadata().ok().flatten().and_then(super::exif::time_s))
 }
 
+/// What the camera wrote of its lens into the file; `None` for a file whose header cannot be read, or without EXIF.
+pub(super) fn lens_of(path: &Path) -> Option<hzn_calib::start::Exif> {
+    let mut decoder = ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?;
+    decoder.exif_metadata().ok().flatten().and_then(super::exif::lens)
+}
+
 /// As [`size_of`], from the file's contents.
 pub(super) fn size_in(contents: impl std::io::BufRead + std::io::Seek) -> Option<(u32, u32)> {
     ImageReader::new(contents).with_guessed_format().ok()?.into_dimensions().ok()
