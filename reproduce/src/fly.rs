@@ -6,7 +6,7 @@ use anyhow::Context;
 use hzn_core::body::Kind;
 use hzn_core::{Config, HostHorizon, Report};
 use hzn_sim::evaluate::{Answer, Case, Evaluation, Found, pair};
-use hzn_sim::{Flight, FlightFrame, Truth};
+use hzn_sim::{Flight, FlightFrame, Picture, Truth};
 use rayon::prelude::*;
 
 /// A sensor with what it is told.
@@ -18,16 +18,30 @@ pub(crate) struct Sensor {
     pub(crate) config: Config,
     /// Error of the prior attitude (1-sigma about each axis) in degrees; without it, the position only.
     pub(crate) attitude_sigma_deg: Option<f64>,
+    /// Told the altitude instead of the position.
+    pub(crate) altitude_only: bool,
 }
 
 impl Sensor {
     /// Told the position only.
     pub(crate) fn new(name: &str, config: Config) -> Self {
-        Self { name: name.into(), config, attitude_sigma_deg: None }
+        Self { name: name.into(), config, attitude_sigma_deg: None, altitude_only: false }
     }
     /// Told an attitude too.
     pub(crate) fn with_attitude(self, sigma_deg: f64) -> Self {
         Self { attitude_sigma_deg: Some(sigma_deg), ..self }
+    }
+    /// Told the altitude, and neither position nor attitude.
+    pub(crate) fn with_altitude_only(self) -> Self {
+        Self { attitude_sigma_deg: None, altitude_only: true, ..self }
+    }
+    /// What it is told about a picture.
+    pub(crate) fn known(&self, frame: &FlightFrame) -> hzn_core::Frame<f64> {
+        let known = match self.attitude_sigma_deg {
+            Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
+            None => frame.known(),
+        };
+        if self.altitude_only { hzn_core::Frame { position_m: None, ..known } } else { known }
     }
 }
 
@@ -49,6 +63,29 @@ pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec
 
 /// As [`fly`], with times.
 pub(crate) fn fly_timed(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Flown>> {
+    look_at_all(flight, sensors, &|frame| Ok(std::borrow::Cow::Owned(frame.render()?)))
+}
+
+/// As [`fly`], of pictures that are rendered already, in the order of the flight's frames.
+pub(crate) fn fly_rendered(
+    flight: &Flight,
+    pictures: &[Picture],
+    sensors: &[Sensor],
+) -> anyhow::Result<Vec<Vec<Case>>> {
+    let rendered = |frame: &FlightFrame| {
+        let place = flight.frames.iter().position(|f| f.file == frame.file);
+        let picture = place.and_then(|i| pictures.get(i)).with_context(|| format!("{} is not rendered", frame.file))?;
+        Ok(std::borrow::Cow::Borrowed(picture))
+    };
+    Ok(look_at_all(flight, sensors, &rendered)?.into_iter().map(|flown| flown.cases).collect())
+}
+
+/// Every picture, from wherever it comes, through every sensor.
+fn look_at_all<'a>(
+    flight: &Flight,
+    sensors: &[Sensor],
+    picture: &(dyn Fn(&FlightFrame) -> anyhow::Result<std::borrow::Cow<'a, Picture>> + Sync),
+) -> anyhow::Result<Vec<Flown>> {
     let make = || sensors.iter().map(|s| HostHorizon::boxed(&s.config)).collect::<Result<Vec<_>, _>>();
     // Refused here, not in a thread.
     make()?;
@@ -59,7 +96,7 @@ pub(crate) fn fly_timed(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<V
         .map_init(make, |horizons, frame| {
             let truth_of = |&kind: &Kind| frame.scene.truth_of(kind, &frame.file, frame.time_s);
             let truths: Vec<Truth> = kinds.iter().map(truth_of).collect::<Result<_, _>>()?;
-            let picture = frame.render()?;
+            let picture = picture(frame)?;
             let horizons = horizons.as_mut().map_err(|e| *e)?;
             let answers = horizons.iter_mut().zip(sensors);
             let answers = answers.map(|(horizon, sensor)| look(horizon, sensor, frame, &picture, &truths));
@@ -82,13 +119,10 @@ fn look(
     horizon: &mut HostHorizon,
     sensor: &Sensor,
     frame: &FlightFrame,
-    picture: &hzn_sim::Picture,
+    picture: &Picture,
     truths: &[Truth],
 ) -> anyhow::Result<(Vec<Answer>, f64)> {
-    let known = match sensor.attitude_sigma_deg {
-        Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
-        None => frame.known(),
-    };
+    let known = sensor.known(frame);
     let expected = (0..truths.len()).map(|which| horizon.expect_body(which, &known)).collect::<Result<Vec<_>, _>>();
     let expected = expected.with_context(|| frame.file.clone())?;
     let begun = Instant::now();

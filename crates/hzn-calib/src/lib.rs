@@ -12,7 +12,7 @@
 //!
 //! Whatever is wrong with a file comes back as a [`Problem`]: which file, which line, which field, what was expected
 //! and, for a misspelt name, the nearest valid one. [`template`] writes a commented sensor.toml to start from; [`keys`]
-//! is what every key of it means.
+//! is what every key of it means. [`noise`] measures limb height and noise on the pictures of a flight.
 
 pub mod camera_file;
 pub mod document;
@@ -20,6 +20,7 @@ pub mod frames;
 pub mod keys;
 mod located;
 mod nearest;
+pub mod noise;
 mod problem;
 pub mod sensor;
 pub mod start;

@@ -121,6 +121,7 @@ fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
         frames,
         fps: 1.0,
         trace: false,
+        keep_traces: false,
         keep_picture: false,
         overlay: None,
     }

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use crate::counter::{Counter, Stream};
 use crate::error::SceneError;
-use crate::globe::Globe;
+use crate::globe::{Globe, View};
 use crate::painter::Painter;
 use crate::scene::Scene;
 
@@ -29,6 +29,15 @@ pub enum EdgeNoise {
         /// Correlation length in pixels along the limb; the L of the covariance model.
         correlation_px: f64,
     },
+}
+
+impl Scene {
+    /// Tangent heights above the ellipsoid, kilometres, of rays in the camera frame, as the camera stands at the middle of the
+    /// exposure; empty for a camera inside the body.
+    pub fn tangent_heights_km(&self, rays: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
+        let Some(view) = View::try_new(Globe::of(&self.body), &self.pose) else { return Vec::new() };
+        rays.into_iter().map(|ray| view.tangent_height_m(&view.look(ray)) * 1e-3).collect()
+    }
 }
 
 /// A point of the visible limb.

@@ -1,7 +1,9 @@
 //! The studies, in the order of the document.
 
 mod artefacts;
+mod defaults;
 mod design;
+mod effects;
 mod horace;
 mod infrared;
 mod presets;
@@ -56,6 +58,8 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("rocket", "Accuracy and honesty: sounding rocket", scenes::rocket),
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
+    reproduced("defaults", "Honesty with default settings", defaults::untold),
+    reproduced("effects", "What moves the limb in the scenes", effects::switched_off),
     Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compared },
 ];
 

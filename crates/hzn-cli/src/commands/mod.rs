@@ -1,5 +1,6 @@
 //! The commands, one file each.
 
+mod calibrate;
 mod camera;
 mod completions;
 mod demo;
@@ -45,6 +46,7 @@ enum Command {
     Init(init::Args),
     Evaluate(evaluate::Args),
     Sensitivity(Box<sensitivity::Args>),
+    Calibrate(calibrate::Args),
     Camera(camera::Args),
     Telemetry(telemetry::Args),
     Telecommand(telecommand::Args),
@@ -68,6 +70,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Init(args) => init::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Sensitivity(args) => sensitivity::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Camera(args) => camera::run(&args),
         Command::Telemetry(args) => telemetry::run(&args),
         Command::Telecommand(args) => telecommand::run(&args),

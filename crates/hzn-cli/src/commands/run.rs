@@ -126,6 +126,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         frames,
         fps: args.source.fps,
         trace,
+        keep_traces: false,
         keep_picture: trace && !args.no_images,
         overlay: args.overlay.clone(),
     };

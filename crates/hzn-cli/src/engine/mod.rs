@@ -42,6 +42,8 @@ pub struct Plan {
     pub fps: f64,
     /// Collect what is to be drawn over the picture.
     pub trace: bool,
+    /// Hand over everything that the pipeline showed of itself.
+    pub keep_traces: bool,
     /// Hand the picture to the sink.
     pub keep_picture: bool,
     /// Draw an overlay of every frame into this folder.
@@ -65,6 +67,8 @@ pub struct Finished {
     pub drawing: hzn_mcap::Annotations,
     /// The picture as PNG or JPEG, when it was asked for.
     pub picture: Option<Vec<u8>>,
+    /// What the pipeline showed of itself, one record a body, when it was asked for.
+    pub traces: Option<Traces>,
     /// What to try, where nothing was found and the picture itself suggests something.
     pub tip: Option<String>,
 }
@@ -290,13 +294,15 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         found: Vec::new(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
+        traces: None,
         tip: None,
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
         Err(why) => return Ok(finished.not_read(plan, &why)),
     };
-    let traces = (plan.trace || plan.overlay.is_some()).then(|| Traces::new(plan.config.each_body().len()));
+    let traces =
+        (plan.trace || plan.keep_traces || plan.overlay.is_some()).then(|| Traces::new(plan.config.each_body().len()));
     let view = match picture.view(plan.config.input.channel) {
         Ok(view) => view,
         Err(why) => return Ok(finished.not_read(plan, &format!("{why} (input.channel in sensor.toml)"))),
@@ -306,7 +312,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     if finished.found.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
         finished.tip = picture.unused_bits();
     }
-    if let Some(traces) = &traces {
+    if let Some(traces) = traces.as_ref().filter(|_| plan.trace || plan.overlay.is_some()) {
         // Here and not in the one thread that writes, which would hold up all the others.
         let drawing = draw(&finished.found, traces, sensor);
         if let Some(folder) = &plan.overlay {
@@ -316,6 +322,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         }
         finished.drawing = drawing;
     }
+    finished.traces = traces.filter(|_| plan.keep_traces);
     if plan.keep_picture {
         finished.picture = match original {
             Some(bytes) => Some(bytes),
@@ -413,6 +420,7 @@ mod tests {
             frames: None,
             fps: 1.0,
             trace: false,
+            keep_traces: false,
             keep_picture: false,
             overlay: None,
         };

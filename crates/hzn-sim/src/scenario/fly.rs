@@ -70,12 +70,18 @@ impl Scenario {
     /// # Errors
     /// A value out of its limits, a camera inside the Earth, or nothing to be seen in any picture.
     pub fn flight(&self) -> Result<Flight, ScenarioError> {
+        self.flight_at(&self.times_s())
+    }
+
+    /// As [`Scenario::flight`], with pictures at these times instead of the capture's own. Way and attitude stay those of
+    /// the whole capture.
+    pub(super) fn flight_at(&self, times_s: &[f64]) -> Result<Flight, ScenarioError> {
         self.check()?;
         let sensor = self.sensor();
         sensor.check().map_err(|e| ScenarioError::new("[[vehicle]]", e.to_string()))?;
         let path = self.path()?;
-        let mut scenes = Vec::with_capacity(self.capture.frames as usize);
-        for (index, time_s) in self.times_s().into_iter().enumerate() {
+        let mut scenes = Vec::with_capacity(times_s.len());
+        for (index, &time_s) in times_s.iter().enumerate() {
             scenes.push((time_s, self.scene(&path, index, time_s)?));
         }
         self.something_is_seen(&scenes)?;

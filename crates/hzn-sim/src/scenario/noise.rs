@@ -7,13 +7,11 @@
 //! themselves do not tell the length: what turns an answer is alike along the whole limb, and small beside each one's
 //! noise.)
 
-use core::cell::RefCell;
-
+use hzn_calib::noise::{Points, Weighted};
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
-use hzn_core::pipeline::{Candidate, Observer, Solution};
-use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::pixel::ImagePoint;
 use hzn_core::{Config, HostHorizon, covariance};
 use nalgebra::{Matrix3, Vector3};
 
@@ -67,26 +65,28 @@ impl Fit {
     ) -> Result<Vec<Self>, ScenarioError> {
         let mut flights = Vec::new();
         for i in 1..=SEEDS {
-            let mut other = scenario.clone();
-            other.seed = scenario.seed.wrapping_add(i * OTHER_SEED);
-            other.capture.frames = pictures.div_ceil(SEEDS as u32).max(2);
+            let other = Scenario { seed: scenario.seed.wrapping_add(i * OTHER_SEED), ..scenario.clone() };
             // With another drift the limb may stay out of view: nothing to measure there.
-            flights.extend(other.flight().ok());
+            flights.extend(other.flight_at(&spread_s(scenario.span_s(), i - 1, pictures)).ok());
         }
-        let total = flights.iter().map(|f| f.frames.len()).sum();
-        let mut seen = Vec::with_capacity(total);
-        for frame in flights.iter().flat_map(|f| &f.frames) {
-            let picture = frame.render().map_err(|e| ScenarioError::new("[trajectory]", e.to_string()))?;
-            seen.push((frame, picture));
-            progress(seen.len(), total);
+        let frames: Vec<&FlightFrame> = flights.iter().flat_map(|f| &f.frames).collect();
+        let mut rendered = Vec::with_capacity(frames.len());
+        for frame in &frames {
+            rendered.push(frame.render().map_err(|e| ScenarioError::new("[trajectory]", e.to_string()))?);
+            progress(rendered.len(), frames.len());
         }
+        Ok(Self::of_pictures(scenario, &frames.into_iter().zip(&rendered).collect::<Vec<_>>()))
+    }
+
+    /// As [`Fit::measure`], on pictures of the scenario that are rendered already, each with its frame.
+    pub fn of_pictures(scenario: &Scenario, seen: &[(&FlightFrame, &Picture)]) -> Vec<Self> {
         let sensor = scenario.sensor();
         let alone = |body: &body::Config| Config { body: body.clone(), bodies: Default::default(), ..sensor.clone() };
-        Ok(sensor.each_body().iter().filter_map(|body| Self::of(scenario, &alone(body), &seen)).collect())
+        sensor.each_body().iter().filter_map(|body| Self::of(scenario, &alone(body), seen)).collect()
     }
 
     /// Of the one body that the sensor looks for.
-    fn of(scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, Picture)]) -> Option<Self> {
+    fn of(scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, &Picture)]) -> Option<Self> {
         let kind = alone.body.kind;
         // At first nothing is known of the limb's height, and points scatter by a pixel.
         let mut sensor = alone.clone();
@@ -126,7 +126,12 @@ impl Fit {
 
     /// With the sigmas at which the answers' errors are as large as they are said to be; and how unlikely these errors are
     /// then: the mean of the negative log-likelihood, twice, but for a constant.
-    fn settled(mut self, scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, Picture)]) -> Option<(Self, f64)> {
+    fn settled(
+        mut self,
+        scenario: &Scenario,
+        alone: &Config,
+        seen: &[(&FlightFrame, &Picture)],
+    ) -> Option<(Self, f64)> {
         let mut unlikely = f64::NAN;
         for round in 0..=ROUNDS {
             let mut sensor = alone.clone();
@@ -178,6 +183,14 @@ impl Fit {
     }
 }
 
+/// Times at which pictures of the seed number `which` (from 0) are taken: together those of all seeds are `pictures`,
+/// spread evenly over the whole span, and each seed's own are far apart.
+fn spread_s([from_s, to_s]: [f64; 2], which: u64, pictures: u32) -> Vec<f64> {
+    let each = u64::from(pictures).div_ceil(SEEDS).max(2);
+    let place = |k: u64| ((k * SEEDS + which) as f64 + 0.5) / (each * SEEDS) as f64;
+    (0..each).map(|k| from_s + (to_s - from_s) * place(k)).collect()
+}
+
 /// The middle value.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
@@ -196,7 +209,7 @@ struct Looked<'a> {
     log_det: f64,
 }
 
-fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &'a [(&'a FlightFrame, Picture)]) -> Vec<Looked<'a>> {
+fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &[(&'a FlightFrame, &Picture)]) -> Vec<Looked<'a>> {
     let config = sensor.clone();
     // A host sensor is some megabytes, and made on the stack before it is moved: more than a thread may have.
     let make = move || HostHorizon::new(&config).map(Box::new);
@@ -210,10 +223,10 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &'a [(&'a FlightFrame, P
             None => frame.known(),
         };
         let Ok(expected) = horizon.expect(&known) else { continue };
-        let watch = Watch::default();
+        let watch = Points::default();
         let report = horizon.process_observed(&picture.view(), &expected, &watch);
         let (Some(solution), Some(axis), true) = (report.solution, truth.axis(), truth.has_limb()) else { continue };
-        let points = watch.candidates.borrow().get(solution.candidate as usize).cloned().unwrap_or_default();
+        let points = watch.of_candidate(solution.candidate);
         let p = solution.covariance.rows();
         let e = Vector3::from(solution.axis.xyz());
         // Rank 2: the null direction is filled up before inverting.
@@ -229,41 +242,6 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &'a [(&'a FlightFrame, P
         });
     }
     out
-}
-
-/// Points with their weights.
-type Weighted = Vec<(ImagePoint<f64>, f64)>;
-
-/// Collects the points of every candidate.
-#[derive(Default)]
-struct Watch {
-    candidates: RefCell<Vec<Weighted>>,
-}
-
-impl Observer<f64> for Watch {
-    fn edge(&self, candidate: u32, _: impl Iterator<Item = Pixel>, _: u32) {
-        let mut all = self.candidates.borrow_mut();
-        let at = candidate as usize;
-        if all.len() <= at {
-            all.resize(at + 1, Vec::new());
-        }
-        if let Some(points) = all.get_mut(at) {
-            points.clear();
-        }
-    }
-    fn point(&self, candidate: u32, point: ImagePoint<f64>) {
-        if let Some(points) = self.candidates.borrow_mut().get_mut(candidate as usize) {
-            points.push((point, 0.0));
-        }
-    }
-    fn weight(&self, candidate: u32, point: u32, weight: f64) {
-        if let Some(points) = self.candidates.borrow_mut().get_mut(candidate as usize)
-            && let Some(p) = points.get_mut(point as usize)
-        {
-            p.1 = weight;
-        }
-    }
-    fn verdict(&self, _: u32, _: &Candidate<f64>, _: Option<&Solution<f64>>) {}
 }
 
 /// Errors of the edge points of one picture.
@@ -295,8 +273,8 @@ impl Edge {
         let off: Vec<(f64, f64, f64)> = looked
             .points
             .iter()
-            .filter_map(|&(point, weight)| {
-                let ray = camera.ray(point)?;
+            .filter_map(|&([u, v], weight)| {
+                let ray = camera.ray(ImagePoint { u, v })?;
                 let jacobian = ray.jacobian();
                 if disc {
                     let s = ray.direction();
@@ -325,13 +303,24 @@ impl Edge {
 mod tests {
     use super::*;
 
+    #[test]
+    fn pictures_are_spread_over_the_whole_capture() {
+        let mut all: Vec<f64> = (0..SEEDS).flat_map(|i| spread_s([60.0, 380.0], i, MEASURED)).collect();
+        all.sort_by(f64::total_cmp);
+        assert_eq!(all.len(), MEASURED as usize);
+        assert!(all.windows(2).all(|w| (w[1] - w[0] - 10.0).abs() < 1e-9), "{all:?}");
+        assert_eq!((all[0], all[31]), (65.0, 375.0));
+        assert_eq!(spread_s([0.0, 32.0], 3, 1), [3.5, 19.5], "at least two a seed");
+    }
+
     /// A sigma so large that four scalings do not bring it down to the errors.
     #[test]
     fn a_fit_that_does_not_settle_says_what_holds_with_it() {
         let mut scenario: Scenario = toml::from_str(crate::scenario::BUILTIN[2].2).unwrap();
         scenario.capture.frames = 8;
         let flight = scenario.flight().unwrap();
-        let seen: Vec<_> = flight.frames.iter().map(|f| (f, f.render().unwrap())).collect();
+        let pictures: Vec<_> = flight.frames.iter().map(|f| f.render().unwrap()).collect();
+        let seen: Vec<_> = flight.frames.iter().zip(&pictures).collect();
         let mut sensor = scenario.sensor();
         // Whatever they are said to be, the answers are there.
         sensor.select.max_sigma_deg = 90.0;

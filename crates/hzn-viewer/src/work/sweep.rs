@@ -123,6 +123,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
         frames: None,
         fps: 1.0,
         trace: output.is_some(),
+        keep_traces: false,
         keep_picture: output.is_some(),
         overlay: None,
     };

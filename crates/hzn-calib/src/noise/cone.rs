@@ -1,0 +1,238 @@
+//! The cone through the edge points of one picture, its half-angle free.
+//!
+//! State: unit axis e and c = cos α. With the slope g = |∂(s·e)/∂(u, v)| of a ray s the distance from the limb is
+//! r = (c + o − s·e)/g in pixels, o being the offset of cos α by azimuth where an attitude tells it. With the tangent basis
+//! B at e and the weighted mean m of Bᵀs the rows are h = [Bᵀs − m, −1]/g, and (Σ w h hᵀ) δ = Σ w r h; the change of c is
+//! a·δ with a = (m, 1).
+
+use hzn_core::Frame;
+use hzn_core::camera::Camera;
+use hzn_core::ellipsoid::LimbCone;
+use hzn_core::frames::UnitVec3;
+use hzn_core::pixel::ImagePoint;
+use nalgebra::{Matrix3, Vector3};
+
+/// Iterations of the fit; it starts at the pipeline's own answer.
+const ITERATIONS: usize = 8;
+/// Fewer points fit any cone.
+const LEAST_POINTS: usize = 24;
+
+/// One edge point that carries the answer.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    ray: Vector3<f64>,
+    /// Derivative of the ray by (u, v), as its two columns.
+    by: [Vector3<f64>; 2],
+    /// From the principal point, pixels.
+    off_px: [f64; 2],
+    weight: f64,
+    /// To the next of them along the edge, pixels; 0 for the last.
+    step_px: f64,
+}
+
+/// A point's row at the cone.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    /// h, per pixel.
+    pub(super) h: Vector3<f64>,
+    /// Distance from the limb, pixels.
+    pub(super) r_px: f64,
+    /// g, per pixel.
+    pub(super) slope: f64,
+    /// The fit's weight, 0 to 1.
+    pub(super) weight: f64,
+    /// To the next point along the edge, pixels.
+    pub(super) step_px: f64,
+    /// Azimuth about the axis from its tangent basis, radians.
+    pub(super) azimuth_rad: f64,
+    /// By how much r grows for a focal length that is longer by its own size, pixels.
+    pub(super) by_focal_px: f64,
+}
+
+/// A fitted cone.
+#[derive(Debug, Clone)]
+pub(super) struct Cone {
+    /// cos of the (mean) half-angle.
+    pub(super) cos: f64,
+    pub(super) rows: Vec<Row>,
+    /// Rays of the rows.
+    pub(super) rays: Vec<Vector3<f64>>,
+    /// Inverse of Σ w h hᵀ, px².
+    pub(super) inverse: Matrix3<f64>,
+    /// a: what the change of c is of δ.
+    pub(super) to_cos: Vector3<f64>,
+    /// Σ w.
+    pub(super) weight: f64,
+}
+
+impl Cone {
+    /// Fits the cone to weighted points (pixels), from the pipeline's axis and cos α on. `azimuth`: the offset of cos α of a
+    /// limb that is no circle. `None` when the points do not determine it.
+    pub(super) fn fit(
+        camera: &Camera<f64>,
+        points: &[([f64; 2], f64)],
+        axis: [f64; 3],
+        cos: f64,
+        azimuth: Option<&Azimuth>,
+    ) -> Option<Self> {
+        let places = places(camera, points);
+        if places.len() < LEAST_POINTS {
+            return None;
+        }
+        let (mut e, mut c) = (Vector3::from(axis), cos);
+        for _ in 0..ITERATIONS {
+            let at = Self::at(&places, e, c, azimuth)?;
+            let sum: Vector3<f64> = at.rows.iter().map(|r| r.h * (r.weight * r.r_px)).sum();
+            let step = at.inverse * sum;
+            let (b1, b2) = basis(&e);
+            e = (e + b1 * step.x + b2 * step.y).try_normalize(1e-12)?;
+            c += at.to_cos.dot(&step);
+            if step.norm() < 1e-13 {
+                break;
+            }
+        }
+        Self::at(&places, e, c, azimuth)
+    }
+
+    fn at(places: &[Place], axis: Vector3<f64>, cos: f64, azimuth: Option<&Azimuth>) -> Option<Self> {
+        let (b1, b2) = basis(&axis);
+        let slope = |p: &Place| axis.dot(&p.by[0]).hypot(axis.dot(&p.by[1])).max(1e-12);
+        let (mut m, mut total) = ([0.0; 2], 0.0);
+        for p in places {
+            let w = p.weight / slope(p).powi(2);
+            m = [m[0] + w * p.ray.dot(&b1), m[1] + w * p.ray.dot(&b2)];
+            total += w;
+        }
+        let m = m.map(|m| m / total);
+        let row = |p: &Place| {
+            let (g, d) = (slope(p), p.ray.dot(&axis));
+            let (x, y) = (p.ray.dot(&b1), p.ray.dot(&b2));
+            let offset = azimuth.map_or(0.0, |a| a.offset(&p.ray, &axis));
+            let by = [axis.dot(&p.by[0]), axis.dot(&p.by[1])];
+            Row {
+                h: Vector3::new(x - m[0], y - m[1], -1.0) / g,
+                r_px: (cos + offset - d) / g,
+                slope: g,
+                weight: p.weight,
+                step_px: p.step_px,
+                azimuth_rad: y.atan2(x),
+                by_focal_px: (by[0] * p.off_px[0] + by[1] * p.off_px[1]) / g,
+            }
+        };
+        let rows: Vec<Row> = places.iter().map(row).collect();
+        let normal: Matrix3<f64> = rows.iter().map(|r| r.h * r.h.transpose() * r.weight).sum();
+        Some(Self {
+            cos,
+            inverse: normal.try_inverse()?,
+            to_cos: Vector3::new(m[0], m[1], 1.0),
+            weight: rows.iter().map(|r| r.weight).sum(),
+            rays: places.iter().map(|p| p.ray).collect(),
+            rows,
+        })
+    }
+
+    /// Weighted RMS distance of the points from the limb, pixels.
+    pub(super) fn rms_px(&self) -> f64 {
+        (self.rows.iter().map(|r| r.weight * r.r_px * r.r_px).sum::<f64>() / self.weight).sqrt()
+    }
+
+    /// Length of edge that the points cover, pixels.
+    pub(super) fn arc_px(&self) -> f64 {
+        self.rows.iter().map(|r| r.step_px).sum()
+    }
+
+    /// Weighted RMS of the slope: change of cos α a pixel.
+    pub(super) fn cos_per_px(&self) -> f64 {
+        let inverse_squares: f64 = self.rows.iter().map(|r| r.weight / (r.slope * r.slope)).sum();
+        (self.weight / inverse_squares.max(1e-300)).sqrt()
+    }
+
+    /// By how much the fitted cos α grows when every r grows by `signal` (pixels).
+    pub(super) fn cos_by(&self, signal: impl Fn(&Row) -> f64) -> f64 {
+        let sum: Vector3<f64> = self.rows.iter().map(|r| r.h * (r.weight * signal(r))).sum();
+        self.to_cos.dot(&(self.inverse * sum))
+    }
+
+    /// The fitted cos α as a weighted mean: by how much it grows when cos α of the limb grows by 1 at this point alone. The
+    /// shares of all points sum to 1.
+    pub(super) fn shares(&self) -> Vec<f64> {
+        let a = self.inverse * self.to_cos;
+        self.rows.iter().map(|r| -r.weight * a.dot(&r.h) / r.slope).collect()
+    }
+
+    /// Variance of the fitted cos α when errors along the limb are a Gauss-Markov process of `sigma_px` and length
+    /// `correlation_px` of which the part `white` is independent from point to point.
+    pub(super) fn variance_of_cos(&self, sigma_px: f64, correlation_px: f64, white: f64) -> f64 {
+        let a = self.inverse * self.to_cos;
+        let (mut own, mut pairs, mut carried) = (0.0, 0.0, 0.0);
+        for row in &self.rows {
+            let q = row.weight * a.dot(&row.h);
+            own += q * q;
+            pairs += 2.0 * q * carried;
+            carried = (carried + q) * decay(row.step_px, correlation_px);
+        }
+        sigma_px * sigma_px * (own + (1.0 - white) * pairs)
+    }
+}
+
+/// exp(−step/length); 0 for white errors.
+pub(super) fn decay(step_px: f64, length_px: f64) -> f64 {
+    if length_px > 0.0 { (-step_px / length_px).exp() } else { 0.0 }
+}
+
+/// The points with a weight and a ray, each with the way to the next.
+fn places(camera: &Camera<f64>, points: &[([f64; 2], f64)]) -> Vec<Place> {
+    let centre = camera.principal_point();
+    let kept = points.iter().filter(|(_, weight)| *weight > 0.0);
+    let mut places: Vec<([f64; 2], Place)> = kept
+        .filter_map(|&([u, v], weight)| {
+            let ray = camera.ray(ImagePoint { u, v })?;
+            let j = ray.jacobian();
+            let by = [0, 1].map(|k| Vector3::new(j[0][k], j[1][k], j[2][k]));
+            let off_px = [u - centre.u, v - centre.v];
+            let ray = Vector3::from(ray.direction().xyz());
+            Some(([u, v], Place { ray, by, off_px, weight, step_px: 0.0 }))
+        })
+        .collect();
+    let ahead: Vec<[f64; 2]> = places.iter().skip(1).map(|p| p.0).collect();
+    for ((here, place), next) in places.iter_mut().zip(ahead) {
+        place.step_px = (next[0] - here[0]).hypot(next[1] - here[1]);
+    }
+    places.into_iter().map(|p| p.1).collect()
+}
+
+/// Two unit vectors across `e` and each other.
+pub(super) fn basis(e: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
+    (b1, e.cross(&b1))
+}
+
+/// cos α by azimuth about the axis, of an ellipsoid whose north is known in the camera: as the pipeline has it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Azimuth {
+    east: Vector3<f64>,
+    cot2_east: f64,
+    cot2_meridian: f64,
+    mean_cos: f64,
+}
+
+impl Azimuth {
+    /// Of the limb cone seen by a camera with this attitude; `None` without one.
+    pub(super) fn new(cone: &LimbCone<f64>, frame: &Frame<f64>) -> Option<Self> {
+        let east: UnitVec3<_, f64> = frame.cam_to_ecef?.inverse().apply(&cone.east);
+        Some(Self {
+            east: Vector3::from(east.xyz()),
+            cot2_east: cone.cot2_east,
+            cot2_meridian: cone.cot2_meridian,
+            mean_cos: cone.mean_half_angle_rad().cos(),
+        })
+    }
+
+    fn offset(&self, ray: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
+        let d = ray.dot(axis);
+        let along = ray.dot(&self.east) - d * axis.dot(&self.east);
+        let cos2 = (along * along / (1.0 - d * d).max(1e-12)).min(1.0);
+        let cot2 = self.cot2_meridian + (self.cot2_east - self.cot2_meridian) * cos2;
+        (cot2 / (1.0 + cot2)).sqrt() - self.mean_cos
+    }
+}

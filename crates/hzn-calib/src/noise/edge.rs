@@ -1,0 +1,134 @@
+//! Edge noise of one picture from the residuals along its limb, by restricted maximum likelihood.
+//!
+//! The residuals are r = H δ + ε with ε a Gauss-Markov process of which a part is white: V = σ²[(1 − ν) e^(−Δs/L) + ν I].
+//! With the three fitted parameters integrated out, −2 ln of the likelihood is (n − 3) ln(q/(n − 3)) + ln|V/σ²| +
+//! ln|HᵀV⁻¹H|, q = rᵀV⁻¹r after the fit; σ² = q/(n − 3). A Kalman filter along the points whitens r and the columns of H in
+//! one pass. The likelihood of one picture is flat in L: so the variance of the fit is averaged over (L, ν), with L about
+//! a quarter of the arc within a factor of two.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::cone::{Cone, Row, decay};
+
+/// Lengths that are tried, pixels.
+pub(super) const LENGTHS_PX: [f64; 10] = [2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1280.0];
+/// White parts that are tried.
+pub(super) const WHITE: [f64; 7] = [0.0, 0.25, 0.5, 0.7, 0.85, 0.95, 0.99];
+/// The length is likely about this part of the arc ...
+const LIKELY_ARC: f64 = 0.25;
+/// ... within so much in its logarithm.
+const LIKELY_WITHIN: f64 = 0.7;
+/// Lengths between a pixel and the likely one that are tried for the equivalent one.
+const EQUIVALENT_STEPS: u32 = 40;
+/// Part of the arc over which a sensor takes errors for alike where it measures them in each picture.
+const SENSOR_ARC: f64 = 1.0 / 12.0;
+/// Points that the fit weighs less are passed over: at half weight they lie about 2.7 sigma off.
+const LEAST_WEIGHT: f64 = 0.5;
+/// No edge is better than this, pixels.
+pub(super) const LEAST_PX: f64 = 0.03;
+/// A variance larger than so many mean squares of the residuals is not in them.
+const MOST_VARIANCE: f64 = 4.0;
+
+/// What one model of the noise says of one picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Score {
+    /// −2 ln of the restricted likelihood, but for a constant.
+    pub(super) unlikely: f64,
+    /// σ², px².
+    pub(super) variance_px2: f64,
+}
+
+/// Every model of the grid on one picture, white parts within lengths.
+pub(super) type Scores = [[Score; WHITE.len()]; LENGTHS_PX.len()];
+
+/// The scores of a picture's residuals; `None` where they are too few or all zero.
+pub(super) fn scores(cone: &Cone) -> Option<Scores> {
+    let mut scores = [[Score { unlikely: f64::INFINITY, variance_px2: f64::NAN }; WHITE.len()]; LENGTHS_PX.len()];
+    for (scores, length) in scores.iter_mut().zip(LENGTHS_PX) {
+        let decays: Vec<f64> = cone.rows.iter().map(|r| decay(r.step_px, length)).collect();
+        for (score, white) in scores.iter_mut().zip(WHITE) {
+            *score = score_of(&cone.rows, &decays, white)?;
+        }
+    }
+    Some(scores)
+}
+
+/// One model on one picture.
+fn score_of(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
+    let freedom = rows.iter().filter(|r| r.weight >= LEAST_WEIGHT).count() as f64 - 3.0;
+    // Of r and of the three columns: what is expected of the next point's correlated part; its variance.
+    let (mut ahead, mut spread) = ([0.0f64; 4], 1.0 - white);
+    let (mut log_det, mut rr) = (0.0, 0.0);
+    let (mut hr, mut hh) = (Vector3::zeros(), Matrix3::zeros());
+    for (row, decay) in rows.iter().zip(decays) {
+        if row.weight < LEAST_WEIGHT {
+            ahead = ahead.map(|x| x * decay);
+            spread = decay * decay * spread + (1.0 - decay * decay) * (1.0 - white);
+            continue;
+        }
+        let seen = [row.r_px, row.h.x, row.h.y, row.h.z];
+        let variance = (spread + white).max(1e-12);
+        let innovation: [f64; 4] = std::array::from_fn(|i| seen[i] - ahead[i]);
+        log_det += variance.ln();
+        let [r, x, y, z] = innovation;
+        let h = Vector3::new(x, y, z);
+        rr += r * r / variance;
+        hr += h * (r / variance);
+        hh += h * h.transpose() / variance;
+        let gain = spread / variance;
+        ahead = std::array::from_fn(|i| (ahead[i] + gain * innovation[i]) * decay);
+        spread = decay * decay * spread * white / variance + (1.0 - decay * decay) * (1.0 - white);
+    }
+    let information = hh.cholesky()?;
+    let q = rr - hr.dot(&information.solve(&hr));
+    if !(q > 0.0 && freedom > 0.0) {
+        return None;
+    }
+    let log_det_h: f64 = 2.0 * information.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    Some(Score { unlikely: freedom * (q / freedom).ln() + log_det + log_det_h, variance_px2: q / freedom })
+}
+
+/// The shortest length over which errors of one exponential with `sigma_px` would have to be alike to make the fitted cos α
+/// as uncertain as `variance` says, pixels; where none does, the length that comes nearest.
+pub(super) fn equivalent_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
+    let most_px = LIKELY_ARC * cone.arc_px();
+    let mut nearest = (0.0, 0.0);
+    for k in 0..=EQUIVALENT_STEPS {
+        let length = most_px.powf(f64::from(k) / f64::from(EQUIVALENT_STEPS));
+        let own = cone.variance_of_cos(sigma_px, length, 0.0);
+        if own >= variance {
+            return length;
+        }
+        if own > nearest.1 {
+            nearest = (length, own);
+        }
+    }
+    nearest.0
+}
+
+/// Variance of the fitted cos α: averaged over the models by their likelihood, and not below that of residuals which are
+/// alike over a twelfth of the arc, as the sensor takes them by default. A light that changes along the limb moves its height
+/// smoothly; the fit takes such an error for curvature, so that residuals do not show it.
+pub(super) fn variance_of_cos(cone: &Cone, scores: &Scores) -> f64 {
+    let (arc, mean_square) = (cone.arc_px(), cone.rms_px().powi(2));
+    let prior = |length: f64| {
+        let off = (length / (LIKELY_ARC * arc)).ln() / LIKELY_WITHIN;
+        off * off
+    };
+    let each = || {
+        scores.iter().zip(LENGTHS_PX).flat_map(move |(scores, length)| {
+            scores.iter().zip(WHITE).map(move |(score, white)| (score, length, white, score.unlikely + prior(length)))
+        })
+    };
+    let least = each().map(|(.., unlikely)| unlikely).fold(f64::INFINITY, f64::min);
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (score, length, white, unlikely) in each() {
+        let likely = (-0.5 * (unlikely - least)).exp();
+        if likely > 1e-6 {
+            let variance = score.variance_px2.min(MOST_VARIANCE * mean_square).max(LEAST_PX * LEAST_PX);
+            sum += likely * cone.variance_of_cos(variance.sqrt(), length, white);
+            total += likely;
+        }
+    }
+    (sum / total).max(cone.variance_of_cos(mean_square.sqrt(), SENSOR_ARC * arc, 0.0))
+}

@@ -1,0 +1,135 @@
+//! One limb height from many measurements of it, with the scatter that their own errors do not explain.
+//!
+//! d_i = A_i h + η_i + ε_i with known variances s_i² of ε and an unknown variance τ² of η. Restricted likelihood:
+//! minimise Σ ln(s_i² + τ²) + ln|AᵀWA| + Σ w_i (d_i − A_i ĥ)² over τ, with w = 1/(s² + τ²).
+
+use nalgebra::{DMatrix, DVector};
+
+/// A measured height.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Measured {
+    /// The height, kilometres.
+    pub(super) km: f64,
+    /// Its variance from edge noise alone, km².
+    pub(super) variance_km2: f64,
+    /// What it is of the parameters: their mean's weights.
+    pub(super) of: Vec<f64>,
+}
+
+/// The parameters with their covariance.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Solved {
+    /// Parameters.
+    pub(super) h: DVector<f64>,
+    /// Their covariance (with the scatter).
+    pub(super) covariance: DMatrix<f64>,
+    /// Variance of the scatter τ², the parameters' unit squared.
+    pub(super) scatter2: f64,
+    /// −2 ln of the likelihood (not restricted) there, to compare models with other parameters.
+    pub(super) unlikely: f64,
+    /// Mean square of the residuals over their own variances, without the scatter: χ² a degree of freedom.
+    pub(super) chi2: f64,
+}
+
+/// Places at which τ is tried in a decade of it.
+const STEPS: i32 = 8;
+
+/// Fits the parameters. `None` when the measurements do not determine them.
+pub(super) fn solve(all: &[Measured]) -> Option<Solved> {
+    let parameters = all.first()?.of.len();
+    let freedom = all.len().checked_sub(parameters).filter(|n| *n > 0)? as f64;
+    let usual = all.iter().map(|m| m.variance_km2).sum::<f64>() / all.len() as f64;
+    let tries = (-3 * STEPS..=3 * STEPS).map(|k| usual * 10f64.powf(2.0 * f64::from(k) / f64::from(STEPS)));
+    let scored = |scatter2: f64| at(all, scatter2).map(|found| (found.restricted, scatter2));
+    let best = std::iter::once(0.0).chain(tries).filter_map(scored).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let scatter2 = refined(best, &scored);
+    let found = at(all, scatter2)?;
+    let own = at(all, 0.0)?;
+    Some(Solved {
+        h: found.h,
+        covariance: found.covariance,
+        scatter2,
+        unlikely: found.unlikely,
+        chi2: own.square / freedom,
+    })
+}
+
+/// A few halvings of the step about the best τ².
+fn refined((mut least, mut at): (f64, f64), scored: &dyn Fn(f64) -> Option<(f64, f64)>) -> f64 {
+    let mut factor = 10f64.powf(2.0 / f64::from(STEPS));
+    for _ in 0..12 {
+        factor = factor.sqrt();
+        for next in [at * factor, at / factor].into_iter().filter_map(scored) {
+            if next.0 < least {
+                (least, at) = next;
+            }
+        }
+    }
+    at
+}
+
+struct At {
+    h: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Σ w (d − A h)².
+    square: f64,
+    unlikely: f64,
+    restricted: f64,
+}
+
+fn at(all: &[Measured], scatter2: f64) -> Option<At> {
+    let parameters = all.first()?.of.len();
+    let (mut normal, mut right) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
+    let mut log_variances = 0.0;
+    for m in all {
+        let (row, variance) = (DVector::from_column_slice(&m.of), m.variance_km2 + scatter2);
+        normal += &row * row.transpose() / variance;
+        right += row * (m.km / variance);
+        log_variances += variance.ln();
+    }
+    let information = normal.cholesky()?;
+    let h = information.solve(&right);
+    let off = |m: &Measured| m.km - m.of.iter().zip(h.iter()).map(|(a, h)| a * h).sum::<f64>();
+    let square = all.iter().map(|m| off(m).powi(2) / (m.variance_km2 + scatter2)).sum::<f64>();
+    let log_det: f64 = 2.0 * information.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    let unlikely = log_variances + square;
+    let restricted = unlikely + log_det;
+    (restricted.is_finite()).then(|| At { covariance: information.inverse(), h, square, unlikely, restricted })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(values: &[(f64, f64)]) -> Vec<Measured> {
+        values.iter().map(|&(km, sigma)| Measured { km, variance_km2: sigma * sigma, of: vec![1.0] }).collect()
+    }
+
+    #[test]
+    fn without_scatter_it_is_the_weighted_mean() {
+        let found = solve(&measured(&[(10.0, 1.0), (10.2, 1.0), (12.0, 10.0), (9.9, 1.0)])).unwrap();
+        let weight = 3.0 + 0.01;
+        assert!((found.h[0] - (10.0 + 10.2 + 9.9 + 0.12) / weight).abs() < 1e-9, "{found:?}");
+        assert_eq!(found.scatter2, 0.0);
+        assert!((found.covariance[(0, 0)] - 1.0 / weight).abs() < 1e-12 && found.chi2 < 0.1);
+    }
+
+    #[test]
+    fn scatter_is_found_where_errors_do_not_explain_it() {
+        // ±3 about 20, with errors of 0.1: nothing but scatter.
+        let values: Vec<(f64, f64)> = (0..40).map(|i| (if i % 2 == 0 { 17.0 } else { 23.0 }, 0.1)).collect();
+        let found = solve(&measured(&values)).unwrap();
+        assert!((found.scatter2.sqrt() - 3.0).abs() < 0.1, "{found:?}");
+        assert!((found.h[0] - 20.0).abs() < 1e-9);
+        assert!((found.covariance[(0, 0)].sqrt() - 3.0 / 40f64.sqrt()).abs() < 0.02);
+        assert!(found.chi2 > 800.0);
+    }
+
+    #[test]
+    fn too_few_or_blind_measurements_say_nothing() {
+        assert!(solve(&measured(&[(10.0, 1.0)])).is_none());
+        let blind: Vec<Measured> =
+            (0..5).map(|_| Measured { km: 1.0, variance_km2: 1.0, of: vec![0.5, 0.5] }).collect();
+        assert!(solve(&blind).is_none());
+    }
+}

@@ -1,0 +1,49 @@
+//! Correlation of residuals along the edge, for a picture to look at: what is written does not come from it.
+
+use super::cone::Cone;
+
+/// Width of a class of distances, pixels.
+const WIDTH_PX: f64 = 8.0;
+/// Classes; the first holds each point with itself.
+const CLASSES: usize = 60;
+
+/// Sums of products of residuals by their distance along the edge.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Lags {
+    sums: [f64; CLASSES],
+    counts: [f64; CLASSES],
+}
+
+impl Lags {
+    pub(super) fn new(cone: &Cone) -> Self {
+        let mut lags = Self { sums: [0.0; CLASSES], counts: [0.0; CLASSES] };
+        for (i, one) in cone.rows.iter().enumerate() {
+            let mut away = 0.0;
+            for other in cone.rows.get(i..).unwrap_or_default() {
+                let weight = one.weight * other.weight;
+                let class = if away > 0.0 { 1 + (away / WIDTH_PX) as usize } else { 0 };
+                let (Some(sum), Some(count)) = (lags.sums.get_mut(class), lags.counts.get_mut(class)) else { break };
+                *sum += weight * one.r_px * other.r_px;
+                *count += weight;
+                away += other.step_px;
+            }
+        }
+        lags
+    }
+}
+
+/// Correlation of all pictures' residuals by distance: (pixels, correlation).
+pub(super) fn correlation<'a>(all: impl Iterator<Item = &'a Lags>) -> Vec<(f64, f64)> {
+    let mut total = Lags { sums: [0.0; CLASSES], counts: [0.0; CLASSES] };
+    for lags in all {
+        let Some(own) = lags.counts.first().filter(|n| **n > 0.0).map(|n| lags.sums[0] / n) else { continue };
+        // Each picture in units of its own mean square.
+        for class in 0..CLASSES {
+            total.sums[class] += lags.sums[class] / own.max(1e-12);
+            total.counts[class] += lags.counts[class];
+        }
+    }
+    let middle = |class: usize| if class == 0 { 0.0 } else { (class as f64 - 0.5) * WIDTH_PX };
+    let each = total.sums.iter().zip(&total.counts).enumerate();
+    each.filter(|(_, (_, n))| **n > 0.0).map(|(class, (sum, n))| (middle(class), sum / n)).collect()
+}

@@ -1,0 +1,129 @@
+//! Limb height by latitude: the rows that the pictures ask for.
+//!
+//! A picture sees a mean over its part of the limb. With hat functions between rows of latitude, that mean is linear in the
+//! rows' heights: d_i = Σ_k a_ik h_k, a_ik the mean of hat k over what the picture saw. More rows are taken only when they
+//! pay for themselves (Bayes' information criterion: ln n a row) and when every row is known better than rows differ.
+
+use super::height::{Measured, Solved, solve};
+use super::sighting::Sighting;
+
+/// Numbers of rows that are tried.
+const ROWS: [usize; 3] = [2, 3, 5];
+/// Part of what was seen that may lie beyond the first and the last row, at each end.
+const BEYOND: f64 = 0.02;
+
+/// A limb height with what was fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Profile {
+    /// Latitudes of the rows in degrees, rising; empty for one height everywhere.
+    pub(super) latitudes_deg: Vec<f64>,
+    pub(super) solved: Solved,
+}
+
+impl Profile {
+    /// The height that a picture is explained by, kilometres.
+    pub(super) fn explains_km(&self, sighting: &Sighting) -> f64 {
+        let of = self.parts(sighting);
+        of.iter().zip(self.solved.h.iter()).map(|(a, h)| a * h).sum()
+    }
+
+    /// What of a picture's height each parameter is.
+    pub(super) fn parts(&self, sighting: &Sighting) -> Vec<f64> {
+        parts(&self.latitudes_deg, sighting)
+    }
+}
+
+/// One height, or as many rows as the pictures tell apart. `None` when they do not even tell one height.
+pub(super) fn profile(sightings: &[&Sighting]) -> Option<Profile> {
+    let with = |latitudes_deg: Vec<f64>| {
+        let measured: Vec<Measured> = sightings
+            .iter()
+            .map(|s| Measured {
+                km: s.limb_height_km,
+                variance_km2: s.sigma_km * s.sigma_km,
+                of: parts(&latitudes_deg, s),
+            })
+            .collect();
+        Some(Profile { solved: solve(&measured)?, latitudes_deg })
+    };
+    let one = with(Vec::new())?;
+    let Some([low, high]) = span_deg(sightings) else { return Some(one) };
+    let pays = |p: &Profile| p.solved.unlikely + p.latitudes_deg.len().max(1) as f64 * (sightings.len() as f64).ln();
+    let tried = ROWS.into_iter().filter_map(|n| {
+        let place = |k: usize| (low + (high - low) * k as f64 / (n - 1) as f64).round();
+        let rows: Vec<f64> = (0..n).map(place).collect();
+        let rising = rows.windows(2).all(|w| w[0] < w[1]);
+        with(rows).filter(|p| rising && sightings.len() >= 4 * n && are_told_apart(p))
+    });
+    let best = tried.min_by(|a, b| pays(a).total_cmp(&pays(b)));
+    Some(best.filter(|p| pays(p) < pays(&one)).unwrap_or(one))
+}
+
+/// Whether every row is known better than the rows differ: a third of their range.
+fn are_told_apart(profile: &Profile) -> bool {
+    let h = &profile.solved.h;
+    let range = h.max() - h.min();
+    profile.solved.covariance.diagonal().iter().all(|variance| 3.0 * variance.sqrt() < range)
+}
+
+/// First and last latitude worth a row, degrees.
+fn span_deg(sightings: &[&Sighting]) -> Option<[f64; 2]> {
+    let mut seen: Vec<(f64, f64)> =
+        sightings.iter().flat_map(|s| s.latitudes.iter().map(|(deg, share)| (*deg, share.abs()))).collect();
+    if sightings.iter().any(|s| s.latitudes.is_empty()) {
+        return None;
+    }
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = seen.iter().map(|s| s.1).sum();
+    let below = |part: f64| {
+        let mut sum = 0.0;
+        seen.iter().find(|s| {
+            sum += s.1;
+            sum >= part * total
+        })
+    };
+    Some([below(BEYOND)?.0, below(1.0 - BEYOND)?.0])
+}
+
+/// Means of the hat functions over what a picture saw.
+fn parts(latitudes_deg: &[f64], sighting: &Sighting) -> Vec<f64> {
+    if latitudes_deg.is_empty() {
+        return vec![1.0];
+    }
+    let mut parts = vec![0.0; latitudes_deg.len()];
+    for &(deg, share) in &sighting.latitudes {
+        for (part, hat) in parts.iter_mut().zip(hats(latitudes_deg, deg)) {
+            *part += share * hat;
+        }
+    }
+    parts
+}
+
+/// The hat functions at one latitude: linear between rows, constant beyond them.
+fn hats(rows: &[f64], deg: f64) -> impl Iterator<Item = f64> + '_ {
+    let at = |k: usize| rows.get(k).copied();
+    (0..rows.len()).map(move |k| {
+        let here = at(k).unwrap_or(f64::NAN);
+        let (before, after) = (k.checked_sub(1).and_then(at), at(k + 1));
+        match (before, after) {
+            (Some(before), _) if deg <= here => ((deg - before) / (here - before)).max(0.0),
+            (_, Some(after)) if deg >= here => ((after - deg) / (after - here)).max(0.0),
+            _ => 1.0,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hats_are_linear_between_rows_and_constant_beyond() {
+        let at = |deg: f64| hats(&[-60.0, 0.0, 40.0], deg).collect::<Vec<_>>();
+        assert_eq!(at(-80.0), [1.0, 0.0, 0.0]);
+        assert_eq!(at(-30.0), [0.5, 0.5, 0.0]);
+        assert_eq!(at(0.0), [0.0, 1.0, 0.0]);
+        assert_eq!(at(30.0), [0.0, 0.25, 0.75]);
+        assert_eq!(at(70.0), [0.0, 0.0, 1.0]);
+    }
+}

@@ -1,0 +1,220 @@
+//! One picture's own measurement of the limb's height.
+//!
+//! With the camera at the height H above the ground of radius R, a limb of the height d has the half-angle sin α =
+//! (R + d)/(R + H). So a half-angle that is fitted freely measures d = d₀ + (R + H)(sin α̂ − sin α₀) beside the expected
+//! (d₀, α₀), with ∂d/∂cos α = −(R + H) cot α.
+
+use hzn_core::body::{self, Kind};
+use hzn_core::camera::Camera;
+use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, from_geodetic, geodetic};
+use hzn_core::{Frame, Solution};
+use nalgebra::Vector3;
+
+use super::cone::{Azimuth, Cone, basis};
+use super::edge::{self, Scores};
+use super::lag::Lags;
+
+/// An attitude that is known no better does not tell which part of the limb is seen, radians (30 degrees).
+const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
+/// 1-sigma of an attitude that comes without one, radians (5 degrees), as for the sensor.
+const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
+/// Places on the limb at which latitudes are looked up where the visible part is not known.
+const RING: usize = 24;
+/// Latitudes, uniformly from pole to pole, of which one without a position may be the camera's.
+const LATITUDES: usize = 19;
+
+/// What one picture says about limb height and noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sighting {
+    /// Name of the picture.
+    pub name: String,
+    /// Limb height that the half-angle-free fit asks for, kilometres.
+    pub limb_height_km: f64,
+    /// 1-sigma of it from edge noise (and the unknown direction of north), kilometres.
+    pub sigma_km: f64,
+    /// 1-sigma of it from the unknown local radius, kilometres: common to pictures from one latitude. 0 with a position.
+    pub radius_sigma_km: f64,
+    /// Limb height that one pixel across the limb makes, kilometres.
+    pub km_per_px: f64,
+    /// Growth of the limb height, kilometres, for a focal length that is longer by its own size.
+    pub km_per_focal: f64,
+    /// Weighted RMS distance of the edge points from the limb, pixels.
+    pub rms_px: f64,
+    /// Length of edge that the points cover, pixels.
+    pub arc_px: f64,
+    /// Length over which edge errors of this RMS would have to be alike for `sigma_km`, pixels.
+    pub correlation_px: f64,
+    /// Geodetic latitudes in degrees of the limb that it saw, with the share of the height each has; empty without a
+    /// position.
+    pub latitudes: Vec<(f64, f64)>,
+    /// Models of edge noise on the residuals.
+    pub(super) scores: Scores,
+    /// Products of residuals by their distance along the edge.
+    pub(super) lags: Lags,
+}
+
+/// What is known of the camera's place and the body: distances in metres.
+struct Place {
+    /// R + H of the sphere that stands for the body.
+    distance_m: f64,
+    sin_expected: f64,
+    limb_m: f64,
+    cone: Option<LimbCone<f64>>,
+    position_m: Option<[f64; 3]>,
+    /// 1-sigma, in metres of limb height, of the radius; and half the difference of the half-angles' cosines.
+    radius_sigma_m: f64,
+    uneven_cos: f64,
+}
+
+impl Sighting {
+    /// Of a picture's answer: `points` are the answer's edge points with their weights, `body` is what the sensor was told of
+    /// the body, `frame` what it knew of the picture. `None` for Sun and Moon, whose half-angle says nothing about a height,
+    /// without an altitude, and where the points do not determine a cone.
+    pub fn measure(
+        name: &str,
+        camera: &Camera<f64>,
+        body: &body::Config,
+        frame: &Frame<f64>,
+        points: &[([f64; 2], f64)],
+        solution: &Solution<f64>,
+    ) -> Option<Self> {
+        if body.half_angle_is_free() {
+            return None;
+        }
+        let place = Place::new(body, frame)?;
+        let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
+        let known =
+            Frame { cam_to_ecef: frame.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*frame };
+        let azimuth = place.cone.as_ref().and_then(|cone| Azimuth::new(cone, &known));
+        let cone = Cone::fit(camera, points, solution.axis.xyz(), solution.half_angle_rad.cos(), azimuth.as_ref())?;
+        let sin = (1.0 - cone.cos * cone.cos).sqrt();
+        if !(sin > 0.0 && cone.cos > 0.0) {
+            return None;
+        }
+        let height_m = place.limb_m + place.distance_m * (sin - place.sin_expected);
+        let by_cos_m = -place.distance_m * cone.cos / sin;
+        let scores = edge::scores(&cone)?;
+        // Where north is not known the limb's second harmonic is anything.
+        let left = if azimuth.is_some() { (2.0 * attitude_sigma).min(1.0) } else { 1.0 };
+        let uneven = left * place.uneven_cos;
+        let harmonic = |of: fn(f64) -> f64| cone.cos_by(|row| of(2.0 * row.azimuth_rad) / row.slope);
+        let (c, s) = (harmonic(f64::cos), harmonic(f64::sin));
+        let noise = edge::variance_of_cos(&cone, &scores);
+        let variance_cos = noise + 0.5 * uneven * uneven * (c * c + s * s);
+        Some(Self {
+            name: name.to_owned(),
+            limb_height_km: height_m / 1e3,
+            sigma_km: by_cos_m.abs() * variance_cos.sqrt() / 1e3,
+            radius_sigma_km: place.radius_sigma_m / 1e3,
+            km_per_px: by_cos_m.abs() * cone.cos_per_px() / 1e3,
+            km_per_focal: by_cos_m * cone.cos_by(|row| row.by_focal_px) / 1e3,
+            rms_px: cone.rms_px(),
+            arc_px: cone.arc_px(),
+            correlation_px: edge::equivalent_px(&cone, cone.rms_px(), noise),
+            latitudes: latitudes(&place, &cone, &known, attitude_sigma),
+            lags: Lags::new(&cone),
+            scores,
+        })
+    }
+}
+
+/// What a picture's limb height is made of: the rays of its edge points (camera frame), each with its share of the height.
+/// The shares sum to 1; on a short arc, where the height comes from the curvature, those of the ends and of the middle have
+/// opposite signs and large values, so that a height which varies along the limb is seen enlarged. Arguments as of
+/// [`Sighting::measure`]; without an attitude.
+pub fn shares(
+    camera: &Camera<f64>,
+    points: &[([f64; 2], f64)],
+    solution: &Solution<f64>,
+) -> Option<Vec<([f64; 3], f64)>> {
+    let cone = Cone::fit(camera, points, solution.axis.xyz(), solution.half_angle_rad.cos(), None)?;
+    Some(cone.rays.iter().map(|ray| (*ray).into()).zip(cone.shares()).collect())
+}
+
+impl Place {
+    fn new(body: &body::Config, frame: &Frame<f64>) -> Option<Self> {
+        let limb_m = body.limb_height_km * 1e3;
+        let given = frame.altitude_m.or(body.altitude_km.map(|km| km * 1e3));
+        let radius_m = body.mean_radius_km() * 1e3;
+        let sphere = |distance_m: f64| Self {
+            distance_m,
+            sin_expected: (radius_m + limb_m) / distance_m,
+            limb_m,
+            cone: None,
+            position_m: None,
+            radius_sigma_m: 0.0,
+            uneven_cos: 0.0,
+        };
+        let place = match (body.kind, frame.position_m) {
+            (Kind::Earth, Some(position)) => {
+                let cone = raised(position, limb_m)?;
+                let (altitude, _) = geodetic(position, WGS84_A_M, WGS84_B_M);
+                let sin = cone.mean_half_angle_rad().sin();
+                let radius = (sin * altitude - limb_m) / (1.0 - sin);
+                Self {
+                    cone: Some(cone),
+                    position_m: Some(position),
+                    uneven_cos: uneven_cos(&cone),
+                    ..Self { sin_expected: sin, ..sphere(radius + altitude) }
+                }
+            }
+            (Kind::EarthSphere | Kind::Sphere, Some([x, y, z])) => sphere(x.hypot(y).hypot(z)),
+            (Kind::Earth, None) => {
+                let place = sphere(radius_m + given?);
+                // The same at any latitude: the mean square of what its radius and its shape change.
+                let (mut radius2, mut uneven2) = (0.0, 0.0);
+                for k in 0..LATITUDES {
+                    let latitude = core::f64::consts::PI * (k as f64 / (LATITUDES - 1) as f64 - 0.5);
+                    let cone = raised(from_geodetic(latitude, 0.0, given?, WGS84_A_M, WGS84_B_M), limb_m)?;
+                    let off_m = place.distance_m * (cone.mean_half_angle_rad().sin() - place.sin_expected);
+                    radius2 += off_m * off_m / LATITUDES as f64;
+                    uneven2 += uneven_cos(&cone).powi(2) / LATITUDES as f64;
+                }
+                Self { radius_sigma_m: radius2.sqrt(), uneven_cos: uneven2.sqrt(), ..place }
+            }
+            (_, None) => sphere(radius_m + given?),
+            (_, Some(_)) => return None,
+        };
+        (place.sin_expected < 1.0 && place.sin_expected > 0.0).then_some(place)
+    }
+}
+
+fn raised(position_m: [f64; 3], limb_m: f64) -> Option<LimbCone<f64>> {
+    LimbCone::try_new(position_m, WGS84_A_M + limb_m, WGS84_B_M + limb_m)
+}
+
+/// Amplitude of the second harmonic of cos α.
+fn uneven_cos(cone: &LimbCone<f64>) -> f64 {
+    let (east, meridian) = cone.half_angles_rad();
+    0.5 * (meridian.cos() - east.cos())
+}
+
+/// Latitudes of the limb with their shares: of the points themselves where an attitude tells, else of the whole ring.
+fn latitudes(place: &Place, cone: &Cone, frame: &Frame<f64>, attitude_sigma_rad: f64) -> Vec<(f64, f64)> {
+    let (Some(position), Some(limb)) = (place.position_m, &place.cone) else { return Vec::new() };
+    let camera = Vector3::from(position);
+    // The point of a ray that is nearest to the centre: its latitude is that of the limb to the flattening.
+    let latitude = |ray: Vector3<f64>| {
+        let p = camera - ray * camera.dot(&ray);
+        geodetic([p.x, p.y, p.z], WGS84_A_M, WGS84_B_M).1.to_degrees()
+    };
+    match frame.cam_to_ecef {
+        Some(attitude) if attitude_sigma_rad < USELESS_ATTITUDE_RAD => {
+            let seen = cone.rays.iter().zip(cone.shares()).filter_map(|(ray, share)| {
+                let ray = hzn_core::frames::UnitVec3::try_new([ray.x, ray.y, ray.z])?;
+                Some((latitude(Vector3::from(attitude.apply(&ray).xyz())), share))
+            });
+            seen.collect()
+        }
+        _ => {
+            let axis = Vector3::from(limb.axis.xyz());
+            let (b1, b2) = basis(&axis);
+            let (sin, cos) = limb.mean_half_angle_rad().sin_cos();
+            let ray = |k: usize| {
+                let (s, c) = ((k as f64 + 0.5) * core::f64::consts::TAU / RING as f64).sin_cos();
+                axis * cos + (b1 * c + b2 * s) * sin
+            };
+            (0..RING).map(|k| (latitude(ray(k)), 1.0 / RING as f64)).collect()
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Flights of edge points whose limb height and noise are known.
+
+use hzn_core::body::{self, Kind};
+use hzn_core::camera::{self, Camera, Model};
+use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, from_geodetic};
+use hzn_core::frames::{Cov3, UnitVec3};
+use hzn_core::{Config, Frame, Solution};
+use nalgebra::Vector3;
+
+use super::{Calibration, Refusal, Sighting, Weighted, cone, edge, into_sensor_toml};
+
+/// A generator of normal numbers that is the same everywhere.
+struct Draws(u64);
+
+impl Draws {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+    fn normal(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (core::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// Edge noise: its sigma and length in pixels, and its white part.
+#[derive(Clone, Copy)]
+struct Noise(f64, f64, f64);
+
+fn camera(fov_deg: f64) -> camera::Config {
+    camera::Config::ideal(Model::Equidistant, 960, 720, 960.0 / fov_deg.to_radians())
+}
+
+fn earth() -> body::Config {
+    body::Config { kind: Kind::EarthSphere, limb_height_km: 15.0, limb_height_sigma_km: 30.0, ..Default::default() }
+}
+
+/// Edge points of the limb whose cone is (axis, cos α by ray) in the picture of a camera that looks at it, with noise across
+/// the limb; the axis lies `below` the optical axis, towards the `down` direction in the picture.
+fn limb(
+    camera: &Camera<f64>,
+    axis: Vector3<f64>,
+    cos: &dyn Fn(&Vector3<f64>) -> f64,
+    noise: Noise,
+    draws: &mut Draws,
+) -> Weighted {
+    let (b1, b2) = cone::basis(&axis);
+    let Noise(sigma, length, white) = noise;
+    let mut points: Weighted = Vec::new();
+    let (mut correlated, mut last) = (draws.normal(), None::<[f64; 2]>);
+    let steps = 5_000;
+    for k in 0..steps {
+        let (s, c) = (core::f64::consts::TAU * k as f64 / steps as f64).sin_cos();
+        let across = b1 * c + b2 * s;
+        let cos = cos(&across);
+        let ray = axis * cos + across * (1.0 - cos * cos).sqrt();
+        let Some(ray) = UnitVec3::try_new([ray.x, ray.y, ray.z]) else { continue };
+        let Some(p) = camera.project(&ray) else { continue };
+        let inside = p.u > 0.0 && p.v > 0.0 && p.u < f64::from(camera.width()) && p.v < f64::from(camera.height());
+        let step = last.map_or(1e9, |[u, v]: [f64; 2]| (p.u - u).hypot(p.v - v));
+        if !inside || step < 2.0 {
+            continue;
+        }
+        last = Some([p.u, p.v]);
+        let rho = (-step / length).exp();
+        correlated = rho * correlated + (1.0 - rho * rho).sqrt() * draws.normal();
+        let off = sigma * ((1.0 - white).sqrt() * correlated + white.sqrt() * draws.normal());
+        // Along the gradient of s·e in the picture.
+        let j = camera.ray(p).unwrap().jacobian();
+        let g = [0, 1].map(|i| (0..3).map(|r| j[r][i] * axis[r]).sum::<f64>());
+        let norm = g[0].hypot(g[1]);
+        points.push(([p.u + off * g[0] / norm, p.v + off * g[1] / norm], 1.0));
+    }
+    points
+}
+
+fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64> {
+    Solution {
+        axis: UnitVec3::try_new([axis.x, axis.y, axis.z]).unwrap(),
+        covariance: Cov3::from_upper([1e-8, 0.0, 0.0, 1e-8, 0.0, 1e-8]),
+        axis_ecef: None,
+        axis_body: None,
+        half_angle_rad,
+        fused_half_angle_rad: half_angle_rad,
+        altitude_m: None,
+        free: None,
+        rms_px: 0.1,
+        inliers: 400,
+        arc_px: 800.0,
+        candidate: 0,
+    }
+}
+
+/// Sightings of a limb at `limb_km` from 200 km with `fov_deg`, `scatter_km` of scatter between pictures.
+fn flight(count: usize, fov_deg: f64, limb_km: f64, scatter_km: f64, noise: Noise, seed: u64) -> Vec<Sighting> {
+    let config = camera(fov_deg);
+    let camera = Camera::try_new(&config).unwrap();
+    let mut draws = Draws(seed);
+    let radius = earth().mean_radius_km();
+    let each = (0..count).filter_map(|k| {
+        let altitude_km = 180.0 + 3.0 * k as f64;
+        let km = limb_km + scatter_km * draws.normal();
+        let alpha = ((radius + km) / (radius + altitude_km)).asin();
+        let below = alpha + (0.1 * k as f64).sin() * 0.1;
+        let axis = Vector3::new(0.3 * below.sin(), 0.954 * below.sin(), below.cos()).normalize();
+        let points = limb(&camera, axis, &|_| alpha.cos(), noise, &mut draws);
+        let frame = Frame { altitude_m: Some(altitude_km * 1e3), ..Frame::default() };
+        // From a start that is not the end.
+        Sighting::measure("p", &camera, &earth(), &frame, &points, &solution(axis, alpha + 1e-3))
+    });
+    each.collect()
+}
+
+#[test]
+fn a_flight_without_noise_gives_the_height_exactly() {
+    let sightings = flight(12, 90.0, 21.5, 0.0, Noise(1e-3, 30.0, 0.5), 1);
+    assert_eq!(sightings.len(), 12);
+    for s in &sightings {
+        assert!((s.limb_height_km - 21.5).abs() < 0.01, "{}", s.limb_height_km);
+    }
+}
+
+#[test]
+fn height_scatter_and_noise_are_found_within_their_errors() {
+    let c = Calibration::of(&earth(), &flight(30, 90.0, 18.7, 8.0, Noise(0.3, 40.0, 0.5), 2)).unwrap();
+    let h = &c.height;
+    assert!((h.km - 18.7).abs() < 2.0 * h.statistical_km && h.statistical_km < 2.5, "{h:?}");
+    assert!((4.0..11.0).contains(&h.scatter_km), "{h:?}");
+    assert!((0.25..0.35).contains(&c.edge.sigma_px), "{:?}", c.edge);
+    assert!((10.0..=80.0).contains(&c.edge.length_px) && (0.25..=0.7).contains(&c.edge.white), "{:?}", c.edge);
+    // (1 − ν) L and more, as the length is not known from one picture.
+    assert!((15.0..=200.0).contains(&c.edge.correlation_px), "{:?}", c.edge);
+    assert!(c.correlation.first().is_some_and(|p| (p.1 - 1.0).abs() < 1e-9));
+}
+
+#[test]
+fn heights_are_as_far_off_as_their_sigmas_say() {
+    let sightings = flight(60, 90.0, 18.7, 0.0, Noise(0.2, 20.0, 0.7), 3);
+    let c = Calibration::of(&earth(), &sightings).unwrap();
+    // Averaged over lengths up to the arc, sigma is on the careful side.
+    assert!((0.02..1.3).contains(&c.chi2), "{}", c.chi2);
+    assert!(c.alarm().is_none());
+}
+
+#[test]
+fn pictures_that_contradict_each_other_raise_the_alarm() {
+    let c = Calibration::of(&earth(), &flight(24, 90.0, 18.7, 15.0, Noise(0.2, 20.0, 0.7), 4)).unwrap();
+    assert!(matches!(c.alarm(), Some(Refusal::Alarm { chi2, .. }) if chi2 > 2.0), "{}", c.chi2);
+}
+
+#[test]
+fn what_pictures_do_not_tell_is_refused_with_the_number() {
+    let noise = Noise(0.3, 40.0, 0.5);
+    let few = Calibration::of(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();
+    assert_eq!(few, Refusal::TooFew { answered: 11, least: 12 });
+    assert!(few.to_string().starts_with("11 pictures were answered, but at least 12 are needed"), "{few}");
+    // Sigma grows with the inverse square of the field.
+    let narrow = Calibration::of(&earth(), &flight(24, 15.0, 18.7, 0.0, noise, 6)).unwrap_err();
+    assert!(matches!(narrow, Refusal::TooVague { sigma_km, .. } if sigma_km > 3.5), "{narrow:?}");
+    // Half of them on other edges.
+    let mut mixed = flight(16, 90.0, 18.7, 0.0, noise, 7);
+    mixed.iter_mut().skip(11).for_each(|s| s.limb_height_km += 90.0);
+    assert_eq!(Calibration::of(&earth(), &mixed).unwrap_err(), Refusal::Apart { apart: 5, pictures: 16 });
+}
+
+/// A limb by latitude, seen all round by a camera that looks straight down from a polar orbit.
+#[test]
+fn a_flight_over_all_latitudes_gives_rows() {
+    let config = camera(140.0);
+    let camera = Camera::try_new(&config).unwrap();
+    let body = body::Config { kind: Kind::Earth, ..earth() };
+    let mut draws = Draws(8);
+    let height_km = |deg: f64| 25.0 + 4.5 * deg / 90.0;
+    let sightings: Vec<Sighting> = (0..24)
+        .filter_map(|k| {
+            let latitude = (-80.0 + 160.0 * k as f64 / 23.0f64).to_radians();
+            let position = from_geodetic(latitude, 0.3, 600e3, WGS84_A_M, WGS84_B_M);
+            let frame = Frame { position_m: Some(position), ..Frame::default() };
+            // The mean height of the ring, as the whole limb is seen.
+            let limb_m = height_km(latitude.to_degrees()) * 1e3 * 0.91 + 25e3 * 0.09;
+            let cone = LimbCone::try_new(position, WGS84_A_M + limb_m, WGS84_B_M + limb_m)?;
+            let axis = Vector3::new(0.05, 0.02, 1.0).normalize();
+            let alpha = cone.mean_half_angle_rad();
+            let points = limb(&camera, axis, &|_| alpha.cos(), Noise(0.05, 10.0, 0.8), &mut draws);
+            Sighting::measure("p", &camera, &body, &frame, &points, &solution(axis, alpha))
+        })
+        .collect();
+    let c = Calibration::of(&body, &sightings).unwrap();
+    assert!(c.height.by_latitude.len() >= 2, "{:?}", c.height);
+    for [deg, km, sigma] in &c.height.by_latitude {
+        assert!((km - height_km(*deg)).abs() < 1.0, "{deg}: {km} ± {sigma}");
+    }
+    let mut sensor = Config::new(config);
+    c.apply(&mut sensor);
+    sensor.check().unwrap();
+    assert_eq!(sensor.body.limb_height_by_latitude_km.len(), c.height.by_latitude.len());
+}
+
+#[test]
+fn variance_of_the_cone_is_that_of_dense_matrices() {
+    let config = camera(90.0);
+    let camera = Camera::try_new(&config).unwrap();
+    let axis = Vector3::new(0.3, 0.9, 0.5).normalize();
+    let points = limb(&camera, axis, &|_| 0.3, Noise(0.2, 30.0, 0.5), &mut Draws(9));
+    let cone = cone::Cone::fit(&camera, &points, axis.into(), 0.3, None).unwrap();
+    let (sigma, length, white) = (0.4, 50.0, 0.3);
+    let places: Vec<f64> = cone
+        .rows
+        .iter()
+        .scan(0.0, |at, r| {
+            let here = *at;
+            *at += r.step_px;
+            Some(here)
+        })
+        .collect();
+    let a = cone.inverse * cone.to_cos;
+    let mut dense = 0.0;
+    for (i, one) in cone.rows.iter().enumerate() {
+        for (j, other) in cone.rows.iter().enumerate() {
+            let rho =
+                (-(places[i] - places[j]).abs() / length).exp() * (1.0 - white) + if i == j { white } else { 0.0 };
+            dense += sigma * sigma * rho * one.weight * other.weight * a.dot(&one.h) * a.dot(&other.h);
+        }
+    }
+    let found = cone.variance_of_cos(sigma, length, white);
+    assert!((found / dense - 1.0).abs() < 1e-9, "{found} {dense}");
+    let shares: f64 = cone.shares().iter().sum();
+    assert!((shares - 1.0).abs() < 1e-9, "{shares}");
+    assert!(edge::variance_of_cos(&cone, &edge::scores(&cone).unwrap()) > 0.0);
+}
+
+#[test]
+fn a_longer_focal_length_makes_the_limb_as_much_higher_as_is_said() {
+    let config = camera(90.0);
+    let camera = Camera::try_new(&config).unwrap();
+    let longer =
+        Camera::try_new(&camera::Config { fx_px: config.fx_px * 1.001, fy_px: config.fy_px * 1.001, ..config.clone() });
+    let radius = earth().mean_radius_km();
+    let alpha = ((radius + 20.0) / (radius + 200.0)).asin();
+    let axis = Vector3::new(0.1, alpha.sin(), alpha.cos()).normalize();
+    let points = limb(&camera, axis, &|_| alpha.cos(), Noise(1e-4, 10.0, 0.5), &mut Draws(10));
+    let frame = Frame { altitude_m: Some(200e3), ..Frame::default() };
+    let at = |camera: &Camera<f64>| {
+        Sighting::measure("p", camera, &earth(), &frame, &points, &solution(axis, alpha)).unwrap()
+    };
+    let (told, changed) = (at(&camera), at(&longer.unwrap()));
+    let grown = changed.limb_height_km - told.limb_height_km;
+    assert!((grown / (told.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", told.km_per_focal);
+}
+
+const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px = 600.0\n\
+                      fy_px = 600.0\ncx_px = 479.5\ncy_px = 359.5\n\n[body]\nkind = \"earth-sphere\"\n# the old guess\n\
+                      limb_height_km = 12.0 # from a book\nlimb_height_sigma_km = 3.0\n\n[reject]\nthreshold_px = 2.5\n";
+
+#[test]
+fn the_keys_are_written_and_all_other_text_stays() {
+    let c = Calibration::of(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
+    let written = into_sensor_toml(SENSOR, &c, "flight").unwrap();
+    let text = &written.text;
+    for kept in ["# mine\n", "# the old guess\n", "# from a book", "threshold_px = 2.5", "cx_px = 479.5"] {
+        assert!(text.contains(kept), "{kept} in {text}");
+    }
+    assert!(text.contains("measured on 16 pictures of flight by `hzn calibrate noise`"), "{text}");
+    let read = crate::sensor::parse(text, std::path::Path::new("sensor.toml")).unwrap().config;
+    let mut applied = crate::sensor::parse(SENSOR, std::path::Path::new("sensor.toml")).unwrap().config;
+    c.apply(&mut applied);
+    assert_eq!(read, applied);
+    // Once more: its own comments are replaced, not repeated.
+    let again = into_sensor_toml(text, &c, "flight").unwrap();
+    assert_eq!(again.text, *text);
+}
+
+#[test]
+fn of_several_bodies_the_earth_gets_its_own_noise() {
+    let bodies = SENSOR.replace(
+        "[body]\nkind = \"earth-sphere\"",
+        "[[bodies]]\nkind = \"sun\"\n\n[[bodies]]\nkind = \"earth-sphere\"",
+    );
+    let c = Calibration::of(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
+    let written = into_sensor_toml(&bodies, &c, "flight").unwrap();
+    let read = crate::sensor::parse(&written.text, std::path::Path::new("sensor.toml")).unwrap().config;
+    let mut applied = crate::sensor::parse(&bodies, std::path::Path::new("sensor.toml")).unwrap().config;
+    c.apply(&mut applied);
+    assert_eq!(read, applied);
+    let wide = super::looks_with(&read).unwrap();
+    assert_eq!((wide.body.kind, wide.bodies.len(), wide.body.limb_height_sigma_km), (Kind::EarthSphere, 0, 30.0));
+}

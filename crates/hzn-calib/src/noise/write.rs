@@ -1,0 +1,158 @@
+//! A calibration into the text of a sensor.toml: its keys with comments, all other text as it was.
+
+use hzn_core::body::Kind;
+use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
+
+use super::calibration::{Calibration, digits};
+
+/// Comments that a calibration wrote begin so; the next one replaces them.
+const MARK: &str = "# calibrated:";
+
+/// The text of a sensor.toml after a calibration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// The whole text.
+    pub text: String,
+    /// Keys that were written, as `[body] limb_height_km = 18.9`.
+    pub keys: Vec<String>,
+}
+
+/// A key, its value, and why it is so.
+struct Line {
+    key: &'static str,
+    value: Value,
+    why: String,
+}
+
+/// Writes limb height and noise into the text of a sensor.toml. `source` names the pictures, for the comments.
+///
+/// # Errors
+/// The text is no TOML, or has something else in the place of a section.
+pub fn into_sensor_toml(text: &str, calibration: &Calibration, source: &str) -> Result<Written, String> {
+    let mut document: DocumentMut = text.parse().map_err(|e| format!("is no TOML: {e}"))?;
+    let mut keys = Vec::new();
+    let several = document.contains_key("bodies");
+    if several {
+        let body = body_of(&mut document, calibration.body)?;
+        put_all(body, limb(calibration, source), "[[bodies]]", &mut keys);
+        body.remove_rows(calibration);
+        let noise = body.entry("covariance").or_insert_with(toml_edit::table);
+        let noise = noise.as_table_like_mut().ok_or("[bodies.covariance] is no section")?;
+        put_all(noise, noise_lines(calibration), "[bodies.covariance]", &mut keys);
+    } else {
+        let body = section(&mut document, "body")?;
+        put_all(body, limb(calibration, source), "[body]", &mut keys);
+        body.remove_rows(calibration);
+        put_all(section(&mut document, "covariance")?, noise_lines(calibration), "[covariance]", &mut keys);
+    }
+    Ok(Written { text: document.to_string(), keys })
+}
+
+fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
+    let item = document.entry(name).or_insert_with(|| Item::Table(Table::new()));
+    // An inline table has no room for comments.
+    if let Item::Value(Value::InlineTable(table)) = item {
+        *item = Item::Table(table.clone().into_table());
+    }
+    item.as_table_like_mut().ok_or(format!("{name} is no section"))
+}
+
+/// The one of several bodies that was calibrated.
+fn body_of(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike, String> {
+    let name = match kind {
+        Kind::Earth => "earth",
+        Kind::EarthSphere => "earth-sphere",
+        Kind::Sun => "sun",
+        Kind::Moon => "moon",
+        Kind::Sphere => "sphere",
+    };
+    let is_it = |table: &Table| table.get("kind").map_or("earth", |k| k.as_str().unwrap_or_default()) == name;
+    let bodies = document.get_mut("bodies").and_then(Item::as_array_of_tables_mut);
+    let bodies = bodies.ok_or("[[bodies]] is no list of sections")?;
+    bodies.iter_mut().find(|t| is_it(t)).map(|t| t as &mut dyn TableLike).ok_or(format!("no [[bodies]] of kind {name}"))
+}
+
+/// What of the text a calibration takes away.
+trait RemoveRows {
+    /// Rows by latitude, which would beat the one height that was measured.
+    fn remove_rows(&mut self, calibration: &Calibration);
+}
+
+impl RemoveRows for dyn TableLike + '_ {
+    fn remove_rows(&mut self, calibration: &Calibration) {
+        if calibration.height.by_latitude.is_empty() {
+            self.remove("limb_height_by_latitude_km");
+        }
+    }
+}
+
+fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
+    let h = &calibration.height;
+    let counted = calibration.pictures.iter().filter(|p| p.counts).count();
+    let mut parts = vec![
+        format!("{:.2} km edge noise over all pictures", h.statistical_km),
+        format!("{:.2} km scatter between them", h.scatter_km),
+        format!("{:.2} km a shift of all edges by their RMS", h.shift_km),
+    ];
+    if h.radius_km > 0.0 {
+        parts.push(format!("{:.2} km the radius, unknown without a position", h.radius_km));
+    }
+    let mut lines = vec![
+        Line {
+            key: "limb_height_km",
+            value: digits(h.km).into(),
+            why: format!("measured on {counted} pictures of {source} by `hzn calibrate noise`"),
+        },
+        Line { key: "limb_height_sigma_km", value: digits(h.sigma_km).into(), why: parts.join(", ") },
+    ];
+    if !h.by_latitude.is_empty() {
+        let row = |[deg, km, _]: &[f64; 3]| Array::from_iter([*deg, digits(*km)]);
+        let sigmas: Vec<String> =
+            h.by_latitude.iter().map(|[deg, _, sigma]| format!("{deg:.0}° ± {sigma:.2}")).collect();
+        lines.push(Line {
+            key: "limb_height_by_latitude_km",
+            value: Array::from_iter(h.by_latitude.iter().map(row)).into(),
+            why: format!("the same by latitude, for frames with a position; {} km", sigmas.join(", ")),
+        });
+    }
+    lines
+}
+
+fn noise_lines(calibration: &Calibration) -> Vec<Line> {
+    let e = &calibration.edge;
+    let length = "one length that says of the fit what the residuals of each picture say of it".to_owned();
+    vec![
+        Line { key: "sigma_px", value: digits(e.sigma_px).into(), why: "RMS of the residuals along the limb".into() },
+        Line { key: "correlation_px", value: digits(e.correlation_px).into(), why: length },
+        Line {
+            key: "bias_px",
+            value: digits(e.bias_px).into(),
+            why: "what shifts all points alike cannot be seen in residuals: taken for as large as their RMS".into(),
+        },
+    ]
+}
+
+fn put_all(table: &mut dyn TableLike, lines: Vec<Line>, section: &str, keys: &mut Vec<String>) {
+    for Line { key, mut value, why } in lines {
+        keys.push(format!("{section} {key} = {}", value.to_string().trim()));
+        match table.get_mut(key) {
+            // In its place, so that comments before and after stay.
+            Some(old) => {
+                if let Some(old) = old.as_value() {
+                    *value.decor_mut() = old.decor().clone();
+                }
+                *old = Item::Value(value);
+            }
+            None => {
+                table.insert(key, Item::Value(value));
+            }
+        }
+        if let Some(mut key) = table.key_mut(key) {
+            let decor = key.leaf_decor_mut();
+            let before = decor.prefix().and_then(|p| p.as_str()).unwrap_or_default();
+            let kept: String =
+                before.lines().filter(|l| !l.trim_start().starts_with(MARK)).map(|l| format!("{l}\n")).collect();
+            decor.set_prefix(format!("{kept}{MARK} {why}\n"));
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! The report as one page of HTML that needs no other file.
+
+use hzn_calib::noise::Calibration;
+
+use super::text;
+use crate::plot::{Chart, Series, Style};
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 1rem;color:#222}\
+h1{font-size:1.5rem}td{padding:.2rem .8rem;border-bottom:1px solid #eee}\
+.plots{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}.plots svg{width:100%;height:auto}";
+
+pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str) -> anyhow::Result<String> {
+    let rows: String = text::lines(calibration, pictures)
+        .iter()
+        .map(|(name, value)| format!("<tr><td>{name}</td><td>{}</td></tr>", escape(value)))
+        .collect();
+    let alarm = calibration.alarm().map(|a| format!("<p><b>{}</b></p>", escape(&a.to_string()))).unwrap_or_default();
+    Ok(format!(
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Limb height and noise</title><style>{STYLE}</style>\
+         <h1>Limb height and noise: {}</h1>{alarm}<table>{rows}</table><div class=\"plots\">{}{}</div></html>\n",
+        escape(flight),
+        heights(calibration).svg()?,
+        correlation(calibration).svg()?
+    ))
+}
+
+/// The limb height of each picture with its errors.
+fn heights(calibration: &Calibration) -> Chart {
+    let each = || calibration.pictures.iter().enumerate().map(|(i, p)| (i as f64, p));
+    let dots = |counts: bool| each().filter(move |(_, p)| p.counts == counts).map(|(x, p)| (x, p.km));
+    let bars = each().flat_map(|(x, p)| [(x, p.km - p.sigma_km), (x, p.km + p.sigma_km), (x, f64::NAN)]);
+    let mut chart = Chart::new("Limb height of each picture", "picture", "limb height [km]")
+        .with(Series::new("1 sigma from edge noise", Style::Ideal, bars))
+        .with(Series::new("measured", Style::Dots, dots(true)))
+        .with(Series::new("calibration", Style::Line, each().map(|(x, p)| (x, p.explained_km))));
+    if calibration.pictures.iter().any(|p| !p.counts) {
+        chart = chart.with(Series::new("left out", Style::Dots, dots(false)));
+    }
+    chart
+}
+
+/// How alike residuals are along the edge.
+fn correlation(calibration: &Calibration) -> Chart {
+    let e = calibration.edge;
+    let last = calibration.correlation.last().map_or(1.0, |p| p.0);
+    let model = (0..=100).map(|k| {
+        let px = last * f64::from(k) / 100.0;
+        (px, (1.0 - e.white) * (-px / e.length_px).exp())
+    });
+    Chart::new("Correlation of the residuals along the limb", "distance [px]", "correlation")
+        .with(Series::new("model, before three parameters are fitted", Style::Ideal, model))
+        .with(Series::new("residuals", Style::Line, calibration.correlation.iter().copied()))
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}

@@ -1,0 +1,170 @@
+//! Which effect of a scene moves the limb: the scene with its effects switched off one at a time.
+
+use anyhow::{Context, anyhow};
+use hzn_sim::detector::Tone;
+use hzn_sim::scenario::Format;
+use hzn_sim::{Optics, Scenario, World};
+
+use hzn_calib::noise;
+use hzn_core::HostHorizon;
+use hzn_core::camera::Camera;
+use rayon::prelude::*;
+
+use super::Effort;
+use super::defaults::{Outcome, Rendered};
+use crate::document::Section;
+use crate::fly::{Sensor, deg, fly_rendered, two_digits};
+
+/// Pictures a variant.
+const PICTURES: usize = 24;
+/// Not a seed of another study.
+const SEED: u64 = 404;
+
+/// A name, and what it changes.
+type Variant = (&'static str, fn(&mut Scenario));
+
+const ROCKET: &[Variant] = &[
+    ("as it is", |_| ()),
+    ("no veil", |s| s.optics.veil = 0.0),
+    ("no bloom", |s| s.optics.bloom = 0.0),
+    ("no ghosts", |s| s.optics.ghosts = 0.0),
+    ("no fall-off", |s| s.optics.vignetting = 0.0),
+    ("linear tone", |s| s.detector.tone = Tone::Linear),
+    ("grey", |s| s.detector.colour = false),
+    ("no JPEG", |s| s.capture.format = Format::Png),
+    ("global shutter", |s| s.shutter = Default::default()),
+    ("no clouds", no_clouds),
+    ("linear tone, no stray light", |s| {
+        s.detector.tone = Tone::Linear;
+        s.optics = Optics { vignetting: s.optics.vignetting, ..Optics::default() };
+    }),
+    ("none of these", |s| {
+        s.detector.tone = Tone::Linear;
+        s.detector.colour = false;
+        s.optics = Optics::default();
+        s.capture.format = Format::Png;
+        s.shutter = Default::default();
+        no_clouds(s);
+    }),
+];
+
+const TUMBLE: &[Variant] = &[
+    ("as it is", |_| ()),
+    ("global shutter", |s| s.shutter.readout_s = 0.0),
+    ("global shutter, no exposure time", |s| s.shutter = Default::default()),
+    ("global shutter, no stray light", |s| {
+        s.shutter.readout_s = 0.0;
+        s.optics = Optics { vignetting: s.optics.vignetting, ..Optics::default() };
+    }),
+    ("global shutter, no fall-off", |s| {
+        s.shutter.readout_s = 0.0;
+        s.optics.vignetting = 0.0;
+    }),
+    ("global shutter, no clouds", |s| {
+        s.shutter.readout_s = 0.0;
+        no_clouds(s);
+    }),
+    ("global shutter, exposure never clips", |s| {
+        s.shutter.readout_s = 0.0;
+        s.exposure.target_mean = None;
+        s.exposure.gain = 0.5;
+    }),
+    ("global shutter, none of these", |s| {
+        s.shutter = Default::default();
+        s.optics = Optics::default();
+        s.exposure.target_mean = None;
+        s.exposure.gain = 0.5;
+        no_clouds(s);
+    }),
+    ("the same, a limb without air", |s| {
+        s.shutter = Default::default();
+        s.optics = Optics::default();
+        s.world = World::Plain;
+    }),
+];
+
+fn no_clouds(scenario: &mut Scenario) {
+    if let World::Visible(world) = &mut scenario.world {
+        world.clear = true;
+    }
+}
+
+pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
+    let count = effort.frames(PICTURES);
+    let mut s = Section::default();
+    s.text(format!(
+        "{count} pictures of one flight, rendered anew with effects switched off. *found*: the limb height of `hzn calibrate \
+         noise`, from the curvature of the limb. *points*: the mean true height of the edge points. *curvature*: the true \
+         heights of the points, each with its share in the fitted height; where the height varies along the limb a fit with \
+         free half-angle takes the variation for another curvature. *found* less *curvature* is geometry: shape of the Earth, \
+         rolling shutter. χ²: the scatter of the pictures' limb heights over their errors. RMS and NEES: with the \
+         height of *points* ± 1 km told, and the default noise.",
+    ));
+    for (scene, variants) in [("rocket", ROCKET), ("tumble", TUMBLE)] {
+        let mut rows = Vec::new();
+        for (name, change) in variants {
+            let mut scenario = Scenario::builtin(scene).ok_or_else(|| anyhow!("no scene {scene}"))?;
+            scenario.seed = SEED;
+            scenario.capture.frames = u32::try_from(count)?;
+            change(&mut scenario);
+            rows.push(cells(name, &Rendered::of(&scenario).with_context(|| format!("{scene}: {name}"))?)?);
+        }
+        s.table([&format!("`{scene}`"), "found", "points", "curvature", "χ²", "edge RMS", "RMS", "NEES"], rows);
+    }
+    Ok(s)
+}
+
+fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
+    let none = || "–".to_owned();
+    let found = flight.calibration.as_ref();
+    let mut told = flight.untold();
+    let [points_km, curvature_km] = heights_km(flight)?;
+    told.body.limb_height_km = points_km;
+    told.body.limb_height_sigma_km = 1.0;
+    let cases = fly_rendered(&flight.flight, &flight.pictures, &[Sensor::new("told", told)])?;
+    let outcome = Outcome { told: "", cases: cases.into_iter().flatten().collect() };
+    Ok(vec![
+        name.to_owned(),
+        match found {
+            Ok(c) => format!(
+                "{:.2} ± {:.2} km",
+                c.height.km,
+                c.height.statistical_km.hypot(c.height.scatter_km / (c.pictures.len() as f64).sqrt())
+            ),
+            Err(why) => why.to_string(),
+        },
+        format!("{points_km:.2} km"),
+        format!("{curvature_km:.2} km"),
+        found.map_or_else(|_| none(), |c| format!("{:.2}", c.chi2)),
+        found.map_or_else(|_| none(), |c| format!("{:.3} px", c.edge.sigma_px)),
+        deg(outcome.rms_deg()),
+        two_digits(outcome.mean_nees()),
+    ])
+}
+
+/// Weighted by the pictures' own errors: the mean true height of the edge points, and the mean of these heights by their
+/// shares in the fitted one.
+fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
+    let wide = noise::looks_with(&flight.untold()).context("no body with a limb height")?;
+    let camera = Camera::try_new(&wide.camera)?;
+    let each = flight.flight.frames.par_iter().zip(&flight.pictures).map_init(
+        || HostHorizon::boxed(&wide),
+        |horizon, (frame, picture)| {
+            let horizon = horizon.as_mut().ok()?;
+            let known = frame.known();
+            let expected = horizon.expect(&known).ok()?;
+            let watch = noise::Points::default();
+            let solution = horizon.process_observed(&picture.view(), &expected, &watch).solution?;
+            let points = watch.of_candidate(solution.candidate);
+            let sighting = noise::Sighting::measure(&frame.file, &camera, &wide.body, &known, &points, &solution)?;
+            let (rays, shares): (Vec<_>, Vec<_>) = noise::shares(&camera, &points, &solution)?.into_iter().unzip();
+            let heights = frame.scene.tangent_heights_km(rays);
+            let mean = heights.iter().sum::<f64>() / heights.len() as f64;
+            let seen = heights.iter().zip(&shares).map(|(h, share)| h * share).sum::<f64>();
+            Some([mean, seen, sighting.sigma_km.powi(-2)])
+        },
+    );
+    let each: Vec<[f64; 3]> = each.flatten().collect();
+    let total: f64 = each.iter().map(|e| e[2]).sum();
+    Ok([0, 1].map(|i| each.iter().map(|e| e[i] * e[2]).sum::<f64>() / total))
+}
