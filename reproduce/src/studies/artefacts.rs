@@ -178,7 +178,7 @@ fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
     s.text(format!(
         "Clean limbs with the same artefacts next to them: the body is lit all along, the limb crosses the picture over at \
          least half its width at a height of 12 to 22 km and falls off exponentially; the artefact leaves at least 90 % of \
-         it alone. An answer more than {FALSE_SIGMAS}σ or {GROSS_DEG}° from the truth is false. Alone: the same pictures \
+         the limb alone and half of the sky dark. An answer more than {FALSE_SIGMAS}σ or {GROSS_DEG}° from the truth is false. Alone: the same pictures \
          without the artefact."
     ));
     let row = |name: &str, of: &dyn Fn(Kind) -> bool| {

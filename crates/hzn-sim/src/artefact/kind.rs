@@ -27,10 +27,12 @@ pub enum Kind {
     Clouds,
     /// Cities, roads and lightning at night, without a limb.
     Lights,
+    /// A ghost far off the axis: cut by a rim of the lens, or an ellipse.
+    Vignetted,
 }
 
 impl Kind {
-    /// All of them.
+    /// All of them. Pictures depend on a kind's place here.
     pub const ALL: &[Self] = &[
         Self::Ring,
         Self::Disc,
@@ -44,6 +46,7 @@ impl Kind {
         Self::Moon,
         Self::Clouds,
         Self::Lights,
+        Self::Vignetted,
     ];
 
     /// Name in tables and on command lines.
@@ -61,6 +64,7 @@ impl Kind {
             Self::Moon => "moon",
             Self::Clouds => "clouds",
             Self::Lights => "lights",
+            Self::Vignetted => "vignetted",
         }
     }
 
@@ -71,7 +75,7 @@ impl Kind {
 
     /// Whether its edges are those of discs, which can have the very half-angle that is expected.
     pub const fn is_disc(self) -> bool {
-        matches!(self, Self::Disc | Self::FarDisc | Self::Chain)
+        matches!(self, Self::Disc | Self::FarDisc | Self::Chain | Self::Vignetted)
     }
 
     /// Whether the camera looks down on the body, from too near for its limb to be in view.

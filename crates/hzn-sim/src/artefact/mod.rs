@@ -9,7 +9,7 @@
 //! | `kind` | which artefacts there are |
 //! | `lens` | the cameras that are drawn |
 //! | `shape` | light and cover of a figure at a place of the picture |
-//! | `circle`, `polygon`, `streak`, `glare`, `panel`, `window`, `moon`, `clouds`, `lights` | one figure each, with its ranges |
+//! | `circle`, `polygon`, `streak`, `glare`, `panel`, `window`, `moon`, `clouds`, `lights`, `vignetted` | one figure each, with its ranges |
 //! | `recipe` | the figures of a kind |
 //! | `trial` | a picture with its truth: without a limb, or with one and the artefact next to it |
 //! | `outcome` | what a sensor says of a trial, and whether that is false |
@@ -33,6 +33,7 @@ mod recipe;
 mod shape;
 mod streak;
 mod trial;
+mod vignetted;
 mod window;
 
 #[cfg(test)]

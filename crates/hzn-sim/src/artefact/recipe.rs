@@ -11,6 +11,7 @@ use super::panel::Panel;
 use super::polygon::Polygon;
 use super::shape::{Canvas, Shape};
 use super::streak::Streak;
+use super::vignetted::Vignetted;
 use super::window::Window;
 
 /// Figures, and the circles among them (middle and radius in pixels).
@@ -21,18 +22,17 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    /// Whether something can be seen of them: light or cover at one place in a hundred of the picture.
-    pub(super) fn is_seen(&self, canvas: &Canvas) -> bool {
-        let place = |i: u32| {
-            let (x, y) = (f64::from(i % 20) + 0.5, f64::from(i / 20) + 0.5);
-            ((x / 20.0 * canvas.width) as f32, (y / 20.0 * canvas.height) as f32)
-        };
-        let bright = |(x, y)| self.shapes.iter().map(|s| s.at(x, y)).any(|s| s.light > 0.05 || s.cover > 0.5);
-        self.shapes.is_empty() || (0..400).filter(|&i| bright(place(i))).count() >= 4
+    /// Whether a place in pixels is lit or covered.
+    pub(super) fn is_bright(&self, x: f64, y: f64) -> bool {
+        self.shapes.iter().map(|s| s.at(x as f32, y as f32)).any(|s| s.light > 0.05 || s.cover > 0.5)
     }
 
     fn add(&mut self, shape: impl Shape + 'static) {
         self.shapes.push(Box::new(shape));
+    }
+    fn vignetted(&mut self, ghost: Vignetted) {
+        self.discs.extend(ghost.circles());
+        self.add(ghost);
     }
     fn disc(&mut self, circle: Circle) {
         self.discs.push(circle.place());
@@ -58,6 +58,7 @@ pub(super) fn draw(kind: Kind, seed: u64, dice: &mut Dice, canvas: &Canvas) -> F
             Kind::Moon => out.add(Moon::draw(dice, canvas)),
             Kind::Clouds => out.add(Clouds::draw(dice, canvas, seed)),
             Kind::Lights => out.add(Lights::draw(dice, canvas)),
+            Kind::Vignetted => out.vignetted(Vignetted::draw(dice, canvas)),
         }
     }
     out

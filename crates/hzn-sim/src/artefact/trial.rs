@@ -54,6 +54,8 @@ const TRIES: u64 = 60;
 /// Light of a figure at the limb from which it disturbs it, and the share of the limb that may be disturbed.
 const DISTURBED: f32 = 0.03;
 const SHARE: f64 = 0.1;
+/// Places a side at which it is looked at where an artefact is bright.
+const GRID: u32 = 24;
 /// Places along the limb where that is looked at, and pixels around them.
 const PLACES: usize = 120;
 const AROUND_PX: f32 = 12.0;
@@ -112,8 +114,8 @@ impl Trial {
     }
 
     /// A clean limb with the artefact next to it: the body is lit all along, the limb crosses the picture over at least
-    /// half its width, and the artefact leaves at least 90 % of it alone. Kinds of ground become the texture inside the
-    /// limb. `None` where no such picture was found for this seed.
+    /// half its width, and the artefact is in view, leaves at least 90 % of the limb alone and half of the sky dark. Kinds
+    /// of ground become the texture inside the limb. `None` where no such picture was found for this seed.
     ///
     /// # Errors
     /// As [`Trial::without_limb`].
@@ -145,6 +147,17 @@ impl Trial {
             return Ok(None);
         }
         let canvas = canvas_of(&scene.camera);
+        let sky = |x: f64, y: f64| {
+            let ray = lens.unproject(ImagePoint { u: x, v: y })?;
+            Some(Vector3::from(ray.xyz()).dot(&axis) < libm::cos(cone.mean_half_angle_rad()))
+        };
+        let grid: Vec<(f64, f64, bool)> = (0..GRID * GRID)
+            .filter_map(|i| {
+                let place = |k: u32, size: f64| (f64::from(k) + 0.5) / f64::from(GRID) * size;
+                let (x, y) = (place(i % GRID, w), place(i / GRID, h));
+                Some((x, y, sky(x, y)?))
+            })
+            .collect();
         for attempt in 0..TRIES {
             let figures = match kind.is_ground() {
                 true => Figures::default(),
@@ -159,7 +172,12 @@ impl Trial {
                     light > DISTURBED || cover > DISTURBED
                 })
             };
-            if limb.iter().filter(hurt).count() as f64 <= SHARE * limb.len() as f64 && figures.is_seen(&canvas) {
+            let alone = limb.iter().filter(hurt).count() as f64 <= SHARE * limb.len() as f64;
+            let bright: Vec<bool> =
+                grid.iter().filter(|(x, y, _)| figures.is_bright(*x, *y)).map(|(.., sky)| *sky).collect();
+            let dark = 2 * bright.iter().filter(|&&sky| sky).count() <= grid.iter().filter(|(.., sky)| *sky).count();
+            let seen = bright.len() >= 4 || matches!(kind, Kind::Moon | Kind::Clouds | Kind::Lights);
+            if alone && dark && seen {
                 return Self::drawn(kind, seed, scene, true, figures, None).map(Some);
             }
         }

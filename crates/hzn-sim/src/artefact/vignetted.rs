@@ -1,0 +1,58 @@
+//! Ghosts that a rim of the lens cuts off.
+
+use super::circle::Circle;
+use super::dice::Dice;
+use super::shape::{Canvas, Shape, Spot, step};
+
+/// What two circles of the picture have in common, or an ellipse: a ghost far off the axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Vignetted {
+    disc: Circle,
+    /// Middle, radius and blur of the rim that cuts it, pixels.
+    rim: ([f32; 2], f32, f32),
+    /// Middle of the disc, and how much it is stretched along a direction.
+    middle: [f32; 2],
+    along: [f32; 2],
+    stretch: f32,
+}
+
+impl Vignetted {
+    /// A disc as [`Circle::disc`] draws it, stretched by 0.9 to 1.1 for one in two; cut by a rim of 0.7 to 1.5 times its
+    /// radius, whose middle is 0.2 to 1.2 radii away, blurred by 0.5 to 6 px.
+    pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
+        let disc = Circle::disc(dice, canvas);
+        let (middle, radius) = disc.place();
+        let (sin, cos) = libm::sincos(dice.turn());
+        let away = dice.between(0.2, 1.2) * radius;
+        let rim = [(middle[0] + away * cos) as f32, (middle[1] + away * sin) as f32];
+        let (b, a) = libm::sincos(dice.turn());
+        Self {
+            disc,
+            rim: (rim, (radius * dice.between(0.7, 1.5)) as f32, dice.between_log(0.5, 6.0) as f32),
+            middle: middle.map(|m| m as f32),
+            along: [a as f32, b as f32],
+            stretch: if dice.chance(0.5) { dice.between(0.9, 1.1) as f32 } else { 1.0 },
+        }
+    }
+
+    /// Middles and radii in pixels of the two circles.
+    pub(super) fn circles(&self) -> [([f64; 2], f64); 2] {
+        let (middle, radius, _) = self.rim;
+        [self.disc.place(), (middle.map(f64::from), f64::from(radius))]
+    }
+}
+
+impl Shape for Vignetted {
+    fn at(&self, x: f32, y: f32) -> Spot {
+        let (middle, radius, soft) = self.rim;
+        let (dx, dy) = (x - middle[0], y - middle[1]);
+        let within = step(radius - (dx * dx + dy * dy).sqrt(), soft);
+        if within <= 0.0 {
+            return Spot::default();
+        }
+        let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
+        let more = (dx * self.along[0] + dy * self.along[1]) * (1.0 / self.stretch - 1.0);
+        let spot = self.disc.at(x + more * self.along[0], y + more * self.along[1]);
+        Spot { light: spot.light * within, ..spot }
+    }
+}
