@@ -25,14 +25,14 @@ pub(super) struct Clouds {
 impl Clouds {
     /// Clouds of 0.05 to 1.5 diagonals in 3 to 6 octaves, stretched up to four times, covering 10 to 90 %, over ground
     /// of 0.01 to 0.25, as bright as 0.25 to 1. Every third has a front: beyond a curve with a radius of 0.3 to 10
-    /// diagonals, ragged by 0.5 to 30 px and blurred by 0.7 to 20 px, there are no clouds.
+    /// diagonals, ragged by 3 to 60 px and blurred by 0.7 to 20 px, there are no clouds.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas, seed: u64) -> Self {
         let (sin, cos) = libm::sincos(dice.turn());
         let front = dice.chance(0.33).then(|| {
             let radius = dice.between_log(0.3, 10.0) * canvas.diagonal;
             let (x, y) = (dice.between(0.1, 0.9) * canvas.width, dice.between(0.1, 0.9) * canvas.height);
             let (s, c) = libm::sincos(dice.turn());
-            let ragged = dice.between_log(0.5, 30.0);
+            let ragged = dice.between_log(3.0, 60.0);
             let middle = [(x + radius * c) as f32, (y + radius * s) as f32];
             (middle, radius as f32, ragged as f32, dice.between_log(0.7, 20.0) as f32)
         });

@@ -9,6 +9,7 @@
 //! | `kind` | which artefacts there are |
 //! | `lens` | the cameras that are drawn |
 //! | `shape` | light and cover of a figure at a place of the picture |
+//! | `solid` | things in space as a lens shows them: panels and windows |
 //! | `circle`, `polygon`, `streak`, `glare`, `panel`, `window`, `moon`, `clouds`, `lights`, `vignetted` | one figure each, with its ranges |
 //! | `recipe` | the figures of a kind |
 //! | `trial` | a picture with its truth: without a limb, or with one and the artefact next to it |
@@ -31,6 +32,7 @@ mod panel;
 mod polygon;
 mod recipe;
 mod shape;
+mod solid;
 mod streak;
 mod trial;
 mod vignetted;

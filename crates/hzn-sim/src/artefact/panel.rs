@@ -1,7 +1,8 @@
 //! Straight parts of the vehicle: panels, masts, booms.
 
 use super::dice::Dice;
-use super::shape::{Canvas, Shape, Spot, step};
+use super::shape::{Canvas, Spot, step};
+use super::solid::Solid;
 
 /// What lies within one to four straight sides.
 #[derive(Debug, Clone)]
@@ -52,11 +53,12 @@ impl Panel {
     }
 }
 
-impl Shape for Panel {
-    fn at(&self, x: f32, y: f32) -> Spot {
+impl Solid for Panel {
+    fn seen(&self, x: f32, y: f32, scale: f32) -> Spot {
+        let soft = self.soft * scale;
         let inside = |(n, offset): &([f32; 2], f32)| offset - x * n[0] - y * n[1];
         let within = self.sides.iter().map(inside).fold(f32::INFINITY, f32::min);
-        let cover = step(within, self.soft);
+        let cover = step(within, soft);
         if cover <= 0.0 {
             return Spot::default();
         }
@@ -65,7 +67,7 @@ impl Shape for Panel {
             && let Some((n, offset)) = self.sides.first()
         {
             let (s, t) = (x * n[0] + y * n[1] - offset, y * n[0] - x * n[1]);
-            let line = |v: f32| (v / self.cells - (v / self.cells).round()).abs() * self.cells < 1.2;
+            let line = |v: f32| (v / self.cells - (v / self.cells).round()).abs() * self.cells < 1.2 * scale;
             if line(s) || line(t) {
                 light *= 1.0 - self.depth;
             }

@@ -1,5 +1,7 @@
 //! The figures of a kind.
 
+use hzn_core::camera;
+
 use super::circle::Circle;
 use super::clouds::Clouds;
 use super::dice::Dice;
@@ -10,9 +12,11 @@ use super::moon::Moon;
 use super::panel::Panel;
 use super::polygon::Polygon;
 use super::shape::{Canvas, Shape};
+use super::solid::Standing;
 use super::streak::Streak;
 use super::vignetted::Vignetted;
 use super::window::Window;
+use crate::error::SceneError;
 
 /// Figures, and the circles among them (middle and radius in pixels).
 #[derive(Default)]
@@ -41,7 +45,13 @@ impl Figures {
 }
 
 /// Draws the figures of a kind: one, or for one in four two of the flares; chains have three to eight.
-pub(super) fn draw(kind: Kind, seed: u64, dice: &mut Dice, canvas: &Canvas) -> Figures {
+pub(super) fn draw(
+    kind: Kind,
+    seed: u64,
+    dice: &mut Dice,
+    canvas: &Canvas,
+    camera: &camera::Config,
+) -> Result<Figures, SceneError> {
     let mut out = Figures::default();
     let flare = matches!(kind, Kind::Ring | Kind::Disc | Kind::Polygon | Kind::Streak);
     for _ in 0..if flare && dice.chance(0.25) { 2 } else { 1 } {
@@ -53,15 +63,15 @@ pub(super) fn draw(kind: Kind, seed: u64, dice: &mut Dice, canvas: &Canvas) -> F
             Kind::FarDisc => out.disc(Circle::far_disc(dice, canvas)),
             Kind::Chain => chain(&mut out, dice, canvas),
             Kind::Glare => out.add(Glare::draw(dice, canvas)),
-            Kind::Panel => out.add(Panel::draw(dice, canvas)),
-            Kind::Window => out.add(Window::draw(dice, canvas)),
+            Kind::Panel => out.add(Standing::try_new(Panel::draw(dice, canvas), camera)?),
+            Kind::Window => out.add(Standing::try_new(Window::draw(dice, canvas), camera)?),
             Kind::Moon => out.add(Moon::draw(dice, canvas)),
             Kind::Clouds => out.add(Clouds::draw(dice, canvas, seed)),
             Kind::Lights => out.add(Lights::draw(dice, canvas)),
             Kind::Vignetted => out.vignetted(Vignetted::draw(dice, canvas)),
         }
     }
-    out
+    Ok(out)
 }
 
 /// Three to eight discs, rings and polygons of 0.01 to 0.6 diagonals on the line from a source of light through the

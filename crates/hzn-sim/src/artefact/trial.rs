@@ -108,7 +108,7 @@ impl Trial {
         finish(&mut scene, kind, seed);
         let canvas = canvas_of(&scene.camera);
         let dice = &mut Part::Figures.dice(kind, seed);
-        let figures = recipe::draw(kind, seed, dice, &canvas);
+        let figures = recipe::draw(kind, seed, dice, &canvas, &scene.camera)?;
         let stars = (!kind.is_ground()).then(|| Lights::stars(dice, &canvas));
         Self::drawn(kind, seed, scene, false, figures, stars)
     }
@@ -161,7 +161,10 @@ impl Trial {
         for attempt in 0..TRIES {
             let figures = match kind.is_ground() {
                 true => Figures::default(),
-                false => recipe::draw(kind, seed, &mut Part::Figures.nth(kind, seed, attempt), &canvas),
+                false => {
+                    let dice = &mut Part::Figures.nth(kind, seed, attempt);
+                    recipe::draw(kind, seed, dice, &canvas, &scene.camera)?
+                }
             };
             let hurt = |p: &&crate::limb::LimbPoint| {
                 let (x, y) = (p.exact.u as f32, p.exact.v as f32);

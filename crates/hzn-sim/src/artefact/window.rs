@@ -1,7 +1,8 @@
 //! Frames of windows.
 
 use super::dice::Dice;
-use super::shape::{Canvas, Shape, Spot, step};
+use super::shape::{Canvas, Spot, step};
+use super::solid::Solid;
 
 /// A frame that covers what lies outside a rectangle with round corners, or that rectangle alone.
 #[derive(Debug, Clone, Copy)]
@@ -58,16 +59,17 @@ impl Window {
     }
 }
 
-impl Shape for Window {
-    fn at(&self, x: f32, y: f32) -> Spot {
+impl Solid for Window {
+    fn seen(&self, x: f32, y: f32, scale: f32) -> Spot {
+        let soft = self.soft * scale;
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let s = (dx * self.along[0] + dy * self.along[1]).abs() - self.half[0] + self.corner;
         let t = (dy * self.along[0] - dx * self.along[1]).abs() - self.half[1] + self.corner;
         let (out_s, out_t) = (s.max(0.0), t.max(0.0));
         let outside = (out_s * out_s + out_t * out_t).sqrt() + s.max(t).min(0.0) - self.corner;
-        let mut cover = if self.through { step(-outside, self.soft) } else { step(outside, self.soft) };
+        let mut cover = if self.through { step(-outside, soft) } else { step(outside, soft) };
         if self.depth.is_finite() {
-            cover *= step(if self.through { outside + self.depth } else { self.depth - outside }, self.soft);
+            cover *= step(if self.through { outside + self.depth } else { self.depth - outside }, soft);
         }
         let light = (self.light + dx * self.slope[0] + dy * self.slope[1]).max(0.0);
         Spot { light: light * cover, cover }

@@ -1,0 +1,79 @@
+//! Things that stand in space in front of the camera: what is straight there is a great circle for the lens.
+
+use hzn_core::camera::{self, Camera};
+use hzn_core::pixel::ImagePoint;
+
+use super::shape::{Shape, Spot};
+use crate::detector::Plane;
+use crate::error::SceneError;
+
+/// A thing drawn for a pinhole with the lens's focal length and principal point.
+pub(super) trait Solid: Send + Sync {
+    /// At a place of the pinhole's picture, where `scale` of its pixels are one of the lens's.
+    fn seen(&self, x: f32, y: f32, scale: f32) -> Spot;
+}
+
+/// A thing as a lens shows it.
+#[derive(Debug, Clone)]
+pub(super) struct Standing<S> {
+    solid: S,
+    lens: Camera<f64>,
+    focal: [f64; 2],
+    centre: [f64; 2],
+}
+
+/// Every how many pixels of a row a ray is asked of the lens: between, it is interpolated to a twentieth of a pixel.
+const STRIDE: usize = 8;
+/// Directions farther off the axis than this cosine count as this far: a pinhole sees no farther.
+const LEAST_COS: f64 = 0.03;
+
+impl<S: Solid> Standing<S> {
+    pub(super) fn try_new(solid: S, config: &camera::Config) -> Result<Self, SceneError> {
+        let lens = Camera::try_new(config)?;
+        let (focal, centre) = ([config.fx_px, config.fy_px], [config.cx_px, config.cy_px]);
+        Ok(Self { solid, lens, focal, centre })
+    }
+
+    fn ray(&self, u: f64, v: f64) -> Option<[f64; 3]> {
+        self.lens.unproject(ImagePoint { u, v }).map(|s| s.xyz())
+    }
+
+    /// Along a ray that is seen at a place of the picture.
+    fn along(&self, [sx, sy, sz]: [f64; 3], u: f64, v: f64) -> Spot {
+        let z = sz.max(LEAST_COS);
+        let (x, y) = (self.focal[0] * sx / z, self.focal[1] * sy / z);
+        let own = libm::hypot(u - self.centre[0], v - self.centre[1]);
+        let scale = if own > 1.0 { libm::hypot(x, y) / own } else { 1.0 };
+        self.solid.seen((x + self.centre[0]) as f32, (y + self.centre[1]) as f32, scale as f32)
+    }
+}
+
+impl<S: Solid> Shape for Standing<S> {
+    fn at(&self, x: f32, y: f32) -> Spot {
+        let (u, v) = (f64::from(x), f64::from(y));
+        self.ray(u, v).map_or(Spot::default(), |s| self.along(s, u, v))
+    }
+
+    fn paint(&self, plane: &mut Plane) {
+        let width = plane.width;
+        for (y, row) in plane.data.chunks_mut(width).enumerate() {
+            let v = y as f64;
+            let mut next = self.ray(0.0, v);
+            for (block, pixels) in row.chunks_mut(STRIDE).enumerate() {
+                let start = block * STRIDE;
+                let (first, last) = (next, self.ray((start + STRIDE) as f64, v));
+                next = last;
+                for (i, pixel) in pixels.iter_mut().enumerate() {
+                    let u = (start + i) as f64;
+                    let part = i as f64 / STRIDE as f64;
+                    let ray = match (first, last) {
+                        (Some(a), Some(b)) => Some([0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * part)),
+                        _ => self.ray(u, v),
+                    };
+                    let spot = ray.map_or(Spot::default(), |s| self.along(s, u, v));
+                    *pixel = *pixel * (1.0 - spot.cover) + spot.light;
+                }
+            }
+        }
+    }
+}
