@@ -77,6 +77,7 @@ impl FrameData {
             attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::of(deg.to_radians())),
             level: None,
             sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::of))),
+            last: None,
         }
     }
 }

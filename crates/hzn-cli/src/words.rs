@@ -31,6 +31,24 @@ pub fn why(verdict: Verdict, s: &select::Config) -> String {
         Verdict::Straight => "too short or too rough an edge to tell on which side of it the body is".into(),
         Verdict::Radius => "the limb is not that wide at any altitude allowed (select.altitude_limits_km)".into(),
         Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
+        Verdict::Circle => format!(
+            "a circle of the image fits it more than {} times better than the limb: a lens flare (select.max_rival_ratio)",
+            s.max_rival_ratio
+        ),
+        Verdict::Polyline => format!(
+            "straight pieces fit it more than {} times better than the limb: an iris or a vehicle's part (select.max_rival_ratio)",
+            s.max_rival_ratio
+        ),
+        Verdict::Departure => "the edge goes on smoothly beside the fitted limb (select.max_departure)".into(),
+        Verdict::Band => "behind the edge is a narrow band and then the sky again, not the body (select.max_band)".into(),
+        Verdict::Attitude => format!(
+            "the axis is more than {} sigma from the given attitude (select.max_attitude_sigma)",
+            s.max_attitude_sigma
+        ),
+        Verdict::Sun => {
+            "the given Sun does not light this limb (select.max_unlit); a thermal camera sets body.sunlit = false".into()
+        }
+        Verdict::Rate => "the axis is farther from the last answer than the vehicle can turn (select.max_rate_deg_s)".into(),
     }
 }
 
@@ -85,6 +103,12 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     }
     if has(Verdict::Unsupported) {
         tips.push("an edge fits by chance (cloud, structure): mask what belongs to the vehicle, or try another level");
+    }
+    if has(Verdict::Attitude) {
+        tips.push("the picture contradicts the given attitude: check the order of the quaternion (qw, qx, qy, qz: camera to ECEF), its time, and attitude_sigma_deg");
+    }
+    if has(Verdict::Sun) {
+        tips.push("the limb is on the night side of the given Sun: check sun_x, sun_y, sun_z (in the camera); for a thermal camera set body.sunlit = false");
     }
     tips
 }

@@ -188,6 +188,12 @@ impl Config {
         self.kind == Kind::Sun
     }
 
+    /// Whether it is seen in the Sun's light, as far as is known: not where `sunlit = false` says that it shines by itself, as
+    /// in the thermal infrared.
+    pub fn is_seen_in_sunlight(&self) -> bool {
+        self.sunlit != Some(false) && self.kind != Kind::Sun
+    }
+
     /// Whether only the limb that the Sun lights is limb, where its direction is known.
     pub fn is_sunlit(&self) -> bool {
         self.sunlit.unwrap_or(matches!(self.kind, Kind::Moon | Kind::Sphere))
@@ -201,16 +207,30 @@ pub struct Frame<T> {
     pub altitude_m: Option<T>,
     /// Position of the camera in ECEF, metres. It beats the altitude.
     pub position_m: Option<[T; 3]>,
-    /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction.
+    /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction, and is a
+    /// gate where the position is known, see `select.max_attitude_sigma`.
     pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
     /// Level between dark and lit that the picture before asks for, in counts: its report's `next_level`, for
     /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) remembers it itself.
     pub level: Option<u16>,
-    /// Direction to the Sun in the camera.
+    /// Direction to the Sun in the camera. It is a gate, see `select.max_unlit`.
     pub sun: Option<UnitVec3<Cam, T>>,
     /// 1-sigma of that attitude about the axis in radians, 0 or more; 5 degrees when it is left out. It widens the
     /// covariance by what the ellipsoid's shape then leaves open; above 30 degrees the attitude is not used.
     pub attitude_sigma_rad: Option<T>,
+    /// The last answer, for `select.max_rate_deg_s`.
+    pub last: Option<Last<T>>,
+}
+
+/// An answer to a picture before.
+#[derive(Debug, Clone, Copy)]
+pub struct Last<T> {
+    /// Its axis in the camera.
+    pub axis: UnitVec3<Cam, T>,
+    /// Its 1-sigma in radians, 0 or more.
+    pub sigma_rad: T,
+    /// How long ago its picture was taken, seconds.
+    pub age_s: T,
 }
 
 /// Why a frame's own data were refused.

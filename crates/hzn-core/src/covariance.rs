@@ -85,6 +85,18 @@ pub(crate) struct Fused<T> {
     pub(crate) var_free_cos: Option<T>,
     /// (ĉ − c₀)²/(P₃₃ + σ_c²): a χ² of one degree of freedom when the candidate is the body's limb.
     pub(crate) chi2: T,
+    /// What the edge's own errors are in it.
+    pub(crate) edge: EdgeNoise<T>,
+}
+
+/// The edge errors that a covariance was made with.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EdgeNoise<T> {
+    /// Their part of the variance of the freely fitted cos α; 0 when it was not fitted.
+    pub(crate) var_cos: T,
+    /// 1-sigma in pixels, and the length over which they stay alike.
+    pub(crate) sigma_px: T,
+    pub(crate) length_px: T,
 }
 
 /// Covariance of the fit, raised when the residuals are larger than the noise model says, and never lowered; then
@@ -108,7 +120,8 @@ pub(crate) fn fuse<T: Real>(
     #[cfg(feature = "zju")]
     if let Some(quadric) = &fit.quadric {
         let p = elliptic::covariance(blocks, quadric, length_px) * variance;
-        return fused(fit, &p, expected, estimate);
+        let edge = EdgeNoise { var_cos: p.m33, sigma_px: variance.sqrt(), length_px };
+        return fused(fit, &p, edge, expected, estimate);
     }
     let is_uneven = expected.uneven_cos.iter().any(|a| *a > T::ZERO);
     let x = correlated(blocks, &fit.e, &b1, &b2, mean, length_px);
@@ -128,19 +141,27 @@ pub(crate) fn fuse<T: Real>(
             let more = uneven::known(blocks, fit, &expected.uneven_cos)?;
             p = [p[0] + more[0], p[1] + more[1], p[2] + more[2]];
         }
-        return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: None, chi2: T::ZERO });
+        let edge = EdgeNoise { var_cos: T::ZERO, sigma_px: variance.sqrt(), length_px };
+        return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: None, chi2: T::ZERO, edge });
     }
     let mut p = sandwich_free(sums, &x, mean, variance)?;
+    let edge = EdgeNoise { var_cos: p.m33, sigma_px: variance.sqrt(), length_px };
     p.m33 += var_bias;
     if is_uneven {
         p += uneven::free(blocks, fit, &expected.uneven_cos)?;
     }
-    fused(fit, &p, expected, estimate)
+    fused(fit, &p, edge, expected, estimate)
 }
 
 /// A fit with its half-angle free and the covariance of (δ₁₂, δc) fused with the expected half-angle, unless that is to
 /// count for nothing.
-fn fused<T: Real>(fit: &Fit<T>, p: &M3<T>, expected: &Expected<T>, estimate: &estimate::Config) -> Option<Fused<T>> {
+fn fused<T: Real>(
+    fit: &Fit<T>,
+    p: &M3<T>,
+    edge: EdgeNoise<T>,
+    expected: &Expected<T>,
+    estimate: &estimate::Config,
+) -> Option<Fused<T>> {
     let (b1, b2) = basis(&fit.e);
     let var_c = expected.sigma_cos * expected.sigma_cos;
     let var_free = p.m33;
@@ -151,6 +172,7 @@ fn fused<T: Real>(fit: &Fit<T>, p: &M3<T>, expected: &Expected<T>, estimate: &es
             p: [p.m11, p.m12, p.m22],
             var_free_cos: Some(var_free),
             chi2: T::ZERO,
+            edge,
         });
     }
     let total = p.m33 + var_c;
@@ -171,6 +193,7 @@ fn fused<T: Real>(fit: &Fit<T>, p: &M3<T>, expected: &Expected<T>, estimate: &es
         p: [form(r1, r1), form(r1, r2), form(r2, r2)],
         var_free_cos: Some(var_free),
         chi2: difference * difference / total,
+        edge,
     })
 }
 

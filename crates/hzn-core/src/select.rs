@@ -1,9 +1,19 @@
 //! Gates and choice: whether a fitted cone is the body's limb, and which of several is.
 
+mod attitude;
+mod band;
 #[cfg(feature = "dlr")]
 mod braun_barf;
+mod circle;
+mod departure;
+mod half_angle;
 #[cfg(feature = "horace")]
 mod horace;
+mod polyline;
+mod shape;
+mod sky;
+mod sun;
+mod view;
 
 use crate::block::{Block, LANES};
 use crate::body::Expected;
@@ -11,14 +21,12 @@ use crate::camera::Camera;
 use crate::contour::Scene;
 use crate::covariance::Fused;
 use crate::error::{ConfigError, Limit, above, between, require};
-use crate::estimate::Fit;
+use crate::estimate::{self, Fit};
 use crate::frames::UnitVec3;
 use crate::image::Pixels;
-use crate::linalg::{V3, basis};
+use crate::linalg::V3;
 use crate::pipeline::{Observer, Verdict};
-use crate::pixel::ImagePoint;
 use crate::real::Real;
-use crate::region::Region;
 
 /// `[select]` of sensor.toml: what an answer must fulfil.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +50,69 @@ pub struct Config {
     /// Largest part of what lies beyond the fitted limb that may be lit, 0 to 1. Beyond a limb is the sky, but for
     /// what stands before it; beyond the edge of a cloud are other clouds.
     pub max_lit_sky: f64,
+    /// Smallest part of an edge's points that must be inliers, 0 to 1. With one point in 20, three pixels of threshold and a
+    /// cone free to turn, a curve passes through clutter by chance.
+    pub min_inlier_share: f64,
+    /// Most points that may lie beside the fitted limb, within three times the cut-off, as a part of the inliers; 0 or more. A
+    /// limb stands alone; a curve laid through many edges has others close beside it.
+    pub max_nearby: f64,
+    /// As `min_support`, of a body without phases (the Sun) where `min_support` is above 0: it is a whole disc, and a gibbous
+    /// Moon has less. 0 to 1.
+    pub min_support_whole: f64,
+    /// Largest ratio of the cone's residual to that of a rival shape through the same points: a circle of the image, as lens
+    /// flares are, and up to four straight pieces, as an iris or a vehicle has. 1 or more. Where residuals are noise the
+    /// ratio is about 1; where the points are the rival's, the cone's misfit makes it large. 2 stands for a likelihood of
+    /// 4 to the power of half the independent points. A large value turns the gate off.
+    pub max_rival_ratio: f64,
+    /// Residuals below this are not told apart, pixels, above 0: what sampling and interpolation leave of a perfect edge.
+    pub rival_floor_px: f64,
+    /// Smallest noise that the gate of the half-angle takes an edge to have when the residuals show less than was told,
+    /// pixels, 0 or more. A large value leaves the gate to the told noise.
+    pub residual_floor_px: f64,
+    /// Largest length over which an edge may go on smoothly beside the fitted limb, as a part of its longest run of
+    /// inliers; 0 or more. Only where it keeps its contrast, see `departure_contrast`. A large value turns the gate off.
+    pub max_departure: f64,
+    /// The largest turn from one 16 pixels of edge to the next that is smooth, degrees, 0 to 90: 8 degrees is a curve of 115
+    /// pixels radius, sharper ones are corners of clouds. Room for the noise is added.
+    pub departure_turn_deg: f64,
+    /// A departing edge counts only where its contrast is at least this part of the limb's, 0 or more: a terminator fades,
+    /// the rim of a flare does not.
+    pub departure_contrast: f64,
+    /// Largest part of the looks from the limb inwards that may end in the sky across a second edge, 0 to 1; for bodies that
+    /// are wider than the picture, which reach its border. 1 turns the gate off.
+    pub max_band: f64,
+    /// A second edge is one whose step is at least this part of the limb's, above 0 to 1.
+    pub band_step: f64,
+    /// Largest angle between the axis and the one that a given attitude and position lead to, in standard deviations of both,
+    /// above 0.
+    pub max_attitude_sigma: f64,
+    /// Fastest turn of the vehicle in degrees a second, above 0: an axis farther from the last answer is refused. Left out:
+    /// any. Pictures must then come in order.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub max_rate_deg_s: Option<f64>,
+    /// Largest part of the inliers over which the given Sun stands lower than `min_sun_elevation_deg`, 0 to 1. For bodies that
+    /// are seen in its light, see `body.sunlit`. 1 turns the gate off.
+    pub max_unlit: f64,
+    /// Lowest Sun that still lights a limb, degrees above its horizon, −90 to 90. −18 is the end of twilight.
+    pub min_sun_elevation_deg: f64,
+    /// How far the fitted half-angle must lie from that of the body on the other side of the edge, in standard deviations,
+    /// 0 or more: the edge itself tells the side.
+    pub min_side_sigma: f64,
+    /// Answers farther apart than this contradict each other, degrees, 0 to 180.
+    pub ambiguous_deg: f64,
+    /// Of answers that contradict each other the better is taken when its score is better by this factor, 1 or more.
+    pub ambiguous_score: f64,
+    /// An answer ends the search when its edge covers this part of the limb in view, 0 to 1 ...
+    pub certain_support: f64,
+    /// ... and this part of its edge is inliers, or their residual is a quarter of the threshold; 0 to 1.
+    pub certain_share: f64,
+    /// Least and largest half-angle of a Sun, as multiples of its own, above 0: it never shrinks, and blooms.
+    pub sun_size: [f64; 2],
+    /// Least and largest half-angle of a Moon, as multiples of its own, above 0: what saturates of it is smaller, and it is
+    /// nearer at times.
+    pub moon_size: [f64; 2],
+    /// By how much a Moon blooms beyond that, pixels, 0 or more.
+    pub moon_bloom_px: f64,
     /// Whether some of the limb of the expected half-angle about the fitted axis must lie in the picture.
     #[cfg(feature = "dlr")]
     pub limb_in_view: bool,
@@ -73,6 +144,29 @@ impl Default for Config {
             max_sigma_deg: 10.0,
             min_support: 0.4,
             max_lit_sky: 0.15,
+            min_inlier_share: 0.05,
+            max_nearby: 1.0 / 3.0,
+            min_support_whole: 0.7,
+            max_rival_ratio: 2.0,
+            rival_floor_px: 0.03,
+            residual_floor_px: 0.1,
+            max_departure: 0.2,
+            departure_turn_deg: 8.0,
+            departure_contrast: 0.6,
+            max_band: 0.5,
+            band_step: 0.4,
+            max_attitude_sigma: 4.0,
+            max_rate_deg_s: None,
+            max_unlit: 0.5,
+            min_sun_elevation_deg: -18.0,
+            min_side_sigma: 4.0,
+            ambiguous_deg: 5.0,
+            ambiguous_score: 2.0,
+            certain_support: 0.5,
+            certain_share: 0.8,
+            sun_size: [0.9, 12.0],
+            moon_size: [0.5, 1.1],
+            moon_bloom_px: 10.0,
             #[cfg(feature = "dlr")]
             limb_in_view: false,
             #[cfg(feature = "dlr")]
@@ -110,7 +204,46 @@ impl Config {
         above("select.max_sigma_deg", self.max_sigma_deg, 0.0)?;
         between("select.max_sigma_deg", self.max_sigma_deg, 0.0, 180.0)?;
         between("select.min_support", self.min_support, 0.0, 1.0)?;
-        between("select.max_lit_sky", self.max_lit_sky, 0.0, 1.0)
+        between("select.max_lit_sky", self.max_lit_sky, 0.0, 1.0)?;
+        between("select.min_inlier_share", self.min_inlier_share, 0.0, 1.0)?;
+        between("select.max_nearby", self.max_nearby, 0.0, 1e6)?;
+        between("select.min_support_whole", self.min_support_whole, 0.0, 1.0)?;
+        between("select.max_rival_ratio", self.max_rival_ratio, 1.0, 1e6)?;
+        above("select.rival_floor_px", self.rival_floor_px, 0.0)?;
+        between("select.rival_floor_px", self.rival_floor_px, 0.0, 1e4)?;
+        between("select.residual_floor_px", self.residual_floor_px, 0.0, 1e4)?;
+        between("select.max_departure", self.max_departure, 0.0, 1e6)?;
+        between("select.departure_turn_deg", self.departure_turn_deg, 0.0, 90.0)?;
+        between("select.departure_contrast", self.departure_contrast, 0.0, 1e6)?;
+        between("select.max_band", self.max_band, 0.0, 1.0)?;
+        above("select.band_step", self.band_step, 0.0)?;
+        between("select.band_step", self.band_step, 0.0, 1.0)?;
+        above("select.max_attitude_sigma", self.max_attitude_sigma, 0.0)?;
+        between("select.max_attitude_sigma", self.max_attitude_sigma, 0.0, 1e6)?;
+        if let Some(rate) = self.max_rate_deg_s {
+            above("select.max_rate_deg_s", rate, 0.0)?;
+            between("select.max_rate_deg_s", rate, 0.0, 1e6)?;
+        }
+        between("select.max_unlit", self.max_unlit, 0.0, 1.0)?;
+        between("select.min_sun_elevation_deg", self.min_sun_elevation_deg, -90.0, 90.0)?;
+        between("select.min_side_sigma", self.min_side_sigma, 0.0, 1e6)?;
+        between("select.ambiguous_deg", self.ambiguous_deg, 0.0, 180.0)?;
+        between("select.ambiguous_score", self.ambiguous_score, 1.0, 1e6)?;
+        between("select.certain_support", self.certain_support, 0.0, 1.0)?;
+        between("select.certain_share", self.certain_share, 0.0, 1.0)?;
+        for (name, [least, most]) in [("select.sun_size", self.sun_size), ("select.moon_size", self.moon_size)] {
+            above(name, least, 0.0)?;
+            between(name, most, least, 1e6)?;
+        }
+        between("select.moon_bloom_px", self.moon_bloom_px, 0.0, 1e6)
+    }
+
+    /// Turns off every gate that compares an edge with what is no limb, for chains that are rebuilt as they were published.
+    #[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
+    pub(crate) fn trust_every_shape(&mut self) {
+        (self.max_rival_ratio, self.residual_floor_px) = (1e6, 1e4);
+        (self.max_departure, self.max_band, self.max_unlit) = (1e6, 1.0, 1.0);
+        self.max_attitude_sigma = 1e6;
     }
 }
 
@@ -124,9 +257,6 @@ pub(crate) struct Judged<T> {
     /// The part of the limb in view that is edge, 0 to 1.
     pub(crate) support: T,
 }
-
-/// An edge of which less than one point in so many is on the curve has it by chance.
-const MOST_OUTLIERS: u32 = 20;
 
 /// Looks a fit over, with the points that carry it; `points` of the edge were made.
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
@@ -142,12 +272,13 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
 ) -> Judged<T> {
     let limb_px = inliers(blocks, 1)
         .next()
-        .map_or(T::ZERO, |(b, l)| limb_in_view(&fused.e, fused.c, &b.ray(l), camera, scene.region));
+        .map_or(T::ZERO, |(b, l)| view::limb_in_view(&fused.e, fused.c, &b.ray(l), camera, scene.region));
     let support = (fit.arc_px / limb_px.most(T::one())).least(T::one());
     let sigma_limit = T::of(config.max_sigma_deg.to_radians());
     let chi = T::of(config.max_half_angle_sigma);
     let least = config.min_inliers.min(small(expected.sin, camera, 3));
-    let verdict = if fit.inliers * MOST_OUTLIERS < points {
+    let counts = |n: u32| T::of_i32(n as i32);
+    let verdict = if counts(fit.inliers) < counts(points) * T::of(config.min_inlier_share) {
         Verdict::NoConsensus
     } else if fit.inliers < u32::from(least) {
         Verdict::FewInliers
@@ -155,19 +286,24 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::ShortArc
     } else if !(fit.rms_px <= T::of(config.max_rms_px)) {
         Verdict::Residuals
-    } else if !(fused.chi2 <= chi * chi) || !blooms_to(&fit.c, expected, camera) {
+    } else if !(fused.chi2 <= chi * chi) || !blooms_to(&fit.c, expected, camera, config) {
         Verdict::HalfAngle
     } else if !(sigma_max_rad <= sigma_limit) {
         Verdict::Uncertain
     } else if support < T::of(least_support(config, expected)) {
         Verdict::Unsupported
-    } else if fit.nearby * 3 > fit.inliers {
-        // A limb stands alone; a curve laid through many edges has others close beside it.
+    } else if counts(fit.nearby) > counts(fit.inliers) * T::of(config.max_nearby) {
         Verdict::Indistinct
-    } else if lit_beyond(&fused.e, blocks, scene, camera) > T::of(config.max_lit_sky) {
-        Verdict::NoSky
     } else {
-        Verdict::Passed
+        surroundings(fused, expected, blocks, scene, camera, config)
+    };
+    let verdict = match verdict {
+        Verdict::Passed => attitude::verdict(&fused.e, sigma_max_rad, expected, config),
+        failed => failed,
+    };
+    let verdict = match verdict {
+        Verdict::Passed => rivals(fit, fused, expected, blocks, points, scene, camera, config),
+        failed => failed,
     };
     #[cfg(feature = "dlr")]
     let verdict = match verdict {
@@ -182,33 +318,94 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
 }
 
-/// A body without phases is a whole disc: of its limb in view so much must be edge. A gibbous Moon has less.
-const WHOLE: f64 = 0.7;
+/// Whether what lies beyond and within the fitted limb is the sky and the body.
+fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
+    fused: &Fused<T>,
+    expected: &Expected<T>,
+    blocks: &[Block<T>],
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+    config: &Config,
+) -> Verdict {
+    let sky = sky::beyond(&fused.e, blocks, scene, camera);
+    if sky.lit > T::of(config.max_lit_sky) {
+        return Verdict::NoSky;
+    }
+    if sun::unlit(&fused.e, fused.c, blocks, expected, config.min_sun_elevation_deg) > T::of(config.max_unlit) {
+        return Verdict::Sun;
+    }
+    // Of a picture that came row by row only lit and dark is left, where a terminator is as steep as an edge.
+    let wide = !P::PASSED && config.max_band < 1.0 && is_wider_than_the_picture(expected, camera);
+    if wide && band::banded(&fused.e, blocks, scene, camera, &sky, T::of(config.band_step)) >= T::of(config.max_band) {
+        return Verdict::Band;
+    }
+    Verdict::Passed
+}
+
+/// Whether the disc's 2 α f exceed the picture's diagonal, so that the body reaches the picture's border.
+fn is_wider_than_the_picture<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> bool {
+    let (w, h) = (T::of_i32(i32::from(camera.width())), T::of_i32(i32::from(camera.height())));
+    let (fx, fy) = camera.focal_px();
+    expected.half_angle_rad() * (fx + fy) > (w * w + h * h).sqrt()
+}
+
+/// Whether the points are another curve's: that they fit the cone no worse than what is no limb, agree with its half-angle
+/// by their own noise, and do not go on beside it.
+fn rivals<T: Real, P: Pixels, O: Observer<T>>(
+    fit: &Fit<T>,
+    fused: &Fused<T>,
+    expected: &Expected<T>,
+    blocks: &[Block<T>],
+    points: u32,
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+    config: &Config,
+) -> Verdict {
+    let curve = shape::Curve::new(fit, estimate::azimuth(expected));
+    let shape = shape::inliers(blocks, fit, &curve, camera);
+    let (ratio, floor) = (T::of(config.max_rival_ratio), T::of(config.rival_floor_px));
+    let (rms, noise) = (shape::rms(&shape), shape::local_noise(&shape));
+    // No smooth curve fits better than the noise from point to point.
+    if rms > ratio * noise.most(floor) {
+        let worse = |rival: T| rms > ratio * rival.most(floor);
+        if circle::rms(&shape).is_some_and(worse) {
+            return Verdict::Circle;
+        }
+        if worse(polyline::rms(&shape, rms)) {
+            return Verdict::Polyline;
+        }
+    }
+    if half_angle::disagrees(fit, fused, expected, &shape, blocks, config) {
+        return Verdict::HalfAngle;
+    }
+    if !P::PASSED
+        && fit.inliers < points
+        && departure::departure(blocks, points, &curve, noise, scene, camera, config) > T::of(config.max_departure)
+    {
+        return Verdict::Departure;
+    }
+    Verdict::Passed
+}
 
 /// The smallest part of the limb in view that must be edge; 0 asks for none of any body.
 fn least_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
     let whole = config.min_support > 0.0 && !expected.phases;
-    if whole { config.min_support.max(WHOLE) } else { config.min_support }
+    if whole { config.min_support.max(config.min_support_whole) } else { config.min_support }
 }
 
-/// The least of its half-angle that a body of free half-angle is seen under: what saturates of a Moon is smaller.
-const LEAST: f64 = 0.5;
-/// The Sun never shrinks, to a pixel, and blooms to a multiple of its own.
-const SUN: [f64; 2] = [0.9, 12.0];
-/// The Moon is nearer at times, and blooms by pixels.
-const MOON: f64 = 1.1;
-const MOON_BLOOM_PX: f64 = 10.0;
-
 /// Whether a body of free half-angle can be seen under that of cosine `c`; others are weighed against the expected.
-fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>) -> bool {
+fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config: &Config) -> bool {
     let sin = (T::one() - *c * *c).most(T::ZERO).sqrt();
     let (fx, fy) = camera.focal_px();
     let px = T::one() / fx.least(fy);
     let times = |n: f64| expected.sin * T::of(n);
     let (least, most) = if expected.blooms() {
-        (times(LEAST).most(times(SUN[0]) - px), times(SUN[1]))
+        // A pixel is within the measure's own error, but half of the Sun is no Sun.
+        let [least, most] = config.sun_size;
+        ((times(least) - px).most(times(least * 0.5)), times(most))
     } else {
-        (times(LEAST), times(MOON) + px * T::of(MOON_BLOOM_PX))
+        let [least, most] = config.moon_size;
+        (times(least), times(most) + px * T::of(config.moon_bloom_px))
     };
     !expected.free || (sin >= least && sin <= most.least(T::one()) && *c > T::ZERO)
 }
@@ -238,44 +435,8 @@ fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (
     all().skip(every / 2).step_by(every).take(count)
 }
 
-/// Inliers from which the sky is looked at, and the distance of the nearest look in pixels; each next is twice as far.
+/// Inliers from which is looked outwards and inwards.
 const LOOKS: usize = 12;
-const NEAREST_PX: f64 = 16.0;
-
-/// The part of what lies beyond the limb, outwards to the border of the region, that is lit. Air that fades outwards from
-/// the limb is sky, however bright it begins.
-fn lit_beyond<T: Real, P: Pixels, O: Observer<T>>(
-    e: &V3<T>,
-    blocks: &[Block<T>],
-    scene: &Scene<'_, T, P, O>,
-    camera: &Camera<T>,
-) -> T {
-    let (mut looks, mut lit) = (0, 0);
-    for (block, lane) in inliers(blocks, LOOKS) {
-        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
-        let [gu, gv] = block.gradient_at(lane, e);
-        let norm = (gu * gu + gv * gv).sqrt().most(T::of(1e-20));
-        let mut distance = T::ZERO;
-        let mut fading = Some(u16::MAX);
-        for _ in 0..11 {
-            let (x, y) = ((from.u - gu / norm * distance).to_i32(), (from.v - gv / norm * distance).to_i32());
-            let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { break };
-            if !scene.region.contains(x, y) {
-                break;
-            }
-            if !scene.region.masked(x, y) {
-                let brightness = scene.brightness(x, y);
-                fading = fading.filter(|&before| brightness < before).map(|_| brightness);
-                if distance > T::ZERO {
-                    looks += 1;
-                    lit += i32::from(fading.is_none() && brightness >= scene.level);
-                }
-            }
-            distance = (distance + distance).most(T::of(NEAREST_PX));
-        }
-    }
-    T::of_i32(lit) / T::of_i32(looks.max(1))
-}
 
 /// Distance from the limb at which the brightness on both sides is read for the next picture's level, pixels.
 const PLATEAU_PX: f64 = 6.0;
@@ -304,60 +465,3 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
     (lit > dark).then(|| ((dark + lit) / 2 / looks.max(1)) as u16)
 }
 
-/// Most steps along the limb to each side.
-const STEPS: usize = 48;
-
-/// Length in pixels of the limb of the cone (e, c) in the picture, walked to both sides from the inlier `seen` until
-/// it leaves the region or comes around. What a mask covers is not counted.
-fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Camera<T>, region: &Region<T>) -> T {
-    let sin = (T::one() - c * c).most(T::ZERO).sqrt();
-    let (b1, b2) = basis(e);
-    let (fx, fy) = camera.focal_px();
-    // A step of about a sixteenth of the picture, and at least eight around.
-    let wide = T::of_i32(i32::from(region.width().max(region.height())));
-    let step =
-        (wide / (T::of(16.0) * (fx + fy) * T::of(0.5) * sin.most(T::of(1e-6)))).least(T::of(0.785)).most(T::of(0.02));
-    let (ss, cs) = step.sin_cos();
-    let radial = (seen.dot(&b1), seen.dot(&b2));
-    let norm = (radial.0 * radial.0 + radial.1 * radial.1).sqrt().most(T::of(1e-12));
-    let start = (radial.0 / norm, radial.1 / norm);
-    let at = |(x, y): (T, T)| -> Option<ImagePoint<T>> {
-        let p = camera.project(&UnitVec3::assume_unit(e * c + (b1 * x + b2 * y) * sin))?;
-        let (half, zero) = (T::of(0.5), T::ZERO);
-        (p.u >= zero && p.v >= zero).then_some(())?;
-        let (x, y) = ((p.u + half).to_i32(), (p.v + half).to_i32());
-        let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
-        region.contains(x, y).then_some(p)
-    };
-    let masked = |p: &ImagePoint<T>| region.masked(p.u.to_i32() as u16, p.v.to_i32() as u16);
-    let half_turn = T::of(core::f64::consts::PI);
-    let mut length = T::ZERO;
-    for turn in [ss, -ss] {
-        let (mut direction, mut before) = (start, at(start));
-        let mut angle = T::ZERO;
-        for _ in 0..STEPS {
-            angle += step;
-            if angle > half_turn {
-                break;
-            }
-            let (x, y) = direction;
-            direction = (x * cs - y * turn, x * turn + y * cs);
-            let now = at(direction);
-            let (Some(a), Some(b)) = (before, now) else {
-                // The last piece, cut by the border, counts half a step.
-                if let (Some(a), None) = (before, now)
-                    && !masked(&a)
-                {
-                    length += step * sin * (fx + fy) * T::of(0.25);
-                }
-                break;
-            };
-            if !(masked(&a) || masked(&b)) {
-                let (du, dv) = (b.u - a.u, b.v - a.v);
-                length += (du * du + dv * dv).sqrt();
-            }
-            before = now;
-        }
-    }
-    length
-}

@@ -2,6 +2,7 @@
 
 use core::cell::RefCell;
 
+use hzn_core::body::Last;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::pipeline::Observer;
 use hzn_core::pixel::Pixel;
@@ -85,6 +86,8 @@ pub struct Flight<'a, B> {
     sensor: Sensor<f32>,
     housekeeping_every: u16,
     known: Frame<f32>,
+    /// The last answer, and when its picture was exposed.
+    last: Option<(Last<f32>, u64)>,
     mode: Mode,
     state: Housekeeping,
     /// Pictures since the last housekeeping packet.
@@ -118,6 +121,7 @@ impl<'a, B: Board> Flight<'a, B> {
             sensor,
             housekeeping_every: loaded.parameters.housekeeping_every,
             known: Frame::default(),
+            last: None,
             mode: Mode::Standby,
             state,
             since: 0,
@@ -398,7 +402,9 @@ impl<'a, B: Board> Flight<'a, B> {
             self.event(Event::WrongSize, shot.bytes as u32, expected_bytes as u32);
             return;
         }
-        let expected = match self.sensor.expect(&self.known) {
+        let age_s = |exposure_us: u64| shot.exposure_us.saturating_sub(exposure_us) as f32 * 1e-6;
+        let last = self.last.map(|(last, exposure_us)| Last { age_s: age_s(exposure_us), ..last });
+        let expected = match self.sensor.expect(&Frame { last, ..self.known }) {
             Ok(expected) => expected,
             Err(_) => {
                 self.state.refused = self.state.refused.saturating_add(1);
@@ -414,6 +420,10 @@ impl<'a, B: Board> Flight<'a, B> {
         self.buffers.edge.forget();
         let watch = Watch { wanted, longest: RefCell::new(&mut self.buffers.edge) };
         let report = self.sensor.process(self.workspace, &picture, &expected, &watch);
+        if let Some(s) = &report.solution {
+            let last = Last { axis: s.axis, sigma_rad: s.covariance.sigma_max_rad(), age_s: 0.0 };
+            self.last = Some((last, shot.exposure_us));
+        }
         let done_us = self.board.now_us();
         let calculation_us = u32::try_from(done_us.saturating_sub(start)).unwrap_or(u32::MAX);
         let state = &mut self.state;

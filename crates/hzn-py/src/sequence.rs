@@ -124,6 +124,7 @@ fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
         keep_traces: false,
         keep_picture: false,
         overlay: None,
+        last: Vec::new(),
     }
 }
 

@@ -119,6 +119,7 @@ impl FlightFrame {
             attitude_sigma_rad: None,
             sun: None,
             level: None,
+            last: None,
         }
     }
     /// As [`FlightFrame::known`], with an attitude that is wrong by `sigma_rad` (1-sigma, about each axis).

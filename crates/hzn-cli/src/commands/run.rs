@@ -117,7 +117,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     let path = args.output.as_deref();
     let trace = Output::wants_trace(path);
-    // One after another, where a picture's level comes from the one before.
+    // One after another, where a picture's level or gate comes from the one before.
     let threads = if sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
     let plan = Plan {
         config: sensor.config,
@@ -129,8 +129,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         keep_traces: false,
         keep_picture: trace && !args.no_images,
         overlay: args.overlay.clone(),
+        last: Vec::new(),
     };
     let (mut output, held) = output::open(path, existing, &plan.config, &sensor.text)?;
+    let plan = Plan { last: held.answered.clone(), ..plan };
     if !args.quiet {
         source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }

@@ -22,7 +22,7 @@ use hzn_core::body::FrameError;
 use hzn_core::status::Status;
 use hzn_core::{Config, Report};
 
-pub use sensor::{AnySensor, Processed, prepare};
+pub use sensor::{Answered, AnySensor, Processed, prepare};
 pub use trace::{Trace, Traces, Watch};
 
 use crate::input::{Item, Source};
@@ -48,6 +48,8 @@ pub struct Plan {
     pub keep_picture: bool,
     /// Draw an overlay of every frame into this folder.
     pub overlay: Option<std::path::PathBuf>,
+    /// The last answers of a run that this one goes on with, a body each.
+    pub last: Vec<Option<Answered>>,
 }
 
 /// One frame, finished.
@@ -204,6 +206,7 @@ pub fn run(
                     Ok(sensor) => sensor,
                     Err(e) => return drop(results.send(Err(e.into()))),
                 };
+                sensor.remember(&plan.last);
                 for job in jobs {
                     if results.send(process(plan, &mut sensor, job)).is_err() {
                         return;
@@ -308,6 +311,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         Err(why) => return Ok(finished.not_read(plan, &format!("{why} (input.channel in sensor.toml)"))),
     };
     let data = finished.data.as_ref();
+    sensor.set_time(finished.time_s);
     finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(Found::from).collect();
     if finished.found.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
         finished.tip = picture.unused_bits();
@@ -423,6 +427,7 @@ mod tests {
             keep_traces: false,
             keep_picture: false,
             overlay: None,
+            last: Vec::new(),
         };
         let (abroad, most) = (AtomicU64::new(0), AtomicU64::new(0));
         let mut source = Counted { left: 200, abroad: &abroad, most: &most };

@@ -26,6 +26,35 @@ pub struct AnySensor {
     /// The lens in f64, for drawing.
     camera: Camera<f64>,
     bodies: Vec<body::Kind>,
+    /// The last answer of each body, and the time of the next picture, for `select.max_rate_deg_s`.
+    last: Vec<Option<Answered>>,
+    time_s: Option<f64>,
+}
+
+/// An answer to a picture before, for `select.max_rate_deg_s`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answered {
+    /// Its axis in the camera.
+    pub axis: [f64; 3],
+    /// Its 1-sigma in radians.
+    pub sigma_rad: f64,
+    /// The time of its picture in seconds, by the sequence's clock.
+    pub time_s: f64,
+}
+
+impl Answered {
+    /// What a row of results says, where it has an answer and a time.
+    pub fn of_row(row: &hzn_mcap::Row) -> Option<Self> {
+        Some(Self {
+            axis: [row.axis_x?, row.axis_y?, row.axis_z?],
+            sigma_rad: row.sigma_max_deg?.to_radians(),
+            time_s: row.time_s?,
+        })
+    }
+    fn to_last<T: Real>(self, now_s: f64) -> Option<body::Last<T>> {
+        let axis = UnitVec3::try_new(self.axis.map(T::of))?;
+        Some(body::Last { axis, sigma_rad: T::of(self.sigma_rad), age_s: T::of(now_s - self.time_s) })
+    }
 }
 
 impl AnySensor {
@@ -40,7 +69,20 @@ impl AnySensor {
         } else {
             Kind::Host(HostHorizon::boxed(config)?)
         };
-        Ok(Self { kind, camera, bodies: config.each_body().iter().map(|b| b.kind).collect() })
+        let bodies: Vec<_> = config.each_body().iter().map(|b| b.kind).collect();
+        Ok(Self { kind, camera, last: vec![None; bodies.len()], time_s: None, bodies })
+    }
+
+    /// Takes answers of another run for those of the pictures before, a body each; more are passed over.
+    pub fn remember(&mut self, answered: &[Option<Answered>]) {
+        for (last, answered) in self.last.iter_mut().zip(answered) {
+            *last = *answered;
+        }
+    }
+
+    /// Says when the next picture was taken; without it, its row's time counts.
+    pub fn set_time(&mut self, time_s: Option<f64>) {
+        self.time_s = time_s;
     }
 
     /// Takes another configuration, from the next picture on. Refused, everything stays as it was.
@@ -55,6 +97,7 @@ impl AnySensor {
         }
         self.camera = camera;
         self.bodies = config.each_body().iter().map(|b| b.kind).collect();
+        self.last = vec![None; self.bodies.len()];
         Ok(())
     }
 
@@ -116,10 +159,16 @@ impl AnySensor {
     }
 
     fn watch<P: Pixels, W: Watch>(&mut self, picture: &P, data: Option<&FrameData>, watch: &W) -> Vec<Processed> {
+        let now_s = self.time_s.take().or(data.and_then(|d| d.time_s));
         let mut processed = match &mut self.kind {
-            Kind::Host(h) => run(h, picture, data, watch),
-            Kind::Flight(h) => run(h, picture, data, watch),
+            Kind::Host(h) => run(h, picture, data, &self.last, now_s, watch),
+            Kind::Flight(h) => run(h, picture, data, &self.last, now_s, watch),
         };
+        for (last, processed) in self.last.iter_mut().zip(&processed) {
+            if let (Ok(Report { solution: Some(s), .. }), Some(time_s)) = (&processed.report, now_s) {
+                *last = Some(Answered { axis: s.axis.xyz(), sigma_rad: s.covariance.sigma_max_rad(), time_s });
+            }
+        }
         for (&body, processed) in self.bodies.iter().zip(&mut processed) {
             if let (Ok(Report { solution: Some(solution), .. }), Some(direction)) =
                 (&mut processed.report, data.and_then(|d| in_the_sky(body, d)))
@@ -173,10 +222,15 @@ fn run<
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
     picture: &P,
     data: Option<&FrameData>,
+    last: &[Option<Answered>],
+    now_s: Option<f64>,
     watch: &W,
 ) -> Vec<Processed> {
-    let bodies = horizon.config().each_body().len();
-    let expected: Vec<_> = (0..bodies).map(|which| horizon.expect_body(which, &frame(data))).collect();
+    let expect = |(which, last): (usize, &Option<Answered>)| {
+        let last = last.zip(now_s).and_then(|(last, now_s)| last.to_last(now_s));
+        horizon.expect_body(which, &Frame { last, ..frame(data) })
+    };
+    let expected: Vec<_> = last.iter().enumerate().map(expect).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
     let reports = horizon.process_each_observed(picture, &known, watch);
     let times = watch.times();

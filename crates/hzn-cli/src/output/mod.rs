@@ -13,7 +13,7 @@ use hzn_mcap::{Contents, Options, Reader, part_path};
 
 pub use record::{altitude_km, annotations, answer, fitted, frame_data, records, rows};
 
-use crate::engine::{Finished, Sink};
+use crate::engine::{Answered, Finished, Sink};
 use crate::exit::{Stop, failed, usage};
 use crate::input::ending;
 use text::{Form, Text};
@@ -50,6 +50,18 @@ pub struct Held {
     pub rows: u64,
     /// The last one's row.
     pub last: Option<hzn_mcap::Row>,
+    /// The last answer of each body.
+    pub answered: Vec<Option<Answered>>,
+}
+
+impl Held {
+    /// Takes note of a frame's rows, one for each body.
+    fn answers(&mut self, rows: &[hzn_mcap::Row]) {
+        self.answered.resize(rows.len().max(self.answered.len()), None);
+        for (answered, row) in self.answered.iter_mut().zip(rows) {
+            *answered = Answered::of_row(row).or(*answered);
+        }
+    }
 }
 
 /// Kinds of output, by ending.
@@ -163,20 +175,36 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
             Ok((Kind::Text(text), held))
         }
         None => {
-            let last = last_frame(part);
+            let before = last_frames(part);
             let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(|e| match e {
                 hzn_mcap::Error::OtherSensor { .. } | hzn_mcap::Error::Foreign { .. } => usage(e),
                 e => failed(e),
             })?;
             let frames = resumed.frames / config.each_body().len() as u64;
-            let held = Held { frames, rows: resumed.frames, last: last.filter(|_| resumed.frames > 0) };
+            let held = match resumed.frames {
+                0 => Held::default(),
+                rows => Held { frames, rows, ..before },
+            };
             Ok((Kind::Mcap(Box::new(resumed.writer)), held))
         }
     }
 }
 
-fn last_frame(part: &Path) -> Option<hzn_mcap::Row> {
-    Reader::open(part, Contents::WithoutImages).ok()?.filter_map(Result::ok).last().map(|f| f.row)
+/// The last row of a recording, and the last answers of its bodies.
+fn last_frames(part: &Path) -> Held {
+    let mut held = Held::default();
+    let Ok(reader) = Reader::open(part, Contents::WithoutImages) else { return held };
+    let mut rows: Vec<hzn_mcap::Row> = Vec::new();
+    for frame in reader.filter_map(Result::ok) {
+        if rows.first().is_some_and(|first| first.index != frame.row.index) {
+            held.answers(&rows);
+            rows.clear();
+        }
+        rows.push(frame.row);
+    }
+    held.answers(&rows);
+    held.last = rows.pop();
+    held
 }
 
 /// As [`advice`] for the file of a run: what is finished stays in it.

@@ -126,11 +126,15 @@ fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, u
             first.len().max(1)
         }
     };
-    let (mut held, mut end, mut rows) = (Held::default(), 0, 0);
+    let (mut held, mut end, mut frame) = (Held::default(), 0, Vec::new());
     each_row(bytes, form, |row, to| {
-        rows += 1;
-        if rows % bodies == 0 {
-            held = Held { frames: held.frames + 1, rows: rows as u64, last: Some(row) };
+        frame.push(row);
+        if frame.len() == bodies {
+            held.answers(&frame);
+            held.frames += 1;
+            held.rows += bodies as u64;
+            held.last = frame.pop();
+            frame.clear();
             end = to;
         }
         true

@@ -5,7 +5,7 @@ use crate::frames::{Cam, Ecef, Rotation, UnitVec3};
 use crate::linalg::V3;
 use crate::real::Real;
 
-use super::{AU_KM, Config, Frame, FrameError, Kind, MOON_DISTANCE_KM, MOON_RADIUS_KM, SUN_RADIUS_KM};
+use super::{AU_KM, Config, Frame, FrameError, Kind, Last, MOON_DISTANCE_KM, MOON_RADIUS_KM, SUN_RADIUS_KM};
 
 /// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
@@ -33,6 +33,12 @@ pub struct Expected<T> {
     pub(crate) level: Option<u16>,
     /// Direction to the Sun in the camera, where only the limb that it lights is limb.
     pub(crate) sun: Option<V3<T>>,
+    /// The Sun's direction for the gate of what it does not light, where the body is seen in its light.
+    pub(crate) sun_seen: Option<V3<T>>,
+    /// The axis in the camera by the given attitude and position, and its 1-sigma in radians.
+    pub(crate) predicted: Option<(V3<T>, T)>,
+    /// The last answer.
+    pub(crate) last: Option<Last<T>>,
     /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
     pub(crate) radius_m: T,
     /// Limb height in metres and its sigma.
@@ -149,6 +155,11 @@ impl<T: Real> Expected<T> {
             None => amplitude.abs(),
         };
         let variance = limb_sigma * limb_sigma + sin * sin * altitude_sigma * altitude_sigma;
+        let axis_ecef = match (&ellipsoid, position, body.kind) {
+            (Some(cone), ..) => Some(cone.axis),
+            (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
+            _ => None,
+        };
         Ok(Self {
             cos,
             sin,
@@ -159,6 +170,9 @@ impl<T: Real> Expected<T> {
             uneven_cos: [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1])],
             level: frame.level,
             sun: frame.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
+            sun_seen: frame.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
+            predicted: frame.cam_to_ecef.zip(axis_ecef).map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
+            last: frame.last,
             radius_m: radius,
             limb_m: limb,
             limb_sigma_m: limb_sigma,

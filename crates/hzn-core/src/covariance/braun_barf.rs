@@ -14,7 +14,7 @@
 //! - (37), λ_max I in place of P, is said to be needed because P has no full rank after e is normalised. A filter needs
 //!   no full rank: project on the plane across e. The overbound is an option; it is some twenty times too careful.
 
-use super::{Config, Fused};
+use super::{Config, EdgeNoise, Fused};
 use crate::block::{Block, LANES};
 use crate::estimate::Fit;
 use crate::estimate::direct::{LEAST_Z, Normal};
@@ -32,6 +32,11 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
         p: across(&p, &fit.e, config.overbound),
         var_free_cos: Some(var_c),
         chi2: T::ZERO,
+        edge: EdgeNoise {
+            var_cos: var_c,
+            sigma_px: T::of(config.sigma_px),
+            length_px: T::of(config.correlation_px),
+        },
     })
 }
 

@@ -127,8 +127,11 @@ impl Config {
         let own = self.each_body().get(usize::from(which)).and_then(|b| b.covariance.as_ref());
         own.unwrap_or(&self.covariance)
     }
-    /// Whether a body's level comes from the picture before, so that pictures must come in order.
+    /// Whether a body's level, or a gate, comes from the picture before, so that pictures must come in order.
     pub fn tracks(&self) -> bool {
+        if self.select.max_rate_deg_s.is_some() {
+            return true;
+        }
         (0..self.each_body().len()).any(|which| self.levels_of(which as u8).method == binarize::Method::Track)
     }
     /// As [`Self::each_body`], to be changed.

@@ -39,13 +39,6 @@ fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u1
     (narrow.to_i32().clamp(1, 64) as u16, disc.to_i32().clamp(1, 256) as u16)
 }
 
-/// Answers more than five degrees apart contradict each other, and one is not better than the other unless its score
-/// is half as large.
-const RIVAL_COS: f64 = 0.9962;
-const RIVAL_SCORE: f64 = 2.0;
-/// An edge whose points scatter by more sigmas than this is rougher than the noise model's limb.
-const ROUGH_SIGMAS: f64 = 3.0;
-
 /// The edges of one picture, judged one by one.
 pub(super) struct Judge<'a, T, O> {
     sensor: &'a Sensor<T>,
@@ -350,16 +343,16 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             candidate: number,
         };
         // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself asks for
-        // must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of 16 variances, as two sigma from either are.
-        // What is rougher than a limb is so over longer stretches: it says the less of the curvature.
-        let rough = (fit.rms_px / (T::of(self.noise.sigma_px) * T::of(ROUGH_SIGMAS))).most(T::one());
-        let curved = fused.var_free_cos.is_some_and(|v| v * rough * T::of(4.0) < fit.c * self.expected.cos);
+        // must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of so many variances.
+        let sides = T::of(config.select.min_side_sigma);
+        let curved = fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * self.expected.cos * T::of(4.0));
         if config.estimate.half_angle == estimate::HalfAngle::Fused && !curved && !self.expected.free {
             outcome.verdict = Verdict::Straight;
             return (outcome, None);
         }
-        let certain =
-            judged.support > T::of(0.5) && (fit.inliers * 10 > points.count * 8 || fit.rms_px * T::of(4.0) < threshold);
+        let share = T::of_i32(fit.inliers as i32) > T::of_i32(points.count as i32) * T::of(config.select.certain_share);
+        let certain = judged.support > T::of(config.select.certain_support)
+            && (share || fit.rms_px * T::of(4.0) < threshold);
         let tracks = (self.tracks && !P::PASSED).then(|| select::middle_level(&fused.e, blocks, scene, camera));
         (outcome, Some(Best { solution, outcome, score: judged.score, certain, level: tracks.flatten() }))
     }
@@ -370,7 +363,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             self.best = Some(new);
             return;
         };
-        let apart = new.solution.axis.dot(&old.solution.axis) < T::of(RIVAL_COS);
+        let apart = new.solution.axis.angle_rad(&old.solution.axis)
+            > T::of(self.sensor.config.select.ambiguous_deg.to_radians());
         let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
         if apart {
             self.rival = Some(self.rival.map_or(other.score, |r| r.least(other.score)));
@@ -387,7 +381,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let report = self.report;
         report.counters.work = self.work.done();
         if let Some(best) = self.best {
-            if !best.certain && self.rival.is_some_and(|r| r < best.score * T::of(RIVAL_SCORE)) {
+            let factor = T::of(self.sensor.config.select.ambiguous_score);
+            if !best.certain && self.rival.is_some_and(|r| r < best.score * factor) {
                 report.status = Status::Ambiguous;
                 return;
             }

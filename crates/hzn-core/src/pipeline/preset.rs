@@ -175,6 +175,7 @@ fn ungated(config: &mut Config) {
     config.select.max_sigma_deg = 180.0;
     config.select.min_support = 0.0;
     config.select.max_lit_sky = 1.0;
+    config.select.trust_every_shape();
 }
 
 #[cfg(test)]

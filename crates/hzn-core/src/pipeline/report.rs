@@ -150,6 +150,20 @@ verdicts! {
     Radius = 14, "radius";
     /// The edge is too short or too rough for its curvature to tell on which side of it the body is.
     Straight = 15, "straight";
+    /// A circle of the image fits the points far better than the limb's cone: a lens flare.
+    Circle = 16, "circle";
+    /// Few straight pieces fit the points far better than the limb's cone: an iris, or a part of the vehicle.
+    Polyline = 17, "polyline";
+    /// The edge goes on smoothly beside the fitted limb.
+    Departure = 18, "departure";
+    /// What lies within the fitted limb is a band, with sky behind it.
+    Band = 19, "band";
+    /// The axis contradicts the given attitude.
+    Attitude = 20, "attitude";
+    /// The given Sun does not light this limb.
+    Sun = 21, "sun";
+    /// The axis is farther from the last answer than the vehicle can have turned.
+    Rate = 22, "rate";
 }
 
 /// The half-angle that the limb itself shows: what the fit finds before the expected one is fused.

@@ -1,0 +1,93 @@
+//! A band has sky on both sides: a ring, a streak and a window's frame. What lies inside a limb is the body.
+
+use super::sky;
+use crate::block::Block;
+use crate::camera::Camera;
+use crate::contour::Scene;
+use crate::frames::UnitVec3;
+use crate::image::Pixels;
+use crate::linalg::V3;
+use crate::pipeline::Observer;
+use crate::real::Real;
+
+/// Places that are looked at from the limb inwards to the border of the region, evenly.
+const PLACES: i32 = 16;
+/// A look that ends nearer than this says nothing, pixels.
+const SHORTEST_PX: i32 = 32;
+/// The limb's own step is read so far to each side, and the far edge of a band likewise, pixels.
+const ASIDE_PX: i32 = 6;
+/// Places from which on nearly everything must be sky again, of ten.
+const FOR_GOOD: usize = 9;
+/// Of the limb's step so much stands above the sky at the most where there is sky again: blur and stray light.
+const SKY_PART: f64 = 0.1;
+
+/// The part of the looks inwards that come back to the sky across a second edge, at least `step` times as high as the limb,
+/// 0 to 1. A terminator fades and is no edge.
+pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
+    e: &V3<T>,
+    blocks: &[Block<T>],
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+    sky: &sky::Sky<T>,
+    step: T,
+) -> T {
+    let (mut looks, mut bands) = (0, 0);
+    for (block, lane) in super::inliers(blocks, super::LOOKS) {
+        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
+        let [gu, gv] = block.gradient_at(lane, e);
+        let norm = (gu * gu + gv * gv).sqrt().most(T::of(1e-20));
+        let (du, dv) = (gu / norm, gv / norm);
+        let at = |px: i32| {
+            let (x, y) = ((from.u + du * T::of_i32(px)).to_i32(), (from.v + dv * T::of_i32(px)).to_i32());
+            let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
+            scene.region.contains(x, y).then_some((x, y))
+        };
+        let seen = |px: i32| {
+            at(px).filter(|&(x, y)| !scene.region.masked(x, y)).map(|(x, y)| T::of_i32(scene.brightness(x, y).into()))
+        };
+        let end = inside(&at, i32::from(scene.region.width()) + i32::from(scene.region.height()));
+        if end < SHORTEST_PX {
+            continue;
+        }
+        let Some(lit) = seen(ASIDE_PX) else { continue };
+        let limb = (lit - sky.median).most(T::one());
+        let dark = (sky.spread * T::of(3.0)).most(limb * T::of(SKY_PART)) + sky.median;
+        looks += 1;
+        let place = |k: i32| ASIDE_PX + (end - ASIDE_PX) * k / PLACES;
+        let mut is_sky = [None; PLACES as usize];
+        for (k, cell) in (1..=PLACES).zip(is_sky.iter_mut()) {
+            *cell = seen(place(k)).map(|b| b < dark);
+        }
+        let Some(back) = back_for_good(&is_sky) else { continue };
+        // Between two places, where it is half as bright as the nearer one.
+        let (mut near, mut far) = (place(back as i32), place(back as i32 + 1));
+        let half = |a: i32| seen(a).map(|b| b - sky.median).filter(|b| *b > T::ZERO);
+        let level = half(near).unwrap_or(limb) * T::of(0.5);
+        while far - near > 1 {
+            let middle = (near + far) / 2;
+            if seen(middle).is_some_and(|b| b - sky.median < level) { far = middle } else { near = middle }
+        }
+        let edge = |px: i32| seen(px).unwrap_or(sky.median);
+        bands += i32::from(edge((near - ASIDE_PX).max(0)) - edge(far + ASIDE_PX) >= limb * step);
+    }
+    T::of_i32(bands) / T::of_i32(looks.max(1))
+}
+
+/// How far the region reaches from the limb inwards, pixels, by halving; at most `most`.
+fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
+    let (mut within, mut beyond) = (0, most);
+    while beyond - within > 4 {
+        let middle = (within + beyond) / 2;
+        if at(middle).is_some() { within = middle } else { beyond = middle }
+    }
+    within
+}
+
+/// The first place from which on nine of ten that are seen are sky, of three or more.
+fn back_for_good(is_sky: &[Option<bool>]) -> Option<usize> {
+    (0..is_sky.len()).find(|&k| {
+        let rest = || is_sky.iter().skip(k).flatten();
+        let (sky, all) = (rest().filter(|s| **s).count(), rest().count());
+        is_sky.get(k) == Some(&Some(true)) && all >= 3 && sky * 10 >= all * FOR_GOOD
+    })
+}

@@ -1,0 +1,46 @@
+//! The half-angle against the expected one, with the noise that the residuals show instead of the one that was told.
+
+use super::shape::{Shape, correlated_points, rms};
+use super::Config;
+use crate::block::Block;
+use crate::body::Expected;
+use crate::covariance::{self, Fused};
+use crate::estimate::Fit;
+use crate::linalg::basis;
+use crate::real::Real;
+
+/// Whether the half-angles differ by more than the residuals allow: an edge that is told to be rough and is smooth says more
+/// of its own curvature than its told noise admits.
+///
+/// (c₀ − ĉ)² / (P₃₃ + σ_c² + what else was told), where P₃₃ has the RMS of the residuals, `select.residual_floor_px` at
+/// least, and the length over which they stay alike. P₃₃ grows with the square of the first and at most in proportion to
+/// the second; the points are gone through once more only where that bound does not settle it.
+pub(super) fn disagrees<T: Real>(
+    fit: &Fit<T>,
+    fused: &Fused<T>,
+    expected: &Expected<T>,
+    shape: &Shape<T>,
+    blocks: &[Block<T>],
+    config: &Config,
+) -> bool {
+    let Some(var_free) = fused.var_free_cos.filter(|_| config.residual_floor_px > 0.0 && !expected.free) else {
+        return false;
+    };
+    let (edge, rest) = (fused.edge.var_cos, var_free - fused.edge.var_cos + expected.sigma_cos * expected.sigma_cos);
+    let difference = expected.cos - fit.c;
+    let chi = T::of(config.max_half_angle_sigma);
+    // Disagrees unless the edge's variance is at least this.
+    let needed = difference * difference / (chi * chi) - rest;
+    let each_px = fit.arc_px / T::of_i32(shape.len().max(1) as i32);
+    let sigma = rms(shape).most(T::of(config.residual_floor_px));
+    let length = correlated_points(shape) * each_px * T::of(0.5);
+    let (smaller, shorter) = (sigma / fused.edge.sigma_px, length / fused.edge.length_px.most(T::of(1e-6)));
+    let bound = edge * smaller * smaller * shorter.least(T::one());
+    if bound >= needed || (smaller >= T::one() && shorter >= T::one()) {
+        return false;
+    }
+    let (b1, b2) = basis(&fit.e);
+    let x = covariance::correlated(blocks, &fit.e, &b1, &b2, fit.mean, length.least(fused.edge.length_px));
+    let p = covariance::sandwich_free(&fit.sums, &x, fit.mean, sigma * sigma);
+    !p.is_some_and(|p| p.m33 >= needed)
+}
