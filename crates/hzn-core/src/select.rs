@@ -64,6 +64,10 @@ pub struct Config {
     /// ratio is about 1; where the points are the rival's, the cone's misfit makes it large. 2 stands for a likelihood of
     /// 4 to the power of half the independent points. A large value turns the gate off.
     pub max_rival_ratio: f64,
+    /// How much likelier the points must be about the limb than about a straight line, and may be at most about a rival than
+    /// about the limb: twice the logarithm, −1e6 to 1e6. 9 are three standard deviations. Points whose residuals are alike
+    /// count once. A large negative value takes straight edges, too.
+    pub min_evidence: f64,
     /// Residuals below this are not told apart, pixels, above 0: what sampling and interpolation leave of a perfect edge.
     pub rival_floor_px: f64,
     /// Smallest noise that the gate of the half-angle takes an edge to have when the residuals show less than was told,
@@ -72,6 +76,9 @@ pub struct Config {
     /// Largest length over which an edge may go on smoothly beside the fitted limb, as a part of its longest run of
     /// inliers; 0 or more. Only where it keeps its contrast, see `departure_contrast`. A large value turns the gate off.
     pub max_departure: f64,
+    /// Smallest part of the fitted limb in view that must be edge where the edge leaves the limb with its contrast kept, see
+    /// `departure_contrast`, 0 to 1: the corner of an iris, the crossing of two flares. 0 turns the gate off.
+    pub min_support_abrupt: f64,
     /// The largest turn from one 16 pixels of edge to the next that is smooth, degrees, 0 to 90: 8 degrees is a curve of 115
     /// pixels radius, sharper ones are corners of clouds. Room for the noise is added.
     pub departure_turn_deg: f64,
@@ -140,7 +147,7 @@ impl Default for Config {
             min_inliers: 24,
             min_arc_px: None,
             max_rms_px: 2.0,
-            max_half_angle_sigma: 4.0,
+            max_half_angle_sigma: 3.0,
             max_sigma_deg: 10.0,
             min_support: 0.4,
             max_lit_sky: 0.15,
@@ -148,9 +155,11 @@ impl Default for Config {
             max_nearby: 1.0 / 3.0,
             min_support_whole: 0.7,
             max_rival_ratio: 2.0,
+            min_evidence: 9.0,
             rival_floor_px: 0.03,
             residual_floor_px: 0.1,
             max_departure: 0.2,
+            min_support_abrupt: 0.7,
             departure_turn_deg: 8.0,
             departure_contrast: 0.6,
             max_band: 0.5,
@@ -209,10 +218,12 @@ impl Config {
         between("select.max_nearby", self.max_nearby, 0.0, 1e6)?;
         between("select.min_support_whole", self.min_support_whole, 0.0, 1.0)?;
         between("select.max_rival_ratio", self.max_rival_ratio, 1.0, 1e6)?;
+        between("select.min_evidence", self.min_evidence, -1e6, 1e6)?;
         above("select.rival_floor_px", self.rival_floor_px, 0.0)?;
         between("select.rival_floor_px", self.rival_floor_px, 0.0, 1e4)?;
         between("select.residual_floor_px", self.residual_floor_px, 0.0, 1e4)?;
         between("select.max_departure", self.max_departure, 0.0, 1e6)?;
+        between("select.min_support_abrupt", self.min_support_abrupt, 0.0, 1.0)?;
         between("select.departure_turn_deg", self.departure_turn_deg, 0.0, 90.0)?;
         between("select.departure_contrast", self.departure_contrast, 0.0, 1e6)?;
         between("select.max_band", self.max_band, 0.0, 1.0)?;
@@ -241,7 +252,8 @@ impl Config {
     /// Turns off every gate that compares an edge with what is no limb, for chains that are rebuilt as they were published.
     #[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
     pub(crate) fn trust_every_shape(&mut self) {
-        (self.max_rival_ratio, self.residual_floor_px) = (1e6, 1e4);
+        (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
+        self.min_support_abrupt = 0.0;
         (self.max_departure, self.max_band, self.max_unlit) = (1e6, 1.0, 1.0);
         self.max_attitude_sigma = 1e6;
     }
@@ -302,7 +314,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         failed => failed,
     };
     let verdict = match verdict {
-        Verdict::Passed => rivals(fit, fused, expected, blocks, points, scene, camera, config),
+        Verdict::Passed => rivals(fit, fused, expected, blocks, points, support, scene, camera, config),
         failed => failed,
     };
     #[cfg(feature = "dlr")]
@@ -357,6 +369,7 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     expected: &Expected<T>,
     blocks: &[Block<T>],
     points: u32,
+    support: T,
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -365,13 +378,25 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     let shape = shape::inliers(blocks, fit, &curve, camera);
     let (ratio, floor) = (T::of(config.max_rival_ratio), T::of(config.rival_floor_px));
     let (rms, noise) = (shape::rms(&shape), shape::local_noise(&shape));
+    let independent = shape::independent(&shape);
+    let evidence = T::of(config.min_evidence);
+    // How much likelier the points are about one curve than about another: n ln(v/v').
+    let likelier = |rms: T, than: T| {
+        let v = rms.most(floor) / than.most(floor);
+        independent * (v * v).ln()
+    };
+    if !(likelier(polyline::straight_rms(&shape), rms) > evidence) {
+        return Verdict::Straight;
+    }
     // No smooth curve fits better than the noise from point to point.
-    if rms > ratio * noise.most(floor) {
+    if rms > ratio * noise.most(floor) || likelier(rms, noise) > evidence {
         let worse = |rival: T| rms > ratio * rival.most(floor);
-        if circle::rms(&shape).is_some_and(worse) {
+        if circle::rms(&shape).is_some_and(|c| worse(c) || (likelier(rms, c) > evidence && evidence > T::ZERO)) {
             return Verdict::Circle;
         }
-        if worse(polyline::rms(&shape, rms)) {
+        let pieces = polyline::rms(&shape, rms);
+        let more = independent.ln() * T::of(polyline::PARAMETERS);
+        if worse(pieces) || (likelier(rms, pieces) > evidence + more && evidence > T::ZERO) {
             return Verdict::Polyline;
         }
     }
@@ -380,7 +405,7 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     }
     if !P::PASSED
         && fit.inliers < points
-        && departure::departure(blocks, points, &curve, noise, scene, camera, config) > T::of(config.max_departure)
+        && departure::departs(blocks, points, &curve, noise, support, scene, camera, config)
     {
         return Verdict::Departure;
     }

@@ -16,8 +16,8 @@ const PLACES: i32 = 16;
 const SHORTEST_PX: i32 = 32;
 /// The limb's own step is read so far to each side, and the far edge of a band likewise, pixels.
 const ASIDE_PX: i32 = 6;
-/// Places from which on nearly everything must be sky again, of ten.
-const FOR_GOOD: usize = 9;
+/// Of what lies behind a band two thirds must be sky, as other artefacts may lie there; of a body nearly nothing is.
+const FOR_GOOD: [usize; 2] = [2, 3];
 /// Of the limb's step so much stands above the sky at the most where there is sky again: blur and stray light.
 const SKY_PART: f64 = 0.1;
 
@@ -67,8 +67,16 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
             let middle = (near + far) / 2;
             if seen(middle).is_some_and(|b| b - sky.median < level) { far = middle } else { near = middle }
         }
-        let edge = |px: i32| seen(px).unwrap_or(sky.median);
-        bands += i32::from(edge((near - ASIDE_PX).max(0)) - edge(far + ASIDE_PX) >= limb * step);
+        // Of three pixels, for the noise.
+        let edge = |px: i32| {
+            let (mut sum, mut count) = (T::ZERO, 0);
+            for b in [px - 1, px, px + 1].into_iter().filter_map(seen) {
+                sum += b;
+                count += 1;
+            }
+            if count > 0 { sum / T::of_i32(count) } else { sky.median }
+        };
+        bands += i32::from(edge((near - ASIDE_PX).max(1)) - edge(far + ASIDE_PX) >= limb * step);
     }
     T::of_i32(bands) / T::of_i32(looks.max(1))
 }
@@ -83,11 +91,11 @@ fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
     within
 }
 
-/// The first place from which on nine of ten that are seen are sky, of three or more.
+/// The first place that is sky and from which on most of what is seen is, of three places or more.
 fn back_for_good(is_sky: &[Option<bool>]) -> Option<usize> {
     (0..is_sky.len()).find(|&k| {
         let rest = || is_sky.iter().skip(k).flatten();
         let (sky, all) = (rest().filter(|s| **s).count(), rest().count());
-        is_sky.get(k) == Some(&Some(true)) && all >= 3 && sky * 10 >= all * FOR_GOOD
+        is_sky.get(k) == Some(&Some(true)) && all >= 3 && sky * FOR_GOOD[1] >= all * FOR_GOOD[0]
     })
 }

@@ -14,6 +14,8 @@ use crate::real::Real;
 const BOX_PX: f64 = 16.0;
 /// Most boxes that are looked at beyond each end of the inliers.
 const BOXES: usize = 24;
+/// Boxes beyond an end that tell whether the edge keeps its contrast there.
+const NEAR: usize = 2;
 /// Gaps up to this length do not end a run of inliers, pixels.
 const GAP_PX: f64 = 12.0;
 /// The edge's contrast is read so far to each side, pixels.
@@ -121,60 +123,66 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     }
 }
 
-/// How long the edge goes on smoothly beside the cone, as a part of the longest run of inliers, where it keeps its contrast;
-/// `noise_px` is the noise from point to point.
+/// Whether the edge goes on beside the cone, where it keeps its contrast: smoothly over more than `select.max_departure` of
+/// the longest run of inliers, or at all, where less than `select.min_support_abrupt` of the limb in view is edge.
+/// `noise_px` is the noise from point to point, `support` the part of the limb in view that is edge.
 ///
 /// Smooth is a turn from box to box of less than `select.departure_turn_deg` and what the noise of the boxes' places makes.
-pub(super) fn departure<T: Real, P: Pixels, O: Observer<T>>(
+pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     blocks: &[Block<T>],
     points: u32,
     curve: &Curve<T>,
     noise_px: T,
+    support: T,
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
-) -> T {
+) -> bool {
     let edge = Edge { blocks, points: points as usize, curve, camera, scene };
-    let Some(run) = longest(blocks) else { return T::ZERO };
-    let off_cone = (noise_px * T::of(3.0)).most(T::of(config.rival_floor_px) * T::of(3.0));
-    let (mut away, mut beside) = (T::ZERO, Mean::default());
+    let Some(run) = longest(blocks) else { return false };
+    let off_cone = noise_px.most(T::of(config.rival_floor_px)) * T::of(3.0);
+    let (mut away, mut smooth, mut near) = (T::ZERO, Mean::default(), Mean::default());
     let turn = T::of(config.departure_turn_deg.to_radians());
     for ahead in [false, true] {
         let end = if ahead { run.last } else { run.first };
         // Two boxes within the run give the direction in which it ends.
-        let inside = |boxes: usize| {
-            let mut place = Some(end);
-            let mut found = None;
-            for _ in 0..boxes {
-                found = edge.stretch(&mut place, !ahead);
-            }
-            found
+        let mut place = Some(end);
+        let (Some(mut before), Some(further)) = (edge.stretch(&mut place, !ahead), edge.stretch(&mut place, !ahead)) else {
+            continue;
         };
-        let (Some(mut before), Some(last)) = (inside(2), inside(1)) else { continue };
-        let mut heading = [last.at[0] - before.at[0], last.at[1] - before.at[1]];
-        before = last;
+        let mut heading = [before.at[0] - further.at[0], before.at[1] - further.at[1]];
         let mut place = if ahead { Some(end + 1) } else { end.checked_sub(1) };
-        for _ in 0..BOXES {
+        let mut is_smooth = true;
+        for number in 0..BOXES {
             let Some(now) = edge.stretch(&mut place, ahead) else { break };
-            let ahead_of = [now.at[0] - before.at[0], now.at[1] - before.at[1]];
-            let length = |v: [T; 2]| (v[0] * v[0] + v[1] * v[1]).sqrt();
-            let cross = heading[0] * ahead_of[1] - heading[1] * ahead_of[0];
-            let dot = heading[0] * ahead_of[0] + heading[1] * ahead_of[1];
+            let step = [now.at[0] - before.at[0], now.at[1] - before.at[1]];
+            let cross = heading[0] * step[1] - heading[1] * step[0];
+            let dot = heading[0] * step[0] + heading[1] * step[1];
             // Means of n points, two differences of them: 4 √6 σ/√n over the box.
             let n = T::of_i32(now.points.max(1)).sqrt();
-            let blur = noise_px * T::of(4.0 * 2.449_489_743) / (n * length(ahead_of).most(T::one()));
-            if !(cross.abs().atan2(dot) <= turn + blur) {
+            let length = (step[0] * step[0] + step[1] * step[1]).sqrt().most(T::one());
+            let blur = noise_px * T::of(4.0 * 2.449_489_743) / (n * length);
+            is_smooth = is_smooth && cross.abs().atan2(dot) <= turn + blur;
+            if now.off.abs() > off_cone {
+                let contrast = edge.contrast(now.at, step);
+                if number < NEAR {
+                    near.add(contrast);
+                }
+                if is_smooth {
+                    away += now.length;
+                    smooth.add(contrast);
+                }
+            }
+            if !is_smooth && number >= NEAR {
                 break;
             }
-            if now.off.abs() > off_cone {
-                away += now.length;
-                beside.add(edge.contrast(now.at, ahead_of));
-            }
-            (before, heading) = (now, ahead_of);
+            (before, heading) = (now, step);
         }
     }
-    if away < T::of(2.0 * BOX_PX) {
-        return T::ZERO;
+    let is_long = away >= T::of(2.0 * BOX_PX) && away > run.length.most(T::one()) * T::of(config.max_departure);
+    let is_abrupt = near.count > 0 && support < T::of(config.min_support_abrupt);
+    if !(is_long || is_abrupt) {
+        return false;
     }
     let mut on_cone = Mean::default();
     for (block, lane) in super::inliers(blocks, super::LOOKS) {
@@ -184,10 +192,10 @@ pub(super) fn departure<T: Real, P: Pixels, O: Observer<T>>(
         }
     }
     // A terminator fades, and the rim of something else does not.
-    if beside.count == 0 || beside.mean::<T>() < on_cone.mean::<T>() * T::of(config.departure_contrast) {
-        return T::ZERO;
-    }
-    away / run.length.most(T::one())
+    let kept = |beside: &Mean| {
+        beside.count > 0 && beside.mean::<T>() >= on_cone.mean::<T>() * T::of(config.departure_contrast)
+    };
+    (is_long && kept(&smooth)) || (is_abrupt && kept(&near))
 }
 
 /// Contrasts in counts.

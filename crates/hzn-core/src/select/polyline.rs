@@ -90,6 +90,17 @@ pub(super) fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
     (end / weight).sqrt()
 }
 
+/// What a polyline has more to turn than a cone: two for each piece and one for each joint, and the cone has three.
+pub(super) const PARAMETERS: f64 = (2 * PIECES + PIECES - 1 - 3) as f64;
+
+/// Weighted RMS distance of the points from the best straight line, in pixels.
+pub(super) fn straight_rms<T: Real>(shape: &Shape<T>) -> T {
+    let (Some(first), Some(last)) = (shape.first(), shape.last()) else { return T::ZERO };
+    let mut line = Line::new(first.at, last.at);
+    shape.iter().for_each(|p| line.add(p));
+    (line.cost() / line.n.most(T::of(1e-20))).sqrt()
+}
+
 /// A piece of this cost from one place to another, after every number of pieces before it.
 fn relax<T: Real>(best: &mut [[T; PLACES + 1]; PIECES + 1], from: usize, to: usize, cost: T) {
     let before: [Option<T>; PIECES] = core::array::from_fn(|k| best.get(k).and_then(|row| row.get(from)).copied());

@@ -131,3 +131,8 @@ pub(super) fn correlated_points<T: Real>(shape: &Shape<T>) -> T {
     }
     sum + sum
 }
+
+/// Residuals that count as independent, 3 at least.
+pub(super) fn independent<T: Real>(shape: &Shape<T>) -> T {
+    (T::of_i32(shape.len() as i32) / correlated_points(shape).most(T::one())).most(T::of(3.0))
+}
