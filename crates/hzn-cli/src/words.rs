@@ -40,15 +40,20 @@ pub fn why(verdict: Verdict, s: &select::Config) -> String {
             s.max_rival_ratio
         ),
         Verdict::Departure => "the edge goes on smoothly beside the fitted limb (select.max_departure)".into(),
-        Verdict::Band => "behind the edge is a narrow band and then the sky again, not the body (select.max_band)".into(),
+        Verdict::Band => {
+            "behind the edge is a narrow band and then the sky again, not the body (select.max_band)".into()
+        }
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (select.max_attitude_sigma)",
             s.max_attitude_sigma
         ),
         Verdict::Sun => {
-            "the given Sun does not light this limb (select.max_unlit); a thermal camera sets body.sunlit = false".into()
+            "the given Sun does not light this limb (select.max_unlit); a thermal camera sets body.sunlit = false"
+                .into()
         }
-        Verdict::Rate => "the axis is farther from the last answer than the vehicle can turn (select.max_rate_deg_s)".into(),
+        Verdict::Rate => {
+            "the axis is farther from the last answer than the vehicle can turn (select.max_rate_deg_s)".into()
+        }
     }
 }
 

@@ -489,4 +489,3 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
     }
     (lit > dark).then(|| ((dark + lit) / 2 / looks.max(1)) as u16)
 }
-

@@ -32,11 +32,7 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
         p: across(&p, &fit.e, config.overbound),
         var_free_cos: Some(var_c),
         chi2: T::ZERO,
-        edge: EdgeNoise {
-            var_cos: var_c,
-            sigma_px: T::of(config.sigma_px),
-            length_px: T::of(config.correlation_px),
-        },
+        edge: EdgeNoise { var_cos: var_c, sigma_px: T::of(config.sigma_px), length_px: T::of(config.correlation_px) },
     })
 }
 

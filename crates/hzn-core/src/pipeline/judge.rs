@@ -351,8 +351,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             return (outcome, None);
         }
         let share = T::of_i32(fit.inliers as i32) > T::of_i32(points.count as i32) * T::of(config.select.certain_share);
-        let certain = judged.support > T::of(config.select.certain_support)
-            && (share || fit.rms_px * T::of(4.0) < threshold);
+        let certain =
+            judged.support > T::of(config.select.certain_support) && (share || fit.rms_px * T::of(4.0) < threshold);
         let tracks = (self.tracks && !P::PASSED).then(|| select::middle_level(&fused.e, blocks, scene, camera));
         (outcome, Some(Best { solution, outcome, score: judged.score, certain, level: tracks.flatten() }))
     }

@@ -1,7 +1,7 @@
 //! An edge that goes on smoothly next to the fitted cone counts against it: a limb does not bend away from itself.
 
-use super::shape::Curve;
 use super::Config;
+use super::shape::Curve;
 use crate::block::{Block, LANES};
 use crate::camera::Camera;
 use crate::contour::Scene;
@@ -147,7 +147,8 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
         let end = if ahead { run.last } else { run.first };
         // Two boxes within the run give the direction in which it ends.
         let mut place = Some(end);
-        let (Some(mut before), Some(further)) = (edge.stretch(&mut place, !ahead), edge.stretch(&mut place, !ahead)) else {
+        let (Some(mut before), Some(further)) = (edge.stretch(&mut place, !ahead), edge.stretch(&mut place, !ahead))
+        else {
             continue;
         };
         let mut heading = [before.at[0] - further.at[0], before.at[1] - further.at[1]];

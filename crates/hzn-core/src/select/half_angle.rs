@@ -1,7 +1,7 @@
 //! The half-angle against the expected one, with the noise that the residuals show instead of the one that was told.
 
-use super::shape::{Shape, correlated_points, rms};
 use super::Config;
+use super::shape::{Shape, correlated_points, rms};
 use crate::block::Block;
 use crate::body::Expected;
 use crate::covariance::{self, Fused};

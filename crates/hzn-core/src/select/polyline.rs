@@ -117,11 +117,7 @@ mod tests {
     use super::*;
 
     fn shape<T: Real>(at: impl Fn(f64) -> [f64; 2]) -> Shape<T> {
-        let place = |i: usize| Place {
-            at: at(i as f64 / (MOST - 1) as f64).map(T::of),
-            r: T::ZERO,
-            w: T::one(),
-        };
+        let place = |i: usize| Place { at: at(i as f64 / (MOST - 1) as f64).map(T::of), r: T::ZERO, w: T::one() };
         (0..MOST).map(place).collect()
     }
 
