@@ -100,10 +100,29 @@ pub struct Level<T> {
     pub mean: T,
     /// Pixels in the sample.
     pub samples: u32,
+    /// Mean of the sample's dark pixels in counts.
+    pub dark: T,
+    /// How much brighter its lit pixels are, on the average, in counts; 0 where it has none.
+    pub contrast: T,
 }
 
-/// Bins of the histogram: the sample's upper eight bits.
+impl<T: Real> Level<T> {
+    /// The level that stands `part` of the way from the dark pixels to this one, 1 at this one: half of a level means half
+    /// of the light also where the sky is not black, as in words of a thermal camera.
+    pub(crate) fn part(&self, part: f64) -> u16 {
+        let level = T::of_i32(i32::from(self.level));
+        counts(self.dark + (level - self.dark) * T::of(part))
+    }
+}
+
+/// Bins of the histogram.
 const BINS: usize = 256;
+/// Dark and lit are two classes from this part of full scale on, or from so many standard deviations of the dark ones:
+/// of mere noise, cut at its middle, the classes stand 2.7 standard deviations apart, of a ramp 3.5.
+const LEAST_CONTRAST: f64 = 0.03;
+const LEAST_SPREADS: f64 = 4.0;
+/// Steps of the samples that classes must be apart at least: fewer are rounding.
+const LEAST_COUNTS: f64 = 4.0;
 /// Cells along each side of the first sample and of the second, as powers of two.
 const SIDES_LOG2: [u32; 2] = [4, 6];
 
@@ -112,18 +131,23 @@ fn counts<T: Real>(level: T) -> u16 {
     level.to_i32().clamp(1, 65535) as u16
 }
 
+/// How often each brightness occurs, in bins that are as fine as the sample's own range allows: words of 16 bits may hold
+/// a picture of a thousand counts.
 #[derive(Debug)]
 struct Histogram {
     bins: [u16; BINS],
     sum: u64,
     count: u32,
+    /// A bin is 2^shift counts wide, and this is the number of the first.
     shift: u32,
+    first: u32,
 }
 
 /// Finds the level. `last`: what the picture before says of it, for `track`.
 ///
 /// # Errors
-/// `too-dark`, `too-bright`, or `no-limb` when dark and lit differ by less than 3 % of full scale.
+/// `too-dark`, `too-bright`, or `no-limb` when dark and lit differ by less than 3 % of full scale and by less than the
+/// sample's noise explains.
 pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
     region: &Region<T>,
@@ -193,8 +217,7 @@ struct Sample {
 
 impl Sample {
     fn new<T: Real>(seed: u32, side_log2: u32, full_scale: u16, region: &Region<T>) -> Self {
-        let shift = (16 - u32::from(full_scale).leading_zeros().saturating_sub(16)).saturating_sub(8);
-        let histogram = Histogram { bins: [0; BINS], sum: 0, count: 0, shift };
+        let histogram = Histogram { bins: [0; BINS], sum: 0, count: 0, shift: 0, first: 0 };
         let mut sample = Self { histogram, rng: Rng::new(seed), side_log2, full_scale, cells: 0, y: 0 };
         sample.y = sample.draw(0, region.height());
         sample
@@ -250,17 +273,72 @@ impl Sample {
         };
         let level = level?;
         observer.level(level, mean, sample.count);
-        Some(Ok(Level { level, mean, samples: sample.count }))
+        let (dark, contrast) = sample.classes(level, mean);
+        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast }))
     }
 }
 
 impl Histogram {
     fn count(&mut self, v: u16) {
-        if let Some(bin) = self.bins.get_mut(usize::from(v >> self.shift)) {
+        let v = u32::from(v);
+        if self.count == 0 {
+            // A byte never needs wider bins, nor others.
+            self.first = if v < BINS as u32 { 0 } else { v - BINS as u32 / 2 };
+        }
+        // Sixteen times at most: then every word has its bin.
+        while self.bin(v).is_none() {
+            self.widen(v);
+        }
+        if let Some(bin) = self.bin(v).and_then(|k| self.bins.get_mut(k)) {
             *bin += 1;
         }
         self.sum += u64::from(v);
         self.count += 1;
+    }
+
+    fn bin(&self, v: u32) -> Option<usize> {
+        (v >> self.shift).checked_sub(self.first).map(|k| k as usize).filter(|&k| k < BINS)
+    }
+
+    /// Makes bins twice as wide, and begins with one as near to `v` as leaves those in place that there are.
+    #[cold]
+    fn widen(&mut self, v: u32) {
+        let old = core::mem::replace(&mut self.bins, [0; BINS]);
+        let (first, last) = (self.first, (self.first + BINS as u32 - 1) / 2);
+        self.shift += 1;
+        self.first = (first / 2).min(v >> self.shift).max((last + 1).saturating_sub(BINS as u32));
+        for (&n, k) in old.iter().zip(first..) {
+            if let Some(bin) = (k / 2).checked_sub(self.first).and_then(|k| self.bins.get_mut(k as usize)) {
+                *bin += n;
+            }
+        }
+    }
+
+    /// Mean of the pixels below the level, and how much brighter the mean of the others is; counts.
+    #[inline(never)]
+    fn classes<T: Real>(&self, level: u16, mean: T) -> (T, T) {
+        let lit = (u32::from(level) >> self.shift).saturating_sub(self.first) as usize;
+        let (mut count, mut sum) = (0u32, 0u32);
+        for (&n, k) in self.bins.iter().zip(0u32..).take(lit) {
+            count += u32::from(n);
+            sum += u32::from(n) * k;
+        }
+        let above = self.count.saturating_sub(count);
+        if count == 0 || above == 0 {
+            return (if count == 0 { T::ZERO } else { mean }, T::ZERO);
+        }
+        let dark = (T::of(f64::from(sum)) / T::of(f64::from(count)) + self.offset()) * self.width();
+        // What the dark ones lack of the mean, the lit ones have over it.
+        let (count, above) = (T::of(f64::from(count)), T::of(f64::from(above)));
+        (dark, (mean - dark) * (count + above) / above)
+    }
+
+    /// Counts a bin, and the number of the first.
+    fn width<T: Real>(&self) -> T {
+        T::of(f64::from(1u32 << self.shift))
+    }
+    fn offset<T: Real>(&self) -> T {
+        T::of(f64::from(self.first))
     }
 
     fn mean<T: Real>(&self) -> Option<T> {
@@ -296,13 +374,27 @@ impl Histogram {
                 (best, first, last, dark, lit) = (between, v, v, m0, m1);
             }
         }
-        let scale = T::of(f64::from(1u32 << self.shift));
+        let scale = self.width::<T>();
         let contrast = (lit - dark) * scale;
-        if !(contrast >= T::of(0.03 * f64::from(full_scale)).most(T::of(2.0))) {
-            return None;
-        }
+        let apart = contrast >= T::of(LEAST_CONTRAST * f64::from(full_scale)) || {
+            let spread = self.spread::<T>(first, dark) * scale;
+            contrast >= (spread * T::of(LEAST_SPREADS)).most(T::of(LEAST_COUNTS))
+        };
         // Lit begins one bin above the dark class.
-        Some((T::of(f64::from(first + last)) * T::of(0.5) + T::one()) * scale)
+        let level = T::of(f64::from(first + last)) * T::of(0.5) + T::one() + self.offset();
+        (apart && contrast >= T::of(2.0)).then_some(level * scale)
+    }
+
+    /// Standard deviation of the bins up to number `last` from their mean, in bins; that of rounding included.
+    #[cold]
+    fn spread<T: Real>(&self, last: u32, mean: T) -> T {
+        let (mut count, mut sum) = (0u32, T::of(0.0));
+        for (&n, k) in self.bins.iter().zip(0..=last) {
+            let off = T::of(f64::from(k)) - mean;
+            sum += T::of(f64::from(n)) * off * off;
+            count += u32::from(n);
+        }
+        (sum / T::of(f64::from(count.max(1))) + T::of(1.0 / 12.0)).sqrt()
     }
 }
 
@@ -352,6 +444,35 @@ mod tests {
         assert_eq!(level(&halves(1, 2), 8, gate, Config::default()).unwrap_err(), Status::TooDark);
         assert_eq!(level(&halves(250, 255), 8, gate, Config::default()).unwrap_err(), Status::TooBright);
         assert_eq!(level(&halves(100, 100), 8, gate, Config::default()).unwrap_err(), Status::NoLimb);
+    }
+
+    #[test]
+    fn a_thermal_camera_uses_a_small_part_of_its_words() {
+        // A range of 1200 counts of 65536, with noise of 10 on both sides: 1.8 % of full scale, 60 standard deviations.
+        let noise = |i: usize| (i * 7919 % 41) as u16;
+        for sky in [0, 7000, 30_000] {
+            let data: Vec<u16> = halves(sky, sky + 1200).iter().enumerate().map(|(i, v)| v + noise(i)).collect();
+            let found = level(&data, 16, Gate::default(), Config::default()).unwrap();
+            assert!(found.level.abs_diff(sky + 620) < 40, "{sky}: {found:?}");
+            assert!((found.contrast - 1200.0).abs() < 40.0 && (found.dark - f64::from(sky) - 20.0).abs() < 40.0);
+            // Half of the light, wherever the dark lies.
+            assert!(found.part(0.5).abs_diff(sky + 320) < 40, "{sky}: {}", found.part(0.5));
+            // Noise alone has no two sides.
+            let flat: Vec<u16> = (0..64 * 64).map(|i| sky + noise(i)).collect();
+            assert_eq!(level(&flat, 16, Gate::default(), Config::default()).unwrap_err(), Status::NoLimb);
+        }
+    }
+
+    #[test]
+    fn bins_widen_without_losing_a_pixel() {
+        let mut histogram = Histogram { bins: [0; BINS], sum: 0, count: 0, shift: 0, first: 0 };
+        let values = [30_000u16, 30_100, 29_000, 31_500, 12, 65_535, 30_000];
+        for (n, v) in (1u32..).zip(values) {
+            histogram.count(v);
+            assert_eq!(histogram.bins.iter().map(|&b| u32::from(b)).sum::<u32>(), n);
+            assert!(histogram.bin(v.into()).is_some_and(|k| histogram.bins[k] > 0));
+        }
+        assert_eq!((histogram.shift, histogram.first), (8, 0));
     }
 
     #[test]

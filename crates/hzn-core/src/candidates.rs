@@ -47,7 +47,8 @@ pub enum SubPixel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
-    /// Edges with fewer border pixels are left out, 8 or more; half of what a small body has around it is enough of it.
+    /// Edges with fewer border pixels are left out, 8 or more; half of what a small body has around it is enough of it, and
+    /// half of the shorter side of a picture of fewer than 80 rows.
     pub min_points: u16,
     /// Points kept of each candidate, evenly along the edge, 16 or more; 0 keeps all that fit.
     pub keep_points: u16,
@@ -82,6 +83,8 @@ const WIDEST: i32 = 6;
 const MARGIN: i32 = REACH + 3;
 /// Where an edge that is no wider than four pixels has faded to half of the level, pixels.
 const FADED: i32 = 3;
+/// Farther than an edge point can stand from its border pixel, pixels.
+const FARTHEST: i32 = 1024;
 /// Stands for a brightness that cannot be read.
 const UNSEEN: i32 = i32::MIN;
 
@@ -405,11 +408,47 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     *slow += 1;
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
-    if FREE && is_clear(scene, p, (MARGIN * step) as u16) {
-        in_steps::<T, P, O, true>(scene, p, lit, (dx, dy), step)
+    let found = if FREE && is_clear(scene, p, (MARGIN * step) as u16) {
+        in_steps::<T, P, O, true>(scene, p, (dx, dy), step)?
     } else {
-        in_steps::<T, P, O, false>(scene, p, lit, (dx, dy), step)
+        in_steps::<T, P, O, false>(scene, p, (dx, dy), step)?
+    };
+    let Wide { off, fallback, .. } = climb(scene, p, (dx, dy), step, found, slow);
+    Some((point_off(p, (dx, dy), off), lit, fallback))
+}
+
+/// Most times that a profile is read again from where it crosses.
+const CLIMBS: u32 = 4;
+
+/// A profile that still grows brighter where it was read to has no plateau there, and its middle moves with the level that
+/// led to its border: it is read again about its crossing, until that is its middle.
+#[inline(never)]
+fn climb<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+    (dx, dy): (i32, i32),
+    step: i32,
+    mut found: Wide<T>,
+    slow: &mut u32,
+) -> Wide<T> {
+    let mut whole = 0;
+    for _ in 0..CLIMBS {
+        let moved = (found.off + T::of_i32(FARTHEST)).to_i32() - FARTHEST - whole;
+        if !found.rising || moved.abs() < step {
+            break;
+        }
+        let (x, y) = (i32::from(p.x) + dx * (whole + moved), i32::from(p.y) + dy * (whole + moved));
+        if !scene.region.counts(x, y) {
+            break;
+        }
+        *slow += 1;
+        let Some(next) = in_steps::<T, P, O, false>(scene, Pixel { x: x as u16, y: y as u16 }, (dx, dy), step) else {
+            break;
+        };
+        whole += moved;
+        found = Wide { off: next.off + T::of_i32(whole), ..next };
     }
+    found
 }
 
 /// Whether neither the region's border nor a mask is within `margin` pixels.
@@ -419,31 +458,38 @@ fn is_clear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: P
     region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || region.clearance(p.x, p.y, margin) == margin)
 }
 
+/// Where a wide edge crosses the mid-level, pixels from a border pixel towards the dark.
+struct Wide<T> {
+    off: T,
+    fallback: bool,
+    /// The lit side did not level off within reach.
+    rising: bool,
+}
+
 /// As [`linear`], `step` pixels a step.
 #[inline(never)]
 fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     scene: &Scene<'_, T, P, O>,
     p: Pixel,
-    lit: Lit,
     (dx, dy): (i32, i32),
     step: i32,
-) -> Option<(ImagePoint<T>, Lit, bool)> {
+) -> Option<Wide<T>> {
     let around = Around::<T, P, O, FREE>::new(scene, p);
     let line = Line::new(&around, (dx, dy), step);
-    let Crossing { part, mid2, fallback } = line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
+    let Crossing { part, mid2, fallback, rising } = line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
     let coarse = part * T::of_i32(step);
     // The profile bends over a step: once more over half of one, in the middle of which the crossing should be.
     let half = step / 2;
     if half == 0 {
-        return Some((point_off(p, (dx, dy), coarse), lit, fallback));
+        return Some(Wide { off: coarse, fallback, rising });
     }
     let pixels = Line::new(&around, (dx, dy), 1);
     let whole = (coarse + T::of_i32(REACH * WIDEST)).to_i32() - REACH * WIDEST;
     let k = whole - half / 2;
     let (a, b) = (pixels.three(k)?, pixels.three(k + half)?);
     let fine = T::of_i32(k) + T::of_i32(half * (2 * a - mid2)) / T::of_i32((2 * (a - b)).max(1));
-    let part = if (fine - coarse).abs() <= T::of_i32(half) { fine } else { coarse };
-    Some((point_off(p, (dx, dy), part), lit, fallback))
+    let off = if (fine - coarse).abs() <= T::of_i32(half) { fine } else { coarse };
+    Some(Wide { off, fallback, rising })
 }
 
 /// Where an edge crosses the mid-level.
@@ -454,6 +500,8 @@ struct Crossing<T> {
     mid2: i32,
     /// Whether the global level had to stand in for the local one.
     fallback: bool,
+    /// The lit side did not level off within reach.
+    rising: bool,
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P, O, FREE> {
@@ -518,8 +566,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         let (dim, outer) = self.plateau::<false>(first_dark, bright);
         let contrast = bright - dim;
         let level4 = i32::from(scene.level) * 4;
-        let least = 4 * (i32::from(scene.picture.full_scale()) / 64).max(2);
-        let (mid2, fallback) = if contrast >= least {
+        let (mid2, fallback) = if contrast >= 4 * scene.least_contrast {
             (bright + dim, false)
         } else if first_lit > first_dark {
             (2 * level4.max(first_dark + 1).min(first_lit), true)
@@ -547,7 +594,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
             return None;
         }
         let part = T::of_i32(k) + T::of_i32(2 * a - mid2) / T::of_i32(2 * (a - b));
-        Some(Crossing { part, mid2, fallback })
+        Some(Crossing { part, mid2, fallback, rising: inner <= -REACH })
     }
 }
 

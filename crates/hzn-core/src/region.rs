@@ -53,6 +53,8 @@ impl Config {
 pub struct Region<T> {
     width: u16,
     height: u16,
+    /// Pixels along each side of the picture that do not count.
+    frame: u16,
     circle: Option<Circle<T>>,
     polygons: heapless::Vec<Outline<T>, MAX_POLYGONS>,
 }
@@ -96,12 +98,30 @@ impl<T: Real> Region<T> {
             }
             let _ = polygons.push(outline);
         }
-        Self { width: camera.width(), height: camera.height(), circle, polygons }
+        Self { width: camera.width(), height: camera.height(), frame: 0, circle, polygons }
     }
 
     /// A whole picture without mask.
     pub fn whole(width: u16, height: u16) -> Self {
-        Self { width, height, circle: None, polygons: heapless::Vec::new() }
+        Self { width, height, frame: 0, circle: None, polygons: heapless::Vec::new() }
+    }
+
+    /// The region without a frame of `px` pixels along each side of the picture, which must be narrower than half of it.
+    pub(crate) fn within(&self, px: u16) -> Self {
+        Self { frame: px, ..self.clone() }
+    }
+    /// First and last column, or row, that counts on a side of `length` pixels.
+    #[inline(always)]
+    fn ends(&self, length: u16) -> (u16, u16) {
+        (self.frame, length.saturating_sub(1).saturating_sub(self.frame))
+    }
+    #[inline(always)]
+    fn columns(&self) -> (u16, u16) {
+        self.ends(self.width)
+    }
+    #[inline(always)]
+    fn rows(&self) -> (u16, u16) {
+        self.ends(self.height)
     }
 
     /// The part of it in the first rows of the picture.
@@ -126,6 +146,7 @@ impl<T: Real> Region<T> {
         Self {
             width: window.width,
             height: window.height,
+            frame: 0,
             circle: self.circle.map(|c| {
                 let [cx, cy] = place([c.cx, c.cy]);
                 Circle { cx, cy, semi_x: c.semi_x / sx, inv_x: c.inv_x * sx, inv_y: c.inv_y * sy }
@@ -146,7 +167,10 @@ impl<T: Real> Region<T> {
     /// Whether the pixel lies in the picture and in the image circle.
     #[inline(always)]
     pub fn contains(&self, x: u16, y: u16) -> bool {
-        x < self.width && y < self.height && self.circle.as_ref().is_none_or(|c| c.contains(x, y))
+        let ((left, right), (top, bottom)) = (self.columns(), self.rows());
+        (left..=right).contains(&x)
+            && (top..=bottom).contains(&y)
+            && self.circle.as_ref().is_none_or(|c| c.contains(x, y))
     }
 
     /// Whether every pixel up to `margin` away in x and y is in the region. (Polygons are not looked at.)
@@ -154,10 +178,11 @@ impl<T: Real> Region<T> {
     pub(crate) fn is_inside_by(&self, x: u16, y: u16, margin: u16) -> bool {
         let (w, h) = (u32::from(self.width), u32::from(self.height));
         let (x32, y32, m) = (u32::from(x), u32::from(y), u32::from(margin));
-        x32 >= m
-            && y32 >= m
-            && x32 + m < w
-            && y32 + m < h
+        let side = m + u32::from(self.frame);
+        x32 >= side
+            && y32 >= side
+            && x32 + side < w
+            && y32 + side < h
             && self.circle.as_ref().is_none_or(|c| c.clear(x, y, T::of_i32(i32::from(margin))))
     }
 
@@ -168,7 +193,8 @@ impl<T: Real> Region<T> {
         let sides = x
             .min(y)
             .min(self.width.saturating_sub(1).saturating_sub(x))
-            .min(self.height.saturating_sub(1).saturating_sub(y));
+            .min(self.height.saturating_sub(1).saturating_sub(y))
+            .saturating_sub(self.frame);
         let most = most.min(sides);
         let clear = |n: u16| {
             let margin = T::of_i32(i32::from(n));
@@ -208,27 +234,31 @@ impl<T: Real> Region<T> {
 
     /// First and last column of a row; `None` when the circle leaves nothing of it.
     pub fn span(&self, y: u16) -> Option<(u16, u16)> {
-        let Some(c) = &self.circle else { return Some((0, self.width - 1)) };
+        let ((first, last), (top, bottom)) = (self.columns(), self.rows());
+        if !(top..=bottom).contains(&y) {
+            return None;
+        }
+        let Some(c) = &self.circle else { return Some((first, last)) };
         let dy = (T::of_i32(i32::from(y)) - c.cy) * c.inv_y;
         let left = T::one() - dy * dy;
         if !(left > T::zero()) {
             return None;
         }
         let half = c.semi_x * left.sqrt();
-        // A picture has columns; said once more, so that `clamp` is seen not to fail.
-        let last = i32::from(self.width.max(1)) - 1;
+        // A region has columns; said once more, so that `clamp` is seen not to fail.
+        let (first, last) = (i32::from(first), i32::from(last.max(first)));
         // Start one pixel inside and grow while the exact test holds: the ring and `contains` must agree.
-        let mut x0 = ((c.cx - half).floor().to_i32() + 2).clamp(0, last);
-        let mut x1 = ((c.cx + half).floor().to_i32() - 1).clamp(0, last);
+        let mut x0 = ((c.cx - half).floor().to_i32() + 2).clamp(first, last);
+        let mut x1 = ((c.cx + half).floor().to_i32() - 1).clamp(first, last);
         if x0 > x1 {
-            let mid = c.cx.to_i32().clamp(0, last);
+            let mid = c.cx.to_i32().clamp(first, last);
             (x0, x1) = (mid, mid);
             if !self.contains(mid as u16, y) {
                 return None;
             }
         }
         for _ in 0..4 {
-            if x0 > 0 && self.contains((x0 - 1) as u16, y) {
+            if x0 > first && self.contains((x0 - 1) as u16, y) {
                 x0 -= 1;
             }
             if x1 < last && self.contains((x1 + 1) as u16, y) {

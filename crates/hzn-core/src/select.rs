@@ -32,7 +32,8 @@ use crate::real::Real;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Config {
-    /// Fewest inliers, 8 or more; a third of what a small body has around it is enough of it.
+    /// Fewest inliers, 8 or more; a third of what a small body has around it is enough of it, and a third of the shorter side
+    /// of a picture of fewer than 80 rows.
     pub min_inliers: u16,
     /// Shortest edge that inliers must cover, in pixels, 0 or more. Left out: a tenth of the picture's diagonal, or a
     /// third of the body's circumference where that is less. Shorter edges fit many curves.
@@ -288,7 +289,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let support = (fit.arc_px / limb_px.most(T::one())).least(T::one());
     let sigma_limit = T::of(config.max_sigma_deg.to_radians());
     let chi = T::of(config.max_half_angle_sigma);
-    let least = config.min_inliers.min(small(expected.sin, camera, 3));
+    let least = config.min_inliers.min(small(expected.sin, camera, 3)).min(few_rows(camera, 3));
     let counts = |n: u32| T::of_i32(n as i32);
     let verdict = if counts(fit.inliers) < counts(points) * T::of(config.min_inlier_share) {
         Verdict::NoConsensus
@@ -440,6 +441,15 @@ pub(crate) fn small<T: Real>(sin: T, camera: &Camera<T>, part: i32) -> u16 {
     let (fx, fy) = camera.focal_px();
     let around = T::of(core::f64::consts::PI) * (fx + fy) * sin;
     (around / T::of_i32(part)).to_i32().clamp(8, i32::from(u16::MAX)) as u16
+}
+
+/// Pictures with shorter sides than this are small: an edge across one has fewer points than the defaults ask for.
+const SMALL_PICTURE: u16 = 80;
+
+/// A part of a small picture's shorter side, one in `part`, 8 or more: of a thermal array of 24 rows a limb has no more.
+pub(crate) fn few_rows<T: Real>(camera: &Camera<T>, part: u16) -> u16 {
+    let side = camera.width().min(camera.height());
+    if side < SMALL_PICTURE { (side / part.max(1)).max(8) } else { u16::MAX }
 }
 
 fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {

@@ -38,7 +38,13 @@ pub(crate) fn look(mask: u32) -> u32 {
 pub(crate) fn line(from: u16, to: u16) -> u32 {
     u32::from(to.saturating_sub(from)) / 15
 }
-/// What such a line costs more each time that it crosses an edge.
+/// The picture's border pixel by pixel, beyond the few that are looked at for nothing.
+pub(crate) fn ring(width: u16, height: u16) -> u32 {
+    (u32::from(width) + u32::from(height)) / 2
+}
+/// A further look at a picture, before anything is found.
+pub(crate) const LOOK: u32 = 1000;
+/// What a search line costs more each time that it crosses an edge.
 pub(crate) const CROSSING: u32 = 4;
 /// A sub-pixel point with its ray, by the default's method.
 pub(crate) const POINT: u32 = 16;

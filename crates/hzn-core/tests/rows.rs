@@ -32,6 +32,9 @@ fn config(mask: bool, circle: bool) -> Config {
     config.select.min_inliers = 8;
     config.binarize.method = Method::Fixed;
     config.binarize.level = 100.0;
+    // A picture that came row by row is looked at once.
+    config.recover.levels.clear();
+    config.recover.frame_px = 0;
     if mask {
         let triangle = [[10.0, 10.0], [50.0, 5.0], [30.0, 60.0]];
         config.mask.polygons_px.push(triangle.into_iter().collect()).unwrap();

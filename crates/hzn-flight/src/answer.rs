@@ -181,6 +181,8 @@ impl Answer {
                 work: self.work,
                 // No pictures come row by row.
                 cut_points: 0,
+                // Not sent down.
+                looks: 0,
             },
             candidates,
             solution,

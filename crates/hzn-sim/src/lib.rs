@@ -28,6 +28,7 @@
 //! | [`utc`] | dates, seconds, terrestrial time |
 //! | [`evaluate`] | answers beside their truth: how many, how good, how honest |
 //! | [`sensitivity`] | covariances by design, without rendering |
+//! | [`painted`] | even discs, painted in no time |
 //! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
 
 pub mod artefact;
@@ -44,6 +45,7 @@ pub mod infrared;
 pub mod limb;
 pub mod motion;
 pub mod optics;
+pub mod painted;
 mod painter;
 pub mod picture;
 pub mod pose;

@@ -24,6 +24,12 @@ pub(super) const STEPS: [(i32, i32); 8] = [(1, 0), (1, -1), (0, -1), (-1, -1), (
 /// The western neighbour, which search lines mark.
 pub(super) const WEST: u8 = 4;
 
+/// An edge point's mid-level is its own from this part of full scale on, or of the picture's contrast, and from so many
+/// counts.
+const FULL_SCALE_PART: i32 = 64;
+const CONTRAST_PART: i32 = 16;
+const LEAST_CONTRAST: i32 = 2;
+
 /// What is followed: a picture, its level and its region.
 pub(crate) struct Scene<'a, T, P, O> {
     pub(crate) picture: &'a P,
@@ -32,6 +38,8 @@ pub(crate) struct Scene<'a, T, P, O> {
     pub(crate) observer: &'a O,
     /// The body's disc blooms: its edge is where the picture's level says, as what lies around it is no plateau.
     pub(crate) blooms: bool,
+    /// Contrast in counts that an edge point's own mid-level needs at least.
+    pub(crate) least_contrast: i32,
     /// What a look at the mask costs, and a look around.
     mask: u32,
     look: u32,
@@ -98,7 +106,27 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
     pub(crate) fn new(picture: &'a P, region: &'a Region<T>, level: u16, observer: &'a O) -> Self {
         let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
         let (mask, masked) = (region.mask_cost(), Cell::new(0));
-        Self { picture, region, level, observer, blooms: false, mask, look: work::look(mask), masked, moves }
+        let least_contrast = (i32::from(picture.full_scale()) / FULL_SCALE_PART).max(LEAST_CONTRAST);
+        Self {
+            picture,
+            region,
+            level,
+            observer,
+            blooms: false,
+            least_contrast,
+            mask,
+            look: work::look(mask),
+            masked,
+            moves,
+        }
+    }
+
+    /// With the contrast between the picture's dark and its lit pixels in counts: where it is a small part of full scale, as
+    /// in words of a thermal camera, an edge has less of it, too. Of bytes three counts are little in any case.
+    pub(crate) fn contrasting(self, contrast: T) -> Self {
+        let own = (contrast / T::of_i32(CONTRAST_PART)).to_i32();
+        let least = if own > 0 && self.picture.full_scale() > 255 { own.max(LEAST_CONTRAST) } else { i32::MAX };
+        Self { least_contrast: self.least_contrast.min(least), ..self }
     }
 
     pub(crate) fn blooming(self, blooms: bool) -> Self {

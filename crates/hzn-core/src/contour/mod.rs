@@ -6,6 +6,7 @@
 #[cfg(feature = "horace")]
 pub(crate) mod erode;
 mod follow;
+mod frame;
 mod marks;
 #[cfg(any(feature = "horace", feature = "zju"))]
 mod order;

@@ -127,6 +127,51 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
         most
     }
 
+    /// Calls `found` with the starts that [`Self::each_start`] can have passed over, until it says to stop: those with
+    /// fewer than `stride` dark pixels before them, or lit ones after them. Every pixel of the ring is read.
+    pub(crate) fn each_narrow_start(&self, stride: u16, found: &mut dyn FnMut(Start) -> bool) {
+        let mut before: Option<(Pixel, bool)> = None;
+        let (mut dark_px, mut lit_px) = (0u32, 0u32);
+        let mut waiting: Option<Start> = None;
+        let mut go_on = true;
+        // The last start's lit pixels may go on where the ring closes.
+        for round in 0..2 {
+            let mut starts = true;
+            self.region.each_run(|run| {
+                for k in 0..run.len {
+                    let pixel = run.at(k);
+                    let lit = self.lit(pixel.x, pixel.y);
+                    if lit {
+                        if let Some((dark, false)) = before
+                            && starts
+                        {
+                            (waiting, lit_px) =
+                                (Some(Start { pixel, dark: direction(pixel, dark), stretch: dark_px }), 0);
+                        }
+                        (dark_px, lit_px) = (0, lit_px + 1);
+                    } else {
+                        dark_px += 1;
+                    }
+                    before = Some((pixel, lit));
+                    starts &= round == 0;
+                    let stride = u32::from(stride);
+                    let ended = !lit || lit_px >= stride;
+                    if let Some(start) = waiting.take_if(|_| ended) {
+                        go_on = start.stretch >= stride && lit_px >= stride || found(start);
+                    }
+                    go_on &= round == 0 || waiting.is_some();
+                    if !go_on {
+                        return false;
+                    }
+                }
+                true
+            });
+            if !go_on {
+                return;
+            }
+        }
+    }
+
     /// The ranked starts.
     pub(crate) fn ranked_starts(&self, stride: u16) -> Ranked {
         let mut ranked = Ranked::new();

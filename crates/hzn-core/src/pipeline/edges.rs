@@ -98,12 +98,11 @@ impl<T: Real> Sensor<T> {
     /// Border pixels of every edge of a picture at a level, in order along each; the edges in the order in which the
     /// pipeline looks at them. It stops at none, whatever `[limits]` say.
     pub fn borders<P: Pixels>(&self, picture: &P, level: u16, expected: &Expected<T>) -> Vec<Vec<Pixel>> {
-        let mut unlimited = self.clone();
-        unlimited.config.limits.max_work = Some(u32::MAX);
         let (mut border, mut marks) = (vec![Pixel { x: 0, y: 0 }; HOST_POINTS], vec![0; HOST_WORDS]);
         let lists = Lists { border: &mut border, blocks: &mut [], marks: &mut marks };
         let borders = Borders::default();
-        unlimited.search(lists, picture, level, expected, &[], &borders, &mut Report::of_nothing());
+        let scene = Scene::new(picture, &self.region, level, &borders).blooming(expected.blooms());
+        self.search(lists, &scene, Work::unlimited(), expected, &[], &mut Report::of_nothing());
         borders.0.into_inner()
     }
 }

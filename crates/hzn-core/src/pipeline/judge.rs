@@ -63,6 +63,17 @@ pub(super) struct Judge<'a, T, O> {
     report: &'a mut Report<T>,
 }
 
+/// Whether an edge begins on the border between two of its strides.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Missed {
+    /// Nothing says so.
+    Unknown,
+    /// At least one does.
+    Some,
+    /// They were looked for pixel by pixel.
+    Found,
+}
+
 struct Best<T> {
     solution: Solution<T>,
     outcome: Candidate<T>,
@@ -74,15 +85,15 @@ struct Best<T> {
 }
 
 impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
-    /// Nothing looked at yet. `taken` are the bodies found before; `blocks` is the room for one edge's points, `pixels` that
-    /// for its border.
+    /// Nothing looked at yet. `taken` are the bodies found before; `blocks` is the room for one edge's points, `work` what
+    /// the look may cost.
     pub(super) fn new(
         sensor: &'a Sensor<T>,
         expected: &'a Expected<T>,
         taken: &'a [Taken<T>],
         observer: &'a O,
         blocks: &'a mut [Block<T>],
-        pixels: usize,
+        work: Work,
         report: &'a mut Report<T>,
     ) -> Self {
         let config = &sensor.config;
@@ -91,9 +102,13 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             taken,
             noise: config.noise_of(expected.which),
             tracks: config.levels_of(expected.which).method == binarize::Method::Track,
-            min_points: config.candidates.min_points.min(select::small(expected.sin, &sensor.camera, 2)),
+            min_points: config
+                .candidates
+                .min_points
+                .min(select::small(expected.sin, &sensor.camera, 2))
+                .min(select::few_rows(&sensor.camera, 2)),
             observer,
-            work: account::open(config, pixels),
+            work,
             blocks,
             best: None,
             rival: None,
@@ -145,16 +160,47 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         if self.best.is_some() {
             return;
         }
+        let mut missed = Missed::Unknown;
         for y in marks.rows(height) {
             let Some((x0, x1)) = scene.region.span(y) else { continue };
             if self.done() || !self.work.spend(work::line(x0, x1)) {
                 break;
             }
             let crossings = scene.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
-                self.edge(scene, pixel, dark, border, marks);
+                self.edge_on_line(scene, pixel, dark, border, marks, &mut missed);
                 !self.done()
             });
             self.work.pay(crossings * work::CROSSING + scene.cost());
+            if missed == Missed::Some {
+                missed = Missed::Found;
+                if !self.work.spend(work::ring(width, height)) {
+                    break;
+                }
+                scene.each_narrow_start(stride, &mut |start| {
+                    self.edge(scene, start.pixel, start.dark, border, &mut marks);
+                    self.work.pay(scene.cost());
+                    !self.done()
+                });
+            }
+        }
+    }
+
+    /// An edge that a search line meets. When it ends at the border, it began there too, where the border's strides passed
+    /// over it: half of an edge is not judged, but asked for whole.
+    fn edge_on_line<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        pixel: Pixel,
+        dark: u8,
+        border: &mut [Pixel],
+        marks: &mut Marks<'_>,
+        missed: &mut Missed,
+    ) {
+        let mut edge = Thinned::new(border);
+        match self.follow(scene, pixel, dark, &mut edge, marks) {
+            Some(End::Open) if *missed != Missed::Found => *missed = Missed::Some,
+            Some(_) => self.piece(scene, &edge),
+            None => {}
         }
     }
 
@@ -195,16 +241,28 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         marks: &mut Marks<'_>,
     ) {
         let mut edge = Thinned::new(border);
+        if self.follow(scene, pixel, dark, &mut edge, marks).is_some() {
+            self.piece(scene, &edge);
+        }
+    }
+
+    /// Follows one edge, and says how it ended; `None` when it is none, or cannot be paid for.
+    fn follow<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        pixel: Pixel,
+        dark: u8,
+        edge: &mut Thinned<'_>,
+        marks: &mut Marks<'_>,
+    ) -> Option<End> {
         if !self.work.spend(work::EDGE) {
-            return;
+            return None;
         }
-        let end = self.work.on_edge(|steps| scene.follow(pixel, dark, &mut edge, marks, steps));
+        let end = self.work.on_edge(|steps| scene.follow(pixel, dark, edge, marks, steps));
         self.report.counters.followed += edge.total();
-        if matches!(end, End::Closed { twice_area } if twice_area > 0) {
-            // A hole: sky or ground seen through something.
-            return;
-        }
-        self.piece(scene, &edge);
+        // A hole: sky or ground seen through something.
+        let hole = matches!(end, End::Closed { twice_area } if twice_area > 0);
+        (!hole).then_some(end)
     }
 
     /// Takes an edge through every stage.
@@ -376,23 +434,24 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         enter(self.report, self.observer, stage);
     }
 
-    /// Writes the answer into the report.
-    pub(super) fn conclude(self) {
-        let report = self.report;
-        report.counters.work = self.work.done();
+    /// Writes the answer into the report. Gives back what is left of the account.
+    pub(super) fn conclude(self) -> Work {
+        let (report, work) = (self.report, self.work);
+        report.counters.work = work.done();
+        report.counters.looks += 1;
         if let Some(best) = self.best {
             let factor = T::of(self.sensor.config.select.ambiguous_score);
             if !best.certain && self.rival.is_some_and(|r| r < best.score * factor) {
                 report.status = Status::Ambiguous;
-                return;
+                return work;
             }
             report.choose(best.outcome);
             report.status = Status::Ok;
             report.next_level = best.level;
             report.solution = Some(best.solution);
-            return;
+            return work;
         }
-        report.status = if self.work.was_cut() {
+        report.status = if work.was_cut() {
             Status::Truncated
         } else if self.fitted {
             Status::Rejected
@@ -401,6 +460,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         } else {
             Status::NoLimb
         };
+        work
     }
 }
 

@@ -3,7 +3,8 @@
 //! One candidate after another goes from its border to a verdict. Edges are looked at in the order in which they are
 //! likely to be the limb: those beside the longest dark stretches of the border first, then every other edge that
 //! begins at the border, then the closed ones. The picture is done as soon as an edge passes every gate and is beyond
-//! doubt; otherwise the best of all that begin at the border is taken, and closed ones are looked at when none is.
+//! doubt; otherwise the best of all that begin at the border is taken, and closed ones are looked at when none is. A
+//! picture without an answer is looked at again, at other levels (`[recover]`).
 
 mod account;
 mod config;
@@ -11,6 +12,7 @@ mod config;
 pub mod edges;
 mod horizon;
 mod judge;
+mod looks;
 mod observer;
 mod optional;
 #[cfg(feature = "horace")]

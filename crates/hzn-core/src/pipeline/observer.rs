@@ -18,6 +18,10 @@ pub trait Observer<T> {
     fn pixel(&self, _x: u16, _y: u16) {}
     /// The level was found: in counts, with the mean and the number of pixels of the sample.
     fn level(&self, _level: u16, _mean: T, _samples: u32) {}
+    /// A dark frame of so many pixels lies around the picture, and is left out from here on.
+    fn frame(&self, _px: u16) {}
+    /// Another look at a picture without an answer begins: its number, 1 for the second look, and its level in counts.
+    fn look(&self, _number: u32, _level: u16) {}
     /// An edge was followed and is candidate number `candidate`: every `stride`-th of its border pixels, in order.
     fn edge(&self, _candidate: u32, _border: impl Iterator<Item = Pixel>, _stride: u32) {}
     /// Whether this edge goes on through the stages. Of an observer that always says no every edge is followed, and there is

@@ -200,6 +200,12 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     fn level(&self, level: u16, mean: T, samples: u32) {
         self.observer.level(level, mean, samples);
     }
+    fn frame(&self, px: u16) {
+        self.observer.frame(px);
+    }
+    fn look(&self, number: u32, level: u16) {
+        self.observer.look(number, level);
+    }
     fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
         self.observer.edge(candidate, border.map(|p| self.window.pixel(p.x, p.y)), stride);
     }

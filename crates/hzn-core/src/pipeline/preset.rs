@@ -169,6 +169,9 @@ const HORACE_ROWS: u16 = 240;
 #[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
 fn ungated(config: &mut Config) {
     config.limits.max_work = Some(200_000_000);
+    // They looked once.
+    config.recover.levels.clear();
+    config.recover.frame_px = 0;
     config.select.min_arc_px = Some(0.0);
     config.select.max_rms_px = 1e6;
     config.select.max_half_angle_sigma = 1e6;

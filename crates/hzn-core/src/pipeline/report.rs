@@ -75,6 +75,8 @@ pub struct Counters {
     pub draws: u32,
     /// What the picture cost, in the unit of `limits.max_work`.
     pub work: u32,
+    /// How often its edges were looked for: 1, and more where the first look gave no answer (`[recover]`).
+    pub looks: u32,
 }
 
 /// One candidate edge and what became of it.

@@ -16,6 +16,7 @@ use crate::image::Pixels;
 use crate::real::Real;
 use crate::region::Region;
 use crate::status::Stage;
+use crate::work::Work;
 
 /// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
 /// that a picture needs are in a [`Workspace`]. [`Horizon`](super::Horizon) is both together.
@@ -147,44 +148,41 @@ impl<T: Real> Sensor<T> {
             config.reject.seed,
             observer,
         ) {
-            Ok(level) => level.level,
+            Ok(level) => level,
             Err(status) => {
                 report.status = status;
                 return;
             }
         };
-        report.level = level;
-        self.search(lists, picture, level, expected, taken, observer, report);
+        self.look_at_levels(lists, picture, &level, expected, taken, observer, report);
     }
 
-    /// Everything after the level.
+    /// One look: everything after the level. What it leaves of the picture's account.
     #[inline(always)]
     pub(super) fn search<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
-        picture: &P,
-        level: u16,
+        scene: &Scene<'_, T, P, O>,
+        work: Work,
         expected: &Expected<T>,
         taken: &[Taken<T>],
-        observer: &O,
         report: &mut Report<T>,
-    ) {
+    ) -> Work {
         let config = &self.config;
-        report.stage = Stage::Contour;
-        observer.enter(Stage::Contour);
-        let scene = Scene::new(picture, &self.region, level, observer).blooming(expected.blooms());
-        let mut judge = Judge::new(self, expected, taken, observer, lists.blocks, lists.border.len(), report);
+        report.stage = report.stage.max(Stage::Contour);
+        scene.observer.enter(Stage::Contour);
+        let mut judge = Judge::new(self, expected, taken, scene.observer, lists.blocks, work, report);
         match config.contour.method {
-            contour::Method::BorderFollowing => judge.border_following(&scene, lists.border, lists.marks),
+            contour::Method::BorderFollowing => judge.border_following(scene, lists.border, lists.marks),
             #[cfg(feature = "horace")]
-            contour::Method::Raster => judge.raster(&scene, lists.border, lists.marks),
+            contour::Method::Raster => judge.raster(scene, lists.border, lists.marks),
             #[cfg(feature = "horace")]
             contour::Method::Erode => {
-                judge.whole(&scene, |work| contour::erode::edges(&scene, &config.contour, lists.border, work));
+                judge.whole(scene, |work| contour::erode::edges(scene, &config.contour, lists.border, work));
             }
             #[cfg(feature = "zju")]
-            contour::Method::Sobel => judge.whole(&scene, |work| contour::sobel::edges(&scene, lists.border, work)),
+            contour::Method::Sobel => judge.whole(scene, |work| contour::sobel::edges(scene, lists.border, work)),
         }
-        judge.conclude();
+        judge.conclude()
     }
 }

@@ -45,7 +45,6 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Work
     }
 }
 
-#[cfg(feature = "horace")]
 impl<T> Lists<'_, T> {
     /// The same, for one look of several.
     pub(super) fn again(&mut self) -> Lists<'_, T> {

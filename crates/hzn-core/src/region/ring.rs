@@ -13,13 +13,14 @@ impl<T: Real> Region<T> {
     /// the left end of the top row, until `visit` says to stop. They are the pixels with an outer 4-neighbour.
     pub(crate) fn each_run(&self, mut visit: impl FnMut(Run) -> bool) {
         let run = |x: u16, y: u16, dx: i32, dy: i32, len: u16| Run { x, y, dx, dy, len };
-        let (w, h) = (self.width, self.height);
+        let ((first, last), (upper, lower)) = (self.columns(), self.rows());
         if self.circle.is_none() {
+            let (across, down) = (last.saturating_sub(first), lower.saturating_sub(upper));
             let sides = [
-                run(0, 0, 1, 0, w),
-                run(w - 1, 1, 0, 1, h - 1),
-                run(w.saturating_sub(2), h - 1, -1, 0, w - 1),
-                run(0, h.saturating_sub(2), 0, -1, h.saturating_sub(2)),
+                run(first, upper, 1, 0, across + 1),
+                run(last, upper + 1, 0, 1, down),
+                run(last.saturating_sub(1), lower, -1, 0, across),
+                run(first, lower.saturating_sub(1), 0, -1, down.saturating_sub(1)),
             ];
             for side in sides {
                 if side.len > 0 && !visit(side) {
@@ -28,9 +29,9 @@ impl<T: Real> Region<T> {
             }
             return;
         }
-        let Some((top, (left, right))) = (0..h).find_map(|y| self.span(y).map(|s| (y, s))) else { return };
+        let Some((top, (left, right))) = (upper..=lower).find_map(|y| self.span(y).map(|s| (y, s))) else { return };
         // The rows of a convex region follow each other.
-        let Some((bottom, (low, _))) = (top..h).rev().find_map(|y| self.span(y).map(|s| (y, s))) else { return };
+        let Some((bottom, (low, _))) = (top..=lower).rev().find_map(|y| self.span(y).map(|s| (y, s))) else { return };
         if !visit(run(left, top, 1, 0, right - left + 1)) {
             return;
         }
@@ -40,11 +41,11 @@ impl<T: Real> Region<T> {
         while y <= bottom {
             let mut end = x;
             if self.contains(x, y) {
-                while end + 1 < w && self.contains(end + 1, y) {
+                while end < last && self.contains(end + 1, y) {
                     end += 1;
                 }
             } else {
-                while end > 0 && !self.contains(end, y) {
+                while end > first && !self.contains(end, y) {
                     end -= 1;
                 }
             }
@@ -52,10 +53,10 @@ impl<T: Real> Region<T> {
                 // As far down as the column goes on as it is.
                 let from = y;
                 // Along the picture's side the region is convex: what holds at both ends holds between.
-                while x + 1 == w && y + LEAP <= bottom && self.contains(x, y + LEAP) {
+                while x == last && y + LEAP <= bottom && self.contains(x, y + LEAP) {
                     y += LEAP;
                 }
-                while y <= bottom && self.contains(x, y) && (x + 1 == w || !self.contains(x + 1, y)) {
+                while y <= bottom && self.contains(x, y) && (x == last || !self.contains(x + 1, y)) {
                     y += 1;
                 }
                 if !visit(run(x, from, 0, 1, y - from)) {
@@ -86,20 +87,20 @@ impl<T: Real> Region<T> {
         while y > top {
             let mut start = x;
             if self.contains(x, y) {
-                while start > 0 && self.contains(start - 1, y) {
+                while start > first && self.contains(start - 1, y) {
                     start -= 1;
                 }
             } else {
-                while start + 1 < w && !self.contains(start, y) {
+                while start < last && !self.contains(start, y) {
                     start += 1;
                 }
             }
             if start == x {
                 let from = y;
-                while x == 0 && y > top + LEAP && self.contains(x, y - LEAP) {
+                while x == first && y > top + LEAP && self.contains(x, y - LEAP) {
                     y -= LEAP;
                 }
-                while y > top && self.contains(x, y) && (x == 0 || !self.contains(x - 1, y)) {
+                while y > top && self.contains(x, y) && (x == first || !self.contains(x - 1, y)) {
                     y -= 1;
                 }
                 if !visit(run(x, from, 0, -1, from - y)) {
@@ -189,6 +190,8 @@ mod tests {
     fn ring_of_a_rectangle() {
         check(&Region::whole(7, 5));
         check(&Region::whole(2, 2));
+        check(&Region::whole(9, 8).within(2));
+        check(&Region::whole(5, 6).within(2));
     }
 
     #[test]
@@ -202,7 +205,9 @@ mod tests {
             };
             let camera = Camera::try_new(&config).unwrap();
             assert!(camera.image_circle_px().is_some());
-            check(&Region::new(&Config::default(), &camera));
+            let region = Region::new(&Config::default(), &camera);
+            check(&region);
+            check(&region.within(3));
         }
     }
 }

@@ -7,7 +7,9 @@
 //!
 //! What is not in memory any more cannot be asked for. When runs or points do not fit, the picture ends with the last row
 //! that did, or pixels are left out evenly: `dropped` counts them. An edge so wide that its plateau is not within the rows
-//! held has the last of them for a plateau: `cut_points`.
+//! held has the last of them for a plateau: `cut_points`. There is one look: `[recover]` does not count, a
+//! dark frame is not found, and a picture without an answer stays without one. The contrast that an edge's own mid-level needs
+//! is a part of full scale, as what the picture has is known only after its last row.
 
 mod points;
 mod runs;
@@ -15,6 +17,7 @@ mod window;
 
 use core::fmt;
 
+use super::account;
 use super::judge::Judge;
 use super::observer::{Observer, Unobserved};
 use super::report::Report;
@@ -254,8 +257,8 @@ impl<T: Real, S: Sample> Stream<'_, T, S> {
         let lists = workspace.lists();
         if picture.height > 1 {
             let scene = Scene::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
-            let pixels = lists.border.len();
-            let mut judge = Judge::new(self.sensor, self.expected, &[], observer, lists.blocks, pixels, report);
+            let work = account::open(&self.sensor.config, lists.border.len());
+            let mut judge = Judge::new(self.sensor, self.expected, &[], observer, lists.blocks, work, report);
             judge.border_following(&scene, lists.border, lists.marks);
             judge.conclude();
         }

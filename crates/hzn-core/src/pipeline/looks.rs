@@ -1,0 +1,81 @@
+//! A second look before a refusal: other levels, and the picture without a dark frame around it.
+//!
+//! Otsu's level follows what is brightest. Of a disc half lit, with clouds, most of the limb may lie below it; of a limb
+//! under a glare all of it. So a picture without an answer is looked at again, a few times, each at another level
+//! and all on the account of one picture. Each look is another chance for a false answer, too: the gates are the same for
+//! all of them, and there are few.
+
+use super::report::Report;
+use super::sensor::Sensor;
+use super::taken::Taken;
+use super::workspace::Lists;
+use super::{Observer, account};
+use crate::binarize::{self, Level};
+use crate::body::Expected;
+use crate::contour::Scene;
+use crate::image::Pixels;
+use crate::real::Real;
+use crate::status::Status;
+use crate::work;
+
+/// A look without an answer, after which another may have one.
+fn goes_on(status: Status) -> bool {
+    matches!(status, Status::NoLimb | Status::TooFewPoints | Status::Rejected)
+}
+
+impl<T: Real> Sensor<T> {
+    /// Everything after the first level: the looks, one after the other, until there is an answer or nothing is left to
+    /// try. Without an answer the level is that of the first look, and the status, too, unless a later one came further.
+    pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(
+        &self,
+        mut lists: Lists<'_, T>,
+        picture: &P,
+        first: &Level<T>,
+        expected: &Expected<T>,
+        taken: &[Taken<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let config = &self.config;
+        // A level that is told to be fixed is kept.
+        let fixed = config.levels_of(expected.which).method == binarize::Method::Fixed;
+        let mut others = if fixed { [].iter() } else { config.recover.levels.iter() };
+        let mut work = account::open(config, lists.border.len());
+        let mut within = None;
+        let mut status = None;
+        report.level = first.level;
+        loop {
+            let look = |region| {
+                Scene::new(picture, region, report.level, observer)
+                    .blooming(expected.blooms())
+                    .contrasting(first.contrast)
+            };
+            if within.is_none() {
+                let frame = look(&self.region).dark_frame_px(config.recover.frame_px, &mut work);
+                if frame > 0 {
+                    observer.frame(frame);
+                    within = Some(self.region.within(frame));
+                }
+            }
+            let scene = look(within.as_ref().unwrap_or(&self.region));
+            work = self.search(lists.again(), &scene, work, expected, taken, report);
+            if !goes_on(report.status) {
+                break;
+            }
+            if status != Some(Status::Rejected) {
+                status = Some(report.status);
+            }
+            let Some(&part) = others.next() else { break };
+            if !work.spend(work::LOOK) {
+                break;
+            }
+            report.level = first.part(part);
+            observer.look(report.counters.looks, report.level);
+        }
+        if let Some(status) = status
+            && report.solution.is_none()
+        {
+            (report.status, report.level) = (status, first.level);
+        }
+    }
+}
