@@ -38,6 +38,9 @@ pub struct Config {
     /// level follows what is brightest: of a disc half lit, with clouds, most of the limb lies below it, and below half of it
     /// nothing. Each look may be wrong, too, so there are few; all draw on `limits.max_work`. A `fixed` level is kept.
     pub levels: heapless::Vec<f64, MAX_LEVELS>,
+    /// Part of an edge's points that must lie on the limb in a further look, 0 to 1. Each look is another chance for a curve
+    /// through a part of something else, such as the glow above a limb: a further one asks for most of the edge.
+    pub min_part: f64,
     /// Widest dark frame around the picture that is found and left out, in pixels, 0 to 64; 0 looks for none. Rows and
     /// columns that demosaicing leaves black are one to four. A frame is dark all around at the level, and an eighth or more
     /// of the pixels next to it are lit: over a lit body it would join the limb to the picture's own outline.
@@ -63,6 +66,7 @@ impl Default for Config {
         let _ = levels.extend_from_slice(&LEVELS);
         Self {
             levels,
+            min_part: 0.5,
             frame_px: 8,
             method: Method::None,
             #[cfg(feature = "horace")]
@@ -78,6 +82,7 @@ impl Config {
         for &part in &self.levels {
             between("recover.levels", part, 0.05, 4.0)?;
         }
+        between("recover.min_part", self.min_part, 0.0, 1.0)?;
         between("recover.frame_px", f64::from(self.frame_px), 0.0, 64.0)?;
         #[cfg(feature = "horace")]
         between("recover.least_part", self.least_part, 1.0 / 64.0, 1.0)?;

@@ -247,9 +247,12 @@ fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }
 
-/// Where it ended and what became of each candidate.
+/// Where it ended, what became of each candidate, and how often the picture was looked at, if more than once.
 fn detail<T: Real>(report: &Report<T>) -> String {
     let mut text = format!("ended at {}", report.stage.name());
+    if report.counters.looks > 1 {
+        text.push_str(&format!(" in {} looks", report.counters.looks));
+    }
     for (i, c) in report.candidates.iter().enumerate() {
         text.push_str(if i == 0 { ": " } else { ", " });
         text.push_str(c.verdict.name());
@@ -337,6 +340,9 @@ mod tests {
             assert_eq!(row.axis().is_some(), status == Status::Ok);
             assert_eq!(row.detail.is_empty(), status == Status::Ok);
         }
+        let counters = Counters { looks: 4, ..Counters::default() };
+        let again = Report { counters, ..report::<f64>(Status::NoLimb) };
+        assert_eq!(Row::from_report(&meta(), &again, None).detail, "ended at select in 4 looks");
         let row = Row::unprocessed(&meta(), Status::Unreadable, "cut off");
         assert_eq!((row.status, row.axis(), row.edge_points), (Status::Unreadable, None, None));
     }

@@ -31,6 +31,8 @@ pub(crate) enum Stream {
     Gnss,
     /// Artefacts in the picture.
     Artefact,
+    /// Painted discs.
+    Painted,
 }
 
 /// A sequence of random numbers, read by index.

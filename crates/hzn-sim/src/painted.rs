@@ -2,9 +2,11 @@
 //!
 //! For campaigns about the search alone: what such a picture is refused for is nobody's fault but the sensor's.
 
-use hzn_core::camera::Camera;
+use hzn_core::camera::{self, Camera};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
+
+use crate::counter::{Counter, Stream};
 
 /// A lens, and the ray through the centre of each of its pixels.
 #[derive(Debug, Clone)]
@@ -71,25 +73,76 @@ impl Canvas {
             .collect()
     }
 
-    /// The part of the disc's outline in the picture, 0 to 1: of 360 places.
-    pub fn outline_in_view(&self, disc: &Even) -> f64 {
+    /// The part of the disc's outline in the picture and in the lens's view, 0 to 1, `margin_px` from their ends: of 360
+    /// places.
+    pub fn outline_in_view(&self, disc: &Even, margin_px: f64) -> f64 {
         let Some(axis) = UnitVec3::<hzn_core::frames::Cam, f64>::try_new(disc.axis) else { return 0.0 };
         let e = nalgebra::Vector3::from(axis.xyz());
         let b1 = e.cross(&e.map(|x| if x.abs() < 0.6 { 1.0 } else { 0.0 })).normalize();
         let b2 = e.cross(&b1);
         let (sin, cos) = disc.half_angle_rad.sin_cos();
+        let (w, h) = (f64::from(self.camera.width()), f64::from(self.camera.height()));
         let seen = |degree: u32| {
             let (s, c) = f64::from(degree).to_radians().sin_cos();
             let ray = e * cos + (b1 * c + b2 * s) * sin;
-            let p = UnitVec3::try_new(ray.into()).and_then(|ray| self.camera.project(&ray));
-            p.is_some_and(|p| {
-                (0.0..f64::from(self.camera.width()) - 1.0).contains(&p.u)
-                    && (0.0..f64::from(self.camera.height()) - 1.0).contains(&p.v)
-            })
+            let Some(p) = UnitVec3::try_new(ray.into()).and_then(|ray| self.camera.project(&ray)) else { return false };
+            let in_circle = self.camera.image_circle_px().is_none_or(|(centre, x, y)| {
+                ((p.u - centre.u) / (x - margin_px)).hypot((p.v - centre.v) / (y - margin_px)) < 1.0
+            });
+            in_circle && (margin_px..w - margin_px).contains(&p.u) && (margin_px..h - margin_px).contains(&p.v)
         };
         (0..360).filter(|&d| seen(d)).count() as f64 / 360.0
     }
 }
+
+/// A lens with an image circle, and discs under it, each as from an altitude above the Earth.
+#[derive(Debug, Clone)]
+pub struct UnderCircle {
+    /// The lens, equidistant to 60 to 90 degrees.
+    pub lens: camera::Config,
+    /// The same with its rays.
+    pub canvas: Canvas,
+    /// Discs of which half of the outline or more is in view, with the altitude in kilometres.
+    pub discs: Vec<(Even, f64)>,
+}
+
+impl UnderCircle {
+    /// Circle number `number` with `count` discs. The same numbers give the same discs.
+    ///
+    /// # Panics
+    /// Never: the lenses are valid.
+    pub fn new(number: u32, count: usize) -> Self {
+        let draws = Counter::new(u64::from(number), Stream::Painted);
+        let draw = |i: u64| draws.uniform(i);
+        let (w, h) = [(400, 400), (480, 360), (640, 480)][number as usize % 3];
+        let theta_max_rad = (60.0 + 30.0 * draw(0)).to_radians();
+        let lens = camera::Config {
+            theta_max_deg: Some(theta_max_rad.to_degrees()),
+            ..camera::Config::ideal(camera::Model::Equidistant, w, h, f64::from(h) / 3.0)
+        };
+        let canvas = Canvas::new(Camera::try_new(&lens).expect("the lens is valid"));
+        let discs = (0..)
+            .map(|n| {
+                let of = |k: u64| draw(1 + 8 * n + k);
+                // 1500 to 19 000 km.
+                let altitude_km = 1500.0 * 10f64.powf(1.1 * of(0));
+                let half_angle_rad = (EARTH_KM / (EARTH_KM + altitude_km)).asin();
+                let (turn, off) = (core::f64::consts::TAU * of(1), of(2) * (theta_max_rad - 0.3 * half_angle_rad));
+                let axis = [off.sin() * turn.cos(), off.sin() * turn.sin(), off.cos()];
+                let (lit, edge_px) = (60.0 + 190.0 * of(3), 1.0 + 3.0 * of(4));
+                (Even { axis, half_angle_rad, lit, dark: 5.0, edge_px }, altitude_km)
+            })
+            .filter(|(disc, _)| canvas.outline_in_view(disc, RIM_PX) >= 0.5)
+            .take(count)
+            .collect();
+        Self { lens, canvas, discs }
+    }
+}
+
+/// Mean radius of the Earth.
+const EARTH_KM: f64 = 6371.0;
+/// What is nearer to the image circle than this counts as out of view: the sensor leaves three pixels out.
+const RIM_PX: f64 = 4.0;
 
 #[cfg(test)]
 mod tests {
@@ -106,9 +159,9 @@ mod tests {
         let area = picture.iter().map(|&p| f64::from(p)).sum::<f64>() / 200.0;
         assert!((area - std::f64::consts::PI * 1600.0).abs() < 5.0, "{area}");
         assert!((0..80).all(|y| (0..200).all(|x| picture[y * 200 + x].abs_diff(picture[(159 - y) * 200 + x]) <= 1)));
-        assert_eq!(canvas.outline_in_view(&disc), 1.0);
+        assert_eq!(canvas.outline_in_view(&disc, 0.0), 1.0);
         let aside = Even { axis: [1f64.sin(), 0.0, 1f64.cos()], ..disc };
-        let part = canvas.outline_in_view(&aside);
+        let part = canvas.outline_in_view(&aside, 0.0);
         assert!((0.4..0.6).contains(&part), "{part}");
     }
 }

@@ -6,6 +6,7 @@ mod design;
 mod effects;
 mod horace;
 mod infrared;
+mod looks;
 mod presets;
 mod scenes;
 
@@ -60,6 +61,9 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
     reproduced("defaults", "Honesty with default settings", defaults::untold),
     reproduced("effects", "What moves the limb in the scenes", effects::switched_off),
+    reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),
+    reproduced("second-look", "One look and several", looks::second_look),
+    reproduced("real-pictures", "Photographs at many settings", looks::real_pictures),
     Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compared },
 ];
 

@@ -152,6 +152,14 @@ impl Told<'_> {
         let c = r.counters;
         let reached = |stage: Stage| r.stage >= stage;
         line("binarize", self.level());
+        let again = self.trace.again();
+        if !again.is_empty() {
+            let levels: Vec<String> = again.iter().map(u16::to_string).collect();
+            line("looks", format!("{}: without an answer at that level, also at {}", c.looks, levels.join(", ")));
+        }
+        if self.trace.frame_px() > 0 {
+            line("frame", format!("{} px of dark frame around the picture left out", self.trace.frame_px()));
+        }
         if reached(Stage::Contour) {
             let masks = self.config.mask.polygons_px.len();
             let masked = if masks > 0 { format!(", {masks} masked areas left out") } else { String::new() };

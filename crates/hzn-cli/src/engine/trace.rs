@@ -35,6 +35,8 @@ pub struct Edge {
 pub struct Trace {
     edges: RefCell<Vec<Edge>>,
     level: Cell<Option<(u16, f64, u32)>>,
+    again: RefCell<Vec<u16>>,
+    frame_px: Cell<u16>,
     times: Cell<[Duration; 8]>,
     running: Cell<Option<(Stage, Instant)>>,
 }
@@ -47,6 +49,14 @@ impl Trace {
     /// Level in counts, with the mean and the number of pixels of the sample.
     pub fn level(&self) -> Option<(u16, f64, u32)> {
         self.level.get()
+    }
+    /// Levels of further looks, after one without an answer, in counts.
+    pub fn again(&self) -> Vec<u16> {
+        self.again.borrow().clone()
+    }
+    /// Width of the dark frame around the picture that was left out, pixels; 0: there is none.
+    pub fn frame_px(&self) -> u16 {
+        self.frame_px.get()
     }
     /// Time spent in every stage.
     pub fn times(&self) -> [(Stage, Duration); 8] {
@@ -147,6 +157,12 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn level(&self, level: u16, mean: T, samples: u32) {
         self.now().into_iter().for_each(|t| Observer::<T>::level(t, level, mean, samples));
     }
+    fn frame(&self, px: u16) {
+        self.now().into_iter().for_each(|t| Observer::<T>::frame(t, px));
+    }
+    fn look(&self, number: u32, level: u16) {
+        self.now().into_iter().for_each(|t| Observer::<T>::look(t, number, level));
+    }
     fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
         if let Some(trace) = self.now() {
             Observer::<T>::edge(trace, candidate, border, stride);
@@ -172,6 +188,12 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     }
     fn level(&self, level: u16, mean: T, samples: u32) {
         self.level.set(Some((level, mean.into(), samples)));
+    }
+    fn frame(&self, px: u16) {
+        self.frame_px.set(px);
+    }
+    fn look(&self, _: u32, level: u16) {
+        self.again.borrow_mut().push(level);
     }
     fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
         self.with(candidate, |e| {

@@ -140,6 +140,25 @@ proptest! {
         }
     }
 
+    /// Between the strides and pixel by pixel together every start is found.
+    #[test]
+    fn no_start_is_passed_over(
+        w in 3u16..40, h in 3u16..40, density in 5u8..=95, seed in 0u32..10_000, stride in 1u16..7, grain in 1u16..5,
+    ) {
+        let coarse = random_bitmap(w.div_ceil(grain), h.div_ceil(grain), density, seed);
+        let at = |x: u16, y: u16| coarse.data[usize::from(y / grain * coarse.w + x / grain)];
+        let data = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| at(x, y)).collect();
+        let map = Bitmap { w, h, data };
+        let (grey, region) = (map.grey(), Region::<f64>::whole(w, h));
+        let scene = Scene::new(&grey, &region, 128, &Unobserved);
+        let key = |pixel: Pixel, dark: u8| (pixel.x, pixel.y, dark);
+        let (mut all, mut found) = (BTreeSet::new(), BTreeSet::new());
+        scene.each_start(1, &mut |s| { all.insert(key(s.pixel, s.dark)); true });
+        scene.each_start(stride, &mut |s| { found.insert(key(s.pixel, s.dark)); true });
+        scene.each_narrow_start(stride, &mut |s| { found.insert(key(s.pixel, s.dark)); true });
+        prop_assert_eq!(&all, &found);
+    }
+
     /// Open and closed edges together visit every lit pixel that has a dark 4-neighbour inside the picture.
     #[test]
     fn no_edge_is_missed(w in 3u16..24, h in 3u16..24, density in 5u8..=95, seed in 0u32..10_000) {
@@ -196,4 +215,31 @@ fn rotated(mut points: Points) -> Points {
         .min_by_key(|&i| points[i..].iter().chain(&points[..i]).copied().collect::<Points>());
     points.rotate_left(best.unwrap_or(0));
     points
+}
+
+/// A lit lower half under a frame of `px` dark pixels.
+fn under_a_frame(px: u16) -> Bitmap {
+    let (w, h) = (60u16, 50u16);
+    let lit = |x: u16, y: u16| y >= 20 && x >= px && x < w - px && y < h - px;
+    let data = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| if lit(x, y) { 200 } else { 0 }).collect();
+    Bitmap { w, h, data }
+}
+
+#[test]
+fn a_dark_frame_is_measured_and_nothing_else_is_one() {
+    let frame = |map: &Bitmap, most: u16| {
+        let region = Region::<f64>::whole(map.w, map.h);
+        let grey = map.grey();
+        Scene::new(&grey, &region, 100, &Unobserved).dark_frame_px(most, &mut crate::work::Work::unlimited())
+    };
+    for px in 0..=9 {
+        assert_eq!(frame(&under_a_frame(px), 8), if px <= 8 { px } else { 0 }, "{px}");
+        assert_eq!(frame(&under_a_frame(px), 0), 0);
+    }
+    // A disc that nearly touches the border, and one that grows brighter inwards.
+    for (r, x0) in [(20i32, 25i32), (22, 30), (24, 30)] {
+        let inside = |i: i32| (i % 60 - x0).pow(2) + (i / 60 - 25).pow(2) < r * r;
+        let data = (0..60 * 50).map(|i| if inside(i) { 200 } else { 0 }).collect();
+        assert_eq!(frame(&Bitmap { w: 60, h: 50, data }, 8), 0, "{r}");
+    }
 }

@@ -375,6 +375,11 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let judged =
             select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, scene, camera, &config.select);
         outcome.verdict = judged.verdict;
+        let most = T::of(f64::from(points.count)) * T::of(config.recover.min_part);
+        if self.report.counters.looks > 0 && T::of(f64::from(fit.inliers)) < most {
+            outcome.verdict = Verdict::NoConsensus;
+            return (outcome, None);
+        }
         if judged.verdict != Verdict::Passed || !sigma.is_finite() {
             return (outcome, None);
         }

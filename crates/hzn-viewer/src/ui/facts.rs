@@ -60,6 +60,7 @@ pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answ
             }
             out
         }
+        "Recover" if c.looks > 1 => vec![format!("{} looks, each at another level", c.looks)],
         "Limits" => vec![format!("{} steps of work", c.work)],
         "Candidates" if reached(Stage::Contour) => {
             let edges = if c.candidates == 1 { "edge" } else { "edges" };

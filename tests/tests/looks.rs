@@ -1,0 +1,181 @@
+//! What keeps a picture from being refused for the search's own sake: discs under an image circle, a dark frame, levels that
+//! follow the clouds, arrays of few pixels, words of which few bits are used.
+
+use hzn_core::binarize::{self, Method};
+use hzn_core::body::{self, Kind};
+use hzn_core::camera::{self, Model};
+use hzn_core::frames::UnitVec3;
+use hzn_core::image::{Grey, Layout};
+use hzn_core::status::Status;
+use hzn_core::{Config, Frame, HostHorizon, Report};
+use hzn_sim::painted::UnderCircle;
+use hzn_sim::pose::position_m;
+use hzn_sim::{Look, Pose, Scenario};
+use hzn_tests::real::Photograph;
+use hzn_tests::sensors::look;
+use hzn_tests::{Sensors, Tally};
+
+/// A sensor at a level, told the disc's altitude.
+fn told(lens: &camera::Config, altitude_km: f64, level: f64) -> Config {
+    let mut config = Config::new(lens.clone());
+    config.body = body::Config {
+        kind: Kind::EarthSphere,
+        altitude_km: Some(altitude_km),
+        altitude_sigma_km: 1.0,
+        limb_height_km: 0.0,
+        limb_height_sigma_km: 2.0,
+        ..config.body
+    };
+    config.binarize = binarize::Config { method: Method::Fixed, level, ..config.binarize };
+    config
+}
+
+fn seen(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report<f64> {
+    let picture = Grey::try_new(data, Layout::packed(lens.width.into(), lens.height.into(), 1, 8)).unwrap();
+    let expected = horizon.expect(&Frame::default()).unwrap();
+    horizon.process(&picture, &expected)
+}
+
+/// A disc whose edge touches the image circle over fewer pixels than the border's strides was met by a search line, which
+/// gave a piece of it.
+#[test]
+fn no_disc_is_lost_under_an_image_circle() {
+    let (mut count, mut lost) = (0, Vec::new());
+    for circle in 0..10 {
+        let under = UnderCircle::new(circle, 6);
+        for (disc, altitude_km) in &under.discs {
+            let data = under.canvas.paint(disc);
+            let axis = UnitVec3::try_new(disc.axis).unwrap();
+            for k in 0..10 {
+                let level = disc.dark + (disc.lit - disc.dark) * (0.05 + 0.09 * f64::from(k));
+                let mut horizon = HostHorizon::boxed(&told(&under.lens, *altitude_km, level)).unwrap();
+                let report = seen(&mut horizon, &data, &under.lens);
+                let right = report.solution.is_some_and(|s| s.axis.angle_rad(&axis).to_degrees() < 0.2);
+                count += 1;
+                if !right {
+                    lost.push((circle, *disc, level, report.status, report.counters));
+                }
+            }
+        }
+    }
+    assert!(count == 600 && lost.is_empty(), "{} of {count}: {lost:#?}", lost.len());
+}
+
+/// Demosaicing left one black pixel all around; the haze fades over a hundred pixels of the whole picture.
+#[test]
+fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
+    let mut p = Photograph::load("opssat-2020-08-16.png");
+    let answer = |sensor: &Config| {
+        let sensors = &mut Sensors::new(sensor);
+        let [host, flight] = [
+            look(&mut sensors.host, &p.view(), &Frame::default()),
+            look(&mut sensors.flight, &p.view(), &Frame::default()),
+        ];
+        let (host, flight) = (host.expect("found in f64"), flight.expect("found in f32"));
+        assert!(host.error_deg(flight.axis) < 1e-3);
+        host
+    };
+    let mut axes = vec![answer(&p.sensor).axis];
+    for level in [0.08, 0.12, 0.16, 0.2, 0.3, 0.4, 0.5] {
+        let mut sensor = p.sensor.clone();
+        sensor.binarize = binarize::Config { method: Method::Fixed, level, ..sensor.binarize };
+        let found = answer(&sensor);
+        println!(
+            "level {level}: {} of {} points, RMS {:.2} px, {:.5?}",
+            found.inliers, found.points, found.rms_px, found.axis
+        );
+        let apart_deg = axes.iter().map(|&axis| found.error_deg(axis)).fold(0.0, f64::max);
+        assert!(apart_deg < 0.05, "level {level}: {apart_deg}");
+        axes.push(found.axis);
+    }
+    // With the frame, the picture's own outline belongs to the edge.
+    p.sensor.recover.frame_px = 0;
+    p.sensor.binarize = binarize::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
+    let with = look(&mut Sensors::new(&p.sensor).host, &p.view(), &Frame::default());
+    assert!(with.is_err(), "{with:?}");
+}
+
+/// Seen from far above, lit from the side: Otsu's level follows the clouds.
+#[test]
+fn half_lit_discs_are_looked_at_again() {
+    let mut scenario = Scenario::builtin("full-disc").unwrap();
+    (scenario.capture.frames, scenario.seed) = (10, 11);
+    let scale = 0.375;
+    let camera = &mut scenario.camera;
+    (camera.width, camera.height) = (384, 384);
+    for length in [&mut camera.fx_px, &mut camera.fy_px] {
+        *length *= scale;
+    }
+    (camera.cx_px, camera.cy_px) = (191.5, 191.5);
+    let flight = scenario.flight().unwrap();
+    let mut config = flight.sensor.clone();
+    (config.body.limb_height_km, config.body.limb_height_sigma_km) = (20.0, 8.0);
+    let mut again = HostHorizon::boxed(&config).unwrap();
+    config.recover.levels.clear();
+    let mut once = HostHorizon::boxed(&config).unwrap();
+    let (mut answered, mut more) = (0, 0);
+    for frame in &flight.frames {
+        let (picture, axis) = (frame.render().unwrap(), frame.truth().unwrap().axis().unwrap());
+        let [one, several] = [&mut once, &mut again].map(|horizon| {
+            let expected = horizon.expect(&frame.known()).unwrap();
+            horizon.process(&picture.view(), &expected)
+        });
+        println!("{}: {} once, {} after {} looks", frame.file, one.status, several.status, several.counters.looks);
+        assert_eq!(one.counters.looks, 1);
+        // A look without need is not taken.
+        assert!(one.status != Status::Ok || several.counters == one.counters);
+        if let Some(s) = several.solution {
+            answered += 1;
+            more += u32::from(several.counters.looks > 1);
+            let off = s.axis.angle_rad(&axis);
+            assert!(off < 5.0 * s.covariance.sigma_max_rad(), "{}: {:.3}°", frame.file, off.to_degrees());
+        }
+    }
+    println!("{answered} of 10, {more} of them at another level");
+    assert_eq!(answered, 10);
+}
+
+/// A limb through a lens of 55 degrees on an array of 32×24, 16 bits of which a range of 1200 counts is used above a sky at
+/// 7000: told nothing but the camera and the altitude.
+#[test]
+fn a_thermal_array_answers_by_default() {
+    let camera = camera::Config::ideal(Model::Equidistant, 32, 24, 33.0);
+    let mut sensor = Config::new(camera.clone());
+    sensor.body.kind = Kind::EarthSphere;
+    let mut known = sensor.clone();
+    // The bound: a known half-angle, independent points, each as wrong as those of the picture are.
+    known.estimate.half_angle = hzn_core::estimate::HalfAngle::Known;
+    (known.covariance.sigma_px, known.covariance.correlation_px) = (1e-3, 0.0);
+    let [mut sensor, mut known] = [sensor, known].map(|c| HostHorizon::boxed(&c).unwrap());
+    let (mut tally, mut bound_deg2, mut count) = (Tally::default(), 0.0, 0.0);
+    for seed in 0..60u32 {
+        let of = |k: u32| f64::from(seed.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 8 & 0xFFFF) / 65536.0;
+        let look_to = Look {
+            azimuth_rad: 6.28 * of(1),
+            depression_rad: (16.0 + 8.0 * of(2)).to_radians(),
+            roll_rad: 6.28 * of(3),
+        };
+        let mut scene = hzn_sim::Scene::new(camera.clone(), Pose::looking(position_m(20.0, 10.0, 400.0), look_to));
+        scene.body = sensor.config().body.clone();
+        (scene.detector.psf_sigma_px, scene.detector.read_noise, scene.seed) = (0.7, 0.01, seed.into());
+        let grey = scene.render().unwrap();
+        let view = grey.view();
+        let words: Vec<u16> = (0..24 * 32u16)
+            .map(|i| 7000 + (f64::from(hzn_core::image::Pixels::at(&view, i % 32, i / 32)) * 1200.0 / 255.0) as u16)
+            .collect();
+        let picture = Grey::try_new(&words[..], Layout::packed(32, 24, 1, 16)).unwrap();
+        let truth = scene.truth("", 0.0).unwrap();
+        let told = hzn_tests::known(&scene);
+        let answer = look(&mut sensor, &picture, &told);
+        tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
+        if let Ok(bound) = look(&mut known, &picture, &told) {
+            let p = bound.covariance_rad2;
+            bound_deg2 += (p[0][0] + p[1][1] + p[2][2]).sqrt().to_degrees().powi(2);
+            count += 1.0;
+        }
+    }
+    let ratio = tally.rms_deg() / (bound_deg2 / count).sqrt();
+    println!("{tally}, {ratio:.2} of the bound");
+    assert_eq!(tally.answered(), 60);
+    assert!(ratio < 2.0, "{ratio}");
+}
