@@ -94,6 +94,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         keep_traces: true,
         keep_picture: false,
         overlay: None,
+        last: Vec::new(),
     };
     if !args.quiet {
         source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
