@@ -67,10 +67,7 @@ fn known<T: Real>(frame: &Picture) -> Frame<T> {
     Frame {
         altitude_m: frame.known.altitude_m.map(T::of),
         position_m: frame.known.position_m.map(|p| p.map(T::of)),
-        cam_to_ecef: None,
-        attitude_sigma_rad: None,
-        sun: None,
-        level: None,
+        ..Frame::default()
     }
 }
 

@@ -68,10 +68,7 @@ pub fn known<T: Real>(scene: &Scene) -> Frame<T> {
     Frame {
         altitude_m: Some(T::of(altitude_m)),
         position_m: (scene.body.kind == Kind::Earth).then(|| position_m.map(T::of)),
-        cam_to_ecef: None,
-        attitude_sigma_rad: None,
-        sun: None,
-        level: None,
+        ..Frame::default()
     }
 }
 

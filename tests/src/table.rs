@@ -48,8 +48,13 @@ pub fn cell(
 ) -> (Config, Vec<Scene>) {
     let (w, h) = (f64::from(camera.width), f64::from(camera.height));
     let mut sensor = Config::new(camera.clone());
-    sensor.body = body::Config { altitude_sigma_km: 0.1, limb_height_sigma_km: HEIGHT_SIGMA_KM, ..sensor.body };
-    sensor.covariance = covariance::Config { sigma_px, correlation_px, bias_px: 0.25, ..Default::default() };
+    sensor.body = body::Config {
+        altitude_sigma_km: 0.1,
+        limb_height_km: 10.0,
+        limb_height_sigma_km: HEIGHT_SIGMA_KM,
+        ..sensor.body
+    };
+    sensor.covariance = covariance::Config { bias_px: 0.25, ..covariance::Config::told(sigma_px, correlation_px) };
     let edge = (1.0 - open) * w;
     // Four pixels more in the mask than the vehicle covers, as its edge is blurred.
     let part = |grow: f64| [[-20.0, -20.0], [edge + grow, -20.0], [edge + grow, h + 20.0], [-20.0, h + 20.0]];

@@ -90,7 +90,7 @@ fn white_noise_against_the_bound() {
     sensor.body.kind = hzn_core::body::Kind::EarthSphere;
     sensor.estimate.half_angle = hzn_core::estimate::HalfAngle::Known;
     // Less than any edge point is wrong by, so that the covariance goes by the residuals.
-    (sensor.covariance.sigma_px, sensor.covariance.correlation_px) = (1e-3, 0.0);
+    sensor.covariance = hzn_core::covariance::Config::told(1e-3, 0.0);
     let look = Look { azimuth_rad: 0.3, depression_rad: 0.25, roll_rad: 0.2 };
     let mut scene = hzn_sim::Scene::new(camera, Pose::looking(position_m(20.0, 10.0, 240.0), look));
     scene.body = sensor.body.clone();

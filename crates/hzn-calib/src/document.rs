@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::Problem;
 use crate::located::{meaning, places, syntax, too_long};
-use crate::sensor::camera_from_file;
+use crate::sensor::{camera_from_file, fill};
 
 /// Reads `text` as a `T`. `path` is named in messages, and a camera `file` is looked for beside it. `check` says what is
 /// wrong with a value that can be read: the key, as `[section] key`, and the rule.
@@ -29,10 +29,10 @@ pub fn parse<T: DeserializeOwned>(
     };
     if !camera.is_empty()
         && let Ok(camera) = DeTable::parse(&camera)
+        && let Some(DeValue::Table(own)) = table.get_mut().get_mut("camera").map(toml::Spanned::get_mut)
     {
-        let span = camera.span();
-        let key = toml::Spanned::new(span.clone(), "camera".into());
-        table.get_mut().insert(key, toml::Spanned::new(span, DeValue::Table(camera.into_inner())));
+        // What stands beside `file` stays.
+        fill(own, camera.into_inner());
     }
     let value = T::deserialize(toml::Deserializer::from(table)).map_err(|e| meaning(&e, text, path, &places, &[]))?;
     check(&value).map_err(|(field, what)| {

@@ -12,6 +12,7 @@
 //! | `qw`, `qx`, `qy`, `qz` | prior attitude, camera to ECEF |
 //! | `attitude_sigma_deg` | 1-sigma of that attitude, 5 where it is empty; it widens the covariance, and above 30 the attitude is not used |
 //! | `sun_x`, `sun_y`, `sun_z` | direction to the Sun in the camera |
+//! | `rate_x`, `rate_y`, `rate_z` | rate of rotation of the camera in its own axes, rad/s; for a rolling shutter |
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,9 @@ pub const COLUMNS: &[&str] = &[
     "sun_x",
     "sun_y",
     "sun_z",
+    "rate_x",
+    "rate_y",
+    "rate_z",
 ];
 
 /// One row.
@@ -65,6 +69,8 @@ pub struct FrameData {
     pub attitude_sigma_deg: Option<f64>,
     /// Direction to the Sun in the camera.
     pub sun_camera: Option<[f64; 3]>,
+    /// The camera's rate of rotation in its own axes, rad/s.
+    pub rate_rad_s: Option<[f64; 3]>,
 }
 
 impl FrameData {
@@ -78,6 +84,7 @@ impl FrameData {
             level: None,
             sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::of))),
             last: None,
+            rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::of)),
         }
     }
 }
@@ -141,6 +148,7 @@ impl Frames {
             FrameError::Altitude => row.altitude_km.map(|h| format!("{h}")),
             FrameError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             FrameError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
+            FrameError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             FrameError::NoAltitude | FrameError::NoBody => None,
         };
         let given = given.map(|given| format!(", not {given}")).unwrap_or_default();
@@ -213,6 +221,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
             camera_to_ecef_wxyz: row.vector(["qw", "qx", "qy", "qz"], &number)?,
             attitude_sigma_deg: number("attitude_sigma_deg")?,
             sun_camera: row.vector(["sun_x", "sun_y", "sun_z"], &number)?,
+            rate_rad_s: row.vector(["rate_x", "rate_y", "rate_z"], &number)?,
         };
         let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         if data.camera_to_ecef_wxyz.is_some_and(|q| (length(&q) - 1.0).abs() > 0.01) {
@@ -310,6 +319,13 @@ mod tests {
         assert_eq!(f.get("b.png").unwrap().altitude_km, None);
         assert!(f.get("c.png").is_none());
         assert_eq!(f.warnings[0].to_string(), "frames.csv:1: note: unknown column, not used");
+    }
+
+    #[test]
+    fn rates_go_to_the_frame() {
+        let f = read("file,altitude_km,rate_x,rate_y,rate_z\na.png,230,0.1,-0.2,0.3\nb.png,230,,,\n").unwrap();
+        assert_eq!(f.rows[0].to_frame::<f64>(None).rate_rad_s, Some([0.1, -0.2, 0.3]));
+        assert_eq!(f.rows[1].to_frame::<f64>(None).rate_rad_s, None);
     }
 
     #[test]

@@ -70,12 +70,12 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     too_long(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
-        // `Config` wants a camera; this one stands in until the file's own is put in below.
+        // `Config` wants a camera; this one stands in until the file's own is put in below. What stands beside `file` stays.
         let stand_in = DeTable::parse("width = 2\nheight = 2\nfx_px = 1.0\nfy_px = 1.0\ncx_px = 0.0\ncy_px = 0.0\n");
-        if let Ok(stand_in) = stand_in {
-            let span = stand_in.span();
-            let key = toml::Spanned::new(span.clone(), "camera".into());
-            table.get_mut().insert(key, toml::Spanned::new(span, DeValue::Table(stand_in.into_inner())));
+        if let (Ok(stand_in), Some(DeValue::Table(own))) =
+            (stand_in, table.get_mut().get_mut("camera").map(toml::Spanned::get_mut))
+        {
+            fill(own, stand_in.into_inner());
         }
     }
     if let Ok(values) = DeTable::parse(&starting_values) {
@@ -84,7 +84,9 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     let mut config = Config::deserialize(toml::Deserializer::from(table))
         .map_err(|e| meaning(&e, text, path, &places, &["preset"]))?;
     if let Some(camera) = from_file {
-        config.camera = camera;
+        let camera::Config { focal_sigma_percent, centre_sigma_px, readout_s, .. } = config.camera;
+        let covariance = config.camera.covariance.take();
+        config.camera = camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, ..camera };
     }
     check(&config).map_err(|e| refused(&e, text, path, &places))?;
     Ok(Sensor { config, text: text.to_owned() })
@@ -110,7 +112,7 @@ fn starting_values(preset: Preset) -> String {
 }
 
 /// Puts in from `values` what `table` does not have. Nothing put in has a place in the file.
-fn fill<'i>(table: &mut DeTable<'i>, values: DeTable<'i>) {
+pub(crate) fn fill<'i>(table: &mut DeTable<'i>, values: DeTable<'i>) {
     for (key, value) in values {
         match (table.get_mut(key.get_ref().as_ref()), value.into_inner()) {
             (Some(own), value) => {
@@ -149,6 +151,9 @@ fn take<'i>(table: &mut DeTable<'i>, name: &str) -> Option<(DeValue<'i>, Range<u
     })
 }
 
+/// What camera files do not say.
+const BESIDE_FILE: [&str; 4] = ["focal_sigma_percent", "centre_sigma_px", "covariance", "readout_s"];
+
 /// The calibration that `file` in `[camera]` names, taken out of the table; `None` when it names none.
 pub(crate) fn camera_from_file(
     table: &mut DeTable<'_>,
@@ -164,8 +169,9 @@ pub(crate) fn camera_from_file(
     };
     let name = take(camera, "camera");
     let theta_max = take(camera, "theta_max_deg");
-    if let Some((key, _)) = camera.iter().next() {
-        let what = "cannot stand beside `file`, which brings the whole calibration; only camera and theta_max_deg may";
+    if let Some((key, _)) = camera.iter().find(|(key, _)| !BESIDE_FILE.contains(&&**key.get_ref())) {
+        let what = "cannot stand beside `file`, which brings the whole calibration; only camera, theta_max_deg, readout_s and \
+                    the calibration's sigmas may";
         let field = format!("[camera] {}", key.get_ref());
         return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
     }

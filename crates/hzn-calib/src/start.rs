@@ -32,8 +32,6 @@ const CENTRE_PART: f64 = 0.015;
 const ALTITUDE_PART: f64 = 0.02;
 /// Sides of the 35 mm film, millimetres.
 const FILM_MM: [f64; 2] = [36.0, 24.0];
-/// What stands before the keys of the lens's sigmas.
-const LENS_SIGMAS: &str = "# ";
 /// Above this width nobody's lens is a pinhole unless it is said, degrees.
 const PINHOLE_UNSAID_DEG: f64 = 90.0;
 
@@ -256,9 +254,9 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
         t,
         "# 1-sigma of the focal length: {:.1} % for {}, and {shape_percent:.1} % for what a real lens differs\n\
          # from an ideal one over this field.\n\
-         {LENS_SIGMAS}focal_sigma_percent = {:.1}\n\
+         focal_sigma_percent = {:.1}\n\
          # 1-sigma of the principal point, each axis: 1.5 % of the width. It turns every answer alike. More where pictures were cropped.\n\
-         {LENS_SIGMAS}centre_sigma_px = {:.1}\n",
+         centre_sigma_px = {:.1}\n",
         focal.percent,
         if focal.percent < EXIF_PERCENT {
             "a stated field of view (makers: 5 % at most)"

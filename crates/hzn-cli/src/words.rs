@@ -1,5 +1,6 @@
 //! What happened to a picture, in words and numbers for people.
 
+use hzn_core::covariance::Term;
 use hzn_core::pipeline::Verdict;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Report, Solution, select};
@@ -54,6 +55,20 @@ pub fn why(verdict: Verdict, s: &select::Config) -> String {
         Verdict::Rate => {
             "the axis is farther from the last answer than the vehicle can turn (select.max_rate_deg_s)".into()
         }
+    }
+}
+
+/// A source of error in words.
+pub fn term(term: Term) -> &'static str {
+    match term {
+        Term::EdgeNoise => "edge noise",
+        Term::CommonShift => "a shift that the whole edge shares",
+        Term::CommonTilt => "a tilt that the whole edge shares",
+        Term::UnknownAzimuth => "the limb's unknown azimuth",
+        Term::Lens => "the calibration of the lens",
+        Term::LimbHeight => "the limb height",
+        Term::Altitude => "the altitude",
+        Term::Radius => "the unknown local radius",
     }
 }
 

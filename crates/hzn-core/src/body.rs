@@ -1,6 +1,7 @@
 //! The body whose limb is looked for, and what a position and an altitude say about its cone.
 
 mod expected;
+mod shape;
 
 use crate::ellipsoid::EARTH_MEAN_RADIUS_M;
 use crate::error::{ConfigError, Limit, above, between, require};
@@ -28,7 +29,7 @@ const PLACES: usize = 8;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Kind {
-    /// WGS-84. Without a position the mean radius, with 20 km of uncertainty added.
+    /// WGS-84. Without a position a sphere of the mean radius, and the covariance holds the unknown latitude.
     #[default]
     Earth,
     /// A sphere of 6371.0088 km.
@@ -38,6 +39,18 @@ pub enum Kind {
     /// A disc of about 0.26° half-angle; its half-angle is free.
     Moon,
     /// A sphere of `radius_km`.
+    Sphere,
+}
+
+/// What an altitude without a position is measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum AltitudeReference {
+    /// The ellipsoid, as satellite navigation gives it. A local radius that differs from the mean one moves the camera with
+    /// the surface, and shows in the half-angle by (H − d)/(R + H) of itself only.
+    #[default]
+    Ellipsoid,
+    /// A sphere, such as orbit radius minus 6371 km. The local radius is unknown in full.
     Sphere,
 }
 
@@ -55,10 +68,15 @@ pub struct Config {
     pub altitude_km: Option<f64>,
     /// 1-sigma of the altitude in kilometres, 0 or more.
     pub altitude_sigma_km: f64,
+    /// What an altitude without a position is measured from, for `earth`: the WGS-84 ellipsoid, or a sphere of 6371 km,
+    /// which leaves the local radius open by some 17 km (1σ).
+    pub altitude_reference: AltitudeReference,
     /// Effective height of the visible limb above the surface in kilometres, −50 to 500: where the edge at half
-    /// brightness stands. Too high a value makes the cone too wide.
+    /// brightness stands. Too high a value makes the cone too wide. The default, 17 km, is where a cloudless limb in sunlight
+    /// has half of its brightness at 550 nm.
     pub limb_height_km: f64,
-    /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts.
+    /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts. The default,
+    /// 7 km, spans the visible wavelengths (24 km at 440 nm, 12 km at 650 nm) and levels between a quarter and three quarters.
     pub limb_height_sigma_km: f64,
     /// Limb height by latitude instead of `limb_height_km`: up to 16 rows of (geodetic latitude in degrees, height in
     /// kilometres), latitudes rising, linear between them and constant beyond. For `earth` with a position; an attitude
@@ -84,8 +102,9 @@ impl Default for Config {
             radius_km: None,
             altitude_km: None,
             altitude_sigma_km: 0.5,
-            limb_height_km: 10.0,
-            limb_height_sigma_km: 2.0,
+            altitude_reference: AltitudeReference::Ellipsoid,
+            limb_height_km: 17.0,
+            limb_height_sigma_km: 7.0,
             limb_height_by_latitude_km: heapless::Vec::new(),
             sunlit: None,
             binarize: None,
@@ -220,6 +239,9 @@ pub struct Frame<T> {
     pub attitude_sigma_rad: Option<T>,
     /// The last answer, for `select.max_rate_deg_s`.
     pub last: Option<Last<T>>,
+    /// The camera's rate of rotation in its own axes, rad/s, up to 1000: for a camera with a rolling shutter
+    /// (`camera.readout_s`), whose rows are taken at different times. The frame's time is that of its middle row.
+    pub rate_rad_s: Option<[T; 3]>,
 }
 
 /// An answer to a picture before.
@@ -244,6 +266,8 @@ pub enum FrameError {
     NoAltitude,
     /// The sigma of the attitude is not a finite number of 0 or more.
     AttitudeSigma,
+    /// The rate of rotation is not finite, or absurd.
+    Rate,
     /// The sensor has no body of that number.
     NoBody,
 }
@@ -254,6 +278,7 @@ impl core::fmt::Display for FrameError {
             Self::Altitude => "altitude_km must be a finite number above 0",
             Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
             Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
+            Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
             Self::NoAltitude => {
                 "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
             }

@@ -5,19 +5,30 @@
 //! covariance of the fit is P = N⁻¹ (R X) N⁻¹, X = Σ Σ b ρ… bᵀ over all pairs. The double sum collapses: with
 //! c₁ = b₁ and c_{j+1} = ρ_j c_j + b_{j+1}, X = Σ (1 − ρ_j²) c_j c_jᵀ, the last ρ being 0. Taking the errors for
 //! independent instead would give a sigma some twenty times too small.
+//!
+//! R and L are told, or come from the residuals ([`Noise`]). Errors that all points of the edge share show in no residual,
+//! and each adds its own term ([`common`]); the expected half-angle is fused last.
 
 #[cfg(feature = "dlr")]
 pub(crate) mod braun_barf;
+mod budget;
+mod common;
 #[cfg(feature = "zju")]
 mod elliptic;
-mod uneven;
+mod noise;
+#[cfg(feature = "reml")]
+pub mod reml;
 
 use crate::block::{Block, HALF, LANES, exp_neg};
 use crate::body::Expected;
+use crate::camera::Camera;
 use crate::error::{ConfigError, above, between};
 use crate::estimate::{self, Fit};
 use crate::linalg::{M3, V3, basis, invert_spd2, unit};
 use crate::real::Real;
+
+pub use budget::{Budget, Term};
+pub use noise::Noise;
 
 /// How the covariance is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,13 +49,20 @@ pub enum Method {
 pub struct Config {
     /// How the covariance is found.
     pub method: Method,
-    /// 1-sigma of an edge point in pixels, above 0.
+    /// Whether the errors of the edge points are the values below, or are measured in each picture with the values below as
+    /// floor.
+    pub noise: Noise,
+    /// 1-sigma of an edge point in pixels, above 0. Where the residuals of an edge are larger, their RMS counts instead.
     pub sigma_px: f64,
+    /// Length along the edge over which errors stay alike, in pixels; 0 for white errors.
+    pub correlation_px: f64,
     /// 1-sigma in pixels of what shifts every point of an edge alike, 0 or more: level, blur, and the limb's profile where
     /// it is no wider than a pixel. It counts against the expected half-angle.
     pub bias_px: f64,
-    /// Length along the edge over which errors stay alike, in pixels; 0 for white errors.
-    pub correlation_px: f64,
+    /// 1-sigma in pixels of a tilt that the whole edge shares, 0 or more: an error that grows in proportion to the place along
+    /// the edge, from −`tilt_px` at one end to `tilt_px` at the other, such as light that fades along the limb. It counts
+    /// against the axis.
+    pub tilt_px: f64,
     /// For `braun-barf`: the largest variance in every direction (Braun & Barf 2022, (37)). Too careful by far.
     #[cfg(feature = "dlr")]
     pub overbound: bool,
@@ -54,9 +72,11 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             method: Method::Sandwich,
-            sigma_px: 1.0,
-            bias_px: 0.0,
-            correlation_px: 300.0,
+            noise: Noise::Rms,
+            sigma_px: 0.1,
+            correlation_px: 60.0,
+            bias_px: 0.3,
+            tilt_px: 0.1,
             #[cfg(feature = "dlr")]
             overbound: false,
         }
@@ -64,10 +84,17 @@ impl Default for Config {
 }
 
 impl Config {
+    /// A noise model that is known: these values, and nothing that the points of an edge share.
+    pub fn told(sigma_px: f64, correlation_px: f64) -> Self {
+        Self { noise: Noise::Told, sigma_px, correlation_px, bias_px: 0.0, tilt_px: 0.0, ..Self::default() }
+    }
+
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        self.noise.check()?;
         above("covariance.sigma_px", self.sigma_px, 0.0)?;
         between("covariance.sigma_px", self.sigma_px, 0.0, 1e4)?;
         between("covariance.bias_px", self.bias_px, 0.0, 1e4)?;
+        between("covariance.tilt_px", self.tilt_px, 0.0, 1e4)?;
         between("covariance.correlation_px", self.correlation_px, 0.0, 1e6)
     }
 }
@@ -99,86 +126,90 @@ pub(crate) struct EdgeNoise<T> {
     pub(crate) length_px: T,
 }
 
-/// Covariance of the fit, raised when the residuals are larger than the noise model says, and never lowered; then
-/// the expected half-angle is fused.
+/// Covariance of the fit from every source of error, never below the told values'; then the expected half-angle is fused.
+/// Leaves each source's part in `budget`.
 pub(crate) fn fuse<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
     expected: &Expected<T>,
     config: &Config,
     estimate: &estimate::Config,
+    camera: &Camera<T>,
+    mut budget: Option<&mut Budget<T>>,
 ) -> Option<Fused<T>> {
     #[cfg(feature = "dlr")]
     if config.method == Method::BraunBarf {
         return braun_barf::fused(blocks, fit, config);
     }
-    let (b1, b2) = basis(&fit.e);
-    let (sums, mean) = (&fit.sums, fit.mean);
-    let length_px = T::of(config.correlation_px);
-    let sigma = T::of(config.sigma_px);
-    let variance = (sigma * sigma).most(fit.rms_px * fit.rms_px);
+    let noise = noise::Levels::new(fit, config);
     #[cfg(feature = "zju")]
     if let Some(quadric) = &fit.quadric {
-        let p = elliptic::covariance(blocks, quadric, length_px) * variance;
-        let edge = EdgeNoise { var_cos: p.m33, sigma_px: variance.sqrt(), length_px };
-        return fused(fit, &p, edge, expected, estimate);
+        let p = elliptic::covariance(blocks, quadric, noise.length_px) * noise.variance;
+        return fused(fit, &p, noise.edge(p.m33), expected, estimate, budget);
     }
-    let is_uneven = expected.uneven_cos.iter().any(|a| *a > T::ZERO);
-    let x = correlated(blocks, &fit.e, &b1, &b2, mean, length_px);
-    // All points shifted alike are another half-angle: by the mean of |g| a pixel.
-    let var_bias = T::of(config.bias_px * config.bias_px) * sums.weight / sums.n[5].most(T::of(1e-20));
-    let var_c = expected.sigma_cos * expected.sigma_cos;
-    if !fit.free {
-        // Half-angle held at the expected one: what it is wrong by, the axis is wrong by in proportion.
-        let p = sandwich_known(sums, &x, mean, variance)?;
-        let n = invert_spd2(sums.known(mean))?;
-        // Σ w Bᵀs · 1: the right-hand side of δe for δc = 1.
-        let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);
-        let (d1, d2) = (n[0] * k1 + n[1] * k2, n[1] * k1 + n[2] * k2);
-        let var_c = if estimate.half_angle == estimate::HalfAngle::Known { T::ZERO } else { var_c } + var_bias;
-        let mut p = [p[0] + d1 * d1 * var_c, p[1] + d1 * d2 * var_c, p[2] + d2 * d2 * var_c];
-        if is_uneven {
-            let more = uneven::known(blocks, fit, &expected.uneven_cos)?;
-            p = [p[0] + more[0], p[1] + more[1], p[2] + more[2]];
+    let response = response(&fit.sums, fit.mean, fit.free)?;
+    let mut p = sandwich(&response, &noise.correlated(blocks, fit, expected));
+    let mut add = |term: Term, more: &M3<T>| {
+        if let Some(budget) = budget.as_deref_mut() {
+            budget.record(term, more);
         }
-        let edge = EdgeNoise { var_cos: T::ZERO, sigma_px: variance.sqrt(), length_px };
-        return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: None, chi2: T::ZERO, edge });
-    }
-    let mut p = sandwich_free(sums, &x, mean, variance)?;
-    let edge = EdgeNoise { var_cos: p.m33, sigma_px: variance.sqrt(), length_px };
-    p.m33 += var_bias;
-    if is_uneven {
-        p += uneven::free(blocks, fit, &expected.uneven_cos)?;
-    }
-    fused(fit, &p, edge, expected, estimate)
+    };
+    add(Term::EdgeNoise, &p);
+    let edge = noise.edge(p.m33);
+    common::each(blocks, fit, expected, &noise, camera, |term, more| {
+        p += more;
+        add(term, more);
+    })?;
+    fused(fit, &p, edge, expected, estimate, budget)
 }
 
-/// A fit with its half-angle free and the covariance of (δ₁₂, δc) fused with the expected half-angle, unless that is to
-/// count for nothing.
+/// The linear map from Σ w h x, about the means, to the errors (δ₁₂, δc) that the signal x in the residuals makes: T N⁻¹ with
+/// T = [[I, 0], [mᵀ, 1]], or, with the half-angle held, the inverse of the upper block, which leaves δc at 0.
+pub(crate) fn response<T: Real>(sums: &estimate::Sums<T>, [m1, m2]: [T; 2], free: bool) -> Option<M3<T>> {
+    let (one, zero) = (T::one(), T::ZERO);
+    if free {
+        return Some(M3::new(one, zero, zero, zero, one, zero, m1, m2, one) * estimate::inverse(sums)?);
+    }
+    let [a, b, d] = invert_spd2(sums.known([m1, m2]))?;
+    // Rows Bᵀs = h₁₂ − m h₃.
+    Some(M3::new(a, b, -(a * m1 + b * m2), b, d, -(b * m1 + d * m2), zero, zero, zero))
+}
+
+/// Covariance of (δ₁₂, δc) from that of the right-hand side, given by its upper triangle.
+pub(crate) fn sandwich<T: Real>(response: &M3<T>, x: &[T; 6]) -> M3<T> {
+    response * M3::new(x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]) * response.transpose()
+}
+
+/// A fit and the covariance of its (δ₁₂, δc), fused with the expected half-angle, unless that is to count for nothing.
 fn fused<T: Real>(
     fit: &Fit<T>,
     p: &M3<T>,
     edge: EdgeNoise<T>,
     expected: &Expected<T>,
     estimate: &estimate::Config,
+    budget: Option<&mut Budget<T>>,
 ) -> Option<Fused<T>> {
     let (b1, b2) = basis(&fit.e);
     let var_c = expected.sigma_cos * expected.sigma_cos;
-    let var_free = p.m33;
-    if estimate.half_angle == estimate::HalfAngle::Free || expected.free {
-        return Some(Fused {
-            e: fit.e,
-            c: fit.c,
-            p: [p.m11, p.m12, p.m22],
-            var_free_cos: Some(var_free),
-            chi2: T::ZERO,
-            edge,
-        });
+    let var_free = fit.free.then_some(p.m33);
+    if !fit.free || estimate.half_angle == estimate::HalfAngle::Free || expected.free {
+        // Half-angle held at the expected one: what it is wrong by, the axis is wrong by in proportion.
+        let k = held_gain(fit);
+        let var_c = if estimate.half_angle == estimate::HalfAngle::Known { T::ZERO } else { var_c };
+        let (k, var_c) = k.filter(|_| !fit.free).map_or(([T::ZERO; 2], T::ZERO), |k| (k, var_c));
+        if let Some(budget) = budget {
+            budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
+        }
+        let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
+        return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: var_free, chi2: T::ZERO, edge });
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
     let k = V3::new(p.m13, p.m23, p.m33) * (T::one() / total);
     let e = unit(&(fit.e + b1 * (k.x * difference) + b2 * (k.y * difference)))?;
+    if let Some(budget) = budget {
+        budget.project(&b1, &b2, [k.x, k.y], [k.x * expected.sigma_cos, k.y * expected.sigma_cos], expected);
+    }
     // The tangent basis at the fused axis differs by the small turn only; the covariance is carried over as it is,
     // through the camera frame.
     let fused = [p.m11 - k.x * p.m13, p.m12 - k.x * p.m23, p.m22 - k.y * p.m23];
@@ -191,10 +222,18 @@ fn fused<T: Real>(
         e,
         c: fit.c + k.z * difference,
         p: [form(r1, r1), form(r1, r2), form(r2, r2)],
-        var_free_cos: Some(var_free),
+        var_free_cos: var_free,
         chi2: difference * difference / total,
         edge,
     })
+}
+
+/// By how much the axis moves for δc = 1 with the half-angle held: Σ w Bᵀs · 1 through the normal equations.
+fn held_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
+    let (sums, mean) = (&fit.sums, fit.mean);
+    let n = invert_spd2(sums.known(mean))?;
+    let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);
+    Some([n[0] * k1 + n[1] * k2, n[1] * k1 + n[2] * k2])
 }
 
 /// Σ (1 − ρ²) c cᵀ about `mean`, upper triangle.
@@ -263,35 +302,4 @@ pub(crate) fn correlated<T: Real>(
         x[5] += c3 * c3;
     }
     x
-}
-
-/// Covariance of (δ₁₂, δc): N⁻¹ (R X) N⁻¹ about the means, then moved back by T = [[I, 0], [mᵀ, 1]].
-pub(crate) fn sandwich_free<T: Real>(
-    sums: &estimate::Sums<T>,
-    x: &[T; 6],
-    [m1, m2]: [T; 2],
-    variance: T,
-) -> Option<M3<T>> {
-    let n = estimate::inverse(sums)?;
-    let x = M3::new(x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]);
-    let p = n * x * n * variance;
-    let (one, zero) = (T::one(), T::ZERO);
-    let t = M3::new(one, zero, zero, zero, one, zero, m1, m2, one);
-    Some(t * p * t.transpose())
-}
-
-/// Covariance of δ₁₂ with the half-angle held.
-pub(crate) fn sandwich_known<T: Real>(
-    sums: &estimate::Sums<T>,
-    x: &[T; 6],
-    [m1, m2]: [T; 2],
-    variance: T,
-) -> Option<[T; 3]> {
-    let [a, b, d] = invert_spd2(sums.known([m1, m2]))?;
-    // X of Bᵀs itself: rows h₁₂ − m h₃.
-    let x11 = x[0] - m1 * x[2] - m1 * x[2] + m1 * m1 * x[5];
-    let x12 = x[1] - m1 * x[4] - m2 * x[2] + m1 * m2 * x[5];
-    let x22 = x[3] - m2 * x[4] - m2 * x[4] + m2 * m2 * x[5];
-    let (y11, y12, y21, y22) = (a * x11 + b * x12, a * x12 + b * x22, b * x11 + d * x12, b * x12 + d * x22);
-    Some([(y11 * a + y12 * b) * variance, (y11 * b + y12 * d) * variance, (y21 * b + y22 * d) * variance])
 }

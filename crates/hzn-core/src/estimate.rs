@@ -535,6 +535,11 @@ impl<T: Real> Sums<T> {
         (self.weight / self.n[5].most(T::of(1e-20))).sqrt()
     }
 
+    /// With the normal equations of a part of the points.
+    pub(crate) fn of_part(&self, n: [T; 6]) -> Self {
+        Self { n, ..*self }
+    }
+
     /// The means of Bᵀs, from the sums about the old ones.
     pub(crate) fn means(&self, [m1, m2]: [T; 2]) -> [T; 2] {
         let w = self.n[5].most(T::of(1e-20));

@@ -295,15 +295,22 @@ impl<'a, B: Board> Flight<'a, B> {
                 let (Some(h), Some(x), Some(y), Some(z)) = (number(), number(), number(), number()) else {
                     return Code::Arguments;
                 };
+                let rate = if from.rest().is_empty() { None } else { Some([from.f32(), from.f32(), from.f32()]) };
                 if let Some(code) = done(from) {
                     return code;
                 }
                 let given = |v: f32| (!v.is_nan()).then_some(v);
-                let position_m = match (given(x), given(y), given(z)) {
-                    (Some(x), Some(y), Some(z)) => Some([x, y, z]),
+                let all = |v: [Option<f32>; 3]| match v.map(|v| v.and_then(given)) {
+                    [Some(x), Some(y), Some(z)] => Some([x, y, z]),
                     _ => None,
                 };
-                let known = Frame { altitude_m: given(h), position_m, ..Frame::default() };
+                // Three numbers or none: a rate that is cut off is no rate.
+                if rate.is_some_and(|r| r.iter().any(Option::is_none)) {
+                    return Code::Arguments;
+                }
+                let position_m = all([Some(x), Some(y), Some(z)]);
+                let rate_rad_s = rate.and_then(all);
+                let known = Frame { altitude_m: given(h), position_m, rate_rad_s, ..Frame::default() };
                 if self.sensor.expect(&known).is_err() {
                     return Code::Refused;
                 }

@@ -4,9 +4,10 @@
 //! parameter that may be left out is NaN when it is.
 
 use hzn_core::binarize;
-use hzn_core::body::Kind;
+use hzn_core::body::{AltitudeReference, Kind};
 use hzn_core::camera::{Camera, Model};
 use hzn_core::candidates::SubPixel;
+use hzn_core::covariance::Noise;
 use hzn_core::error::ConfigError;
 use hzn_core::estimate::HalfAngle;
 use hzn_core::pipeline::Mount;
@@ -114,6 +115,8 @@ choice! {
     SubPixel { 0 Linear, 1 None }
     reject::Method { 0 TwoPoint, 1 None }
     HalfAngle { 0 Fused, 1 Known, 2 Free }
+    AltitudeReference { 0 Ellipsoid, 1 Sphere }
+    Noise { 0 Told, 1 Rms }
 }
 
 /// One line a parameter: number, name as in sensor.toml, place.
@@ -152,12 +155,16 @@ parameters! {
     6 "camera.cx_px" sensor.camera.cx_px;
     7 "camera.cy_px" sensor.camera.cy_px;
     13 "camera.theta_max_deg" sensor.camera.theta_max_deg;
+    14 "camera.focal_sigma_percent" sensor.camera.focal_sigma_percent;
+    15 "camera.centre_sigma_px" sensor.camera.centre_sigma_px;
+    16 "camera.readout_s" sensor.camera.readout_s;
     30 "body.kind" sensor.body.kind;
     31 "body.radius_km" sensor.body.radius_km;
     32 "body.altitude_km" sensor.body.altitude_km;
     33 "body.altitude_sigma_km" sensor.body.altitude_sigma_km;
     34 "body.limb_height_km" sensor.body.limb_height_km;
     35 "body.limb_height_sigma_km" sensor.body.limb_height_sigma_km;
+    36 "body.altitude_reference" sensor.body.altitude_reference;
     40 "gate.min_mean" sensor.gate.min_mean;
     41 "gate.max_mean" sensor.gate.max_mean;
     50 "binarize.method" sensor.binarize.method;
@@ -175,6 +182,9 @@ parameters! {
     90 "estimate.half_angle" sensor.estimate.half_angle;
     100 "covariance.sigma_px" sensor.covariance.sigma_px;
     101 "covariance.correlation_px" sensor.covariance.correlation_px;
+    102 "covariance.noise" sensor.covariance.noise;
+    103 "covariance.bias_px" sensor.covariance.bias_px;
+    104 "covariance.tilt_px" sensor.covariance.tilt_px;
     110 "select.min_inliers" sensor.select.min_inliers;
     111 "select.min_arc_px" sensor.select.min_arc_px;
     112 "select.max_rms_px" sensor.select.max_rms_px;

@@ -453,6 +453,14 @@ fn a_picture_is_processed_on_command_and_its_edge_sent() {
             [231e3, f32::NAN, f32::NAN, f32::NAN].map(|v| w.f32(v)).into_iter().collect()
         });
         assert_eq!(tell(f, &known).answers, [(7, 1, Code::Done)]);
+        let turning = command(1, Function::SetKnown, |w| {
+            [231e3, f32::NAN, f32::NAN, f32::NAN, 0.1, 0.0, -0.2].map(|v| w.f32(v)).into_iter().collect()
+        });
+        assert_eq!(tell(f, &turning).answers, [(7, 1, Code::Done)]);
+        let cut = command(1, Function::SetKnown, |w| {
+            [231e3, f32::NAN, f32::NAN, f32::NAN, 0.1].map(|v| w.f32(v)).into_iter().collect()
+        });
+        assert_eq!(tell(f, &cut).answers, [(7, 1, Code::Arguments)]);
         let wrong = command(2, Function::SetKnown, |w| {
             [-5.0, f32::NAN, f32::NAN, f32::NAN].map(|v| w.f32(v)).into_iter().collect()
         });

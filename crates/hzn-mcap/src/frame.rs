@@ -173,6 +173,9 @@ pub struct Given {
     /// Direction to the Sun in the camera frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun_camera: Option<[f64; 3]>,
+    /// Rate of rotation of the camera in its own axes, rad/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_rad_s: Option<[f64; 3]>,
 }
 
 /// How much a message matters.

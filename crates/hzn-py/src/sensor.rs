@@ -107,7 +107,7 @@ impl Sensor {
 
     #[doc = doc!("Sensor.expect")]
     #[pyo3(signature = (*, body = 0, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
-                        time_s = None))]
+                        rate_rad_s = None, time_s = None))]
     fn expect(
         &self,
         body: usize,
@@ -115,14 +115,16 @@ impl Sensor {
         position_km: Option<[f64; 3]>,
         attitude: Option<[f64; 4]>,
         attitude_sigma_deg: Option<f64>,
+        rate_rad_s: Option<[f64; 3]>,
         time_s: Option<f64>,
     ) -> PyResult<Expected> {
-        Expected::of(&self.state(), known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?, body)
+        let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
+        Expected::of(&self.state(), data, body)
     }
 
     #[doc = doc!("Sensor.process")]
     #[pyo3(signature = (image, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
-                        time_s = None, bits = None, detail = false))]
+                        rate_rad_s = None, time_s = None, bits = None, detail = false))]
     fn process(
         &self,
         py: Python<'_>,
@@ -131,11 +133,12 @@ impl Sensor {
         position_km: Option<[f64; 3]>,
         attitude: Option<[f64; 4]>,
         attitude_sigma_deg: Option<f64>,
+        rate_rad_s: Option<[f64; 3]>,
         time_s: Option<f64>,
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<Report> {
-        let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, time_s)?;
+        let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
         let state = self.state();
         let array = Array::of(image)?;
         state.check_size(&array)?;
@@ -209,6 +212,7 @@ fn known(
     position_km: Option<[f64; 3]>,
     attitude: Option<[f64; 4]>,
     attitude_sigma_deg: Option<f64>,
+    rate_rad_s: Option<[f64; 3]>,
     time_s: Option<f64>,
 ) -> PyResult<FrameData> {
     let unit = |q: &[f64; 4]| (q.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() < 0.01;
@@ -225,6 +229,7 @@ fn known(
         position_km,
         camera_to_ecef_wxyz: attitude,
         attitude_sigma_deg,
+        rate_rad_s,
         ..FrameData::default()
     })
 }

@@ -102,6 +102,9 @@ fn known(scenario: &Scenario, frame: &FlightFrame) -> Value {
         known["attitude"] = json!([w, x, y, z]);
         known["attitude_sigma_deg"] = json!(row.attitude_sigma_deg);
     }
+    if let (Some(x), Some(y), Some(z)) = (row.rate_x, row.rate_y, row.rate_z) {
+        known["rate_rad_s"] = json!([x, y, z]);
+    }
     known
 }
 

@@ -70,13 +70,25 @@ pub struct FrameRow {
     pub qz: Option<f64>,
     /// 1-sigma of the prior attitude about each axis, degrees.
     pub attitude_sigma_deg: Option<f64>,
+    /// Rate of rotation of the camera in its own axes, rad/s; of a camera with a rolling shutter.
+    pub rate_x: Option<f64>,
+    /// About its second axis.
+    pub rate_y: Option<f64>,
+    /// About its third axis.
+    pub rate_z: Option<f64>,
 }
 
 impl FlightFrame {
+    /// Rate of rotation of a camera whose rows are exposed one after the other.
+    fn rate_rad_s(&self) -> Option<[f64; 3]> {
+        self.scene.motion.filter(|motion| motion.readout_s != 0.0).map(|motion| motion.rate_radps)
+    }
+
     /// What frames.csv says about the picture: time and position, no attitude.
     pub fn row(&self) -> FrameRow {
         let [x_km, y_km, z_km] = self.scene.pose.position_m.map(|m| m * 1e-3);
         let altitude_km = Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m) * 1e-3;
+        let rate = self.rate_rad_s();
         FrameRow {
             file: self.file.clone(),
             time_s: self.time_s,
@@ -90,6 +102,9 @@ impl FlightFrame {
             qy: None,
             qz: None,
             attitude_sigma_deg: None,
+            rate_x: rate.map(|[x, _, _]| x),
+            rate_y: rate.map(|[_, y, _]| y),
+            rate_z: rate.map(|[_, _, z]| z),
         }
     }
     /// The picture as who reads its file has it: with the losses of JPEG where it is kept as such.
@@ -118,6 +133,7 @@ impl FlightFrame {
             cam_to_ecef: None,
             attitude_sigma_rad: None,
             sun: None,
+            rate_rad_s: self.rate_rad_s(),
             level: None,
             last: None,
         }
@@ -200,10 +216,15 @@ pub fn rocket_camera(width: u16, height: u16) -> camera::Config {
 pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     let camera = rocket_camera(width, height);
     let mut sensor = hzn_core::Config::new(camera.clone());
-    sensor.body = body::Config { altitude_sigma_km: 0.1, limb_height_sigma_km: 1.0, ..body::Config::default() };
+    sensor.body = body::Config {
+        altitude_sigma_km: 0.1,
+        limb_height_km: 10.0,
+        limb_height_sigma_km: 1.0,
+        ..body::Config::default()
+    };
     // Chosen so that errors are as large as they are said to be: squared errors over their covariance are 1.5 to 2.7
     // (two degrees of freedom) on pictures 960 to 1920 pixels wide. Clouds seen through the band correlate them.
-    sensor.covariance = covariance::Config { sigma_px: 0.1, correlation_px: 30.0, ..Default::default() };
+    sensor.covariance = covariance::Config::told(0.1, 30.0);
     let half_s = 190.0;
     let frames = places(count)
         .map(|(index, place)| {
@@ -246,7 +267,7 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
     sensor.body =
         body::Config { limb_height_km: 25.0, limb_height_sigma_km: 1.0, altitude_sigma_km: 0.1, ..sensor.body };
     // Noise and little else: errors of neighbouring points are unrelated beyond the blur.
-    sensor.covariance = covariance::Config { sigma_px: 0.07, correlation_px: 5.0, ..Default::default() };
+    sensor.covariance = covariance::Config::told(0.07, 5.0);
     let frames = places(count)
         .map(|(index, place)| {
             let time_s = 5800.0 * place;

@@ -174,7 +174,7 @@ impl Default for Sky {
 }
 
 impl Scene {
-    /// A uniformly bright Earth with a sharp limb at a height of 10 km in a dark sky, seen by a detector without
+    /// A uniformly bright Earth with a sharp limb at the default height, 17 km, in a dark sky, seen by a detector without
     /// noise.
     pub fn new(camera: camera::Config, pose: Pose) -> Self {
         Self {

@@ -47,6 +47,8 @@ typedef struct {
   float altitude_m;
   // Position of the camera in ECEF, metres. It beats the altitude.
   float position_m[3];
+  // Rate of rotation of the camera in its own axes, rad/s; it counts with a rolling shutter.
+  float rate_rad_s[3];
 } HznKnown;
 
 // The answer to a picture. Without a direction (status not 0) its numbers are NaN and 0.

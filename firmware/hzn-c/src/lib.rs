@@ -74,6 +74,8 @@ pub struct HznKnown {
     pub altitude_m: f32,
     /// Position of the camera in ECEF, metres. It beats the altitude.
     pub position_m: [f32; 3],
+    /// Rate of rotation of the camera in its own axes, rad/s; it counts with a rolling shutter.
+    pub rate_rad_s: [f32; 3],
 }
 
 /// The answer to a picture. Without a direction (status not 0) its numbers are NaN and 0.
@@ -229,10 +231,11 @@ pub unsafe extern "C" fn hzn_process(
 }
 
 fn frame(known: &HznKnown) -> Frame<f32> {
-    let told = !known.position_m.iter().any(|x| x.is_nan());
+    let told = |v: [f32; 3]| (!v.iter().any(|x| x.is_nan())).then_some(v);
     Frame {
         altitude_m: (!known.altitude_m.is_nan()).then_some(known.altitude_m),
-        position_m: told.then_some(known.position_m),
+        position_m: told(known.position_m),
+        rate_rad_s: told(known.rate_rad_s),
         ..Frame::default()
     }
 }

@@ -154,7 +154,8 @@ impl File<'_> {
             return Err(self.problem(field, what));
         }
         let k = k.iter().copied().take(most).collect();
-        Ok(Config { width, height, model, fx_px: fx, fy_px: fy, cx_px: cx, cy_px: cy, k, theta_max_deg: None })
+        let ideal = Config::ideal(model, width, height, fx);
+        Ok(Config { fx_px: fx, fy_px: fy, cx_px: cx, cy_px: cy, k, ..ideal })
     }
 }
 

@@ -99,7 +99,9 @@ pub(super) fn run(args: &Args) -> Outcome {
             half_angle: half_angle.map_err(usage)?,
         };
         tell::result(format_args!("{}{}", if which > 0 { "\n" } else { "" }, told.text(decoding, time.elapsed)))?;
-        drawing.add(output::annotations(trace, report.solution.as_ref(), sensor.camera()));
+        // Drawn where each row sees it.
+        let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
+        drawing.add(output::annotations(trace, report.solution.as_ref(), &camera));
         let name = hzn_mcap::body_name(body.kind);
         statuses.push(if several { format!("{name} {}", report.status) } else { report.status.name().to_owned() });
     }
@@ -268,6 +270,26 @@ impl Told<'_> {
         }
     }
 
+    /// What makes the answer's sigma, in degrees along the term's own worst direction.
+    fn budget(&self, candidate: u32) -> Vec<(&'static str, f64)> {
+        let edges = self.trace.edges();
+        let terms = edges.iter().find(|e| e.candidate == candidate).map_or(&[][..], |e| &e.budget_rad);
+        terms.iter().filter(|(_, rad)| *rad > 0.0).map(|(term, rad)| (words::term(*term), rad.to_degrees())).collect()
+    }
+
+    /// What became of a rolling shutter.
+    fn shutter(&self) -> Option<String> {
+        let readout_s = self.config.camera.readout_s;
+        let rate = self.data.and_then(|d| d.rate_rad_s);
+        let turned = |rate: [f64; 3]| rate.map(|r| (r * readout_s).to_degrees());
+        (readout_s != 0.0).then(|| match rate.map(turned) {
+            Some([x, y, z]) => {
+                format!("rows turned back by the rate: {x:.3}, {y:.3}, {z:.3} deg from the first to the last")
+            }
+            None => "no rate of rotation is given: the rows are not turned back, and sigma does not hold it".to_owned(),
+        })
+    }
+
     fn answer(&self, s: &Solution<f64>, line: &mut impl FnMut(&str, String)) {
         let [x, y, z] = s.axis.xyz();
         line(
@@ -287,6 +309,12 @@ impl Told<'_> {
                 sigma[1].to_degrees()
             ),
         );
+        for (name, sigma) in self.budget(s.candidate) {
+            line("", format!("{sigma:.5} deg from {name}"));
+        }
+        if let Some(what) = self.shutter() {
+            line("shutter", what);
+        }
         if let Some(e) = s.axis_ecef {
             let [x, y, z] = e.xyz();
             line("axis, ECEF", format!("{x:.7}, {y:.7}, {z:.7} (the same direction, from the position)"));

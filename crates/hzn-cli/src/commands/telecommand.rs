@@ -20,7 +20,7 @@ use crate::output;
 ///                                      (NaN: left out)
 ///   "load sensor.toml"                 every parameter of a sensor
 ///   "read NAME [NAME]..."
-///   "known ALTITUDE_KM [X_KM Y_KM Z_KM]"
+///   "known ALTITUDE_KM [X_KM Y_KM Z_KM [RATE_X RATE_Y RATE_Z]]"   rates in rad/s; NaN: not known
 ///   "process-once", "dump-edges", "reset-counters"
 /// The bytes go to standard output unless -o is given. The format: docs/telemetry.md.
 #[derive(Debug, clap::Args)]
@@ -122,7 +122,8 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
             })
         }
         Function::SetKnown => {
-            let km = rest.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
+            let given = rest.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
+            let (km, rate) = given.split_at(given.len().min(4));
             if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
                 return Err(bad(&format!("{x} is no finite number of kilometres")));
             }
@@ -134,7 +135,13 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
                 [h, x, y, z] => [h, x, y, z],
                 _ => return Err(bad("known takes the altitude in kilometres, and the ECEF position if there is one")),
             };
-            user(&mut |w| [h, x, y, z].iter().for_each(|v| w.f32((v * 1e3) as f32)))
+            if !matches!(rate.len(), 0 | 3) {
+                return Err(bad("known takes the rate of rotation as three numbers, rad/s, after the position"));
+            }
+            user(&mut |w| {
+                [h, x, y, z].iter().for_each(|v| w.f32((v * 1e3) as f32));
+                rate.iter().for_each(|v| w.f32(*v as f32));
+            })
         }
         Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters if !rest.is_empty() => {
             Err(bad("takes nothing else"))

@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use hzn_calib::{FrameData, Frames};
 use hzn_core::body::FrameError;
+use hzn_core::camera::Camera;
 use hzn_core::status::Status;
 use hzn_core::{Config, Report};
 
@@ -318,7 +319,9 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     }
     if let Some(traces) = traces.as_ref().filter(|_| plan.trace || plan.overlay.is_some()) {
         // Here and not in the one thread that writes, which would hold up all the others.
-        let drawing = draw(&finished.found, traces, sensor);
+        // Where each row sees it.
+        let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
+        let drawing = draw(&finished.found, traces, &camera);
         if let Some(folder) = &plan.overlay {
             let title = statuses(&finished.found, plan);
             let image = crate::overlay::draw_annotations(picture.to_rgb(), &drawing, &title);
@@ -337,11 +340,11 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
 }
 
 /// What is drawn over the picture for all of its bodies.
-fn draw(found: &[Found], traces: &Traces, sensor: &AnySensor) -> hzn_mcap::Annotations {
+fn draw(found: &[Found], traces: &Traces, camera: &Camera<f64>) -> hzn_mcap::Annotations {
     let mut drawing = hzn_mcap::Annotations::default();
     for (found, trace) in found.iter().zip(&traces.each) {
         let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref());
-        drawing.add(crate::output::annotations(trace, solution, sensor.camera()));
+        drawing.add(crate::output::annotations(trace, solution, camera));
     }
     drawing
 }

@@ -3,6 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
+use hzn_core::covariance::{Budget, Term};
 use hzn_core::pipeline::Candidate;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::real::Real;
@@ -26,6 +27,8 @@ pub struct Edge {
     pub weights: Vec<f64>,
     /// What became of it.
     pub outcome: Option<Candidate<f64>>,
+    /// The larger 1-sigma of the axis that each source of error makes, radians; empty when there was no fit.
+    pub budget_rad: Vec<(Term, f64)>,
     /// Its own fit, when there was one.
     pub solution: Option<Solution<f64>>,
 }
@@ -174,6 +177,12 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.now().into_iter().for_each(|t| t.weight(candidate, point, weight));
     }
+    fn wants_budget(&self) -> bool {
+        self.now().is_some()
+    }
+    fn budget(&self, candidate: u32, budget: &Budget<T>) {
+        self.now().into_iter().for_each(|t| t.budget(candidate, budget));
+    }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.now().into_iter().for_each(|t| t.verdict(candidate, outcome, solution));
     }
@@ -210,6 +219,14 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
             if let Some(slot) = e.weights.get_mut(point as usize) {
                 *slot = weight.into();
             }
+        });
+    }
+    fn wants_budget(&self) -> bool {
+        true
+    }
+    fn budget(&self, candidate: u32, budget: &Budget<T>) {
+        self.with(candidate, |e| {
+            e.budget_rad = Term::ALL.map(|term| (term, budget.of(term).sigma_max_rad().into())).into();
         });
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {

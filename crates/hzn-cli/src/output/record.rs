@@ -94,6 +94,7 @@ fn given(data: &FrameData) -> Given {
         q_ecef_from_camera_wxyz: data.camera_to_ecef_wxyz,
         attitude_sigma_deg: data.attitude_sigma_deg,
         sun_camera: data.sun_camera,
+        rate_rad_s: data.rate_rad_s,
     }
 }
 
@@ -109,6 +110,7 @@ pub fn frame_data(row: &Row, given: &Given) -> FrameData {
         camera_to_ecef_wxyz: given.q_ecef_from_camera_wxyz,
         attitude_sigma_deg: given.attitude_sigma_deg,
         sun_camera: given.sun_camera,
+        rate_rad_s: given.rate_rad_s,
     }
 }
 

@@ -5,12 +5,18 @@ use crate::frames::{Cam, Ecef, Rotation, UnitVec3};
 use crate::linalg::V3;
 use crate::real::Real;
 
-use super::{AU_KM, Config, Frame, FrameError, Kind, Last, MOON_DISTANCE_KM, MOON_RADIUS_KM, SUN_RADIUS_KM};
+use super::{
+    AU_KM, AltitudeReference, Config, Frame, FrameError, Kind, Last, MOON_DISTANCE_KM, MOON_RADIUS_KM, SUN_RADIUS_KM,
+    shape,
+};
 
 /// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude that comes without one: 5 degrees.
 const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
+
+/// Nothing that takes pictures turns faster.
+const MAX_RATE_RAD_S: f64 = 1000.0;
 
 /// The cone that is expected: cosine of its half-angle with its sigma, and what turns a half-angle into an altitude.
 #[derive(Debug, Clone, Copy)]
@@ -21,13 +27,16 @@ pub struct Expected<T> {
     pub(crate) sin: T,
     /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
     pub(crate) sigma_cos: T,
+    /// 1-sigmas of the limb height that this comes of: of the limb itself, of the altitude, of the unknown radius; metres.
+    pub(crate) sigma_parts: [T; 3],
     /// The limb cone of the ellipsoid, when the position is known.
     pub(crate) ellipsoid: Option<LimbCone<T>>,
     /// Prior attitude, camera to ECEF.
     pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
     /// How the limb differs from the mean cone by azimuth about the axis: first and second harmonic of cos α, from north.
     pub(crate) harmonics_cos: [T; 2],
-    /// 1-sigma amplitudes of what of this is not known to the fit, because the direction of north is not.
+    /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct: because the azimuth of north is
+    /// unknown, or because the position is.
     pub(crate) uneven_cos: [T; 2],
     /// Level that the picture before asks for, counts.
     pub(crate) level: Option<u16>,
@@ -39,6 +48,8 @@ pub struct Expected<T> {
     pub(crate) predicted: Option<(V3<T>, T)>,
     /// The last answer.
     pub(crate) last: Option<Last<T>>,
+    /// The camera's rate of rotation in its own axes, rad/s.
+    pub(crate) rate_rad_s: Option<[T; 3]>,
     /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
     pub(crate) radius_m: T,
     /// Limb height in metres and its sigma.
@@ -70,7 +81,7 @@ impl<T: Real> Expected<T> {
         let km = T::of(1000.0);
         let mut limb = T::of(body.limb_height_km) * km;
         let mut harmonics = [T::zero(); 2];
-        let mut limb_sigma = T::of(body.limb_height_sigma_km) * km;
+        let limb_sigma = T::of(body.limb_height_sigma_km) * km;
         let mut altitude_sigma = T::of(body.altitude_sigma_km) * km;
         let given = match frame.altitude_m {
             Some(h) if !(h > T::zero() && h.is_finite()) => return Err(FrameError::Altitude),
@@ -85,7 +96,11 @@ impl<T: Real> Expected<T> {
         if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
             return Err(FrameError::AttitudeSigma);
         }
+        if frame.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::of(MAX_RATE_RAD_S))) {
+            return Err(FrameError::Rate);
+        }
         let mut ellipsoid = None;
+        let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
         let (radius, altitude, sin) = match (body.kind, position) {
             (Kind::Earth, Some(p)) => {
                 let raised = |limb: T| {
@@ -123,12 +138,17 @@ impl<T: Real> Expected<T> {
                     (_, Some(h), _) => h,
                     (_, None, _) => return Err(FrameError::NoAltitude),
                 };
+                let sin = (r + limb) / (r + altitude);
                 if body.kind == Kind::Earth {
-                    // The local radius is unknown without a position.
-                    let unknown = T::of(20e3);
-                    limb_sigma = (limb_sigma * limb_sigma + unknown * unknown).sqrt();
+                    // A height above the ellipsoid rises with the local radius: most of its error cancels.
+                    let counts = match body.altitude_reference {
+                        AltitudeReference::Ellipsoid => (altitude - limb) / (r + altitude),
+                        AltitudeReference::Sphere => T::one(),
+                    };
+                    unknown_m = shape::radius_sigma_m(sin) * counts;
+                    unknown_second_m = shape::second_harmonic_m(sin);
                 }
-                (r, altitude, (r + limb) / (r + altitude))
+                (r, altitude, sin)
             }
         };
         let cos2 = T::one() - sin * sin;
@@ -154,7 +174,8 @@ impl<T: Real> Expected<T> {
             Some(_) => amplitude.abs() * (attitude_sigma * T::of(k)).least(T::one()),
             None => amplitude.abs(),
         };
-        let variance = limb_sigma * limb_sigma + sin * sin * altitude_sigma * altitude_sigma;
+        let sigma_parts = [limb_sigma, sin * altitude_sigma, unknown_m];
+        let variance = sigma_parts.iter().fold(T::zero(), |sum, s| sum + *s * *s);
         let axis_ecef = match (&ellipsoid, position, body.kind) {
             (Some(cone), ..) => Some(cone.axis),
             (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
@@ -164,18 +185,20 @@ impl<T: Real> Expected<T> {
             cos,
             sin,
             sigma_cos: scale * variance.sqrt(),
+            sigma_parts,
             ellipsoid,
             cam_to_ecef: known,
             harmonics_cos,
-            uneven_cos: [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1])],
+            uneven_cos: [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * unknown_second_m],
             level: frame.level,
             sun: frame.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             sun_seen: frame.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
             predicted: frame.cam_to_ecef.zip(axis_ecef).map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
             last: frame.last,
+            rate_rad_s: frame.rate_rad_s,
             radius_m: radius,
             limb_m: limb,
-            limb_sigma_m: limb_sigma,
+            limb_sigma_m: (limb_sigma * limb_sigma + unknown_m * unknown_m).sqrt(),
             free: body.half_angle_is_free(),
             phases: body.kind != Kind::Sun,
             which: 0,

@@ -1,5 +1,6 @@
 //! `[camera]` of sensor.toml.
 
+use super::uncertain::INTRINSICS;
 use crate::error::{ConfigError, Limit, above, between, require};
 
 /// The projection of the lens.
@@ -29,6 +30,34 @@ impl Model {
     }
 }
 
+/// An intrinsic parameter, by its name in sensor.toml.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[allow(missing_docs, reason = "the names are those of the keys")]
+pub enum Intrinsic {
+    FxPx,
+    FyPx,
+    CxPx,
+    CyPx,
+    K1,
+    K2,
+    K3,
+    K4,
+    P1,
+    P2,
+}
+
+/// `[camera.covariance]`: covariance of the intrinsic parameters, as a calibration program gives it.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Covariance {
+    /// The parameters of the rows and columns: `fx_px`, `fy_px`, `cx_px`, `cy_px`, and the coefficients by their names, `k1` to
+    /// `k4` of `kannala-brandt`, `k1, k2, p1, p2, k3` of `brown-conrady`. What is left out counts as known exactly.
+    pub order: heapless::Vec<Intrinsic, INTRINSICS>,
+    /// The matrix row by row, symmetric and positive semidefinite, in px² and the coefficients' own unit.
+    pub rows: heapless::Vec<heapless::Vec<f64, INTRINSICS>, INTRINSICS>,
+}
+
 /// A camera calibration. Pixel centres at integers, x right, y down, z forward (as OpenCV).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
@@ -55,6 +84,26 @@ pub struct Config {
     /// to the smaller of this and the farthest corner, with 2° to spare.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub theta_max_deg: Option<f64>,
+    /// 1-sigma of the focal length, of both axes alike, in percent of it, 0 to 100. It widens the covariance.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
+    pub focal_sigma_percent: f64,
+    /// 1-sigma of the principal point in pixels, of each coordinate, 0 or more. It widens the covariance.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
+    pub centre_sigma_px: f64,
+    /// Covariance of the intrinsic parameters; it counts instead of the two sigmas.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub covariance: Option<Covariance>,
+    /// Time from the exposure of the first row to that of the last one in seconds, 0 to 10; 0 for a global shutter, and
+    /// negative where the last row comes first. It counts where a frame brings the camera's rate of rotation: the rays of each
+    /// row are turned to the time of the middle row.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
+    pub readout_s: f64,
+}
+
+/// What a lens that is known exactly leaves out.
+#[cfg(feature = "serde")]
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 impl Config {
@@ -70,6 +119,10 @@ impl Config {
             cy_px: (f64::from(height) - 1.0) / 2.0,
             k: heapless::Vec::new(),
             theta_max_deg: None,
+            focal_sigma_percent: 0.0,
+            centre_sigma_px: 0.0,
+            covariance: None,
+            readout_s: 0.0,
         }
     }
 
@@ -108,6 +161,8 @@ impl Config {
         if let Some(deg) = self.theta_max_deg {
             between("camera.theta_max_deg", deg, 0.1, 175.0)?;
         }
-        Ok(())
+        between("camera.focal_sigma_percent", self.focal_sigma_percent, 0.0, 100.0)?;
+        between("camera.centre_sigma_px", self.centre_sigma_px, 0.0, 1e6)?;
+        between("camera.readout_s", self.readout_s, -10.0, 10.0)
     }
 }

@@ -6,8 +6,11 @@
 mod brown;
 mod config;
 mod radial;
+mod shutter;
+mod uncertain;
 
-pub use config::{Config, Model};
+pub use config::{Config, Covariance, Intrinsic, Model};
+pub(crate) use uncertain::INTRINSICS;
 
 use crate::block::{Block, LANES};
 use crate::error::{ConfigError, Limit, require};
@@ -35,6 +38,13 @@ pub struct Camera<T> {
     theta_max: T,
     circle: bool,
     lens: Lens<T>,
+    /// What the calibration leaves open.
+    modes: uncertain::Modes<T>,
+    /// From one row to the next, seconds, and the row that is exposed at the picture's time.
+    row_s: T,
+    middle_row: T,
+    /// How the camera turns while this picture is read out.
+    turning: Option<shutter::Turning<T>>,
 }
 
 #[derive(Debug, Clone)]
@@ -128,6 +138,10 @@ impl<T: Real> Camera<T> {
             theta_max: T::of(theta_max),
             circle: rho_max < rho_corner * (1.0 - 1e-6),
             lens,
+            modes: uncertain::modes(c)?,
+            row_s: T::of(c.readout_s / (f64::from(c.height) - 1.0)),
+            middle_row: T::of((f64::from(c.height) - 1.0) * 0.5),
+            turning: None,
         })
     }
 
@@ -144,6 +158,8 @@ impl<T: Real> Camera<T> {
             inv_fy: self.inv_fy * sy,
             cx: centre.u,
             cy: centre.v,
+            row_s: self.row_s * sy,
+            middle_row: window.of_picture(ImagePoint { u: T::ZERO, v: self.middle_row }).v,
             ..self.clone()
         }
     }
@@ -177,6 +193,16 @@ impl<T: Real> Camera<T> {
     /// The ray of an image point with its derivative; `None` beyond the image circle.
     #[inline]
     pub fn ray(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
+        let ray = self.ray_at_its_row(p)?;
+        Some(match &self.turning {
+            None => ray,
+            Some(turning) => turning.to_frame_time(&ray, p.v),
+        })
+    }
+
+    /// As [`Self::ray`], in the camera as it stands when the point's row is exposed.
+    #[inline(always)]
+    fn ray_at_its_row(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
         let x = (p.u - self.cx) * self.inv_fx;
         let y = (p.v - self.cy) * self.inv_fy;
         let rho2 = x * x + y * y;
@@ -197,7 +223,7 @@ impl<T: Real> Camera<T> {
     /// Rays of a block of image points in place, as [`Self::ray`]; a point beyond the image circle is cleared.
     #[inline(always)]
     pub(crate) fn rays(&self, block: &mut Block<T>) {
-        if let Lens::Radial(lens) = &self.lens {
+        if let (Lens::Radial(lens), None) = (&self.lens, &self.turning) {
             let (mut x, mut y) = ([T::ZERO; LANES], [T::ZERO; LANES]);
             for l in 0..LANES {
                 x[l] = (block.s[0][l] - self.cx) * self.inv_fx;
@@ -224,7 +250,7 @@ impl<T: Real> Camera<T> {
         self.rays_one_by_one(block);
     }
 
-    /// As [`Self::rays`], for lenses without series.
+    /// As [`Self::rays`], for lenses without series and pictures whose rows have a time of their own.
     // Once in flash: inlined it would stand there for every lane.
     #[inline(never)]
     fn rays_one_by_one(&self, block: &mut Block<T>) {
@@ -264,7 +290,14 @@ impl<T: Real> Camera<T> {
 
     /// The image point of a direction; `None` beyond the image circle. It may lie outside the picture.
     pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
-        let s = d.v();
+        match &self.turning {
+            None => self.project_at_its_row(d.v()),
+            Some(turning) => turning.project(self, d.v()),
+        }
+    }
+
+    /// As [`Self::project`], of a direction in the camera as it stands when the point's row is exposed.
+    fn project_at_its_row(&self, s: &V3<T>) -> Option<ImagePoint<T>> {
         let h = (s.x * s.x + s.y * s.y).sqrt();
         let theta = h.atan2(s.z);
         if !(theta <= self.theta_max) {

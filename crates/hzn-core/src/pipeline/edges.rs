@@ -217,7 +217,8 @@ impl<T: Real> Edges<T> {
     /// The covariance of a fit, and the expected half-angle fused with it.
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
         let noise = sensor.config.noise_of(expected.which);
-        let fused = covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate)?;
+        let fused =
+            covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate, sensor.camera(), None)?;
         let (b1, b2) = basis(&fused.e);
         Some(Fused {
             axis: UnitVec3::assume_unit(fused.e),

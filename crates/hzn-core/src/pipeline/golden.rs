@@ -5,6 +5,7 @@
 mod dlr;
 #[cfg(feature = "horace")]
 mod horace;
+mod lens;
 #[cfg(feature = "zju")]
 mod zju;
 
@@ -216,9 +217,9 @@ fn solve<T: Real>(
     let (fx, _) = camera.focal_px();
     let start = reject::keep(&mut blocks, points.len() as u32, expected, fx, &config, &mut Work::unlimited())?;
     let estimate = estimate::Config { half_angle, ..Default::default() };
-    let noise = covariance::Config { sigma_px, correlation_px, ..Default::default() };
+    let noise = covariance::Config::told(sigma_px, correlation_px);
     let fit = estimate::fit(&mut blocks, &start, expected, camera, T::of(config.threshold_px), &estimate, &noise)?;
-    let fused = covariance::fuse(&blocks, &fit, expected, &noise, &estimate)?;
+    let fused = covariance::fuse(&blocks, &fit, expected, &noise, &estimate, camera, None)?;
     let (b1, b2) = basis(&fused.e);
     Some(Answer {
         axis: UnitVec3::assume_unit(fused.e),
@@ -336,8 +337,9 @@ fn sandwich<T: Real>(tolerance: f64) {
         let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, T::one() - c, mean, &estimate::Weights::Kept, None);
         let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::of(num(&case["L_px"])));
         let variance = T::of(num(&case["R_px2"]));
-        let known = covariance::sandwich_known(&sums, &x, mean, variance).unwrap();
-        let free = covariance::sandwich_free(&sums, &x, mean, variance).unwrap();
+        let [known, free] = [false, true]
+            .map(|free| covariance::sandwich(&covariance::response(&sums, mean, free).unwrap(), &x) * variance);
+        let known = [known.m11, known.m12, known.m22];
         let compare = |name: &str, got: [T; 3]| {
             let got = Cov3::<Cam, T>::from_tangent(&b1, &b2, got).rows();
             let want = rows(&case["tangent"][name]);
@@ -419,8 +421,9 @@ fn recursion<T: Real>(tolerance: f64) {
         let weights = estimate::Weights::Kept;
         let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, T::of(1.0 - c), mean, &weights, None);
         let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::of(length_px));
-        let free = covariance::sandwich_free(&sums, &x, mean, T::one()).unwrap();
-        let [a, b, d] = covariance::sandwich_known(&sums, &x, mean, T::one()).unwrap();
+        let [known, free] =
+            [false, true].map(|free| covariance::sandwich(&covariance::response(&sums, mean, free).unwrap(), &x));
+        let [a, b, d] = [known.m11, known.m12, known.m22];
         let (want, want_known) = dense(&blocks, points.len(), [e.v(), &b1, &b2], length_px);
         let mut worst: f64 = 0.0;
         for i in 0..3 {

@@ -11,6 +11,7 @@ use crate::camera::Camera;
 #[cfg(feature = "horace")]
 use crate::contour;
 use crate::contour::{End, Marks, Scene, Thinned};
+use crate::covariance::Budget;
 use crate::frames::{Cov3, UnitVec3};
 use crate::image::Pixels;
 use crate::linalg::basis;
@@ -42,6 +43,8 @@ fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u1
 /// The edges of one picture, judged one by one.
 pub(super) struct Judge<'a, T, O> {
     sensor: &'a Sensor<T>,
+    /// The sensor's, or as it turns while the picture is read out.
+    camera: &'a Camera<T>,
     expected: &'a Expected<T>,
     taken: &'a [Taken<T>],
     noise: &'a covariance::Config,
@@ -85,10 +88,11 @@ struct Best<T> {
 }
 
 impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
-    /// Nothing looked at yet. `taken` are the bodies found before; `blocks` is the room for one edge's points, `work` what
-    /// the look may cost.
+    /// Nothing looked at yet. `camera` is the sensor's or [`Sensor::turning`]; `taken` are the bodies found before; `blocks` is
+    /// the room for one edge's points, `work` what the look may cost.
     pub(super) fn new(
         sensor: &'a Sensor<T>,
+        camera: &'a Camera<T>,
         expected: &'a Expected<T>,
         taken: &'a [Taken<T>],
         observer: &'a O,
@@ -115,6 +119,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
             short: 0,
             fitted: false,
             report,
+            camera,
             sensor,
         }
     }
@@ -305,7 +310,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         length: u32,
         border: &[Pixel],
     ) -> (Candidate<T>, Option<Best<T>>) {
-        let Sensor { config, camera, cam_to_body, .. } = self.sensor;
+        let Sensor { config, cam_to_body, .. } = self.sensor;
+        let camera = self.camera;
         let mut outcome = Candidate {
             number,
             length_px: length,
@@ -365,8 +371,13 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
 
         enter(self.report, self.observer, Stage::Covariance);
-        let fused = covariance::fuse(blocks, &fit, self.expected, self.noise, &config.estimate);
+        let mut budget = self.observer.wants_budget().then(Budget::new);
+        let fused =
+            covariance::fuse(blocks, &fit, self.expected, self.noise, &config.estimate, camera, budget.as_mut());
         let Some(fused) = fused else { return (outcome, None) };
+        if let Some(budget) = &budget {
+            self.observer.budget(number, budget);
+        }
 
         enter(self.report, self.observer, Stage::Select);
         let (b1, b2) = basis(&fused.e);

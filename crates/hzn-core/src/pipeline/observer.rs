@@ -1,5 +1,6 @@
 //! A window into the pipeline for clocks, counters and pictures; without one, nothing of it is compiled.
 
+use crate::covariance::Budget;
 use crate::pipeline::report::{Candidate, Solution};
 use crate::pixel::{ImagePoint, Pixel};
 use crate::status::Stage;
@@ -36,6 +37,15 @@ pub trait Observer<T> {
     /// The weight of a candidate's point after the fit: 0 rejected, up to 1. Only when there was a fit.
     #[inline(always)]
     fn weight(&self, _candidate: u32, _point: u32, _weight: T) {}
+    /// Whether [`Self::budget`] is to be called: working it out costs something.
+    #[inline(always)]
+    fn wants_budget(&self) -> bool {
+        false
+    }
+    /// What each source of error adds to the covariance of a candidate's axis, in rad². Only when there was a fit, before its
+    /// verdict.
+    #[inline(always)]
+    fn budget(&self, _candidate: u32, _budget: &Budget<T>) {}
     /// What became of a candidate, with its solution if there is one.
     fn verdict(&self, _candidate: u32, _outcome: &Candidate<T>, _solution: Option<&Solution<T>>) {}
 }

@@ -27,6 +27,7 @@ pub const OPTIONAL: &[Optional] = optional! {
     "zju": "contour.method" = "sobel";
     "zju": "preset" = "zju-2022";
     "dlr": "covariance.method" = "braun-barf";
+    "reml": "covariance.noise" = "reml";
     "dlr": "estimate.method" = "conic";
     "dlr": "estimate.method" = "direct";
     "dlr": "preset" = "dlr-2022";

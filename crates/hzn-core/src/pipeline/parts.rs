@@ -10,6 +10,7 @@ use super::taken::Taken;
 use super::workspace::Lists;
 use super::{Candidate, Observer, Report, Sensor, Solution, Verdict};
 use crate::body::Expected;
+use crate::covariance::Budget;
 use crate::frames::{Cov3, UnitVec3};
 use crate::image::{Part, Pixels, Window};
 use crate::linalg::{V3, basis, unit};
@@ -217,6 +218,12 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.observer.weight(candidate, point, weight);
+    }
+    fn wants_budget(&self) -> bool {
+        self.observer.wants_budget()
+    }
+    fn budget(&self, candidate: u32, budget: &Budget<T>) {
+        self.observer.budget(candidate, budget);
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.observer.verdict(candidate, outcome, solution);

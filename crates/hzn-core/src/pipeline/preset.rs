@@ -89,7 +89,15 @@ impl Config {
 fn disc(config: &mut Config, kind: Kind, level: f64) {
     config.body.kind = kind;
     config.binarize = binarize::Config { method: binarize::Method::Fixed, level, ..config.binarize };
-    config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, ..config.covariance };
+    config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, bias_px: 0.0, ..config.covariance };
+}
+
+/// The noise model and limb height that the published systems' presets have always had: told values, for comparison.
+#[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
+fn told(config: &mut Config) {
+    config.body.limb_height_km = 10.0;
+    config.body.limb_height_sigma_km = 2.0;
+    config.covariance = covariance::Config::told(1.0, 300.0);
 }
 
 /// Braun & Barf 2022 as flown on ATEK: fixed threshold, whole pixels, RANSAC on three points, the direct nadir, the
@@ -97,6 +105,7 @@ fn disc(config: &mut Config, kind: Kind, level: f64) {
 #[cfg(feature = "dlr")]
 fn dlr_2022(config: &mut Config) {
     use crate::{candidates, estimate, reject};
+    told(config);
     config.binarize.method = binarize::Method::Fixed;
     config.candidates.sub_pixel = candidates::SubPixel::None;
     config.candidates.keep_points = 0;
@@ -118,6 +127,7 @@ fn dlr_2022(config: &mut Config) {
 #[cfg(feature = "zju")]
 fn zju_2022(config: &mut Config) {
     use crate::{candidates, contour, estimate, reject};
+    told(config);
     config.contour.method = contour::Method::Sobel;
     config.candidates.sub_pixel = candidates::SubPixel::Zernike;
     config.candidates.keep_points = 0;
@@ -139,6 +149,7 @@ fn zju_2022(config: &mut Config) {
 #[cfg(feature = "horace")]
 fn horace_2015(config: &mut Config) {
     use crate::{candidates, contour, estimate, recover, reject};
+    told(config);
     config.gate.min_mean = 0.02;
     config.gate.max_mean = 0.9;
     config.binarize.method = binarize::Method::Dynamic;
@@ -194,5 +205,19 @@ mod tests {
             assert_eq!(Preset::named(preset.name()), Some(preset));
         }
         assert_eq!(Preset::named("hznn"), None);
+    }
+
+    #[test]
+    #[cfg(all(feature = "dlr", feature = "horace", feature = "zju"))]
+    fn published_systems_keep_their_noise_and_limb() {
+        for preset in [Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015] {
+            let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+            let covariance::Config { noise, sigma_px, correlation_px, bias_px, tilt_px, .. } = config.covariance;
+            assert_eq!(noise, covariance::Noise::Told);
+            assert_eq!([sigma_px, correlation_px, bias_px, tilt_px], [1.0, 300.0, 0.0, 0.0]);
+            assert_eq!([config.body.limb_height_km, config.body.limb_height_sigma_km], [10.0, 2.0]);
+            let braun_barf = config.covariance.method == covariance::Method::BraunBarf;
+            assert_eq!(braun_barf, preset == Preset::Dlr2022);
+        }
     }
 }

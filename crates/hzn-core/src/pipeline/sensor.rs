@@ -127,6 +127,12 @@ impl<T: Real> Sensor<T> {
         report
     }
 
+    /// The camera as it turns while a picture is read out row by row, where that is known.
+    pub(super) fn turning(&self, expected: &Expected<T>) -> Option<Camera<T>> {
+        let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter())?;
+        Some(self.camera.turning(Some(rate)))
+    }
+
     pub(super) fn look<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
@@ -171,7 +177,9 @@ impl<T: Real> Sensor<T> {
         let config = &self.config;
         report.stage = report.stage.max(Stage::Contour);
         scene.observer.enter(Stage::Contour);
-        let mut judge = Judge::new(self, expected, taken, scene.observer, lists.blocks, work, report);
+        let turning = self.turning(expected);
+        let camera = turning.as_ref().unwrap_or(&self.camera);
+        let mut judge = Judge::new(self, camera, expected, taken, scene.observer, lists.blocks, work, report);
         match config.contour.method {
             contour::Method::BorderFollowing => judge.border_following(scene, lists.border, lists.marks),
             #[cfg(feature = "horace")]

@@ -41,6 +41,6 @@ pub(super) fn disagrees<T: Real>(
     }
     let (b1, b2) = basis(&fit.e);
     let x = covariance::correlated(blocks, &fit.e, &b1, &b2, fit.mean, length.least(fused.edge.length_px));
-    let p = covariance::sandwich_free(&fit.sums, &x, fit.mean, sigma * sigma);
-    !p.is_some_and(|p| p.m33 >= needed)
+    let response = covariance::response(&fit.sums, fit.mean, true);
+    !response.is_some_and(|response| covariance::sandwich(&response, &x).m33 * sigma * sigma >= needed)
 }

@@ -261,6 +261,7 @@ class Sensor:
         position_km: Sequence[float] | None = None,
         attitude: Sequence[float] | None = None,
         attitude_sigma_deg: float | None = None,
+        rate_rad_s: Sequence[float] | None = None,
         time_s: float | None = None,
     ) -> Expected:
         """Work out the cone to expect, for the single stages (`hzn.ransac` and its neighbours).
@@ -270,7 +271,7 @@ class Sensor:
         body
             Of a sensor of several bodies the number of one, from 0: the stages that are told so work for this one, with its
             own level and edge errors.
-        altitude_km, position_km, attitude, attitude_sigma_deg, time_s
+        altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s
             As in `process`.
 
         Raises
@@ -287,6 +288,7 @@ class Sensor:
         position_km: Sequence[float] | None = None,
         attitude: Sequence[float] | None = None,
         attitude_sigma_deg: float | None = None,
+        rate_rad_s: Sequence[float] | None = None,
         time_s: float | None = None,
         bits: int | None = None,
         detail: bool = False,
@@ -306,6 +308,8 @@ class Sensor:
             Prior attitude, quaternion (w, x, y, z) that takes the camera frame to ECEF.
         attitude_sigma_deg
             1-sigma of that attitude; without it, 5.
+        rate_rad_s
+            Rate of rotation of the camera in its own axes, rad/s, shape (3,); with a rolling shutter (`camera.readout_s`).
         time_s
             UTC in seconds since 1970. With a position it gives `Report.axis_ecef` of Sun and Moon.
         bits

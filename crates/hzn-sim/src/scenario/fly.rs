@@ -41,6 +41,7 @@ impl Scenario {
         let gates = self.bodies.last().copied().map_or(Preset::Hzn, preset);
         let mut sensor = hzn_core::Config::preset(gates, self.camera.clone());
         sensor.mount = self.mount;
+        sensor.camera.readout_s = self.shutter.readout_s;
         let body = |kind: Kind| hzn_core::body::Config {
             altitude_sigma_km: self.known.position_sigma_km.max(0.05),
             ..self.body_of(kind)

@@ -162,9 +162,8 @@ impl Fit {
         // Two digits more than are known. Rows by latitude go up or down with the mean.
         let digits = |x: f64| (x * 1e3).round() / 1e3;
         let noise = covariance::Config {
-            sigma_px: digits(self.sigma_px),
-            correlation_px: digits(self.correlation_px),
-            ..sensor.covariance
+            method: sensor.covariance.method,
+            ..covariance::Config::told(digits(self.sigma_px), digits(self.correlation_px))
         };
         let several = !sensor.bodies.is_empty();
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };

@@ -165,10 +165,10 @@ fn elliptic_cones_are_told_honestly() {
                     .collect();
                 let mut blocks = blocks(&camera, &points, &e);
                 let got = fit(&mut blocks, method, 0.0).unwrap();
-                let noise = covariance::Config { sigma_px, correlation_px: length_px, ..covariance::Config::default() };
+                let noise = covariance::Config::told(sigma_px, length_px);
                 let expected = expected();
                 let config = estimate::Config { half_angle: HalfAngle::Free, ..estimate::Config::default() };
-                let fused = covariance::fuse(&blocks, &got, &expected, &noise, &config).unwrap();
+                let fused = covariance::fuse(&blocks, &got, &expected, &noise, &config, &camera, None).unwrap();
                 let (b1, b2) = basis(&fused.e);
                 let off = V3::from(e.xyz()) - fused.e;
                 let (x, y) = (off.dot(&b1), off.dot(&b2));
@@ -214,7 +214,7 @@ proptest::proptest! {
                     proptest::prop_assert!((got.e.dot(&got.e).f64() - 1.0).abs() < 1e-5 && got.c.is_finite());
                     let expected = expected();
                     let noise = covariance::Config::default();
-                    if let Some(fused) = covariance::fuse(&blocks, &got, &expected, &noise, &estimate::Config::default()) {
+                    if let Some(fused) = covariance::fuse(&blocks, &got, &expected, &noise, &estimate::Config::default(), &camera, None) {
                         proptest::prop_assert!(fused.p.iter().all(|x| !x.f64().is_nan()), "{:?}", fused.p);
                     }
                 }

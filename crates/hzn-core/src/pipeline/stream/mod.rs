@@ -258,7 +258,9 @@ impl<T: Real, S: Sample> Stream<'_, T, S> {
         if picture.height > 1 {
             let scene = Scene::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
             let work = account::open(&self.sensor.config, lists.border.len());
-            let mut judge = Judge::new(self.sensor, self.expected, &[], observer, lists.blocks, work, report);
+            let turning = self.sensor.turning(self.expected);
+            let camera = turning.as_ref().unwrap_or(&self.sensor.camera);
+            let mut judge = Judge::new(self.sensor, camera, self.expected, &[], observer, lists.blocks, work, report);
             judge.border_following(&scene, lists.border, lists.marks);
             judge.conclude();
         }

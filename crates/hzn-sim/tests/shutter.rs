@@ -1,0 +1,50 @@
+//! A rolling shutter in a camera that turns by some degrees while it reads a picture out.
+
+use hzn_core::camera::{self, Model};
+use hzn_core::frames::UnitVec3;
+use hzn_core::{Config, Frame, HostHorizon};
+use hzn_sim::pose::position_m;
+use hzn_sim::{Look, Motion, Pose, Scene};
+
+const READOUT_S: f64 = 0.03;
+/// 5° over the picture.
+const RATE_RADPS: f64 = 5.0 * core::f64::consts::PI / 180.0 / READOUT_S;
+
+/// The answer's error in degrees and the same in sigmas, with the rate given or not.
+fn error(scene: &Scene, told: bool) -> Option<[f64; 2]> {
+    let mut config = Config::new(scene.camera.clone());
+    config.body = scene.body.clone();
+    config.body.limb_height_sigma_km = 0.5;
+    let motion = scene.motion.unwrap();
+    let frame = Frame {
+        position_m: Some(scene.pose.position_m),
+        rate_rad_s: told.then_some(motion.rate_radps),
+        ..Frame::default()
+    };
+    let mut horizon = HostHorizon::boxed(&config).unwrap();
+    let expected = horizon.expect(&frame).unwrap();
+    let picture = scene.render().unwrap();
+    let solution = horizon.process(&picture.view(), &expected).solution?;
+    let truth = scene.truth("", 0.0).unwrap();
+    let truth = UnitVec3::try_new([truth.axis_x, truth.axis_y, truth.axis_z]).unwrap();
+    let error_rad = solution.axis.angle_rad(&truth);
+    Some([error_rad.to_degrees(), error_rad / solution.covariance.sigma_max_rad()])
+}
+
+#[test]
+fn with_the_rate_given_the_answer_is_as_good_as_of_a_camera_that_stands_still() {
+    let camera = camera::Config { readout_s: READOUT_S, ..camera::Config::ideal(Model::Pinhole, 640, 480, 554.0) };
+    let mut worst_untold: f64 = 0.0;
+    for (i, axis) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.5, 0.62]].into_iter().enumerate() {
+        for roll_rad in [0.2, 1.4] {
+            let look = Look { azimuth_rad: 0.7 * i as f64, depression_rad: 0.3, roll_rad };
+            let mut scene = Scene::new(camera.clone(), Pose::looking(position_m(30.0, 10.0, 300.0), look));
+            let rate_radps = axis.map(|w: f64| w * RATE_RADPS);
+            scene.motion = Some(Motion { rate_radps, exposure_s: 0.0, readout_s: READOUT_S });
+            let [deg, sigmas] = error(&scene, true).expect("an answer");
+            assert!(deg < 0.02 && sigmas < 3.0, "{axis:?} {roll_rad}: {deg} deg, {sigmas} sigma");
+            worst_untold = worst_untold.max(error(&scene, false).map_or(0.0, |[deg, _]| deg));
+        }
+    }
+    assert!(worst_untold > 0.1, "without the rate it must show: {worst_untold}");
+}
