@@ -17,14 +17,14 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use hzn_core::Frame;
 use hzn_core::body::{FrameError, Kind};
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use hzn_core::frames::{Rotation, UnitVec3};
 use hzn_core::real::Real;
+use hzn_core::{Config, Frame};
 
 use crate::nearest::nearest;
-use crate::{Problem, time};
+use crate::{Problem, plausible, time};
 
 /// Columns that have a meaning.
 pub const COLUMNS: &[&str] = &[
@@ -99,8 +99,10 @@ pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Opti
     }
 }
 
-/// No camera of the Earth's limb is farther: twice the Moon's distance.
-const FARTHEST_KM: f64 = 768_800.0;
+/// No camera of a limb is farther, in radii of its body: about twice the Moon's distance from the Earth.
+const FARTHEST_RADII: f64 = 120.0;
+/// Nothing rises or sinks as fast, in kilometres a second: what flies by the Earth does so at 11 to 20.
+const FASTEST_KM_S: f64 = 30.0;
 
 /// A frames.csv that was read.
 #[derive(Debug, Clone, Default)]
@@ -125,12 +127,28 @@ impl Frames {
         self.rows.iter().any(|row| row.time_s.is_some())
     }
 
-    /// Warnings for altitude and position of a row that differ by more than 0.1 km, and for a position so far off that it
-    /// must be metres.
+    /// As [`Self::check_altitudes`], for every body of a sensor; each warning once.
+    pub fn check_sensor(&self, config: &Config) -> Vec<Problem> {
+        let bodies = config.each_body();
+        // Altitudes are those above the Earth where Sun or Moon are looked for beside it.
+        let only_free = bodies.iter().all(|b| b.half_angle_is_free());
+        let mut warnings: Vec<Problem> = Vec::new();
+        for body in bodies.iter().filter(|b| only_free || !b.half_angle_is_free()) {
+            for warning in self.check_altitudes(body.kind, body.mean_radius_km()) {
+                if !warnings.contains(&warning) {
+                    warnings.push(warning);
+                }
+            }
+        }
+        warnings
+    }
+
+    /// Warnings for values that can be but look wrong: altitude and position of a row that differ by more than 0.1 km, heights
+    /// and positions that must be in metres, altitudes that are not used.
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
         let odd = |row: &FrameData| {
             let own = altitude_at_km(row.position_km?, kind, radius_km)?;
-            if kind == Kind::Earth && own > FARTHEST_KM {
+            if own > FARTHEST_RADII * radius_km {
                 let what =
                     format!("the position is at {own:.0} km: x_km, y_km, z_km are kilometres, are these metres?");
                 return Some(self.problem(row, what));
@@ -139,7 +157,33 @@ impl Frames {
             let what = format!("altitude_km is {h} but the position is at {own:.3} km; the position is used");
             ((own - h).abs() > 0.1).then(|| self.problem(row, what))
         };
-        self.rows.iter().filter_map(odd).collect()
+        let mut warnings: Vec<Problem> = self.rows.iter().filter_map(odd).collect();
+        warnings.extend(self.suspect_metres(kind, radius_km));
+        if let (Some(what), Some(row)) =
+            (plausible::unused_altitude(kind), self.rows.iter().find(|r| r.altitude_km.is_some()))
+        {
+            warnings.push(self.problem(row, format!("altitude_km {what}")));
+        }
+        warnings
+    }
+
+    /// One warning where altitudes, or their change from row to row, are those of metres.
+    fn suspect_metres(&self, kind: Kind, radius_km: f64) -> Option<Problem> {
+        if plausible::unused_altitude(kind).is_some() {
+            return None;
+        }
+        let far = |row: &&FrameData| row.altitude_km.is_some_and(|h| h > plausible::far_km(kind, radius_km));
+        if let Some(row) = self.rows.iter().find(far) {
+            let h = row.altitude_km.unwrap_or_default();
+            let what = format!("altitude_km is {h}: farther than limbs are taken from; is it in metres?");
+            return Some(self.problem(row, what));
+        }
+        let known: Vec<_> = self.rows.iter().filter_map(|r| Some((r, r.time_s?, r.altitude_km?))).collect();
+        let rate = |(a, b): (&(_, f64, f64), &(_, f64, f64))| (b.2 - a.2) / (b.1 - a.1);
+        let pairs = known.iter().zip(known.iter().skip(1)).filter(|(a, b)| b.1 > a.1);
+        let (row, km_s) = pairs.map(|pair| (pair.1.0, rate(pair))).find(|(_, rate)| rate.abs() > FASTEST_KM_S)?;
+        let what = format!("altitude_km changes by {km_s:.0} km a second, which nothing does; is it in metres?");
+        Some(self.problem(row, what))
     }
 
     /// A row that hzn-core refused, with the value that was given.
@@ -149,7 +193,7 @@ impl Frames {
             FrameError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             FrameError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
             FrameError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
-            FrameError::NoAltitude | FrameError::NoBody => None,
+            FrameError::NoAltitude | FrameError::BelowLimb { .. } | FrameError::NoBody => None,
         };
         let given = given.map(|given| format!(", not {given}")).unwrap_or_default();
         self.problem(row, format!("{error}{given}"))
@@ -197,8 +241,14 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
     }
     if !columns.contains_key("file") {
         let found: Vec<&str> = header.iter().collect();
-        let what =
-            format!("the column `file` is missing (found: {}); it names the picture of each row", found.join(", "));
+        let other =
+            [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| header.iter().any(|name| name.contains(*c)));
+        let hint =
+            other.map(|(_, what)| format!("; columns are separated by commas here, not by {what}")).unwrap_or_default();
+        let what = format!(
+            "the column `file` is missing (found: {}); it names the picture of each row{hint}",
+            found.join(", ")
+        );
         return Err(Problem::new(path, what).at_line(1));
     }
     let mut frames = Frames { path: path.to_owned(), rows: Vec::new(), warnings, by_file: HashMap::new() };
@@ -226,6 +276,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
         let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         if data.camera_to_ecef_wxyz.is_some_and(|q| (length(&q) - 1.0).abs() > 0.01) {
             return Err(row.problem("qw, qx, qy, qz", "the quaternion's length must be 1"));
+        }
+        if data.sun_camera.is_some_and(|s| length(&s) < 1e-9) {
+            return Err(
+                row.problem("sun_x, sun_y, sun_z", "has no direction; leave the cells empty if it is not known")
+            );
         }
         if let Some(&first) = frames.by_file.get(&row.file) {
             let before: usize = frames.rows.get(first).map_or(0, |r| r.line);
@@ -271,6 +326,9 @@ impl Row<'_> {
         let Some(cell) = cell else { return Ok(None) };
         match cell.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(Some(x)),
+            _ if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+                Err(self.problem(column, &format!("{cell:?} has a decimal comma; write a point")))
+            }
             _ => Err(self
                 .problem(column, &format!("{cell:?} is not a finite number; leave the cell empty if it is not known"))),
         }
@@ -351,6 +409,19 @@ mod tests {
             "frames.csv:2: this row has 1 cells, but the header has 2 columns"
         );
         assert!(read("file,qw,qx,qy,qz\na,2,0,0,0\n").unwrap_err().contains("length must be 1"));
+        assert!(
+            read("file,sun_x,sun_y,sun_z\na,0,0,0\n").unwrap_err().contains("sun_x, sun_y, sun_z: has no direction")
+        );
+        // As spreadsheets of other countries write it.
+        assert!(
+            read("file;altitude_km\r\na;1,5\r\n").unwrap_err().ends_with("separated by commas here, not by semicolons")
+        );
+        assert!(read("file\taltitude_km\n").unwrap_err().ends_with("not by tabs"));
+        assert!(
+            read("file,altitude_km\na,\"400,5\"\n")
+                .unwrap_err()
+                .contains("\"400,5\" has a decimal comma; write a point")
+        );
     }
 
     #[test]
@@ -359,6 +430,27 @@ mod tests {
         let odd = f.check_altitudes(Kind::Earth, 6371.0);
         assert_eq!(odd.len(), 1);
         assert!(odd[0].to_string().starts_with("frames.csv:3: b: altitude_km is 401 but"), "{}", odd[0]);
+    }
+
+    #[test]
+    fn altitudes_in_metres_are_suspected_once() {
+        let odd = |text: &str, kind| {
+            let all = read(text).unwrap().check_altitudes(kind, 6371.0);
+            all.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        // A balloon: no height is too large, but the ascent is too fast.
+        let balloon = "file,time_s,altitude_km\na,0,300\nb,60,600\nc,120,3900\n";
+        let told = odd(balloon, Kind::Earth);
+        assert_eq!(told.len(), 1);
+        assert!(told[0].starts_with("frames.csv:4: c: altitude_km changes by 55 km a second"), "{told:?}");
+        let orbit = odd("file,altitude_km\na,517500\nb,517600\n", Kind::Earth);
+        assert_eq!(
+            orbit,
+            ["frames.csv:2: a: altitude_km is 517500: farther than limbs are taken from; is it in metres?"]
+        );
+        assert!(odd("file,time_s,altitude_km\na,0,60\nb,1,61.5\nc,1,90\n", Kind::Earth).is_empty());
+        let moon = odd("file,altitude_km\na,100\nb,100\n", Kind::Moon);
+        assert!(moon.len() == 1 && moon[0].contains("altitude_km is not used: kind = \"moon\""), "{moon:?}");
     }
 
     #[test]

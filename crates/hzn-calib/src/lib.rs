@@ -21,6 +21,7 @@ pub mod keys;
 mod located;
 mod nearest;
 pub mod noise;
+pub mod plausible;
 mod problem;
 pub mod sensor;
 pub mod start;

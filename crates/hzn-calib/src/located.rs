@@ -210,8 +210,13 @@ pub(crate) fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Pl
         rule if error.value.is_nan() => format!("nan is refused: {rule}"),
         rule => format!("{} is refused: {rule}", error.value),
     };
-    let mut parts: Vec<String> = error.field.split('.').map(str::to_owned).collect();
-    if let Some(which) = error.body {
+    at_key(error.field, error.body, what, text, path, places)
+}
+
+/// A problem with a key as hzn-core names it, such as `camera.fx_px`, and of which of several bodies it is.
+pub(crate) fn at_key(key: &str, body: Option<u8>, what: String, text: &str, path: &Path, places: &[Place]) -> Problem {
+    let mut parts: Vec<String> = key.split('.').map(str::to_owned).collect();
+    if let Some(which) = body {
         // Core says `body.` for the body's own keys, and no more for its level and its edge errors.
         parts.retain(|p| p != "body");
         parts.splice(0..0, ["bodies".to_owned(), which.to_string()]);

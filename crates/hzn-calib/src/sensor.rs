@@ -14,9 +14,9 @@ use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
-use crate::located::{meaning, places, refused, syntax, too_long, unbuilt};
+use crate::located::{at_key, meaning, places, refused, syntax, too_long, unbuilt};
 use crate::nearest::suggestion;
-use crate::{Problem, camera_file};
+use crate::{Problem, camera_file, plausible};
 
 /// A sensor.toml that was read and checked.
 #[derive(Debug, Clone)]
@@ -25,6 +25,8 @@ pub struct Sensor {
     pub config: Config,
     /// The file's text as it stands on disk, to be kept beside results.
     pub text: String,
+    /// Values that can be but look wrong, such as a swapped width and height.
+    pub warnings: Vec<Problem>,
 }
 
 /// Reads and checks a sensor.toml, lens included.
@@ -88,8 +90,13 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
         let covariance = config.camera.covariance.take();
         config.camera = camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, ..camera };
     }
+    if let Some(what) = plausible::five_coefficients(&config.camera) {
+        return Err(at_key("camera.k", None, what, text, path, &places));
+    }
     check(&config).map_err(|e| refused(&e, text, path, &places))?;
-    Ok(Sensor { config, text: text.to_owned() })
+    let warning = |doubt: plausible::Doubt| at_key(doubt.key, doubt.body, doubt.what, text, path, &places);
+    let warnings = plausible::doubts(&config).into_iter().map(warning).collect();
+    Ok(Sensor { config, text: text.to_owned(), warnings })
 }
 
 /// The preset of that name, or what is wrong with it.
@@ -324,6 +331,28 @@ mod tests {
         let twisted = CAMERA.replace("pinhole", "kannala-brandt") + "k = [-0.9]\n";
         let message = parse(&twisted, Path::new("s.toml")).unwrap_err().to_string();
         assert!(message.starts_with("s.toml:9: [camera] k: ") || message.contains("monotone"), "{message}");
+    }
+
+    #[test]
+    fn what_looks_wrong_is_a_warning_with_its_line() {
+        let warned = |text: String| {
+            let sensor = parse(&text, Path::new("s.toml")).unwrap();
+            sensor.warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+        };
+        assert_eq!(warned(CAMERA.to_owned()), "");
+        let swapped = CAMERA.replace("319.5", "x").replace("239.5", "319.5").replace("= x", "= 39.5");
+        assert!(
+            warned(swapped).starts_with("s.toml:7: [camera] cx_px: the centre (39.5, 319.5) is far from the middle")
+        );
+        let moon = warned(format!("{CAMERA}[body]\nkind = \"moon\"\naltitude_km = 100\n"));
+        assert!(moon.starts_with("s.toml:11: [body] altitude_km: is not used: kind = \"moon\""), "{moon}");
+        let two = "[[bodies]]\naltitude_km = 400\n[[bodies]]\nkind = \"sphere\"\nradius_km = 1\naltitude_km = 100\n";
+        assert!(warned(format!("{CAMERA}{two}")).starts_with("s.toml:14: [[bodies]] 2 altitude_km: 100 km is farther"));
+        // The preset moon gives none.
+        assert_eq!(warned(format!("preset = \"moon\"\n{CAMERA}")), "");
+        let five = CAMERA.replace("pinhole", "kannala-brandt") + "k = [1.0, -0.055, 0.011, -0.0035, 0.0002]\n";
+        let message = parse(&five, Path::new("s.toml")).unwrap_err().to_string();
+        assert!(message.starts_with("s.toml:9: [camera] k: five coefficients that begin with"), "{message}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ pub mod output;
 pub mod overlay;
 pub mod plot;
 mod progress;
+mod refusals;
 pub mod scene;
 mod setup;
 mod tell;

@@ -5,11 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
-use hzn_calib::{FrameData, Frames, Sensor};
-use hzn_core::body;
+use hzn_calib::{FrameData, Frames, Sensor, plausible};
+use hzn_core::Config;
+use hzn_core::body::{self, FrameError};
+use hzn_core::pipeline::Orient;
 use hzn_sim::Truth;
 
-use crate::engine;
+use crate::engine::{self, AnySensor};
 use crate::exit::{Exit, Stop, usage};
 use crate::input::{self, Raw, Source};
 use crate::{output, tell};
@@ -63,11 +65,24 @@ impl SensorArgs {
                 return Err(usage(format!("{what} (`hzn init` writes one to start from)")));
             }
         };
+        sensor.warnings.iter().for_each(tell::warning);
         if let Some(km) = self.altitude_km {
-            for body in sensor.config.each_body_mut() {
-                body.altitude_km = Some(km);
+            let only_free = sensor.config.each_body().iter().all(body::Config::half_angle_is_free);
+            // What is the altitude above the Earth is none above the Moon beside it.
+            let mut taken = Vec::new();
+            for (which, body) in sensor.config.each_body_mut().iter_mut().enumerate() {
+                if only_free || !body.half_angle_is_free() {
+                    body.altitude_km = Some(km);
+                    taken.push(which);
+                }
             }
+            // A recording is processed again with the altitude that it was processed with.
+            sensor.text = with_altitude(&sensor.text, km, &taken);
             hzn_calib::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
+            let doubts = plausible::doubts(&sensor.config);
+            if let Some(doubt) = doubts.iter().find(|d| d.key == "body.altitude_km") {
+                tell::warning(format_args!("--altitude-km: {}", doubt.what));
+            }
         }
         Ok(sensor)
     }
@@ -94,14 +109,54 @@ impl InputArgs {
         for warning in &frames.warnings {
             tell::warning(warning);
         }
-        for body in sensor.config.each_body() {
-            for warning in frames.check_altitudes(body.kind, body.mean_radius_km()) {
-                tell::warning(warning);
-            }
+        for warning in frames.check_sensor(&sensor.config) {
+            tell::warning(warning);
         }
         engine::prepare(&sensor.config, flight, Some(&frames))?;
         Ok(Some(frames))
     }
+}
+
+/// The text of a sensor.toml with the altitude of these of its bodies.
+fn with_altitude(text: &str, km: f64, bodies: &[usize]) -> String {
+    let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_owned() };
+    let several = document.contains_key("bodies");
+    if !several {
+        document.entry("body").or_insert_with(toml_edit::table);
+    }
+    for &which in bodies {
+        let body = if several { document["bodies"].get_mut(which) } else { document.get_mut("body") };
+        if let Some(body) = body.and_then(toml_edit::Item::as_table_like_mut) {
+            body.insert("altitude_km", toml_edit::value(km));
+        }
+    }
+    document.to_string()
+}
+
+/// Says in the sensor, and in its text, what the pictures themselves tell about their samples, and tells the source which
+/// colour is wanted. Gives what the user should know.
+pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<String>, Stop> {
+    let mut notes = Vec::new();
+    source.want_channel(sensor.config.input.channel)?;
+    if sensor.config.input.bits.is_none() {
+        let found = input::find_bits(source);
+        // Recorded pictures are PNG, which has room for more: who reads them is told by the recorded sensor.
+        let bits = source.bits().filter(|bits| *bits > 8).or(found.map(|f| f.bits));
+        if let Some(bits) = bits {
+            sensor.config.input.bits = Some(bits);
+            sensor.text = input::with_key(&sensor.text, "bits", i64::from(bits));
+        }
+        notes.extend(found.filter(|f| f.bits < 16).map(|f| f.to_string()));
+    }
+    if sensor.config.input.orient == Orient::AsStored
+        && let Some((name, how)) = source.to_be_turned()
+    {
+        notes.push(format!(
+            "{name} says that it is to be shown {how}; pixels are taken as they are stored. If the camera was calibrated with \
+             turned pictures, as OpenCV's imread gives them, turn them with orient in [input] of sensor.toml"
+        ));
+    }
+    Ok(notes)
 }
 
 /// A sensor whose pictures have another size than all that are there is the wrong sensor, and that is said once and
@@ -110,15 +165,19 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
     let camera = &sensor.config.camera;
     let own = (u32::from(camera.width), u32::from(camera.height));
     let mut first = None;
-    for (name, size) in source.sizes() {
-        if size == own {
+    let orient = sensor.config.input.orient;
+    for (name, (width, height)) in source.sizes() {
+        let turned = matches!(orient, Orient::Rotate90 | Orient::Rotate270);
+        let size = if turned { (height, width) } else { (width, height) };
+        if size == own || (orient == Orient::Exif && (height, width) == own) {
             return Ok(());
         }
         first.get_or_insert((name, size));
     }
     let Some((name, (width, height))) = first else { return Ok(()) };
+    let hint = if (height, width) == own { "turn the pictures with orient in [input], " } else { "" };
     Err(usage(format!(
-        "the sensor is for pictures of {} x {} px, but those here are not: {name} is {width} x {height}; give the sensor \
+        "the sensor is for pictures of {} x {} px, but those here are not: {name} is {width} x {height}; {hint}give the sensor \
          of this camera with --sensor, or set camera.width and height and scale focal lengths and centre with them",
         own.0, own.1
     )))
@@ -129,11 +188,27 @@ pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option
     let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some();
     let tells = |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some();
     let rows = frames.map_or(source.sensor_toml().is_some(), |f| f.rows.iter().any(tells));
-    if rows || sensor.config.each_body().iter().any(known) {
+    if rows {
         return Ok(());
+    }
+    if sensor.config.each_body().iter().any(known) {
+        return above_the_limb(&sensor.config);
     }
     let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or a frames.csv with it";
     Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
+}
+
+/// Where the sensor's own altitude is the only one, it must be above the limb height of one of its bodies.
+fn above_the_limb(config: &Config) -> Result<(), Stop> {
+    let Ok(sensor) = AnySensor::new(config, false) else { return Ok(()) };
+    let half_angles = sensor.expected_half_angles_rad(None);
+    let below = |e: &Result<f64, FrameError>| e.err().filter(|e| matches!(e, FrameError::BelowLimb { .. }));
+    match half_angles.iter().map(below).collect::<Option<Vec<_>>>().and_then(|each| each.first().copied()) {
+        Some(why) => {
+            Err(usage(format!("body.altitude_km: {why}, so that no limb can be seen; give the altitude of the camera")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Removes the pictures of the rendering before, which new tables would not know: those that the folder's truth.csv names,

@@ -72,6 +72,22 @@ pub fn term(term: Term) -> &'static str {
     }
 }
 
+/// What a status means of a picture in which no edge was fitted.
+pub fn without_edges(status: Status) -> &'static str {
+    match status {
+        Status::Ok => "the answer",
+        Status::NoLimb => "no edge that could be a limb, or one brightness all over",
+        Status::TooDark => "darker than gate.min_mean allows",
+        Status::TooBright => "brighter than gate.max_mean allows",
+        Status::TooFewPoints => "only short edges (candidates.min_points)",
+        Status::Ambiguous => "two directions fit about equally well",
+        Status::Rejected => "an edge failed a gate",
+        Status::Truncated => "more edges than may be looked at (limits.max_work)",
+        Status::Unreadable => "the picture cannot be read",
+        Status::NoAltitude => "no altitude above the limb height is known",
+    }
+}
+
 /// Standard deviations of the axis along its two principal directions, the larger first, and the angle of that one from
 /// image x towards image y, in radians.
 pub fn principal(s: &Solution<f64>) -> ([f64; 2], f64) {

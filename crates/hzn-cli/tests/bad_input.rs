@@ -42,7 +42,7 @@ fn wrong_rows_of_frames_csv() {
     let err = with("file,altitude_km\n0000.png,NaN\n").expect(2).err;
     insta::assert_snapshot!(err, @r#"error: in/frames.csv:2: 0000.png altitude_km: "NaN" is not a finite number; leave the cell empty if it is not known"#);
     let err = with("file,altitude_km\n0000.png,400\n0001.png,-3\n").expect(2).err;
-    insta::assert_snapshot!(err, @"error: in/frames.csv:3: 0001.png: altitude_km must be a finite number above 0, not -3");
+    insta::assert_snapshot!(err, @"error: in/frames.csv:3: 0001.png: altitude_km must be a finite number above -1 (kilometres), not -3");
     let err = with("file,x_km,y_km,z_km\n0000.png,6000,0,-0.5\n").expect(2).err;
     insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres), not 6000, 0, -0.5");
     let err = with("file,altitude_km,attitude_sigma_deg\n0000.png,400,-1\n").expect(2).err;
@@ -57,6 +57,7 @@ fn wrong_rows_of_frames_csv() {
 fn the_sensor_of_another_camera_is_said_once() {
     let place = Place::with_pictures(5);
     let other = common::SENSOR.replace("width = 320", "width = 640").replace("height = 240", "height = 480");
+    let other = other.replace("159.5", "319.5").replace("119.5", "239.5");
     place.write("other.toml", other.as_bytes());
     place.write("p.raw", &[0; 100]);
     place.run(&["run", "in", "-o", "a.mcap"]).expect(0);
@@ -200,4 +201,37 @@ fn the_length_of_headerless_pictures_is_told() {
     ] {
         assert!(ran.err.contains(text), "{text} in {}", ran.err);
     }
+}
+
+#[test]
+fn what_looks_wrong_is_a_warning_and_the_run_goes_on() {
+    let place = Place::with_pictures(1);
+    let told = |from: &str, to: &str| {
+        place.write("in/sensor.toml", common::SENSOR.replace(from, to).as_bytes());
+        place.run(&["run", "in"]).expect(0).err
+    };
+    let swapped = told("cx_px = 159.5\ncy_px = 119.5", "cx_px = 20\ncy_px = 119.5");
+    assert!(
+        swapped.contains("warning: in/sensor.toml:9: [camera] cx_px: the centre (20, 119.5) is far from"),
+        "{swapped}"
+    );
+    let metres = told("altitude_km = 400.0", "altitude_km = 400000.0");
+    assert!(
+        metres.contains("[body] altitude_km: 400000 km is farther than limbs are taken from: is it in metres?"),
+        "{metres}"
+    );
+    let moon = told("earth-sphere", "moon");
+    insta::assert_snapshot!(moon.lines().next().unwrap(), @r#"warning: in/sensor.toml:14: [body] altitude_km: is not used: kind = "moon" is the Moon as a disc of half a degree, seen from about the Earth; for a camera in orbit about the Moon write kind = "sphere" and radius_km = 1737.4"#);
+    // Beside the Earth the altitude is that above the Earth.
+    let two = common::SENSOR.replace("[body]", "[[bodies]]") + "[[bodies]]\nkind = \"moon\"\n";
+    place.write("in/sensor.toml", two.as_bytes());
+    place.write("in/frames.csv", b"file,altitude_km\n0000.png,400\n");
+    for more in [&[][..], &["--altitude-km", "400"]] {
+        let ran = place.run(&[&["run", "in"], more].concat()).expect(0);
+        assert!(!ran.err.contains("warning"), "{}", ran.err);
+    }
+    place.write("in/sensor.toml", common::SENSOR.as_bytes());
+    place.write("in/frames.csv", b"file,altitude_km\n0000.png,517500\n");
+    place.run(&["run", "in"]).expect(0).says("frames.csv:2: 0000.png: altitude_km is 517500: farther than limbs are");
+    place.run(&["run", "in", "--altitude-km", "517500"]).expect(0).says("warning: --altitude-km: 517500 km is farther");
 }

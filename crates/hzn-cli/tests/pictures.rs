@@ -59,19 +59,93 @@ fn sixteen_bits_are_not_cut_to_eight() {
     assert!(off < 8e-3, "{off}");
 }
 
+/// A limb in words, such as a camera of few bits writes them; `dark` leaves so much of its brightness.
+fn words(shift: f64, of: impl Fn(u16) -> u16) -> image::ImageBuffer<image::Luma<u16>, Vec<u16>> {
+    let words = limb(320, 240, shift).into_raw().into_iter().map(|v| of(u16::from(v))).collect();
+    image::ImageBuffer::from_raw(320, 240, words).unwrap()
+}
+
 #[test]
-fn ten_bits_in_the_lower_bits_of_sixteen() {
-    let place = Place::new();
-    let picture = |bits: u32| {
-        let words = limb(320, 240, 0.0).into_raw().into_iter().map(|v| u16::from(v) << (bits - 8)).collect();
-        image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_raw(320, 240, words).unwrap()
+fn bits_are_found_once_for_a_sequence() {
+    let bits_of = |of: &dyn Fn(u16) -> u16, first: &dyn Fn(u16) -> u16| {
+        let place = Place::new();
+        words(0.0, first).save(place.path("in/0.png")).unwrap();
+        words(0.0, of).save(place.path("in/1.png")).unwrap();
+        let ran = place.run(&["run", "in"]).expect(0);
+        let rows = without_time(&ran.out);
+        let off =
+            angle_deg(["axis_x", "axis_y", "axis_z"].map(|name| cell(&rows[1], name).parse().unwrap()), plain(0.0));
+        // Where all around is bright, the edge is taken for a wider one.
+        assert!(off < 8e-3, "{off}");
+        // By itself, it is one of its folder.
+        let told = place.run(&["explain", "in/1.png"]).expect(0);
+        let found = ran.err.split("taken as ").nth(1).map_or("16".into(), |t| t.split(' ').next().unwrap().to_owned());
+        assert!(told.out.contains(&format!("1 channel of {found} bits")), "{}", told.out);
+        found
     };
-    picture(10).save(place.path("in/low.png")).unwrap();
-    // Nothing is found, and the reason is told.
-    let ran = place.run(&["run", "in", "-o", "none.csv"]).expect(0);
-    ran.says("note: nothing found in low.png: samples reach").says("bits = 10 in [input] of sensor.toml");
-    let explained = place.run(&["explain", "in/low.png"]).expect(0).out;
-    assert!(explained.contains("bits = 10 in [input] of sensor.toml"), "{explained}");
+    let dark = |v: u16| v / 60;
+    for (bits, most) in [(10, 1023u16), (12, 4095), (14, 16383), (16, 65535)] {
+        let of = |v: u16| (u32::from(v) * u32::from(most) / 255) as u16;
+        assert_eq!(bits_of(&of, &of), bits.to_string());
+        // The first picture is dark, and the last decides.
+        assert_eq!(bits_of(&of, &dark), bits.to_string());
+    }
+    // A thermal array: 1200 counts, far above 0.
+    assert_eq!(bits_of(&|v| 7000 + v * 5, &|v| 7000 + v * 5), "14");
+}
+
+#[test]
+fn a_picture_with_more_bits_than_the_others_is_not_taken_for_another() {
+    let place = Place::new();
+    for i in 0..33 {
+        // Of 33 pictures 16 are looked at; this is not one of them.
+        let shift = if i == 9 { 4 } else { 2 };
+        words(f64::from(i), |v| v << shift).save(place.path(&format!("in/{i:02}.png"))).unwrap();
+    }
+    let alone = place.run(&["run", "in", "-j", "1", "-o", "a.mcap"]).expect(3);
+    let alone = alone.says("samples are words of 16 bits that reach 800 in 16 pictures looked at: taken as 10 bits");
+    assert!(
+        alone.err.contains("unreadable: 09.png: a sample of 3200 has more bits than input.bits = 10"),
+        "{}",
+        alone.err
+    );
+    let three = place.run(&["run", "in", "-j", "3"]).expect(3);
+    place.run(&["export", "a.mcap", "-o", "a.csv"]).expect(0);
+    assert_eq!(without_time(&place.read("a.csv")), without_time(&three.out));
+    // The recording's sensor knows; the lost picture is not in it.
+    let again = place.run(&["run", "a.mcap"]).expect(3);
+    assert!(!again.err.contains("taken as"), "{}", again.err);
+    let axis = |rows: &[Vec<(String, String)>]| rows.iter().map(|r| cell(r, "axis_y").to_owned()).collect::<Vec<_>>();
+    assert_eq!(axis(&without_time(&again.out)), axis(&without_time(&three.out)));
+    place.write("in/sensor.toml", format!("{}[input]\nbits = 12\n", common::SENSOR).as_bytes());
+    let told = place.run(&["run", "in"]).expect(0);
+    assert!(!told.err.contains("taken as"), "{}", told.err);
+}
+
+#[test]
+fn bits_of_headerless_words_and_of_transparent_ones() {
+    let place = Place::new();
+    let bytes: Vec<u8> = words(0.0, |v| v << 4).into_raw().iter().flat_map(|w| w.to_le_bytes()).collect();
+    place.write("in/a.raw", &bytes);
+    let ran = place.run(&["run", "in", "--raw", "320x240:mono16"]).expect(0).says("taken as 12 bits");
+    assert_eq!(without_time(&ran.out).len(), 1);
+    std::fs::remove_file(place.path("in/a.raw")).unwrap();
+    // What stands in an alpha channel is no brightness, nor is what a header says about full scale found again.
+    let grey = words(0.0, |v| v << 4);
+    let clear = image::ImageBuffer::from_fn(320, 240, |x, y| image::LumaA([grey.get_pixel(x, y).0[0], u16::MAX]));
+    DynamicImage::ImageLumaA16(clear).save(place.path("in/a.png")).unwrap();
+    place.run(&["run", "in"]).expect(0).says("taken as 12 bits").says("1 frame: 1 ok");
+    std::fs::remove_file(place.path("in/a.png")).unwrap();
+    let big_endian = grey.into_raw().iter().flat_map(|w| w.to_be_bytes()).collect::<Vec<u8>>();
+    place.write("in/a.pgm", &[b"P5 320 240 4095\n".to_vec(), big_endian].concat());
+    let ran = place.run(&["run", "in"]).expect(0).says("1 frame: 1 ok");
+    assert!(!ran.err.contains("taken as"), "{}", ran.err);
+}
+
+#[test]
+fn bits_that_are_told_hold() {
+    let place = Place::new();
+    words(0.0, |v| v << 2).save(place.path("in/low.png")).unwrap();
     let told = |bits: u8| format!("{}[input]\nbits = {bits}\n", common::SENSOR);
     place.write("in/sensor.toml", told(10).as_bytes());
     let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
@@ -167,12 +241,44 @@ fn animated_png(first: &GrayImage, second: &GrayImage) -> Vec<u8> {
 }
 
 #[test]
-fn of_an_animation_the_first_picture_is_taken() {
+fn of_an_animation_the_first_picture_is_taken_and_the_others_are_told() {
     let place = Place::new();
     place.write("in/film.png", &animated_png(&limb(320, 240, 0.0), &limb(320, 240, 40.0)));
-    let axis = axes(&place, &["run", "in"])[0];
+    let ran = place.run(&["run", "in"]).expect(3);
+    let ran = ran.says(
+        "warning: only the first picture was processed of 1 file with several pages or frames (the first is film.png",
+    );
+    let rows = without_time(&ran.out);
+    let axis = ["axis_x", "axis_y", "axis_z"].map(|name| cell(&rows[0], name).parse().unwrap());
     assert_eq!(axis, plain(0.0));
     assert!(angle_deg(axis, plain(40.0)) > 1.0);
+    let told = place.run(&["info", "in/film.png"]).expect(0).out;
+    assert!(told.contains("pictures         2, of which hzn takes the first"), "{told}");
+    // A stack of pages, written one behind the other.
+    std::fs::remove_file(place.path("in/film.png")).unwrap();
+    place.write("in/stack.tif", &two_pages(&limb(320, 240, 0.0)));
+    place.run(&["run", "in"]).expect(3).says("stack.tif with 2 pictures").says("1 frame: 1 ok");
+}
+
+/// A TIFF of two pages that are the same picture.
+fn two_pages(picture: &GrayImage) -> Vec<u8> {
+    let mut out = b"II*\0\x08\0\0\0".to_vec();
+    let (w, h) = picture.dimensions();
+    let directory = 2 + 8 * 12 + 4;
+    let data = 8 + 2 * directory;
+    for page in 0..2 {
+        let tags = [(256, w), (257, h), (258, 8), (259, 1), (262, 1), (273, data), (278, h), (279, w * h)];
+        out.extend((tags.len() as u16).to_le_bytes());
+        for (tag, value) in tags {
+            out.extend((tag as u16).to_le_bytes());
+            out.extend(4u16.to_le_bytes());
+            out.extend(1u32.to_le_bytes());
+            out.extend(value.to_le_bytes());
+        }
+        out.extend(if page == 0 { 8 + directory } else { 0 }.to_le_bytes());
+    }
+    out.extend(picture.as_raw());
+    out
 }
 
 /// A disc that search lines find, after so many lit things along the border that the report has no room for more.
@@ -201,6 +307,59 @@ fn an_edge_that_comes_late_is_listed_as_chosen() {
     let frame = recorded.next().unwrap().unwrap();
     assert_eq!(frame.candidates.iter().filter(|c| c.verdict == "chosen").count(), 1);
     assert!(frame.annotations.inliers.len() > 50);
+}
+
+/// EXIF that says how a picture is to be shown, and nothing else.
+fn exif_orientation(number: u16) -> Vec<u8> {
+    let value = [number.to_le_bytes(), [0; 2]].concat();
+    let entry = [&0x0112u16.to_le_bytes()[..], &3u16.to_le_bytes(), &1u32.to_le_bytes(), &value].concat();
+    [b"II*\0".as_slice(), &8u32.to_le_bytes(), &1u16.to_le_bytes(), &entry, &0u32.to_le_bytes()].concat()
+}
+
+#[test]
+fn pictures_are_turned_only_when_it_is_asked_for() {
+    let place = Place::new();
+    let turned = image::imageops::rotate270(&limb(320, 240, 0.0));
+    let save = |orientation: u16| {
+        let mut bytes = Vec::new();
+        let mut encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+        encoder.set_exif_metadata(exif_orientation(orientation)).unwrap();
+        turned.write_with_encoder(encoder).unwrap();
+        place.write("in/a.png", &bytes);
+    };
+    let orient = |word: &str| {
+        place.write("in/sensor.toml", format!("{}[input]\norient = \"{word}\"\n", common::SENSOR).as_bytes());
+    };
+    // To be turned by 90 degrees clockwise.
+    save(6);
+    let err = place.run(&["run", "in"]).expect(2).err;
+    assert!(err.contains("a.png is 240 x 320; turn the pictures with orient in [input]"), "{err}");
+    for word in ["exif", "rotate-90"] {
+        orient(word);
+        assert_eq!(axes(&place, &["run", "in"])[0], plain(0.0));
+        // The recording has it as it was looked at, and is not turned again.
+        place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(0);
+        assert_eq!(axes(&place, &["run", "a.mcap"])[0], plain(0.0));
+        place.run(&["export", "a.mcap", "--images", "pictures", "--force"]).expect(0);
+        assert_eq!(image::image_dimensions(place.path("pictures/a.png")).unwrap(), (320, 240));
+    }
+    let told = place.run(&["explain", "in/a.png", "--overlay", "o.png"]).expect(0).out;
+    assert!(told.contains("a.png: 320 x 240 px"), "{told}");
+    // As it is stored: said once.
+    orient("as-stored");
+    let sensor = place.read("in/sensor.toml").replace("width = 320\nheight = 240", "width = 240\nheight = 320");
+    place.write("in/sensor.toml", sensor.as_bytes());
+    let ran = place.run(&["run", "in"]).expect(0);
+    ran.says(
+        "note: a.png says that it is to be shown turned by 90 degrees clockwise; pixels are taken as they are stored",
+    );
+    save(1);
+    let ran = place.run(&["run", "in"]).expect(0);
+    assert!(!ran.err.contains("to be shown"), "{}", ran.err);
+    let told = place.run(&["run", "in"]).expect(0).err;
+    assert!(!told.contains("turned"), "{told}");
+    orient("sideways");
+    place.run(&["run", "in"]).expect(2).says("[input] orient: ");
 }
 
 /// EXIF that holds `DateTimeOriginal`, 19 characters, and nothing else.

@@ -81,3 +81,54 @@ fn what_a_recording_does_not_hold_is_said() {
     place.write("cut.mcap", &whole[..at + picture.len() + 100]);
     place.run(&["run", "cut.mcap"]).expect(3).says("was cut off").says("no frames");
 }
+
+#[test]
+fn a_recording_that_is_not_whole_is_told_wherever_it_is_read() {
+    let place = place();
+    let whole = std::fs::read(place.path("out.mcap")).unwrap();
+    let chunk = |picture: &str| {
+        let picture = std::fs::read(place.path(&format!("in/{picture}.png"))).unwrap();
+        whole.windows(picture.len()).position(|w| w == picture).unwrap()
+    };
+    place.write("early.mcap", &whole[..chunk("0000") + 100]);
+    place.run(&["run", "early.mcap"]).expect(2).says("was cut off before its first picture was whole");
+    let pictures = chunk("0003") + std::fs::metadata(place.path("in/0003.png")).unwrap().len() as usize;
+    place.write("cut.mcap", &whole[..pictures + 100]);
+    let mut damaged = whole.clone();
+    damaged[chunk("0001") + 100] ^= 1;
+    place.write("damaged.mcap", &damaged);
+    for (name, what) in [("cut.mcap", "was cut off"), ("damaged.mcap", "1 damaged part was left out")] {
+        let told = |args: &[&str]| {
+            place.run(args).expect(3).says(&format!("warning: {name}: {what}"));
+        };
+        told(&["info", name]);
+        told(&["run", name]);
+        told(&["export", name, "-o", "rows.csv", "--force", "--images", &format!("{name}.pictures")]);
+    }
+    assert_eq!(
+        place.rows("rows.csv").len(),
+        place.rows("rows.csv").iter().filter(|r| cell(r, "status") == "ok").count()
+    );
+    place.run(&["info", "out.mcap"]).expect(0);
+    place.run(&["export", "out.mcap", "-o", "rows.csv", "--force"]).expect(0);
+    // Of another program: pictures alone.
+    let bare = |bytes: &[u8], name: &str| {
+        // Without the name of our attachment it is nobody's recording.
+        let mut bytes = bytes.to_vec();
+        let at = bytes.windows(11).position(|w| w == b"sensor.toml").unwrap();
+        bytes[at] = b'S';
+        // The record's length stands before it, and before the name two times and a length; its checksum is its end.
+        let start = at - 20;
+        let length = u64::from_le_bytes(bytes[start - 8..start].try_into().unwrap()) as usize;
+        let checksum = common::crc32(&bytes[start..start + length - 4]).to_le_bytes();
+        bytes[start + length - 4..start + length].copy_from_slice(&checksum);
+        place.write(name, &bytes);
+    };
+    bare(&whole, "theirs.mcap");
+    place.run(&["run", "theirs.mcap", "-s", "in/sensor.toml"]).expect(0);
+    bare(&whole[..pictures + 100], "theirs-cut.mcap");
+    place
+        .run(&["run", "theirs-cut.mcap", "-s", "in/sensor.toml"])
+        .expect(3)
+        .says("theirs-cut.mcap: was cut off; the pictures before that were processed");
+}

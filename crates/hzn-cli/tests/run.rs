@@ -90,6 +90,28 @@ fn a_frame_without_altitude_is_a_row_that_says_so() {
 }
 
 #[test]
+fn a_rocket_begins_below_the_limb_height() {
+    let place = Place::with_pictures(3);
+    let sensor = common::SENSOR.replace("altitude_km = 400.0\n", "limb_height_km = 17.0\n");
+    place.write("in/sensor.toml", sensor.as_bytes());
+    place.write("in/frames.csv", b"file,altitude_km\n0000.png,-0.02\n0001.png,3.2\n0002.png,400\n");
+    for out in ["a.csv", "a.mcap"] {
+        let ran = place.run(&["run", "in", "-o", out]).expect(3).says("3 frames: 1 ok, 2 no-altitude");
+        ran.says("of 3 frames: 2 below the limb height, where no limb can be seen, not processed (status no-altitude)");
+    }
+    let rows = place.rows("a.csv");
+    assert_eq!(cell(&rows[1], "detail"), "altitude 3.2 km is below the limb height 17 km");
+    assert_eq!(cell(&rows[1], "altitude_km"), "3.2");
+    assert_eq!(without_time(&place.run(&["run", "a.mcap"]).expect(3).out), without_time(&place.read("a.csv")));
+    let told = place.run(&["explain", "in", "--index", "1"]).expect(3).out;
+    assert_eq!(told, "0001.png: earth-sphere: no-altitude: altitude 3.2 km is below the limb height 17 km\n");
+    place.run(&["explain", "in/0002.png"]).expect(0);
+    // An altitude that serves no frame at all is said before.
+    std::fs::remove_file(place.path("in/frames.csv")).unwrap();
+    place.run(&["run", "in", "--altitude-km", "3.2"]).expect(2).says("altitude 3.2 km is below the limb height 17 km");
+}
+
+#[test]
 fn flight_precision_agrees() {
     let place = Place::with_pictures(2);
     let host = without_time(&place.run(&["run", "in"]).expect(0).out);
@@ -113,6 +135,28 @@ fn patterns_and_single_pictures() {
     assert_eq!(without_time(&place.run(&["run", "in/*"]).expect(0).out).len(), 12);
     place.run(&["run", "in/sensor.toml"]).expect(2).says("is no picture");
     place.run(&["run", "nowhere"]).expect(2).says("nowhere: no such file or folder");
+}
+
+#[test]
+fn numbers_in_names_count_by_their_value() {
+    let place = Place::with_pictures(3);
+    for (from, to) in [("0000", "img1"), ("0001", "img10"), ("0002", "img2")] {
+        std::fs::rename(place.path(&format!("in/{from}.png")), place.path(&format!("in/{to}.png"))).unwrap();
+    }
+    let names = |ran: common::Ran| {
+        without_time(&ran.out).iter().map(|r| cell(r, "file").to_owned()).collect::<Vec<_>>().join(" ")
+    };
+    for input in ["in", "in/*.png"] {
+        let ran = place.run(&["run", input]).expect(0);
+        assert!(!ran.err.contains("order given"), "{}", ran.err);
+        assert_eq!(names(ran), "img1.png img2.png img10.png");
+    }
+    // As a shell writes the pattern out: what is given in a list stays in its order, and that is told.
+    let ran = place.run(&["run", "in/img1.png", "in/img10.png", "in/img2.png"]).expect(0);
+    let ran = ran.says("note: pictures are taken in the order given, img10.png before img2.png; give the folder");
+    assert_eq!(names(ran), "img1.png img10.png img2.png");
+    let ran = place.run(&["run", "in/img2.png", "in/img1.png", "in/img10.png"]).expect(0);
+    assert!(!ran.err.contains("order given"), "{}", ran.err);
 }
 
 #[cfg(unix)]
@@ -308,7 +352,8 @@ fn another_sensor_is_not_appended() {
         place
             .run(&["run", "in", "-o", out, "--resume", "--altitude-km", "410"])
             .expect(2)
-            .says("now comes out differently");
+            // A recording knows its sensor.
+            .says(if out == "a.mcap" { "was begun with another sensor.toml" } else { "now comes out differently" });
         assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
         place.write("other.toml", format!("{}[reject]\nseed = 2\n", common::SENSOR).as_bytes());
         let ran = place.run(&["run", "in", "-o", out, "--resume", "-s", "other.toml"]);
@@ -340,4 +385,62 @@ fn nobody_listening_is_no_crash() {
         assert_eq!(status.code(), Some(code), "{args:?}");
     }
     assert_eq!(without_time(&place.read("a.csv")).len(), 3);
+}
+
+/// What `hzn run` prints after `what to try: `.
+fn suggested(ran: &common::Ran) -> String {
+    let line = ran.err.lines().find(|l| l.contains("what to try: ")).unwrap_or_else(|| panic!("{}", ran.err));
+    line.split("what to try: ").nth(1).unwrap().to_owned()
+}
+
+#[cfg(unix)]
+#[test]
+fn the_commonest_refusal_is_named_and_the_command_runs_as_printed() {
+    let place = Place::with_pictures(1);
+    std::fs::create_dir_all(place.path("some flight's/a")).unwrap();
+    let other = "some flight's/a";
+    for (n, picture) in [(0, "0000"), (1, "black"), (2, "black"), (3, "bright")] {
+        let file = place.path(&format!("{other}/{n} {picture}.png"));
+        match picture {
+            "black" => image::GrayImage::new(320, 240).save(file).unwrap(),
+            "bright" => image::GrayImage::from_pixel(320, 240, image::Luma([255])).save(file).unwrap(),
+            _ => std::fs::copy(place.path("in/0000.png"), file).map(drop).unwrap(),
+        }
+    }
+    let sensor = common::SENSOR.replace("altitude_km = 400.0\n", "");
+    place.write("its sensor.toml", sensor.as_bytes());
+    place.write("frames.csv", b"file,altitude_km\n1 black.png,400\n");
+    let explain = |ran: &common::Ran| {
+        let path = std::path::Path::new(assert_cmd::cargo::cargo_bin!("hzn")).parent().unwrap();
+        let command = suggested(ran);
+        let mut shell = std::process::Command::new("/bin/sh");
+        shell.args(["-c", &command]).current_dir(place.path("")).env("PATH", path);
+        let done = common::Ran::of(&shell.output().unwrap(), &place.path(""));
+        done.expect(0).out
+    };
+    let base = ["-s", "its sensor.toml", "--altitude-km", "400"];
+    let with = |more: &[&str]| place.run(&[&["run"], more, &base].concat());
+    let ran = with(&[other]).expect(0).says("note: 3 refused, 2 as no-limb: ");
+    assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
+    // A pattern, files, and a table that is named.
+    let ran =
+        with(&["some flight's/*/*black.png"]).expect(0).says("nothing was found in any picture; 2 refused, all as");
+    assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
+    let ran = with(&["some flight's/a/0 0000.png", "some flight's/a/2 black.png"]).expect(0).says("1 refused, all as");
+    assert!(explain(&ran).contains("2 black.png: 320 x 240"), "{}", suggested(&ran));
+    let ran = place.run(&["run", other, "-s", "its sensor.toml", "--frames", "frames.csv", "--flight"]).expect(3);
+    assert!(suggested(&ran).ends_with("--frames frames.csv --flight"), "{}", suggested(&ran));
+    assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
+    // A recording has frames by their numbers.
+    with(&[other, "-o", "out file.mcap"]).expect(0);
+    let ran = place.run(&["run", "out file.mcap"]).expect(0);
+    assert_eq!(suggested(&ran), "hzn explain 'out file.mcap' --index 1");
+    assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
+    // Headerless.
+    std::fs::create_dir(place.path("raw")).unwrap();
+    place.write("raw/a b.raw", &[0; 320 * 240]);
+    let ran = with(&["raw", "--raw", "320x240:mono8"]).expect(0);
+    assert!(explain(&ran).contains("a b.raw: 320 x 240"), "{}", suggested(&ran));
+    // All answered: nothing to say.
+    assert!(!with(&["some flight's/a/0 0000.png"]).expect(0).err.contains("refused"));
 }

@@ -270,3 +270,51 @@ fn a_video_interrupted_with_all_its_helpers_can_be_continued() {
     ran(&["a.csv", "--resume"]).says(&format!("(after {begun} that were finished before)"));
     assert_eq!(without_time(&scripts.place.read("a.csv")), without_time(&scripts.place.read("whole.csv")));
 }
+
+#[test]
+fn one_colour_of_a_video_and_its_rotation() {
+    if !decoder("one_colour_of_a_video_and_its_rotation") {
+        return;
+    }
+    // Blue has the limb; red is bright all over, and heavier in the luma.
+    let place = Place::new();
+    for i in 0..3 {
+        let grey = common::limb(320, 240, f64::from(i));
+        let colours = image::RgbImage::from_fn(320, 240, |x, y| image::Rgb([230, 230, grey.get_pixel(x, y).0[0]]));
+        colours.save(place.path(&format!("in/{i}.png"))).unwrap();
+    }
+    let sensor = |more: &str| place.write("in/sensor.toml", format!("{}[input]\n{more}", common::SENSOR).as_bytes());
+    sensor("channel = \"blue\"\n");
+    let pictures = axes(&place, &["run", "in"]);
+    for (name, coding) in [
+        ("rgb.avi", &["-c:v", "rawvideo", "-pix_fmt", "bgr24"][..]),
+        ("yuv.mkv", &["-c:v", "ffv1", "-pix_fmt", "yuv444p"]),
+        ("deep.mkv", &["-c:v", "ffv1", "-pix_fmt", "yuv444p12le"]),
+    ] {
+        make(&place, &["-framerate", "10"], "in/%d.png", coding, name);
+        let found = axes(&place, &["run", name, "-s", "in/sensor.toml"]);
+        assert_eq!(found.len(), 3, "{name}");
+        for (a, b) in found.iter().zip(&pictures) {
+            assert!(angle_deg(*a, *b) < 0.01, "{name}: {a:?} {b:?}");
+        }
+        place.run(&["explain", name, "-s", "in/sensor.toml", "--index", "1"]).expect(0);
+    }
+    // The luma says something else, or nothing.
+    sensor("");
+    let luma = run(&place, "yuv.mkv").expect(0);
+    assert!(
+        column(&luma, "status").iter().all(|s| s != "ok")
+            || column(&luma, "axis_y")[0] != format!("{}", pictures[0][1])
+    );
+    // To be shown turned: the container says so, and it is not done unasked.
+    make(&place, &[], "rgb.avi", &["-c:v", "mpeg4", "-q:v", "1"], "plain.mp4");
+    let turned = |before: &[&str], coding: &[&str]| {
+        let mut tool = Command::new("ffmpeg");
+        tool.args(["-nostdin", "-v", "error", "-y"]).args(before).arg("-i").arg(place.path("plain.mp4"));
+        let made = tool.args(["-c", "copy"]).args(coding).arg(place.path("turned.mp4")).stderr(Stdio::null()).status();
+        made.unwrap().success()
+    };
+    // Counter-clockwise, since version 6; before, a tag that counts clockwise.
+    assert!(turned(&["-display_rotation", "-90"], &[]) || turned(&[], &["-metadata:s:v:0", "rotate=90"]));
+    run(&place, "turned.mp4").expect(0).says("turned.mp4 says that it is to be shown turned by 90 degrees clockwise");
+}

@@ -20,6 +20,9 @@ pub const AU_KM: f64 = 149_597_870.7;
 /// Mean distance of the Moon in kilometres.
 pub const MOON_DISTANCE_KM: f64 = 384_400.0;
 
+/// No camera stands lower than this above its body, in metres: the lowest dry land is 0.4 km below WGS-84.
+pub const LOWEST_ALTITUDE_M: f64 = -1000.0;
+
 /// Most rows of a limb height by latitude.
 pub const MAX_LATITUDES: usize = 16;
 /// Places on one half of the limb at which a height by latitude is looked up.
@@ -222,7 +225,7 @@ impl Config {
 /// What is known about one picture besides the picture itself. Everything may be missing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frame<T> {
-    /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. Above 0.
+    /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. Above the limb height.
     pub altitude_m: Option<T>,
     /// Position of the camera in ECEF, metres. It beats the altitude.
     pub position_m: Option<[T; 3]>,
@@ -258,10 +261,17 @@ pub struct Last<T> {
 /// Why a frame's own data were refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameError {
-    /// The altitude is not a finite number above zero.
+    /// The altitude is not a finite number, or no camera is that low.
     Altitude,
-    /// The position is not finite, or not outside the body and its limb height.
+    /// The position is not finite, or inside the body.
     Position,
+    /// The camera is not above the limb height, where the limb encloses it and no cone is seen. A rocket begins there.
+    BelowLimb {
+        /// Altitude of the camera in metres.
+        altitude_m: i32,
+        /// Limb height in metres.
+        limb_m: i32,
+    },
     /// Neither the frame nor the configuration gives an altitude.
     NoAltitude,
     /// The sigma of the attitude is not a finite number of 0 or more.
@@ -275,8 +285,13 @@ pub enum FrameError {
 impl core::fmt::Display for FrameError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Altitude => "altitude_km must be a finite number above 0",
+            Self::Altitude => "altitude_km must be a finite number above -1 (kilometres)",
             Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
+            Self::BelowLimb { altitude_m, limb_m } => {
+                let [altitude, limb] = [altitude_m, limb_m].map(|m| f64::from(*m) / 1e3);
+                let place = if altitude < limb { "below" } else { "not above" };
+                return write!(f, "altitude {altitude} km is {place} the limb height {limb} km");
+            }
             Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
             Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
             Self::NoAltitude => {

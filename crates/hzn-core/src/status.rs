@@ -25,7 +25,7 @@ pub enum Status {
     Truncated = 7,
     /// The picture could not be read (host only).
     Unreadable = 8,
-    /// Nothing gives the altitude that the body's cone follows from (host only).
+    /// Nothing gives the altitude that the body's cone follows from, or it is below the limb height (host only).
     NoAltitude = 9,
 }
 

@@ -218,7 +218,7 @@ fn impossible_frames_are_refused_by_name() {
     let refused = |frame: Frame<f64>| host.expect(&frame).unwrap_err();
     assert_eq!(refused(Frame::default()), FrameError::NoAltitude);
     assert_eq!(refused(Frame { altitude_m: Some(f64::NAN), ..Frame::default() }), FrameError::Altitude);
-    assert_eq!(refused(Frame { altitude_m: Some(-5.0), ..Frame::default() }), FrameError::Altitude);
+    assert_eq!(refused(Frame { altitude_m: Some(-5e3), ..Frame::default() }), FrameError::Altitude);
     assert_eq!(refused(Frame { position_m: Some([6.3e6, 0.0, 0.0]), ..Frame::default() }), FrameError::Position);
     assert_eq!(
         refused(Frame { position_m: Some([f64::INFINITY, 0.0, 0.0]), ..Frame::default() }),

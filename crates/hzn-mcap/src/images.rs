@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
@@ -34,6 +34,7 @@ pub struct ImageReader {
     topic: Option<String>,
     others: BTreeSet<String>,
     done: bool,
+    broken: Option<String>,
 }
 
 impl std::fmt::Debug for ImageReader {
@@ -60,7 +61,13 @@ impl ImageReader {
             topic: topic.map(str::to_owned),
             others: BTreeSet::new(),
             done: false,
+            broken: None,
         })
+    }
+
+    /// After the last picture: why the recording ended before its end, cut off or damaged; `None` of a whole one.
+    pub fn broken(&self) -> Option<&str> {
+        self.broken.as_deref()
     }
 
     /// The topic that is read, once it is known.
@@ -72,6 +79,21 @@ impl ImageReader {
     pub fn other_topics(&self) -> impl Iterator<Item = &str> {
         self.others.iter().map(String::as_str)
     }
+}
+
+/// What befell a recording of which the end is missing.
+const CUT_OFF: &str = "was cut off";
+
+/// Whether the file ends as a recording that was closed.
+fn ends_as_mcap(path: &Path) -> bool {
+    let last = || -> std::io::Result<[u8; 8]> {
+        let mut file = File::open(path)?;
+        let mut last = [0; 8];
+        file.seek(SeekFrom::End(-8))?;
+        file.read_exact(&mut last)?;
+        Ok(last)
+    };
+    last().is_ok_and(|last| last == *mcap::MAGIC)
 }
 
 /// Which decoder a channel's pictures need; `None` for other messages.
@@ -93,16 +115,24 @@ impl Iterator for ImageReader {
 
     fn next(&mut self) -> Option<Self::Item> {
         while !self.done {
-            let message = match self.messages.next()? {
+            let Some(message) = self.messages.next() else {
+                self.done = true;
+                // Cut off between two records.
+                self.broken = (!ends_as_mcap(&self.path)).then(|| CUT_OFF.to_owned());
+                return None;
+            };
+            let message = match message {
                 Ok(message) => message,
                 Err(e) => {
                     self.done = true;
-                    return match e {
-                        // Cut off: what was whole has been given.
-                        McapError::UnexpectedEof | McapError::UnexpectedEoc => None,
-                        McapError::BadMagic => Some(Err(Error::NotMcap { path: self.path.clone() })),
-                        e => Some(Err(Error::Decode { path: self.path.clone(), detail: e.to_string() })),
+                    // What was whole has been given.
+                    self.broken = match e {
+                        McapError::BadMagic => return Some(Err(Error::NotMcap { path: self.path.clone() })),
+                        McapError::UnexpectedEof | McapError::UnexpectedEoc => Some(CUT_OFF.to_owned()),
+                        _ if !ends_as_mcap(&self.path) => Some(CUT_OFF.to_owned()),
+                        e => Some(format!("is damaged ({e})")),
                     };
+                    return None;
                 }
             };
             let channel = &message.channel;

@@ -280,7 +280,7 @@ fn our_recordings_are_an_input_too() {
     let check = |path: &Path, n: usize| {
         let mut images = ImageReader::open(path, None).unwrap();
         let got: Vec<_> = images.by_ref().map(Result::unwrap).collect();
-        assert_eq!(got.len(), n);
+        assert_eq!((got.len(), images.broken()), (n, None));
         for (a, (time_s, image)) in got.iter().zip(&expect) {
             assert!((a.time_s - time_s.unwrap()).abs() < 1e-6);
             assert_eq!(a.image.as_ref(), Ok(image));
@@ -290,8 +290,15 @@ fn our_recordings_are_an_input_too() {
     let bytes = fs::read(&path).unwrap();
     let cut = dir.path().join("cut.mcap");
     fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
-    let images = ImageReader::open(&cut, None).unwrap();
-    assert!(images.map(Result::unwrap).count() < expect.len());
+    let mut images = ImageReader::open(&cut, None).unwrap();
+    assert!(images.by_ref().map(Result::unwrap).count() < expect.len());
+    assert_eq!(images.broken(), Some("was cut off"));
+    let mut damaged = bytes.clone();
+    damaged[bytes.len() / 2] ^= 1;
+    fs::write(&cut, damaged).unwrap();
+    let mut images = ImageReader::open(&cut, None).unwrap();
+    assert!(images.by_ref().map(Result::unwrap).count() < expect.len());
+    assert!(images.broken().unwrap().starts_with("is damaged ("), "{:?}", images.broken());
     assert_eq!(ImageReader::open(&path, Some("/nothing")).unwrap().count(), 0);
 }
 

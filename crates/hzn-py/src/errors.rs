@@ -1,8 +1,9 @@
 //! One exception a family of errors, and the door through which no panic comes.
 
+use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::{PyErr, create_exception};
 
@@ -28,6 +29,12 @@ pub(crate) fn image(what: impl std::fmt::Display) -> PyErr {
 /// Anything else that went wrong, such as a file.
 pub(crate) fn other(what: impl std::fmt::Display) -> PyErr {
     HznError::new_err(what.to_string())
+}
+
+/// Something that stops nothing but that the user should look at.
+pub(crate) fn warn(py: Python<'_>, what: impl std::fmt::Display) -> PyResult<()> {
+    let text = CString::new(what.to_string()).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
 /// Works without holding the interpreter. A panic becomes an exception: whatever `work` held is gone, the process lives.

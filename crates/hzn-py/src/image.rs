@@ -77,6 +77,14 @@ impl<'py> Array<'py> {
         given.or(input.bits.filter(|_| matches!(self, Self::Words(_))))
     }
 
+    /// What to try where nothing was found and the upper bits of uint16 are unused, of which nobody has told.
+    pub(crate) fn unused_bits(&self, bits: Option<u8>) -> Option<String> {
+        match self {
+            Self::Words(a) if bits.is_none() => picture::unused_bits(a.as_array().iter().copied().max()?),
+            _ => None,
+        }
+    }
+
     /// The picture for the pipeline, without a copy.
     pub(crate) fn view(&self, bits: Option<u8>, channel: Channel) -> PyResult<View<'_>> {
         let layout = self.layout(bits)?;

@@ -17,11 +17,13 @@ use crate::sensor::Sensor;
 #[doc = doc!("read_mcap")]
 #[pyfunction]
 pub(crate) fn read_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
-    let rows = errors::detached(py, || {
-        let reader = Reader::open(&path, Contents::WithoutImages)?;
-        reader.map(|frame| frame.map(|f| f.row)).collect::<Result<Vec<Row>, hzn_mcap::Error>>()
+    let read = errors::detached(py, || {
+        let mut reader = Reader::open(&path, Contents::WithoutImages)?;
+        let rows = reader.by_ref().map(|frame| frame.map(|f| f.row)).collect::<Result<Vec<Row>, hzn_mcap::Error>>()?;
+        Ok::<_, hzn_mcap::Error>((rows, hzn_cli::input::lost_of_recording(&reader, &path, "read")))
     })?;
-    let rows = rows.map_err(errors::other)?;
+    let (rows, lost) = read.map_err(errors::other)?;
+    lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
     let rows: Vec<Value> = rows.iter().map(|r| serde_json::to_value(r).unwrap_or_default()).collect();
     let numpy = py.import("numpy")?;
     let table = PyDict::new(py);
@@ -52,7 +54,8 @@ pub(crate) fn open_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
         sensor_toml: text,
         metadata: reader.metadata().clone(),
         camera: config.and_then(|c| Camera::of(c.config.camera).ok()).map(Arc::new),
-        open: Mutex::new(Some(Open { reader, ahead: None })),
+        path,
+        open: Mutex::new(Some(Open { reader, ahead: None, told: false })),
     })
 }
 
@@ -62,6 +65,7 @@ pub(crate) struct Recording {
     sensor_toml: Option<String>,
     metadata: BTreeMap<String, String>,
     camera: Option<Arc<Camera>>,
+    path: PathBuf,
     open: Mutex<Option<Open>>,
 }
 
@@ -69,9 +73,20 @@ struct Open {
     reader: Reader,
     /// The first record of the next frame.
     ahead: Option<FrameRecord>,
+    /// It was told what is missing.
+    told: bool,
 }
 
 impl Open {
+    /// What is missing of a recording that was read to its end; once.
+    fn lost(&mut self, path: &Path) -> Option<String> {
+        if std::mem::replace(&mut self.told, true) {
+            None
+        } else {
+            hzn_cli::input::lost_of_recording(&self.reader, path, "read")
+        }
+    }
+
     /// The records of a frame, one a body.
     fn next(&mut self) -> Result<Vec<FrameRecord>, hzn_mcap::Error> {
         let mut records: Vec<FrameRecord> = self.ahead.take().into_iter().collect();
@@ -113,13 +128,18 @@ impl Recording {
         slf
     }
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Frame>> {
-        let records = errors::detached(py, || {
+        let (records, lost) = errors::detached(py, || {
             let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
             let open =
                 open.as_mut().ok_or_else(|| errors::other("the recording is closed; open_mcap opens it again"))?;
-            open.next().map_err(errors::other)
+            let records = open.next().map_err(errors::other)?;
+            let lost = if records.is_empty() { open.lost(&self.path) } else { None };
+            Ok::<_, PyErr>((records, lost))
         })??;
-        let Some(image) = records.first().map(|first| first.image.clone()) else { return Ok(None) };
+        let Some(image) = records.first().map(|first| first.image.clone()) else {
+            lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
+            return Ok(None);
+        };
         let reports = records.into_iter().map(|r| Report::recorded(r, self.camera.clone()));
         Ok(Some(Frame { image, report: Py::new(py, Report::of_bodies(py, reports)?)? }))
     }

@@ -9,6 +9,7 @@ use hzn_cli::engine::Trace;
 use hzn_core::camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
+use hzn_core::status::Status;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
 use numpy::ndarray::{Array2, arr1, arr2};
 use numpy::{PyArray1, PyArray2, ToPyArray};
@@ -104,6 +105,11 @@ impl Report {
             detail: (!drawing.is_empty()).then(|| Detail { drawing, ..Detail::default() }),
             ..Self::of_row(record.row)
         }
+    }
+
+    /// Whether its body was found.
+    pub(crate) fn is_answer(&self) -> bool {
+        self.row.status == Status::Ok
     }
 
     /// The report of the first body, with those of the others.

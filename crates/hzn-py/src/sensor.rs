@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
-use hzn_calib::{FrameData, sensor};
+use hzn_calib::{FrameData, plausible, sensor};
 use hzn_cli::engine::{AnySensor, Traces};
+use hzn_core::body::FrameError;
+use hzn_core::status::Status;
 use hzn_core::{Config, Sensor as CoreSensor};
 use hzn_mcap::{Row, RowMeta};
 use pyo3::prelude::*;
@@ -73,14 +75,19 @@ impl Sensor {
     #[pyo3(signature = (*, flight = false, **sections))]
     fn new(py: Python<'_>, flight: bool, sections: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let none = PyDict::new(py);
-        Self::of(parameters::config(sections.unwrap_or(&none))?, flight)
+        let config = parameters::config(sections.unwrap_or(&none))?;
+        let doubts = plausible::doubts(&config);
+        doubts.iter().try_for_each(|doubt| errors::warn(py, format_args!("{}: {}", doubt.key, doubt.what)))?;
+        Self::of(config, flight)
     }
 
     #[doc = doc!("Sensor.from_toml")]
     #[staticmethod]
     #[pyo3(signature = (path, *, flight = false))]
-    fn from_toml(path: PathBuf, flight: bool) -> PyResult<Self> {
-        Self::of(sensor::load(&path).map_err(errors::config)?.config, flight)
+    fn from_toml(py: Python<'_>, path: PathBuf, flight: bool) -> PyResult<Self> {
+        let loaded = sensor::load(&path).map_err(errors::config)?;
+        loaded.warnings.iter().try_for_each(|warning| errors::warn(py, warning))?;
+        Self::of(loaded.config, flight)
     }
 
     #[doc = doc!("Sensor.parameters")]
@@ -161,13 +168,25 @@ impl Sensor {
                 altitude_km: hzn_cli::output::altitude_km(Some(&data), body),
                 ..RowMeta::default()
             };
-            let found = processed.report.map_err(errors::config)?;
+            let found = match processed.report {
+                Ok(found) => found,
+                // Every rocket begins there: a flight goes on after it.
+                Err(why @ FrameError::BelowLimb { .. }) => {
+                    return Ok(Report::of_row(Row::unprocessed(&meta, Status::NoAltitude, why.to_string())));
+                }
+                Err(why) => return Err(errors::config(why)),
+            };
             let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
             let row = Row::from_report(&meta, &found, Some(elapsed_us));
             Ok(Report::new(row, &found, traces.get(which), &state.camera))
         };
         let reports: Vec<Report> =
             processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<_>>()?;
+        if reports.iter().all(|report| !report.is_answer())
+            && let Some(tip) = array.unused_bits(bits)
+        {
+            errors::warn(py, format_args!("nothing found: {tip}"))?;
+        }
         Ok(Report::of_bodies(py, reports)?.with_image(image, bits))
     }
 

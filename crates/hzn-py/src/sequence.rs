@@ -1,6 +1,5 @@
 //! Pictures from files, as `hzn run` takes them.
 
-use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,7 +8,6 @@ use hzn_calib::FrameData;
 use hzn_cli::engine::{self, Finished, Plan};
 use hzn_cli::exit::{Exit, Stop};
 use hzn_cli::input::{self, Payload, Source};
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -44,16 +42,28 @@ impl Sequence {
     #[new]
     fn new(py: Python<'_>, sensor: &Sensor, inputs: Vec<PathBuf>) -> PyResult<Self> {
         let state = sensor.state();
-        let (source, frames) = errors::detached(py, || -> PyResult<_> {
-            let source = input::open(&inputs, None, None).map_err(stopped)?;
+        let (source, frames, bits) = errors::detached(py, || -> PyResult<_> {
+            let mut source = input::open(&inputs, None, None).map_err(stopped)?;
+            source.want_channel(state.config.input.channel).map_err(stopped)?;
+            let given = state.config.input.bits.or(source.bits());
+            let found = if given.is_none() { input::find_bits(source.as_ref()) } else { None };
+            let bits = (given.or(found.map(|f| f.bits)), found.filter(|f| f.bits < 16));
             let beside = source.folder().join("frames.csv");
             let own = source.sensor_toml().is_some();
             let frames = (!own && beside.exists()).then(|| hzn_calib::frames::load(&beside)).transpose();
             let frames = frames.map_err(errors::config)?;
             engine::prepare(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
-            Ok((source, frames))
+            Ok((source, frames, bits))
         })??;
-        let plan = plan(&state, frames);
+        for warning in frames.iter().flat_map(|f: &hzn_calib::Frames| f.check_sensor(&state.config)) {
+            errors::warn(py, warning)?;
+        }
+        let (bits, found) = bits;
+        if let Some(found) = found {
+            errors::warn(py, found)?;
+        }
+        let mut plan = plan(&state, frames);
+        plan.config.input.bits = bits;
         Ok(Self { state, plan, source: Mutex::new(source), next: AtomicU64::new(0) })
     }
 
@@ -74,9 +84,7 @@ impl Sequence {
             Ok(item) => item,
             Err(lost) => {
                 // A recording or video that was cut off ends sooner than it should.
-                if let Some(text) = lost.and_then(|text| CString::new(text).ok()) {
-                    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
-                }
+                lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
                 return Ok(None);
             }
         };

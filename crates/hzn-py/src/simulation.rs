@@ -140,7 +140,7 @@ impl SimulatedFrame {
                 hzn_sim::Samples::Bytes(d) => Samples::Bytes(d.clone()),
                 hzn_sim::Samples::Words(d) => Samples::Words(d.clone()),
             };
-            Ok::<_, PyErr>(crate::image::to_array(py, Picture { samples, layout, exif_time_s: None })?.unbind())
+            Ok::<_, PyErr>(crate::image::to_array(py, Picture::new(samples, layout))?.unbind())
         });
         image.map(|i| i.clone_ref(py))
     }

@@ -367,3 +367,18 @@ def test_the_package_is_typed_and_documented():
         if isinstance(thing, type) and not issubclass(thing, Exception):
             for name in vars(thing):
                 assert name.startswith("_") or getattr(thing, name).__doc__, (thing, name)
+
+
+def test_a_camera_below_the_limb_height_gets_a_report():
+    sensor = hzn.Sensor(camera=CAMERA, body={"altitude_km": 400.0, "limb_height_km": 17.0})
+    report = sensor.process(limb(), altitude_km=3.2)
+    assert report.status == "no-altitude" and report.altitude_km == 3.2
+    assert report.detail == "altitude 3.2 km is below the limb height 17 km"
+    assert sensor.process(limb(), altitude_km=400.0).altitude_km == 400.0
+
+
+def test_unused_bits_of_an_array_warn(sensor):
+    words = limb().astype(np.uint16)
+    with pytest.warns(UserWarning, match="samples reach 200 of 65535"):
+        assert not sensor.process(words).ok
+    assert sensor.process(words, bits=8).ok

@@ -176,3 +176,21 @@ def test_a_tracked_level_goes_from_picture_to_picture():
     reports = list(sensor.process_many([limb(i) for i in range(6)], jobs=4))
     alone = hzn.Sensor(**PARAMETERS, binarize={"method": "track"})
     assert [r.level for r in reports] == [alone.process(limb(i)).level for i in range(6)]
+
+
+def test_bits_are_found_once_for_a_sequence(sensor, tmp_path):
+    # The first picture is dark: by itself it has 8 bits.
+    for i, scale in enumerate((0.25, 16, 16)):
+        words = (limb(i) * scale).astype(">u2")
+        (tmp_path / f"{i}.pgm").write_bytes(b"P5\n320 240\n65535\n" + words.tobytes())
+    with pytest.warns(UserWarning, match="reach 3200 in 3 pictures looked at: taken as 12 bits"):
+        reports = list(sensor.process_many(tmp_path))
+    assert reports[1].ok and np.allclose(reports[1].axis, sensor.process(limb(1)).axis, atol=1e-4)
+
+
+def test_implausible_values_warn(tmp_path):
+    camera = PARAMETERS["camera"] | {"cx_px": 119.5, "cy_px": 159.5, "width": 480}
+    with pytest.warns(UserWarning, match="camera.cx_px: the centre"):
+        hzn.Sensor(camera=camera)
+    with pytest.warns(UserWarning, match='write kind = "sphere" and radius_km = 1737.4'):
+        hzn.Sensor(camera=PARAMETERS["camera"], body={"kind": "moon", "altitude_km": 100.0})

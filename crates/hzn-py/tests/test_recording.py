@@ -47,3 +47,14 @@ def test_a_recording_that_was_cut(recording, tmp_path):
     cut.write_bytes(recording.read_bytes()[:-20_000])
     frames = list(hzn.open_mcap(cut))
     assert 0 < len(frames) < 50 and all(frame.report.ok for frame in frames)
+
+
+def test_a_recording_that_was_cut_off_warns(recording):
+    whole = recording.read_bytes()
+    cut = recording.with_name("cut.mcap")
+    cut.write_bytes(whole[: len(whole) // 2])
+    with pytest.warns(UserWarning, match="was cut off; its finished frames were read"):
+        table = hzn.read_mcap(cut)
+    assert 0 < len(table["file"]) < 50
+    with pytest.warns(UserWarning, match="was cut off"), hzn.open_mcap(cut) as opened:
+        assert len(list(opened)) == len(table["file"])

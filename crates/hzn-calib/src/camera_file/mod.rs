@@ -1,4 +1,4 @@
-//! Camera calibrations of other tools: Kalibr camchains, OpenCV YAML, EuRoC `sensor.yaml`.
+//! Camera calibrations of other tools: Kalibr camchains, OpenCV YAML, EuRoC `sensor.yaml`, ROS's camera_info.
 //!
 //! | file | lens there | in hzn |
 //! |---|---|---|
@@ -6,10 +6,11 @@
 //! | Kalibr, EuRoC | `pinhole` + `radtan`, `radial-tangential`, `plumb_bob` | `brown-conrady` |
 //! | Kalibr, EuRoC | `pinhole` + `none` | `pinhole` |
 //! | OpenCV | `camera_matrix` or `K`, `distortion_coefficients` or `D`, `fisheye_model: 1` | `kannala-brandt` |
-//! | OpenCV | the same without `fisheye_model`, up to five coefficients | `brown-conrady` |
+//! | OpenCV | the same with `fisheye_model: 0`, or with five coefficients | `brown-conrady` |
+//! | ROS | the same with `distortion_model`: `plumb_bob`, or `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
+//! | ROS | the same with `distortion_model`: `equidistant`, `fisheye` | `kannala-brandt` |
 //!
-//! A file that calls its coefficients `D` and holds four of them is a fisheye when its name or `fisheye_model` says
-//! so; otherwise OpenCV's usual order k1, k2, p1, p2 is taken.
+//! A file without either word that holds four coefficients may be both: it is refused, unless its name says `fisheye`.
 //!
 //! [`load`] reads, [`write()`] writes; [`from_braun_barf`] takes the five coefficients of that paper.
 

@@ -29,7 +29,9 @@ pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Prob
     };
     // The tag says nothing that its mapping does not.
     let body = body.replace("!!opencv-matrix", "");
-    let value: Value = serde_saphyr::from_str(&body).map_err(|e| {
+    // `ros2 topic echo` ends every message like this.
+    let body = body.trim_end().strip_suffix("\n---").unwrap_or(&body);
+    let value: Value = serde_saphyr::from_str(body).map_err(|e| {
         let location = e.location();
         let shown = e.to_string();
         let what = format!("not valid YAML: {}", shown.lines().next().unwrap_or_default());
@@ -52,7 +54,7 @@ pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Prob
         (Some(name), _) => file.kalibr(&top[name], name),
         (None, Some(first)) => file.kalibr(&top[*first], first),
         (None, None) if top.contains_key("intrinsics") => file.kalibr(&value, ""),
-        (None, None) if top.contains_key("camera_matrix") || top.contains_key("K") => file.opencv(&value),
+        (None, None) if ["camera_matrix", "K", "k"].iter().any(|key| top.contains_key(*key)) => file.opencv(&value),
         _ => Err(file.unknown()),
     }
 }
@@ -70,7 +72,8 @@ impl File<'_> {
         Problem::new(
             self.path,
             "is no camera file that is known here: a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
-             resolution) or an OpenCV calibration (camera_matrix or K, image_width, image_height) is expected",
+             resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height) or ROS's camera_info is \
+             expected",
         )
     }
 
@@ -90,45 +93,136 @@ impl File<'_> {
         let Some([width, height]) = size.and_then(|v| <[f64; 2]>::try_from(v).ok()) else {
             return Err(self.problem(&field("resolution"), "two numbers, width and height, are expected"));
         };
-        let coefficients = list("distortion_coeffs").or_else(|| list("distortion_coefficients")).unwrap_or_default();
-        const KNOWN: &[&str] = &["equidistant", "radtan", "radial-tangential", "plumb_bob", "none"];
-        let distortion = camera["distortion_model"].as_str().unwrap_or("none");
-        let model = match distortion {
-            "equidistant" => Model::KannalaBrandt,
-            "radtan" | "radial-tangential" | "plumb_bob" => Model::BrownConrady,
-            "none" => Model::Pinhole,
-            other => {
-                let what = format!("{other:?} is a lens that hzn does not have{}", suggestion(other, KNOWN));
-                return Err(self.problem(&field("distortion_model"), what));
-            }
+        let key = if camera.get("distortion_coefficients").is_some() {
+            "distortion_coefficients"
+        } else {
+            "distortion_coeffs"
         };
-        self.camera(model, [width, height], [fx, fy, cx, cy], &coefficients, &field("distortion_coeffs"))
+        let given = Coefficients { values: self.coefficients(camera.get(key), &field(key))?, field: field(key) };
+        let lens = self.stated_lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
+        let model = self.model(lens, &given)?;
+        self.camera(model, [width, height], [fx, fy, cx, cy], &given)
     }
 
+    /// OpenCV's own files, and ROS's camera_info as its calibrator writes it or as its topic shows it.
     fn opencv(&self, top: &Value) -> Result<Config, Problem> {
-        let either = |a: &str, b: &str| top.get(a).or_else(|| top.get(b)).cloned().unwrap_or(Value::Null);
-        let matrix = matrix(&either("camera_matrix", "K"));
-        let Some([fx, skew, cx, _, fy, cy, ..]) = matrix.as_deref().filter(|m| m.len() == 9) else {
-            return Err(self.problem("camera_matrix", "a 3x3 matrix is expected"));
+        let either = |names: &[&'static str]| {
+            let found = names.iter().find_map(|name| top.get(*name).map(|value| (*name, value)));
+            found.unwrap_or((names.first().copied().unwrap_or_default(), &Value::Null))
         };
-        if *skew != 0.0 {
-            return Err(
-                self.problem("camera_matrix", "has a skew, which hzn's lenses do not have; calibrate without it")
-            );
-        }
-        let size = |key: &str| {
-            top[key].as_f64().ok_or_else(|| self.problem(key, "missing: add the picture's size in pixels to the file"))
+        let (key, value) = either(&["camera_matrix", "K", "k"]);
+        let [fx, fy, cx, cy] = self.intrinsics(value, key)?;
+        let (key, value) = either(&["distortion_coefficients", "D", "d"]);
+        let given = Coefficients { values: self.coefficients(Some(value), key)?, field: key.to_owned() };
+        let size = |names: &[&'static str]| {
+            let (key, value) = either(names);
+            number(value).ok_or_else(|| self.problem(key, "missing: add the picture's size in pixels to the file"))
         };
-        let coefficients = self::matrix(&either("distortion_coefficients", "D")).unwrap_or_default();
+        let size = [size(&["image_width", "width"])?, size(&["image_height", "height"])?];
+        let stated = self.stated_lens(top.get("distortion_model"), "distortion_model")?;
+        let flag = top.get("fisheye_model").map(|f| f.as_f64() == Some(1.0) || f.as_bool() == Some(true));
         let named = self.path.file_name().is_some_and(|n| n.to_string_lossy().to_lowercase().contains("fisheye"));
-        let fisheye = top.get("fisheye_model").map_or(named, |f| f.as_f64() == Some(1.0) || f.as_bool() == Some(true));
-        let model = match (fisheye, coefficients.iter().any(|k| *k != 0.0)) {
-            (true, _) => Model::KannalaBrandt,
-            (false, true) => Model::BrownConrady,
-            (false, false) => Model::Pinhole,
+        let lens = match (stated, flag) {
+            (Some(lens), Some(flag)) if flag != (lens == Lens::Fisheye) => {
+                let what = "says another lens than distortion_model; leave the wrong one of them out";
+                return Err(self.problem("fisheye_model", what));
+            }
+            (Some(lens), _) => lens,
+            (None, Some(true)) => Lens::Fisheye,
+            (None, None) if named => Lens::Fisheye,
+            (None, None) if given.meant() == 4 => {
+                let what = "four coefficients are k1 to k4 of a fisheye lens (cv2.fisheye) or k1, k2, p1, p2 of \
+                            Brown-Conrady (cv2.calibrateCamera): add `fisheye_model: 1` or `fisheye_model: 0` to the file";
+                return Err(self.problem(&given.field, what));
+            }
+            (None, _) => Lens::PlumbBob,
         };
-        let size = [size("image_width")?, size("image_height")?];
-        self.camera(model, size, [*fx, *fy, *cx, *cy], &coefficients, "distortion_coefficients")
+        let model = self.model(lens, &given)?;
+        self.camera(model, size, [fx, fy, cx, cy], &given)
+    }
+
+    /// fx, fy, cx, cy of a camera matrix.
+    fn intrinsics(&self, value: &Value, key: &str) -> Result<[f64; 4], Problem> {
+        let Some(Ok([fx, skew, cx, below, fy, cy, last @ ..])) = matrix(value).map(<[f64; 9]>::try_from) else {
+            return Err(self.problem(key, "a 3x3 matrix is expected"));
+        };
+        if [fx, fy, cx, cy] == [0.0; 4] {
+            return Err(self.problem(key, "is all zeros, as of a camera that was not calibrated; calibrate it first"));
+        }
+        if below != 0.0 || last != [0.0, 0.0, 1.0] {
+            let what = "must be [fx, 0, cx; 0, fy, cy; 0, 0, 1]";
+            let transposed = skew == 0.0 && cx == 0.0 && cy == 0.0 && last[2] == 1.0;
+            let hint = if transposed { "; it is transposed, as MATLAB keeps it: swap rows and columns" } else { "" };
+            return Err(self.problem(key, format!("{what}{hint}")));
+        }
+        if skew != 0.0 {
+            return Err(self.problem(key, "has a skew, which hzn's lenses do not have; calibrate without it"));
+        }
+        Ok([fx, fy, cx, cy])
+    }
+
+    /// The coefficients, which must be one list; none where the file has none.
+    fn coefficients(&self, value: Option<&Value>, field: &str) -> Result<Option<Vec<f64>>, Problem> {
+        let Some(value) = value.filter(|v| !v.is_null()) else { return Ok(None) };
+        let Some(values) = matrix(value) else {
+            return Err(self.problem(field, "a list of numbers is expected"));
+        };
+        let side = |key: &str| value.get(key).and_then(Value::as_u64);
+        if let (Some(rows), Some(cols)) = (side("rows"), side("cols")) {
+            if rows.saturating_mul(cols) != values.len() as u64 {
+                let what = format!("has {} numbers, but rows and cols say {rows} x {cols}", values.len());
+                return Err(self.problem(field, what));
+            }
+            if rows.min(cols) > 1 {
+                return Err(
+                    self.problem(field, format!("is a matrix of {rows} x {cols}; one row or column is expected"))
+                );
+            }
+        }
+        Ok(Some(values))
+    }
+
+    /// The lens that a file's own word says; `None` where it says none.
+    fn stated_lens(&self, word: Option<&Value>, field: &str) -> Result<Option<Lens>, Problem> {
+        let Some(word) = word.and_then(Value::as_str).map(str::trim).filter(|word| !word.is_empty()) else {
+            return Ok(None);
+        };
+        let known = LENSES.iter().find(|(name, _)| name.eq_ignore_ascii_case(word));
+        let names: Vec<&str> = LENSES.iter().map(|(name, _)| *name).collect();
+        known.map(|(_, lens)| Some(*lens)).ok_or_else(|| {
+            let what = format!("{word:?} is a lens that hzn does not have{}", suggestion(word, &names));
+            self.problem(field, what)
+        })
+    }
+
+    /// What hzn calls the lens; its coefficients must be as many as it has.
+    fn model(&self, lens: Lens, given: &Coefficients) -> Result<Model, Problem> {
+        let wrong = |what: String| Err(self.problem(&given.field, what));
+        let count = given.values.as_ref().map(Vec::len);
+        match (lens, count, given.meant()) {
+            (Lens::None, _, 0) => Ok(Model::Pinhole),
+            (Lens::None, _, n) => wrong(format!("{n} coefficients, but distortion_model does not say of which lens")),
+            (Lens::Fisheye, None, _) => wrong("missing: a fisheye lens has four, k1 to k4".into()),
+            (Lens::PlumbBob, None | Some(0), _) => Ok(Model::Pinhole),
+            (Lens::PlumbBob, Some(n), 0) if n >= 4 => Ok(Model::Pinhole),
+            (Lens::Radtan, None, _) => wrong("missing: this lens has k1, k2, p1, p2".into()),
+            (Lens::Fisheye, Some(n), meant) if n < 4 || meant > 4 => {
+                wrong(format!("{n} coefficients, but a fisheye lens has four, k1 to k4; is it another lens?"))
+            }
+            (Lens::Fisheye, ..) => Ok(Model::KannalaBrandt),
+            (Lens::Radtan | Lens::PlumbBob, Some(n), _) if n < 4 => wrong(format!(
+                "{n} coefficients, but this lens has k1, k2, p1, p2 and k3; write 0 for what it does without"
+            )),
+            (Lens::Radtan | Lens::PlumbBob | Lens::Rational, Some(n), meant) if meant > 5 => wrong(format!(
+                "{n} coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; calibrate without the higher ones \
+                 (plumb_bob, or a fisheye lens)"
+            )),
+            (Lens::Rational, None, _) => wrong("missing: this lens has k1, k2, p1, p2, k3, k4, k5, k6".into()),
+            (Lens::Rational, Some(n), _) if n < 8 => {
+                wrong(format!("{n} coefficients, but rational_polynomial has eight; is it plumb_bob?"))
+            }
+            (Lens::Radtan | Lens::PlumbBob | Lens::Rational, ..) => Ok(Model::BrownConrady),
+        }
     }
 
     fn camera(
@@ -136,8 +230,7 @@ impl File<'_> {
         model: Model,
         size: [f64; 2],
         [fx, fy, cx, cy]: [f64; 4],
-        k: &[f64],
-        field: &str,
+        given: &Coefficients,
     ) -> Result<Config, Problem> {
         let whole = |x: f64| (x.fract() == 0.0 && (2.0..=65535.0).contains(&x)).then_some(x as u16);
         let [Some(width), Some(height)] = size.map(whole) else {
@@ -148,14 +241,49 @@ impl File<'_> {
             Model::BrownConrady => 5,
             Model::Equidistant | Model::Pinhole => 0,
         };
-        if k.iter().skip(most).any(|k| *k != 0.0) {
-            let what =
-                format!("{} coefficients, but this lens has {most} in hzn; calibrate without the higher ones", k.len());
-            return Err(self.problem(field, what));
-        }
-        let k = k.iter().copied().take(most).collect();
+        let k = given.values.iter().flatten().copied().take(most).collect();
         let ideal = Config::ideal(model, width, height, fx);
         Ok(Config { fx_px: fx, fy_px: fy, cx_px: cx, cy_px: cy, k, ..ideal })
+    }
+}
+
+/// A lens as other tools call it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Lens {
+    /// Without distortion.
+    None,
+    /// k1 to k4 of the angle off axis.
+    Fisheye,
+    /// k1, k2, p1, p2 as Kalibr writes them, which never leaves them out.
+    Radtan,
+    /// k1, k2, p1, p2, k3; OpenCV writes none for a lens without distortion.
+    PlumbBob,
+    /// Three more in the denominator, which hzn's lens does not have.
+    Rational,
+}
+
+/// What the files call them.
+const LENSES: &[(&str, Lens)] = &[
+    ("equidistant", Lens::Fisheye),
+    ("fisheye", Lens::Fisheye),
+    ("kannala_brandt", Lens::Fisheye),
+    ("radtan", Lens::Radtan),
+    ("radial-tangential", Lens::Radtan),
+    ("plumb_bob", Lens::PlumbBob),
+    ("rational_polynomial", Lens::Rational),
+    ("none", Lens::None),
+];
+
+/// Coefficients of a lens, and the field that holds them.
+struct Coefficients {
+    values: Option<Vec<f64>>,
+    field: String,
+}
+
+impl Coefficients {
+    /// How many there are up to the last that is not 0.
+    fn meant(&self) -> usize {
+        self.values.iter().flatten().enumerate().filter(|(_, k)| **k != 0.0).map(|(i, _)| i + 1).max().unwrap_or(0)
     }
 }
 
@@ -232,10 +360,86 @@ mod tests {
         assert_eq!(c.k.as_slice(), [0.01, 0.002, -0.001, 0.0]);
         let brown = read(&text.replace("fisheye_model: 1", "fisheye_model: 0")).unwrap();
         assert_eq!(brown.model, Model::BrownConrady);
-        assert!(read(&text.replace("image_width", "width")).unwrap_err().contains("image_width: missing"));
+        assert!(read(&text.replace("image_width", "columns")).unwrap_err().contains("image_width: missing"));
         let short =
             "K: [[300, 0, 320], [0, 300, 240], [0, 0, 1]]\nD: [0, 0, 0, 0]\nimage_width: 640\nimage_height: 480\n";
         assert_eq!(read(short).unwrap().model, Model::Pinhole);
+    }
+
+    #[test]
+    fn ros_camera_info() {
+        // As the calibrator of ROS writes it.
+        let written = |model: &str, k: &str, cols: usize| {
+            format!(
+                "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
+                 data: [300, 0, 319.5, 0, 301, 239.5, 0, 0, 1]\ndistortion_model: {model}\n\
+                 distortion_coefficients:\n  rows: 1\n  cols: {cols}\n  data: [{k}]\nrectification_matrix:\n  \
+                 rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+            )
+        };
+        let four = "-0.05, 0.01, -0.0035, 0.0002";
+        let c = read(&written("equidistant", four, 4)).unwrap();
+        assert_eq!((c.model, c.k.as_slice()), (Model::KannalaBrandt, [-0.05, 0.01, -0.0035, 0.0002].as_slice()));
+        assert_eq!(read(&written("fisheye", four, 4)).unwrap(), c);
+        assert_eq!(read(&written("plumb_bob", &format!("{four}, 0.1"), 5)).unwrap().model, Model::BrownConrady);
+        assert_eq!(read(&written("plumb_bob", "0, 0, 0, 0, 0", 5)).unwrap().model, Model::Pinhole);
+        let eight = |last: &str| read(&written("rational_polynomial", &format!("{four}, 0.1, 0, 0, {last}"), 8));
+        // Without its denominator it is the same lens.
+        assert_eq!(eight("0").unwrap().k.as_slice(), [-0.05, 0.01, -0.0035, 0.0002, 0.1]);
+        let error = |text: String| read(&text).unwrap_err();
+        assert_eq!(
+            eight("0.2").unwrap_err(),
+            "cam.yaml: distortion_coefficients: 8 coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; calibrate \
+             without the higher ones (plumb_bob, or a fisheye lens)"
+        );
+        assert_eq!(
+            error(written("thin_prism", four, 4)),
+            "cam.yaml: distortion_model: \"thin_prism\" is a lens that hzn does not have; valid here: equidistant, fisheye, \
+             kannala_brandt, radtan, radial-tangential, plumb_bob, rational_polynomial, none"
+        );
+        assert!(error(written("plumbob", four, 4)).contains("did you mean plumb_bob?"));
+        // The shape of D.
+        assert_eq!(
+            error(written("equidistant", &format!("{four}, 0.1"), 5)),
+            "cam.yaml: distortion_coefficients: 5 coefficients, but a fisheye lens has four, k1 to k4; is it another lens?"
+        );
+        assert!(
+            error(written("plumb_bob", "-0.05, 0.01", 2)).contains("2 coefficients, but this lens has k1, k2, p1,")
+        );
+        assert!(error(written("rational_polynomial", four, 4)).contains("is it plumb_bob?"));
+        assert!(error(written("plumb_bob", four, 5)).contains("has 4 numbers, but rows and cols say 1 x 5"));
+        assert!(error(written("plumb_bob", "\"a\"", 1)).contains("a list of numbers is expected"));
+        // As `ros2 topic echo` shows it, and ROS 1.
+        let echoed = "header:\n  frame_id: cam\nheight: 480\nwidth: 640\ndistortion_model: equidistant\nd:\n- -0.05\n- 0.01\n\
+                      - -0.0035\n- 0.0002\nk:\n- 300.0\n- 0.0\n- 319.5\n- 0.0\n- 301.0\n- 239.5\n- 0.0\n- 0.0\n- 1.0\n\
+                      binning_x: 0\n---\n";
+        assert_eq!(read(echoed).unwrap(), c);
+        assert_eq!(read(&echoed.replace("\nd:", "\nD:").replace("\nk:", "\nK:")).unwrap(), c);
+        let none = "height: 480\nwidth: 640\ndistortion_model: ''\nD: []\nK: [0, 0, 0, 0, 0, 0, 0, 0, 0]\n";
+        assert!(read(none).unwrap_err().contains("K: is all zeros, as of a camera that was not calibrated"));
+    }
+
+    #[test]
+    fn what_would_be_misread_is_refused() {
+        let text = "K: [[300, 0, 320], [0, 300, 240], [0, 0, 1]]\nD: [-0.05, 0.01, -0.0035, 0.0002]\nimage_width: 640\n\
+                    image_height: 480\n";
+        assert!(read(text).unwrap_err().starts_with("cam.yaml: D: four coefficients are k1 to k4 of a fisheye"));
+        assert_eq!(read(&format!("{text}fisheye_model: 0\n")).unwrap().model, Model::BrownConrady);
+        assert_eq!(parse(text, Path::new("fisheye.yaml"), None).unwrap().model, Model::KannalaBrandt);
+        let both = format!("{text}fisheye_model: 1\ndistortion_model: plumb_bob\n");
+        assert!(read(&both).unwrap_err().contains("fisheye_model: says another lens than distortion_model"));
+        let turned =
+            text.replace("[[300, 0, 320], [0, 300, 240], [0, 0, 1]]", "[[300, 0, 0], [0, 300, 0], [320, 240, 1]]");
+        assert!(read(&turned).unwrap_err().contains("it is transposed, as MATLAB keeps it"));
+        // Coefficients under another name would be a lens without distortion.
+        let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  resolution: [640, 480]\n  \
+                     distortion_model: radtan\n  distortion_coefs: [0.01, 0.0, 0.0, 0.0]\n";
+        assert_eq!(read(chain).unwrap_err(), "cam.yaml: cam0.distortion_coeffs: missing: this lens has k1, k2, p1, p2");
+        assert!(
+            read(&chain.replace("coefs", "coeffs").replace("  distortion_model: radtan\n", ""))
+                .unwrap_err()
+                .contains("distortion_model does not say of which lens")
+        );
     }
 
     #[test]

@@ -8,10 +8,10 @@ use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, binarize, body};
 use hzn_mcap::Annotations;
 
-use crate::engine::{AnySensor, Trace, Traces};
+use crate::engine::{AnySensor, Trace, Traces, Unprocessed};
 use crate::exit::{Exit, Outcome, usage};
 use crate::input::{self, Picture};
-use crate::setup::{InputArgs, SensorArgs, need_altitude};
+use crate::setup::{InputArgs, SensorArgs, need_altitude, settle_input};
 use crate::tell;
 use crate::{output, overlay, words};
 
@@ -49,7 +49,9 @@ pub(super) fn run(args: &Args) -> Outcome {
         output::refuse_existing(path, args.force)?;
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
-    let sensor = args.sensor.load(source.as_ref())?;
+    let mut sensor = args.sensor.load(source.as_ref())?;
+    let notes = settle_input(source.as_mut(), &mut sensor)?;
+    notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
     need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     let mut item = None;
@@ -72,6 +74,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
     };
     let decoding = decoding.elapsed();
+    if picture.pages > 1 {
+        let what = "pictures, of which this is the first";
+        tell::line(format_args!("note: {} holds {} {what}", item.name, picture.pages));
+    }
     let flight = args.sensor.flight;
     let mut sensor = AnySensor::new(config, flight).map_err(usage)?;
     let half_angles = sensor.expected_half_angles_rad(data);
@@ -84,9 +90,21 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut statuses = Vec::new();
     let several = config.each_body().len() > 1;
     let processed = sensor.process(&view, data, Some(&traces)).into_iter().zip(times);
+    let mut exit = Exit::Done;
     for (which, ((processed, time), half_angle)) in processed.zip(half_angles).enumerate() {
         let (Some(body), Some(trace)) = (config.each_body().get(which), traces.each.get(which)) else { continue };
-        let report = processed.report.map_err(usage)?;
+        let between = if which > 0 { "\n" } else { "" };
+        let name = hzn_mcap::body_name(body.kind);
+        let (report, half_angle) = match (processed.report, half_angle) {
+            (Ok(report), Ok(half_angle)) => (report, half_angle),
+            (Err(why), _) | (_, Err(why)) => {
+                let Unprocessed { status, why, .. } = why.into();
+                tell::result(format_args!("{between}{}: {name}: {status}: {why}\n", item.name))?;
+                statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
+                exit = Exit::SomeUnreadable;
+                continue;
+            }
+        };
         let told = Told {
             name: &item.name,
             config,
@@ -96,20 +114,19 @@ pub(super) fn run(args: &Args) -> Outcome {
             picture: &picture,
             trace,
             report: &report,
-            half_angle: half_angle.map_err(usage)?,
+            half_angle,
         };
-        tell::result(format_args!("{}{}", if which > 0 { "\n" } else { "" }, told.text(decoding, time.elapsed)))?;
+        tell::result(format_args!("{between}{}", told.text(decoding, time.elapsed)))?;
         // Drawn where each row sees it.
         let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
         drawing.add(output::annotations(trace, report.solution.as_ref(), &camera));
-        let name = hzn_mcap::body_name(body.kind);
         statuses.push(if several { format!("{name} {}", report.status) } else { report.status.name().to_owned() });
     }
     if let Some(path) = &args.overlay {
         overlay::save(&overlay::draw_annotations(picture.to_rgb(), &drawing, &statuses.join(", ")), path)?;
         tell::line(format_args!("overlay: {}", path.display()));
     }
-    Ok(Exit::Done)
+    Ok(exit)
 }
 
 /// Everything that is known about the frame.

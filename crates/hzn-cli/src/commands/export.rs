@@ -51,9 +51,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
     let mut table = args.output.as_deref().map(|path| Rows::create(path, existing)).transpose()?;
     let (mut rows, mut images) = (0u64, 0u64);
+    let mut lost = None;
     if kind == "mcap" {
         let contents = if pictures { Contents::All } else { Contents::WithoutImages };
-        for frame in Reader::open(file, contents).map_err(failed)? {
+        let mut reader = Reader::open(file, contents).map_err(failed)?;
+        for frame in reader.by_ref() {
             let frame = frame.map_err(failed)?;
             rows += 1;
             if let Some(table) = &mut table {
@@ -63,6 +65,7 @@ pub(super) fn run(args: &Args) -> Outcome {
                 images += 1;
             }
         }
+        lost = input::lost_of_recording(&reader, file, "exported");
         if pictures && images == 0 {
             tell::warning(format_args!("{}: holds no pictures (was it recorded with --no-images?)", file.display()));
         }
@@ -81,7 +84,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     written.extend(args.images.iter().map(|_| tell::counted(images, "picture")));
     written.extend(args.overlay.iter().map(|_| tell::counted(images, "overlay")));
     tell::line(written.join(", "));
-    Ok(Exit::Done)
+    lost.iter().for_each(tell::warning);
+    Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
 fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {

@@ -24,18 +24,23 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
     let (kind, _) = input::existing(file)?;
-    let text = match kind.as_str() {
+    let (text, lost) = match kind.as_str() {
         "mcap" => recording(file)?,
-        "csv" | "jsonl" => table(file, &kind)?,
-        "toml" | "yaml" | "yml" => sensor(file, &kind)?,
-        _ => one_picture(file)?,
+        "csv" | "jsonl" => (table(file, &kind)?, None),
+        "toml" | "yaml" | "yml" => (sensor(file, &kind)?, None),
+        _ => (one_picture(file)?, None),
     };
     tell::result(text)?;
-    Ok(Exit::Done)
+    lost.iter().for_each(tell::warning);
+    Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
-fn recording(file: &Path) -> Result<String, Stop> {
-    let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
+/// What it is, and what is missing of it.
+type Said = (String, Option<String>);
+
+fn recording(file: &Path) -> Result<Said, Stop> {
+    // Pictures too: whether they are whole is part of what is in the file.
+    let mut reader = Reader::open(file, Contents::All).map_err(failed)?;
     let mut summary = Summary::default();
     for frame in reader.by_ref() {
         summary.add(&frame.map_err(failed)?.row);
@@ -57,7 +62,9 @@ fn recording(file: &Path) -> Result<String, Stop> {
         let c = sensor.config.camera;
         out.push_str(&format!("camera           {} x {} px, {}\n", c.width, c.height, c.model.name()));
     }
-    Ok(out)
+    // A run that still goes on, or that --resume continues, is no damage.
+    let unfinished = ending(file) == "part" && reader.broken_chunks() == 0;
+    Ok((out, input::lost_of_recording(&reader, file, "counted").filter(|_| !unfinished)))
 }
 
 fn unfinished(file: &Path) -> String {
@@ -65,7 +72,7 @@ fn unfinished(file: &Path) -> String {
 }
 
 /// A recording of another program: its pictures.
-fn foreign(file: &Path) -> Result<String, Stop> {
+fn foreign(file: &Path) -> Result<Said, Stop> {
     let mut reader = hzn_mcap::ImageReader::open(file, None).map_err(failed)?;
     let (mut count, mut span) = (0u64, None::<(f64, f64)>);
     for image in reader.by_ref() {
@@ -80,7 +87,8 @@ fn foreign(file: &Path) -> Result<String, Stop> {
     for topic in reader.other_topics() {
         out.push_str(&format!("other topic      {topic}\n"));
     }
-    Ok(out)
+    let lost = reader.broken().map(|why| format!("{}: {why}; the pictures before that were counted", file.display()));
+    Ok((out, lost))
 }
 
 fn table(file: &Path, kind: &str) -> Result<String, Stop> {
@@ -185,7 +193,9 @@ fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     if table.contains_key("trajectory") && table.contains_key("capture") {
         return scene(&crate::scene::parse(&text, file, None, None)?);
     }
-    Ok(what("sensor.toml") + &super::camera::describe(&hzn_calib::sensor::load(file)?.config)?)
+    let sensor = hzn_calib::sensor::load(file)?;
+    sensor.warnings.iter().for_each(tell::warning);
+    Ok(what("sensor.toml") + &super::camera::describe(&sensor.config)?)
 }
 
 fn scene(scenario: &Scenario) -> Result<String, Stop> {
@@ -215,6 +225,12 @@ fn one_picture(file: &Path) -> Result<String, Stop> {
         tell::counted(l.channels.into(), "channel"),
         l.bits
     ));
+    if p.pages > 1 {
+        out.push_str(&format!("pictures         {}, of which hzn takes the first\n", p.pages));
+    }
+    if let Some(how) = p.to_be_turned() {
+        out.push_str(&format!("to be shown      {how}; input.orient says whether it is\n"));
+    }
     if let Some(t) = p.exif_time_s {
         out.push_str(&format!("EXIF time        {t:.3} s since 1970, taken as UTC\n"));
     }

@@ -3,23 +3,26 @@
 use std::path::{Path, PathBuf};
 
 use hzn_calib::Frames;
+use hzn_core::pipeline::Orient;
 use hzn_core::status::Status;
 use hzn_mcap::{Row, part_path};
 
-use crate::engine::{self, AnySensor, End, Finished, Plan};
+use crate::engine::{self, AnySensor, End, Finished, Found, Plan};
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::input::{Source, ending};
+use crate::input::{self, Source, ending};
 use crate::output::{self, Existing, Held, Output};
 use crate::progress::Progress;
-use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, stop_flag};
+use crate::refusals::{Refusals, quoted, quoted_path};
+use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, settle_input, stop_flag};
 use crate::tell;
 
 /// Process a sequence of pictures
 ///
 /// Pictures are PNG, JPEG, TIFF, PNM or BMP, in a folder, as a pattern, or one by one; or headerless (--raw); or a
-/// video (through ffmpeg on PATH); or an MCAP with an image topic. Those of a folder are taken in the order of their
-/// names. An MCAP of an earlier run is processed again with its own sensor, names, times and positions. A picture that
-/// cannot be read becomes a row with status `unreadable`; the run goes on.
+/// video (through ffmpeg on PATH); or an MCAP with an image topic. Those of a folder or pattern are taken in the order
+/// of their names, where numbers count by their value (img2 before img10). An MCAP of an earlier run is processed again
+/// with its own sensor, names, times and positions. A picture that cannot be read becomes a row with status
+/// `unreadable`; the run goes on.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A folder, a pattern in quotes, pictures, a video, or an MCAP
@@ -86,11 +89,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut source = args.source.open(&args.input)?;
     let folder = source.folder();
     let mut sensor = args.sensor.load(source.as_ref())?;
-    if let Some(bits) = source.bits().filter(|bits| *bits > 8 && sensor.config.input.bits.is_none()) {
-        // Recorded pictures are PNG, which has room for more: who reads them is told by the recorded sensor.
-        sensor.config.input.bits = Some(bits);
-        sensor.text = with_bits(&sensor.text, bits);
-    }
+    let mut notes = source.notes();
+    notes.extend(settle_input(source.as_mut(), &mut sensor)?);
     check_size(source.as_ref(), &sensor)?;
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
     need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
@@ -131,10 +131,15 @@ pub(super) fn run(args: &Args) -> Outcome {
         overlay: args.overlay.clone(),
         last: Vec::new(),
     };
-    let (mut output, held) = output::open(path, existing, &plan.config, &sensor.text)?;
+    // Pictures are recorded as they were looked at.
+    let recorded = match plan.config.input.orient {
+        Orient::AsStored => sensor.text,
+        _ => input::with_key(&sensor.text, "orient", "as-stored"),
+    };
+    let (mut output, held) = output::open(path, existing, &plan.config, &recorded)?;
     let plan = Plan { last: held.answered.clone(), ..plan };
     if !args.quiet {
-        source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
+        notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }
     if held.frames > 0 && plan.overlay.is_some() && !args.quiet {
         tell::line(format_args!("note: what was finished before ({} frames) is not drawn again", held.frames));
@@ -149,12 +154,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     let stop = stop_flag();
     let mut tipped = args.quiet;
     let mut gaps = Gaps::default();
-    let mut unanswered = None;
+    let mut refusals = Refusals::default();
+    let mut several = Several::default();
     let mut seen = |frame: &Finished| {
         gaps.count(frame);
-        if unanswered.is_none() && frame.found.iter().all(|f| f.report.is_ok()) {
-            unanswered = Some(frame.name.clone());
-        }
+        refusals.count(frame);
+        several.count(frame);
         if let Some(tip) = frame.tip.as_ref().filter(|_| !tipped) {
             tipped = true;
             progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
@@ -173,17 +178,21 @@ pub(super) fn run(args: &Args) -> Outcome {
     let lost = source.lost().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
     gaps.tell(plan.frames.as_ref());
+    several.tell();
     if !args.quiet {
         let before = match held.frames {
             0 => String::new(),
             n => format!(" (after {n} that were finished before)"),
         };
         tell::line(format_args!("{summary}{before}"));
-        if let Some(name) = unanswered.filter(|_| !progress.any_answered() && held.frames == 0) {
-            let picture = args.input.iter().find(|p| p.ends_with(&name)).or(args.input.first());
-            let shown = picture.map(|p| if p.is_dir() { p.join(&name) } else { p.clone() }).unwrap_or_default();
-            let what = "nothing was found in any picture; what happens to one, and what to try:";
-            tell::line(format_args!("note: {what} hzn explain {}", shown.display()));
+        if let Some((why, frame)) = refusals.commonest(&plan.config.select) {
+            let nothing = !progress.any_answered() && held.frames == 0;
+            let found = if nothing { "nothing was found in any picture; " } else { "" };
+            let more = frame.map(|frame| {
+                let command = explain_command(args, source.as_ref(), frame);
+                format!("; what happens to one, and what to try: {command}")
+            });
+            tell::line(format_args!("note: {found}{why}{}", more.unwrap_or_default()));
         }
     }
     let done = held.frames + progress.frames();
@@ -196,17 +205,35 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("interrupted after {done}{of} frames{next}"));
         return Ok(Exit::Interrupted);
     }
-    Ok(if progress.any_unprocessed() || lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+    let missed = progress.any_unprocessed() || lost.is_some() || several.files > 0;
+    Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
 }
 
-/// The text of a sensor.toml with its `input.bits`.
-fn with_bits(text: &str, bits: u8) -> String {
-    let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_owned() };
-    let input = document.entry("input").or_insert_with(toml_edit::table);
-    if let Some(input) = input.as_table_like_mut() {
-        input.insert("bits", toml_edit::value(i64::from(bits)));
+/// The command that explains a frame of this run, as it is to be typed.
+fn explain_command(args: &Args, source: &dyn Source, frame: u64) -> String {
+    let mut words = vec!["hzn".to_owned(), "explain".to_owned()];
+    match (source.path(frame), args.input.first()) {
+        (Some(path), _) => words.push(quoted_path(&path)),
+        (None, input) => {
+            words.extend(input.map(|input| quoted_path(input)));
+            words.extend(["--index".to_owned(), frame.to_string()]);
+        }
     }
-    document.to_string()
+    let mut option = |name: &str, value: Option<String>| {
+        if let Some(value) = value {
+            words.extend([name.to_owned(), quoted(Path::new(&value))]);
+        }
+    };
+    let path = |path: &PathBuf| path.to_string_lossy().into_owned();
+    option("--sensor", args.sensor.sensor.as_ref().map(path));
+    option("--altitude-km", args.sensor.altitude_km.map(|km| km.to_string()));
+    option("--frames", args.source.frames.as_ref().map(path));
+    option("--raw", args.source.raw.map(|raw| raw.to_string()));
+    option("--topic", args.source.topic.clone());
+    if args.sensor.flight {
+        words.push("--flight".to_owned());
+    }
+    words.join(" ")
 }
 
 pub(super) fn cores() -> usize {
@@ -251,8 +278,41 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
 }
 
 fn warn_of_missing(frames: &Frames, folder: &Path) {
-    for row in frames.rows.iter().filter(|r| !folder.join(&r.file).exists()) {
+    let missing: Vec<_> = frames.rows.iter().filter(|r| !folder.join(&r.file).exists()).collect();
+    for row in missing.iter().take(MISSING_TOLD) {
         tell::warning(frames.problem(row, "no such picture in the folder; the row is not used"));
+    }
+    if let Some(more) = missing.len().checked_sub(MISSING_TOLD).filter(|n| *n > 0) {
+        let rows = tell::counted(more as u64, "further row");
+        tell::warning(format_args!("{}: {rows} without a picture in the folder", frames.path.display()));
+    }
+}
+
+/// Rows without a picture that are told one by one.
+const MISSING_TOLD: usize = 3;
+
+/// Files that hold more pictures than the one that was processed.
+#[derive(Default)]
+struct Several {
+    files: u64,
+    first: Option<(String, u32)>,
+}
+
+impl Several {
+    fn count(&mut self, frame: &Finished) {
+        if frame.pages > 1 {
+            self.files += 1;
+            self.first.get_or_insert_with(|| (frame.name.clone(), frame.pages));
+        }
+    }
+
+    fn tell(&self) {
+        let Some((name, pages)) = &self.first else { return };
+        let files = tell::counted(self.files, "file");
+        tell::warning(format_args!(
+            "only the first picture was processed of {files} with several pages or frames (the first is {name} with {pages} \
+             pictures): write each picture into a file of its own, or give a video"
+        ));
     }
 }
 
@@ -263,6 +323,7 @@ struct Gaps {
     no_row: u64,
     no_time: u64,
     no_altitude: u64,
+    below_limb: u64,
 }
 
 impl Gaps {
@@ -270,7 +331,11 @@ impl Gaps {
         self.frames += 1;
         self.no_row += u64::from(frame.data.is_none());
         self.no_time += u64::from(frame.time_s.is_none());
-        self.no_altitude += u64::from(frame.found.iter().any(|f| f.status() == Status::NoAltitude));
+        let unprocessed = |f: &Found| f.status() == Status::NoAltitude;
+        if frame.found.iter().any(unprocessed) {
+            let below = frame.found.iter().any(Found::is_below_limb);
+            *(if below { &mut self.below_limb } else { &mut self.no_altitude }) += 1;
+        }
     }
 
     fn tell(&self, frames: Option<&Frames>) {
@@ -285,6 +350,10 @@ impl Gaps {
             let what = "without an altitude, not processed (status no-altitude): give it in frames.csv, as body.altitude_km, or \
                         by --altitude-km";
             parts.push(format!("{} {what}", self.no_altitude));
+        }
+        if self.below_limb > 0 {
+            let what = "below the limb height, where no limb can be seen, not processed (status no-altitude)";
+            parts.push(format!("{} {what}", self.below_limb));
         }
         if !parts.is_empty() {
             tell::warning(format_args!("of {}: {}", tell::counted(self.frames, "frame"), parts.join("; ")));

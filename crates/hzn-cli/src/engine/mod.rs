@@ -74,6 +74,8 @@ pub struct Finished {
     pub traces: Option<Traces>,
     /// What to try, where nothing was found and the picture itself suggests something.
     pub tip: Option<String>,
+    /// Pictures in its file, of which the first was taken.
+    pub pages: u32,
 }
 
 /// What came of one body in one frame.
@@ -90,6 +92,11 @@ impl Found {
     pub fn status(&self) -> Status {
         self.report.as_ref().map_or_else(|e| e.status, |r| r.status)
     }
+
+    /// Whether it was not looked for because the camera is not above the limb height.
+    pub fn is_below_limb(&self) -> bool {
+        self.report.as_ref().is_err_and(|e| e.below_limb)
+    }
 }
 
 impl From<Processed> for Found {
@@ -105,12 +112,17 @@ pub struct Unprocessed {
     pub status: Status,
     /// In words.
     pub why: String,
+    /// The camera is not above the limb height.
+    pub below_limb: bool,
 }
 
 impl From<FrameError> for Unprocessed {
     fn from(error: FrameError) -> Self {
-        let status = if error == FrameError::NoAltitude { Status::NoAltitude } else { Status::Unreadable };
-        Self { status, why: error.to_string() }
+        let status = match error {
+            FrameError::NoAltitude | FrameError::BelowLimb { .. } => Status::NoAltitude,
+            _ => Status::Unreadable,
+        };
+        Self { status, why: error.to_string(), below_limb: matches!(error, FrameError::BelowLimb { .. }) }
     }
 }
 
@@ -122,7 +134,7 @@ impl Finished {
     }
     /// A picture that could not be read: so it is with every body.
     fn not_read(self, plan: &Plan, why: &str) -> Self {
-        let why = Unprocessed { status: Status::Unreadable, why: why.to_owned() };
+        let why = Unprocessed { status: Status::Unreadable, why: why.to_owned(), below_limb: false };
         let none = || Found { report: Err(why.clone()), elapsed: Duration::ZERO };
         Self { found: plan.config.each_body().iter().map(|_| none()).collect(), ..self }
     }
@@ -300,6 +312,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         picture: None,
         traces: None,
         tip: None,
+        pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
@@ -384,7 +397,7 @@ mod tests {
             let abroad = self.abroad.fetch_add(1, Ordering::SeqCst) + 1;
             self.most.fetch_max(abroad, Ordering::SeqCst);
             let layout = Layout::packed(32, 24, 1, 8);
-            let picture = Picture { samples: Samples::Bytes(vec![7; 32 * 24]), layout, exif_time_s: None };
+            let picture = Picture::new(Samples::Bytes(vec![7; 32 * 24]), layout);
             Some(Ok(Item {
                 name: self.left.to_string(),
                 time: TimeSource::Count,

@@ -297,7 +297,8 @@ fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
 }
 
 /// Checks a sensor, and every row of frames.csv against it, before the first frame is processed. A row that leaves the
-/// altitude open is none of these: its picture gets [`Status::NoAltitude`](hzn_core::status::Status::NoAltitude).
+/// altitude open, or gives one below the limb height, is not refused: its picture gets
+/// [`Status::NoAltitude`](hzn_core::status::Status::NoAltitude).
 ///
 /// # Errors
 /// The row, the picture and the column that cannot be.
@@ -307,7 +308,7 @@ pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result
     for row in &frames.rows {
         for half_angle in sensor.expected_half_angles_rad(Some(row)) {
             match half_angle {
-                Ok(_) | Err(FrameError::NoAltitude) => {}
+                Ok(_) | Err(FrameError::NoAltitude | FrameError::BelowLimb { .. }) => {}
                 Err(why) => return Err(frames.refused(row, why)),
             }
         }

@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Item, Payload, Raw, SIZES, Source, TimeSource, ending, picture, video};
+use hzn_core::image::Channel;
+use image::metadata::Orientation;
+
+use super::{Item, Payload, Raw, SIZES, Source, TimeSource, bits, ending, natural, picture, raw, turn, video};
 use crate::exit::{Stop, usage};
 use crate::tell;
 
@@ -11,6 +14,9 @@ use crate::tell;
 const PICTURES: &[&str] = &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp"];
 /// Endings of files that lie beside pictures and are none.
 const COMPANIONS: &[&str] = &["csv", "toml", "txt", "md", "json", "jsonl", "yaml", "yml", "xml", "log", "mcap", "part"];
+
+/// Pictures of which it is looked up how they are to be shown.
+const TURNED: usize = 4;
 
 pub(super) struct Files {
     paths: Vec<PathBuf>,
@@ -22,6 +28,10 @@ pub(super) struct Files {
     /// Names are given with their folder, because the files lie in several.
     with_folder: bool,
     left_out: LeftOut,
+    /// Two that the shell put the other way round than they count.
+    out_of_order: Option<[String; 2]>,
+    /// One pattern is all that was given.
+    is_pattern: bool,
 }
 
 /// Files and other things that were left out, counted by what they are and by their ending.
@@ -95,7 +105,7 @@ impl Files {
                 if found.is_empty() {
                     return Err(usage(format!("{text}: no picture matches")));
                 }
-                found.sort();
+                found.sort_by(|a, b| natural::compare(a, b));
                 paths.extend(found);
             } else {
                 return Err(usage(format!("{text}: no such file or folder")));
@@ -117,8 +127,21 @@ impl Files {
         let with_folder = paths.iter().any(|p| parent(p) != first);
         let folder = folder.unwrap_or(first);
         let time = if raw.is_none() && tell_their_time(&paths) { TimeSource::Exif } else { TimeSource::Count };
-        Ok(Self { paths, given: 0, folder, raw, time, with_folder, left_out })
+        let out_of_order = out_of_order(&paths);
+        let is_pattern = matches!(inputs, [one] if !one.exists());
+        Ok(Self { paths, given: 0, folder, raw, time, with_folder, left_out, out_of_order, is_pattern })
     }
+}
+
+/// The first two names that stand in the order of their bytes, as a shell lists them, where their numbers say the opposite.
+/// Only where all names stand in that order: any other was chosen by someone.
+fn out_of_order(paths: &[PathBuf]) -> Option<[String; 2]> {
+    let pairs = || paths.windows(2).filter_map(|w| w.first().zip(w.last()));
+    if !pairs().all(|(a, b)| a.as_os_str() <= b.as_os_str()) {
+        return None;
+    }
+    let (a, b) = pairs().find(|(a, b)| natural::compare(a, b).is_gt())?;
+    Some([a, b].map(|p| p.file_name().unwrap_or_default().to_string_lossy().into_owned()))
 }
 
 /// Whether the camera wrote the time into the pictures: the first that can be read speaks for all.
@@ -142,7 +165,7 @@ fn in_folder(folder: &Path, raw: bool, left_out: &mut LeftOut) -> Result<Vec<Pat
     });
     only_files(&mut paths, left_out);
     // By name, so that the order does not depend on the file system.
-    paths.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
+    paths.sort_by(|a, b| natural::compare(a, b));
     Ok(paths)
 }
 
@@ -153,6 +176,20 @@ impl Files {
             _ => path.to_string_lossy().into_owned(),
         }
     }
+
+    fn payload(&self, path: PathBuf) -> Payload {
+        match self.raw {
+            Some(raw) => Payload::RawFile(path, raw),
+            None => Payload::File(path),
+        }
+    }
+
+    /// The pictures of the same kind in the folder of one of them, in order.
+    fn alike_in_folder(&self, one: &Path) -> Vec<PathBuf> {
+        let folder = Some(&self.folder).filter(|f| !f.as_os_str().is_empty()).map_or(Path::new("."), |f| f);
+        let paths = in_folder(folder, self.raw.is_some(), &mut LeftOut::new()).unwrap_or_default();
+        paths.into_iter().filter(|path| ending(path) == ending(one)).collect()
+    }
 }
 
 impl Source for Files {
@@ -160,10 +197,7 @@ impl Source for Files {
         let path = self.paths.get(self.given)?.clone();
         self.given += 1;
         let name = self.name(&path);
-        let payload = match self.raw {
-            Some(raw) => Payload::RawFile(path, raw),
-            None => Payload::File(path),
-        };
+        let payload = self.payload(path);
         Some(Ok(Item { name, time: self.time, data: None, payload }))
     }
     fn total(&self) -> Option<u64> {
@@ -178,11 +212,51 @@ impl Source for Files {
         };
         Box::new(self.paths.iter().step_by(step).filter_map(move |p| Some((self.name(p), size(p)?))))
     }
+    fn path(&self, frame: u64) -> Option<PathBuf> {
+        // By itself it would have another name in frames.csv.
+        let one = self.paths.get(usize::try_from(frame).ok()?)?;
+        (!self.with_folder || !self.is_pattern).then(|| one.clone())
+    }
     fn folder(&self) -> PathBuf {
         self.folder.clone()
     }
     fn bits(&self) -> Option<u8> {
-        self.raw.map(|raw| raw.bits())
+        // mono16 has room for any number.
+        self.raw.filter(|raw| raw.format != raw::Format::Words(16)).map(|raw| raw.bits())
+    }
+    fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
+        let [one] = self.paths.as_slice() else {
+            let path = |i: usize| self.paths.get(i).cloned();
+            return Box::new(bits::places(self.paths.len()).filter_map(move |i| Some(self.payload(path(i)?))));
+        };
+        // One picture of a sequence must come out as in the sequence.
+        let others = self.alike_in_folder(one);
+        let size = picture::size_of(one);
+        let alike = move |path: &PathBuf| path != one && (self.raw.is_some() || picture::size_of(path) == size);
+        let sampled: Vec<PathBuf> = bits::places(others.len()).filter_map(|i| others.get(i).cloned()).collect();
+        let others = sampled.into_iter().filter(alike).map(|path| self.payload(path));
+        Box::new(std::iter::once(self.payload(one.clone())).chain(others))
+    }
+    fn to_be_turned(&self) -> Option<(String, &'static str)> {
+        if self.raw.is_some() {
+            return None;
+        }
+        let turned = |path: &PathBuf| {
+            let turn = picture::orientation_of(path).filter(|turn| *turn != Orientation::NoTransforms)?;
+            Some((self.name(path), turn::in_words(turn)))
+        };
+        // A camera writes it into all of them; each is read as a whole.
+        let step = self.paths.len().div_ceil(TURNED).max(1);
+        self.paths.iter().step_by(step).find_map(turned)
+    }
+    fn want_channel(&mut self, channel: Channel) -> Result<(), Stop> {
+        match self.raw {
+            Some(raw) if channel != Channel::Mean && raw.format == raw::Format::Bayer8 => Err(usage(format!(
+                "--raw {raw}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in [input] of \
+                 sensor.toml"
+            ))),
+            _ => Ok(()),
+        }
     }
     fn notes(&self) -> Vec<String> {
         let note = |((kind, ending), n): (&(Kind, String), &usize)| {
@@ -194,6 +268,10 @@ impl Source for Files {
             let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };
             format!("{} {name} left out", tell::counted(*n as u64, what))
         };
-        self.left_out.iter().map(note).collect()
+        let mut notes: Vec<String> = self.left_out.iter().map(note).collect();
+        notes.extend(self.out_of_order.as_ref().map(|[a, b]| {
+            format!("pictures are taken in the order given, {a} before {b}; give the folder, or the pattern in quotes, to count them")
+        }));
+        notes
     }
 }

@@ -2,21 +2,29 @@
 //!
 //! A [`Source`] hands out [`Item`]s in the sequence's order without decoding them; decoding is left to the threads.
 
+mod bits;
 mod exif;
 mod files;
+mod natural;
+mod pages;
 pub mod picture;
 pub mod raw;
 mod recording;
 mod rerun;
+mod turn;
 mod video;
 
 use std::path::{Path, PathBuf};
 
 use hzn_calib::{FrameData, Frames};
 use hzn_core::Config;
+use hzn_core::image::Channel;
+use hzn_core::pipeline::Orient;
 
+pub use bits::{FoundBits, find_bits, with_key};
 pub use picture::Picture;
 pub use raw::Raw;
+pub use rerun::lost as lost_of_recording;
 
 use crate::exit::{Stop, usage};
 
@@ -92,6 +100,10 @@ pub trait Source: Send {
     /// Names and sizes (width, height in pixels) of some of the pictures, from their headers alone; those that cannot
     /// be read are left out.
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_>;
+    /// The file of a frame that can be had by itself, with what lies beside it.
+    fn path(&self, _frame: u64) -> Option<PathBuf> {
+        None
+    }
     /// Folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
     /// Text of the sensor.toml that the pictures were recorded with; a source that has one also knows what frames.csv said
@@ -102,6 +114,22 @@ pub trait Source: Send {
     /// Significant bits of a sample, when they are known before.
     fn bits(&self) -> Option<u8> {
         None
+    }
+    /// Pictures from the whole sequence, a few, for what only their samples tell ([`find_bits`]). By their places alone, so that
+    /// the same sequence gives the same ones.
+    fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
+        Box::new(std::iter::empty())
+    }
+    /// The first picture that is to be shown turned, and how, as the camera wrote into it.
+    fn to_be_turned(&self) -> Option<(String, &'static str)> {
+        None
+    }
+    /// Colours are asked for, which a source may have to be told before it reads.
+    ///
+    /// # Errors
+    /// The source has none.
+    fn want_channel(&mut self, _channel: Channel) -> Result<(), Stop> {
+        Ok(())
     }
     /// Things that the user should know, such as files left out.
     fn notes(&self) -> Vec<String> {
@@ -130,17 +158,35 @@ impl Item {
 
 impl Payload {
     /// The picture, decoded, and the file's own bytes where they are PNG or JPEG and can be kept as they are. A sensor says
-    /// which size it must have, and how many bits.
+    /// which size it must have, how many bits, and how it is turned.
     ///
     /// # Errors
     /// Why it cannot be read, for the record of the frame.
     pub fn decode(self, sensor: Option<&Config>) -> Result<(Picture, Option<Vec<u8>>), String> {
-        let expected = sensor.map(|s| (u32::from(s.camera.width), u32::from(s.camera.height)));
-        let (picture, original) = self.decode_as_it_is(expected)?;
-        match sensor {
-            Some(sensor) => Ok((picture.told(&sensor.input)?, original)),
-            None => Ok((picture, original)),
+        let Some(sensor) = sensor else { return self.decode_as_it_is(None) };
+        let own = (u32::from(sensor.camera.width), u32::from(sensor.camera.height));
+        // Each picture says itself how it is turned, so that its size is known only then.
+        let stored = match sensor.input.orient {
+            Orient::Exif => None,
+            Orient::Rotate90 | Orient::Rotate270 => Some((own.1, own.0)),
+            Orient::AsStored | Orient::Rotate180 => Some(own),
+        };
+        let (picture, original) = self.decode_as_it_is(stored)?;
+        let turned = picture.is_turned(&sensor.input);
+        let picture = picture.told(&sensor.input)?;
+        picture::check_size(picture.layout.width, picture.layout.height, Some(own))?;
+        Ok((picture, original.filter(|_| !turned)))
+    }
+
+    /// The largest sample of a picture of 16-bit words; `None` of any other, and of one that cannot be read.
+    fn largest_word(self) -> Option<u16> {
+        match &self {
+            Self::File(path) if !picture::has_words(std::fs::File::open(path).ok()?) => return None,
+            Self::File(path) if picture::tells_its_scale(path) => return Some(u16::MAX),
+            Self::Encoded(bytes) if !picture::has_words(std::io::Cursor::new(bytes)) => return None,
+            _ => {}
         }
+        self.decode_as_it_is(None).ok()?.0.largest_word()
     }
 
     fn decode_as_it_is(self, expected: Option<(u32, u32)>) -> Result<(Picture, Option<Vec<u8>>), String> {

@@ -5,7 +5,10 @@ use std::path::Path;
 
 use hzn_core::image::{Channel, ImageError, ImageView, Layout};
 use hzn_core::pipeline::Input;
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+
+use super::{pages, turn};
 
 /// Longest side of a picture that is read, in pixels.
 pub const MAX_SIDE_PX: u32 = 20_000;
@@ -33,34 +36,59 @@ pub struct Picture {
     pub layout: Layout,
     /// Time of exposure from EXIF, seconds since 1970 (EXIF has no time zone: taken as UTC).
     pub exif_time_s: Option<f64>,
+    /// How the camera says that it is to be turned to be shown.
+    pub orientation: Orientation,
+    /// Pictures in its file, of which it is the first.
+    pub pages: u32,
 }
 
 impl Picture {
-    /// With as many bits as a sensor says.
+    /// A picture that is no file.
+    pub fn new(samples: Samples, layout: Layout) -> Self {
+        Self { samples, layout, exif_time_s: None, orientation: Orientation::NoTransforms, pages: 1 }
+    }
+
+    /// With as many bits as a sensor says, and turned as it says.
     ///
     /// # Errors
     /// A sample that has more.
     pub fn told(mut self, input: &Input) -> Result<Self, String> {
-        let (Samples::Words(words), Some(bits)) = (&self.samples, input.bits) else { return Ok(self) };
-        let most = words.iter().copied().max().unwrap_or(0);
-        if u32::from(most) >> bits > 0 {
-            return Err(format!("a sample of {most} has more bits than input.bits = {bits} in sensor.toml says"));
+        if let (Some(most), Some(bits)) = (self.largest_word(), input.bits) {
+            if u32::from(most) >> bits > 0 {
+                let needed = 16 - most.leading_zeros();
+                return Err(format!(
+                    "a sample of {most} has more bits than input.bits = {bits}, which sensor.toml or the other pictures say: \
+                     write bits = {needed} or more in [input] of sensor.toml"
+                ));
+            }
+            self.layout.bits = bits;
         }
-        self.layout.bits = bits;
-        Ok(self)
+        let turn = turn::needed(input.orient, self.orientation);
+        Ok(turn::turned(self, turn))
+    }
+
+    /// Whether [`Self::told`] turns it.
+    pub fn is_turned(&self, input: &Input) -> bool {
+        turn::needed(input.orient, self.orientation) != Orientation::NoTransforms
+    }
+
+    /// How the camera says that it is to be shown, in words, where that is not as it is stored.
+    pub fn to_be_turned(&self) -> Option<&'static str> {
+        (self.orientation != Orientation::NoTransforms).then(|| turn::in_words(self.orientation))
+    }
+
+    /// The largest sample of a picture of words, transparency aside.
+    pub fn largest_word(&self) -> Option<u16> {
+        let Samples::Words(words) = &self.samples else { return None };
+        let channels = usize::from(self.layout.channels.max(1));
+        let bright = if channels.is_multiple_of(2) { channels - 1 } else { channels };
+        words.chunks_exact(channels).flat_map(|pixel| pixel.iter().take(bright)).copied().max()
     }
 
     /// What to try when nothing is found and the upper bits of all words are unused, of which nobody has told.
     pub fn unused_bits(&self) -> Option<String> {
-        let Samples::Words(words) = &self.samples else { return None };
-        let most = words.iter().copied().max()?;
-        let bits = (16 - most.leading_zeros()).max(8);
-        (self.layout.bits == 16 && bits + UNUSED_BITS <= 16).then(|| {
-            format!(
-                "samples reach {most} of 65535: if the camera has fewer bits than the file has room for, say so with bits = \
-                 {bits} in [input] of sensor.toml"
-            )
-        })
+        let most = self.largest_word()?;
+        if self.layout.bits == 16 { unused_bits(most) } else { None }
     }
 
     /// The picture for the pipeline.
@@ -121,6 +149,17 @@ impl Picture {
     }
 }
 
+/// What to try where samples of 16 bits reach no more than `most`, and nobody has told how many bits they have.
+pub fn unused_bits(most: u16) -> Option<String> {
+    let bits = (16 - most.leading_zeros()).max(8);
+    (bits + UNUSED_BITS <= 16).then(|| {
+        format!(
+            "samples reach {most} of 65535: if the camera has fewer bits than the file has room for, say so with bits = {bits} in \
+             [input] of sensor.toml"
+        )
+    })
+}
+
 /// The kind of picture that these bytes are, by their first few.
 pub fn format_of(bytes: &[u8]) -> Option<ImageFormat> {
     image::guess_format(bytes).ok()
@@ -141,6 +180,28 @@ pub(super) fn exif_of(path: &Path) -> Option<Option<f64>> {
 pub(super) fn lens_of(path: &Path) -> Option<hzn_calib::start::Exif> {
     let mut decoder = ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?;
     decoder.exif_metadata().ok().flatten().and_then(super::exif::lens)
+}
+
+/// How the camera says that a picture is to be turned to be shown.
+pub(super) fn orientation_of(path: &Path) -> Option<Orientation> {
+    ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?.orientation().ok()
+}
+
+/// Whether its samples are words, by its header.
+pub(super) fn has_words(contents: impl std::io::Read + std::io::Seek) -> bool {
+    let reader = ImageReader::new(std::io::BufReader::new(contents)).with_guessed_format();
+    reader.ok().and_then(|reader| reader.into_decoder().ok()).is_some_and(|decoder| {
+        let color = decoder.color_type();
+        color.bytes_per_pixel() > color.channel_count()
+    })
+}
+
+/// Whether its header says which sample is white, so that it is scaled to all 16 bits when it is decoded: a PNM of less.
+pub(super) fn tells_its_scale(path: &Path) -> bool {
+    use image::codecs::pnm::PnmDecoder;
+    let Ok(file) = std::fs::File::open(path) else { return false };
+    let decoder = PnmDecoder::new(std::io::BufReader::new(file));
+    decoder.is_ok_and(|d| d.into_inner().1.maximal_sample() < u32::from(u16::MAX))
 }
 
 /// As [`size_of`], from the file's contents.
@@ -200,6 +261,7 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
         return Err("JPEG data end before the picture does: the file is truncated".into());
     }
     let exif_time_s = decoder.exif_metadata().ok().flatten().and_then(super::exif::time_s);
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let image = DynamicImage::from_decoder(decoder).map_err(|e| explain(&e, format))?;
     let (samples, channels, bits) = match image {
         DynamicImage::ImageLuma8(i) => (Samples::Bytes(i.into_raw()), 1, 8),
@@ -214,7 +276,8 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
             return Err(format!("samples of kind {:?} are not supported; use 8 or 16 bit integers", other.color()));
         }
     };
-    Ok(Picture { samples, layout: Layout::packed(width, height, channels, bits), exif_time_s })
+    let layout = Layout::packed(width, height, channels, bits);
+    Ok(Picture { exif_time_s, orientation, pages: pages::count(bytes, format), ..Picture::new(samples, layout) })
 }
 
 /// Refuses sizes that are not the camera's, zero, or beyond all limits.
@@ -227,7 +290,8 @@ pub(crate) fn check_size(width: u32, height: u32, expected: Option<(u32, u32)>) 
     }
     match expected {
         Some((w, h)) if (w, h) != (width, height) => Err(format!(
-            "picture is {width}x{height} but the camera is {w}x{h} (camera.width, camera.height in sensor.toml)"
+            "picture is {width}x{height} but the camera is {w}x{h} (camera.width, camera.height in sensor.toml){}",
+            if (h, w) == (width, height) { "; input.orient turns pictures" } else { "" }
         )),
         _ => Ok(()),
     }

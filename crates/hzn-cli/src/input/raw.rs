@@ -141,7 +141,7 @@ impl Raw {
             Format::Mono12p => Samples::Words(unpack(data, 12, pixels)),
             Format::Bayer8 => return Ok(self.bayer(data)),
         };
-        Ok(Picture { samples, layout: Layout::packed(self.width, self.height, 1, self.bits()), exif_time_s: None })
+        Ok(Picture::new(samples, Layout::packed(self.width, self.height, 1, self.bits())))
     }
 
     fn bayer(&self, data: &[u8]) -> Picture {
@@ -156,7 +156,7 @@ impl Raw {
         }
         let (width, height) = self.size();
         let layout = Layout::packed(width, height, 1, 8);
-        Picture { samples: Samples::Bytes(out), layout, exif_time_s: None }
+        Picture::new(Samples::Bytes(out), layout)
     }
 }
 

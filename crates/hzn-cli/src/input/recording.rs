@@ -9,6 +9,9 @@ use super::picture::{self, Picture, Samples};
 use super::{Item, Payload, SIZES, Source, TimeSource};
 use crate::exit::{Stop, usage};
 
+/// A recording does not say how many pictures it has: of its beginning every so many are looked at for [`Source::samples`].
+pub(super) const SAMPLE_EVERY: usize = 16;
+
 /// Frames of one topic. They are named after the recording: `flight.mcap#000012`.
 pub(super) struct Recording {
     reader: ImageReader,
@@ -40,7 +43,8 @@ impl Recording {
                             .to_owned()
                     }
                 };
-                return Err(usage(format!("{}: {what}", path.display())));
+                let broken = recording.reader.broken().map(|why| format!("; it {why}")).unwrap_or_default();
+                return Err(usage(format!("{}: {what}{broken}", path.display())));
             }
         };
         Ok(recording)
@@ -81,7 +85,7 @@ pub(crate) fn payload(image: EncodedImage) -> Payload {
     let EncodedImage { format, bytes } = image;
     let raw = |samples, width, height, channels, bits| {
         let layout = Layout::packed(width, height, channels, bits);
-        Payload::Decoded(Picture { samples, layout, exif_time_s: None })
+        Payload::Decoded(Picture::new(samples, layout))
     };
     match format {
         ImageFormat::Png | ImageFormat::Jpeg => Payload::Encoded(bytes),
@@ -116,6 +120,17 @@ impl Source for Recording {
     }
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
+    }
+    fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
+        let Ok(reader) = ImageReader::open(&self.path, self.reader.topic()) else {
+            return Box::new(std::iter::empty());
+        };
+        let images = reader.map_while(Result::ok).step_by(SAMPLE_EVERY);
+        Box::new(images.map(|m| m.image.map_or_else(Payload::Broken, payload)))
+    }
+    fn lost(&self) -> Option<String> {
+        let why = self.reader.broken()?;
+        Some(format!("{}: {why}; the pictures before that were processed", self.path.display()))
     }
     fn notes(&self) -> Vec<String> {
         let topics: Vec<&str> = self.reader.other_topics().collect();

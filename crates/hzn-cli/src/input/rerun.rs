@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hzn_calib::FrameData;
 use hzn_mcap::{Contents, Found, FrameRecord, Index, Reader};
 
-use super::recording::{payload, size_of};
+use super::recording::{SAMPLE_EVERY, payload, size_of};
 use super::{Item, Payload, SIZES, Source, TimeSource};
 use crate::exit::{Stop, usage};
 use crate::output;
@@ -25,9 +25,16 @@ impl Rerun {
         if reader.sensor_toml().is_none() {
             return Ok(None);
         }
-        if !has_pictures(path).map_err(usage)? {
-            let what = "holds results without their pictures; give the pictures themselves";
-            return Err(usage(format!("{}: {what}", path.display())));
+        match holds(path).map_err(usage)? {
+            Holds::Pictures => {}
+            Holds::Results => {
+                let what = "holds results without their pictures; give the pictures themselves";
+                return Err(usage(format!("{}: {what}", path.display())));
+            }
+            Holds::LostPictures => {
+                let what = "was cut off before its first picture was whole; give the pictures themselves";
+                return Err(usage(format!("{}: {what}", path.display())));
+            }
         }
         Ok(Some(Self { reader, path: path.to_owned(), last: None }))
     }
@@ -37,15 +44,24 @@ fn open(path: &Path) -> Result<Reader, hzn_mcap::Error> {
     Reader::open(path, Contents::All)
 }
 
+enum Holds {
+    Pictures,
+    Results,
+    /// Nothing that is whole.
+    LostPictures,
+}
+
 /// Pictures come before the results, so that little is read of a recording that has them.
-fn has_pictures(path: &Path) -> Result<bool, hzn_mcap::Error> {
+fn holds(path: &Path) -> Result<Holds, hzn_mcap::Error> {
     let mut index = Index::open(path)?;
+    let mut any = false;
     while let Some(part) = index.next_part()? {
         if part.iter().any(|found| matches!(found, Found::Picture(_))) {
-            return Ok(true);
+            return Ok(Holds::Pictures);
         }
+        any |= !part.is_empty();
     }
-    Ok(false)
+    Ok(if any || index.is_complete() { Holds::Results } else { Holds::LostPictures })
 }
 
 fn item(record: FrameRecord) -> Item {
@@ -72,6 +88,11 @@ impl Source for Rerun {
         let records = reader.map_while(Result::ok).take(SIZES);
         Box::new(records.filter_map(|r| Some((r.row.file, size_of(r.image.as_ref()?)?))))
     }
+    fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
+        let Ok(reader) = open(&self.path) else { return Box::new(std::iter::empty()) };
+        let pictures = reader.map_while(Result::ok).filter_map(|record| record.image);
+        Box::new(pictures.step_by(SAMPLE_EVERY).map(payload))
+    }
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
     }
@@ -79,12 +100,17 @@ impl Source for Rerun {
         self.reader.sensor_toml()
     }
     fn lost(&self) -> Option<String> {
-        let name = self.path.display();
-        match self.reader.broken_chunks() {
-            0 if self.reader.is_complete() => None,
-            0 => Some(format!("{name}: was cut off; its finished frames were processed (`hzn recover` closes it)")),
-            1 => Some(format!("{name}: 1 damaged part was left out; what it held is missing")),
-            n => Some(format!("{name}: {n} damaged parts were left out; what they held is missing")),
-        }
+        lost(&self.reader, &self.path, "processed")
+    }
+}
+
+/// What is missing of a recording that was read to its end, and what was `done` with the rest.
+pub fn lost(reader: &Reader, path: &Path, done: &str) -> Option<String> {
+    let name = path.display();
+    match reader.broken_chunks() {
+        0 if reader.is_complete() => None,
+        0 => Some(format!("{name}: was cut off; its finished frames were {done} (`hzn recover` closes it)")),
+        1 => Some(format!("{name}: 1 damaged part was left out; what it held is missing")),
+        n => Some(format!("{name}: {n} damaged parts were left out; what they held is missing")),
     }
 }

@@ -6,8 +6,8 @@ use crate::linalg::V3;
 use crate::real::Real;
 
 use super::{
-    AU_KM, AltitudeReference, Config, Frame, FrameError, Kind, Last, MOON_DISTANCE_KM, MOON_RADIUS_KM, SUN_RADIUS_KM,
-    shape,
+    AU_KM, AltitudeReference, Config, Frame, FrameError, Kind, LOWEST_ALTITUDE_M, Last, MOON_DISTANCE_KM,
+    MOON_RADIUS_KM, SUN_RADIUS_KM, shape,
 };
 
 /// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
@@ -83,8 +83,10 @@ impl<T: Real> Expected<T> {
         let mut harmonics = [T::zero(); 2];
         let limb_sigma = T::of(body.limb_height_sigma_km) * km;
         let mut altitude_sigma = T::of(body.altitude_sigma_km) * km;
+        let lowest = T::of(LOWEST_ALTITUDE_M);
+        let below = |h: T, limb: T| FrameError::BelowLimb { altitude_m: rounded_m(h), limb_m: rounded_m(limb) };
         let given = match frame.altitude_m {
-            Some(h) if !(h > T::zero() && h.is_finite()) => return Err(FrameError::Altitude),
+            Some(h) if !(h > lowest && h.is_finite()) => return Err(FrameError::Altitude),
             Some(h) => Some(h),
             None => body.altitude_km.map(|h| T::of(h) * km),
         };
@@ -107,17 +109,22 @@ impl<T: Real> Expected<T> {
                     let (a, b) = (T::of(WGS84_A_M) + limb, T::of(WGS84_B_M) + limb);
                     LimbCone::try_new(p, a, b).ok_or(FrameError::Position)
                 };
-                let mut cone = raised(limb)?;
                 let (h, latitude) = geodetic(p, T::of(WGS84_A_M), T::of(WGS84_B_M));
-                if !body.limb_height_by_latitude_km.is_empty() {
-                    let (sin, _) = cone.mean_half_angle_rad().sin_cos();
-                    let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
-                    (limb, harmonics) = (mean * km, [first * km, second * km]);
-                    cone = raised(limb)?;
-                }
-                if !(h > limb && h > T::zero()) {
+                if !(h > lowest && h.is_finite()) {
                     return Err(FrameError::Position);
                 }
+                let mut cone = raised(limb);
+                if !body.limb_height_by_latitude_km.is_empty() {
+                    // Below the limb height the limb is all around at the camera's own latitude.
+                    let sin = cone.as_ref().map_or(T::one(), |cone| cone.mean_half_angle_rad().sin_cos().0);
+                    let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
+                    (limb, harmonics) = (mean * km, [first * km, second * km]);
+                    cone = raised(limb);
+                }
+                if !(h > limb) {
+                    return Err(below(h, limb));
+                }
+                let cone = cone?;
                 let (sin, _) = cone.mean_half_angle_rad().sin_cos();
                 ellipsoid = Some(cone);
                 // The sphere with this half-angle at this altitude.
@@ -128,7 +135,7 @@ impl<T: Real> Expected<T> {
                 let altitude = match (position, given, body.kind) {
                     (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
                         let h = (x * x + y * y + z * z).sqrt() - r;
-                        if !(h > T::zero()) {
+                        if !(h > lowest && h.is_finite()) {
                             return Err(FrameError::Position);
                         }
                         h
@@ -153,7 +160,7 @@ impl<T: Real> Expected<T> {
         };
         let cos2 = T::one() - sin * sin;
         if !(sin > T::zero() && cos2 > T::EPSILON) {
-            return Err(FrameError::Altitude);
+            return Err(below(altitude, limb));
         }
         let cos = cos2.sqrt();
         if body.half_angle_is_free() {
@@ -240,8 +247,15 @@ impl<T: Real> Expected<T> {
     }
 }
 
+/// A length to the nearest metre, for messages.
+fn rounded_m<T: Real>(m: T) -> i32 {
+    (m + T::of(0.5)).floor().to_i32()
+}
+
 #[cfg(test)]
 mod tests {
+    use std::string::ToString;
+
     use super::*;
 
     #[test]
@@ -286,5 +300,33 @@ mod tests {
             let frame = Frame { attitude_sigma_rad: Some(deg), ..frame };
             assert_eq!(Expected::new(&body, &frame).unwrap_err(), FrameError::AttitudeSigma);
         }
+    }
+
+    #[test]
+    fn a_camera_below_the_limb_height_is_told_apart_from_impossible_ones() {
+        let with = |kind| Config { kind, limb_height_km: 17.0, radius_km: None, ..Config::default() };
+        let body = with(Kind::Earth);
+        let at = |body: &Config, frame: Frame<f64>| Expected::<f64>::new(body, &frame).unwrap_err();
+        let altitude = |h: f64| Frame { altitude_m: Some(h), ..Frame::default() };
+        let told = FrameError::BelowLimb { altitude_m: 3200, limb_m: 17_000 };
+        assert_eq!(at(&body, altitude(3200.0)), told);
+        assert_eq!(told.to_string(), "altitude 3.2 km is below the limb height 17 km");
+        let pad = crate::ellipsoid::from_geodetic(1.18, 0.37, 3200.0, WGS84_A_M, WGS84_B_M);
+        assert_eq!(at(&body, Frame { position_m: Some(pad), ..Frame::default() }), told);
+        let rows = [[-90.0, 16.0], [0.0, 18.0], [90.0, 16.0]].into_iter().collect();
+        let by_latitude = Config { limb_height_by_latitude_km: rows, ..body.clone() };
+        let FrameError::BelowLimb { altitude_m: 3200, limb_m: 16_000..17_000 } =
+            at(&by_latitude, Frame { position_m: Some(pad), ..Frame::default() })
+        else {
+            panic!()
+        };
+        let sphere = with(Kind::EarthSphere);
+        let near = Frame { position_m: Some([0.0, 6371.0088e3 + 3200.0, 0.0]), ..Frame::default() };
+        assert_eq!(at(&sphere, near), told);
+        // The pad may stand below the ellipsoid. At the limb height itself nothing is seen either.
+        assert!(matches!(at(&body, altitude(-20.0)), FrameError::BelowLimb { altitude_m: -20, .. }));
+        assert!(at(&body, altitude(17_000.0)).to_string().contains("is not above the limb height"));
+        assert_eq!(at(&body, altitude(-1000.0)), FrameError::Altitude);
+        assert!(Expected::<f64>::new(&body, &altitude(17_500.0)).is_ok());
     }
 }

@@ -75,14 +75,40 @@ pub struct Input {
     /// Mean of the colours, or one of them.
     pub channel: Channel,
     /// Significant bits of a sample, 8 to 16, where words have room for more: full scale is theirs. For programs that read
-    /// files, which put it into the picture's [`Layout`](crate::image::Layout). Left out: as the file says.
+    /// files, which put it into the picture's [`Layout`](crate::image::Layout). Left out: as the file says, and where that is
+    /// 16, as many as the samples of the sequence use.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub bits: Option<u8>,
+    /// How pictures are turned before they are looked at; the camera's width, height and calibration are those of the turned
+    /// picture. For programs that read files.
+    pub orient: Orient,
     /// Rows of a smaller copy of the picture that is looked at instead of it, 16 up to the picture's own. From there on
     /// every length is in the copy's pixels. Left out: the picture as it is.
     #[cfg(feature = "horace")]
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub scale_to_height: Option<u16>,
+}
+
+/// How a picture is turned between its file and the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Orient {
+    /// Not at all: pixels are where the file has them, as the detector gave them.
+    #[default]
+    #[cfg_attr(feature = "serde", serde(rename = "as-stored"))]
+    AsStored,
+    /// As the camera wrote into the file (EXIF) that it is to be shown, as photograph viewers and OpenCV's `imread` do.
+    #[cfg_attr(feature = "serde", serde(rename = "exif"))]
+    Exif,
+    /// By 90 degrees clockwise.
+    #[cfg_attr(feature = "serde", serde(rename = "rotate-90"))]
+    Rotate90,
+    /// By 180 degrees.
+    #[cfg_attr(feature = "serde", serde(rename = "rotate-180"))]
+    Rotate180,
+    /// By 90 degrees counter-clockwise.
+    #[cfg_attr(feature = "serde", serde(rename = "rotate-270"))]
+    Rotate270,
 }
 
 impl Config {

@@ -27,7 +27,7 @@ mod workspace;
 #[cfg(test)]
 mod golden;
 
-pub use config::{Config, Input, MAX_BODIES, Mount};
+pub use config::{Config, Input, MAX_BODIES, Mount, Orient};
 pub use horizon::{FlightHorizon, Horizon, HostHorizon};
 pub use observer::{Observer, Unobserved};
 pub use optional::{OPTIONAL, Optional, lacking};

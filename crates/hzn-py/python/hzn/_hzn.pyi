@@ -313,14 +313,16 @@ class Sensor:
         time_s
             UTC in seconds since 1970. With a position it gives `Report.axis_ecef` of Sun and Moon.
         bits
-            Significant bits of uint16, 8 to 16; without it, the sensor's `input.bits`, else 16.
+            Significant bits of uint16, 8 to 16; without it, the sensor's `input.bits`, else 16. Where nothing is found and the
+            upper bits are unused, a warning says so.
         detail
             Keep edges, points and times of the stages.
 
         Returns
         -------
         Report
-            Of a sensor of several bodies that of the first; `Report.others` has the rest.
+            Of a sensor of several bodies that of the first; `Report.others` has the rest. Below the limb height, where every
+            rocket begins, its status is ``no-altitude``.
 
         Raises
         ------

@@ -11,7 +11,7 @@ use hzn_cli::input::Picture;
 use hzn_cli::input::picture::Samples;
 use hzn_core::Config;
 use hzn_core::camera::Camera;
-use hzn_core::pipeline::Input;
+use hzn_core::pipeline::{Input, Orient};
 
 use super::Wake;
 use super::paint::{self, Recipe, Warp};
@@ -102,12 +102,13 @@ struct Looker {
     ahead: VecDeque<(usize, Entry)>,
 }
 
-/// The picture with as many bits as the sensor says.
+/// The picture with as many bits as the sensor says, and turned as it says.
 fn told(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
     match (&picture.samples, input.bits) {
         (Samples::Words(_), Some(bits)) if bits != picture.layout.bits => {
             Picture::clone(&picture).told(input).map(Arc::new)
         }
+        _ if picture.is_turned(input) => Picture::clone(&picture).told(input).map(Arc::new),
         _ => Ok(picture),
     }
 }
@@ -246,7 +247,8 @@ impl Looker {
             Some(config) if ask.look != Look::Colour => config.input.channel,
             _ => hzn_core::image::Channel::Mean,
         };
-        let recipe = Recipe { look: ask.look, level, channel, plane };
+        let orient = config.map_or(Orient::AsStored, |config| config.input.orient);
+        let recipe = Recipe { look: ask.look, level, channel, orient, plane };
         let of = (ask.index, recipe);
         if let Some(shown) = self.shown.as_ref().filter(|s| s.of == of) {
             return Arc::clone(shown);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_calib::Frames;
-use hzn_cli::input::{self, Item, Payload, Raw, TimeSource};
+use hzn_cli::input::{self, Item, Payload, Raw, Source, TimeSource};
 use hzn_mcap::{Found, Index, Row};
 use hzn_sim::truth::{self, Truth};
 
@@ -172,6 +172,21 @@ fn companions(request: &Request, folder: &Path, own: Option<SensorText>) -> (Ope
     (opened, frames)
 }
 
+/// Says what looks wrong about the sensor, and puts in what the pictures tell about their samples.
+fn settle(opened: &mut Opened, source: &dyn Source) {
+    let Some(sensor) = &mut opened.sensor else { return };
+    // What is wrong with it, the session says.
+    let Ok(parsed) = hzn_calib::sensor::parse(&sensor.text, &sensor.home) else { return };
+    opened.notes.extend(parsed.warnings.iter().map(ToString::to_string));
+    if parsed.config.input.bits.is_some() {
+        return;
+    }
+    if let Some(found) = input::find_bits(source) {
+        sensor.text = input::with_key(&sensor.text, "bits", i64::from(found.bits));
+        opened.notes.extend((found.bits < 16).then(|| found.to_string()));
+    }
+}
+
 /// A recording: of our own, with results and sensor; or of another program, with pictures only.
 fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
@@ -189,6 +204,9 @@ fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), Stri
     }
     let (mut opened, frames) = companions(&request, &folder, own);
     opened.title = title(path);
+    if let Ok(source) = input::open(std::slice::from_ref(&path.to_owned()), None, None) {
+        settle(&mut opened, source.as_ref());
+    }
     teller.tell(Event::Opened(Box::new(opened)));
     let mut frames_of = Gather { name: title(path), frames, pending: HashMap::new(), pictures_only: 0, last: None };
     let mut known = 0;
@@ -282,6 +300,7 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
         several => format!("{} pictures", several.len()),
     };
     opened.notes.extend(source.notes());
+    settle(&mut opened, source.as_ref());
     teller.tell(Event::Opened(Box::new(opened)));
     let mut batch = Vec::new();
     for index in 0u64.. {

@@ -4,6 +4,7 @@ use egui::{Color32, ColorImage};
 use hzn_cli::input::{Picture, picture::Samples};
 use hzn_core::camera::Camera;
 use hzn_core::image::{Channel, ImageView, Pixels};
+use hzn_core::pipeline::Orient;
 
 use crate::model::{Look, Plane};
 
@@ -21,6 +22,8 @@ pub struct Recipe {
     pub level: u16,
     /// Which channel is brightness.
     pub channel: Channel,
+    /// How the picture was turned.
+    pub orient: Orient,
     /// The plane it is shown in.
     pub plane: Plane,
 }
@@ -145,11 +148,11 @@ mod tests {
 
     fn picture(channels: u8) -> Picture {
         let data = (0..8 * 6 * u32::from(channels)).map(|i| (i * 5) as u8).collect();
-        Picture { samples: Samples::Bytes(data), layout: Layout::packed(8, 6, channels, 8), exif_time_s: None }
+        Picture::new(Samples::Bytes(data), Layout::packed(8, 6, channels, 8))
     }
 
     fn recipe(look: Look) -> Recipe {
-        Recipe { look, level: 100, channel: Channel::Mean, plane: Plane::Camera }
+        Recipe { look, level: 100, channel: Channel::Mean, orient: Orient::AsStored, plane: Plane::Camera }
     }
 
     #[test]
@@ -171,7 +174,7 @@ mod tests {
     #[test]
     fn words_are_shown_by_their_high_bits() {
         let layout = Layout::packed(2, 1, 1, 12);
-        let p = Picture { samples: Samples::Words(vec![0xfff, 0x080]), layout, exif_time_s: None };
+        let p = Picture::new(Samples::Words(vec![0xfff, 0x080]), layout);
         let shown = paint(&p, &recipe(Look::Colour), None, &mut Warp::default());
         assert_eq!((shown[(0, 0)], shown[(1, 0)]), (Color32::from_gray(255), Color32::from_gray(8)));
         assert_eq!(read(&p, Channel::Mean, 1, 0), Some((0x80, vec![0x80])));

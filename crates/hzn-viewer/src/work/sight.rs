@@ -231,6 +231,8 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
         tip: None,
+        pages: 1,
+        traces: None,
     };
     let rows = output::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(data);

@@ -15,7 +15,7 @@ use crate::exit::{Exit, Outcome, failed, usage};
 use crate::input::ending;
 use crate::output;
 use crate::progress::Progress;
-use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, stop_flag};
+use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, settle_input, stop_flag};
 use crate::tell;
 
 /// Measure limb height and edge noise on the pictures of a flight
@@ -71,14 +71,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut source = args.source.open(&args.input)?;
     let mut sensor = args.sensor.load(source.as_ref())?;
-    if let Some(bits) = source.bits().filter(|bits| *bits > 8 && sensor.config.input.bits.is_none()) {
-        sensor.config.input.bits = Some(bits);
-    }
+    let mut notes = source.notes();
+    notes.extend(settle_input(source.as_mut(), &mut sensor)?);
     check_size(source.as_ref(), &sensor)?;
     let Some(config) = noise::looks_with(&sensor.config) else {
         return Err(usage("the sensor looks for Sun and Moon only, whose limb has no height to measure"));
     };
-    let wide = Sensor { config, text: sensor.text.clone() };
+    let wide = Sensor { config, ..sensor.clone() };
     let frames = args.source.frames(source.as_ref(), &wide, args.sensor.flight)?;
     need_altitude(&wide, source.as_ref(), frames.as_ref())?;
     let camera = Camera::try_new(&wide.config.camera).map_err(usage)?;
@@ -97,7 +96,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         last: Vec::new(),
     };
     if !args.quiet {
-        source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
+        notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }
     let mut progress = Progress::new(source.total(), 0, args.quiet);
     let mut sightings = Vec::new();

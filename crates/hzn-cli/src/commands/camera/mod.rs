@@ -25,7 +25,7 @@ pub(super) struct Args {
 enum Command {
     /// Print lens table, field of view, image circle, and the size in which the limb is expected
     Show {
-        /// A sensor.toml, or a camera file of Kalibr, OpenCV or EuRoC (.yaml)
+        /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC or ROS (.yaml)
         file: PathBuf,
     },
     Convert(convert::Args),
@@ -33,7 +33,13 @@ enum Command {
 
 pub(super) fn run(args: &Args) -> Outcome {
     match &args.command {
-        Command::Show { file } => tell::result(describe(&load(file)?)?)?,
+        Command::Show { file } => {
+            let config = load(file)?;
+            for doubt in hzn_calib::plausible::doubts(&config) {
+                tell::warning(format_args!("{}: {}: {}", file.display(), doubt.key, doubt.what));
+            }
+            tell::result(describe(&config)?)?;
+        }
         Command::Convert(args) => convert::run(args)?,
     }
     Ok(Exit::Done)

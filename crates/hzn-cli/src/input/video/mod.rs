@@ -1,7 +1,8 @@
 //! Videos, through `ffmpeg` and `ffprobe` on PATH.
 //!
 //! Brightness is the luma plane as it stands in the stream (`extractplanes=y`): converting to grey would stretch
-//! limited range. Times are every frame's own, from ffprobe, which runs alongside; a constant rate is never assumed.
+//! limited range. Where one colour is wanted (`input.channel`), ffmpeg converts to RGB of full range. Pixels are taken as they are
+//! stored, whatever the container says about turning them. Times are every frame's own, from ffprobe, which runs alongside; a constant rate is never assumed.
 //!
 //! That the end is missing is known by what ffmpeg says and by the sizes in an AVI. A y4m, or a stream such as MPEG-TS that was cut
 //! between two frames, does not tell.
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::thread::JoinHandle;
 
-use hzn_core::image::Layout;
+use hzn_core::image::{Channel, Layout};
 
 use super::picture::{Picture, Samples, check_size};
 use super::{Item, Payload, Source};
@@ -36,10 +37,15 @@ pub(super) struct Video {
     stem: String,
     width: u32,
     height: u32,
+    /// Samples a pixel: luma alone, or three colours.
+    channels: u8,
     /// Significant bits of a sample.
     bits: u8,
+    pix_fmt: String,
+    /// How the container says that it is to be shown.
+    turned: Option<&'static str>,
     frames: Running,
-    pixels: BufReader<Box<dyn Read + Send>>,
+    pixels: Pixels,
     /// What ffmpeg says, while it runs.
     said: Option<JoinHandle<Said>>,
     times: Times,
@@ -57,7 +63,7 @@ impl Video {
                 "-select_streams",
                 "v:0",
                 "-show_entries",
-                "stream=width,height,pix_fmt,nb_frames",
+                "stream=width,height,pix_fmt,nb_frames:stream_side_data=rotation:stream_tags=rotate",
                 "-of",
                 "default=nw=1",
             ])
@@ -76,34 +82,22 @@ impl Video {
         };
         check_size(width, height, None).map_err(|e| usage(format!("{name}: {e}")))?;
         let pix_fmt = entry("pix_fmt").unwrap_or_default().trim();
-        let bits = [("16", 16), ("14", 14), ("12", 12), ("10", 10), ("9", 9)]
-            .iter()
-            .find(|(n, _)| pix_fmt.ends_with(&format!("{n}le")) || pix_fmt.ends_with(&format!("{n}be")))
-            .map_or(8, |(_, bits)| *bits);
-        let out_format = if bits == 8 { "gray".to_owned() } else { format!("gray{bits}le") };
-        // Colour planes have no luma plane to extract.
-        let filter = if ["rgb", "bgr", "gbr", "pal"].iter().any(|p| pix_fmt.contains(p)) {
-            "format=gray"
-        } else {
-            "extractplanes=y"
-        };
-        let mut command = tool("ffmpeg");
-        command
-            .args(["-nostdin", "-noautorotate", "-i"])
-            .arg(path)
-            .args(["-map", "0:v:0", "-fps_mode", "passthrough", "-vf", filter, "-pix_fmt", &out_format])
-            .args(["-f", "rawvideo", "-"])
-            .stderr(Stdio::piped());
-        let (mut frames, pixels) = Running::start("ffmpeg", &mut command)?;
-        let said = frames.listen();
+        let (bits, arguments) = luma(pix_fmt);
+        let (frames, pixels, said) = start(path, &arguments)?;
+        let degrees = |key: &str| entry(key).and_then(|deg| deg.trim().parse::<f64>().ok());
+        // The tag, of older files, counts clockwise.
+        let turned = degrees("rotation").or(degrees("TAG:rotate").map(|deg| -deg)).and_then(turned);
         Ok(Self {
             path: path.to_owned(),
             stem: path.file_name().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
             width,
             height,
+            channels: 1,
             bits,
+            pix_fmt: pix_fmt.to_owned(),
+            turned,
             frames,
-            pixels: BufReader::with_capacity(1 << 20, Box::new(pixels)),
+            pixels,
             said: Some(said),
             times: Times::start(path)?,
             index: 0,
@@ -140,7 +134,73 @@ impl Video {
     }
 }
 
+/// The bits of a stream's luma, and what asks ffmpeg for it.
+fn luma(pix_fmt: &str) -> (u8, Vec<String>) {
+    let bits = bits_of(pix_fmt);
+    let out_format = if bits == 8 { "gray".to_owned() } else { format!("gray{bits}le") };
+    // Colour planes have no luma plane to extract.
+    let filter = if ["rgb", "bgr", "gbr", "pal"].iter().any(|p| pix_fmt.contains(p)) {
+        "format=gray"
+    } else {
+        "extractplanes=y"
+    };
+    (bits, ["-vf", filter, "-pix_fmt", &out_format].map(str::to_owned).to_vec())
+}
+
+/// The bits of a stream's colours as they are handed out, and what asks ffmpeg for them.
+fn colours(pix_fmt: &str) -> (u8, Vec<String>) {
+    let (bits, out_format) = if bits_of(pix_fmt) == 8 { (8, "rgb24") } else { (16, "rgb48le") };
+    (bits, ["-pix_fmt", out_format].map(str::to_owned).to_vec())
+}
+
+fn bits_of(pix_fmt: &str) -> u8 {
+    let deep = [("16", 16), ("14", 14), ("12", 12), ("10", 10), ("9", 9)];
+    let named = |n: &str| pix_fmt.ends_with(&format!("{n}le")) || pix_fmt.ends_with(&format!("{n}be"));
+    deep.iter().find(|(n, _)| named(n)).map_or(8, |(_, bits)| *bits)
+}
+
+/// What a container's rotation means, in words; `None` for none.
+fn turned(counter_clockwise_deg: f64) -> Option<&'static str> {
+    match (counter_clockwise_deg / 90.0).round().rem_euclid(4.0) as u8 {
+        1 => Some("turned by 90 degrees counter-clockwise"),
+        2 => Some("turned by 180 degrees"),
+        3 => Some("turned by 90 degrees clockwise"),
+        _ => None,
+    }
+}
+
+type Pixels = BufReader<Box<dyn Read + Send>>;
+
+/// Starts ffmpeg on a video.
+fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHandle<Said>), Stop> {
+    let mut command = tool("ffmpeg");
+    command
+        .args(["-nostdin", "-noautorotate", "-i"])
+        .arg(path)
+        .args(["-map", "0:v:0", "-fps_mode", "passthrough"])
+        .args(arguments)
+        .args(["-f", "rawvideo", "-"])
+        .stderr(Stdio::piped());
+    let (mut frames, pixels) = Running::start("ffmpeg", &mut command)?;
+    let said = frames.listen();
+    Ok((frames, BufReader::with_capacity(1 << 20, Box::new(pixels)), said))
+}
+
 impl Source for Video {
+    fn to_be_turned(&self) -> Option<(String, &'static str)> {
+        self.turned.map(|how| (self.stem.clone(), how))
+    }
+    fn want_channel(&mut self, channel: Channel) -> Result<(), Stop> {
+        // A picture without colours has its luma in each of them.
+        if channel == Channel::Mean || self.channels == 3 || self.pix_fmt.starts_with("gray") {
+            return Ok(());
+        }
+        let (bits, arguments) = colours(&self.pix_fmt);
+        let (frames, pixels, said) = start(&self.path, &arguments)?;
+        (self.frames, self.pixels, self.said) = (frames, pixels, Some(said));
+        (self.bits, self.channels) = (bits, 3);
+        Ok(())
+    }
     fn bits(&self) -> Option<u8> {
         Some(self.bits)
     }
@@ -148,8 +208,8 @@ impl Source for Video {
         if self.ended {
             return None;
         }
-        let pixels = self.width as usize * self.height as usize;
-        let mut data = vec![0; if self.bits == 8 { pixels } else { 2 * pixels }];
+        let samples = self.width as usize * self.height as usize * usize::from(self.channels);
+        let mut data = vec![0; if self.bits == 8 { samples } else { 2 * samples }];
         let mut have = 0;
         while have < data.len() {
             match self.pixels.read(&mut data[have..]) {
@@ -167,8 +227,7 @@ impl Source for Video {
         } else {
             Samples::Words(data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect())
         };
-        let picture =
-            Picture { samples, layout: Layout::packed(self.width, self.height, 1, self.bits), exif_time_s: None };
+        let picture = Picture::new(samples, Layout::packed(self.width, self.height, self.channels, self.bits));
         let name = format!("{}#{:06}", self.stem, self.index);
         let time = self.times.next();
         self.index += 1;
@@ -185,5 +244,28 @@ impl Source for Video {
     }
     fn lost(&self) -> Option<String> {
         self.lost.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotations_are_told_the_way_they_turn() {
+        assert_eq!(turned(-90.0), Some("turned by 90 degrees clockwise"));
+        assert_eq!(turned(270.0), turned(-90.0));
+        assert_eq!(turned(90.0), Some("turned by 90 degrees counter-clockwise"));
+        assert_eq!((turned(-180.0), turned(0.0)), (Some("turned by 180 degrees"), None));
+    }
+
+    #[test]
+    fn colours_are_asked_for_only_where_they_are_wanted() {
+        assert_eq!(luma("yuv420p10le").1, ["-vf", "extractplanes=y", "-pix_fmt", "gray10le"]);
+        assert_eq!(luma("gbrp").1, ["-vf", "format=gray", "-pix_fmt", "gray"]);
+        assert_eq!(
+            (colours("yuv420p").0, colours("yuv422p12le")),
+            (8, (16, vec!["-pix_fmt".into(), "rgb48le".into()]))
+        );
     }
 }

@@ -1,0 +1,308 @@
+//! Values that can be, and that nobody means: swapped, in another unit, or in another order.
+//!
+//! Each is only a warning, as an odd camera may exist. What cannot be is refused by hzn-core's own checks.
+
+use hzn_core::Config;
+use hzn_core::body;
+use hzn_core::camera::{self, Camera, Model};
+use hzn_core::pixel::ImagePoint;
+
+/// What is odd about a value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Doubt {
+    /// The key of sensor.toml, such as `camera.fx_px`.
+    pub key: &'static str,
+    /// Which of several `[[bodies]]` it belongs to, from 0.
+    pub body: Option<u8>,
+    /// In words, with what it may have been meant to be.
+    pub what: String,
+}
+
+impl Doubt {
+    fn new(key: &'static str, what: impl Into<String>) -> Self {
+        Self { key, body: None, what: what.into() }
+    }
+}
+
+/// The principal point of a camera lies within this part of the picture's side from its middle, unless the picture was cut.
+const OFF_CENTRE: f64 = 0.2;
+/// Focal lengths along x and y differ by no more than this part: pixels are square.
+const SQUARE: f64 = 0.2;
+/// Pinhole lenses show no more from side to side, in degrees.
+const WIDEST_PINHOLE_DEG: f64 = 150.0;
+/// Fisheye lenses show no more, in degrees.
+const WIDEST_FISHEYE_DEG: f64 = 250.0;
+/// Telescopes show less than this, in degrees, and have no limb in view.
+const NARROWEST_DEG: f64 = 0.5;
+/// Tangential coefficients come from a lens that sits askew, by little.
+const TANGENTIAL: f64 = 0.05;
+/// From farther than this many radii a body is a disc of less than 3 degrees, and from farther than geostationary orbit
+/// pictures of the Earth are rare.
+const FAR_RADII: f64 = 40.0;
+/// Farther than geostationary orbit: kilometres above the Earth.
+pub(crate) const FAR_KM: f64 = 40_000.0;
+
+/// Everything odd about a sensor.
+pub fn doubts(config: &Config) -> Vec<Doubt> {
+    let mut doubts = of_camera(&config.camera);
+    if let Some(mount) = &config.mount
+        && mount.q_body_from_camera_wxyz == [0.0, 0.0, 0.0, 1.0]
+    {
+        let what =
+            "is half a turn about the optical axis, as the scalar comes first; no rotation at all is [1, 0, 0, 0]";
+        doubts.push(Doubt::new("mount.q_body_from_camera_wxyz", what));
+    }
+    let several = !config.bodies.is_empty();
+    for (which, body) in (0u8..).zip(config.each_body()) {
+        doubts.extend(of_body(body).map(|doubt| Doubt { body: several.then_some(which), ..doubt }));
+    }
+    doubts
+}
+
+/// Beyond which altitude in kilometres metres are suspected.
+pub(crate) fn far_km(body: body::Kind, radius_km: f64) -> f64 {
+    match body {
+        body::Kind::Earth | body::Kind::EarthSphere => FAR_KM,
+        _ => FAR_RADII * radius_km,
+    }
+}
+
+fn of_body(body: &body::Config) -> Option<Doubt> {
+    let km = body.altitude_km?;
+    if let Some(what) = unused_altitude(body.kind) {
+        return Some(Doubt::new("body.altitude_km", what));
+    }
+    let far = km > far_km(body.kind, body.mean_radius_km());
+    far.then(|| {
+        Doubt::new("body.altitude_km", format!("{km} km is farther than limbs are taken from: is it in metres?"))
+    })
+}
+
+/// What is said where an altitude is given for the Sun or the Moon, whose cone does not follow from it.
+pub fn unused_altitude(body: body::Kind) -> Option<String> {
+    match body {
+        body::Kind::Moon => Some(format!(
+            "is not used: kind = \"moon\" is the Moon as a disc of half a degree, seen from about the Earth; for a camera in \
+             orbit about the Moon write kind = \"sphere\" and radius_km = {}",
+            body::MOON_RADIUS_KM
+        )),
+        body::Kind::Sun => Some("is not used: kind = \"sun\" is the Sun as a disc of half a degree".to_owned()),
+        _ => None,
+    }
+}
+
+fn of_camera(c: &camera::Config) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
+    doubts.extend(centre(c));
+    doubts.extend(focal(c));
+    doubts.extend(coefficients(c));
+    if let Some(deg) = c.theta_max_deg {
+        let wide = half_width_deg(c);
+        if deg < std::f64::consts::PI && wide.is_some_and(|wide| wide > 3.0 * deg) {
+            let what = format!("an image circle of {deg} degrees leaves out most of the picture: is it in radians?");
+            doubts.push(Doubt::new("camera.theta_max_deg", what));
+        }
+    }
+    doubts
+}
+
+fn centre(c: &camera::Config) -> Option<Doubt> {
+    let (w, h) = (f64::from(c.width), f64::from(c.height));
+    let off = |x: f64, y: f64| ((x + 0.5) / w - 0.5).abs().max(((y + 0.5) / h - 0.5).abs());
+    if off(c.cx_px, c.cy_px) <= OFF_CENTRE {
+        return None;
+    }
+    let at = format!("the centre ({}, {}) is far from the middle of {} x {} px", c.cx_px, c.cy_px, c.width, c.height);
+    let unit = 0.0..=1.0;
+    let why = if unit.contains(&c.cx_px) && unit.contains(&c.cy_px) {
+        "; it is counted in pixels from the picture's upper left corner".to_owned()
+    } else if off(c.cy_px, c.cx_px) <= OFF_CENTRE / 2.0 {
+        ": are cx_px and cy_px, or width and height, swapped?".to_owned()
+    } else {
+        // The middle of a picture of another size.
+        let [a, b] = [(c.cx_px + 0.5) / w * 2.0, (c.cy_px + 0.5) / h * 2.0];
+        if a > 0.0 && b > 0.0 && (a / b - 1.0).abs() < 0.2 {
+            let [w, h] = [w * a, h * b].map(f64::round);
+            format!(": is the calibration that of pictures of about {w} x {h} px?")
+        } else {
+            ": was the picture cut from a larger one?".to_owned()
+        }
+    };
+    Some(Doubt::new("camera.cx_px", at + &why))
+}
+
+fn focal(c: &camera::Config) -> Option<Doubt> {
+    let ratio = c.fx_px / c.fy_px;
+    if (ratio - 1.0).abs() > SQUARE && (1.0 / ratio - 1.0).abs() > SQUARE {
+        let what =
+            format!("{} and fy_px = {} make pixels that are not square: is one of them wrong?", c.fx_px, c.fy_px);
+        return Some(Doubt::new("camera.fx_px", what));
+    }
+    let half = half_width_deg(c)?;
+    let widest = if c.model == Model::Pinhole || c.model == Model::BrownConrady {
+        WIDEST_PINHOLE_DEG
+    } else {
+        WIDEST_FISHEYE_DEG
+    };
+    if 2.0 * half > widest && c.theta_max_deg.is_none() {
+        let what = format!(
+            "{} px over {} px of width is a field of view of {:.0} degrees: is it in millimetres? (divide those by the width of \
+             a pixel)",
+            c.fx_px,
+            c.width,
+            2.0 * half
+        );
+        return Some(Doubt::new("camera.fx_px", what));
+    }
+    (2.0 * half < NARROWEST_DEG).then(|| {
+        let what =
+            format!("{} px over {} px of width is a field of view of {:.2} degrees", c.fx_px, c.width, 2.0 * half);
+        Doubt::new("camera.fx_px", what)
+    })
+}
+
+/// How far off axis the middle of the picture's farther side is, degrees.
+fn half_width_deg(c: &camera::Config) -> Option<f64> {
+    // Beyond a half turn there are no rays.
+    let linear = linear_half_width_deg(c);
+    if linear > 180.0 {
+        return Some(linear);
+    }
+    // The whole lens, whatever its image circle.
+    let free = camera::Config { theta_max_deg: None, ..c.clone() };
+    let camera = Camera::<f64>::try_new(&free).or_else(|_| Camera::try_new(c)).ok()?;
+    let side = |u: f64| camera.unproject(ImagePoint { u, v: c.cy_px });
+    let [left, right] = [side(-0.5 + 1e-6), side(f64::from(c.width) - 0.5 - 1e-6)].map(|ray| {
+        let [x, y, z] = ray?.xyz();
+        Some(x.hypot(y).atan2(z).to_degrees())
+    });
+    match (left, right) {
+        (Some(a), Some(b)) => Some((a + b) / 2.0),
+        // Without a ray it is beyond what the lens shows.
+        _ => Some(linear),
+    }
+}
+
+/// As [`half_width_deg`], of a lens without coefficients.
+fn linear_half_width_deg(c: &camera::Config) -> f64 {
+    let half = f64::from(c.width) / 2.0 / c.fx_px;
+    match c.model {
+        Model::Pinhole | Model::BrownConrady => half.atan().to_degrees(),
+        Model::KannalaBrandt | Model::Equidistant => half.to_degrees(),
+    }
+}
+
+fn coefficients(c: &camera::Config) -> Option<Doubt> {
+    let k = c.k.as_slice();
+    match (c.model, k) {
+        (Model::KannalaBrandt, [first, ..]) if (first - 1.0).abs() < 1e-9 => Some(Doubt::new(
+            "camera.k",
+            "begins with 1: k1 is the coefficient of the angle's third power; leave the 1 of the first power out",
+        )),
+        (Model::BrownConrady, [_, _, p1, p2, rest @ ..])
+            if p1.abs().max(p2.abs()) > TANGENTIAL && rest.iter().all(|k3| k3.abs() <= p1.abs().max(p2.abs())) =>
+        {
+            Some(Doubt::new(
+                "camera.k",
+                format!("has tangential coefficients {p1} and {p2}, which are large: the order is k1, k2, p1, p2, k3"),
+            ))
+        }
+        _ => None,
+    }
+}
+
+/// Five coefficients where a fisheye lens has four: those of Braun & Barf 2022, (13), and what hzn calls them.
+pub(crate) fn five_coefficients(c: &camera::Config) -> Option<String> {
+    let [first, higher @ ..] = c.k.as_slice() else { return None };
+    if c.model != Model::KannalaBrandt || higher.len() != 4 || higher.last() == Some(&0.0) {
+        return None;
+    }
+    let in_px = (first - 1.0).abs() > 1e-9;
+    let k: Vec<String> = higher.iter().map(|k| format!("{}", if in_px { k / first } else { *k })).collect();
+    let focal = if in_px { format!("fx_px = fy_px = {first} and ") } else { String::new() };
+    let plausible = !in_px || (first / c.fx_px - 1.0).abs() < 0.2;
+    plausible.then(|| {
+        format!(
+            "five coefficients that begin with the angle's first power, as in Braun & Barf 2022; hzn's four follow it: write \
+             {focal}k = [{}] (`hzn camera convert --braun-barf` does it)",
+            k.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(model: Model, size: [u16; 2], focal: [f64; 2], centre: [f64; 2], k: &[f64]) -> camera::Config {
+        let mut c = camera::Config::ideal(model, size[0], size[1], focal[0]);
+        (c.fy_px, c.cx_px, c.cy_px) = (focal[1], centre[0], centre[1]);
+        c.k = k.iter().copied().collect();
+        c
+    }
+
+    fn told(c: &camera::Config) -> String {
+        let doubts = of_camera(c);
+        doubts.iter().map(|d| format!("{}: {}", d.key, d.what)).collect::<Vec<_>>().join("\n")
+    }
+
+    #[test]
+    fn swapped_and_absurd_cameras_are_told() {
+        let hd = |focal, centre| told(&camera(Model::Pinhole, [1920, 1080], focal, centre, &[]));
+        assert_eq!(hd([1200.0; 2], [963.2, 536.7]), "");
+        assert_eq!(hd([1200.0; 2], [1100.0, 500.0]), "");
+        assert!(hd([1200.0; 2], [536.7, 963.2]).contains("are cx_px and cy_px, or width and height, swapped?"));
+        assert!(hd([1200.0; 2], [480.0, 270.0]).contains("that of pictures of about 961 x 541 px?"));
+        assert!(hd([1200.0; 2], [0.5, 0.5]).contains("counted in pixels from the picture's upper left corner"));
+        assert!(hd([1200.0; 2], [1800.0, 540.0]).contains("was the picture cut from a larger one?"));
+        assert!(hd([1200.0, 675.0], [960.0, 540.0]).contains("fy_px = 675 make pixels that are not square"));
+        assert!(hd([8.0; 2], [960.0, 540.0]).contains("field of view of 179 degrees: is it in millimetres?"));
+        assert!(hd([500_000.0; 2], [960.0, 540.0]).contains("field of view of 0.22 degrees"));
+        // HORACE's, a telescope's for the Moon, and a fisheye's with its image circle.
+        assert_eq!(told(&camera(Model::Pinhole, [1024, 768], [2133.0; 2], [511.5, 383.5], &[])), "");
+        assert_eq!(told(&camera(Model::Pinhole, [2048, 1944], [9200.0; 2], [1023.5, 971.5], &[])), "");
+        let fisheye =
+            camera(Model::KannalaBrandt, [1440, 1080], [458.0; 2], [719.5, 539.5], &[-0.05, 0.01, -0.003, 0.0]);
+        assert_eq!(told(&fisheye), "");
+        let circle = |deg| told(&camera::Config { theta_max_deg: Some(deg), ..fisheye.clone() });
+        assert_eq!(circle(90.0), "");
+        assert!(
+            circle(1.57).contains("an image circle of 1.57 degrees leaves out most of the picture: is it in radians?")
+        );
+        assert!(told(&camera(Model::Equidistant, [1440, 1080], [4.0; 2], [719.5, 539.5], &[])).contains("millimetres"));
+    }
+
+    #[test]
+    fn coefficients_in_another_order_are_told() {
+        let with = |model, k: &[f64]| camera(model, [1920, 1080], [1235.0; 2], [963.0, 537.0], k);
+        assert!(told(&with(Model::KannalaBrandt, &[1.0, -0.055, 0.011, -0.0035])).contains("leave the 1 of the first"));
+        assert_eq!(told(&with(Model::BrownConrady, &[-0.3, 0.1, 0.001, -0.002, -0.02])), "");
+        assert!(
+            told(&with(Model::BrownConrady, &[-0.3, 0.1, -0.09, 0.001, -0.002]))
+                .contains("order is k1, k2, p1, p2, k3")
+        );
+        let five = |k: &[f64]| five_coefficients(&with(Model::KannalaBrandt, k));
+        assert!(
+            five(&[1.0, -0.055, 0.011, -0.0035, 0.0002])
+                .unwrap()
+                .contains("write k = [-0.055, 0.011, -0.0035, 0.0002] (")
+        );
+        let in_px = five(&[1250.0, -62.5, 12.5, -4.0, 0.25]).unwrap();
+        assert!(in_px.contains("write fx_px = fy_px = 1250 and k = [-0.05, 0.01, -0.0032, 0.0002] ("), "{in_px}");
+        assert_eq!(five(&[-0.05, 0.01, 0.0, 0.0, 0.0002]), None);
+    }
+
+    #[test]
+    fn altitudes_in_metres_and_of_the_moon_are_told() {
+        let with = |kind, km| {
+            let radius_km = (kind == body::Kind::Sphere).then_some(1737.4);
+            let body = body::Config { kind, radius_km, altitude_km: Some(km), ..body::Config::default() };
+            of_body(&body).map(|d| d.what).unwrap_or_default()
+        };
+        assert_eq!(with(body::Kind::Earth, 35_786.0) + &with(body::Kind::Sphere, 100.0), "");
+        assert!(with(body::Kind::Earth, 230_000.0).contains("is it in metres?"));
+        assert!(with(body::Kind::Sphere, 100_000.0).contains("is it in metres?"));
+        assert!(with(body::Kind::Moon, 100.0).contains("write kind = \"sphere\" and radius_km = 1737.4"));
+        assert!(with(body::Kind::Sun, 400.0).contains("is not used"));
+    }
+}

@@ -1,0 +1,94 @@
+//! What the pictures without an answer have in common, for the end of a run.
+
+use std::path::Path;
+
+use hzn_core::pipeline::Verdict;
+use hzn_core::status::Status;
+use hzn_core::{Report, select};
+
+use crate::engine::Finished;
+use crate::words;
+
+/// Why a body was not found in a picture: what became of its longest fitted edge, or where the picture ended without one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Why {
+    Verdict(Verdict),
+    Status(Status),
+}
+
+impl Why {
+    /// `None` of an answer.
+    fn of(report: &Report<f64>) -> Option<Self> {
+        if report.status == Status::Ok {
+            return None;
+        }
+        // Of edges that carry alike the first, which lies beside the longest dark stretch of the border.
+        let most = report.candidates.iter().rev().max_by_key(|c| c.inliers);
+        Some(most.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
+    }
+
+    fn text(self, limits: &select::Config) -> String {
+        match self {
+            Self::Verdict(verdict) => format!("{}: {}", verdict.name(), words::why(verdict, limits)),
+            Self::Status(status) => format!("{status}: {}", words::without_edges(status)),
+        }
+    }
+}
+
+/// Counts refusals by their reason.
+#[derive(Debug, Default)]
+pub(crate) struct Refusals {
+    /// Reason, how often, and the number of the first frame with it that was processed for every body.
+    each: Vec<(Why, u64, Option<u64>)>,
+    total: u64,
+}
+
+impl Refusals {
+    pub(crate) fn count(&mut self, frame: &Finished) {
+        let whole = frame.found.iter().all(|f| f.report.is_ok()).then_some(frame.index);
+        for why in frame.found.iter().filter_map(|f| Why::of(f.report.as_ref().ok()?)) {
+            self.total += 1;
+            match self.each.iter_mut().find(|(known, ..)| *known == why) {
+                Some((_, n, first)) => (*n, *first) = (*n + 1, first.or(whole)),
+                None => self.each.push((why, 1, whole)),
+            }
+        }
+    }
+
+    /// The commonest reason in words, and the number of the first frame with it; of reasons that are as common, the first.
+    pub(crate) fn commonest(&self, limits: &select::Config) -> Option<(String, Option<u64>)> {
+        let (why, n, first) = self.each.iter().rev().max_by_key(|(_, n, _)| *n)?;
+        let share = if *n == self.total { "all".to_owned() } else { format!("{n}") };
+        Some((format!("{} refused, {share} as {}", self.total, why.text(limits)), *first))
+    }
+}
+
+/// A word of a command line, quoted where a shell would read more into it.
+pub(crate) fn quoted(word: &Path) -> String {
+    let text = word.to_string_lossy();
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_./:=@%+,-".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        return text.into_owned();
+    }
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+/// A path that no program takes for an option.
+pub(crate) fn quoted_path(path: &Path) -> String {
+    if path.to_string_lossy().starts_with('-') { quoted(&Path::new(".").join(path)) } else { quoted(path) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        let shown = |text: &str| quoted_path(Path::new(text));
+        assert_eq!(shown("in/0001.png"), "in/0001.png");
+        assert_eq!(shown("a b.png"), "'a b.png'");
+        assert_eq!(shown("it's.png"), r"'it'\''s.png'");
+        assert_eq!(shown("-x.png"), "./-x.png");
+        assert_eq!(shown("$(x)*"), "'$(x)*'");
+    }
+}
