@@ -236,7 +236,8 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
     };
     let rows = output::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(data);
-    let camera = sensor.camera();
+    // Drawn where each row sees it.
+    let camera = &sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
     let each = bodies.iter().zip(finished.found).zip(rows).zip(half_angles).zip(&watch.traces.each);
     for ((((body, found), row), expected), trace) in each {
         let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref()).copied();
