@@ -130,12 +130,8 @@ impl FlightFrame {
         hzn_core::Frame {
             altitude_m: Some(Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m)),
             position_m: Some(self.scene.pose.position_m),
-            cam_to_ecef: None,
-            attitude_sigma_rad: None,
-            sun: None,
             rate_rad_s: self.rate_rad_s(),
-            level: None,
-            last: None,
+            ..hzn_core::Frame::default()
         }
     }
     /// As [`FlightFrame::known`], with an attitude that is wrong by `sigma_rad` (1-sigma, about each axis).
