@@ -14,7 +14,7 @@ use super::sighting::Sighting;
 pub const LEAST_PICTURES: usize = 12;
 /// The limb height must come out better than this from the pictures' own errors, kilometres: half of the sigma that a
 /// sensor assumes of a limb nobody measured.
-const MOST_SIGMA_KM: f64 = 3.5;
+pub(super) const MOST_SIGMA_KM: f64 = 3.5;
 /// A mean square of the residuals over their variances above this is an alarm.
 const ALARM: f64 = 2.0;
 /// A picture so many sigma from the middle of all has another edge.

@@ -4,11 +4,14 @@
 //! rows' heights: d_i = Σ_k a_ik h_k, a_ik the mean of hat k over what the picture saw. More rows are taken only when they
 //! pay for themselves (Bayes' information criterion: ln n a row) and when every row is known better than rows differ.
 
+use super::calibration::MOST_SIGMA_KM;
 use super::height::{Measured, Solved, solve};
 use super::sighting::Sighting;
 
 /// Numbers of rows that are tried.
 const ROWS: [usize; 3] = [2, 3, 5];
+/// A row must make up this much more of some picture's limb than of another's.
+const LEAST_SPREAD: f64 = 0.5;
 /// Part of what was seen that may lie beyond the first and the last row, at each end.
 const BEYOND: f64 = 0.02;
 
@@ -53,17 +56,25 @@ pub(super) fn profile(sightings: &[&Sighting]) -> Option<Profile> {
         let place = |k: usize| (low + (high - low) * k as f64 / (n - 1) as f64).round();
         let rows: Vec<f64> = (0..n).map(place).collect();
         let rising = rows.windows(2).all(|w| w[0] < w[1]);
-        with(rows).filter(|p| rising && sightings.len() >= 4 * n && are_told_apart(p))
+        with(rows).filter(|p| rising && sightings.len() >= 4 * n && are_told_apart(p, sightings))
     });
     let best = tried.min_by(|a, b| pays(a).total_cmp(&pays(b)));
     Some(best.filter(|p| pays(p) < pays(&one)).unwrap_or(one))
 }
 
-/// Whether every row is known better than the rows differ: a third of their range.
-fn are_told_apart(profile: &Profile) -> bool {
+/// Whether every row is known better than the rows differ (a third of their range) and than a default is, and some pictures
+/// see more of it than others by half of their limb: what all pictures see alike is no matter of latitude.
+fn are_told_apart(profile: &Profile, sightings: &[&Sighting]) -> bool {
     let h = &profile.solved.h;
     let range = h.max() - h.min();
-    profile.solved.covariance.diagonal().iter().all(|variance| 3.0 * variance.sqrt() < range)
+    let parts: Vec<Vec<f64>> = sightings.iter().map(|s| profile.parts(s)).collect();
+    let spread = |row: usize| {
+        let each = parts.iter().filter_map(|p| p.get(row));
+        let ends = each.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+        ends.1 - ends.0
+    };
+    let known = |variance: &f64| 3.0 * variance.sqrt() < range && variance.sqrt() < MOST_SIGMA_KM;
+    profile.solved.covariance.diagonal().iter().all(known) && (0..h.len()).all(|row| spread(row) >= LEAST_SPREAD)
 }
 
 /// First and last latitude worth a row, degrees.

@@ -195,6 +195,30 @@ fn a_flight_over_all_latitudes_gives_rows() {
     assert_eq!(sensor.body.limb_height_by_latitude_km.len(), c.height.by_latitude.len());
 }
 
+/// Heights that drift with time are not taken for a matter of latitude where all pictures see the same latitudes.
+#[test]
+fn a_flight_at_one_latitude_gives_no_rows() {
+    let config = camera(90.0);
+    let camera = Camera::try_new(&config).unwrap();
+    let body = body::Config { kind: Kind::Earth, ..earth() };
+    let mut draws = Draws(12);
+    let sightings: Vec<Sighting> = (0..24)
+        .filter_map(|k| {
+            let position = from_geodetic((67.9 + 0.05 * f64::from(k)).to_radians(), 0.3, 200e3, WGS84_A_M, WGS84_B_M);
+            let frame = Frame { position_m: Some(position), ..Frame::default() };
+            let limb_m = 15e3 + 500.0 * f64::from(k);
+            let cone = LimbCone::try_new(position, WGS84_A_M + limb_m, WGS84_B_M + limb_m)?;
+            let alpha = cone.mean_half_angle_rad();
+            let axis = Vector3::new(0.3 * alpha.sin(), 0.954 * alpha.sin(), alpha.cos()).normalize();
+            let points = limb(&camera, axis, &|_| alpha.cos(), Noise(0.02, 10.0, 0.8), &mut draws);
+            Sighting::measure("p", &camera, &body, &frame, &points, &solution(axis, alpha))
+        })
+        .collect();
+    assert_eq!(sightings.len(), 24);
+    let c = Calibration::of(&body, &sightings).unwrap();
+    assert!(c.height.by_latitude.is_empty(), "{:?}", c.height);
+}
+
 #[test]
 fn variance_of_the_cone_is_that_of_dense_matrices() {
     let config = camera(90.0);
