@@ -10,18 +10,19 @@ use crate::input::{self, Payload, Source};
 use crate::output;
 use crate::tell;
 
+const EXAMPLES: &str = "\
+Examples:
+  hzn init                                          every key, into sensor.toml
+  hzn init flight/ --fov 92 --lens fisheye          a fisheye that sees 92 degrees over the width
+  hzn init IMG_0001.JPG --altitude 418 -o iss.toml  the lens as EXIF has it, pictures from 418 km";
+
 /// Write a sensor.toml to start from
 ///
 /// With pictures: for the camera that took them, from a field of view (--fov) or from the focal length in their EXIF. Its
 /// sigmas say how little that is; with an altitude it works at once. Without pictures: every key with its default and a
 /// comment, so that only the camera must be filled in.
-///
-/// Examples:
-///   hzn init                                                        all keys, into sensor.toml
-///   hzn init flight/ --fov 92 --lens fisheye -o flight/sensor.toml  a fisheye that sees 92 degrees over the width
-///   hzn init IMG_0001.JPG --altitude 418                            the lens as EXIF has it, all pictures from 418 km
 #[derive(Debug, clap::Args)]
-#[command(verbatim_doc_comment)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// Pictures of the camera: files, a folder, a glob, a video, a recording
     #[arg(value_name = "PICTURE")]
