@@ -20,12 +20,14 @@ pub(crate) struct Sensor {
     pub(crate) attitude_sigma_deg: Option<f64>,
     /// Told the altitude instead of the position.
     pub(crate) altitude_only: bool,
+    /// Not told the rates of rotation.
+    pub(crate) without_rates: bool,
 }
 
 impl Sensor {
     /// Told the position only.
     pub(crate) fn new(name: &str, config: Config) -> Self {
-        Self { name: name.into(), config, attitude_sigma_deg: None, altitude_only: false }
+        Self { name: name.into(), config, attitude_sigma_deg: None, altitude_only: false, without_rates: false }
     }
     /// Told an attitude too.
     pub(crate) fn with_attitude(self, sigma_deg: f64) -> Self {
@@ -35,13 +37,21 @@ impl Sensor {
     pub(crate) fn with_altitude_only(self) -> Self {
         Self { attitude_sigma_deg: None, altitude_only: true, ..self }
     }
+    /// Told no rates of rotation.
+    pub(crate) fn without_rates(self) -> Self {
+        Self { without_rates: true, ..self }
+    }
     /// What it is told about a picture.
     pub(crate) fn known(&self, frame: &FlightFrame) -> hzn_core::Frame<f64> {
         let known = match self.attitude_sigma_deg {
             Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
             None => frame.known(),
         };
-        if self.altitude_only { hzn_core::Frame { position_m: None, ..known } } else { known }
+        hzn_core::Frame {
+            position_m: known.position_m.filter(|_| !self.altitude_only),
+            rate_rad_s: known.rate_rad_s.filter(|_| !self.without_rates),
+            ..known
+        }
     }
 }
 

@@ -82,6 +82,7 @@ impl Sighting {
             return None;
         }
         let place = Place::new(body, frame)?;
+        let camera = &camera.turning(frame.rate_rad_s);
         let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
         let known =
             Frame { cam_to_ecef: frame.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*frame };
@@ -121,7 +122,7 @@ impl Sighting {
 /// What a picture's limb height is made of: the rays of its edge points (camera frame), each with its share of the height.
 /// The shares sum to 1; on a short arc, where the height comes from the curvature, those of the ends and of the middle have
 /// opposite signs and large values, so that a height which varies along the limb is seen enlarged. Arguments as of
-/// [`Sighting::measure`]; without an attitude.
+/// [`Sighting::measure`], without an attitude; `camera` is the one that turns, where rows have times of their own.
 pub fn shares(
     camera: &Camera<f64>,
     points: &[([f64; 2], f64)],

@@ -9,7 +9,7 @@
 
 use hzn_calib::noise::{Points, Weighted};
 use hzn_core::body::{self, Kind};
-use hzn_core::camera::Camera;
+use hzn_core::camera::{self, Camera};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::{Config, HostHorizon, covariance};
@@ -254,7 +254,10 @@ struct Edge {
 impl Edge {
     fn of(kind: Kind, looked: &Looked<'_>, limb_height_km: f64) -> Option<Self> {
         let scene = &looked.frame.scene;
-        let camera = Camera::<f64>::try_new(&scene.camera).ok()?;
+        let readout_s = scene.motion.map_or(0.0, |motion| motion.readout_s);
+        let camera = Camera::<f64>::try_new(&camera::Config { readout_s, ..scene.camera.clone() }).ok()?;
+        // Rays as at the time of the middle row, for which the truth holds.
+        let camera = camera.turning(looked.frame.known().rate_rad_s);
         let view = View::try_new(Globe::of(&scene.body).raised(limb_height_km * 1e3), &scene.pose)?;
         let truth = scene.truth_of(kind, "", 0.0).ok()?;
         let axis: UnitVec3<_, f64> = truth.axis()?;
