@@ -121,8 +121,9 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
         "`rocket`: *found* is *curvature* in every row, so the fit and the calibration are right; the limb itself is not of one \
          height. Its light changes along the limb with the angle from the Sun, the edge stands where half of the local \
          brightness is left, and a tone curve moves that place up by 6 km and its variation with it. A free half-angle \
-         reads the variation as curvature, which is why the calibrated height is 1 to 2 km below the mean height of the points. Stray light, \
-         JPEG and shutter change nothing. `tumble`: the shutter is the smaller part of the excess. The exposure controller \
+         reads the variation as curvature, which is why the calibrated height is 1 to 2 km below the mean height of the points. The Sun's \
+         stray light falls on none of the answered pictures of this flight, so it is not the cause; JPEG and shutter change \
+         0.2 km or less. `tumble`: the shutter is the smaller part of the excess. The exposure controller \
          saturates the bright limb; where the band is clipped, half of the clipped value is found farther out, by several \
          kilometres and not everywhere alike. With an exposure that does not clip the errors are a fifth. A camera for this \
          sensor should be exposed so that the limb is not saturated.",
