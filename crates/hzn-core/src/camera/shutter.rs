@@ -41,7 +41,7 @@ impl<T: Real> Turning<T> {
     /// A ray of row `v` in the camera of the picture's time.
     // Once in flash.
     #[inline(never)]
-    pub(super) fn to_frame_time(&self, ray: &Ray<T>, v: T) -> Ray<T> {
+    pub(super) fn to_frame_time(self, ray: &Ray<T>, v: T) -> Ray<T> {
         let angle = self.per_row * (v - self.middle);
         let s = turned(&ray.s, &angle);
         // The derivative, from the tangent basis at the one to that at the other, and by the row the turn itself.
