@@ -30,6 +30,9 @@ fn sensor(trial: &Trial, threshold_px: Option<f64>) -> Config {
     config
 }
 
+/// A kind with what came of its limbs, next to artefacts and alone.
+type Beside = (Kind, Vec<Outcome>, Vec<Outcome>);
+
 /// What was told and how the sensor was set.
 #[derive(Clone, Copy, PartialEq)]
 struct Setting {
@@ -184,7 +187,7 @@ fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
     let row = |name: &str, of: &dyn Fn(Kind) -> bool| {
         let chosen: Vec<_> = all.iter().filter(|(k, ..)| of(*k)).collect();
         let n = chosen.len();
-        let share = |of: &dyn Fn(&(Kind, Vec<Outcome>, Vec<Outcome>)) -> bool| {
+        let share = |of: &dyn Fn(&Beside) -> bool| {
             format!("{:.1} %", 100.0 * chosen.iter().filter(|c| of(c)).count() as f64 / n.max(1) as f64)
         };
         let at = |o: &[Outcome], i: usize, of: fn(&Outcome) -> bool| o.get(i).is_some_and(of);

@@ -233,7 +233,6 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
         traces: None,
         tip: None,
         pages: 1,
-        traces: None,
     };
     let rows = output::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(data);
