@@ -165,9 +165,9 @@ fn a_thermal_array_answers_by_default() {
     for seed in 0..60u32 {
         let of = |k: u32| f64::from(seed.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 8 & 0xFFFF) / 65536.0;
         let look_to = Look {
-            azimuth_rad: 6.28 * of(1),
+            azimuth_rad: core::f64::consts::TAU * of(1),
             depression_rad: (16.0 + 8.0 * of(2)).to_radians(),
-            roll_rad: 6.28 * of(3),
+            roll_rad: core::f64::consts::TAU * of(3),
         };
         let mut scene = Scene::new(camera.clone(), Pose::looking(position_m(20.0, 10.0, 400.0), look_to));
         scene.body = sensor.config().body.clone();
