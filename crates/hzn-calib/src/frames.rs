@@ -326,7 +326,7 @@ impl Row<'_> {
         let Some(cell) = cell else { return Ok(None) };
         match cell.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(Some(x)),
-            _ if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+            _ if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
                 Err(self.problem(column, &format!("{cell:?} has a decimal comma; write a point")))
             }
             _ => Err(self

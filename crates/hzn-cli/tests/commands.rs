@@ -55,7 +55,7 @@ fn init_writes_what_run_takes() {
     place.run(&["init", "other.toml"]).expect(2).says("hzn init -o other.toml");
     let shown = place.run(&["camera", "show", "new.toml"]).expect(0).out;
     assert!(shown.contains("1920 x 1080 px") && shown.contains("field of view"), "{shown}");
-    assert!(shown.contains("half-angle 70.459"), "{shown}");
+    assert!(shown.contains("half-angle 70.637"), "{shown}");
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn an_answer_farther_than_the_vehicle_can_turn_is_refused() {
     place.write("in/sensor.toml", format!("{SENSOR}\n[select]\nmax_rate_deg_s = 1.0\n").as_bytes());
     let slow = statuses(&place.run(&["run", "in"]).expect(0).out);
     assert_eq!([&slow[0].0, &slow[1].0, &slow[2].0], ["ok", "rejected", "ok"], "{slow:?}");
-    assert!(slow[1].1.contains("select.max_rate_deg_s"), "{slow:?}");
+    assert!(slow[1].1.contains("rate"), "{slow:?}");
     // Ten times the time between pictures is room for ten degrees.
     let slow = statuses(&place.run(&["run", "in", "--fps", "0.1"]).expect(0).out);
     assert!(slow.iter().all(|(status, _)| status == "ok"), "{slow:?}");
@@ -76,9 +76,9 @@ fn a_given_attitude_and_a_given_sun_are_gates() {
     let noon = "0,-0.9,-0.4358898943540674";
     assert_eq!(frames(&to_ecef(0.0), noon).0, "ok");
     let (status, why) = frames(&to_ecef(20.0), noon);
-    assert!(status == "rejected" && why.contains("select.max_attitude_sigma"), "{status}: {why}");
+    assert!(status == "rejected" && why.contains("attitude"), "{status}: {why}");
     let (status, why) = frames(&to_ecef(0.0), "0,0.9,0.4358898943540674");
-    assert!(status == "rejected" && why.contains("select.max_unlit"), "{status}: {why}");
+    assert!(status == "rejected" && why.contains("sun"), "{status}: {why}");
     // A camera for its own warmth does not need the Sun.
     place.write("in/sensor.toml", SENSOR.replace("[body]\n", "[body]\nsunlit = false\n").as_bytes());
     assert_eq!(frames(&to_ecef(0.0), "0,0.9,0.4358898943540674").0, "ok");

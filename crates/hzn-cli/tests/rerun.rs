@@ -15,7 +15,11 @@ fn place() -> Place {
     let mut truth = TRUTH.to_owned();
     for i in 0..4 {
         let (sin, cos) = (68.0 + 0.05 * f64::from(i)).to_radians().sin_cos();
-        let place = if i % 2 == 0 { "390,,,,,,,,,,," } else { ",6771.0088,0,0,1,0,0,0,0.5,0,-1,0" };
+        let place = if i % 2 == 0 {
+            "390,,,,,,,,,,,"
+        } else {
+            ",6771.0088,0,0,0.694115,-0.134923,-0.134923,0.694115,0.5,0,-1,0"
+        };
         frames.push_str(&format!("{i:04}.png,2020-11-20T08:30:0{i}Z,{place}\n"));
         truth.push_str(&format!(
             "{i:04}.png,{},earth-sphere,1,0,{sin},{cos},70.38,400,,,,,,,1,0,0,0\n",

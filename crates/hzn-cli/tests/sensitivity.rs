@@ -55,8 +55,8 @@ fn a_sensor_file_brings_camera_body_and_noise() {
     let place = Place::new();
     let own = place.run(&["sensitivity", "-s", "in/sensor.toml", "--depression", "20"]).expect(0);
     let line = own.out.lines().nth(1).unwrap();
-    // Of the file: 400 km above a sphere with the limb at 10 km.
-    assert!(line.trim_start().starts_with("400") && line.contains("70.46"), "{}", own.out);
+    // Of the file: 400 km above a sphere with the limb at 17 km.
+    assert!(line.trim_start().starts_with("400") && line.contains("70.64"), "{}", own.out);
     place.run(&["sensitivity", "-s", "in/sensor.toml", "--fov", "60"]).expect(2).says("cannot be used with");
     // Of several bodies one must be named.
     let bodies = "[[bodies]]\nkind = \"sun\"\n[[bodies]]\nkind = \"moon\"\n";

@@ -431,7 +431,7 @@ mod tests {
         {
             assert!(matches!(p.set(id, value), Err(Refused::Value(n, _)) if n == id), "{id} {value}");
         }
-        assert_eq!(p.set(14, 1.0), Err(Refused::Unknown(14)));
+        assert_eq!(p.set(999, 1.0), Err(Refused::Unknown(999)));
         assert_eq!(p, before);
         // A value of the right type and beyond its limits is for `check`.
         p.set(4, -5.0).unwrap();
