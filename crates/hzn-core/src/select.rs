@@ -286,7 +286,8 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let limb_px = inliers(blocks, 1)
         .next()
         .map_or(T::ZERO, |(b, l)| view::limb_in_view(&fused.e, fused.c, &b.ray(l), camera, scene.region));
-    let support = (fit.arc_px / limb_px.most(T::one())).least(T::one());
+    let covered_px = view::covered(&fused.e, blocks);
+    let support = (covered_px / limb_px.most(T::one())).least(T::one());
     let sigma_limit = T::of(config.max_sigma_deg.to_radians());
     let chi = T::of(config.max_half_angle_sigma);
     let least = config.min_inliers.min(small(expected.sin, camera, 3)).min(few_rows(camera, 3));
@@ -295,7 +296,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::NoConsensus
     } else if fit.inliers < u32::from(least) {
         Verdict::FewInliers
-    } else if fit.arc_px < min_arc(&fused.c, camera, config) {
+    } else if covered_px < min_arc(&fused.c, camera, config) {
         Verdict::ShortArc
     } else if !(fit.rms_px <= T::of(config.max_rms_px)) {
         Verdict::Residuals

@@ -1,11 +1,33 @@
 //! How much of a fitted limb lies in the picture.
 
+use crate::block::{Block, LANES};
 use crate::camera::Camera;
 use crate::frames::UnitVec3;
 use crate::linalg::{V3, basis};
 use crate::pixel::ImagePoint;
 use crate::real::Real;
 use crate::region::Region;
+
+/// Length in pixels that the inliers cover along the limb about `e`: a step from one to the next counts as far as it leads
+/// along it, forth and back. The way along a noisy edge is many times as long.
+pub(super) fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
+    let mut length = T::ZERO;
+    let mut before: Option<V3<T>> = None;
+    for block in blocks {
+        for lane in 0..LANES {
+            let here = (block.weight[lane] > T::ZERO).then(|| block.ray(lane));
+            if let (Some(a), Some(b)) = (before, here) {
+                let (step, along) = (b - a, e.cross(&b));
+                let whole = (step.dot(&step) * along.dot(&along)).sqrt();
+                if whole > T::ZERO {
+                    length += block.step_px[lane] * step.dot(&along) / whole;
+                }
+            }
+            before = here;
+        }
+    }
+    length.abs()
+}
 
 /// Most steps along the limb to each side.
 const STEPS: usize = 48;
@@ -63,4 +85,50 @@ pub(super) fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Came
         }
     }
     length
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points about a circle of 30° at every half degree, every other `off` radians aside; 600 pixels are a radian.
+    fn edge(off: f64) -> [Block<f64>; 4] {
+        let mut blocks = [Block::EMPTY; 4];
+        let mut before: Option<V3<f64>> = None;
+        for i in 0..4 * LANES {
+            let alpha = 0.5 + if i % 2 == 1 { off } else { 0.0 };
+            let (sin, cos) = libm::sincos(alpha);
+            let (y, x) = libm::sincos(i as f64 * 0.5f64.to_radians());
+            let ray = V3::new(x * sin, y * sin, cos);
+            let (block, lane) = (&mut blocks[i / LANES], i % LANES);
+            for (k, v) in [ray.x, ray.y, ray.z].into_iter().enumerate() {
+                block.s[k][lane] = v;
+            }
+            block.weight[lane] = 1.0;
+            block.step_px[lane] = before.map_or(0.0, |b| 600.0 * (ray - b).dot(&(ray - b)).sqrt());
+            before = Some(ray);
+        }
+        blocks
+    }
+
+    #[test]
+    fn noise_makes_no_limb_longer() {
+        let axis = V3::new(0.0, 0.0, 1.0);
+        let arc = 600.0 * libm::sin(0.5) * 15.5f64.to_radians();
+        for off in [0.0, 0.002, 0.01] {
+            let blocks = edge(off);
+            assert!((covered(&axis, &blocks) / arc - 1.0).abs() < 0.02, "{off}: {} of {arc}", covered(&axis, &blocks));
+        }
+        let way: f64 = edge(0.01).iter().flat_map(|b| b.step_px).sum();
+        assert!(way > 2.0 * arc, "{way}");
+    }
+
+    #[test]
+    fn rejected_points_cover_nothing() {
+        let mut blocks = edge(0.0);
+        let whole = covered(&V3::new(0.0, 0.0, 1.0), &blocks);
+        blocks[1].weight = [0.0; LANES];
+        let rest = covered(&V3::new(0.0, 0.0, 1.0), &blocks);
+        assert!((whole - rest - 9.0 * whole / 31.0).abs() < 1e-6 * whole, "{rest} of {whole}");
+    }
 }
