@@ -151,7 +151,7 @@ impl Default for Config {
             max_half_angle_sigma: 3.0,
             max_sigma_deg: 10.0,
             min_support: 0.4,
-            max_lit_sky: 0.15,
+            max_lit_sky: 0.3,
             min_inlier_share: 0.05,
             max_nearby: 1.0 / 3.0,
             min_support_whole: 0.7,
