@@ -72,7 +72,15 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
             look(&mut sensors.host, &p.view(), &Frame::default()),
             look(&mut sensors.flight, &p.view(), &Frame::default()),
         ];
-        let (host, flight) = (host.expect("found in f64"), flight.expect("found in f32"));
+        let why = || {
+            let mut horizon = HostHorizon::boxed(sensor).unwrap();
+            let expected = horizon.expect(&Frame::default()).unwrap();
+            format!("{:?}", horizon.process(&p.view(), &expected).candidates)
+        };
+        let (host, flight) = (
+            host.unwrap_or_else(|s| panic!("{s}: {}", why())),
+            flight.unwrap_or_else(|s| panic!("f32, {s}: {}", why())),
+        );
         assert!(host.error_deg(flight.axis) < 1e-3);
         host
     };
@@ -181,6 +189,10 @@ fn a_thermal_array_answers_by_default() {
         let truth = scene.truth("", 0.0).unwrap();
         let told = hzn_tests::known(&scene);
         let answer = look(&mut sensor, &picture, &told);
+        if let Err(status) = answer {
+            let expected = sensor.expect(&told).unwrap();
+            println!("{seed}: {status}, {:?}", sensor.process(&picture, &expected).candidates);
+        }
         tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
         if let Ok(bound) = look(&mut known, &picture, &told) {
             let p = bound.covariance_rad2;
