@@ -1,0 +1,123 @@
+//! `hzn calibrate noise`, end to end through the binary.
+
+use std::path::Path;
+
+const SCENE: &str = r#"
+name = "small"
+utc = 2019-06-13T10:30:00Z
+[capture]
+from_s = 90.0
+to_s = 400.0
+frames = 16
+[camera]
+width = 384
+height = 256
+model = "pinhole"
+fx_px = 200.0
+fy_px = 200.0
+cx_px = 191.5
+cy_px = 127.5
+[trajectory.rocket]
+[attitude.pointing]
+off_nadir_deg = [72.0, 78.0]
+azimuth_deg = [0.0, 200.0]
+[world.visible]
+[detector]
+read_noise = 0.02
+"#;
+
+/// Runs hzn in a folder: exit code, stdout, stderr.
+fn hzn(folder: &Path, args: &[&str]) -> (i32, String, String) {
+    let out = assert_cmd::Command::cargo_bin("hzn")
+        .expect("the binary is built")
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .expect("hzn starts");
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (out.status.code().unwrap_or(-1), text(&out.stdout), text(&out.stderr))
+}
+
+/// The number after a key in the text of a sensor.toml.
+fn value(text: &str, key: &str) -> f64 {
+    let line = text.lines().find(|l| l.starts_with(&format!("{key} = "))).unwrap_or_else(|| panic!("{key} in {text}"));
+    line.split(" = ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_flight_tells_limb_height_and_noise_or_why_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    std::fs::write(at.join("my.toml"), SCENE).unwrap();
+    let (code, _, stderr) = hzn(at, &["simulate", "my.toml", "-o", "flight", "-q"]);
+    assert_eq!(code, 0, "{stderr}");
+    let told = std::fs::read_to_string(at.join("flight/sensor.toml")).unwrap();
+    // What a user has who knows the camera only.
+    let (_, camera) = told.split_once("[camera]").unwrap();
+    let camera = camera.split("\n[").next().unwrap();
+    std::fs::write(at.join("mine.toml"), format!("# my camera\n[camera]{camera}\n")).unwrap();
+
+    let calibrate = ["calibrate", "noise", "flight", "--sensor", "mine.toml"];
+    let outputs = ["-o", "out.toml", "-o", "out.html"];
+    let (code, stdout, stderr) = hzn(at, &[&calibrate[..], &outputs].concat());
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    for what in ["limb height", "edge noise", "chi-square", "focal length", "[body] limb_height_km = "] {
+        assert!(stdout.contains(what), "{what} in {stdout}");
+    }
+    let text = std::fs::read_to_string(at.join("out.toml")).unwrap();
+    assert!(text.starts_with("# my camera\n") && text.contains("# calibrated: measured on "), "{text}");
+    let (km, sigma) = (value(&text, "limb_height_km"), value(&text, "limb_height_sigma_km"));
+    // The truth, as `hzn simulate` measured it on other pictures of the scene.
+    let true_km = value(&told, "limb_height_km");
+    assert!((km - true_km).abs() < 2.0 * sigma && sigma < 3.5, "{km} ± {sigma}, {true_km}");
+    let html = std::fs::read_to_string(at.join("out.html")).unwrap();
+    assert_eq!(html.matches("<svg").count(), 2);
+    assert!(html.contains("Correlation of the residuals"));
+
+    // The sensor that came of it answers.
+    let (code, _, stderr) = hzn(at, &["run", "flight", "--sensor", "out.toml", "-o", "out.csv", "-q"]);
+    assert_eq!(code, 0, "{stderr}");
+
+    // Outputs are not replaced unasked, and have to be of a kind.
+    let (code, _, stderr) = hzn(at, &[&calibrate[..], &outputs].concat());
+    assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+    let (code, _, stderr) = hzn(at, &[&calibrate[..], &["-o", "out.csv"]].concat());
+    assert!(code == 2 && stderr.contains("a sensor ends in .toml"), "{stderr}");
+
+    // Too few pictures.
+    let few: Vec<String> = (0..5).map(|i| format!("flight/small-{i:05}.png")).collect();
+    let few: Vec<&str> = few.iter().map(String::as_str).collect();
+    let (code, stdout, stderr) =
+        hzn(at, &[&["calibrate", "noise"], &few[..], &["--sensor", "mine.toml", "-o", "few.toml", "-q"]].concat());
+    assert_eq!(code, 1, "{stdout}{stderr}");
+    assert!(stderr.contains("5 pictures were answered, but at least 12 are needed"), "{stderr}");
+
+    // Altitudes of other pictures: 10 km too low and too high by turns.
+    let mut rows = csv::Reader::from_path(at.join("flight/frames.csv")).unwrap();
+    let column = rows.headers().unwrap().iter().position(|h| h == "altitude_km").unwrap();
+    let mut wrong = String::from("file,altitude_km\n");
+    for (i, row) in rows.records().enumerate() {
+        let row = row.unwrap();
+        let altitude_km: f64 = row[column].parse().unwrap();
+        wrong += &format!("{},{}\n", &row[0], altitude_km + if i % 2 == 0 { 10.0 } else { -10.0 });
+    }
+    std::fs::write(at.join("wrong.csv"), wrong).unwrap();
+    let (code, stdout, stderr) =
+        hzn(at, &[&calibrate[..], &["--frames", "wrong.csv", "-o", "wrong.toml", "-q"]].concat());
+    assert_eq!(code, 1, "{stdout}{stderr}");
+    assert!(stderr.contains("scatter more than their errors allow"), "{stderr}");
+    assert!(!at.join("few.toml").exists() && !at.join("wrong.toml").exists());
+}
+
+#[test]
+fn sun_and_moon_have_no_limb_height() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    std::fs::create_dir(at.join("in")).unwrap();
+    image::GrayImage::new(64, 48).save(at.join("in/a.png")).unwrap();
+    let sensor = "preset = \"sun\"\n[camera]\nwidth = 64\nheight = 48\nfx_px = 900.0\nfy_px = 900.0\ncx_px = 31.5\ncy_px = 23.5\n\
+                  model = \"pinhole\"\n";
+    std::fs::write(at.join("in/sensor.toml"), sensor).unwrap();
+    let (code, _, stderr) = hzn(at, &["calibrate", "noise", "in"]);
+    assert!(code == 2 && stderr.contains("no height to measure"), "{stderr}");
+}
