@@ -401,8 +401,8 @@ mod tests {
         let t = scene(Look::off_nadir(0.0, 0.0, 0.0)).truth("a.png", 1.5).unwrap();
         assert!((t.axis_z - 1.0).abs() < 1e-12 && (t.altitude_km - 200.0).abs() < 1e-6);
         assert_eq!((t.limb, t.body.as_str(), t.file.as_str(), t.time_s), (0, "earth", "a.png", 1.5));
-        // sin α = (R + 10 km)/(R + 200 km) with a radius between the two of the ellipsoid's curvature.
-        let alpha = |r: f64| ((r + 10.0) / (r + 200.0)).asin().to_degrees();
+        // sin α = (R + 17 km)/(R + 200 km) with a radius between the two of the ellipsoid's curvature.
+        let alpha = |r: f64| ((r + 17.0) / (r + 200.0)).asin().to_degrees();
         assert!(t.half_angle_deg > alpha(6330.0) && t.half_angle_deg < alpha(6380.0));
     }
 

@@ -160,7 +160,10 @@ fn truth_and_frames_have_the_columns_of_their_files() {
     let mut frames = csv::Writer::from_writer(Vec::new());
     frames.serialize(frame.row()).unwrap();
     let text = String::from_utf8(frames.into_inner().unwrap()).unwrap();
-    assert_eq!(text.lines().next(), Some("file,time_s,utc,altitude_km,x_km,y_km,z_km,qw,qx,qy,qz,attitude_sigma_deg"));
+    assert_eq!(
+        text.lines().next(),
+        Some("file,time_s,utc,altitude_km,x_km,y_km,z_km,qw,qx,qy,qz,attitude_sigma_deg,rate_x,rate_y,rate_z")
+    );
     assert!((frame.row().altitude_km - 600.0).abs() < 1e-6 && frame.row().x_km.hypot(frame.row().y_km) > 1000.0);
 }
 
