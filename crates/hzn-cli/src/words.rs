@@ -29,7 +29,9 @@ pub fn why(verdict: Verdict, s: &select::Config) -> String {
         Verdict::OutOfView => {
             "the limb that is expected about the fitted axis is not in the picture (select.limb_in_view)".into()
         }
-        Verdict::Straight => "too short or too rough an edge to tell on which side of it the body is".into(),
+        Verdict::Straight => {
+            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature does not tell the body's side (select.min_side_sigma)".into()
+        }
         Verdict::Radius => "the limb is not that wide at any altitude allowed (select.altitude_limits_km)".into(),
         Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
         Verdict::Circle => format!(

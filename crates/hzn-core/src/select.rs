@@ -78,7 +78,8 @@ pub struct Config {
     /// inliers; 0 or more. Only where it keeps its contrast, see `departure_contrast`. A large value turns the gate off.
     pub max_departure: f64,
     /// Smallest part of the fitted limb in view that must be edge where the edge leaves the limb with its contrast kept, see
-    /// `departure_contrast`, 0 to 1: the corner of an iris, the crossing of two flares. 0 turns the gate off: 0.7 refuses half-lit discs, too.
+    /// `departure_contrast`, 0 to 1. The corner of an iris and the crossing of two flares end an edge so. 0 turns the gate off,
+    /// and is the default: 0.7 refuses half-lit discs, too.
     pub min_support_abrupt: f64,
     /// The largest turn from one 16 pixels of edge to the next that is smooth, degrees, 0 to 90: 8 degrees is a curve of 115
     /// pixels radius, sharper ones are corners of clouds. Room for the noise is added.

@@ -150,7 +150,8 @@ verdicts! {
     OutOfView = 13, "out-of-view";
     /// The fitted circle is smaller or larger than the limb can be between the altitude limits.
     Radius = 14, "radius";
-    /// The edge is too short or too rough for its curvature to tell on which side of it the body is.
+    /// The edge is too short or too rough for its curvature to tell on which side of it the body is, or a straight line of the
+    /// image fits it nearly as well.
     Straight = 15, "straight";
     /// A circle of the image fits the points far better than the limb's cone: a lens flare.
     Circle = 16, "circle";
