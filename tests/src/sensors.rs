@@ -100,6 +100,11 @@ pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
     let expected = horizon.expect(known).expect("what is known of the picture is possible");
     let report = horizon.process_observed(picture, &expected, observer);
     assert_eq!(report.status == Status::Ok, report.solution.is_some(), "a solution with `ok`, and only there");
+    if report.solution.is_none() {
+        // Seen only where the test fails.
+        let verdicts = report.candidates.iter().map(|c| format!("{} points {:?}", c.points, c.verdict));
+        println!("{:?}: {}", report.status, verdicts.collect::<Vec<_>>().join(", "));
+    }
     Answer::of(&report).ok_or(report.status)
 }
 

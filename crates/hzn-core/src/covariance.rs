@@ -29,6 +29,7 @@ use crate::real::Real;
 
 pub use budget::{Budget, Term};
 pub use noise::Noise;
+pub(crate) use noise::measured_length_px;
 
 /// How the covariance is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -397,13 +397,18 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
         if circle::rms(&shape).is_some_and(|c| worse(c) || (likelier(rms, c) > evidence && evidence > T::ZERO)) {
             return Verdict::Circle;
         }
-        let pieces = polyline::rms(&shape, rms);
-        let more = independent.ln() * T::of(polyline::PARAMETERS);
-        if worse(pieces) || (likelier(rms, pieces) > evidence + more && evidence > T::ZERO) {
-            return Verdict::Polyline;
+        // What it has more to turn makes its residual smaller, whatever the points are; of few points it tells nothing.
+        let (points, turns) = (T::of_i32(shape.len() as i32), T::of(polyline::PARAMETERS));
+        let left = points - T::of(3.0) - turns;
+        if left > T::ZERO {
+            let pieces = polyline::rms(&shape, rms) * ((left + turns) / left).sqrt();
+            let more = independent.ln() * turns;
+            if worse(pieces) || (likelier(rms, pieces) > evidence + more && evidence > T::ZERO) {
+                return Verdict::Polyline;
+            }
         }
     }
-    if half_angle::disagrees(fit, fused, expected, &shape, blocks, config) {
+    if half_angle::disagrees(fit, fused, expected, blocks, config) {
         return Verdict::HalfAngle;
     }
     if !P::PASSED

@@ -40,6 +40,11 @@ impl Noise {
 /// wavelengths that the fit takes up are assumed to be as strong as the longest that the residuals show.
 const LENGTHS_PER_EDGE: f64 = 12.0;
 
+/// The correlation length that an edge's own residuals are taken to have, pixels.
+pub(crate) fn measured_length_px<T: Real>(fit: &Fit<T>) -> T {
+    fit.arc_px / T::of(LENGTHS_PER_EDGE)
+}
+
 /// A tilt whose RMS along the edge is 1 is so large at its ends: √3.
 const ENDS: f64 = 1.732_050_807_568_877_2;
 
@@ -63,7 +68,7 @@ impl<T: Real> Levels<T> {
     pub(super) fn new(fit: &Fit<T>, config: &Config) -> Self {
         let told = T::of(config.sigma_px);
         let (length_px, common) = match config.noise {
-            Noise::Rms => (fit.arc_px / T::of(LENGTHS_PER_EDGE), fit.rms_px),
+            Noise::Rms => (measured_length_px(fit), fit.rms_px),
             // What the fit takes up is in the likelihood, at every length.
             Noise::Told | Noise::Reml => (T::ZERO, T::ZERO),
         };

@@ -16,10 +16,10 @@ const PLACES: i32 = 16;
 const SHORTEST_PX: i32 = 32;
 /// The limb's own step is read so far to each side, and the far edge of a band likewise, pixels.
 const ASIDE_PX: i32 = 6;
-/// Of what lies behind a band two thirds must be sky, as other artefacts may lie there; of a body nearly nothing is.
-const FOR_GOOD: [usize; 2] = [2, 3];
+/// Of what lies behind a band so much must be sky; of a body nearly nothing is.
+const FOR_GOOD: [usize; 2] = [9, 10];
 /// Of the limb's step so much stands above the sky at the most where there is sky again: blur and stray light.
-const SKY_PART: f64 = 0.1;
+const SKY_PART: f64 = 0.02;
 
 /// The part of the looks inwards that come back to the sky across a second edge, at least `step` times as high as the limb,
 /// 0 to 1. A terminator fades and is no edge.
@@ -49,7 +49,8 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
         if end < SHORTEST_PX {
             continue;
         }
-        let Some(lit) = seen(ASIDE_PX) else { continue };
+        // The brightest: a band may end before that.
+        let lit = (1..=ASIDE_PX).filter_map(seen).fold(T::ZERO, |a, b| a.most(b));
         let limb = (lit - sky.median).most(T::one());
         let dark = (sky.spread * T::of(3.0)).most(limb * T::of(SKY_PART)) + sky.median;
         looks += 1;

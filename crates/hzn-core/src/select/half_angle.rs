@@ -1,7 +1,6 @@
 //! The half-angle against the expected one, with the noise that the residuals show instead of the one that was told.
 
 use super::Config;
-use super::shape::{Shape, correlated_points, rms};
 use crate::block::Block;
 use crate::body::Expected;
 use crate::covariance::{self, Fused};
@@ -13,13 +12,13 @@ use crate::real::Real;
 /// of its own curvature than its told noise admits.
 ///
 /// (c₀ − ĉ)² / (P₃₃ + σ_c² + what else was told), where P₃₃ has the RMS of the residuals, `select.residual_floor_px` at
-/// least, and the length over which they stay alike. P₃₃ grows with the square of the first and at most in proportion to
-/// the second; the points are gone through once more only where that bound does not settle it.
+/// least, alike over the length that the edge itself tells ([`covariance::measured_length_px`]). P₃₃ grows with the square
+/// of the first and at most in proportion to the second; the points are gone through once more only where that bound does
+/// not settle it.
 pub(super) fn disagrees<T: Real>(
     fit: &Fit<T>,
     fused: &Fused<T>,
     expected: &Expected<T>,
-    shape: &Shape<T>,
     blocks: &[Block<T>],
     config: &Config,
 ) -> bool {
@@ -31,9 +30,8 @@ pub(super) fn disagrees<T: Real>(
     let chi = T::of(config.max_half_angle_sigma);
     // Disagrees unless the edge's variance is at least this.
     let needed = difference * difference / (chi * chi) - rest;
-    let each_px = fit.arc_px / T::of_i32(shape.len().max(1) as i32);
-    let sigma = rms(shape).most(T::of(config.residual_floor_px));
-    let length = correlated_points(shape) * each_px * T::of(0.5);
+    let sigma = fit.rms_px.most(T::of(config.residual_floor_px));
+    let length = covariance::measured_length_px(fit);
     let (smaller, shorter) = (sigma / fused.edge.sigma_px, length / fused.edge.length_px.most(T::of(1e-6)));
     let bound = edge * smaller * smaller * shorter.least(T::one());
     if bound >= needed || (smaller >= T::one() && shorter >= T::one()) {
