@@ -87,13 +87,17 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         let mut config = case.sensor.clone();
         config.binarize.method = Method::Fixed;
         config.binarize.level = own.max(1).into();
+        // Of rows that are gone no brightness is left, which these gates read; and nothing to look at again.
+        (config.select.max_band, config.select.max_departure) = (1.0, 1e6);
+        config.recover.frame_px = 0;
         let sensor = Sensor::new(&config).unwrap();
         let (there, here) = (Seen::default(), Seen::default());
         let (want, got) = (case.whole(&sensor, &there), case.by_rows(&sensor, &here));
         assert_eq!((want.status, want.level), (got.status, got.level), "{}", case.name);
         let (there, here) = (there.0.into_inner(), here.0.into_inner());
-        assert_eq!(there.len(), here.len(), "{}: candidates", case.name);
         let beyond = got.counters.cut_points;
+        // An answer that other points make surer ends the search.
+        assert!(beyond > 0 || there.len() == here.len(), "{}: candidates", case.name);
         if beyond == 0 && got.counters.dropped == want.counters.dropped {
             assert_eq!(there, here, "{}", case.name);
         }
