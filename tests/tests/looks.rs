@@ -101,7 +101,10 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     p.sensor.recover.frame_px = 0;
     p.sensor.binarize = binarize::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
     let with = look(&mut Sensors::new(&p.sensor).host, &p.view(), &Frame::default());
-    assert!(with.is_err() || with.is_ok_and(|a| 2 * a.inliers < a.points && a.error_deg(axes[0]) < a.sigma_deg()), "{with:?}");
+    assert!(
+        with.is_err() || with.is_ok_and(|a| 2 * a.inliers < a.points && a.error_deg(axes[0]) < a.sigma_deg()),
+        "{with:?}"
+    );
 }
 
 /// Seen from far above and lit from the side, bright clouds over dark ground: Otsu's level follows the clouds.

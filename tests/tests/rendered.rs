@@ -119,7 +119,10 @@ fn white_noise_against_the_bound() {
             let bias_px = squared(&mean, [0.0; 3]).sqrt() / pixel_deg;
             let ratio = scatter_deg / bound_deg2.sqrt();
             println!("{limb_height_km} km, noise {noise}: {ratio:.3} of the bound, all {bias_px:.4} px off");
-            assert!((0.85..=limit).contains(&ratio) && bias_px < 0.02, "{limb_height_km} km, {noise}: {ratio}, {bias_px}");
+            assert!(
+                (0.85..=limit).contains(&ratio) && bias_px < 0.02,
+                "{limb_height_km} km, {noise}: {ratio}, {bias_px}"
+            );
         }
     }
 }

@@ -3,6 +3,7 @@
 use hzn_core::Config;
 use hzn_core::body::{self, Kind};
 
+use super::bend;
 use super::edge::{LEAST_PX, LENGTHS_PX, WHITE};
 use super::height::Solved;
 use super::lag;
@@ -15,6 +16,9 @@ pub const LEAST_PICTURES: usize = 12;
 /// The limb height must come out better than this from the pictures' own errors, kilometres: half of the sigma that a
 /// sensor assumes of a limb nobody measured.
 pub(super) const MOST_SIGMA_KM: f64 = 3.5;
+/// Blur and level move the middle of an edge by parts of a pixel however smooth it is: less than the default of
+/// `covariance.sigma_px` is not believed, pixels.
+const LEAST_SHIFT_PX: f64 = 0.1;
 /// A mean square of the residuals over their variances above this is an alarm.
 const ALARM: f64 = 2.0;
 /// A picture so many sigma from the middle of all has another edge.
@@ -44,14 +48,17 @@ pub fn looks_with(sensor: &Config) -> Option<Config> {
 pub struct Height {
     /// The height; of rows by latitude their mean over what was seen.
     pub km: f64,
-    /// The 1-sigma to tell a sensor: the root of the squares of the four that follow.
+    /// The 1-sigma to tell a sensor: the root of the squares of the five that follow.
     pub sigma_km: f64,
     /// From edge noise, over all pictures.
     pub statistical_km: f64,
     /// Scatter from picture to picture beyond edge noise.
     pub scatter_km: f64,
-    /// A shift of all edges by the residuals' RMS: level and blur do that, alike in every picture.
+    /// A shift of all edges by the residuals' RMS, and 0.1 pixels at least: level and blur do that, alike in every picture.
     pub shift_km: f64,
+    /// A bend that all edges share, which the fit reads as another height: as strong as the next shapes along the edge that
+    /// the residuals show in the mean.
+    pub bend_km: f64,
     /// The local radius, where no position tells it.
     pub radius_km: f64,
     /// Rows of (geodetic latitude in degrees, height, 1-sigma from edge noise and scatter); empty when one height explains
@@ -71,7 +78,7 @@ pub struct Edge {
     pub length_px: f64,
     /// ν of it, the white part of the variance.
     pub white: f64,
-    /// 1-sigma of what shifts all points of an edge alike, pixels: as large as the residuals' RMS.
+    /// 1-sigma of what shifts all points of an edge alike, pixels: as large as the residuals' RMS, and 0.1 at least.
     pub bias_px: f64,
 }
 
@@ -217,16 +224,19 @@ fn height(profile: &Profile, sightings: &[&Sighting]) -> Height {
         .sum();
     let mean_square = |of: &dyn Fn(&Sighting) -> f64| sightings.iter().map(|s| of(s).powi(2)).sum::<f64>() / n;
     let (statistical_km, scatter_km) = (mean_variance.sqrt(), scatter2.sqrt());
-    let shift_km = mean_square(&|s| s.rms_px * s.km_per_px).sqrt();
+    let shift_km = mean_square(&|s| s.rms_px.max(LEAST_SHIFT_PX) * s.km_per_px).sqrt();
+    let bend_km = bend::common_px(sightings) * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
     let rows = profile.latitudes_deg.iter().enumerate();
     let row = |(k, deg): (usize, &f64)| [*deg, h[k], covariance[(k, k)].sqrt()];
     Height {
         km,
-        sigma_km: (mean_variance + scatter2 + shift_km * shift_km + radius_km * radius_km).sqrt(),
+        sigma_km: (mean_variance + scatter2 + [shift_km, bend_km, radius_km].map(|km| km * km).iter().sum::<f64>())
+            .sqrt(),
         statistical_km,
         scatter_km,
         shift_km,
+        bend_km,
         radius_km,
         by_latitude: rows.map(row).collect(),
     }
@@ -244,7 +254,7 @@ fn edge(sightings: &[&Sighting]) -> Edge {
         correlation_px: median(sightings.iter().map(|s| s.correlation_px)),
         length_px: LENGTHS_PX[i],
         white: WHITE[j],
-        bias_px: rms_px,
+        bias_px: rms_px.max(LEAST_SHIFT_PX),
     }
 }
 

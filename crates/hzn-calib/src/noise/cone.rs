@@ -43,6 +43,8 @@ pub(super) struct Row {
     pub(super) weight: f64,
     /// To the next point along the edge, pixels.
     pub(super) step_px: f64,
+    /// Place along the edge, from −1 at its beginning to 1 at its end.
+    pub(super) along: f64,
     /// Azimuth about the axis from its tangent basis, radians.
     pub(super) azimuth_rad: f64,
     /// By how much r grows for a focal length that is longer by its own size, pixels.
@@ -115,11 +117,18 @@ impl Cone {
                 slope: g,
                 weight: p.weight,
                 step_px: p.step_px,
+                along: 0.0,
                 azimuth_rad: y.atan2(x),
                 by_focal_px: (by[0] * p.off_px[0] + by[1] * p.off_px[1]) / g,
             }
         };
-        let rows: Vec<Row> = places.iter().map(row).collect();
+        let mut rows: Vec<Row> = places.iter().map(row).collect();
+        let whole: f64 = places.iter().map(|p| p.step_px).sum();
+        let mut way = 0.0;
+        for row in &mut rows {
+            row.along = 2.0 * way / whole.max(1e-12) - 1.0;
+            way += row.step_px;
+        }
         let normal: Matrix3<f64> = rows.iter().map(|r| r.h * r.h.transpose() * r.weight).sum();
         Some(Self {
             cos,

@@ -9,6 +9,7 @@
 //!                            └─► limb height ──────────────────────────────────────────────────────┴─► Calibration
 //! ```
 
+mod bend;
 mod calibration;
 mod cone;
 mod edge;

@@ -10,6 +10,7 @@ use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, from_geodetic, geodeti
 use hzn_core::{Frame, Solution};
 use nalgebra::Vector3;
 
+use super::bend::{self, SHAPES};
 use super::cone::{Azimuth, Cone, basis};
 use super::edge::{self, Scores};
 use super::lag::Lags;
@@ -34,8 +35,11 @@ pub struct Sighting {
     pub sigma_km: f64,
     /// 1-sigma of it from the unknown local radius, kilometres: common to pictures from one latitude. 0 with a position.
     pub radius_sigma_km: f64,
-    /// Limb height that one pixel across the limb makes, kilometres.
+    /// Limb height that one pixel across the limb makes when all points move by it, kilometres: in a wide picture more than
+    /// its size at the limb, as pixels away from the middle are finer and the shift looks like a bend.
     pub km_per_px: f64,
+    /// Limb height that a bend of the whole edge makes whose RMS is one pixel, kilometres.
+    pub km_per_bend_px: f64,
     /// Growth of the limb height, kilometres, for a focal length that is longer by its own size.
     pub km_per_focal: f64,
     /// Weighted RMS distance of the edge points from the limb, pixels.
@@ -47,6 +51,8 @@ pub struct Sighting {
     /// Geodetic latitudes in degrees of the limb that it saw, with the share of the height each has; empty without a
     /// position.
     pub latitudes: Vec<(f64, f64)>,
+    /// How much of each next shape the residuals hold, pixels.
+    pub(super) shapes_px: [f64; SHAPES],
     /// Models of edge noise on the residuals.
     pub(super) scores: Scores,
     /// Products of residuals by their distance along the edge.
@@ -107,7 +113,9 @@ impl Sighting {
             limb_height_km: height_m / 1e3,
             sigma_km: by_cos_m.abs() * variance_cos.sqrt() / 1e3,
             radius_sigma_km: place.radius_sigma_m / 1e3,
-            km_per_px: by_cos_m.abs() * cone.cos_per_px() / 1e3,
+            km_per_px: by_cos_m.abs() * cone.cos_per_px().max(cone.cos_by(|_| 1.0).abs()) / 1e3,
+            km_per_bend_px: by_cos_m.abs() * cone.cos_by(|row| bend::bend(row.along)).abs() / 1e3,
+            shapes_px: bend::shapes_px(&cone),
             km_per_focal: by_cos_m * cone.cos_by(|row| row.by_focal_px) / 1e3,
             rms_px: cone.rms_px(),
             arc_px: cone.arc_px(),

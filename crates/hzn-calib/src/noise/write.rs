@@ -92,7 +92,8 @@ fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
     let mut parts = vec![
         format!("{:.2} km edge noise over all pictures", h.statistical_km),
         format!("{:.2} km scatter between them", h.scatter_km),
-        format!("{:.2} km a shift of all edges by their RMS", h.shift_km),
+        format!("{:.2} km a shift of all edges by their RMS, 0.1 px at least", h.shift_km),
+        format!("{:.2} km a bend that all edges share", h.bend_km),
     ];
     if h.radius_km > 0.0 {
         parts.push(format!("{:.2} km the radius, unknown without a position", h.radius_km));
@@ -127,7 +128,7 @@ fn noise_lines(calibration: &Calibration) -> Vec<Line> {
         Line {
             key: "bias_px",
             value: digits(e.bias_px).into(),
-            why: "what shifts all points alike cannot be seen in residuals: taken for as large as their RMS".into(),
+            why: "what shifts all points alike cannot be seen in residuals: taken for as large as their RMS, and 0.1 px at least".into(),
         },
     ]
 }

@@ -23,7 +23,8 @@ pub(super) fn lines(calibration: &Calibration, pictures: u64) -> Vec<(&'static s
         ("limb height", format!("{:.2} km ± {:.2} km", h.km, h.sigma_km)),
         ("", format!("{:.2} km from edge noise over all pictures", h.statistical_km)),
         ("", format!("{:.2} km of scatter between pictures beyond it", h.scatter_km)),
-        ("", format!("{:.2} km for a shift of all edges alike by their RMS", h.shift_km)),
+        ("", format!("{:.2} km for a shift of all edges alike by their RMS, 0.1 px at least", h.shift_km)),
+        ("", format!("{:.2} km for a bend that all edges share", h.bend_km)),
     ];
     if h.radius_km > 0.0 {
         lines.push(("", format!("{:.2} km for the local radius, which no position tells", h.radius_km)));

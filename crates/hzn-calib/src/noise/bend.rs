@@ -1,0 +1,73 @@
+//! A bend that all pictures of a flight share.
+//!
+//! The visible limb is no cone to the last tenth of a pixel: it stands higher where the Sun is higher, a veil is brighter
+//! towards one side. Of such a shape the fit takes up what a cone can follow: a shift, a tilt, and a bend, which it reads
+//! as another half-angle. Edge noise averages out over many pictures; a shape that they share does not, and no scatter
+//! between them shows it. What is left of it does show: the residuals' mean over all pictures, as the next shapes along the
+//! edge (Legendre polynomials of the degrees 3 to 5, each of RMS 1). The bend is taken to be as strong as the strongest
+//! of those.
+
+use super::cone::Cone;
+use super::sighting::Sighting;
+
+/// Shapes of the mean residuals that are looked at.
+pub(super) const SHAPES: usize = 3;
+
+/// Legendre polynomials of the degrees 3 to 5 at x from −1 to 1, scaled to an RMS of 1.
+fn next_shapes(x: f64) -> [f64; SHAPES] {
+    let x2 = x * x;
+    [
+        7.0f64.sqrt() * 0.5 * x * (5.0 * x2 - 3.0),
+        3.0 / 8.0 * (x2 * (35.0 * x2 - 30.0) + 3.0),
+        11.0f64.sqrt() / 8.0 * x * (x2 * (63.0 * x2 - 70.0) + 15.0),
+    ]
+}
+
+/// The one of degree 2.
+pub(super) fn bend(x: f64) -> f64 {
+    5.0f64.sqrt() * 0.5 * (3.0 * x * x - 1.0)
+}
+
+/// How much of each next shape the residuals hold, pixels.
+pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
+    let mut sums = [0.0; SHAPES];
+    for row in &cone.rows {
+        for (sum, shape) in sums.iter_mut().zip(next_shapes(row.along)) {
+            *sum += row.weight * row.r_px * shape / cone.weight;
+        }
+    }
+    sums
+}
+
+/// RMS in pixels of the bend that all edges may share: as strong as the strongest of the next shapes in the mean of their
+/// residuals, or as its error.
+pub(super) fn common_px(sightings: &[&Sighting]) -> f64 {
+    let n = sightings.len().max(1) as f64;
+    let of = |k: usize| {
+        let values = || sightings.iter().filter_map(move |s| s.shapes_px.get(k));
+        let mean = values().sum::<f64>() / n;
+        let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0).max(1.0));
+        mean.abs().max(variance.sqrt())
+    };
+    (0..SHAPES).map(of).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_have_an_rms_of_one_and_are_independent() {
+        let at = |i: i32| f64::from(i) / 5000.0 - 1.0 + 1e-4;
+        let all = |x: f64| {
+            let [a, b, c] = next_shapes(x);
+            [1.0, 3.0f64.sqrt() * x, bend(x), a, b, c]
+        };
+        for i in 0..6 {
+            for j in 0..6 {
+                let mean = (0..10_000).map(|k| all(at(k))[i] * all(at(k))[j]).sum::<f64>() / 1e4;
+                assert!((mean - f64::from(u8::from(i == j))).abs() < 1e-3, "{i} {j}: {mean}");
+            }
+        }
+    }
+}
