@@ -23,7 +23,7 @@ pub fn why(verdict: Verdict, s: &select::Config) -> String {
         ),
         Verdict::Uncertain => format!("sigma above {} deg (select.max_sigma_deg)", s.max_sigma_deg),
         Verdict::NoFit => "the fit did not converge".into(),
-        Verdict::Indistinct => "many of its points lie close beside the fitted limb: a curve through clutter".into(),
+        Verdict::Indistinct => "a curve through clutter: many of its points lie close beside the fitted limb, or a part of it follows the limb by chance".into(),
         Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
         Verdict::Taken => "it is the limb of another body, found before".into(),
         Verdict::OutOfView => {

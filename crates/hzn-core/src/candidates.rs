@@ -413,7 +413,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     } else {
         in_steps::<T, P, O, false>(scene, p, (dx, dy), step)?
     };
-    let Wide { off, fallback, .. } = climb(scene, p, (dx, dy), step, found, slow);
+    let Wide { off, fallback, .. } = if found.rising { climb(scene, p, (dx, dy), step, found, slow) } else { found };
     Some((point_off(p, (dx, dy), off), lit, fallback))
 }
 

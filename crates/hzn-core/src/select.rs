@@ -57,6 +57,15 @@ pub struct Config {
     /// Most points that may lie beside the fitted limb, within three times the cut-off, as a part of the inliers; 0 or more. A
     /// limb stands alone; a curve laid through many edges has others close beside it.
     pub max_nearby: f64,
+    /// An edge of whose points this part or more are inliers lies on the limb as a whole, 0 to 1. Of others a part may lie on
+    /// it by chance, and is asked for more: see `max_spread` and `max_way`. 0 asks no edge.
+    pub whole_edge: f64,
+    /// Largest weighted RMS of the inliers of an edge that is not whole, as a part of `reject.threshold_px`, above 0. Points that are
+    /// spread evenly over the threshold have about a half.
+    pub max_spread: f64,
+    /// Longest way along the inliers of an edge that is not whole, as a multiple of what they cover of the limb, 1 or more: a
+    /// cloud's edge winds, and has many parts of which one may lie on a limb.
+    pub max_way: f64,
     /// As `min_support`, of a body without phases (the Sun) where `min_support` is above 0: it is a whole disc, and a gibbous
     /// Moon has less. 0 to 1.
     pub min_support_whole: f64,
@@ -88,7 +97,7 @@ pub struct Config {
     /// the rim of a flare does not.
     pub departure_contrast: f64,
     /// Largest part of the looks from the limb inwards that may end in the sky across a second edge, 0 to 1; for bodies that
-    /// are wider than the picture, which reach its border. 1 turns the gate off.
+    /// cannot lie whole in the picture: a crescent is a band. 1 turns the gate off.
     pub max_band: f64,
     /// A second edge is one whose step is at least this part of the limb's, above 0 to 1.
     pub band_step: f64,
@@ -155,6 +164,9 @@ impl Default for Config {
             max_lit_sky: 0.3,
             min_inlier_share: 0.05,
             max_nearby: 1.0 / 3.0,
+            whole_edge: 0.8,
+            max_spread: 0.25,
+            max_way: 2.0,
             min_support_whole: 0.7,
             max_rival_ratio: 2.0,
             min_evidence: 9.0,
@@ -218,6 +230,10 @@ impl Config {
         between("select.max_lit_sky", self.max_lit_sky, 0.0, 1.0)?;
         between("select.min_inlier_share", self.min_inlier_share, 0.0, 1.0)?;
         between("select.max_nearby", self.max_nearby, 0.0, 1e6)?;
+        between("select.whole_edge", self.whole_edge, 0.0, 1.0)?;
+        above("select.max_spread", self.max_spread, 0.0)?;
+        between("select.max_spread", self.max_spread, 0.0, 1e6)?;
+        between("select.max_way", self.max_way, 1.0, 1e6)?;
         between("select.min_support_whole", self.min_support_whole, 0.0, 1.0)?;
         between("select.max_rival_ratio", self.max_rival_ratio, 1.0, 1e6)?;
         between("select.min_evidence", self.min_evidence, -1e6, 1e6)?;
@@ -255,7 +271,7 @@ impl Config {
     #[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
     pub(crate) fn trust_every_shape(&mut self) {
         (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
-        self.min_support_abrupt = 0.0;
+        (self.min_support_abrupt, self.whole_edge) = (0.0, 0.0);
         (self.max_departure, self.max_band, self.max_unlit) = (1e6, 1.0, 1.0);
         self.max_attitude_sigma = 1e6;
     }
@@ -280,6 +296,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     expected: &Expected<T>,
     blocks: &[Block<T>],
     points: u32,
+    threshold_px: T,
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -307,7 +324,9 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::Uncertain
     } else if support < T::of(least_support(config, expected)) {
         Verdict::Unsupported
-    } else if counts(fit.nearby) > counts(fit.inliers) * T::of(config.max_nearby) {
+    } else if counts(fit.nearby) > counts(fit.inliers) * T::of(config.max_nearby)
+        || is_by_chance(fit, points, covered_px, threshold_px, config)
+    {
         Verdict::Indistinct
     } else {
         surroundings(fused, expected, blocks, scene, camera, config)
@@ -333,6 +352,12 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
 }
 
+/// Whether a part of an edge lies on the cone as a part of any edge may: spread over the threshold, or winding.
+fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, threshold_px: T, config: &Config) -> bool {
+    let whole = T::of_i32(fit.inliers as i32) >= T::of_i32(points as i32) * T::of(config.whole_edge);
+    !whole && (fit.rms_px > threshold_px * T::of(config.max_spread) || fit.arc_px > covered_px * T::of(config.max_way))
+}
+
 /// Whether what lies beyond and within the fitted limb is the sky and the body.
 fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
     fused: &Fused<T>,
@@ -350,18 +375,21 @@ fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
         return Verdict::Sun;
     }
     // Of a picture that came row by row only lit and dark is left, where a terminator is as steep as an edge.
-    let wide = !P::PASSED && config.max_band < 1.0 && is_wider_than_the_picture(expected, camera);
-    if wide && band::banded(&fused.e, blocks, scene, camera, &sky, T::of(config.band_step)) >= T::of(config.max_band) {
+    // A disc that lies whole in the picture may be a crescent, which is a band.
+    let disc_px = disc_px(expected, camera);
+    let wide = disc_px > T::of_i32(camera.width().min(camera.height()).into());
+    let looks = !P::PASSED && config.max_band < 1.0 && wide;
+    let step = T::of(config.band_step);
+    if looks && band::banded(&fused.e, blocks, scene, camera, &sky, disc_px, step) >= T::of(config.max_band) {
         return Verdict::Band;
     }
     Verdict::Passed
 }
 
-/// Whether the disc's 2 α f exceed the picture's diagonal, so that the body reaches the picture's border.
-fn is_wider_than_the_picture<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> bool {
-    let (w, h) = (T::of_i32(i32::from(camera.width())), T::of_i32(i32::from(camera.height())));
+/// The diameter of the body's disc, 2 α f, in pixels.
+fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T {
     let (fx, fy) = camera.focal_px();
-    expected.half_angle_rad() * (fx + fy) > (w * w + h * h).sqrt()
+    expected.half_angle_rad() * (fx + fy)
 }
 
 /// Whether the points are another curve's: that they fit the cone no worse than what is no limb, agree with its half-angle

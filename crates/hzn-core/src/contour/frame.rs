@@ -13,7 +13,7 @@ use crate::work::{self, Work};
 const SPECKS: u32 = 64;
 const LIT: u32 = 8;
 /// Pixels between those that are looked at first: they tell of nearly every picture that it has none.
-const COARSE: u16 = 16;
+const COARSE: u16 = 64;
 
 impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
     /// Width of the frame in pixels, `most` at most; 0 where there is none: light must come at once from its inner side

@@ -29,7 +29,7 @@ use crate::linalg::{M3, V3, basis};
 use crate::real::Real;
 
 /// Points that the signals are summed over, at most, evenly along the edge.
-const PART: usize = 128;
+const PART: usize = 64;
 
 /// The standard deviation of a place along the edge, for places from −1 to 1: 1/√3.
 const SPREAD: f64 = 0.577_350_269_189_625_8;

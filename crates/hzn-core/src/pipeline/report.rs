@@ -140,7 +140,7 @@ verdicts! {
     NoFit = 8, "no-fit";
     /// The fitted limb goes on where the picture shows none: too small a part of it is edge.
     Unsupported = 9, "unsupported";
-    /// Many edge points lie close beside the fitted limb: a curve through clutter.
+    /// A curve through clutter: many edge points lie close beside the fitted limb, or a part of the edge follows it by chance.
     Indistinct = 10, "indistinct";
     /// Too much of what lies beyond the fitted limb is lit.
     NoSky = 11, "no-sky";

@@ -14,21 +14,24 @@ use crate::real::Real;
 const PLACES: i32 = 16;
 /// A look that ends nearer than this says nothing, pixels.
 const SHORTEST_PX: i32 = 32;
+/// The looks end before the far side of the body's disc, at this part of its diameter.
+const ACROSS: f64 = 0.8;
 /// The limb's own step is read so far to each side, and the far edge of a band likewise, pixels.
 const ASIDE_PX: i32 = 6;
 /// Of what lies behind a band so much must be sky; of a body nearly nothing is.
-const FOR_GOOD: [usize; 2] = [9, 10];
+const FOR_GOOD: [usize; 2] = [2, 3];
 /// Of the limb's step so much stands above the sky at the most where there is sky again: blur and stray light.
-const SKY_PART: f64 = 0.02;
+const SKY_PART: f64 = 0.1;
 
 /// The part of the looks inwards that come back to the sky across a second edge, at least `step` times as high as the limb,
-/// 0 to 1. A terminator fades and is no edge.
+/// 0 to 1. A terminator fades and is no edge. `disc_px` is the diameter of the body's disc.
 pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
     sky: &sky::Sky<T>,
+    disc_px: T,
     step: T,
 ) -> T {
     let (mut looks, mut bands) = (0, 0);
@@ -45,7 +48,8 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
         let seen = |px: i32| {
             at(px).filter(|&(x, y)| !scene.region.masked(x, y)).map(|(x, y)| T::of_i32(scene.brightness(x, y).into()))
         };
-        let end = inside(&at, i32::from(scene.region.width()) + i32::from(scene.region.height()));
+        let most = i32::from(scene.region.width()) + i32::from(scene.region.height());
+        let end = inside(&at, most.min((disc_px * T::of(ACROSS)).to_i32()));
         if end < SHORTEST_PX {
             continue;
         }
@@ -60,10 +64,12 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
             *cell = seen(place(k)).map(|b| b < dark);
         }
         let Some(back) = back_for_good(&is_sky) else { continue };
-        // Between two places, where it is half as bright as the nearer one.
-        let (mut near, mut far) = (place(back as i32), place(back as i32 + 1));
-        let half = |a: i32| seen(a).map(|b| b - sky.median).filter(|b| *b > T::ZERO);
-        let level = half(near).unwrap_or(limb) * T::of(0.5);
+        // The far edge is where half of the band's brightness is left: behind the last place that has more.
+        let above = |px: i32| seen(px).map_or(T::ZERO, |b| b - sky.median);
+        let passed = |k: i32| above(if k == 0 { ASIDE_PX } else { place(k) });
+        let level = (0..=back as i32).fold(limb, |most, k| most.most(passed(k))) * T::of(0.5);
+        let last = (0..=back as i32).rev().find(|&k| passed(k) >= level).unwrap_or(0);
+        let (mut near, mut far) = (place(last), place(last + 1));
         while far - near > 1 {
             let middle = (near + far) / 2;
             if seen(middle).is_some_and(|b| b - sky.median < level) { far = middle } else { near = middle }
@@ -77,7 +83,9 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
             }
             if count > 0 { sum / T::of_i32(count) } else { sky.median }
         };
-        bands += i32::from(edge((near - ASIDE_PX).max(1)) - edge(far + ASIDE_PX) >= limb * step);
+        // A narrow band is brightest less than so far from its far edge.
+        let bright = ((near - ASIDE_PX).max(1)..=near).map(edge).fold(T::ZERO, |a, b| a.most(b));
+        bands += i32::from(bright - edge(far + ASIDE_PX) >= limb * step);
     }
     T::of_i32(bands) / T::of_i32(looks.max(1))
 }
