@@ -58,11 +58,8 @@ pub struct Config {
     /// limb stands alone; a curve laid through many edges has others close beside it.
     pub max_nearby: f64,
     /// An edge of whose points this part or more are inliers lies on the limb as a whole, 0 to 1. Of others a part may lie on
-    /// it by chance, and is asked for more: see `max_spread` and `max_way`. 0 asks no edge.
+    /// it by chance, and is asked for more: see `max_way`. 0 asks no edge.
     pub whole_edge: f64,
-    /// Largest weighted RMS of the inliers of an edge that is not whole, as a part of `reject.threshold_px`, above 0. Points that are
-    /// spread evenly over the threshold have about a half.
-    pub max_spread: f64,
     /// Longest way along the inliers of an edge that is not whole, as a multiple of what they cover of the limb, 1 or more: a
     /// cloud's edge winds, and has many parts of which one may lie on a limb.
     pub max_way: f64,
@@ -165,8 +162,7 @@ impl Default for Config {
             min_inlier_share: 0.05,
             max_nearby: 1.0 / 3.0,
             whole_edge: 0.8,
-            max_spread: 0.25,
-            max_way: 2.0,
+            max_way: 3.0,
             min_support_whole: 0.7,
             max_rival_ratio: 2.0,
             min_evidence: 9.0,
@@ -231,8 +227,6 @@ impl Config {
         between("select.min_inlier_share", self.min_inlier_share, 0.0, 1.0)?;
         between("select.max_nearby", self.max_nearby, 0.0, 1e6)?;
         between("select.whole_edge", self.whole_edge, 0.0, 1.0)?;
-        above("select.max_spread", self.max_spread, 0.0)?;
-        between("select.max_spread", self.max_spread, 0.0, 1e6)?;
         between("select.max_way", self.max_way, 1.0, 1e6)?;
         between("select.min_support_whole", self.min_support_whole, 0.0, 1.0)?;
         between("select.max_rival_ratio", self.max_rival_ratio, 1.0, 1e6)?;
@@ -296,7 +290,6 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     expected: &Expected<T>,
     blocks: &[Block<T>],
     points: u32,
-    threshold_px: T,
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -325,7 +318,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     } else if support < T::of(least_support(config, expected)) {
         Verdict::Unsupported
     } else if counts(fit.nearby) > counts(fit.inliers) * T::of(config.max_nearby)
-        || is_by_chance(fit, points, covered_px, threshold_px, config)
+        || is_by_chance(fit, points, covered_px, config)
     {
         Verdict::Indistinct
     } else {
@@ -352,10 +345,10 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     Judged { verdict, score: fit.rms_px.most(T::of(0.05)) / support.most(T::of(1e-3)), support }
 }
 
-/// Whether a part of an edge lies on the cone as a part of any edge may: spread over the threshold, or winding.
-fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, threshold_px: T, config: &Config) -> bool {
+/// Whether a part of an edge lies on the cone as a part of any edge that winds may.
+fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Config) -> bool {
     let whole = T::of_i32(fit.inliers as i32) >= T::of_i32(points as i32) * T::of(config.whole_edge);
-    !whole && (fit.rms_px > threshold_px * T::of(config.max_spread) || fit.arc_px > covered_px * T::of(config.max_way))
+    !whole && fit.arc_px > covered_px * T::of(config.max_way)
 }
 
 /// Whether what lies beyond and within the fitted limb is the sky and the body.

@@ -383,9 +383,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
-        let limits = &config.select;
         let judged =
-            select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, threshold, scene, camera, limits);
+            select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, scene, camera, &config.select);
         outcome.verdict = judged.verdict;
         let most = T::of(f64::from(points.count)) * T::of(config.recover.min_part);
         if self.report.counters.looks > 0 && T::of(f64::from(fit.inliers)) < most {

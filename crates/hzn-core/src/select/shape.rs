@@ -8,8 +8,8 @@ use crate::limb::Azimuth;
 use crate::linalg::V3;
 use crate::real::Real;
 
-/// Most inliers that are looked at, evenly along the edge: the ratio of two residuals is then known to some 15 %.
-pub(super) const MOST: usize = 64;
+/// Most inliers that are looked at, evenly along the edge: the ratio of two residuals is then known to some 10 %.
+pub(super) const MOST: usize = 128;
 
 /// An inlier.
 #[derive(Debug, Clone, Copy)]
