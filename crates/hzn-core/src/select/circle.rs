@@ -5,7 +5,7 @@ use crate::linalg::{V3, invert_spd3};
 use crate::real::Real;
 
 /// Gauss-Newton steps; from a circle through three of the points two are enough.
-const STEPS: usize = 3;
+const STEPS: usize = 2;
 
 /// A circle through `at` with the unit normal `n` towards its centre and the curvature `kappa`; 0 is a straight line.
 struct Circle<T> {

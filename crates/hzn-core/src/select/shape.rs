@@ -94,18 +94,21 @@ pub(super) fn rms<T: Real>(shape: &Shape<T>) -> T {
 /// is 0.6745 √1.5 times the sigma of independent errors.
 pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
     let half = T::of(0.5);
-    let second = |w: &[Place<T>]| match w {
-        [a, b, c] => (b.r - (a.r + c.r) * half).abs(),
-        _ => T::ZERO,
-    };
-    let most = shape.windows(3).map(second).fold(T::ZERO, |a, b| a.most(b));
-    let count = shape.len().saturating_sub(2);
-    // By halving: sorting would need room, or a panic path.
+    let mut all = heapless::Vec::<T, MOST>::new();
+    let mut most = T::ZERO;
+    for w in shape.windows(3) {
+        if let [a, b, c] = w {
+            let second = (b.r - (a.r + c.r) * half).abs();
+            most = most.most(second);
+            let _ = all.push(second);
+        }
+    }
+    // By halving: sorting would need a panic path.
     let (mut low, mut high) = (T::ZERO, most);
     for _ in 0..12 {
         let middle = (low + high) * half;
-        let below = shape.windows(3).filter(|w| second(w) <= middle).count();
-        if 2 * below >= count { high = middle } else { low = middle }
+        let below = all.iter().filter(|second| **second <= middle).count();
+        if 2 * below >= all.len() { high = middle } else { low = middle }
     }
     high * T::of(1.0 / (0.6745 * 1.224_744_871))
 }

@@ -71,7 +71,7 @@ pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
 
 /// The smallest value that half of the values do not exceed, by halving; 0 of none.
 fn median(values: &[u16]) -> u16 {
-    let (mut low, mut high) = (0u32, 65535u32);
+    let (mut low, mut high) = (0u32, values.iter().fold(0, |most, &v| most.max(v)).into());
     while low < high {
         let middle = (low + high) / 2;
         let below = values.iter().filter(|&&v| u32::from(v) <= middle).count();
