@@ -38,6 +38,8 @@ impl Why {
 /// Counts refusals by their reason.
 #[derive(Debug, Default)]
 pub(crate) struct Refusals {
+    /// Answers that a further look at another level gave.
+    further: u64,
     /// Reason, how often, and the number of the first frame with it that was processed for every body.
     each: Vec<(Why, u64, Option<u64>)>,
     total: u64,
@@ -46,12 +48,23 @@ pub(crate) struct Refusals {
 impl Refusals {
     pub(crate) fn count(&mut self, frame: &Finished) {
         let whole = frame.found.iter().all(|f| f.report.is_ok()).then_some(frame.index);
+        let again = |report: &Report<f64>| report.status == Status::Ok && report.counters.looks > 1;
+        self.further += frame.found.iter().filter(|f| f.report.as_ref().is_ok_and(again)).count() as u64;
         for why in frame.found.iter().filter_map(|f| Why::of(f.report.as_ref().ok()?)) {
             self.total += 1;
             match self.each.iter_mut().find(|(known, ..)| *known == why) {
                 Some((_, n, first)) => (*n, *first) = (*n + 1, first.or(whole)),
                 None => self.each.push((why, 1, whole)),
             }
+        }
+    }
+
+    /// How many answers a further look gave, in words; `None` of none.
+    pub(crate) fn further(&self) -> Option<String> {
+        match self.further {
+            0 => None,
+            1 => Some("1 answer came from a further look at another level (recover.levels)".to_owned()),
+            n => Some(format!("{n} answers came from a further look at another level (recover.levels)")),
         }
     }
 

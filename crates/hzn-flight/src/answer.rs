@@ -60,6 +60,8 @@ pub struct Answer {
     pub status: u8,
     /// [`hzn_core::status::Stage`] as a number: the last that was entered.
     pub stage: u8,
+    /// How often the picture was looked at, each time at another level: 1 to 16.
+    pub looks: u8,
     /// Level between dark and lit in counts.
     pub level: u16,
     /// Border pixels followed.
@@ -81,6 +83,9 @@ pub struct Answer {
     /// The first candidates, and the chosen one.
     pub edges: [Option<Edge>; MAX_LISTED],
 }
+
+/// So many looks fit into a packet.
+const MOST_LOOKS: u32 = 16;
 
 impl Answer {
     /// What a report says.
@@ -117,6 +122,7 @@ impl Answer {
         Self {
             status: report.status as u8,
             stage: report.stage as u8,
+            looks: c.looks.clamp(1, MOST_LOOKS) as u8,
             level: report.level,
             followed: c.followed,
             candidates: c.candidates,
@@ -181,8 +187,7 @@ impl Answer {
                 work: self.work,
                 // No pictures come row by row.
                 cut_points: 0,
-                // Not sent down.
-                looks: 0,
+                looks: self.looks.into(),
             },
             candidates,
             solution,
@@ -192,7 +197,8 @@ impl Answer {
     /// Appends the answer.
     pub fn write(&self, out: &mut Writer<'_>) {
         out.u8(self.status);
-        out.u8(self.stage);
+        // Two numbers in a byte: the stage, and the further looks above it.
+        out.u8(self.stage | self.looks.saturating_sub(1).min(15) << 4);
         out.u16(self.level);
         let counts = [self.followed, self.candidates, self.dropped, self.fallback_points, self.edge_points, self.draws];
         for n in counts.into_iter().chain([self.work]) {
@@ -220,9 +226,11 @@ impl Answer {
 
     /// Reads an answer; `None` when it is cut off.
     pub fn read(from: &mut Reader<'_>) -> Option<Self> {
+        let (status, stage) = (from.u8()?, from.u8()?);
         let mut answer = Self {
-            status: from.u8()?,
-            stage: from.u8()?,
+            status,
+            stage: stage & 15,
+            looks: (stage >> 4) + 1,
             level: from.u16()?,
             followed: from.u32()?,
             candidates: from.u32()?,
@@ -298,6 +306,7 @@ mod tests {
         let whole = Answer {
             status: 0,
             stage: 7,
+            looks: 3,
             level: 88,
             followed: 2000,
             candidates: 2,

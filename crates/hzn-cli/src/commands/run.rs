@@ -185,6 +185,9 @@ pub(super) fn run(args: &Args) -> Outcome {
             n => format!(" (after {n} that were finished before)"),
         };
         tell::line(format_args!("{summary}{before}"));
+        if let Some(further) = refusals.further() {
+            tell::line(format_args!("note: {further}"));
+        }
         if let Some((why, frame)) = refusals.commonest(&plan.config.select) {
             let nothing = !progress.any_answered() && held.frames == 0;
             let found = if nothing { "nothing was found in any picture; " } else { "" };
