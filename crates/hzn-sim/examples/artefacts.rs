@@ -61,10 +61,13 @@ struct Args {
     set: Vec<String>,
 }
 
+/// A point of the picture in pixels, and its weight in the fit.
+type Weighted = ([f64; 2], f64);
+
 /// Points of each edge with their weights.
 #[derive(Default)]
 struct Watch {
-    edges: RefCell<BTreeMap<u32, Vec<([f64; 2], f64)>>>,
+    edges: RefCell<BTreeMap<u32, Vec<Weighted>>>,
 }
 
 impl Observer<f64> for Watch {
