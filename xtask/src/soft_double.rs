@@ -23,15 +23,18 @@ const STAGES: [&str; 10] = [
 ];
 /// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
 /// places where they do.
-const ONCE: [(&str, usize); 8] = [
+const ONCE: [(&str, usize); 11] = [
     ("hzn_core::binarize::Config::fixed_level", 4),
     ("hzn_core::binarize::Histogram::mean", 2),
     ("hzn_core::binarize::Histogram::otsu", 3),
     ("hzn_core::reject::keep", 2),
     ("hzn_core::estimate::fit", 4),
     ("hzn_core::covariance::fuse", 5),
-    ("hzn_core::select::judge", 8),
-    ("hzn_core::pipeline::judge::Judge<T,O>::edge", 4),
+    ("hzn_core::select::attitude::verdict", 4),
+    ("hzn_core::select::judge", 18),
+    ("hzn_core::select::rivals", 14),
+    ("hzn_core::select::surroundings", 7),
+    ("hzn_core::pipeline::judge::Judge<T,O>::piece", 14),
 ];
 /// Loops that must be found, or the check would say nothing.
 const LOOPS: [&str; 3] = ["contour::follow", "candidates::", "estimate::pass"];

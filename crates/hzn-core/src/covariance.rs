@@ -7,7 +7,7 @@
 //! independent instead would give a sigma some twenty times too small.
 //!
 //! R and L are told, or come from the residuals ([`Noise`]). Errors that all points of the edge share show in no residual,
-//! and each adds its own term ([`common`]); the expected half-angle is fused last.
+//! and each adds its own term; the expected half-angle is fused last.
 
 #[cfg(feature = "dlr")]
 pub(crate) mod braun_barf;

@@ -502,7 +502,7 @@ fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (
 const LOOKS: usize = 12;
 
 /// Distance from the limb at which the brightness on both sides is read for the next picture's level, pixels.
-const PLATEAU_PX: f64 = 6.0;
+const PLATEAU_PX: i32 = 6;
 
 /// Halfway between the brightness on both sides of the limb, in counts.
 pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
@@ -516,8 +516,9 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
         let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
         let [gu, gv] = block.gradient_at(lane, e);
         let norm = (gu * gu + gv * gv).sqrt().most(T::of(1e-20));
-        let at = |px: f64| {
-            let (x, y) = ((from.u + gu / norm * T::of(px)).to_i32(), (from.v + gv / norm * T::of(px)).to_i32());
+        let at = |px: i32| {
+            let px = T::of_i32(px);
+            let (x, y) = ((from.u + gu / norm * px).to_i32(), (from.v + gv / norm * px).to_i32());
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
             (scene.region.contains(x, y) && !scene.region.masked(x, y)).then(|| u32::from(scene.brightness(x, y)))
         };

@@ -386,8 +386,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let judged =
             select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, scene, camera, &config.select);
         outcome.verdict = judged.verdict;
-        let most = T::of(f64::from(points.count)) * T::of(config.recover.min_part);
-        if self.report.counters.looks > 0 && T::of(f64::from(fit.inliers)) < most {
+        let most = T::of_i32(points.count as i32) * T::of(config.recover.min_part);
+        if self.report.counters.looks > 0 && T::of_i32(fit.inliers as i32) < most {
             outcome.verdict = Verdict::NoConsensus;
             return (outcome, None);
         }

@@ -19,7 +19,7 @@ const NEAR: usize = 2;
 /// Gaps up to this length do not end a run of inliers, pixels.
 const GAP_PX: f64 = 12.0;
 /// The edge's contrast is read so far to each side, pixels.
-const ASIDE_PX: f64 = 3.0;
+const ASIDE_PX: i32 = 3;
 
 /// The longest run of inliers: its first and last point and its length in pixels.
 struct Run<T> {
@@ -111,10 +111,10 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     /// Difference in brightness across the edge at `at`, whose direction is (dx, dy), counts.
     fn contrast(&self, at: [T; 2], [dx, dy]: [T; 2]) -> Option<i32> {
         let norm = (dx * dx + dy * dy).sqrt().most(T::of(1e-6));
-        let side = |px: f64| {
+        let side = |px: i32| {
             let half = T::of(0.5);
-            let x = (at[0] - dy / norm * T::of(px) + half).to_i32();
-            let y = (at[1] + dx / norm * T::of(px) + half).to_i32();
+            let x = (at[0] - dy / norm * T::of_i32(px) + half).to_i32();
+            let y = (at[1] + dx / norm * T::of_i32(px) + half).to_i32();
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
             let counts = self.scene.region.contains(x, y) && !self.scene.region.masked(x, y);
             counts.then(|| i32::from(self.scene.brightness(x, y)))
