@@ -341,7 +341,11 @@ fn the_sensor_alone_answers_with_the_same_bits() {
     let mut sensor = Config::new(lens.clone());
     sensor.body.altitude_km = Some(150.0);
     let mut flight = rocket(1920, 1080, 6, 7);
-    flight.frames.iter_mut().for_each(|f| f.scene.camera = lens.clone());
+    for (i, frame) in (0..).map(f64::from).zip(&mut flight.frames) {
+        frame.scene.camera = lens.clone();
+        let look = hzn_sim::Look { azimuth_rad: i, depression_rad: 0.2 + 0.02 * i, roll_rad: 0.5 * i };
+        frame.scene.pose = hzn_sim::Pose::looking(hzn_sim::pose::position_m(10.0 * i, 20.0, 150.0), look);
+    }
     let mut ok = 0;
     for frame in &flight.frames {
         let case = Case { known: Frame::default(), ..Case::rendered(frame.file.clone(), &sensor, frame) };
