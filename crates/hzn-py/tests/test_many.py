@@ -181,7 +181,7 @@ def test_a_tracked_level_goes_from_picture_to_picture():
 def test_bits_are_found_once_for_a_sequence(sensor, tmp_path):
     # The first picture is dark: by itself it has 8 bits.
     for i, scale in enumerate((0.25, 16, 16)):
-        words = (limb(i) * scale).astype(">u2")
+        words = (limb(i).astype(float) * scale).astype(">u2")
         (tmp_path / f"{i}.pgm").write_bytes(b"P5\n320 240\n65535\n" + words.tobytes())
     with pytest.warns(UserWarning, match="reach 3200 in 3 pictures looked at: taken as 12 bits"):
         reports = list(sensor.process_many(tmp_path))
