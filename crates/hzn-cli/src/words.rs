@@ -68,6 +68,7 @@ pub fn term(term: Term) -> &'static str {
         Term::CommonTilt => "a tilt that the whole edge shares",
         Term::UnknownAzimuth => "the limb's unknown azimuth",
         Term::Lens => "the calibration of the lens",
+        Term::Clipping => "the height of a limb that is clipped at full scale",
         Term::LimbHeight => "the limb height",
         Term::Altitude => "the altitude",
         Term::Radius => "the unknown local radius",

@@ -104,6 +104,8 @@ pub struct Level<T> {
     pub dark: T,
     /// How much brighter its lit pixels are, on the average, in counts; 0 where it has none.
     pub contrast: T,
+    /// 1-sigma of the noise of the dark pixels, in counts, from their upper quartile: a quarter of them may be dim ground.
+    pub noise: T,
 }
 
 impl<T: Real> Level<T> {
@@ -112,6 +114,11 @@ impl<T: Real> Level<T> {
     pub(crate) fn part(&self, part: f64) -> u16 {
         let level = T::of_i32(i32::from(self.level));
         counts(self.dark + (level - self.dark) * T::of(part))
+    }
+
+    /// Whether a level stands so many sigmas of the noise above the dark pixels.
+    pub(crate) fn clears(&self, level: u16, sigmas: f64) -> bool {
+        T::of_i32(level.into()) >= self.dark + self.noise * T::of(sigmas)
     }
 }
 
@@ -123,6 +130,8 @@ const LEAST_CONTRAST: f64 = 0.03;
 const LEAST_SPREADS: f64 = 4.0;
 /// Steps of the samples that classes must be apart at least: fewer are rounding.
 const LEAST_COUNTS: f64 = 4.0;
+/// A normal distribution's sigma over the distance from its median to its quartile.
+const QUARTILES: f64 = 1.0 / 0.6745;
 /// Cells along each side of the first sample and of the second, as powers of two.
 const SIDES_LOG2: [u32; 2] = [4, 6];
 
@@ -273,8 +282,8 @@ impl Sample {
         };
         let level = level?;
         observer.level(level, mean, sample.count);
-        let (dark, contrast) = sample.classes(level, mean);
-        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast }))
+        let (dark, contrast, noise) = sample.classes(level, mean);
+        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast, noise }))
     }
 }
 
@@ -314,9 +323,9 @@ impl Histogram {
         }
     }
 
-    /// Mean of the pixels below the level, and how much brighter the mean of the others is; counts.
+    /// Mean of the pixels below the level, how much brighter the mean of the others is, and the noise of those below; counts.
     #[inline(never)]
-    fn classes<T: Real>(&self, level: u16, mean: T) -> (T, T) {
+    fn classes<T: Real>(&self, level: u16, mean: T) -> (T, T, T) {
         let lit = (u32::from(level) >> self.shift).saturating_sub(self.first) as usize;
         let (mut count, mut sum) = (0u32, 0u32);
         for (&n, k) in self.bins.iter().zip(0u32..).take(lit) {
@@ -325,12 +334,22 @@ impl Histogram {
         }
         let above = self.count.saturating_sub(count);
         if count == 0 || above == 0 {
-            return (if count == 0 { T::ZERO } else { mean }, T::ZERO);
+            return (if count == 0 { T::ZERO } else { mean }, T::ZERO, T::ZERO);
         }
+        // The bins that hold the median of the dark pixels and their upper quartile.
+        let (mut passed, mut quartiles) = (0u32, [0u32; 2]);
+        for &n in self.bins.iter().take(lit) {
+            passed += u32::from(n);
+            let [middle, upper] = &mut quartiles;
+            *middle += u32::from(2 * passed < count);
+            *upper += u32::from(4 * passed < 3 * count);
+        }
+        let [middle, upper] = quartiles;
+        let noise = T::of(f64::from(upper - middle)) * self.width() * T::of(QUARTILES);
         let dark = (T::of(f64::from(sum)) / T::of(f64::from(count)) + self.offset()) * self.width();
         // What the dark ones lack of the mean, the lit ones have over it.
         let (count, above) = (T::of(f64::from(count)), T::of(f64::from(above)));
-        (dark, (mean - dark) * (count + above) / above)
+        (dark, (mean - dark) * (count + above) / above, noise)
     }
 
     /// Counts a bin, and the number of the first.
@@ -461,6 +480,20 @@ mod tests {
             let flat: Vec<u16> = (0..64 * 64).map(|i| sky + noise(i)).collect();
             assert_eq!(level(&flat, 16, Gate::default(), Config::default()).unwrap_err(), Status::NoLimb);
         }
+    }
+
+    #[test]
+    fn a_level_in_the_noise_of_the_dark_is_told() {
+        // Noise of a normal distribution, 4 counts, by the sum of twelve numbers.
+        let mut rng = Rng::new(5);
+        let mut noise = || (0..12).map(|_| f64::from(rng.below(1000)) / 1000.0).sum::<f64>() * 4.0;
+        let data: Vec<u16> = halves(10, 150).iter().map(|&v| v + noise() as u16).collect();
+        let found = level(&data, 8, Gate::default(), Config::default()).unwrap();
+        assert!((found.noise - 4.0).abs() < 1.5, "{found:?}");
+        assert!(found.clears(found.part(0.25), 3.0) && !found.clears(found.part(0.1), 3.0));
+        // A sky without noise forbids nothing.
+        let found = level(&halves(10, 210), 8, Gate::default(), Config::default()).unwrap();
+        assert!(found.noise == 0.0 && found.clears(found.part(0.05), 3.0));
     }
 
     #[test]

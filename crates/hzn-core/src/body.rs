@@ -81,6 +81,13 @@ pub struct Config {
     /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts. The default,
     /// 7 km, spans the visible wavelengths (24 km at 440 nm, 12 km at 650 nm) and levels between a quarter and three quarters.
     pub limb_height_sigma_km: f64,
+    /// What clipping adds to the limb's height in kilometres, 0 to 500: where the limb is overexposed, half of full scale lies
+    /// h ln B above half of the light, h being the height over which the air thins out to 1/e (7.5 km) and B how far the light
+    /// exceeds full scale. The default, 7.8 km, is the mean over B from 1 to 8, evenly distributed in its logarithm. Only the
+    /// part of the limb counts whose lit side is clipped.
+    pub clipped_height_km: f64,
+    /// 1-sigma of that in kilometres, 0 or more; 4.5 km over the same B. It varies along the limb.
+    pub clipped_sigma_km: f64,
     /// Limb height by latitude instead of `limb_height_km`: up to 16 rows of (geodetic latitude in degrees, height in
     /// kilometres), latitudes rising, linear between them and constant beyond. For `earth` with a position; an attitude
     /// is needed to make use of how the height varies along the limb, without one it widens the covariance.
@@ -108,6 +115,8 @@ impl Default for Config {
             altitude_reference: AltitudeReference::Ellipsoid,
             limb_height_km: 17.0,
             limb_height_sigma_km: 7.0,
+            clipped_height_km: 7.8,
+            clipped_sigma_km: 4.5,
             limb_height_by_latitude_km: heapless::Vec::new(),
             sunlit: None,
             binarize: None,
@@ -134,6 +143,8 @@ impl Config {
         between("body.altitude_sigma_km", self.altitude_sigma_km, 0.0, 1e6)?;
         between("body.limb_height_km", self.limb_height_km, -50.0, 500.0)?;
         between("body.limb_height_sigma_km", self.limb_height_sigma_km, 0.0, 1e4)?;
+        between("body.clipped_height_km", self.clipped_height_km, 0.0, 500.0)?;
+        between("body.clipped_sigma_km", self.clipped_sigma_km, 0.0, 1e4)?;
         let rows = &self.limb_height_by_latitude_km;
         let field = "body.limb_height_by_latitude_km";
         for [latitude, height] in rows {

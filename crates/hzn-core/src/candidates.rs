@@ -83,6 +83,8 @@ const WIDEST: i32 = 6;
 const MARGIN: i32 = REACH + 3;
 /// Where an edge that is no wider than four pixels has faded to half of the level, pixels.
 const FADED: i32 = 3;
+/// A plateau is clipped when it is within this part of full scale below it: noise pulls a clipped mean down, never up.
+const CLIPPED_PART: i32 = 32;
 /// Farther than an edge point can stand from its border pixel, pixels.
 const FARTHEST: i32 = 1024;
 /// Stands for a brightness that cannot be read.
@@ -95,6 +97,8 @@ pub(crate) struct Points {
     pub(crate) count: u32,
     /// Of them, points at the global level, because the local one was not found.
     pub(crate) fallback: u32,
+    /// Of them, points whose lit side is clipped at full scale.
+    pub(crate) clipped: u32,
     /// Border pixels that took longer: beside a mask or the picture's border, or on a wide edge.
     pub(crate) slow: u32,
     /// Of a picture that came row by row: points whose plateaus were not within the rows held.
@@ -126,32 +130,54 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         let found = if P::PASSED {
             let found = scene.picture.passed(pixel.x, pixel.y);
             made.cut += u32::from(found.is_some_and(|f| f.cut));
-            found.map(|f| (point_off(pixel, f.lit.towards_dark(), T::of(f.towards_dark_px.into())), f.lit, f.fallback))
+            found.map(|f| {
+                let point = point_off(pixel, f.lit.towards_dark(), T::of(f.towards_dark_px.into()));
+                Found { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped }
+            })
         } else {
             locate(scene, config, pixel, &mut made.slow)
         };
-        let Some((point, lit, fallback)) = found else { continue };
+        let Some(found) = found else { continue };
         let Some(block) = blocks.get_mut(place / LANES) else { break };
         if place % LANES == 0 {
             *block = Block::default();
         }
-        block.set_point(place % LANES, point, lit);
-        scene.observer.point(candidate, point);
+        block.set_point(place % LANES, found.point, found.lit);
+        scene.observer.point(candidate, found.point);
         place += 1;
         made.count += 1;
-        made.fallback += u32::from(fallback);
+        made.fallback += u32::from(found.fallback);
+        made.clipped += u32::from(found.clipped);
     }
     made
 }
 
-/// The edge point at a border pixel, the side of the light, and whether it stands at the global level.
+/// An edge point.
+struct Found<T> {
+    point: ImagePoint<T>,
+    /// The side of the light.
+    lit: Lit,
+    /// It stands at the global level, because the local one was not found.
+    fallback: bool,
+    /// The lit side is clipped at full scale, so that its half is not half of the light.
+    clipped: bool,
+}
+
+impl<T> Found<T> {
+    /// Of a method that has no level of its own.
+    fn plain(point: ImagePoint<T>, lit: Lit) -> Self {
+        Self { point, lit, fallback: false, clipped: false }
+    }
+}
+
+/// The edge point at a border pixel.
 #[inline(always)]
 fn locate<T: Real, P: Pixels, O: Observer<T>>(
     scene: &Scene<'_, T, P, O>,
     config: &Config,
     p: Pixel,
     slow: &mut u32,
-) -> Option<(ImagePoint<T>, Lit, bool)> {
+) -> Option<Found<T>> {
     match config.sub_pixel {
         SubPixel::Linear => {
             if is_clear(scene, p, MARGIN as u16) {
@@ -175,11 +201,11 @@ pub(crate) fn pass<T: Real, P: Pixels, O: Observer<T>>(
     config: &Config,
     p: Pixel,
 ) -> Option<Passed> {
-    let (point, lit, fallback) = locate(scene, config, p, &mut 0)?;
+    let Found { point, lit, fallback, clipped } = locate(scene, config, p, &mut 0)?;
     // The difference is exact, and so is the sum that makes the point again.
     let (dx, dy) = lit.towards_dark();
     let off = (point.u - T::of_i32(p.x.into())) * T::of_i32(dx) + (point.v - T::of_i32(p.y.into())) * T::of_i32(dy);
-    Some(Passed { towards_dark_px: off.f64() as f32, lit, fallback, cut: false })
+    Some(Passed { towards_dark_px: off.f64() as f32, lit, fallback, clipped, cut: false })
 }
 
 /// Reads around one border pixel; `None` beyond the region and under the mask. `FREE`: no read within reach needs a
@@ -355,20 +381,17 @@ fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
 
 /// A point of the methods that know the gradient's direction.
 #[cfg(any(feature = "erf", feature = "zju"))]
-fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<(ImagePoint<T>, Lit, bool)> {
+fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<Found<T>> {
     // Whole numbers are what `orientation` compares; the direction is a unit vector.
     let scale = T::of(1024.0);
     let (lit, _, _) = orientation(((x * scale).to_i32(), (y * scale).to_i32()))?;
-    Some((point, lit, false))
+    Some(Found::plain(point, lit))
 }
 
-fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
-    p: Pixel,
-) -> Option<(ImagePoint<T>, Lit, bool)> {
+fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<Found<T>> {
     let around = Around::<T, P, O, false>::new(scene, p);
     let (lit, dx, dy) = orientation(around.near()?.gradient())?;
-    Some((point_off(p, (dx, dy), T::of(0.5)), lit, false))
+    Some(Found::plain(point_off(p, (dx, dy), T::of(0.5)), lit))
 }
 
 fn point_off<T: Real>(p: Pixel, (dx, dy): (i32, i32), towards_dark: T) -> ImagePoint<T> {
@@ -384,7 +407,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     scene: &Scene<'_, T, P, O>,
     p: Pixel,
     slow: &mut u32,
-) -> Option<(ImagePoint<T>, Lit, bool)> {
+) -> Option<Found<T>> {
     let around = Around::<T, P, O, FREE>::new(scene, p);
     let near = around.near()?;
     let gradient = near.gradient();
@@ -394,7 +417,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
         let [_, inner, outer] = near.across(lit);
         let level4 = (4 * level).max(outer + 1).min(inner);
         let part = T::of_i32(inner - level4) / T::of_i32((inner - outer).max(1));
-        return (inner > outer).then(|| (point_off(p, (dx, dy), part), lit, false));
+        return (inner > outer).then(|| Found::plain(point_off(p, (dx, dy), part), lit));
     }
     // The edge fades over level / gradient pixels; at the top of a narrow one the gradient says less than how soon it is dark.
     // A step is half of that, so that air seen from a rocket is read to where it ends; but of haze through a long lens, below
@@ -402,8 +425,8 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let steep = gradient.0.abs().max(gradient.1.abs());
     let line = Line::new(&around, (dx, dy), 1);
     if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
-        let Crossing { part, fallback, .. } = line.crossing(near.across(lit))?;
-        return Some((point_off(p, (dx, dy), part), lit, fallback));
+        let Crossing { part, fallback, clipped, .. } = line.crossing(near.across(lit))?;
+        return Some(Found { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
     }
     *slow += 1;
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
@@ -413,8 +436,9 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     } else {
         in_steps::<T, P, O, false>(scene, p, (dx, dy), step)?
     };
-    let Wide { off, fallback, .. } = if found.rising { climb(scene, p, (dx, dy), step, found, slow) } else { found };
-    Some((point_off(p, (dx, dy), off), lit, fallback))
+    let Wide { off, fallback, clipped, .. } =
+        if found.rising { climb(scene, p, (dx, dy), step, found, slow) } else { found };
+    Some(Found { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
 }
 
 /// Most times that a profile is read again from where it crosses.
@@ -462,6 +486,7 @@ fn is_clear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: P
 struct Wide<T> {
     off: T,
     fallback: bool,
+    clipped: bool,
     /// The lit side did not level off within reach.
     rising: bool,
 }
@@ -476,12 +501,13 @@ fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
 ) -> Option<Wide<T>> {
     let around = Around::<T, P, O, FREE>::new(scene, p);
     let line = Line::new(&around, (dx, dy), step);
-    let Crossing { part, mid2, fallback, rising } = line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
+    let Crossing { part, mid2, fallback, clipped, rising } =
+        line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
     let coarse = part * T::of_i32(step);
     // The profile bends over a step: once more over half of one, in the middle of which the crossing should be.
     let half = step / 2;
     if half == 0 {
-        return Some(Wide { off: coarse, fallback, rising });
+        return Some(Wide { off: coarse, fallback, clipped, rising });
     }
     let pixels = Line::new(&around, (dx, dy), 1);
     let whole = (coarse + T::of_i32(REACH * WIDEST)).to_i32() - REACH * WIDEST;
@@ -489,7 +515,7 @@ fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let (a, b) = (pixels.three(k)?, pixels.three(k + half)?);
     let fine = T::of_i32(k) + T::of_i32(half * (2 * a - mid2)) / T::of_i32((2 * (a - b)).max(1));
     let off = if (fine - coarse).abs() <= T::of_i32(half) { fine } else { coarse };
-    Some(Wide { off, fallback, rising })
+    Some(Wide { off, fallback, clipped, rising })
 }
 
 /// Where an edge crosses the mid-level.
@@ -500,6 +526,8 @@ struct Crossing<T> {
     mid2: i32,
     /// Whether the global level had to stand in for the local one.
     fallback: bool,
+    /// The lit side is clipped at full scale.
+    clipped: bool,
     /// The lit side did not level off within reach.
     rising: bool,
 }
@@ -594,7 +622,9 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
             return None;
         }
         let part = T::of_i32(k) + T::of_i32(2 * a - mid2) / T::of_i32(2 * (a - b));
-        Some(Crossing { part, mid2, fallback, rising: inner <= -REACH })
+        let full = i32::from(scene.picture.full_scale());
+        let clipped = bright >= 4 * (full - full / CLIPPED_PART);
+        Some(Crossing { part, mid2, fallback, clipped, rising: inner <= -REACH })
     }
 }
 
@@ -667,6 +697,23 @@ mod tests {
         }
     }
 
+    /// Half of full scale is not half of the light where the light goes on beyond it.
+    #[test]
+    fn points_before_a_clipped_side_are_counted() {
+        let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
+        for width in [1.0, 9.0] {
+            for (bright, all) in [(255.0, true), (253.0, true), (240.0, false), (120.0, false)] {
+                let data = picture([0.0, 1.0], 49.8, width, 20.0, bright);
+                let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
+                let region = Region::<f64>::whole(100, 100);
+                let scene = Scene::new(&grey, &region, 70, &Unobserved);
+                let mut blocks = [Block::default(); 8];
+                let made = pick(&scene, &Config::default(), &border, 0, &mut blocks, u32::MAX);
+                assert_eq!((made.count, made.clipped), (60, if all { 60 } else { 0 }), "{width} {bright}");
+            }
+        }
+    }
+
     #[test]
     fn thinning_keeps_the_whole_edge() {
         let data = picture([0.0, 1.0], 49.8, 1.0, 20.0, 220.0);
@@ -676,10 +723,7 @@ mod tests {
         let scene = Scene::new(&grey, &region, 120, &Unobserved);
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
         let mut blocks = [Block::default(); 2];
-        assert_eq!(
-            pick(&scene, &config, &border, 0, &mut blocks, u32::MAX),
-            Points { count: 15, fallback: 0, slow: 0, cut: 0 }
-        );
+        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks, u32::MAX), Points { count: 15, ..Points::default() });
         let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
         assert_eq!((first, last), (22.0, 78.0));
     }

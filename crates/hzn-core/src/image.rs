@@ -63,6 +63,8 @@ pub struct Passed {
     pub(crate) lit: Lit,
     /// It stands at the global level.
     pub(crate) fallback: bool,
+    /// Its lit side is clipped at full scale.
+    pub(crate) clipped: bool,
     /// Its plateaus were not within what was held.
     pub(crate) cut: bool,
 }

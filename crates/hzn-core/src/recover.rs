@@ -38,6 +38,9 @@ pub struct Config {
     /// level follows what is brightest: of a disc half lit, with clouds, most of the limb lies below it, and below half of it
     /// nothing. Each look may be wrong, too, so there are few; all draw on `limits.max_work`. A `fixed` level is kept.
     pub levels: heapless::Vec<f64, MAX_LEVELS>,
+    /// Lowest level of a further look, standard deviations of the dark pixels' noise above their mean, 0 to 100: an edge in the
+    /// noise of the sky is none. At 2, the default, 2 % of the sky's pixels are lit by their noise, too few to touch.
+    pub min_sigma: f64,
     /// Part of an edge's points that must lie on the limb in a further look, 0 to 1. Each look is another chance for a curve
     /// through a part of something else, such as the glow above a limb: a further one asks for most of the edge.
     pub min_part: f64,
@@ -66,6 +69,7 @@ impl Default for Config {
         let _ = levels.extend_from_slice(&LEVELS);
         Self {
             levels,
+            min_sigma: 2.0,
             min_part: 0.5,
             frame_px: 8,
             method: Method::None,
@@ -82,6 +86,7 @@ impl Config {
         for &part in &self.levels {
             between("recover.levels", part, 0.05, 4.0)?;
         }
+        between("recover.min_sigma", self.min_sigma, 0.0, 100.0)?;
         between("recover.min_part", self.min_part, 0.0, 1.0)?;
         between("recover.frame_px", f64::from(self.frame_px), 0.0, 64.0)?;
         #[cfg(feature = "horace")]

@@ -165,6 +165,8 @@ parameters! {
     34 "body.limb_height_km" sensor.body.limb_height_km;
     35 "body.limb_height_sigma_km" sensor.body.limb_height_sigma_km;
     36 "body.altitude_reference" sensor.body.altitude_reference;
+    37 "body.clipped_height_km" sensor.body.clipped_height_km;
+    38 "body.clipped_sigma_km" sensor.body.clipped_sigma_km;
     40 "gate.min_mean" sensor.gate.min_mean;
     41 "gate.max_mean" sensor.gate.max_mean;
     50 "binarize.method" sensor.binarize.method;

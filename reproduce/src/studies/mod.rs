@@ -100,7 +100,10 @@ fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
     fits.iter().for_each(|fit| fit.apply(&mut flight.sensor));
     let told = |body: Kind| {
         let Some(fit) = fits.iter().find(|fit| fit.body == body) else { return "nothing could be measured".to_owned() };
-        let noise = format!("{:.2} px over {:.0} px", fit.sigma_px, fit.correlation_px);
+        let noise = match fit.noise {
+            covariance::Noise::Told => format!("{:.2} px over {:.0} px", fit.sigma_px, fit.correlation_px),
+            _ => "edge errors by each picture's residuals".to_owned(),
+        };
         let limb = (fit.limb_height_sigma_km > 0.0)
             .then(|| format!("{:.1} km ± {:.1} km, ", fit.limb_height_km, fit.limb_height_sigma_km));
         limb.unwrap_or_default() + &noise

@@ -105,6 +105,11 @@ fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
             why: format!("measured on {counted} pictures of {source} by `hzn calibrate noise`"),
         },
         Line { key: "limb_height_sigma_km", value: digits(h.sigma_km).into(), why: parts.join(", ") },
+        Line {
+            key: "clipped_height_km",
+            value: 0.0.into(),
+            why: "the measured height has the pictures' clipping in it".into(),
+        },
     ];
     if !h.by_latitude.is_empty() {
         let row = |[deg, km, _]: &[f64; 3]| Array::from_iter([*deg, digits(*km)]);

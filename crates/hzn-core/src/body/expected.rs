@@ -27,8 +27,11 @@ pub struct Expected<T> {
     pub(crate) sin: T,
     /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
     pub(crate) sigma_cos: T,
-    /// 1-sigmas of the limb height that this comes of: of the limb itself, of the altitude, of the unknown radius; metres.
-    pub(crate) sigma_parts: [T; 3],
+    /// 1-sigmas of the limb height that this comes of: of the limb itself, of the altitude, of the unknown radius, of clipping;
+    /// metres.
+    pub(crate) sigma_parts: [T; 4],
+    /// What clipping adds to the height of a limb that is clipped all along, and its 1-sigma; metres.
+    pub(crate) clipped_m: [T; 2],
     /// The limb cone of the ellipsoid, when the position is known.
     pub(crate) ellipsoid: Option<LimbCone<T>>,
     /// Prior attitude, camera to ECEF.
@@ -181,7 +184,7 @@ impl<T: Real> Expected<T> {
             Some(_) => amplitude.abs() * (attitude_sigma * T::of(k)).least(T::one()),
             None => amplitude.abs(),
         };
-        let sigma_parts = [limb_sigma, sin * altitude_sigma, unknown_m];
+        let sigma_parts = [limb_sigma, sin * altitude_sigma, unknown_m, T::zero()];
         let variance = sigma_parts.iter().fold(T::zero(), |sum, s| sum + *s * *s);
         let axis_ecef = match (&ellipsoid, position, body.kind) {
             (Some(cone), ..) => Some(cone.axis),
@@ -193,6 +196,7 @@ impl<T: Real> Expected<T> {
             sin,
             sigma_cos: scale * variance.sqrt(),
             sigma_parts,
+            clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::of(h) * km),
             ellipsoid,
             cam_to_ecef: known,
             harmonics_cos,
@@ -210,6 +214,42 @@ impl<T: Real> Expected<T> {
             phases: body.kind != Kind::Sun,
             which: 0,
         })
+    }
+
+    /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Where its light is cut off at 1/B of
+    /// its peak, half of what is left lies h ln B higher, h being the height over which the air thins out to 1/e; B is not
+    /// known, and differs along the limb with the light. What differs counts as a first harmonic of the azimuth: between points
+    /// that are clipped and such that are not, part (1 − part) of the height squared; and of two ends whose heights differ
+    /// independently, each by σ, half the difference is σ/√2.
+    pub(crate) fn clipped(&self, part: T) -> Self {
+        if self.free || !(part > T::zero()) {
+            return *self;
+        }
+        let [height, sigma] = self.clipped_m.map(|h| h * part);
+        let distance = (self.radius_m + self.limb_m) / self.sin;
+        let sin = (self.sin + height / distance).least(T::one() - T::of(1e-6));
+        let cos = (T::one() - sin * sin).sqrt();
+        // ∂cos/∂d = −tan/(R + H), as in `new`.
+        let scale = sin / (cos * distance);
+        let [limb, altitude, radius, _] = self.sigma_parts;
+        let sigma_parts = [limb, altitude, radius, sigma];
+        let one = T::one();
+        let apart = self.clipped_m[0] * (part * (one - part)).most(T::zero()).sqrt();
+        let root = |parts: &[T]| parts.iter().fold(T::zero(), |sum, s| sum + *s * *s).sqrt();
+        let [first, second] = self.uneven_cos;
+        Self {
+            cos,
+            sin,
+            sigma_cos: scale * root(&sigma_parts),
+            sigma_parts,
+            uneven_cos: [
+                root(&[first, scale * apart, scale * sigma * T::of(core::f64::consts::FRAC_1_SQRT_2)]),
+                second,
+            ],
+            limb_m: self.limb_m + height,
+            limb_sigma_m: root(&[self.limb_sigma_m, sigma]),
+            ..*self
+        }
     }
 
     /// Altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle says
@@ -275,6 +315,26 @@ mod tests {
             &Frame { altitude_m: Some(400e3), ..Frame::default() },
         );
         assert!((single.unwrap().limb_height_m(raised.cos as f32).unwrap().0 - 25e3).abs() < 10.0);
+    }
+
+    #[test]
+    fn a_clipped_limb_is_expected_higher_and_less_surely() {
+        let at = |km: f64, sigma_km: f64, kind| {
+            let body = Config { limb_height_km: km, limb_height_sigma_km: sigma_km, kind, ..Config::default() };
+            Expected::<f64>::new(&body, &Frame { altitude_m: Some(400e3), ..Frame::default() }).unwrap()
+        };
+        let told = at(17.0, 7.0, Kind::EarthSphere);
+        for part in [0.0, 0.3, 1.0] {
+            let higher = at(17.0 + 7.8 * part, libm::hypot(7.0, 4.5 * part), Kind::EarthSphere);
+            let clipped = told.clipped(part);
+            let same = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-5;
+            assert!(same(clipped.cos, higher.cos) && same(clipped.sin, higher.sin), "{part}");
+            assert!(same(clipped.sigma_cos, higher.sigma_cos) && same(clipped.limb_m, higher.limb_m), "{part}");
+            assert_eq!(clipped.uneven_cos[0] > 0.0, part > 0.0);
+        }
+        // Nothing is expected of how large a Moon looks.
+        let moon = at(0.0, 0.0, Kind::Moon);
+        assert_eq!(moon.clipped(1.0).cos, moon.cos);
     }
 
     #[test]

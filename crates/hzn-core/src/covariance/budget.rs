@@ -25,11 +25,13 @@ pub enum Term {
     Altitude = 6,
     /// The local radius of the body, likewise.
     Radius = 7,
+    /// The height of a limb that is clipped at full scale, likewise.
+    Clipping = 8,
 }
 
 impl Term {
     /// Every term in the order of its number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::EdgeNoise,
         Self::CommonShift,
         Self::CommonTilt,
@@ -38,6 +40,7 @@ impl Term {
         Self::LimbHeight,
         Self::Altitude,
         Self::Radius,
+        Self::Clipping,
     ];
 }
 

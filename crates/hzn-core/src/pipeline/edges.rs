@@ -34,6 +34,8 @@ pub struct Edges<T> {
     pub(crate) blocks: Vec<Block<T>>,
     points: Vec<(ImagePoint<T>, Lit)>,
     focal_px: T,
+    /// The part of the points whose lit side is clipped, where they were picked from a picture.
+    clipped: T,
 }
 
 /// What a method of rejection finds.
@@ -145,7 +147,8 @@ impl<T: Real> Edges<T> {
         let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
         let made = candidates::pick(&scene, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
         let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
-        Self::of(sensor.camera(), (0..made.count as usize).map(point).collect())
+        let clipped = T::of_i32(made.clipped as i32) / T::of_i32(made.count.max(1) as i32);
+        Self { clipped, ..Self::of(sensor.camera(), (0..made.count as usize).map(point).collect()) }
     }
 
     fn of(camera: &Camera<T>, points: Vec<(ImagePoint<T>, Lit)>) -> Self {
@@ -155,7 +158,7 @@ impl<T: Real> Edges<T> {
         }
         undistort::to_rays(camera, &mut blocks);
         let (fx, fy) = camera.focal_px();
-        Self { blocks, points, focal_px: (fx + fy) * T::of(0.5) }
+        Self { blocks, points, focal_px: (fx + fy) * T::of(0.5), clipped: T::ZERO }
     }
 
     /// The points in the picture, and on which side of each the light is: a step along u or v.
@@ -193,6 +196,7 @@ impl<T: Real> Edges<T> {
     /// Rejects outliers.
     pub fn reject(&mut self, expected: &Expected<T>, config: &reject::Config) -> Option<Agreed<T>> {
         let (count, mut work) = (self.points.len() as u32, Work::unlimited());
+        let expected = &expected.clipped(self.clipped);
         let found = reject::keep(&mut self.blocks, count, expected, self.focal_px, config, &mut work)?;
         let axis = UnitVec3::assume_unit(found.e);
         Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
@@ -201,6 +205,7 @@ impl<T: Real> Edges<T> {
     /// Fits the cone, from what a method of rejection has found. Leaves in each point the weight that it had.
     pub fn fit(&mut self, sensor: &Sensor<T>, start: &Agreed<T>, expected: &Expected<T>) -> Option<Fitted<T>> {
         let config = sensor.config();
+        let expected = &expected.clipped(self.clipped);
         let start =
             reject::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
         let threshold = T::of(config.reject.threshold_px);
@@ -217,6 +222,7 @@ impl<T: Real> Edges<T> {
     /// The covariance of a fit, and the expected half-angle fused with it.
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
         let noise = sensor.config.noise_of(expected.which);
+        let expected = &expected.clipped(self.clipped);
         let fused =
             covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate, sensor.camera(), None)?;
         let (b1, b2) = basis(&fused.e);

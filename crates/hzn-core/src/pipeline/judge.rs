@@ -337,6 +337,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let used = (points.count as usize).div_ceil(LANES);
         let Some(blocks) = self.blocks.get_mut(..used) else { return (outcome, None) };
 
+        let clipped = T::of_i32(points.clipped as i32) / T::of_i32(points.count.max(1) as i32);
+        let expected = &self.expected.clipped(clipped);
         enter(self.report, self.observer, Stage::Undistort);
         undistort::to_rays(camera, blocks);
 
@@ -349,7 +351,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
         let (fx, fy) = camera.focal_px();
         let focal = (fx + fy) * T::of(0.5);
-        let Some(consensus) = reject::keep(blocks, points.count, self.expected, focal, &config.reject, &mut self.work)
+        let Some(consensus) = reject::keep(blocks, points.count, expected, focal, &config.reject, &mut self.work)
         else {
             return (outcome, None);
         };
@@ -360,7 +362,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         if !self.work.spend(used as u32 * work::FIT + work::GATES) {
             return (outcome, None);
         }
-        let fit = estimate::fit(blocks, &consensus, self.expected, camera, threshold, &config.estimate, self.noise);
+        let fit = estimate::fit(blocks, &consensus, expected, camera, threshold, &config.estimate, self.noise);
         let Some(fit) = fit else { return (outcome, None) };
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;
@@ -372,8 +374,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
 
         enter(self.report, self.observer, Stage::Covariance);
         let mut budget = self.observer.wants_budget().then(Budget::new);
-        let fused =
-            covariance::fuse(blocks, &fit, self.expected, self.noise, &config.estimate, camera, budget.as_mut());
+        let fused = covariance::fuse(blocks, &fit, expected, self.noise, &config.estimate, camera, budget.as_mut());
         let Some(fused) = fused else { return (outcome, None) };
         if let Some(budget) = &budget {
             self.observer.budget(number, budget);
@@ -383,8 +384,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
-        let judged =
-            select::judge(&fit, &fused, sigma, self.expected, blocks, points.count, scene, camera, &config.select);
+        let judged = select::judge(&fit, &fused, sigma, expected, blocks, points.count, scene, camera, &config.select);
         outcome.verdict = judged.verdict;
         let most = T::of_i32(points.count as i32) * T::of(config.recover.min_part);
         if self.report.counters.looks > 0 && T::of_i32(fit.inliers as i32) < most {
@@ -400,11 +400,11 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let solution = Solution {
             axis,
             covariance,
-            axis_ecef: self.expected.axis_ecef(),
+            axis_ecef: expected.axis_ecef(),
             axis_body: cam_to_body.as_ref().map(|r| r.apply(&axis)),
             half_angle_rad: half_angle(fit.k),
             fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
-            altitude_m: fused.var_free_cos.and_then(|v| self.expected.altitude(fit.c, v)),
+            altitude_m: fused.var_free_cos.and_then(|v| expected.altitude(fit.c, v)),
             free: fused.var_free_cos.map(|var_cos| Free {
                 axis: UnitVec3::assume_unit(fit.e),
                 cos: fit.c,
@@ -419,8 +419,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself asks for
         // must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of so many variances.
         let sides = T::of(config.select.min_side_sigma);
-        let curved = fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * self.expected.cos * T::of(4.0));
-        if config.estimate.half_angle == estimate::HalfAngle::Fused && !curved && !self.expected.free {
+        let curved = fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::of(4.0));
+        if config.estimate.half_angle == estimate::HalfAngle::Fused && !curved && !expected.free {
             outcome.verdict = Verdict::Straight;
             return (outcome, None);
         }

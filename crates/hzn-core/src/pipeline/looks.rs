@@ -65,11 +65,13 @@ impl<T: Real> Sensor<T> {
             if status != Some(Status::Rejected) {
                 status = Some(report.status);
             }
-            let Some(&part) = others.next() else { break };
+            let next =
+                others.by_ref().map(|&part| first.part(part)).find(|&l| first.clears(l, config.recover.min_sigma));
+            let Some(level) = next else { break };
             if !work.spend(work::LOOK) {
                 break;
             }
-            report.level = first.part(part);
+            report.level = level;
             observer.look(report.counters.looks, report.level);
         }
         if let Some(status) = status

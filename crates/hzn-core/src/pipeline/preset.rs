@@ -97,6 +97,7 @@ fn disc(config: &mut Config, kind: Kind, level: f64) {
 fn told(config: &mut Config) {
     config.body.limb_height_km = 10.0;
     config.body.limb_height_sigma_km = 2.0;
+    [config.body.clipped_height_km, config.body.clipped_sigma_km] = [0.0; 2];
     config.covariance = covariance::Config::told(1.0, 300.0);
 }
 

@@ -6,13 +6,16 @@
 //! the likeliest, each with the variance that makes the answers' errors as large as they are said to be. (The points
 //! themselves do not tell the length: what turns an answer is alike along the whole limb, and small beside each one's
 //! noise.)
+//! Where the pictures are of different worth, one variance for all of them is less likely than each picture's own residuals,
+//! which are tried, too.
 
 use hzn_calib::noise::{Points, Weighted};
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera};
+use hzn_core::covariance::{self, Noise};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
-use hzn_core::{Config, HostHorizon, covariance};
+use hzn_core::{Config, HostHorizon};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Scenario, ScenarioError};
@@ -30,9 +33,11 @@ pub struct Fit {
     pub limb_height_km: f64,
     /// Standard deviation of the pictures' own limb heights, kilometres.
     pub limb_height_sigma_km: f64,
-    /// Standard deviation of an edge point in pixels.
+    /// Whether the errors are the two values below in every picture, or each picture's residuals tell them.
+    pub noise: Noise,
+    /// Standard deviation of an edge point in pixels; with [`Noise::Rms`] its floor.
     pub sigma_px: f64,
-    /// Integral length of the errors along the limb in pixels.
+    /// Integral length of the errors along the limb in pixels; with [`Noise::Rms`] its floor.
     pub correlation_px: f64,
     /// Mean squared error over covariance with this model; 2 is ideal.
     pub nees: f64,
@@ -49,8 +54,8 @@ pub const MEASURED: u32 = 32;
 const LENGTHS_PX: [f64; 7] = [10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0];
 /// How often the sigmas are scaled at most.
 const ROUNDS: u32 = 4;
-/// A NEES beyond this is a wrong answer, not a noisy one.
-const NEES_MOST: f64 = 20.0;
+/// An error beyond this is a wrong answer, not a noisy one: 2 degrees.
+const GROSS_RAD: f64 = std::f64::consts::PI / 90.0;
 
 impl Fit {
     /// Measures `pictures` pictures of the scenario, spread over sixteen other seeds; `progress` hears of every one. One fit a
@@ -115,13 +120,17 @@ impl Fit {
             body: kind,
             limb_height_km: if disc { 0.0 } else { sensor.body.limb_height_km + height_km },
             limb_height_sigma_km: if disc { 0.0 } else { spread_km.max(0.2) },
+            noise: Noise::Told,
             sigma_px: variance.sqrt().max(0.02),
             correlation_px: f64::NAN,
             nees: f64::NAN,
             frames: [answered.len(), seen.len()],
         };
-        let settled = LENGTHS_PX.map(|length| Self { correlation_px: length, ..fit }.settled(scenario, alone, seen));
-        settled.into_iter().flatten().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(fit, _)| fit)
+        let own = covariance::Config::default();
+        let by_picture = Self { noise: Noise::Rms, sigma_px: own.sigma_px, correlation_px: own.correlation_px, ..fit };
+        let told = LENGTHS_PX.map(|length| Self { correlation_px: length, ..fit });
+        let settled = told.into_iter().chain([by_picture]).map(|model| model.settled(scenario, alone, seen));
+        settled.flatten().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(fit, _)| fit)
     }
 
     /// With the sigmas at which the answers' errors are as large as they are said to be; and how unlikely these errors are
@@ -137,19 +146,22 @@ impl Fit {
             let mut sensor = alone.clone();
             self.apply(&mut sensor);
             let looked = look(scenario, &sensor, seen);
-            let usable: Vec<&Looked> = looked.iter().filter(|l| l.nees.is_finite()).collect();
+            let usable: Vec<&Looked> =
+                looked.iter().filter(|l| l.nees.is_finite() && l.error_rad < GROSS_RAD).collect();
             if usable.len() < 4 {
                 return None;
             }
             let mean = |of: &dyn Fn(&Looked) -> f64| usable.iter().map(|l| of(l)).sum::<f64>() / usable.len() as f64;
-            self.nees = mean(&|l| l.nees.min(NEES_MOST));
+            self.nees = mean(&|l| l.nees);
             unlikely = mean(&|l| l.log_det) + self.nees;
             let scale = (self.nees / 2.0).sqrt().clamp(0.5, 2.5);
             // What is told of the last model is what holds with it, settled or not.
             if (0.85..1.15).contains(&scale) || round == ROUNDS {
                 break;
             }
-            self.sigma_px *= scale;
+            if self.noise == Noise::Told {
+                self.sigma_px *= scale;
+            }
             if self.limb_height_sigma_km > 0.0 {
                 self.limb_height_sigma_km *= scale.max(1.0);
             }
@@ -161,10 +173,11 @@ impl Fit {
     pub fn apply(&self, sensor: &mut Config) {
         // Two digits more than are known. Rows by latitude go up or down with the mean.
         let digits = |x: f64| (x * 1e3).round() / 1e3;
-        let noise = covariance::Config {
-            method: sensor.covariance.method,
-            ..covariance::Config::told(digits(self.sigma_px), digits(self.correlation_px))
+        let model = match self.noise {
+            Noise::Told => covariance::Config::told(digits(self.sigma_px), digits(self.correlation_px)),
+            noise => covariance::Config { noise, ..covariance::Config::default() },
         };
+        let noise = covariance::Config { method: sensor.covariance.method, ..model };
         let several = !sensor.bodies.is_empty();
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
         if body.kind == Kind::Earth {
@@ -173,6 +186,8 @@ impl Fit {
             }
             body.limb_height_km = digits(self.limb_height_km);
             body.limb_height_sigma_km = digits(self.limb_height_sigma_km);
+            // What was measured has the pictures' clipping in it.
+            [body.clipped_height_km, body.clipped_sigma_km] = [0.0; 2];
         }
         if several {
             body.covariance = Some(noise);
@@ -331,6 +346,7 @@ mod tests {
             body: sensor.body.kind,
             limb_height_km: sensor.body.limb_height_km,
             limb_height_sigma_km: 0.05,
+            noise: Noise::Told,
             sigma_px: 4.0,
             correlation_px: 40.0,
             nees: f64::NAN,
@@ -341,7 +357,8 @@ mod tests {
         let mut told = sensor.clone();
         fit.apply(&mut told);
         let looked = look(&scenario, &told, &seen);
-        let nees: Vec<f64> = looked.iter().map(|l| l.nees.min(NEES_MOST)).filter(|n| n.is_finite()).collect();
+        let nees: Vec<f64> =
+            looked.iter().filter(|l| l.error_rad < GROSS_RAD).map(|l| l.nees).filter(|n| n.is_finite()).collect();
         assert_eq!(fit.nees, nees.iter().sum::<f64>() / nees.len() as f64);
     }
 }

@@ -9,12 +9,13 @@ pub(super) struct Point {
     towards_dark_px: f32,
     x: u16,
     lit: Lit,
-    /// [`FALLBACK`] and [`CUT`].
+    /// [`FALLBACK`], [`CUT`] and [`CLIPPED`].
     marks: u8,
 }
 
 const FALLBACK: u8 = 1;
 const CUT: u8 = 2;
+const CLIPPED: u8 = 4;
 
 impl Point {
     pub(super) const NONE: Self = Self { towards_dark_px: 0.0, x: 0, lit: Lit::Right, marks: 0 };
@@ -101,7 +102,8 @@ impl<'a> Points<'a> {
     /// Adds a point of the row that is not finished; columns rise.
     pub(super) fn push(&mut self, x: u16, found: Passed) {
         if let Some(place) = self.points.get_mut(self.used) {
-            let marks = u8::from(found.fallback) * FALLBACK + u8::from(found.cut) * CUT;
+            let marks =
+                u8::from(found.fallback) * FALLBACK + u8::from(found.cut) * CUT + u8::from(found.clipped) * CLIPPED;
             *place = Point { towards_dark_px: found.towards_dark_px, x, lit: found.lit, marks };
             self.used += 1;
         }
@@ -122,6 +124,7 @@ impl<'a> Points<'a> {
         let row = self.points.get(start..at(y))?;
         let found = row.get(row.partition_point(|p| p.x < x)).filter(|p| p.x == x)?;
         let Point { towards_dark_px, lit, marks, .. } = *found;
-        Some(Passed { towards_dark_px, lit, fallback: marks & FALLBACK > 0, cut: marks & CUT > 0 })
+        let has = |mark: u8| marks & mark > 0;
+        Some(Passed { towards_dark_px, lit, fallback: has(FALLBACK), clipped: has(CLIPPED), cut: has(CUT) })
     }
 }
