@@ -104,8 +104,6 @@ pub struct Level<T> {
     pub dark: T,
     /// How much brighter its lit pixels are, on the average, in counts; 0 where it has none.
     pub contrast: T,
-    /// 1-sigma of the noise of the dark pixels, in counts, from their upper quartile: a quarter of them may be dim ground.
-    pub noise: T,
 }
 
 impl<T: Real> Level<T> {
@@ -114,11 +112,6 @@ impl<T: Real> Level<T> {
     pub(crate) fn part(&self, part: f64) -> u16 {
         let level = T::of_i32(i32::from(self.level));
         counts(self.dark + (level - self.dark) * T::of(part))
-    }
-
-    /// Whether a level stands so many sigmas of the noise above the dark pixels.
-    pub(crate) fn clears(&self, level: u16, sigmas: f64) -> bool {
-        T::of_i32(level.into()) >= self.dark + self.noise * T::of(sigmas)
     }
 }
 
@@ -130,8 +123,8 @@ const LEAST_CONTRAST: f64 = 0.03;
 const LEAST_SPREADS: f64 = 4.0;
 /// Steps of the samples that classes must be apart at least: fewer are rounding.
 const LEAST_COUNTS: f64 = 4.0;
-/// A normal distribution's sigma over the distance from its median to its quartile.
-const QUARTILES: f64 = 1.0 / 0.6745;
+/// Sigma over the mean distance of two values of a normal distribution: √π/2.
+const BY_DISTANCE: f64 = 0.886_226_925_452_758;
 /// Cells along each side of the first sample and of the second, as powers of two.
 const SIDES_LOG2: [u32; 2] = [4, 6];
 
@@ -169,13 +162,34 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     for side_log2 in SIDES_LOG2 {
         let mut sample = Sample::new(seed, side_log2, picture.full_scale(), region);
         while let Some(y) = sample.row() {
-            sample.take(region, observer, |x| picture.at(x, y));
+            sample.take(region, observer, |x| Some(picture.at(x, y)));
         }
         if let Some(decided) = sample.decide(gate, config, last, observer) {
             return decided;
         }
     }
     Err(Status::NoLimb)
+}
+
+/// 1-sigma of the noise of the dark pixels in counts, from how far neighbours below the level are apart; 0 where there are
+/// none. What is cut off at 0 counts for less.
+#[cold]
+pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
+    picture: &P,
+    region: &Region<T>,
+    level: u16,
+    seed: u32,
+    observer: &O,
+) -> T {
+    let mut sample = Sample::new(seed, SIDES_LOG2[0], picture.full_scale(), region);
+    while let Some(y) = sample.row() {
+        sample.take(region, observer, |x| {
+            let next = x.checked_add(1).filter(|&next| region.contains(next, y) && !region.masked(next, y))?;
+            let (here, there) = (picture.at(x, y), picture.at(next, y));
+            (here < level && there < level).then(|| here.abs_diff(there))
+        });
+    }
+    sample.histogram.mean().unwrap_or(T::ZERO) * T::of(BY_DISTANCE)
 }
 
 /// Both samples of a picture whose rows pass.
@@ -196,7 +210,7 @@ impl Passing {
     ) {
         for sample in &mut self.0 {
             while sample.row() == Some(y) {
-                sample.take(region, observer, |x| row.get(usize::from(x)).map_or(0, |&s| s.into()));
+                sample.take(region, observer, |x| Some(row.get(usize::from(x)).map_or(0, |&s| s.into())));
             }
         }
     }
@@ -244,14 +258,16 @@ impl Sample {
     }
 
     /// Looks at that row. The cells of a row share theirs: each row of a picture is a page of memory away from the next.
-    fn take<T: Real, O: Observer<T>>(&mut self, region: &Region<T>, observer: &O, at: impl Fn(u16) -> u16) {
+    fn take<T: Real, O: Observer<T>>(&mut self, region: &Region<T>, observer: &O, at: impl Fn(u16) -> Option<u16>) {
         for cell in 0..1u32 << self.side_log2 {
             let x = self.draw(cell, region.width());
             if !region.contains(x, self.y) || region.masked(x, self.y) {
                 continue;
             }
             observer.pixel(x, self.y);
-            self.histogram.count(at(x));
+            if let Some(v) = at(x) {
+                self.histogram.count(v);
+            }
         }
         self.cells += 1;
         self.y = self.draw(self.cells, region.height());
@@ -282,8 +298,8 @@ impl Sample {
         };
         let level = level?;
         observer.level(level, mean, sample.count);
-        let (dark, contrast, noise) = sample.classes(level, mean);
-        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast, noise }))
+        let (dark, contrast) = sample.classes(level, mean);
+        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast }))
     }
 }
 
@@ -323,9 +339,9 @@ impl Histogram {
         }
     }
 
-    /// Mean of the pixels below the level, how much brighter the mean of the others is, and the noise of those below; counts.
+    /// Mean of the pixels below the level, and how much brighter the mean of the others is; counts.
     #[inline(never)]
-    fn classes<T: Real>(&self, level: u16, mean: T) -> (T, T, T) {
+    fn classes<T: Real>(&self, level: u16, mean: T) -> (T, T) {
         let lit = (u32::from(level) >> self.shift).saturating_sub(self.first) as usize;
         let (mut count, mut sum) = (0u32, 0u32);
         for (&n, k) in self.bins.iter().zip(0u32..).take(lit) {
@@ -334,22 +350,12 @@ impl Histogram {
         }
         let above = self.count.saturating_sub(count);
         if count == 0 || above == 0 {
-            return (if count == 0 { T::ZERO } else { mean }, T::ZERO, T::ZERO);
+            return (if count == 0 { T::ZERO } else { mean }, T::ZERO);
         }
-        // The bins that hold the median of the dark pixels and their upper quartile.
-        let (mut passed, mut quartiles) = (0u32, [0u32; 2]);
-        for &n in self.bins.iter().take(lit) {
-            passed += u32::from(n);
-            let [middle, upper] = &mut quartiles;
-            *middle += u32::from(2 * passed < count);
-            *upper += u32::from(4 * passed < 3 * count);
-        }
-        let [middle, upper] = quartiles;
-        let noise = T::of(f64::from(upper - middle)) * self.width() * T::of(QUARTILES);
         let dark = (T::of(f64::from(sum)) / T::of(f64::from(count)) + self.offset()) * self.width();
         // What the dark ones lack of the mean, the lit ones have over it.
         let (count, above) = (T::of(f64::from(count)), T::of(f64::from(above)));
-        (dark, (mean - dark) * (count + above) / above, noise)
+        (dark, (mean - dark) * (count + above) / above)
     }
 
     /// Counts a bin, and the number of the first.
@@ -483,17 +489,20 @@ mod tests {
     }
 
     #[test]
-    fn a_level_in_the_noise_of_the_dark_is_told() {
-        // Noise of a normal distribution, 4 counts, by the sum of twelve numbers.
+    fn the_noise_of_the_dark_is_told_whatever_lies_in_it() {
+        // Noise of a normal distribution, 4 counts, by the sum of twelve numbers, on a sky and on dim ground.
         let mut rng = Rng::new(5);
         let mut noise = || (0..12).map(|_| f64::from(rng.below(1000)) / 1000.0).sum::<f64>() * 4.0;
-        let data: Vec<u16> = halves(10, 150).iter().map(|&v| v + noise() as u16).collect();
-        let found = level(&data, 8, Gate::default(), Config::default()).unwrap();
-        assert!((found.noise - 4.0).abs() < 1.5, "{found:?}");
-        assert!(found.clears(found.part(0.25), 3.0) && !found.clears(found.part(0.1), 3.0));
-        // A sky without noise forbids nothing.
-        let found = level(&halves(10, 210), 8, Gate::default(), Config::default()).unwrap();
-        assert!(found.noise == 0.0 && found.clears(found.part(0.05), 3.0));
+        let ground = |i: usize| if i < 64 * 12 { 30 } else { 0 };
+        let data: Vec<u16> = halves(10, 190)
+            .iter()
+            .enumerate()
+            .map(|(i, &v)| v.min(190 - ground(i)) + noise() as u16 + ground(i))
+            .collect();
+        let picture = Grey::try_new(&data, Layout::packed(64, 64, 1, 8)).unwrap();
+        let of = |level| dark_noise::<f64, _, _>(&picture, &Region::whole(64, 64), level, 7, &Unobserved);
+        assert!((of(120) - 4.0).abs() < 0.8, "{}", of(120));
+        assert_eq!(of(1), 0.0, "nothing is below");
     }
 
     #[test]

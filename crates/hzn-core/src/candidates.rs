@@ -83,8 +83,9 @@ const WIDEST: i32 = 6;
 const MARGIN: i32 = REACH + 3;
 /// Where an edge that is no wider than four pixels has faded to half of the level, pixels.
 const FADED: i32 = 3;
-/// A plateau is clipped when it is within this part of full scale below it: noise pulls a clipped mean down, never up.
-const CLIPPED_PART: i32 = 32;
+/// A plateau is clipped when it is within this part of full scale below it, which is room for what JPEG makes of one. A bright one
+/// with noise seldom comes so near.
+const CLIPPED_PART: i32 = 128;
 /// Farther than an edge point can stand from its border pixel, pixels.
 const FARTHEST: i32 = 1024;
 /// Stands for a brightness that cannot be read.

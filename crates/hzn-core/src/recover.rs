@@ -39,7 +39,7 @@ pub struct Config {
     /// nothing. Each look may be wrong, too, so there are few; all draw on `limits.max_work`. A `fixed` level is kept.
     pub levels: heapless::Vec<f64, MAX_LEVELS>,
     /// Lowest level of a further look, standard deviations of the dark pixels' noise above their mean, 0 to 100: an edge in the
-    /// noise of the sky is none. At 2, the default, 2 % of the sky's pixels are lit by their noise, too few to touch.
+    /// noise of the sky is none.
     pub min_sigma: f64,
     /// Part of an edge's points that must lie on the limb in a further look, 0 to 1. Each look is another chance for a curve
     /// through a part of something else, such as the glow above a limb: a further one asks for most of the edge.
@@ -69,7 +69,7 @@ impl Default for Config {
         let _ = levels.extend_from_slice(&LEVELS);
         Self {
             levels,
-            min_sigma: 2.0,
+            min_sigma: 3.0,
             min_part: 0.5,
             frame_px: 8,
             method: Method::None,

@@ -43,6 +43,7 @@ impl<T: Real> Sensor<T> {
         let mut work = account::open(config, lists.border.len());
         let mut within = None;
         let mut status = None;
+        let mut lowest = None;
         report.level = first.level;
         loop {
             let look = |region| {
@@ -65,12 +66,15 @@ impl<T: Real> Sensor<T> {
             if status != Some(Status::Rejected) {
                 status = Some(report.status);
             }
-            let next =
-                others.by_ref().map(|&part| first.part(part)).find(|&l| first.clears(l, config.recover.min_sigma));
-            let Some(level) = next else { break };
-            if !work.spend(work::LOOK) {
+            if others.len() == 0 || !work.spend(work::LOOK) {
                 break;
             }
+            let lowest = *lowest.get_or_insert_with(|| {
+                let noise = binarize::dark_noise(picture, &self.region, first.level, config.reject.seed, observer);
+                first.dark + noise * T::of(config.recover.min_sigma)
+            });
+            let mut levels = others.by_ref().map(|&part| first.part(part));
+            let Some(level) = levels.find(|&level| T::of_i32(level.into()) >= lowest) else { break };
             report.level = level;
             observer.look(report.counters.looks, report.level);
         }
