@@ -82,11 +82,16 @@ fn halton(mut index: usize, base: usize) -> f64 {
     out
 }
 
-/// A published system on a flight: its own methods; the camera, mask, body and edge noise that `hzn` is told too.
+/// A published system on a flight: its own methods; the camera, mask and body that `hzn` is told too, and the edge noise where it
+/// is told.
 fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
     let own = Config::preset(preset, flight.sensor.camera.clone());
-    let covariance::Config { sigma_px, correlation_px, .. } = flight.sensor.covariance;
-    let covariance = covariance::Config { sigma_px, correlation_px, ..own.covariance };
+    let covariance::Config { noise, sigma_px, correlation_px, .. } = flight.sensor.covariance;
+    // Where the pictures' residuals tell the noise, nothing is told that a published system could use.
+    let covariance = match noise {
+        covariance::Noise::Told => covariance::Config { sigma_px, correlation_px, ..own.covariance },
+        _ => own.covariance,
+    };
     Config { body, mask: flight.sensor.mask.clone(), covariance, ..own }
 }
 

@@ -14,6 +14,8 @@ use crate::scene::{Light, Scene, World};
 use crate::trajectory::Path;
 use crate::utc;
 
+/// Most pictures before a wanted one that the exposure is followed over.
+const LEADS_MOST: f64 = 32.0;
 /// Pixels that a mask reaches beyond what it hides, as edges are blurred.
 const MASK_MARGIN_PX: f64 = 4.0;
 
@@ -75,20 +77,28 @@ impl Scenario {
     }
 
     /// As [`Scenario::flight`], with pictures at these times instead of the capture's own. Way and attitude stay those of
-    /// the whole capture.
+    /// the whole capture; the exposure, too, which has followed the pictures that the capture takes before.
     pub(super) fn flight_at(&self, times_s: &[f64]) -> Result<Flight, ScenarioError> {
         self.check()?;
         let sensor = self.sensor();
         sensor.check().map_err(|e| ScenarioError::new("[[vehicle]]", e.to_string()))?;
         let path = self.path()?;
-        let mut scenes = Vec::with_capacity(times_s.len());
+        let (mut scenes, mut wanted) = (Vec::with_capacity(times_s.len()), Vec::with_capacity(times_s.len()));
         for (index, &time_s) in times_s.iter().enumerate() {
+            let before = scenes.last().map_or(f64::NEG_INFINITY, |(last_s, _)| *last_s);
+            for lead_s in self.leads_s(before, time_s) {
+                scenes.push((lead_s, self.scene(&path, index, lead_s)?));
+                wanted.push(false);
+            }
             scenes.push((time_s, self.scene(&path, index, time_s)?));
+            wanted.push(true);
         }
         self.something_is_seen(&scenes)?;
         self.exposure.set(&mut scenes).map_err(|e| ScenarioError::new("[exposure]", e.to_string()))?;
         let frames = scenes
             .into_iter()
+            .zip(wanted)
+            .filter_map(|(scene, wanted)| wanted.then_some(scene))
             .enumerate()
             .map(|(index, (time_s, scene))| FlightFrame {
                 file: self.file(index),
@@ -99,6 +109,21 @@ impl Scenario {
             })
             .collect();
         Ok(Flight { name: self.name.clone(), sensor, frames })
+    }
+
+    /// The capture's own pictures between a picture and the next wanted one, as far back as the exposure controller
+    /// remembers.
+    fn leads_s(&self, before_s: f64, time_s: f64) -> Vec<f64> {
+        let [from_s, to_s] = self.span_s();
+        let every_s = (to_s - from_s) / f64::from(self.capture.frames.saturating_sub(1).max(1));
+        if self.exposure.target_mean.is_none() || !(every_s > 0.0) {
+            return Vec::new();
+        }
+        // Of a step 1 % is left after 4.6 lags.
+        let most = (4.6 * self.exposure.lag_s / every_s).ceil().min(LEADS_MOST) as u32;
+        let at = |k: u32| time_s - f64::from(k) * every_s;
+        // Half a step of room: times are rounded.
+        (1..=most).rev().map(at).filter(|&t| t >= from_s && t > before_s + 0.5 * every_s).collect()
     }
 
     fn scene(&self, path: &Path, index: usize, time_s: f64) -> Result<Scene, ScenarioError> {

@@ -2,12 +2,12 @@
 //!
 //! Pictures of the same scenario with other seeds (other clouds, another drift) go through the sensor. Edge points that
 //! it holds for limb are compared with the exact limb: their mean height is the limb height, the scatter of the pictures'
-//! means its sigma. What is left is a process along the limb with a variance and an integral length: of the lengths tried
+//! means its sigma. What is left of a limb is the noise that each picture's own residuals show (`covariance.noise = "rms"`):
+//! pictures are of different worth, and one that is far worse than the others may not be among those that are measured.
+//! Of Sun and Moon it is a process along the edge with a variance and an integral length: of the lengths tried
 //! the likeliest, each with the variance that makes the answers' errors as large as they are said to be. (The points
-//! themselves do not tell the length: what turns an answer is alike along the whole limb, and small beside each one's
+//! themselves do not tell the length: what turns an answer is alike along the whole edge, and small beside each one's
 //! noise.)
-//! Where the pictures are of different worth, one variance for all of them is less likely than each picture's own residuals,
-//! which are tried, too.
 
 use hzn_calib::noise::{Points, Weighted};
 use hzn_core::body::{self, Kind};
@@ -52,6 +52,8 @@ const SEEDS: u64 = 16;
 pub const MEASURED: u32 = 32;
 /// Integral lengths that are tried, pixels.
 const LENGTHS_PX: [f64; 7] = [10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0];
+/// Smallest sigma of an edge point, pixels.
+const LEAST_PX: f64 = 0.02;
 /// How often the sigmas are scaled at most.
 const ROUNDS: u32 = 4;
 /// An error beyond this is a wrong answer, not a noisy one: 2 degrees.
@@ -121,15 +123,18 @@ impl Fit {
             limb_height_km: if disc { 0.0 } else { sensor.body.limb_height_km + height_km },
             limb_height_sigma_km: if disc { 0.0 } else { spread_km.max(0.2) },
             noise: Noise::Told,
-            sigma_px: variance.sqrt().max(0.02),
+            sigma_px: variance.sqrt().max(LEAST_PX),
             correlation_px: f64::NAN,
             nees: f64::NAN,
             frames: [answered.len(), seen.len()],
         };
-        let own = covariance::Config::default();
-        let by_picture = Self { noise: Noise::Rms, sigma_px: own.sigma_px, correlation_px: own.correlation_px, ..fit };
-        let told = LENGTHS_PX.map(|length| Self { correlation_px: length, ..fit });
-        let settled = told.into_iter().chain([by_picture]).map(|model| model.settled(scenario, alone, seen));
+        // What the points of a picture share is in the limb height's sigma, so that no floor is left but that of rounding.
+        let by_picture = Self { noise: Noise::Rms, sigma_px: LEAST_PX, correlation_px: 0.0, ..fit };
+        let models: Vec<Self> = match disc {
+            true => LENGTHS_PX.map(|length| Self { correlation_px: length, ..fit }).into(),
+            false => vec![by_picture],
+        };
+        let settled = models.into_iter().map(|model| model.settled(scenario, alone, seen));
         settled.flatten().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(fit, _)| fit)
     }
 
@@ -173,11 +178,11 @@ impl Fit {
     pub fn apply(&self, sensor: &mut Config) {
         // Two digits more than are known. Rows by latitude go up or down with the mean.
         let digits = |x: f64| (x * 1e3).round() / 1e3;
-        let model = match self.noise {
-            Noise::Told => covariance::Config::told(digits(self.sigma_px), digits(self.correlation_px)),
-            noise => covariance::Config { noise, ..covariance::Config::default() },
+        let noise = covariance::Config {
+            method: sensor.covariance.method,
+            noise: self.noise,
+            ..covariance::Config::told(digits(self.sigma_px), digits(self.correlation_px))
         };
-        let noise = covariance::Config { method: sensor.covariance.method, ..model };
         let several = !sensor.bodies.is_empty();
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
         if body.kind == Kind::Earth {
