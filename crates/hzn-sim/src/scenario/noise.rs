@@ -52,6 +52,8 @@ const SEEDS: u64 = 16;
 pub const MEASURED: u32 = 32;
 /// Integral lengths that are tried, pixels.
 const LENGTHS_PX: [f64; 7] = [10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0];
+/// A mean NEES up to this is settled: 2 times the square of 1.15.
+const NEES_MOST: f64 = 2.645;
 /// Smallest sigma of an edge point, pixels.
 const LEAST_PX: f64 = 0.02;
 /// How often the sigmas are scaled at most.
@@ -130,12 +132,14 @@ impl Fit {
         };
         // What the points of a picture share is in the limb height's sigma, so that no floor is left but that of rounding.
         let by_picture = Self { noise: Noise::Rms, sigma_px: LEAST_PX, correlation_px: 0.0, ..fit };
-        let models: Vec<Self> = match disc {
-            true => LENGTHS_PX.map(|length| Self { correlation_px: length, ..fit }).into(),
-            false => vec![by_picture],
-        };
-        let settled = models.into_iter().map(|model| model.settled(scenario, alone, seen));
-        settled.flatten().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(fit, _)| fit)
+        let noise = if disc { Noise::Told } else { Noise::Rms };
+        let by_itself = by_picture.settled(scenario, alone, seen).filter(|(fit, _)| !disc && fit.nees <= NEES_MOST);
+        // What residuals do not show, such as light that clips along the limb, wants a floor.
+        by_itself.map(|(fit, _)| fit).or_else(|| {
+            let floors = LENGTHS_PX.map(|length| Self { noise, correlation_px: length, ..fit });
+            let settled = floors.into_iter().map(|model| model.settled(scenario, alone, seen));
+            settled.flatten().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(fit, _)| fit)
+        })
     }
 
     /// With the sigmas at which the answers' errors are as large as they are said to be; and how unlikely these errors are
@@ -164,9 +168,7 @@ impl Fit {
             if (0.85..1.15).contains(&scale) || round == ROUNDS {
                 break;
             }
-            if self.noise == Noise::Told {
-                self.sigma_px *= scale;
-            }
+            self.sigma_px *= scale;
             if self.limb_height_sigma_km > 0.0 {
                 self.limb_height_sigma_km *= scale.max(1.0);
             }
