@@ -172,7 +172,7 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// 1-sigma of the noise of the dark pixels in counts, from how far neighbours below the level are apart; 0 where there are
-/// none. What is cut off at 0 counts for less.
+/// none. Noise that is cut off at 0 makes it smaller.
 #[cold]
 pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,

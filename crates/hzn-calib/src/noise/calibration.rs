@@ -185,7 +185,7 @@ impl Calibration {
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
         body.limb_height_km = digits(self.height.km);
         body.limb_height_sigma_km = digits(self.height.sigma_km);
-        // What was measured has the pictures' clipping in it.
+        // The measured height is already that of clipped limbs.
         body.clipped_height_km = 0.0;
         body.limb_height_by_latitude_km =
             self.height.by_latitude.iter().map(|[deg, km, _]| [*deg, digits(*km)]).collect();

@@ -216,9 +216,9 @@ impl<T: Real> Expected<T> {
         })
     }
 
-    /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Where its light is cut off at 1/B of
-    /// its peak, half of what is left lies h ln B higher, h being the height over which the air thins out to 1/e; B is not
-    /// known, and differs along the limb with the light. What differs counts as a first harmonic of the azimuth: between points
+    /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Full scale cuts its light off at 1/B
+    /// of the peak. Half of full scale then lies h ln B above half of the light; over the height h the air thins out to 1/e. B is
+    /// not known and differs along the limb. What differs counts as a first harmonic of the azimuth: between points
     /// that are clipped and such that are not, part (1 − part) of the height squared; and of two ends whose heights differ
     /// independently, each by σ, half the difference is σ/√2.
     pub(crate) fn clipped(&self, part: T) -> Self {

@@ -2,9 +2,9 @@
 //!
 //! Pictures of the same scenario with other seeds (other clouds, another drift) go through the sensor. Edge points that
 //! it holds for limb are compared with the exact limb: their mean height is the limb height, the scatter of the pictures'
-//! means its sigma. What is left of a limb is the noise that each picture's own residuals show (`covariance.noise = "rms"`):
-//! pictures are of different worth, and one that is far worse than the others may not be among those that are measured.
-//! Of Sun and Moon it is a process along the edge with a variance and an integral length: of the lengths tried
+//! means its sigma. For a limb, each picture's own residuals then tell the noise (`covariance.noise = "rms"`): one picture may be
+//! far worse than the others, and it need not be among those that are measured. Where the residuals alone make the answers too
+//! sure, the model below is their floor. For Sun and Moon the model is told: a process along the edge with a variance and an integral length: of the lengths tried
 //! the likeliest, each with the variance that makes the answers' errors as large as they are said to be. (The points
 //! themselves do not tell the length: what turns an answer is alike along the whole edge, and small beside each one's
 //! noise.)
@@ -133,7 +133,8 @@ impl Fit {
         // What the points of a picture share is in the limb height's sigma, so that no floor is left but that of rounding.
         let by_picture = Self { noise: Noise::Rms, sigma_px: LEAST_PX, correlation_px: 0.0, ..fit };
         let noise = if disc { Noise::Told } else { Noise::Rms };
-        let by_itself = by_picture.settled(scenario, alone, seen).filter(|(fit, _)| !disc && fit.nees <= NEES_MOST);
+        let by_itself = (!disc).then(|| by_picture.settled(scenario, alone, seen)).flatten();
+        let by_itself = by_itself.filter(|(fit, _)| fit.nees <= NEES_MOST);
         // What residuals do not show, such as light that clips along the limb, wants a floor.
         by_itself.map(|(fit, _)| fit).or_else(|| {
             let floors = LENGTHS_PX.map(|length| Self { noise, correlation_px: length, ..fit });
@@ -193,7 +194,7 @@ impl Fit {
             }
             body.limb_height_km = digits(self.limb_height_km);
             body.limb_height_sigma_km = digits(self.limb_height_sigma_km);
-            // What was measured has the pictures' clipping in it.
+            // The measured height is already that of clipped limbs.
             [body.clipped_height_km, body.clipped_sigma_km] = [0.0; 2];
         }
         if several {
