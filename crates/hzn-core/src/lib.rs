@@ -74,6 +74,7 @@ pub mod frames;
 pub mod image;
 mod limb;
 mod linalg;
+mod median;
 pub mod pixel;
 pub mod real;
 pub mod region;

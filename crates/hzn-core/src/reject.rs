@@ -7,6 +7,7 @@
 
 #[cfg(feature = "zju")]
 mod mlesac;
+mod noise;
 #[cfg(feature = "zju")]
 mod preverified;
 #[cfg(feature = "dlr")]
@@ -53,6 +54,9 @@ pub struct Config {
     pub method: Method,
     /// Distance from the limb in pixels up to which a point can be an inlier, above 0 to 1000.
     pub threshold_px: f64,
+    /// The threshold is at least this many times the noise of the edge from point to point, 0 to 100, but no more than
+    /// the sigma of the expected limb; 0 leaves it at `threshold_px`. A threshold that cuts into the noise keeps the points that happen to lie near some limb.
+    pub noise_sigma: f64,
     /// Seed of the sampler: the same seed gives the same answer.
     pub seed: u32,
     /// Most draws, 1 to 100000. 800 find the limb among 80 % of outliers.
@@ -61,7 +65,7 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { method: Method::TwoPoint, threshold_px: 3.0, seed: 1, max_draws: 800 }
+        Self { method: Method::TwoPoint, threshold_px: 3.0, noise_sigma: 3.0, seed: 1, max_draws: 800 }
     }
 }
 
@@ -69,8 +73,41 @@ impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         above("reject.threshold_px", self.threshold_px, 0.0)?;
         between("reject.threshold_px", self.threshold_px, 0.0, 1000.0)?;
+        between("reject.noise_sigma", self.noise_sigma, 0.0, 100.0)?;
         let draws = f64::from(self.max_draws);
         require((1..=100_000).contains(&self.max_draws), "reject.max_draws", draws, Limit::Between(1.0, 1e5))
+    }
+}
+
+/// The distance from the limb up to which a point of one edge can be an inlier.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Threshold<T> {
+    /// The distance in pixels.
+    pub(crate) px: T,
+    /// How many times `threshold_px` it is, 1 or more: by as much larger may the residuals be.
+    pub(crate) raised: T,
+}
+
+impl<T: Real> Threshold<T> {
+    /// `threshold_px` as it was told.
+    #[cfg(test)]
+    pub(crate) fn told(config: &Config) -> Self {
+        Self { px: T::of(config.threshold_px), raised: T::one() }
+    }
+    /// The threshold for the first `count` points of the blocks, which are rays in the order of the edge.
+    ///
+    /// It is raised for noise to no more than the sigma of the expected limb: an edge that scatters more is none of a
+    /// limb that is known so well.
+    pub(crate) fn of(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
+        let told = T::of(config.threshold_px);
+        let most = if expected.free { told } else { told.most(sigma_alpha(expected) * focal_px) };
+        let factor = T::of(config.noise_sigma);
+        let px = if most > told && factor > T::ZERO {
+            told.most((factor * noise::point_to_point(blocks, count)).least(most))
+        } else {
+            told
+        };
+        Self { px, raised: px / told }
     }
 }
 
@@ -100,11 +137,12 @@ pub(crate) fn keep<T: Real>(
     count: u32,
     expected: &Expected<T>,
     focal_px: T,
+    threshold: Threshold<T>,
     config: &Config,
     work: &mut Work,
 ) -> Option<Consensus<T>> {
     let best = match config.method {
-        Method::TwoPoint => search(blocks, count, expected, focal_px, config, work)?,
+        Method::TwoPoint => search(blocks, count, expected, focal_px, threshold, config, work)?,
         Method::None => {
             let (a, b) = (ray(blocks, 0)?, ray(blocks, count.saturating_sub(1))?);
             let mid = ray(blocks, count / 2)?;
@@ -112,11 +150,11 @@ pub(crate) fn keep<T: Real>(
             return Some(Consensus { e, c, draws: 1, all: true });
         }
         #[cfg(feature = "dlr")]
-        Method::Ransac => return ransac::keep(blocks, count, config, work),
+        Method::Ransac => return ransac::keep(blocks, count, threshold, config, work),
         #[cfg(feature = "zju")]
-        Method::RansacPreverify => return preverified::keep(blocks, count, config, work),
+        Method::RansacPreverify => return preverified::keep(blocks, count, threshold, config, work),
         #[cfg(feature = "zju")]
-        Method::Mlesac => return mlesac::keep(blocks, count, focal_px, config, work),
+        Method::Mlesac => return mlesac::keep(blocks, count, focal_px, threshold, config, work),
     };
     for block in blocks {
         let g = block.gradient(&best.e);
@@ -128,6 +166,11 @@ pub(crate) fn keep<T: Real>(
         }
     }
     Some(best)
+}
+
+/// Sigma of the expected half-angle in radians.
+fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
+    expected.sigma_cos / expected.sin
 }
 
 /// Whether the Sun lights the body where the ray touches it; yes, where its direction is unknown. The normal there is
@@ -145,16 +188,17 @@ fn search<T: Real>(
     count: u32,
     expected: &Expected<T>,
     focal_px: T,
+    threshold: Threshold<T>,
     config: &Config,
     work: &mut Work,
 ) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
     }
-    let sigma_alpha = expected.sigma_cos / expected.sin;
+    let sigma_alpha = sigma_alpha(expected);
     let free = expected.free || sigma_alpha > T::of(0.0175);
     // An error of the half-angle bends the edge by a small part of itself: room for it, within reason.
-    let threshold = T::of(config.threshold_px);
+    let threshold = threshold.px;
     let bend = if free { T::ZERO } else { (sigma_alpha * focal_px * T::of(0.05)).least(threshold * T::of(3.0)) };
     let limit2 = (threshold + bend) * (threshold + bend);
     let scored = blocks.len().div_ceil(SCORED).max(1);

@@ -39,7 +39,8 @@ pub struct Config {
     /// third of the body's circumference where that is less. Shorter edges fit many curves.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub min_arc_px: Option<f64>,
-    /// Largest weighted RMS distance of the inliers from the limb in pixels, above 0.
+    /// Largest weighted RMS distance of the inliers from the limb in pixels, above 0; larger by as much as the noise of
+    /// the edge raises `reject.threshold_px`.
     pub max_rms_px: f64,
     /// Largest difference of the fitted half-angle from the expected one in standard deviations, above 0.
     pub max_half_angle_sigma: f64,
@@ -282,7 +283,8 @@ pub(crate) struct Judged<T> {
     pub(crate) support: T,
 }
 
-/// Looks a fit over, with the points that carry it; `points` of the edge were made.
+/// Looks a fit over, with the points that carry it; `points` of the edge were made, and the noise of the edge has
+/// `raised` the threshold of the rejection so many times.
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
@@ -290,6 +292,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     expected: &Expected<T>,
     blocks: &[Block<T>],
     points: u32,
+    raised: T,
     scene: &Scene<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -309,7 +312,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::FewInliers
     } else if covered_px < min_arc(&fused.c, camera, config) {
         Verdict::ShortArc
-    } else if !(fit.rms_px <= T::of(config.max_rms_px)) {
+    } else if !(fit.rms_px <= T::of(config.max_rms_px) * raised) {
         Verdict::Residuals
     } else if !(fused.chi2 <= chi * chi) || !blooms_to(&fit.c, expected, camera, config) {
         Verdict::HalfAngle

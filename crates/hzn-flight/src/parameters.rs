@@ -181,6 +181,7 @@ parameters! {
     81 "reject.threshold_px" sensor.reject.threshold_px;
     82 "reject.seed" sensor.reject.seed;
     83 "reject.max_draws" sensor.reject.max_draws;
+    84 "reject.noise_sigma" sensor.reject.noise_sigma;
     90 "estimate.half_angle" sensor.estimate.half_angle;
     100 "covariance.sigma_px" sensor.covariance.sigma_px;
     101 "covariance.correlation_px" sensor.covariance.correlation_px;

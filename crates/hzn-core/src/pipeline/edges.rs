@@ -193,11 +193,18 @@ impl<T: Real> Edges<T> {
         taken.withdraw(&mut self.blocks, T::of(config.threshold_px))
     }
 
+    /// The distance from the limb up to which a point can be an inlier: by the noise from point to point, whatever the
+    /// weights are.
+    fn threshold(&self, expected: &Expected<T>, config: &reject::Config) -> reject::Threshold<T> {
+        reject::Threshold::of(&self.blocks, self.points.len() as u32, expected, self.focal_px, config)
+    }
+
     /// Rejects outliers.
     pub fn reject(&mut self, expected: &Expected<T>, config: &reject::Config) -> Option<Agreed<T>> {
         let (count, mut work) = (self.points.len() as u32, Work::unlimited());
         let expected = &expected.clipped(self.clipped);
-        let found = reject::keep(&mut self.blocks, count, expected, self.focal_px, config, &mut work)?;
+        let threshold = self.threshold(expected, config);
+        let found = reject::keep(&mut self.blocks, count, expected, self.focal_px, threshold, config, &mut work)?;
         let axis = UnitVec3::assume_unit(found.e);
         Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
     }
@@ -208,7 +215,7 @@ impl<T: Real> Edges<T> {
         let expected = &expected.clipped(self.clipped);
         let start =
             reject::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
-        let threshold = T::of(config.reject.threshold_px);
+        let threshold = self.threshold(expected, &config.reject).px;
         let noise = sensor.config.noise_of(expected.which);
         estimate::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise)
             .map(Fitted)

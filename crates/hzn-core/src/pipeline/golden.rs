@@ -215,7 +215,15 @@ fn solve<T: Real>(
     let mut blocks = blocks(camera, points, lit_towards);
     let config = reject::Config::default();
     let (fx, _) = camera.focal_px();
-    let start = reject::keep(&mut blocks, points.len() as u32, expected, fx, &config, &mut Work::unlimited())?;
+    let start = reject::keep(
+        &mut blocks,
+        points.len() as u32,
+        expected,
+        fx,
+        reject::Threshold::told(&config),
+        &config,
+        &mut Work::unlimited(),
+    )?;
     let estimate = estimate::Config { half_angle, ..Default::default() };
     let noise = covariance::Config::told(sigma_px, correlation_px);
     let fit = estimate::fit(&mut blocks, &start, expected, camera, T::of(config.threshold_px), &estimate, &noise)?;

@@ -343,16 +343,17 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         undistort::to_rays(camera, blocks);
 
         enter(self.report, self.observer, Stage::Reject);
-        let threshold = T::of(config.reject.threshold_px);
-        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, threshold)).sum();
+        let told_px = T::of(config.reject.threshold_px);
+        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, told_px)).sum();
         if on_another * 2 > points.count {
             outcome.verdict = Verdict::Taken;
             return (outcome, None);
         }
         let (fx, fy) = camera.focal_px();
         let focal = (fx + fy) * T::of(0.5);
-        let Some(consensus) = reject::keep(blocks, points.count, expected, focal, &config.reject, &mut self.work)
-        else {
+        let threshold = reject::Threshold::of(blocks, points.count, expected, focal, &config.reject);
+        let consensus = reject::keep(blocks, points.count, expected, focal, threshold, &config.reject, &mut self.work);
+        let Some(consensus) = consensus else {
             return (outcome, None);
         };
         self.report.counters.draws += consensus.draws;
@@ -362,7 +363,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         if !self.work.spend(used as u32 * work::FIT + work::GATES) {
             return (outcome, None);
         }
-        let fit = estimate::fit(blocks, &consensus, expected, camera, threshold, &config.estimate, self.noise);
+        let fit = estimate::fit(blocks, &consensus, expected, camera, threshold.px, &config.estimate, self.noise);
         let Some(fit) = fit else { return (outcome, None) };
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;
@@ -384,7 +385,8 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
-        let judged = select::judge(&fit, &fused, sigma, expected, blocks, points.count, scene, camera, &config.select);
+        let (made, raised) = (points.count, threshold.raised);
+        let judged = select::judge(&fit, &fused, sigma, expected, blocks, made, raised, scene, camera, &config.select);
         outcome.verdict = judged.verdict;
         let most = T::of_i32(points.count as i32) * T::of(config.recover.min_part);
         if self.report.counters.looks > 0 && T::of_i32(fit.inliers as i32) < most {
@@ -426,7 +428,7 @@ impl<'a, T: Real, O: Observer<T>> Judge<'a, T, O> {
         }
         let share = T::of_i32(fit.inliers as i32) > T::of_i32(points.count as i32) * T::of(config.select.certain_share);
         let certain =
-            judged.support > T::of(config.select.certain_support) && (share || fit.rms_px * T::of(4.0) < threshold);
+            judged.support > T::of(config.select.certain_support) && (share || fit.rms_px * T::of(4.0) < threshold.px);
         let tracks = (self.tracks && !P::PASSED).then(|| select::middle_level(&fused.e, blocks, scene, camera));
         (outcome, Some(Best { solution, outcome, score: judged.score, certain, level: tracks.flatten() }))
     }

@@ -99,6 +99,7 @@ fn told(config: &mut Config) {
     config.body.limb_height_sigma_km = 2.0;
     [config.body.clipped_height_km, config.body.clipped_sigma_km] = [0.0; 2];
     config.covariance = covariance::Config::told(1.0, 300.0);
+    config.reject.noise_sigma = 0.0;
 }
 
 /// Braun & Barf 2022 as flown on ATEK: fixed threshold, whole pixels, RANSAC on three points, the direct nadir, the

@@ -6,7 +6,7 @@
 //! at several times in every draw, with an exponential each.
 
 use super::sampled::{FEWEST, conclude, distances2, drawn, needed};
-use super::{Config, Consensus};
+use super::{Config, Consensus, Threshold};
 use crate::block::{Block, LANES, sum};
 use crate::linalg::V3;
 use crate::real::Real;
@@ -24,6 +24,7 @@ pub(super) fn keep<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
     focal_px: T,
+    threshold: Threshold<T>,
     config: &Config,
     work: &mut Work,
 ) -> Option<Consensus<T>> {
@@ -31,7 +32,7 @@ pub(super) fn keep<T: Real>(
         return None;
     }
     // Outliers lie up to a radian from the limb, to both sides.
-    let mixture = Mixture { sigma: T::of(config.threshold_px / SIGMAS), range: focal_px * T::of(2.0) };
+    let mixture = Mixture { sigma: threshold.px / T::of(SIGMAS), range: focal_px * T::of(2.0) };
     let mut rng = Rng::new(config.seed);
     let mut best: Option<(V3<T>, T, T)> = None;
     let (mut draws, mut enough) = (0, config.max_draws);
@@ -46,7 +47,7 @@ pub(super) fn keep<T: Real>(
         }
     }
     let cone = best.map(|(e, c, _)| (e, c));
-    conclude(blocks, cone, T::of(config.threshold_px * config.threshold_px), draws)
+    conclude(blocks, cone, threshold.px * threshold.px, draws)
 }
 
 /// Inliers and outliers: standard deviation of the ones, range of the others, in pixels.

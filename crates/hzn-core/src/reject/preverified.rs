@@ -9,7 +9,7 @@
 //! bounded by `max_draws`.
 
 use super::sampled::{agreeing, conclude, distances2, point};
-use super::{Config, Consensus};
+use super::{Config, Consensus, Threshold};
 use crate::block::{Block, LANES};
 use crate::limb::through_three;
 use crate::linalg::V3;
@@ -27,13 +27,14 @@ const SAMPLE: usize = 5;
 pub(super) fn keep<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
+    threshold: Threshold<T>,
     config: &Config,
     work: &mut Work,
 ) -> Option<Consensus<T>> {
     if count < SAMPLE as u32 {
         return None;
     }
-    let limit2 = T::of(config.threshold_px * config.threshold_px);
+    let limit2 = threshold.px * threshold.px;
     let mut rng = Rng::new(config.seed);
     let (mut best, mut most) = (None, T::ZERO);
     let (mut draws, mut hypotheses) = (0, 0);

@@ -6,7 +6,7 @@
 //! default, `two-point`, is better at.
 
 use super::sampled::{FEWEST, agreeing, conclude, drawn, needed};
-use super::{Config, Consensus};
+use super::{Config, Consensus, Threshold};
 use crate::block::Block;
 use crate::real::Real;
 use crate::rng::Rng;
@@ -17,13 +17,14 @@ use crate::work::{DRAW, SCORE, Work};
 pub(super) fn keep<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
+    threshold: Threshold<T>,
     config: &Config,
     work: &mut Work,
 ) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
     }
-    let limit2 = T::of(config.threshold_px * config.threshold_px);
+    let limit2 = threshold.px * threshold.px;
     let mut rng = Rng::new(config.seed);
     let (mut best, mut most) = (None, T::of(3.5));
     let (mut draws, mut enough) = (0, config.max_draws);

@@ -102,9 +102,15 @@ fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
 
 /// The first place that is sky and from which on most of what is seen is, of three places or more.
 fn back_for_good(is_sky: &[Option<bool>]) -> Option<usize> {
-    (0..is_sky.len()).find(|&k| {
-        let rest = || is_sky.iter().skip(k).flatten();
-        let (sky, all) = (rest().filter(|s| **s).count(), rest().count());
-        is_sky.get(k) == Some(&Some(true)) && all >= 3 && sky * FOR_GOOD[1] >= all * FOR_GOOD[0]
-    })
+    let (mut first, mut sky, mut all) = (None, 0, 0);
+    // From the far end, so that each place adds itself to what lies behind it.
+    for (k, seen) in is_sky.iter().enumerate().rev() {
+        let Some(is_sky) = *seen else { continue };
+        all += 1;
+        sky += usize::from(is_sky);
+        if is_sky && all >= 3 && sky * FOR_GOOD[1] >= all * FOR_GOOD[0] {
+            first = Some(k);
+        }
+    }
+    first
 }

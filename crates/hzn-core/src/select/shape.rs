@@ -6,6 +6,7 @@ use crate::estimate::Fit;
 use crate::frames::UnitVec3;
 use crate::limb::Azimuth;
 use crate::linalg::V3;
+use crate::median;
 use crate::real::Real;
 
 /// Most inliers that are looked at, evenly along the edge: the ratio of two residuals is then known to some 10 %.
@@ -103,14 +104,7 @@ pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
             let _ = all.push(second);
         }
     }
-    // By halving: sorting would need a panic path.
-    let (mut low, mut high) = (T::ZERO, most);
-    for _ in 0..12 {
-        let middle = (low + high) * half;
-        let below = all.iter().filter(|second| **second <= middle).count();
-        if 2 * below >= all.len() { high = middle } else { low = middle }
-    }
-    high * T::of(1.0 / (0.6745 * 1.224_744_871))
+    median::of_reals(&all, most) * T::of(1.0 / (0.6745 * 1.224_744_871))
 }
 
 /// Arc over which the residuals stay alike, in points of the shape: 1 + 2 Σ ρ_k up to the first below 0.05.

@@ -6,6 +6,7 @@ use crate::contour::Scene;
 use crate::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::linalg::V3;
+use crate::median;
 use crate::pipeline::Observer;
 use crate::real::Real;
 
@@ -57,39 +58,14 @@ pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
             distance = (distance + distance).most(T::of(NEAREST_PX));
         }
     }
-    let middle = median(&seen);
+    let middle = median::of_counts(&seen);
     for b in &mut seen {
         *b = b.abs_diff(middle);
     }
-    let spread = median(&seen);
+    let spread = median::of_counts(&seen);
     Sky {
         lit: T::of_i32(lit) / T::of_i32(looks.max(1)),
         median: T::of_i32(middle.into()),
         spread: T::of_i32(spread.max(1).into()),
-    }
-}
-
-/// The smallest value that half of the values do not exceed, by halving; 0 of none.
-fn median(values: &[u16]) -> u16 {
-    let (mut low, mut high) = (0u32, values.iter().fold(0, |most, &v| most.max(v)).into());
-    while low < high {
-        let middle = (low + high) / 2;
-        let below = values.iter().filter(|&&v| u32::from(v) <= middle).count();
-        if 2 * below >= values.len() { high = middle } else { low = middle + 1 }
-    }
-    low as u16
-}
-
-#[cfg(test)]
-mod tests {
-    use super::median;
-
-    #[test]
-    fn medians_of_few_and_many() {
-        assert_eq!(median(&[]), 0);
-        assert_eq!(median(&[7]), 7);
-        assert_eq!(median(&[9, 1, 5]), 5);
-        assert_eq!(median(&[65535, 65535, 3, 65535]), 65535);
-        assert_eq!(median(&[4, 2, 8, 6]), 4);
     }
 }

@@ -367,8 +367,16 @@ fn ransac_leaves_outliers_out() {
     let body = crate::body::Config { altitude_km: Some(120.0), ..Default::default() };
     let expected = crate::body::Expected::new(&body, &crate::body::Frame::default()).unwrap();
     let config = reject::Config { method: reject::Method::Ransac, threshold_px: 1.0, ..Default::default() };
-    let found =
-        reject::keep(&mut blocks, points.len() as u32, &expected, 888.97, &config, &mut Work::unlimited()).unwrap();
+    let found = reject::keep(
+        &mut blocks,
+        points.len() as u32,
+        &expected,
+        888.97,
+        reject::Threshold::told(&config),
+        &config,
+        &mut Work::unlimited(),
+    )
+    .unwrap();
     assert!(found.draws < config.max_draws);
     for (i, p) in points.iter().enumerate() {
         let near = exact.iter().any(|q| libm::hypot(p.0 - q.0, p.1 - q.1) < 5.0);
@@ -378,7 +386,15 @@ fn ransac_leaves_outliers_out() {
     }
     let (got, got_c) = direct::fit(&blocks).unwrap();
     assert!(UnitVec3::<Cam, f64>::assume_unit(got).angle_rad(&e).to_degrees() < 0.2 && (got_c - c).abs() < 0.01);
-    let few = reject::keep(&mut blocks[..1], 2, &expected, 888.97, &config, &mut Work::unlimited());
+    let few = reject::keep(
+        &mut blocks[..1],
+        2,
+        &expected,
+        888.97,
+        reject::Threshold::told(&config),
+        &config,
+        &mut Work::unlimited(),
+    );
     assert!(few.is_none());
 }
 

@@ -47,7 +47,16 @@ fn fitted(
     let mut blocks = blocks(&camera, &points, &e);
     let config = reject::Config { threshold_px: 30.0, ..reject::Config::default() };
     let (fx, _) = camera.focal_px();
-    let start = reject::keep(&mut blocks, points.len() as u32, &expected, fx, &config, &mut Work::unlimited()).unwrap();
+    let start = reject::keep(
+        &mut blocks,
+        points.len() as u32,
+        &expected,
+        fx,
+        reject::Threshold::told(&config),
+        &config,
+        &mut Work::unlimited(),
+    )
+    .unwrap();
     let estimate = estimate::Config { half_angle: HalfAngle::Free, ..Default::default() };
     let noise = covariance::Config::told(0.1, 60.0);
     let fit = estimate::fit(&mut blocks, &start, &expected, &camera, 30.0, &estimate, &noise).unwrap();
@@ -172,7 +181,16 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
         for noise in [Noise::Told, Noise::Rms] {
             let mut blocks = blocks(&camera, &points, &e);
             let mut work = Work::unlimited();
-            let start = reject::keep(&mut blocks, points.len() as u32, &expected, fx, &config, &mut work).unwrap();
+            let start = reject::keep(
+                &mut blocks,
+                points.len() as u32,
+                &expected,
+                fx,
+                reject::Threshold::told(&config),
+                &config,
+                &mut work,
+            )
+            .unwrap();
             let noise = covariance::Config { noise, ..Default::default() };
             let fit = estimate::fit(&mut blocks, &start, &expected, &camera, 3.0, &estimate, &noise).unwrap();
             let mut budget = Budget::new();

@@ -268,7 +268,15 @@ fn solved(config: &reject::Config, outliers: f64, runs: u32) -> u32 {
     let solved = |seed: &u32| {
         let mut blocks = blocks(&camera, &scattered(&camera, &exact, outliers, 2 * *seed), &e);
         let config = reject::Config { seed: *seed, ..*config };
-        let found = reject::keep(&mut blocks, 400, &expected(), 92.0, &config, &mut Work::unlimited());
+        let found = reject::keep(
+            &mut blocks,
+            400,
+            &expected(),
+            92.0,
+            reject::Threshold::told(&config),
+            &config,
+            &mut Work::unlimited(),
+        );
         found.is_some_and(|f| f.e.dot(e.v()) > 2f64.to_radians().cos())
     };
     (0..runs).filter(solved).count() as u32
@@ -323,7 +331,7 @@ proptest::proptest! {
         for method in [reject::Method::RansacPreverify, reject::Method::Mlesac] {
             let mut blocks = blocks(&camera, &points, &direction([0.0, 0.0, 1.0]));
             let config = reject::Config { method, max_draws: 300, ..reject::Config::default() };
-            if let Some(found) = reject::keep(&mut blocks, points.len() as u32, &expected(), 92.0, &config, &mut Work::unlimited()) {
+            if let Some(found) = reject::keep(&mut blocks, points.len() as u32, &expected(), 92.0, reject::Threshold::told(&config), &config, &mut Work::unlimited()) {
                 proptest::prop_assert!((found.e.dot(&found.e) - 1.0).abs() < 1e-4 && found.c.is_finite());
             }
         }
