@@ -55,7 +55,7 @@ pub struct Config {
     /// Distance from the limb in pixels up to which a point can be an inlier, above 0 to 1000.
     pub threshold_px: f64,
     /// The threshold is at least this many times the noise of the edge from point to point, 0 to 100, but no more than
-    /// the sigma of the expected limb; 0 leaves it at `threshold_px`. A threshold that cuts into the noise keeps the points that happen to lie near some limb.
+    /// the sigma of the limb's height; 0 leaves it at `threshold_px`. A threshold that cuts into the noise keeps the points that happen to lie near some limb.
     pub noise_sigma: f64,
     /// Seed of the sampler: the same seed gives the same answer.
     pub seed: u32,
@@ -96,11 +96,11 @@ impl<T: Real> Threshold<T> {
     }
     /// The threshold for the first `count` points of the blocks, which are rays in the order of the edge.
     ///
-    /// It is raised for noise to no more than the sigma of the expected limb: an edge that scatters more is none of a
-    /// limb that is known so well.
+    /// It is raised for noise to no more than the sigma of the limb's own height: so far its air may spread it, and an
+    /// edge that scatters more is another's.
     pub(crate) fn of(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
         let told = T::of(config.threshold_px);
-        let most = if expected.free { told } else { told.most(sigma_alpha(expected) * focal_px) };
+        let most = if expected.free { told } else { told.most(expected.limb_sigma_rad() * focal_px) };
         let factor = T::of(config.noise_sigma);
         let px = if most > told && factor > T::ZERO {
             told.most((factor * noise::point_to_point(blocks, count)).least(most))

@@ -12,6 +12,7 @@ const VOCABULARY: &[&str] = &[
     "pixel",
     "image",
     "linalg",
+    "median",
     "limb",
     "block",
     "rng",

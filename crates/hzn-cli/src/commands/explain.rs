@@ -225,13 +225,13 @@ impl Told<'_> {
             );
         }
         if reached(Stage::Reject) {
-            line(
-                "reject",
-                format!(
-                    "{} draws; points up to {} px from the limb can belong to it",
-                    c.draws, self.config.reject.threshold_px
-                ),
-            );
+            let reject = &self.config.reject;
+            let noisy = match reject.noise_sigma {
+                0.0 => String::new(),
+                sigmas => format!(", and on a noisy edge up to {sigmas} times its noise"),
+            };
+            let px = reject.threshold_px;
+            line("reject", format!("{} draws; points up to {px} px from the limb can belong to it{noisy}", c.draws));
         }
         line("work", format!("{} (limits.max_work bounds it)", c.work));
         line("status", r.status.name().to_owned());

@@ -216,6 +216,11 @@ impl<T: Real> Expected<T> {
         })
     }
 
+    /// 1-sigma of the half-angle from the limb's own height alone, radians: over the way to the limb, (R + d)/tan α.
+    pub(crate) fn limb_sigma_rad(&self) -> T {
+        self.sigma_parts[0] * self.sin / (self.cos.most(T::of(1e-6)) * (self.radius_m + self.limb_m))
+    }
+
     /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Full scale cuts its light off at 1/B
     /// of the peak. Half of full scale then lies h ln B above half of the light; over the height h the air thins out to 1/e. B is
     /// not known and differs along the limb. What differs counts as a first harmonic of the azimuth: between points
