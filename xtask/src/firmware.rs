@@ -53,7 +53,7 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
 /// Lints and documents of the workspace, and that the C header is what the library says.
 fn looked_over() -> Outcome {
     let dir = target().join("firmware/host");
-    let here = ["--package", "hzn-c", "--package", "hzn-fpu"];
+    let here = ["--package", "hzn-c"];
     let on_this_machine = |verb: &str| {
         let mut command = cargo(&[verb]);
         command.arg("--target-dir").arg(&dir).args(here);

@@ -13,7 +13,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use hzn_cli::input;
+use hzn_run::source;
 
 const HELP: &str = "usage: cargo xtask bench run [OPTION]...
   --frames N   distinct rendered frames of 1920x1080 (default 100)
@@ -59,7 +59,7 @@ impl Options {
 
 /// Decodes every picture of a folder on all cores, and nothing else.
 fn decode(folder: &Path) -> Result<(), String> {
-    let mut source = input::open(&[folder.to_owned()], None, None).map_err(|stop| stop.error.to_string())?;
+    let mut source = source::open(&[folder.to_owned()], None, None).map_err(|e| e.to_string())?;
     let mut items = Vec::new();
     while let Some(item) = source.next() {
         items.push(Mutex::new(Some(item.map_err(|e| e.to_string())?)));

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use hzn_calib::Problem;
+use hzn_run::{Kind, Remedy};
 
 /// Exit codes. The numbers are fixed: scripts rely on them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +49,33 @@ impl From<std::io::Error> for Stop {
     fn from(error: std::io::Error) -> Self {
         Self { exit: Exit::Failed, error: error.into() }
     }
+}
+
+impl From<hzn_run::Error> for Stop {
+    fn from(error: hzn_run::Error) -> Self {
+        let exit = match error.kind() {
+            Kind::Unusable => Exit::Usage,
+            Kind::Failed => Exit::Failed,
+        };
+        let error = match error.remedy().and_then(option) {
+            Some(option) => anyhow::anyhow!("{error}; {option}"),
+            None => error.into_cause(),
+        };
+        Self { exit, error }
+    }
+}
+
+/// What the command line offers against an error.
+fn option(remedy: Remedy) -> Option<&'static str> {
+    Some(match remedy {
+        Remedy::Replace => "--force replaces it",
+        Remedy::ReplaceOrResume => "--force replaces it, --resume continues it",
+        Remedy::ResumeOrRestart => "--resume goes on with it, --force starts over",
+        Remedy::Restart => "--force starts over",
+        Remedy::NoTopic => "leave --topic out, or give an MCAP as the input",
+        Remedy::Headerless => "--raw reads files without a header",
+        _ => return None,
+    })
 }
 
 impl From<Problem> for Stop {

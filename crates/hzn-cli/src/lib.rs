@@ -1,24 +1,18 @@
 //! The command `hzn`: from a sequence of pictures to directions with covariances, in files that others can read.
 //!
 //! `main.rs` turns [`main`]'s answer into an exit code. Commands live in [`commands`], one file each; they are put
-//! together from [`input`] (where pictures come from), [`engine`] (all cores, results in order), [`output`] (where
-//! results go), [`overlay`] and [`plot`] (what is drawn) and [`words`] (what is said).
+//! together from what `hzn-run` has. Here are the arguments, the progress bar, the exit codes ([`exit`]) and the charts
+//! of reports ([`plot`]).
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when nobody reads; `tell` does not")]
 
 pub mod commands;
-pub mod engine;
 pub mod exit;
-pub mod input;
-pub mod output;
-pub mod overlay;
 pub mod plot;
 mod progress;
 mod refusals;
-pub mod scene;
 mod setup;
 mod tell;
-pub mod words;
 
 use clap::Parser;
 

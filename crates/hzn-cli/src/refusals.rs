@@ -6,8 +6,8 @@ use hzn_core::pipeline::Verdict;
 use hzn_core::status::Status;
 use hzn_core::{Report, select};
 
-use crate::engine::Finished;
-use crate::words;
+use hzn_run::engine::Finished;
+use hzn_run::explain;
 
 /// Why a body was not found in a picture: what became of its longest fitted edge, or where the picture ended without one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,8 +29,8 @@ impl Why {
 
     fn text(self, limits: &select::Config) -> String {
         match self {
-            Self::Verdict(verdict) => format!("{}: {}", verdict.name(), words::why(verdict, limits)),
-            Self::Status(status) => format!("{status}: {}", words::without_edges(status)),
+            Self::Verdict(verdict) => format!("{}: {}", verdict.name(), explain::why(verdict, limits)),
+            Self::Status(status) => format!("{status}: {}", explain::without_edges(status)),
         }
     }
 }

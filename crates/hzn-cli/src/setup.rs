@@ -11,10 +11,11 @@ use hzn_core::body::{self, FrameError};
 use hzn_core::pipeline::Orient;
 use hzn_sim::Truth;
 
-use crate::engine::{self, AnySensor};
 use crate::exit::{Exit, Stop, usage};
-use crate::input::{self, Raw, Source};
-use crate::{output, tell};
+use crate::tell;
+use hzn_run::engine::{self, AnySensor};
+use hzn_run::sink;
+use hzn_run::source::{self, Raw, Source};
 
 /// Which sensor.
 #[derive(Debug, Clone, Args)]
@@ -94,7 +95,7 @@ impl InputArgs {
         if !(self.fps > 0.0 && self.fps.is_finite()) {
             return Err(usage("--fps: must be above 0"));
         }
-        input::open(inputs, self.raw, self.topic.as_deref())
+        Ok(source::open(inputs, self.raw, self.topic.as_deref())?)
     }
 
     /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings go to stderr.
@@ -139,12 +140,12 @@ pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Resu
     let mut notes = Vec::new();
     source.want_channel(sensor.config.input.channel)?;
     if sensor.config.input.bits.is_none() {
-        let found = input::find_bits(source);
+        let found = source::find_bits(source);
         // Recorded pictures are PNG, which has room for more: who reads them is told by the recorded sensor.
         let bits = source.bits().filter(|bits| *bits > 8).or(found.map(|f| f.bits));
         if let Some(bits) = bits {
             sensor.config.input.bits = Some(bits);
-            sensor.text = input::with_key(&sensor.text, "bits", i64::from(bits));
+            sensor.text = source::with_key(&sensor.text, "bits", i64::from(bits));
         }
         notes.extend(found.filter(|f| f.bits < 16).map(|f| f.to_string()));
     }
@@ -218,7 +219,7 @@ pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
     for truth in before.deserialize::<Truth>().map_while(Result::ok) {
         let path = folder.join(Path::new(&truth.file).file_name().unwrap_or_default());
         if path.is_file() {
-            std::fs::remove_file(&path).map_err(|e| output::cannot(&path, &e))?;
+            std::fs::remove_file(&path).map_err(|e| sink::cannot(&path, &e))?;
         }
     }
     Ok(())

@@ -20,11 +20,6 @@ pub(crate) fn line(text: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// `1 picture`, `2 pictures`.
-pub(crate) fn counted(n: u64, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
-}
-
 /// A line to stderr about something that stops nothing but that the user should look at.
 pub(crate) fn warning(text: impl Display) {
     line(format_args!("warning: {text}"));

@@ -197,7 +197,7 @@ fn wrong_usage_is_2() {
         (&["--altitude-km", "-5"], "--altitude-km: body.altitude_km"),
         (&["-j", "0"], "0 is not in 1.."),
         (&["--no-images", "-o", "a.csv"], "--no-images: only an MCAP"),
-        (&["--topic", "/x"], "--topic: only an MCAP"),
+        (&["--topic", "/x"], "only an MCAP has topics; leave --topic out"),
         (&["--resume"], "--output <FILE>"),
         (&["-o", "a.csv", "--resume", "--force"], "cannot be used with"),
         (&["-s", "nowhere.toml"], "hzn init"),

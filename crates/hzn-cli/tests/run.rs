@@ -249,7 +249,10 @@ fn a_disk_that_fills_up_keeps_what_is_finished() {
         let hzn = place.command(&[]);
         let mut shell = std::process::Command::new("bash");
         shell.args(["-c", &limited]).arg(hzn.get_program()).current_dir(place.path(""));
-        common::Ran::of(&shell.output().unwrap(), &place.path("")).expect(1).says("ulimit -f").says("--resume goes on");
+        common::Ran::of(&shell.output().unwrap(), &place.path(""))
+            .expect(1)
+            .says("ulimit -f")
+            .says("resume the run to go on");
         assert!(!place.path(out).exists());
         let info = place.run(&["info", &format!("{out}.part")]).expect(0).out;
         assert!(!info.contains("frames           0"), "{out}: {info}");

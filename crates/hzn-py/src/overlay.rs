@@ -1,6 +1,6 @@
 //! `hzn.overlay`.
 
-use hzn_cli::input::Picture;
+use hzn_run::source::Picture;
 use image::RgbImage;
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray3};
@@ -29,5 +29,5 @@ pub(crate) fn draw(py: Python<'_>, image: &Bound<'_, PyAny>, report: &Report, bi
     let array = Array::of(image)?;
     let picture = Picture::new(array.to_samples(), array.layout(bits)?);
     let (drawing, title) = (report.drawing_of_all(), report.title());
-    errors::detached(py, || hzn_cli::overlay::draw_annotations(picture.to_rgb(), &drawing, &title))
+    errors::detached(py, || hzn_run::overlay::draw_annotations(picture.to_rgb(), &drawing, &title))
 }

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use hzn_calib::{FrameData, plausible, sensor};
-use hzn_cli::engine::{AnySensor, Traces};
 use hzn_core::body::FrameError;
 use hzn_core::status::Status;
 use hzn_core::{Config, Sensor as CoreSensor};
 use hzn_mcap::{Row, RowMeta};
+use hzn_run::engine::{AnySensor, Traces};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -161,11 +161,11 @@ impl Sensor {
             processed.map(|p| (p, traces))
         })??;
         let traces = traces.map(|t| t.each).unwrap_or_default();
-        let report = |(which, (processed, body)): (usize, (hzn_cli::engine::Processed, &hzn_core::body::Config))| {
+        let report = |(which, (processed, body)): (usize, (hzn_run::engine::Processed, &hzn_core::body::Config))| {
             let meta = RowMeta {
                 time_s: Some(data.time_s.unwrap_or(0.0)),
                 body: hzn_mcap::body_name(body.kind).to_owned(),
-                altitude_km: hzn_cli::output::altitude_km(Some(&data), body),
+                altitude_km: hzn_run::sink::altitude_km(Some(&data), body),
                 ..RowMeta::default()
             };
             let found = match processed.report {

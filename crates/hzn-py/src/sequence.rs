@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use hzn_calib::FrameData;
-use hzn_cli::engine::{self, Finished, Plan};
-use hzn_cli::exit::{Exit, Stop};
-use hzn_cli::input::{self, Payload, Source};
+use hzn_run::engine::{self, Finished, Plan};
+use hzn_run::source::{self, Payload, Source};
+use hzn_run::{Error, Kind};
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -28,13 +28,15 @@ pub(crate) struct Sequence {
 #[pyclass(frozen, name = "_Item", module = "hzn._hzn")]
 pub(crate) struct Item {
     index: u64,
-    item: Mutex<Option<input::Item>>,
+    item: Mutex<Option<source::Item>>,
 }
 
-/// What the command line ends with, as an exception.
-pub(crate) fn stopped(stop: Stop) -> PyErr {
-    let text = format!("{:#}", stop.error);
-    if stop.exit == Exit::Usage { errors::config(text) } else { errors::other(text) }
+/// Why a run cannot begin or ends early, as an exception.
+pub(crate) fn stopped(error: Error) -> PyErr {
+    match error.kind() {
+        Kind::Unusable => errors::config(error),
+        Kind::Failed => errors::other(error),
+    }
 }
 
 #[pymethods]
@@ -43,10 +45,10 @@ impl Sequence {
     fn new(py: Python<'_>, sensor: &Sensor, inputs: Vec<PathBuf>) -> PyResult<Self> {
         let state = sensor.state();
         let (source, frames, bits) = errors::detached(py, || -> PyResult<_> {
-            let mut source = input::open(&inputs, None, None).map_err(stopped)?;
+            let mut source = source::open(&inputs, None, None).map_err(stopped)?;
             source.want_channel(state.config.input.channel).map_err(stopped)?;
             let given = state.config.input.bits.or(source.bits());
-            let found = if given.is_none() { input::find_bits(source.as_ref()) } else { None };
+            let found = if given.is_none() { source::find_bits(source.as_ref()) } else { None };
             let bits = (given.or(found.map(|f| f.bits)), found.filter(|f| f.bits < 16));
             let beside = source.folder().join("frames.csv");
             let own = source.sensor_toml().is_some();
@@ -118,7 +120,13 @@ pub(crate) fn process_encoded(
     let row = FrameData { file: name.clone(), time_s, ..expected.data.clone() };
     let plan = plan(&state, None);
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
-    processed(py, &state, &plan, index, input::Item { name, time: input::TimeSource::Table, data: Some(row), payload })
+    processed(
+        py,
+        &state,
+        &plan,
+        index,
+        source::Item { name, time: source::TimeSource::Table, data: Some(row), payload },
+    )
 }
 
 fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
@@ -136,10 +144,10 @@ fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
     }
 }
 
-fn processed(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: input::Item) -> PyResult<Report> {
+fn processed(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: source::Item) -> PyResult<Report> {
     let finished = errors::detached(py, || state.lend(|sensor| engine::one(plan, sensor, index, item)))??;
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
-    let rows = hzn_cli::output::rows(&finished, &plan.config);
+    let rows = hzn_run::sink::rows(&finished, &plan.config);
     let report = |(row, found): (hzn_mcap::Row, &engine::Found)| match &found.report {
         Ok(found) => Report::new(row, found, None, &state.camera),
         Err(_) => Report::of_row(row),

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_cli::input::picture::{Picture, Samples};
-use hzn_cli::scene;
 use hzn_core::camera::Camera as Lens;
 use hzn_core::image::Layout;
+use hzn_run::scene;
+use hzn_run::source::picture::{Picture, Samples};
 use hzn_sim::evaluate::{Evaluation, pair};
 use hzn_sim::scenario::{Fit, MEASURED};
 use hzn_sim::sensitivity::Design;
@@ -184,7 +184,7 @@ pub(crate) fn evaluate<'py>(
     let mut camera = camera.map(|c| c.config.clone());
     let mut rows = match results.extract::<PathBuf>() {
         Ok(path) => {
-            let (rows, sensor) = hzn_cli::output::read(&path).map_err(stopped)?;
+            let (rows, sensor) = hzn_run::results::read(&path).map_err(stopped)?;
             let recorded = sensor.and_then(|t| hzn_calib::sensor::parse(&t, Path::new("sensor.toml")).ok());
             camera = camera.or(recorded.map(|s| s.config.camera));
             rows
@@ -209,7 +209,7 @@ pub(crate) fn evaluate<'py>(
     };
     let value = errors::detached(py, move || -> PyResult<Value> {
         let lens = camera.and_then(|c| Lens::<f64>::try_new(&c).ok());
-        let answers: Vec<_> = rows.drain(..).map(|r| hzn_cli::output::answer(&r)).collect();
+        let answers: Vec<_> = rows.drain(..).map(|r| hzn_run::sink::answer(&r)).collect();
         let cases = pair(&answers, &truth, lens.as_ref()).map_err(errors::other)?;
         Ok(json!({ "evaluations": Evaluation::by_body(&cases), "frames": cases }))
     })??;

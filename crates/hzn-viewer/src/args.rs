@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use hzn_cli::input::Raw;
+use hzn_run::source::Raw;
 
 use crate::measure::Kind;
 use crate::work::open::Request;

@@ -1,5 +1,6 @@
 //! `hzn demo`: a rendered flight with known truth, and a real photograph, end to end.
 
+use hzn_run::explain;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -9,10 +10,10 @@ use hzn_sim::{Flight, Truth};
 
 use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::output;
-use crate::overlay;
 use crate::setup::clear_rendered;
 use crate::tell;
+use hzn_run::overlay;
+use hzn_run::sink;
 
 const ISS_PICTURE: &[u8] = include_bytes!("../../assets/iss-limb-2020-11-20.jpg");
 const ISS_SENSOR: &str = include_str!("../../assets/iss.toml");
@@ -48,9 +49,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     clear_rendered(&folder.join("flight"))?;
     let (flight_dir, iss_dir) = (folder.join("flight"), folder.join("iss"));
     for dir in [&flight_dir, &iss_dir] {
-        std::fs::create_dir_all(dir).map_err(|e| output::cannot(dir, &e))?;
+        std::fs::create_dir_all(dir).map_err(|e| sink::cannot(dir, &e))?;
     }
-    tell::line(format_args!("rendering {} of a rocket flight ...", tell::counted(args.count.into(), "picture")));
+    tell::line(format_args!("rendering {} of a rocket flight ...", explain::counted(args.count.into(), "picture")));
     let flight = hzn_sim::flight::rocket(1280, 720, usize::from(args.count), 1);
     let truth = write_flight(&flight, &flight_dir)?;
 
@@ -58,7 +59,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (flight_mcap, flight_csv) = (folder.join("flight.mcap"), folder.join("flight.csv"));
     process(&flight_dir, &flight_mcap)?;
     let rows = rows(&flight_mcap)?;
-    let mut table = output::Rows::create(&flight_csv, output::Existing::Replace)?;
+    let mut table = sink::Rows::create(&flight_csv, sink::Existing::Replace)?;
     for row in &rows {
         table.write(row)?;
     }
@@ -66,7 +67,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 
     let write = |name: &str, bytes: &[u8]| {
         let path = iss_dir.join(name);
-        std::fs::write(&path, bytes).map_err(|e| output::cannot(&path, &e))
+        std::fs::write(&path, bytes).map_err(|e| sink::cannot(&path, &e))
     };
     write("iss-limb-2020-11-20.jpg", ISS_PICTURE)?;
     write("sensor.toml", ISS_SENSOR.as_bytes())?;
@@ -75,9 +76,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     process(&iss_dir, &iss_mcap)?;
     let iss = self::rows(&iss_mcap)?;
     let layout = folder.join("foxglove-layout.json");
-    std::fs::write(&layout, hzn_mcap::LAYOUT).map_err(|e| output::cannot(&layout, &e))?;
+    std::fs::write(&layout, hzn_mcap::LAYOUT).map_err(|e| sink::cannot(&layout, &e))?;
     let overlays = folder.join("overlay");
-    std::fs::create_dir_all(&overlays).map_err(|e| output::cannot(&overlays, &e))?;
+    std::fs::create_dir_all(&overlays).map_err(|e| sink::cannot(&overlays, &e))?;
     let shown = draw(&flight_mcap, &overlays, 5)? + draw(&iss_mcap, &overlays, 1)?;
 
     let mut out = format!("{}\n{}\n", flight_text(&rows, &truth)?, iss_text(iss.first()));
@@ -110,12 +111,12 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
     let config = toml::to_string(&flight.sensor).map_err(failed)?;
     let path = folder.join("sensor.toml");
     let text = format!("# The camera of a rendered rocket flight.\npreset = \"hzn\"\n\n{config}");
-    std::fs::write(&path, text).map_err(|e| output::cannot(&path, &e))?;
+    std::fs::write(&path, text).map_err(|e| sink::cannot(&path, &e))?;
 
     // Pictures are rendered on all cores already, one after the other.
     for frame in &flight.frames {
         let path = folder.join(&frame.file);
-        frame.render().map_err(failed)?.save(&path).map_err(|e| output::not_saved(&path, &e))?;
+        frame.render().map_err(failed)?.save(&path).map_err(|e| sink::not_saved(&path, &e))?;
     }
     let mut known = String::from("file,time_s,x_km,y_km,z_km\n");
     for frame in &flight.frames {
@@ -123,19 +124,19 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
         known.push_str(&format!("{},{},{x},{y},{z}\n", frame.file, frame.time_s));
     }
     let path = folder.join("frames.csv");
-    std::fs::write(&path, known).map_err(|e| output::cannot(&path, &e))?;
+    std::fs::write(&path, known).map_err(|e| sink::cannot(&path, &e))?;
 
     let truth: Vec<Truth> = flight.frames.iter().map(|f| f.truth()).collect::<Result<_, _>>().map_err(failed)?;
     let path = folder.join("truth.csv");
     let written = |e: csv::Error| match e.into_kind() {
-        csv::ErrorKind::Io(e) => output::cannot(&path, &e),
+        csv::ErrorKind::Io(e) => sink::cannot(&path, &e).into(),
         other => failed(format!("{}: {other:?}", path.display())),
     };
     let mut table = csv::Writer::from_path(&path).map_err(written)?;
     for row in &truth {
         table.serialize(row).map_err(written)?;
     }
-    table.flush().map_err(|e| output::cannot(&path, &e))?;
+    table.flush().map_err(|e| sink::cannot(&path, &e))?;
     Ok(truth)
 }
 
@@ -165,7 +166,7 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
             continue;
         }
         let Some(image) = frame.image else { continue };
-        let (picture, _) = crate::input::recorded(image).decode(None).map_err(failed)?;
+        let (picture, _) = hzn_run::source::recorded(image).decode(None).map_err(failed)?;
         let image = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
         overlay::save(&image, &folder.join(overlay::file_name(&frame.row.file)))?;
         drawn += 1;
@@ -175,7 +176,7 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
 
 /// Results beside the truth.
 fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
-    let answers: Vec<_> = rows.iter().map(crate::output::answer).collect();
+    let answers: Vec<_> = rows.iter().map(hzn_run::sink::answer).collect();
     let cases = pair(&answers, truth, None).map_err(failed)?;
     let mut out = String::from("Rendered rocket flight, against the truth\n");
     let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));

@@ -8,12 +8,12 @@ use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, binarize, body};
 use hzn_mcap::Annotations;
 
-use crate::engine::{AnySensor, Trace, Traces, Unprocessed};
 use crate::exit::{Exit, Outcome, usage};
-use crate::input::{self, Picture};
 use crate::setup::{InputArgs, SensorArgs, need_altitude, settle_input};
 use crate::tell;
-use crate::{output, overlay, words};
+use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
+use hzn_run::source::{self, Picture};
+use hzn_run::{explain, overlay, sink};
 
 /// Show what happens to one frame: what was kept, what was dropped, and why
 #[derive(Debug, clap::Args)]
@@ -37,16 +37,16 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.overlay {
-        if input::ending(path) != "png" {
+        if source::ending(path) != "png" {
             return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
         }
-        if output::is_same(path, &args.frame) {
+        if sink::is_same(path, &args.frame) {
             return Err(usage(format!(
                 "{}: is the picture itself; choose another name for the overlay",
                 path.display()
             )));
         }
-        output::refuse_existing(path, args.force)?;
+        sink::refuse_existing(path, args.force)?;
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
     let mut sensor = args.sensor.load(source.as_ref())?;
@@ -119,7 +119,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::result(format_args!("{between}{}", told.text(decoding, time.elapsed)))?;
         // Drawn where each row sees it.
         let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
-        drawing.add(output::annotations(trace, report.solution.as_ref(), &camera));
+        drawing.add(sink::annotations(trace, report.solution.as_ref(), &camera));
         statuses.push(if several { format!("{name} {}", report.status) } else { report.status.name().to_owned() });
     }
     if let Some(path) = &args.overlay {
@@ -162,7 +162,7 @@ impl Told<'_> {
                 self.name,
                 l.width,
                 l.height,
-                tell::counted(l.channels.into(), "channel"),
+                explain::counted(l.channels.into(), "channel"),
                 l.bits
             ),
         );
@@ -206,7 +206,7 @@ impl Told<'_> {
                         k.points,
                         k.inliers,
                         k.verdict.name(),
-                        words::why(k.verdict, &self.config.select)
+                        explain::why(k.verdict, &self.config.select)
                     ),
                 );
             }
@@ -260,7 +260,7 @@ impl Told<'_> {
         let body = self.body;
         let cone =
             format!("{}, cone of {:.4} deg half-angle", hzn_mcap::body_name(body.kind), self.half_angle.to_degrees());
-        let Some(km) = output::altitude_km(self.data, body) else {
+        let Some(km) = sink::altitude_km(self.data, body) else {
             return format!("{cone}, as seen from about the Earth");
         };
         let from = match self.data {
@@ -291,7 +291,7 @@ impl Told<'_> {
     fn budget(&self, candidate: u32) -> Vec<(&'static str, f64)> {
         let edges = self.trace.edges();
         let terms = edges.iter().find(|e| e.candidate == candidate).map_or(&[][..], |e| &e.budget_rad);
-        terms.iter().filter(|(_, rad)| *rad > 0.0).map(|(term, rad)| (words::term(*term), rad.to_degrees())).collect()
+        terms.iter().filter(|(_, rad)| *rad > 0.0).map(|(term, rad)| (explain::term(*term), rad.to_degrees())).collect()
     }
 
     /// What became of a rolling shutter.
@@ -316,7 +316,7 @@ impl Told<'_> {
                 z.clamp(-1.0, 1.0).acos().to_degrees()
             ),
         );
-        let (sigma, angle_rad) = words::principal(s);
+        let (sigma, angle_rad) = explain::principal(s);
         line(
             "sigma",
             format!(
@@ -358,7 +358,7 @@ impl Told<'_> {
 
 /// What to try when there is no answer.
 fn advice(r: &Report<f64>, picture: &Picture, line: &mut impl FnMut(&str, String)) {
-    let mut tips: Vec<String> = words::tips(r).into_iter().map(str::to_owned).collect();
+    let mut tips: Vec<String> = explain::tips(r).into_iter().map(str::to_owned).collect();
     tips.extend(picture.unused_bits());
     if tips.is_empty() {
         tips.push("look at the edges that were found: --overlay out.png".to_owned());

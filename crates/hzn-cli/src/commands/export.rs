@@ -1,15 +1,16 @@
 //! `hzn export`: results in another form.
 
-use std::io::BufRead;
+use hzn_run::explain;
 use std::path::{Path, PathBuf};
 
-use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader, Row};
+use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader};
+use hzn_run::results;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::input::{self, ending};
-use crate::output::{self, Existing, Rows};
-use crate::overlay;
 use crate::tell;
+use hzn_run::overlay;
+use hzn_run::sink::{self, Existing, Rows};
+use hzn_run::source::{self, ending};
 
 /// Turn a recording into a table, pictures, or pictures with overlay
 #[derive(Debug, clap::Args)]
@@ -32,13 +33,13 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (kind, _) = input::existing(file)?;
+    let (kind, _) = source::existing(file)?;
     let pictures = args.images.is_some() || args.overlay.is_some();
     if args.output.is_none() && !pictures {
         return Err(usage("nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR"));
     }
     if let Some(path) = &args.output
-        && output::target(path)? == output::Target::Mcap
+        && sink::target(path)? == sink::Target::Mcap
     {
         return Err(usage(format!("{}: a table is written here: .csv or .jsonl", path.display())));
     }
@@ -46,7 +47,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{}: only a recording (.mcap) holds pictures", file.display())));
     }
     for folder in [&args.images, &args.overlay].into_iter().flatten() {
-        std::fs::create_dir_all(folder).map_err(|e| output::cannot(folder, &e))?;
+        std::fs::create_dir_all(folder).map_err(|e| sink::cannot(folder, &e))?;
     }
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
     let mut table = args.output.as_deref().map(|path| Rows::create(path, existing)).transpose()?;
@@ -65,12 +66,12 @@ pub(super) fn run(args: &Args) -> Outcome {
                 images += 1;
             }
         }
-        lost = input::lost_of_recording(&reader, file, "exported");
+        lost = source::lost_of_recording(&reader, file, "exported");
         if pictures && images == 0 {
             tell::warning(format_args!("{}: holds no pictures (was it recorded with --no-images?)", file.display()));
         }
     } else {
-        for row in self::rows(file, &kind)? {
+        for row in results::rows(file, &kind)? {
             rows += 1;
             if let Some(table) = &mut table {
                 table.write(&row?)?;
@@ -80,9 +81,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(table) = table {
         table.finish()?;
     }
-    let mut written: Vec<String> = args.output.iter().map(|_| tell::counted(rows, "row")).collect();
-    written.extend(args.images.iter().map(|_| tell::counted(images, "picture")));
-    written.extend(args.overlay.iter().map(|_| tell::counted(images, "overlay")));
+    let mut written: Vec<String> = args.output.iter().map(|_| explain::counted(rows, "row")).collect();
+    written.extend(args.images.iter().map(|_| explain::counted(images, "picture")));
+    written.extend(args.overlay.iter().map(|_| explain::counted(images, "overlay")));
     tell::line(written.join(", "));
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
@@ -98,12 +99,12 @@ fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
             _ => (decode(&image, &name)?.to_png().map_err(failed)?, "png"),
         };
         let path = folder.join(picture_name(&name, ending));
-        output::refuse_existing(&path, args.force)?;
-        std::fs::write(&path, bytes).map_err(|e| output::cannot(&path, &e))?;
+        sink::refuse_existing(&path, args.force)?;
+        std::fs::write(&path, bytes).map_err(|e| sink::cannot(&path, &e))?;
     }
     if let Some(folder) = &args.overlay {
         let path = folder.join(overlay::file_name(&name));
-        output::refuse_existing(&path, args.force)?;
+        sink::refuse_existing(&path, args.force)?;
         let picture = decode(&image, &name)?;
         let drawn = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
         overlay::save(&drawn, &path)?;
@@ -111,8 +112,8 @@ fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
     Ok(true)
 }
 
-fn decode(image: &hzn_mcap::EncodedImage, name: &str) -> Result<crate::input::Picture, Stop> {
-    let decoded = crate::input::recorded(image.clone()).decode(None);
+fn decode(image: &hzn_mcap::EncodedImage, name: &str) -> Result<hzn_run::source::Picture, Stop> {
+    let decoded = hzn_run::source::recorded(image.clone()).decode(None);
     decoded.map(|(picture, _)| picture).map_err(|why| failed(format!("{name}: {why}")))
 }
 
@@ -121,37 +122,4 @@ fn picture_name(name: &str, ending: &str) -> String {
     let flat = name.replace(['/', '\\', ':'], "_");
     let same = |e: &str| e == ending || (ending == "jpg" && matches!(e, "jpeg" | "jpe"));
     if same(&self::ending(Path::new(&flat))) { flat } else { format!("{flat}.{ending}") }
-}
-
-/// Rows, one after the other.
-pub(crate) type AllRows = Box<dyn Iterator<Item = Result<Row, Stop>>>;
-
-/// Rows of a table of results. What an unfinished one (`.part`) ends with in the middle of a row is left out.
-pub(crate) fn rows(file: &Path, kind: &str) -> Result<AllRows, Stop> {
-    let name = file.display().to_string();
-    let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
-    match kind {
-        "csv" => {
-            let reader = csv::Reader::from_path(file).map_err(failed)?;
-            let why = |e: csv::Error| match e.kind() {
-                // The line stands before it already.
-                csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
-                _ => e.to_string(),
-            };
-            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| not(i as u64 + 2, why(e)));
-            Ok(whole(Box::new(reader.into_deserialize().enumerate().map(row)), file))
-        }
-        "jsonl" => {
-            let lines = std::io::BufReader::new(std::fs::File::open(file)?).lines();
-            let row = move |(i, line): (usize, std::io::Result<String>)| {
-                serde_json::from_str(&line?).map_err(|e| not(i as u64 + 1, e.to_string()))
-            };
-            Ok(whole(Box::new(lines.enumerate().map(row)), file))
-        }
-        _ => Err(usage(format!("{}: .mcap, .csv or .jsonl is expected", file.display()))),
-    }
-}
-
-fn whole(rows: AllRows, file: &Path) -> AllRows {
-    if ending(file) == "part" { Box::new(rows.take_while(Result::is_ok)) } else { rows }
 }

@@ -1,5 +1,6 @@
 //! `hzn info`: what is in a file.
 
+use hzn_run::explain;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -8,8 +9,8 @@ use hzn_mcap::{Contents, Reader, Row};
 use hzn_sim::Scenario;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::input::{self, ending, picture};
 use crate::tell;
+use hzn_run::source::{self, ending, picture};
 
 /// Say what a file is, and what is in it
 ///
@@ -23,7 +24,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (kind, _) = input::existing(file)?;
+    let (kind, _) = source::existing(file)?;
     let (text, lost) = match kind.as_str() {
         "mcap" => recording(file)?,
         "csv" | "jsonl" => (table(file, &kind)?, None),
@@ -64,7 +65,7 @@ fn recording(file: &Path) -> Result<Said, Stop> {
     }
     // A run that still goes on, or that --resume continues, is no damage.
     let unfinished = ending(file) == "part" && reader.broken_chunks() == 0;
-    Ok((out, input::lost_of_recording(&reader, file, "counted").filter(|_| !unfinished)))
+    Ok((out, source::lost_of_recording(&reader, file, "counted").filter(|_| !unfinished)))
 }
 
 fn unfinished(file: &Path) -> String {
@@ -123,7 +124,7 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
             return Ok(out);
         }
     }
-    for row in super::export::rows(file, kind)? {
+    for row in hzn_run::results::rows(file, kind)? {
         summary.add(&row?);
     }
     let mut out = what("results of hzn run") + &summary.text();
@@ -191,7 +192,7 @@ fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     // What is wrong with the text is said by whoever reads it.
     let table = text.parse::<toml::Table>().unwrap_or_default();
     if table.contains_key("trajectory") && table.contains_key("capture") {
-        return scene(&crate::scene::parse(&text, file, None, None)?);
+        return scene(&hzn_run::scene::parse(&text, file, None, None)?);
     }
     let sensor = hzn_calib::sensor::load(file)?;
     sensor.warnings.iter().for_each(tell::warning);
@@ -222,7 +223,7 @@ fn one_picture(file: &Path) -> Result<String, Stop> {
         "{format} picture of {} x {} px, {} of {} bits",
         l.width,
         l.height,
-        tell::counted(l.channels.into(), "channel"),
+        explain::counted(l.channels.into(), "channel"),
         l.bits
     ));
     if p.pages > 1 {

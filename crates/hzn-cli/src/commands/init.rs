@@ -6,9 +6,9 @@ use hzn_calib::start::{self, Known};
 use hzn_core::camera::Model;
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::input::{self, Payload, Source};
-use crate::output;
 use crate::tell;
+use hzn_run::sink;
+use hzn_run::source::{self, Payload, Source};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -63,7 +63,7 @@ impl From<Lens> for Model {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    if let Some(file) = args.pictures.iter().find(|p| input::ending(p) == "toml") {
+    if let Some(file) = args.pictures.iter().find(|p| source::ending(p) == "toml") {
         let name = file.display();
         return Err(usage(format!("{name}: is a file to write, not a picture; name it with -o:  hzn init -o {name}")));
     }
@@ -71,7 +71,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.output.exists() && !args.force {
         return Err(usage(format!("{name}: exists already; choose another name with -o, or --force replaces it")));
     }
-    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| output::cannot(&args.output, &e));
+    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| sink::cannot(&args.output, &e));
     if args.pictures.is_empty() {
         write(hzn_calib::template::SENSOR_TOML)?;
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
@@ -105,14 +105,14 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// What the pictures and the command line say of the camera.
 fn known(args: &Args) -> Result<Known, Stop> {
-    let mut source = input::open(&args.pictures, None, None)?;
+    let mut source = source::open(&args.pictures, None, None)?;
     source.notes().iter().for_each(tell::warning);
     let size_px = one_size(source.as_ref())?;
     if let Some(km) = args.altitude.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(usage(format!("--altitude {km}: must be above 0 km")));
     }
     let exif = match source.next().transpose()?.map(|item| item.payload) {
-        Some(Payload::File(path)) => input::exif_lens(&path).unwrap_or_default(),
+        Some(Payload::File(path)) => source::exif_lens(&path).unwrap_or_default(),
         _ => start::Exif::default(),
     };
     let size_px = [size_px.0, size_px.1];

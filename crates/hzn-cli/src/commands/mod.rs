@@ -19,8 +19,6 @@ mod view;
 
 use clap::{Parser, Subcommand};
 
-pub(crate) use export::rows;
-
 use crate::exit::Outcome;
 
 /// Finds the limb of a planet in pictures: the direction to the body, with its covariance.

@@ -1,11 +1,12 @@
 //! `hzn recover`: what a crash left, closed.
 
+use hzn_run::explain;
 use std::path::{Path, PathBuf};
 
 use crate::exit::{Exit, Outcome, failed, usage};
-use crate::input;
-use crate::output;
 use crate::tell;
+use hzn_run::sink;
+use hzn_run::source;
 
 /// Close a file that a crash left unfinished
 ///
@@ -25,7 +26,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (kind, unfinished) = input::existing(file)?;
+    let (kind, unfinished) = source::existing(file)?;
     if !matches!(kind.as_str(), "mcap" | "csv" | "jsonl") {
         let what = "is no file of results (.mcap, .csv or .jsonl, with .part behind it when it is unfinished)";
         return Err(usage(format!("{}: {what}", file.display())));
@@ -38,7 +39,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             file.with_file_name(format!("{stem}.recovered.{kind}"))
         }
     };
-    let target = output::target(&path)?;
+    let target = sink::target(&path)?;
     if path.exists() {
         if !args.force {
             return Err(usage(format!("{}: exists already; choose another name with -o, or --force", path.display())));
@@ -48,14 +49,14 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
     }
     let (rows, lost) = match target {
-        output::Target::Mcap => recording(file, &path)?,
-        target => output::recover_text(file, &path, target).map_err(|e| match e.kind() {
+        sink::Target::Mcap => recording(file, &path)?,
+        target => sink::recover_text(file, &path, target).map_err(|e| match e.kind() {
             std::io::ErrorKind::InvalidData => failed(format!("{}: {e}", file.display())),
-            _ => output::cannot(&path, &e),
+            _ => sink::cannot(&path, &e).into(),
         })?,
     };
     let dropped = if lost > 0 { format!(", {lost} bytes of unfinished frames dropped") } else { String::new() };
-    tell::line(format_args!("{}: {} kept{dropped}", path.display(), tell::counted(rows, "row")));
+    tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
     if unfinished && args.output.is_none() && file.exists() {
         // Its frames are in the new file, and beside that it would look like another unfinished run.
         std::fs::remove_file(file)?;

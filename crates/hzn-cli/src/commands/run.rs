@@ -1,5 +1,6 @@
 //! `hzn run`: a sequence, from pictures to results.
 
+use hzn_run::explain;
 use std::path::{Path, PathBuf};
 
 use hzn_calib::Frames;
@@ -7,14 +8,14 @@ use hzn_core::pipeline::Orient;
 use hzn_core::status::Status;
 use hzn_mcap::{Row, part_path};
 
-use crate::engine::{self, AnySensor, End, Finished, Found, Plan};
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::input::{self, Source, ending};
-use crate::output::{self, Existing, Held, Output};
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
 use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, settle_input, stop_flag};
 use crate::tell;
+use hzn_run::engine::{self, AnySensor, End, Finished, Found, Plan};
+use hzn_run::sink::{self, Existing, Held, Output};
+use hzn_run::source::{self, Source, ending};
 
 /// Process a sequence of pictures
 ///
@@ -75,11 +76,10 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.output {
-        output::target(path)?;
+        sink::target(path)?;
     }
     if let Some(path) = &args.output
-        && let Some(input) =
-            args.input.iter().find(|i| output::is_same(path, i) || output::is_same(&part_path(path), i))
+        && let Some(input) = args.input.iter().find(|i| sink::is_same(path, i) || sink::is_same(&part_path(path), i))
     {
         return Err(usage(format!("{}: is the input itself; choose another name for the output", input.display())));
     }
@@ -99,12 +99,12 @@ pub(super) fn run(args: &Args) -> Outcome {
         warn_of_missing(frames, &folder);
     }
     if let Some(drawn) = &args.overlay {
-        std::fs::create_dir_all(drawn).map_err(|e| output::cannot(drawn, &e))?;
-        if output::is_same(drawn, &folder) {
+        std::fs::create_dir_all(drawn).map_err(|e| sink::cannot(drawn, &e))?;
+        if sink::is_same(drawn, &folder) {
             let what = "is where the pictures are, which would be replaced; choose another folder";
             return Err(usage(format!("--overlay {}: {what}", drawn.display())));
         }
-        let holds = std::fs::read_dir(drawn).map_err(|e| output::cannot(drawn, &e))?.next().is_some();
+        let holds = std::fs::read_dir(drawn).map_err(|e| sink::cannot(drawn, &e))?.next().is_some();
         if holds && !(args.force || args.resume) {
             let what = "holds files already; choose another folder, or --force replaces those of the same name";
             return Err(usage(format!("--overlay {}: {what}", drawn.display())));
@@ -134,9 +134,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     // Pictures are recorded as they were looked at.
     let recorded = match plan.config.input.orient {
         Orient::AsStored => sensor.text,
-        _ => input::with_key(&sensor.text, "orient", "as-stored"),
+        _ => source::with_key(&sensor.text, "orient", "as-stored"),
     };
-    let (mut output, held) = output::open(path, existing, &plan.config, &recorded)?;
+    let (mut output, held) = sink::open(path, existing, &plan.config, &recorded)?;
     let plan = Plan { last: held.answered.clone(), ..plan };
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
@@ -269,7 +269,7 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
     }
     let mut sensor = AnySensor::new(&plan.config, plan.flight).map_err(usage)?;
     let here = engine::one(&Plan { overlay: None, ..plan.clone() }, &mut sensor, there.index, item)?;
-    let Some(here) = output::rows(&here, &plan.config).pop() else { return Ok(()) };
+    let Some(here) = sink::rows(&here, &plan.config).pop() else { return Ok(()) };
     let here = Row { elapsed_us: there.elapsed_us, ..here };
     if here != *there {
         let what = format!("its last frame, {}, now comes out differently", there.file);
@@ -286,7 +286,7 @@ fn warn_of_missing(frames: &Frames, folder: &Path) {
         tell::warning(frames.problem(row, "no such picture in the folder; the row is not used"));
     }
     if let Some(more) = missing.len().checked_sub(MISSING_TOLD).filter(|n| *n > 0) {
-        let rows = tell::counted(more as u64, "further row");
+        let rows = explain::counted(more as u64, "further row");
         tell::warning(format_args!("{}: {rows} without a picture in the folder", frames.path.display()));
     }
 }
@@ -311,7 +311,7 @@ impl Several {
 
     fn tell(&self) {
         let Some((name, pages)) = &self.first else { return };
-        let files = tell::counted(self.files, "file");
+        let files = explain::counted(self.files, "file");
         tell::warning(format_args!(
             "only the first picture was processed of {files} with several pages or frames (the first is {name} with {pages} \
              pictures): write each picture into a file of its own, or give a video"
@@ -359,7 +359,7 @@ impl Gaps {
             parts.push(format!("{} {what}", self.below_limb));
         }
         if !parts.is_empty() {
-            tell::warning(format_args!("of {}: {}", tell::counted(self.frames, "frame"), parts.join("; ")));
+            tell::warning(format_args!("of {}: {}", explain::counted(self.frames, "frame"), parts.join("; ")));
         }
     }
 }

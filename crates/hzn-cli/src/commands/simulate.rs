@@ -1,5 +1,6 @@
 //! `hzn simulate`: pictures of a scene, with truth.
 
+use hzn_run::explain;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,11 +11,11 @@ use hzn_sim::{Flight, FlightFrame, Scenario, truth};
 use rayon::prelude::*;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::output;
 use crate::progress::Progress;
-use crate::scene;
 use crate::setup::{clear_rendered, stop_flag};
 use crate::tell;
+use hzn_run::scene;
+use hzn_run::sink;
 
 /// Render a sequence of pictures with truth, and the sensor.toml that fits it
 ///
@@ -92,7 +93,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     // Everything that can be wrong with the scene is said before anything is written.
     let flight = scenario.flight().map_err(|e| scene::refused(name, &e))?;
-    std::fs::create_dir_all(&folder).map_err(|e| output::cannot(&folder, &e))?;
+    std::fs::create_dir_all(&folder).map_err(|e| sink::cannot(&folder, &e))?;
     if !args.resume {
         clear_rendered(&folder)?;
     }
@@ -115,7 +116,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn files(scenario: &mut Scenario, from: &Path) -> Result<Vec<(String, Vec<u8>)>, Stop> {
     let take = |(what, path): (&str, &mut PathBuf)| {
         let source = from.join(&*path);
-        let bytes = std::fs::read(&source).map_err(|e| output::cannot(&source, &e))?;
+        let bytes = std::fs::read(&source).map_err(|e| sink::cannot(&source, &e))?;
         let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
         let name = format!("scene-{what}.{ending}");
         *path = PathBuf::from(&name);
@@ -125,7 +126,7 @@ fn files(scenario: &mut Scenario, from: &Path) -> Result<Vec<(String, Vec<u8>)>,
 }
 
 fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
-    std::fs::write(path, text).map_err(|e| output::cannot(path, &e))
+    std::fs::write(path, text).map_err(|e| sink::cannot(path, &e).into())
 }
 
 /// The text of the sensor.toml: what differs from the defaults, with a noise model that was measured.
@@ -244,13 +245,13 @@ fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
         Some(quality) => picture.jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),
         None => picture.save(&part),
     };
-    saved.map_err(|e| output::not_saved(&path, &e))?;
-    std::fs::rename(&part, &path).map_err(|e| output::cannot(&path, &e))
+    saved.map_err(|e| sink::not_saved(&path, &e))?;
+    std::fs::rename(&part, &path).map_err(|e| sink::cannot(&path, &e).into())
 }
 
 fn summary(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {
     let shown = folder.display();
-    let pictures = tell::counted(flight.frames.len() as u64, "picture");
+    let pictures = explain::counted(flight.frames.len() as u64, "picture");
     tell::result(format_args!("{shown}: {pictures} of {}\n", scenario.name))?;
     for &kind in &scenario.bodies {
         let mut seen = 0;

@@ -10,7 +10,7 @@ use hzn_flight::packet::{self, Apid};
 use hzn_flight::{Parameters, parameters};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::output;
+use hzn_run::sink;
 
 /// Write commands for a flight computer
 ///
@@ -54,8 +54,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     match &args.output {
         Some(path) => {
-            output::refuse_existing(path, args.force)?;
-            std::fs::write(path, out).map_err(|e| output::cannot(path, &e))?;
+            sink::refuse_existing(path, args.force)?;
+            std::fs::write(path, out).map_err(|e| sink::cannot(path, &e))?;
             Ok(Exit::Done)
         }
         None => {

@@ -15,8 +15,8 @@ use hzn_flight::{Parameters, parameters};
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::output::{self, Existing, Rows, Target};
 use crate::tell;
+use hzn_run::sink::{self, Existing, Rows, Target};
 
 /// Decode a flight computer's telemetry
 ///
@@ -91,7 +91,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Stop> {
 }
 
 fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {
-    output::refuse_existing(path, force)?;
+    sink::refuse_existing(path, force)?;
     let mut table = csv::Writer::from_path(path).map_err(|e| failed(format!("{}: {e}", path.display())))?;
     let columns = ["time_s"].into_iter().chain(Housekeeping::FIELDS.iter().copied());
     table.write_record(columns).map_err(failed)?;
@@ -106,8 +106,8 @@ enum Sink {
 
 impl Sink {
     fn create(path: &Path, existing: Existing) -> Result<Self, Stop> {
-        if output::target(path)? != Target::Mcap {
-            return Rows::create(path, existing).map(Self::Rows);
+        if sink::target(path)? != Target::Mcap {
+            return Ok(Self::Rows(Rows::create(path, existing)?));
         }
         let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
         let options = hzn_mcap::Options { metadata, force: existing == Existing::Replace, ..Default::default() };
@@ -122,7 +122,7 @@ impl Sink {
     }
     fn finish(self) -> Result<(), Stop> {
         match self {
-            Self::Rows(rows) => rows.finish(),
+            Self::Rows(rows) => Ok(rows.finish()?),
             Self::Mcap(writer) => writer.finish().map(drop).map_err(failed),
         }
     }

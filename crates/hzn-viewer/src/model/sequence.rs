@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use hzn_calib::FrameData;
-use hzn_cli::input::Raw;
+use hzn_run::source::Raw;
 
 /// One frame.
 #[derive(Debug, Clone, PartialEq)]

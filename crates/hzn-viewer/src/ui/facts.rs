@@ -93,7 +93,7 @@ pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answ
             out
         }),
         "Covariance" => answer.solution().map_or_else(Vec::new, |s| {
-            let ([major, minor], angle) = hzn_cli::words::principal(s);
+            let ([major, minor], angle) = hzn_run::explain::principal(s);
             vec![format!(
                 "σ {:.4}° along {:.0}° from image x, {:.4}° across",
                 major.to_degrees(),
@@ -105,7 +105,7 @@ pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answ
             Status::Ok => vec!["passed every gate".into()],
             status => {
                 let mut out = vec![format!("{status} at {}", report.stage.name())];
-                out.extend(hzn_cli::words::tips(report).into_iter().map(|tip| format!("Try: {tip}")));
+                out.extend(hzn_run::explain::tips(report).into_iter().map(|tip| format!("Try: {tip}")));
                 out
             }
         },

@@ -95,7 +95,7 @@ fn detail(sight: &Sight, answer: Option<&Answer>) -> Vec<String> {
     match (&sight.picture, answer) {
         (Err(why), _) => vec![why.clone()],
         (_, Some(answer)) => {
-            let tips = answer.report.as_ref().map(hzn_cli::words::tips).unwrap_or_default();
+            let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
             let tip = tips.first().map(|tip| format!("Try: {tip}"));
             [facts::in_short(&answer.row.detail)].into_iter().chain(tip).collect()
         }

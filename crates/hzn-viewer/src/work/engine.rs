@@ -6,12 +6,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
-use hzn_cli::engine::AnySensor;
-use hzn_cli::input::Picture;
-use hzn_cli::input::picture::Samples;
 use hzn_core::Config;
 use hzn_core::camera::Camera;
 use hzn_core::pipeline::{Input, Orient};
+use hzn_run::engine::AnySensor;
+use hzn_run::source::Picture;
+use hzn_run::source::picture::Samples;
 
 use super::Wake;
 use super::paint::{self, Recipe, Warp};
@@ -233,7 +233,7 @@ impl Looker {
     }
 
     /// The picture for the screen, painted only when it is another one.
-    fn show(&mut self, ask: &Ask, picture: &hzn_cli::input::Picture, sight: &Sight) -> Arc<Shown> {
+    fn show(&mut self, ask: &Ask, picture: &hzn_run::source::Picture, sight: &Sight) -> Arc<Shown> {
         let config = ask.setups.first().map(|s| &s.config);
         let camera = sight.camera.as_deref();
         let plane = match camera {

@@ -5,12 +5,12 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
-use hzn_cli::engine::AnySensor;
-use hzn_cli::input::{Picture, Source};
-use hzn_cli::output::{Existing, Rows as Table};
-use hzn_cli::overlay;
 use hzn_core::Config;
 use hzn_mcap::{Annotations, Row};
+use hzn_run::engine::AnySensor;
+use hzn_run::overlay;
+use hzn_run::sink::{Existing, Rows as Table};
+use hzn_run::source::{Picture, Source};
 
 use super::job::{Done, Halt, Progress};
 use super::sight::{self, Outcome, Sight, Subject};
@@ -25,7 +25,7 @@ pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
     for answer in &outcome.bodies {
         if on(Layer::Edges) {
             let border =
-                |e: &hzn_cli::engine::trace::Edge| e.border.iter().map(|p| [f64::from(p.x), f64::from(p.y)]).collect();
+                |e: &hzn_run::engine::trace::Edge| e.border.iter().map(|p| [f64::from(p.x), f64::from(p.y)]).collect();
             out.edges.extend(answer.edges.iter().map(border));
         }
         for r in &answer.residuals {
@@ -78,7 +78,7 @@ pub fn picture(sight: &Sight, layers: &[Layer], path: &Path) -> Result<Done, Hal
 /// # Errors
 /// Another ending, or the disk says no.
 pub fn table(rows: &[Row], path: &Path, progress: &Progress) -> Result<Done, Halt> {
-    let told = |stop: hzn_cli::exit::Stop| format!("{:#}", stop.error);
+    let told = |error: hzn_run::Error| error.to_string();
     let mut table = Table::create(path, Existing::Replace).map_err(told)?;
     let total = rows.len() as u64;
     for (i, row) in (0..).zip(rows) {
@@ -150,7 +150,7 @@ impl Film {
             _ if end.status.success() => Ok(()),
             Some(_) if why.contains("No space left") => {
                 let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
-                Err(Halt::Failed(hzn_cli::output::advice(path, &full)))
+                Err(Halt::Failed(hzn_run::sink::advice(path, &full)))
             }
             last => Err(Halt::Failed(format!("{}: ffmpeg: {}", path.display(), last.unwrap_or("ended with an error")))),
         }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_calib::Frames;
-use hzn_cli::input::{self, Item, Payload, Raw, Source, TimeSource};
 use hzn_mcap::{Found, Index, Row};
+use hzn_run::source::{self, Item, Payload, Raw, Source, TimeSource};
 use hzn_sim::truth::{self, Truth};
 
 use super::Wake;
@@ -181,8 +181,8 @@ fn settle(opened: &mut Opened, source: &dyn Source) {
     if parsed.config.input.bits.is_some() {
         return;
     }
-    if let Some(found) = input::find_bits(source) {
-        sensor.text = input::with_key(&sensor.text, "bits", i64::from(found.bits));
+    if let Some(found) = source::find_bits(source) {
+        sensor.text = source::with_key(&sensor.text, "bits", i64::from(found.bits));
         opened.notes.extend((found.bits < 16).then(|| found.to_string()));
     }
 }
@@ -204,7 +204,7 @@ fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), Stri
     }
     let (mut opened, frames) = companions(&request, &folder, own);
     opened.title = title(path);
-    if let Ok(source) = input::open(std::slice::from_ref(&path.to_owned()), None, None) {
+    if let Ok(source) = source::open(std::slice::from_ref(&path.to_owned()), None, None) {
         settle(&mut opened, source.as_ref());
     }
     teller.tell(Event::Opened(Box::new(opened)));
@@ -279,7 +279,7 @@ impl Gather {
                         continue;
                     }
                     out.extend(self.last.take());
-                    let data = hzn_cli::output::frame_data(&row, &given);
+                    let data = hzn_run::sink::frame_data(&row, &given);
                     let place = self.pending.remove(&(row.index as u32)).map_or(Place::Nowhere, Place::Recorded);
                     let entry = Entry { name: row.file.clone(), time_s: row.time_s, data: Some(data), place };
                     self.last = Some((entry, vec![*row]));
@@ -292,8 +292,8 @@ impl Gather {
 
 /// Pictures that are files of their own, or a video.
 fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
-    let open = || input::open(&request.inputs, request.raw, None);
-    let mut source = open().map_err(|stop| format!("{:#}", stop.error))?;
+    let open = || source::open(&request.inputs, request.raw, None);
+    let mut source = open().map_err(|e| e.to_string())?;
     let (mut opened, frames) = companions(request, &source.folder(), None);
     opened.title = match request.inputs.as_slice() {
         [one] => title(one),
@@ -322,7 +322,7 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
             _ => Place::Video(index),
         };
         let exif = || match &place {
-            Place::File(path) => input::exif_time_s(path),
+            Place::File(path) => source::exif_time_s(path),
             _ => None,
         };
         let time_s = time.time_s(data.as_ref(), exif, index, request.fps);

@@ -1,10 +1,10 @@
 //! The picture as it is shown: colour, brightness or level, in the camera's plane or a pinhole's.
 
 use egui::{Color32, ColorImage};
-use hzn_cli::input::{Picture, picture::Samples};
 use hzn_core::camera::Camera;
 use hzn_core::image::{Channel, ImageView, Pixels};
 use hzn_core::pipeline::Orient;
+use hzn_run::source::{Picture, picture::Samples};
 
 use crate::model::{Look, Plane};
 

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use hzn_cli::input::{self, Payload, Source};
 use hzn_mcap::Pictures;
+use hzn_run::source::{self, Payload, Source};
 
 use crate::model::Place;
 
@@ -30,7 +30,7 @@ impl Reader {
             Place::File(path) => Payload::File(path.clone()),
             Place::RawFile(path, raw) => Payload::RawFile(path.clone(), *raw),
             Place::Recorded(place) => match &mut self.recording {
-                Some(pictures) => pictures.read(place)?.image.map_or_else(Payload::Broken, input::recorded),
+                Some(pictures) => pictures.read(place)?.image.map_or_else(Payload::Broken, source::recorded),
                 None => Payload::Broken("the recording is not open".into()),
             },
             Place::Video(index) => self.of_video(*index)?,
@@ -42,7 +42,7 @@ impl Reader {
     fn of_video(&mut self, index: u64) -> anyhow::Result<Payload> {
         let (source, next) = match &mut self.video {
             Some(video) if video.1 <= index => video,
-            video => video.insert((input::open(&self.inputs, None, None).map_err(|stop| stop.error)?, 0)),
+            video => video.insert((source::open(&self.inputs, None, None).map_err(hzn_run::Error::into_cause)?, 0)),
         };
         while let Some(item) = source.next().transpose()? {
             *next += 1;

@@ -7,10 +7,6 @@ use std::time::Duration;
 
 use egui::{Color32, ColorImage};
 use hzn_calib::FrameData;
-use hzn_cli::engine::trace::Edge;
-use hzn_cli::engine::{AnySensor, Finished, Found, Traces, Watch};
-use hzn_cli::input::Picture;
-use hzn_cli::{output, words};
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::ImageView;
@@ -20,6 +16,10 @@ use hzn_core::real::Real;
 use hzn_core::status::Stage;
 use hzn_core::{Config, Observer, Report, Solution, body};
 use hzn_mcap::Row;
+use hzn_run::engine::trace::Edge;
+use hzn_run::engine::{AnySensor, Finished, Found, Traces, Watch};
+use hzn_run::source::Picture;
+use hzn_run::{explain, sink};
 
 use super::paint::Recipe;
 use crate::model::view::Point;
@@ -234,7 +234,7 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
         tip: None,
         pages: 1,
     };
-    let rows = output::rows(&finished, config);
+    let rows = sink::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(data);
     // Drawn where each row sees it.
     let camera = &sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
@@ -250,7 +250,7 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
             times: trace.times().to_vec(),
             elapsed: found.elapsed,
             expected_rad: expected.ok(),
-            limb: solution.map(|s| output::fitted(&s.axis, s.fused_half_angle_rad, camera).limb).unwrap_or_default(),
+            limb: solution.map(|s| sink::fitted(&s.axis, s.fused_half_angle_rad, camera).limb).unwrap_or_default(),
             axis: solution.and_then(|s| camera.project(&s.axis)).map(|p| [p.u, p.v]),
             ellipse: solution.map(|s| ellipse(&s, camera)).unwrap_or_default(),
             residuals: solution.zip(chosen).map(|(s, edge)| residuals(&s, edge, camera)).unwrap_or_default(),
@@ -302,7 +302,7 @@ fn beside(axis: [f64; 3], angle_rad: f64, azimuth_rad: f64) -> Option<UnitVec3<h
 
 fn ellipse(s: &Solution<f64>, camera: &Camera<f64>) -> Vec<Point> {
     const STEPS: usize = 72;
-    let ([major, minor], angle) = words::principal(s);
+    let ([major, minor], angle) = explain::principal(s);
     let point = |i: usize| {
         let (sin, cos) = (i as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
         let (a, b) = (3.0 * major * cos, 3.0 * minor * sin);

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use hzn_cli::input::{Picture, picture::Samples};
 use hzn_mcap::Pictures;
+use hzn_run::source::{Picture, picture::Samples};
 
 use super::reader::Reader;
 use crate::model::Place;

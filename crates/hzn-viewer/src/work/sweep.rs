@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
-use hzn_cli::engine::{self, End, Finished, Plan, Sink};
-use hzn_cli::output::{self, Existing};
 use hzn_core::Config;
 use hzn_mcap::Row;
+use hzn_run::engine::{self, End, Finished, Plan, Sink};
+use hzn_run::sink::{self, Existing};
 
 use super::Wake;
 use super::walk::Walk;
@@ -131,13 +131,13 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
     let mut source = Walk::new(sequence)?;
     let mut file = match &output {
         Some(path) => {
-            let opened = output::open(Some(path), Existing::Replace, &config, &sensor_toml);
-            Some(opened.map_err(|stop| format!("{:#}", stop.error))?.0)
+            let opened = sink::open(Some(path), Existing::Replace, &config, &sensor_toml);
+            Some(opened.map_err(|e| e.to_string())?.0)
         }
         None => None,
     };
     let mut seen = |frame: &Finished| {
-        let rows = output::rows(frame, &config);
+        let rows = sink::rows(frame, &config);
         let _ = send.send(Event::Frame { index: frame.index as usize, changes, rows });
         wake();
     };
@@ -148,7 +148,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
     let stopped = end.map_err(|e| format!("{e:#}"))? == End::Interrupted;
     match file {
         Some(file) if stopped => file.discard(),
-        Some(file) => file.finish().map_err(|stop| format!("{:#}", stop.error))?,
+        Some(file) => file.finish().map_err(|e| e.to_string())?,
         None => {}
     }
     Ok(Event::End { file: output, stopped })

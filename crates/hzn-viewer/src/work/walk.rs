@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use hzn_calib::FrameData;
-use hzn_cli::input::{Item, Source, TimeSource};
 use hzn_mcap::{Index, Pictures};
+use hzn_run::source::{Item, Source, TimeSource};
 
 use super::reader::Reader;
 use crate::model::{Entry, Sequence};

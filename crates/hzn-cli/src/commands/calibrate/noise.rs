@@ -1,5 +1,6 @@
 //! `hzn calibrate noise`: limb height and edge noise from the pictures of a flight.
 
+use hzn_run::explain;
 use std::path::PathBuf;
 
 use hzn_calib::Sensor;
@@ -10,13 +11,13 @@ use hzn_core::camera::Camera;
 
 use super::{page, text};
 use crate::commands::run::cores;
-use crate::engine::{self, End, Finished, Plan, Sink};
 use crate::exit::{Exit, Outcome, failed, usage};
-use crate::input::ending;
-use crate::output;
 use crate::progress::Progress;
 use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, settle_input, stop_flag};
 use crate::tell;
+use hzn_run::engine::{self, End, Finished, Plan, Sink};
+use hzn_run::sink;
+use hzn_run::source::ending;
 
 /// Measure limb height and edge noise on the pictures of a flight
 ///
@@ -67,7 +68,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             "toml" | "html" => {}
             _ => return Err(usage(format!("{}: a sensor ends in .toml, a report in .html", path.display()))),
         }
-        output::refuse_existing(path, args.force)?;
+        sink::refuse_existing(path, args.force)?;
     }
     let mut source = args.source.open(&args.input)?;
     let mut sensor = args.sensor.load(source.as_ref())?;
@@ -114,12 +115,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     let shown = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let pictures = progress.frames();
     let calibration = Calibration::of(&body, &sightings)
-        .map_err(|why| failed(format!("{shown}: of {} {why}", tell::counted(pictures, "picture"))))?;
+        .map_err(|why| failed(format!("{shown}: of {} {why}", explain::counted(pictures, "picture"))))?;
     let written = noise::into_sensor_toml(&sensor.text, &calibration, &shown).map_err(failed)?;
     tell::result(text::of(&calibration, pictures))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
         let html = page::html(&calibration, pictures, &shown)?;
-        std::fs::write(path, html).map_err(|e| output::cannot(path, &e))?;
+        std::fs::write(path, html).map_err(|e| sink::cannot(path, &e))?;
     }
     if let Some(alarm) = calibration.alarm() {
         return Err(failed(format!("{shown}: no sensor.toml is written: {alarm}")));
@@ -127,7 +128,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     tell::result(format_args!("\n{}\n", written.keys.join("\n")))?;
     let sensors: Vec<_> = args.output.iter().filter(|p| ending(p) == "toml").collect();
     for path in &sensors {
-        std::fs::write(path, &written.text).map_err(|e| output::cannot(path, &e))?;
+        std::fs::write(path, &written.text).map_err(|e| sink::cannot(path, &e))?;
     }
     if sensors.is_empty() && !args.quiet {
         tell::line("note: -o sensor.toml writes these keys into a copy of the sensor.toml");

@@ -2,7 +2,7 @@
 
 use hzn_calib::noise::Calibration;
 
-use crate::tell::counted;
+use hzn_run::explain::counted;
 
 /// The report.
 pub(super) fn of(calibration: &Calibration, pictures: u64) -> String {

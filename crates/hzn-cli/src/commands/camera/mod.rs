@@ -4,15 +4,15 @@ mod convert;
 
 use std::path::{Path, PathBuf};
 
-use crate::engine::AnySensor;
 use hzn_core::Config;
 use hzn_core::camera::{self, Camera, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
+use hzn_run::engine::AnySensor;
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::input::ending;
 use crate::tell;
+use hzn_run::source::ending;
 
 /// Look at a camera calibration, or convert it
 #[derive(Debug, clap::Args)]

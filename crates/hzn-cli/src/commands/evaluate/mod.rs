@@ -13,9 +13,9 @@ use hzn_sim::evaluate::{Answer, Case, Evaluation, pair};
 use serde::Serialize;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::input::ending;
-use crate::output;
 use crate::tell;
+use hzn_run::sink;
+use hzn_run::source::ending;
 
 /// Compare results with the truth: shares, errors, honesty of the covariance
 ///
@@ -58,18 +58,18 @@ pub(super) fn run(args: &Args) -> Outcome {
             "json" | "html" => {}
             _ => return Err(usage(format!("{}: a report ends in .json or .html", path.display()))),
         }
-        output::refuse_existing(path, args.force)?;
+        sink::refuse_existing(path, args.force)?;
     }
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
     let truth = hzn_sim::truth::load(&truth_path).map_err(usage)?;
-    let (rows, recorded_sensor) = output::read(&args.results)?;
+    let (rows, recorded_sensor) = hzn_run::results::read(&args.results)?;
     let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
     if camera.is_none() {
         tell::line("note: no sensor.toml at hand (--sensor): the length of limb in view is left out");
     }
-    let answers: Vec<Answer> = rows.iter().map(output::answer).collect();
+    let answers: Vec<Answer> = rows.iter().map(sink::answer).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
         .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
     warn_of_other_times(&rows, &truth);
@@ -87,7 +87,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             let drawn = worst::draw(&worst, &args.results, folder, &truth, camera.as_ref())?;
             page::html(&report, &drawn)?.into_bytes()
         };
-        std::fs::write(path, bytes).map_err(|e| output::cannot(path, &e))?;
+        std::fs::write(path, bytes).map_err(|e| sink::cannot(path, &e))?;
     }
     tell::result(text::of(&report, &worst))?;
     Ok(Exit::Done)

@@ -11,8 +11,8 @@ use image::RgbImage;
 
 use super::text::worst_line;
 use crate::exit::{Stop, failed};
-use crate::input::{Payload, ending};
-use crate::overlay::{self, limb};
+use hzn_run::overlay::{self, limb};
+use hzn_run::source::{Payload, ending};
 
 /// Wide enough to see a pixel's error on a page, small enough to be sent.
 const WIDTH_PX: u32 = 960;
@@ -57,7 +57,7 @@ pub(super) fn draw(
             let file = base(&frame.row.file);
             // A picture of several bodies is recorded once, with one of them.
             if let Some(image) = frame.image.filter(|_| worst.iter().any(|c| c.file == file))
-                && let Ok((picture, _)) = crate::input::recorded(image).decode(None)
+                && let Ok((picture, _)) = hzn_run::source::recorded(image).decode(None)
             {
                 pictures.insert(file.clone(), picture.to_rgb());
             }

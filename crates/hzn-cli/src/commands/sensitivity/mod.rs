@@ -11,11 +11,11 @@ use hzn_core::camera::{self, Model};
 use hzn_sim::sensitivity::{Design, Sigmas};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::input::ending;
-use crate::output;
 use crate::plot::{Chart, Series, Style};
 use crate::tell;
 use body::Body;
+use hzn_run::sink;
+use hzn_run::source::ending;
 use sweep::Values;
 use table::Table;
 
@@ -123,7 +123,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             "csv" | "svg" => {}
             _ => return Err(usage(format!("{}: a table ends in .csv, a plot in .svg", path.display()))),
         }
-        output::refuse_existing(path, args.force)?;
+        sink::refuse_existing(path, args.force)?;
     }
     let Finished { table, chart, notes } = match args.what {
         What::Sigma => sigma(args)?,
@@ -140,7 +140,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             };
             chart.svg()?.into_bytes()
         };
-        std::fs::write(path, bytes).map_err(|e| output::cannot(path, &e))?;
+        std::fs::write(path, bytes).map_err(|e| sink::cannot(path, &e))?;
     }
     tell::result(table.text())?;
     notes.iter().for_each(tell::line);

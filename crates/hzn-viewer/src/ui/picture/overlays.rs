@@ -41,7 +41,7 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &Sight, outcome: &
     if on(Layer::Truth) {
         for truth in viewer.truth.get(&sight.name).into_iter().flatten() {
             let (Some(camera), Some(axis)) = (stage.camera, truth.axis()) else { continue };
-            let limb = hzn_cli::overlay::limb::lines(axis.xyz(), truth.half_angle_deg.to_radians(), camera);
+            let limb = hzn_run::overlay::limb::lines(axis.xyz(), truth.half_angle_deg.to_radians(), camera);
             lines(painter, stage, &limb, Stroke::new(1.5, theme::TRUTH));
             if let Some(p) = camera.project(&axis).and_then(|p| stage.screen([p.u, p.v])) {
                 cross(painter, p, 8.0, Stroke::new(1.5, theme::TRUTH));

@@ -55,7 +55,7 @@ impl Viewer {
                 }
             }
             Command::ExportPicture => {
-                let name = hzn_cli::overlay::file_name(self.sight.as_ref().map_or("frame", |s| &s.name));
+                let name = hzn_run::overlay::file_name(self.sight.as_ref().map_or("frame", |s| &s.name));
                 let name = format!("overlay-{name}");
                 self.asking = Some(Asking::new(Purpose::Picture, &self.sequence.beside(&name)));
             }

@@ -26,7 +26,7 @@ use hzn_core::{Config, Report};
 pub use sensor::{Answered, AnySensor, Processed, prepare};
 pub use trace::{Trace, Traces, Watch};
 
-use crate::input::{Item, Source};
+use crate::source::{Item, Source};
 
 /// What a run does with every frame.
 #[derive(Debug, Clone)]
@@ -357,7 +357,7 @@ fn draw(found: &[Found], traces: &Traces, camera: &Camera<f64>) -> hzn_mcap::Ann
     let mut drawing = hzn_mcap::Annotations::default();
     for (found, trace) in found.iter().zip(&traces.each) {
         let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref());
-        drawing.add(crate::output::annotations(trace, solution, camera));
+        drawing.add(crate::sink::annotations(trace, solution, camera));
     }
     drawing
 }
@@ -382,7 +382,7 @@ mod tests {
     use hzn_core::image::Layout;
 
     use super::*;
-    use crate::input::{Payload, Picture, TimeSource, picture::Samples};
+    use crate::source::{Payload, Picture, TimeSource, picture::Samples};
 
     /// Counts the frames that were handed out and not written yet.
     struct Counted<'a> {

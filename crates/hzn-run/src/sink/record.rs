@@ -58,7 +58,7 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
             });
         }
         first.image = frame.picture.take().map(|bytes| {
-            let png = matches!(crate::input::picture::format_of(&bytes), Some(image::ImageFormat::Png));
+            let png = matches!(crate::source::picture::format_of(&bytes), Some(image::ImageFormat::Png));
             EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes }
         });
         first.annotations = std::mem::take(&mut frame.drawing);

@@ -100,7 +100,7 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, tit
 pub fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
     // Through memory: the encoder would tell of a full disk in words of its own.
     let bytes = png(image).map_err(|e| e.context(path.display().to_string()))?;
-    std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::output::advice(path, &e)))
+    std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::sink::advice(path, &e)))
 }
 
 /// A picture as the bytes of a PNG.

@@ -7,8 +7,8 @@ use hzn_core::image::Channel;
 use image::metadata::Orientation;
 
 use super::{Item, Payload, Raw, SIZES, Source, TimeSource, bits, ending, natural, picture, raw, turn, video};
-use crate::exit::{Stop, usage};
-use crate::tell;
+use crate::error::{Error, Remedy, unusable};
+use crate::explain;
 
 /// Endings of pictures that are read.
 const PICTURES: &[&str] = &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp"];
@@ -68,7 +68,7 @@ fn only_files(paths: &mut Vec<PathBuf>, left_out: &mut LeftOut) {
 }
 
 impl Files {
-    pub(super) fn open(inputs: &[PathBuf], raw: Option<Raw>) -> Result<Self, Stop> {
+    pub(super) fn open(inputs: &[PathBuf], raw: Option<Raw>) -> Result<Self, Error> {
         let mut left_out = LeftOut::new();
         let mut paths = Vec::new();
         let mut folder = None;
@@ -76,7 +76,7 @@ impl Files {
             let text = input.to_string_lossy();
             if input.is_dir() {
                 if inputs.len() > 1 {
-                    return Err(usage(format!(
+                    return Err(unusable(format!(
                         "{text}: a folder is a sequence of its own; give one folder, or only files"
                     )));
                 }
@@ -84,18 +84,20 @@ impl Files {
                 paths.extend(in_folder(input, raw.is_some(), &mut left_out)?);
             } else if input.exists() || (inputs.len() > 1 && input.is_symlink()) {
                 if inputs.len() > 1 && (ending(input) == "mcap" || video::ENDINGS.contains(&ending(input).as_str())) {
-                    return Err(usage(format!("{text}: a video or recording is a sequence of its own; give it alone")));
+                    return Err(unusable(format!(
+                        "{text}: a video or recording is a sequence of its own; give it alone"
+                    )));
                 }
                 if raw.is_none() && COMPANIONS.contains(&ending(input).as_str()) {
                     // `hzn run flight/*`, written out by the shell.
                     if inputs.len() == 1 {
-                        return Err(usage(format!("{text}: is no picture (PNG, JPEG, TIFF, PNM, BMP)")));
+                        return Err(unusable(format!("{text}: is no picture (PNG, JPEG, TIFF, PNM, BMP)")));
                     }
                     continue;
                 }
                 paths.push(input.clone());
             } else if text.contains(['*', '?', '[']) {
-                let matches = glob::glob(&text).map_err(|e| usage(format!("{text}: not a valid pattern: {e}")))?;
+                let matches = glob::glob(&text).map_err(|e| unusable(format!("{text}: not a valid pattern: {e}")))?;
                 let mut found: Vec<PathBuf> = matches.flatten().collect();
                 found.retain(|p| match Kind::of(p) {
                     Kind::File => raw.is_some() || !COMPANIONS.contains(&ending(p).as_str()),
@@ -103,24 +105,24 @@ impl Files {
                 });
                 only_files(&mut found, &mut left_out);
                 if found.is_empty() {
-                    return Err(usage(format!("{text}: no picture matches")));
+                    return Err(unusable(format!("{text}: no picture matches")));
                 }
                 found.sort_by(|a, b| natural::compare(a, b));
                 paths.extend(found);
             } else {
-                return Err(usage(format!("{text}: no such file or folder")));
+                return Err(unusable(format!("{text}: no such file or folder")));
             }
         }
         if paths.is_empty() {
             let what = if raw.is_some() { "no headerless files" } else { "no pictures (PNG, JPEG, TIFF, PNM, BMP)" };
-            let hint = match left_out.keys().next() {
-                Some((Kind::File, e)) => {
-                    format!("; there are files ending in .{e}: convert them, or use --raw if they are headerless")
-                }
-                _ => String::new(),
-            };
             let name = inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
-            return Err(usage(format!("{name}: {what} in this folder{hint}")));
+            let what = format!("{name}: {what} in this folder");
+            return Err(match left_out.keys().next() {
+                Some((Kind::File, e)) => {
+                    unusable(format!("{what}; there are files ending in .{e}: convert them")).with(Remedy::Headerless)
+                }
+                _ => unusable(what),
+            });
         }
         let parent = |p: &PathBuf| p.parent().map(Path::to_owned).unwrap_or_default();
         let first = paths.first().map(parent).unwrap_or_default();
@@ -149,10 +151,10 @@ fn tell_their_time(paths: &[PathBuf]) -> bool {
     paths.iter().take(SIZES).find_map(|p| picture::exif_of(p)).flatten().is_some()
 }
 
-fn in_folder(folder: &Path, raw: bool, left_out: &mut LeftOut) -> Result<Vec<PathBuf>, Stop> {
-    let cannot = |e: std::io::Error| usage(format!("{}: cannot be listed: {e}", folder.display()));
+fn in_folder(folder: &Path, raw: bool, left_out: &mut LeftOut) -> Result<Vec<PathBuf>, Error> {
+    let cannot = |e: std::io::Error| unusable(format!("{}: cannot be listed: {e}", folder.display()));
     let list = std::fs::read_dir(folder).map_err(cannot)?;
-    let mut paths = list.map(|e| Ok(e.map_err(cannot)?.path())).collect::<Result<Vec<PathBuf>, Stop>>()?;
+    let mut paths = list.map(|e| Ok(e.map_err(cannot)?.path())).collect::<Result<Vec<PathBuf>, Error>>()?;
     paths.retain(|p| {
         let e = ending(p);
         let hidden = p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
@@ -249,10 +251,10 @@ impl Source for Files {
         let step = self.paths.len().div_ceil(TURNED).max(1);
         self.paths.iter().step_by(step).find_map(turned)
     }
-    fn want_channel(&mut self, channel: Channel) -> Result<(), Stop> {
+    fn want_channel(&mut self, channel: Channel) -> Result<(), Error> {
         match self.raw {
-            Some(raw) if channel != Channel::Mean && raw.format == raw::Format::Bayer8 => Err(usage(format!(
-                "--raw {raw}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in [input] of \
+            Some(raw) if channel != Channel::Mean && raw.format == raw::Format::Bayer8 => Err(unusable(format!(
+                "raw pictures, {raw}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in [input] of \
                  sensor.toml"
             ))),
             _ => Ok(()),
@@ -266,7 +268,7 @@ impl Source for Files {
                 Kind::Special => "special file",
             };
             let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };
-            format!("{} {name} left out", tell::counted(*n as u64, what))
+            format!("{} {name} left out", explain::counted(*n as u64, what))
         };
         let mut notes: Vec<String> = self.left_out.iter().map(note).collect();
         notes.extend(self.out_of_order.as_ref().map(|[a, b]| {

@@ -14,8 +14,8 @@ use hzn_mcap::{Contents, Options, Reader, part_path};
 pub use record::{altitude_km, annotations, answer, fitted, frame_data, records, rows};
 
 use crate::engine::{Answered, Finished, Sink};
-use crate::exit::{Stop, failed, usage};
-use crate::input::ending;
+use crate::error::{Error, Remedy, failed, unusable};
+use crate::source::ending;
 use text::{Form, Text};
 
 /// How an output is treated that exists already.
@@ -79,12 +79,12 @@ pub enum Target {
 ///
 /// # Errors
 /// An ending that is not known.
-pub fn target(path: &Path) -> Result<Target, Stop> {
+pub fn target(path: &Path) -> Result<Target, Error> {
     match ending(path).as_str() {
         "mcap" => Ok(Target::Mcap),
         "csv" => Ok(Target::Csv),
         "jsonl" => Ok(Target::Jsonl),
-        _ => Err(usage(format!("{}: the output's ending must be .mcap, .csv or .jsonl", path.display()))),
+        _ => Err(unusable(format!("{}: the output's ending must be .mcap, .csv or .jsonl", path.display()))),
     }
 }
 
@@ -97,12 +97,12 @@ pub fn open(
     existing: Existing,
     config: &Config,
     sensor_toml: &str,
-) -> Result<(Output, Held), Stop> {
+) -> Result<(Output, Held), Error> {
     let output = |kind, held| Ok((Output { kind, path: path.map(Path::to_owned), config: config.clone() }, held));
     let Some(path) = path else { return output(Kind::Text(Text::stdout()?), Held::default()) };
     let target = target(path)?;
     if path.is_dir() {
-        return Err(usage(format!("{}: is a folder", path.display())));
+        return Err(unusable(format!("{}: is a folder", path.display())));
     }
     let part = part_path(path);
     match existing {
@@ -124,7 +124,7 @@ pub fn open(
                 // Not left, but still being written.
                 hzn_mcap::open_part(&part).map_err(|e| cannot(&part, &e))?;
                 let what = "exists beside what an unfinished run left; remove one of the two";
-                return Err(usage(format!("{}: {what} ({})", path.display(), part.display())));
+                return Err(unusable(format!("{}: {what} ({})", path.display(), part.display())));
             }
             let (kind, held) = resume(path, &part, target, config, sensor_toml)?;
             return output(kind, held);
@@ -140,13 +140,13 @@ pub fn open(
     output(kind, Held::default())
 }
 
-fn refuse(path: &Path, part: &Path) -> Result<(), Stop> {
+fn refuse(path: &Path, part: &Path) -> Result<(), Error> {
     if path.exists() {
-        return Err(usage(format!("{}: exists already; --force replaces it, --resume continues it", path.display())));
+        return Err(unusable(format!("{}: exists already", path.display())).with(Remedy::ReplaceOrResume));
     }
     if std::fs::symlink_metadata(part).is_ok() {
-        let what = "was left by a run that did not end; --resume goes on with it, --force starts over";
-        return Err(usage(format!("{}: {what}", part.display())));
+        let what = format!("{}: was left by a run that did not end", part.display());
+        return Err(unusable(what).with(Remedy::ResumeOrRestart));
     }
     Ok(())
 }
@@ -164,11 +164,11 @@ fn options(config: &Config, sensor_toml: &str, force: bool) -> Options {
     Options { sensor_toml: sensor_toml.to_owned(), metadata, camera: Some(config.camera.clone()), force }
 }
 
-fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml: &str) -> Result<(Kind, Held), Stop> {
+fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml: &str) -> Result<(Kind, Held), Error> {
     match form(target) {
         Some(form) => {
             let resumed = Text::resume(path, part, form, Some(config.each_body().len())).map_err(|e| match e.kind() {
-                std::io::ErrorKind::InvalidData => usage(format!("{}: {e}; --force starts over", part.display())),
+                std::io::ErrorKind::InvalidData => unusable(format!("{}: {e}", part.display())).with(Remedy::Restart),
                 _ => cannot(part, &e),
             });
             let (text, held) = resumed?;
@@ -177,7 +177,7 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
         None => {
             let before = last_frames(part);
             let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(|e| match e {
-                hzn_mcap::Error::OtherSensor { .. } | hzn_mcap::Error::Foreign { .. } => usage(e),
+                hzn_mcap::Error::OtherSensor { .. } | hzn_mcap::Error::Foreign { .. } => unusable(e),
                 e => failed(e),
             })?;
             let frames = resumed.frames / config.each_body().len() as u64;
@@ -212,14 +212,14 @@ pub(crate) fn advice_of_run(path: &Path, error: &std::io::Error) -> String {
     let what = advice(path, error);
     match error.kind() {
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded | std::io::ErrorKind::FileTooLarge => {
-            format!("{what}; finished frames are kept, and --resume goes on with them")
+            format!("{what}; finished frames are kept; resume the run to go on with them")
         }
         _ => what,
     }
 }
 
 /// Whether two paths lead to one file or folder that exists.
-pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
+pub fn is_same(a: &Path, b: &Path) -> bool {
     let b = if b.as_os_str().is_empty() { Path::new(".") } else { b };
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
@@ -228,20 +228,20 @@ pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
 ///
 /// # Errors
 /// It exists and `force` is false.
-pub(crate) fn refuse_existing(path: &Path, force: bool) -> Result<(), Stop> {
+pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
     if path.exists() && !force {
-        return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
+        return Err(unusable(format!("{}: exists already", path.display())).with(Remedy::Replace));
     }
     Ok(())
 }
 
 /// A file that cannot be written, and what to do.
-pub(crate) fn cannot(path: &Path, error: &std::io::Error) -> Stop {
+pub fn cannot(path: &Path, error: &std::io::Error) -> Error {
     failed(advice(path, error))
 }
 
 /// A picture that cannot be written, and what to do.
-pub(crate) fn not_saved(path: &Path, error: &image::ImageError) -> Stop {
+pub fn not_saved(path: &Path, error: &image::ImageError) -> Error {
     let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
     while let Some(e) = cause {
         if let Some(e) = e.downcast_ref::<std::io::Error>() {
@@ -281,7 +281,7 @@ impl Output {
     ///
     /// # Errors
     /// The disk.
-    pub fn finish(self) -> Result<(), Stop> {
+    pub fn finish(self) -> Result<(), Error> {
         match self.kind {
             Kind::Mcap(writer) => writer.finish().map(|_| ()).map_err(failed),
             Kind::Text(text) => {
@@ -334,7 +334,7 @@ impl Rows {
     ///
     /// # Errors
     /// It exists and must not, has another ending, or cannot be written.
-    pub fn create(path: &Path, existing: Existing) -> Result<Self, Stop> {
+    pub fn create(path: &Path, existing: Existing) -> Result<Self, Error> {
         let part = part_path(path);
         if existing == Existing::Refuse {
             // Which no --resume continues.
@@ -342,7 +342,7 @@ impl Rows {
             refuse(path, &part)?;
         }
         let Some(form) = form(target(path)?) else {
-            return Err(usage(format!("{}: a table ends in .csv or .jsonl", path.display())));
+            return Err(unusable(format!("{}: a table ends in .csv or .jsonl", path.display())));
         };
         let text = Text::create(path, &part, form).map_err(|e| {
             let _ = std::fs::remove_file(&part);
@@ -366,28 +366,9 @@ impl Rows {
     ///
     /// # Errors
     /// The disk.
-    pub fn finish(self) -> Result<(), Stop> {
+    pub fn finish(self) -> Result<(), Error> {
         let Self { text, path } = self;
         text.finish().map_err(|e| cannot(&path, &e))
-    }
-}
-
-/// Rows of results, and the sensor.toml that an MCAP holds.
-///
-/// # Errors
-/// No such file, none of `hzn run`, or a broken one.
-pub fn read(file: &Path) -> Result<(Vec<hzn_mcap::Row>, Option<String>), Stop> {
-    if !file.is_file() {
-        return Err(usage(format!("{}: no such file", file.display())));
-    }
-    match ending(file).as_str() {
-        "mcap" => {
-            let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
-            let rows = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
-            Ok((rows, reader.sensor_toml().map(str::to_owned)))
-        }
-        kind @ ("csv" | "jsonl") => Ok((crate::commands::rows(file, kind)?.collect::<Result<_, _>>()?, None)),
-        _ => Err(usage(format!("{}: results of `hzn run` are expected: .mcap, .csv or .jsonl", file.display()))),
     }
 }
 

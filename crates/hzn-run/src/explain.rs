@@ -151,3 +151,8 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     }
     tips
 }
+
+/// `1 picture`, `2 pictures`.
+pub fn counted(n: u64, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}

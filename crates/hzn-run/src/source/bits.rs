@@ -27,7 +27,7 @@ pub struct FoundBits {
 impl std::fmt::Display for FoundBits {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { bits, most, pictures } = self;
-        let of = crate::tell::counted(*pictures as u64, "picture");
+        let of = crate::explain::counted(*pictures as u64, "picture");
         write!(
             f,
             "samples are words of 16 bits that reach {most} in {of} looked at: taken as {bits} bits; if the camera has others, \

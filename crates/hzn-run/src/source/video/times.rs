@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::Stdio;
 
 use super::tool::{Running, tool};
-use crate::exit::Stop;
-use crate::input::TimeSource;
+use crate::error::Error;
+use crate::source::TimeSource;
 
 /// A container in which so many frames have no time at the beginning has none at all.
 const TIMELESS: usize = 32;
@@ -21,7 +21,7 @@ pub(super) struct Times {
 }
 
 impl Times {
-    pub(super) fn start(path: &Path) -> Result<Self, Stop> {
+    pub(super) fn start(path: &Path) -> Result<Self, Error> {
         let mut command = tool("ffprobe");
         command
             .args([

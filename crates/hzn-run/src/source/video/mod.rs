@@ -20,8 +20,8 @@ use hzn_core::image::{Channel, Layout};
 
 use super::picture::{Picture, Samples, check_size};
 use super::{Item, Payload, Source};
-use crate::exit::{Stop, usage};
-use crate::tell;
+use crate::error::{Error, unusable};
+use crate::explain;
 use times::Times;
 use tool::{Running, Said, absent, tool};
 
@@ -56,7 +56,7 @@ pub(super) struct Video {
 }
 
 impl Video {
-    pub(super) fn open(path: &Path) -> Result<Self, Stop> {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let name = path.display();
         let probe = tool("ffprobe")
             .args([
@@ -72,15 +72,15 @@ impl Video {
             .map_err(|e| absent("ffprobe", &e))?;
         if !probe.status.success() {
             let why = String::from_utf8_lossy(&probe.stderr);
-            return Err(usage(format!("{name}: ffprobe cannot read it: {}", why.trim())));
+            return Err(unusable(format!("{name}: ffprobe cannot read it: {}", why.trim())));
         }
         let text = String::from_utf8_lossy(&probe.stdout);
         let entry = |key: &str| text.lines().find_map(|l| l.strip_prefix(key)?.strip_prefix('='));
         let side = |key: &str| entry(key).and_then(|v| v.trim().parse::<u32>().ok());
         let (Some(width), Some(height)) = (side("width"), side("height")) else {
-            return Err(usage(format!("{name}: no video stream in this file")));
+            return Err(unusable(format!("{name}: no video stream in this file")));
         };
-        check_size(width, height, None).map_err(|e| usage(format!("{name}: {e}")))?;
+        check_size(width, height, None).map_err(|e| unusable(format!("{name}: {e}")))?;
         let pix_fmt = entry("pix_fmt").unwrap_or_default().trim();
         let (bits, arguments) = luma(pix_fmt);
         let (frames, pixels, said) = start(path, &arguments)?;
@@ -114,7 +114,7 @@ impl Video {
         let name = self.path.display();
         let code = self.frames.wait().ok().and_then(|status| status.code());
         let said = self.said.take().and_then(|said| said.join().ok()).unwrap_or_default().summary();
-        let frames = tell::counted(self.index, "frame");
+        let frames = explain::counted(self.index, "frame");
         let Some(code) = code.filter(|code| *code != STOPPED) else {
             return Some(Err(anyhow::anyhow!("{name}: ffmpeg was ended from outside after {frames}")));
         };
@@ -172,7 +172,7 @@ fn turned(counter_clockwise_deg: f64) -> Option<&'static str> {
 type Pixels = BufReader<Box<dyn Read + Send>>;
 
 /// Starts ffmpeg on a video.
-fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHandle<Said>), Stop> {
+fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHandle<Said>), Error> {
     let mut command = tool("ffmpeg");
     command
         .args(["-nostdin", "-noautorotate", "-i"])
@@ -190,7 +190,7 @@ impl Source for Video {
     fn to_be_turned(&self) -> Option<(String, &'static str)> {
         self.turned.map(|how| (self.stem.clone(), how))
     }
-    fn want_channel(&mut self, channel: Channel) -> Result<(), Stop> {
+    fn want_channel(&mut self, channel: Channel) -> Result<(), Error> {
         // A picture without colours has its luma in each of them.
         if channel == Channel::Mean || self.channels == 3 || self.pix_fmt.starts_with("gray") {
             return Ok(());

@@ -26,7 +26,7 @@ pub use picture::Picture;
 pub use raw::Raw;
 pub use rerun::lost as lost_of_recording;
 
-use crate::exit::{Stop, usage};
+use crate::error::{Error, Remedy, unusable};
 
 /// One frame before it is decoded.
 #[derive(Debug)]
@@ -128,7 +128,7 @@ pub trait Source: Send {
     ///
     /// # Errors
     /// The source has none.
-    fn want_channel(&mut self, _channel: Channel) -> Result<(), Stop> {
+    fn want_channel(&mut self, _channel: Channel) -> Result<(), Error> {
         Ok(())
     }
     /// Things that the user should know, such as files left out.
@@ -214,7 +214,7 @@ impl Payload {
 ///
 /// # Errors
 /// Nothing there, nothing that is known, or a mixture that has no order.
-pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result<Box<dyn Source>, Stop> {
+pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result<Box<dyn Source>, Error> {
     if let [one] = inputs
         && raw.is_none()
         && one.is_file()
@@ -226,13 +226,13 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
         }
     }
     if topic.is_some() {
-        return Err(usage("--topic: only an MCAP has topics; give one as the input, or leave it out"));
+        return Err(unusable("only an MCAP has topics").with(Remedy::NoTopic));
     }
     Ok(Box::new(files::Files::open(inputs, raw)?))
 }
 
 /// One of our own is processed again as it was recorded; of any other, and of a further topic, there are the pictures.
-fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, Stop> {
+fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, Error> {
     if topic.is_none_or(|topic| topic == hzn_mcap::IMAGE_TOPIC)
         && let Some(ours) = rerun::Rerun::open(path)?
     {
@@ -258,16 +258,16 @@ pub fn recorded(image: hzn_mcap::EncodedImage) -> Payload {
 
 /// A file that a command reads: it must be there. Gives the ending of its kind, and whether it is what an unfinished
 /// run left: such a file has the ending of its kind before `.part`.
-pub(crate) fn existing(file: &Path) -> Result<(String, bool), Stop> {
+pub fn existing(file: &Path) -> Result<(String, bool), Error> {
     if !file.is_file() {
         let what = if file.is_dir() { "is a folder; a file is expected here" } else { "no such file" };
-        return Err(usage(format!("{}: {what}", file.display())));
+        return Err(unusable(format!("{}: {what}", file.display())));
     }
     let unfinished = ending(file) == "part";
     Ok((if unfinished { ending(&file.with_extension("")) } else { ending(file) }, unfinished))
 }
 
 /// The file's ending in small letters.
-pub(crate) fn ending(path: &Path) -> String {
+pub fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }

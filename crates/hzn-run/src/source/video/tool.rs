@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::JoinHandle;
 
-use crate::exit::{Stop, failed, usage};
+use crate::error::{Error, failed, unusable};
 
 /// What ffmpeg calls errors and what loses nothing: frames at the same time, and what some cameras write into JPEG.
 const HARMLESS: &[&str] = &["non monotonically increasing dts", "unable to decode APP fields"];
@@ -20,9 +20,9 @@ pub(super) fn tool(name: &str) -> Command {
 }
 
 /// Why a program cannot be started.
-pub(super) fn absent(tool: &str, error: &std::io::Error) -> Stop {
+pub(super) fn absent(tool: &str, error: &std::io::Error) -> Error {
     match error.kind() {
-        ErrorKind::NotFound => usage(format!(
+        ErrorKind::NotFound => unusable(format!(
             "videos need `{tool}` on PATH, and it is not there; install ffmpeg, or extract the frames as pictures"
         )),
         _ => failed(format!("{tool} cannot be started: {error}")),
@@ -34,7 +34,7 @@ pub(super) struct Running(Child);
 
 impl Running {
     /// Starts it; also gives what it writes to stdout.
-    pub(super) fn start(name: &str, command: &mut Command) -> Result<(Self, impl Read + Send + use<>), Stop> {
+    pub(super) fn start(name: &str, command: &mut Command) -> Result<(Self, impl Read + Send + use<>), Error> {
         let mut child = command.stdout(Stdio::piped()).spawn().map_err(|e| absent(name, &e))?;
         let out = child.stdout.take();
         let running = Self(child);

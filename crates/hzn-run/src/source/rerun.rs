@@ -7,8 +7,8 @@ use hzn_mcap::{Contents, Found, FrameRecord, Index, Reader};
 
 use super::recording::{SAMPLE_EVERY, payload, size_of};
 use super::{Item, Payload, SIZES, Source, TimeSource};
-use crate::exit::{Stop, usage};
-use crate::output;
+use crate::error::{Error, unusable};
+use crate::sink;
 
 /// Frames as they were recorded: names, times, what was given, and the sensor.
 pub(super) struct Rerun {
@@ -20,20 +20,20 @@ pub(super) struct Rerun {
 
 impl Rerun {
     /// `None` for a recording of another program.
-    pub(super) fn open(path: &Path) -> Result<Option<Self>, Stop> {
-        let reader = open(path).map_err(usage)?;
+    pub(super) fn open(path: &Path) -> Result<Option<Self>, Error> {
+        let reader = open(path).map_err(unusable)?;
         if reader.sensor_toml().is_none() {
             return Ok(None);
         }
-        match holds(path).map_err(usage)? {
+        match holds(path).map_err(unusable)? {
             Holds::Pictures => {}
             Holds::Results => {
                 let what = "holds results without their pictures; give the pictures themselves";
-                return Err(usage(format!("{}: {what}", path.display())));
+                return Err(unusable(format!("{}: {what}", path.display())));
             }
             Holds::LostPictures => {
                 let what = "was cut off before its first picture was whole; give the pictures themselves";
-                return Err(usage(format!("{}: {what}", path.display())));
+                return Err(unusable(format!("{}: {what}", path.display())));
             }
         }
         Ok(Some(Self { reader, path: path.to_owned(), last: None }))
@@ -65,7 +65,7 @@ fn holds(path: &Path) -> Result<Holds, hzn_mcap::Error> {
 }
 
 fn item(record: FrameRecord) -> Item {
-    let data: FrameData = output::frame_data(&record.row, &record.given);
+    let data: FrameData = sink::frame_data(&record.row, &record.given);
     let picture = record.image.map_or_else(|| Payload::Broken("the recording holds no picture of it".into()), payload);
     Item { name: record.row.file, time: TimeSource::Table, data: Some(data), payload: picture }
 }

@@ -7,7 +7,7 @@ use hzn_mcap::{EncodedImage, ImageFormat, ImageReader};
 
 use super::picture::{self, Picture, Samples};
 use super::{Item, Payload, SIZES, Source, TimeSource};
-use crate::exit::{Stop, usage};
+use crate::error::{Error, unusable};
 
 /// A recording does not say how many pictures it has: of its beginning every so many are looked at for [`Source::samples`].
 pub(super) const SAMPLE_EVERY: usize = 16;
@@ -23,13 +23,13 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    pub(super) fn open(path: &Path, topic: Option<&str>) -> Result<Self, Stop> {
-        let reader = ImageReader::open(path, topic).map_err(usage)?;
+    pub(super) fn open(path: &Path, topic: Option<&str>) -> Result<Self, Error> {
+        let reader = ImageReader::open(path, topic).map_err(unusable)?;
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let mut recording = Self { reader, path: path.to_owned(), name, first: None, index: 0 };
         recording.first = match recording.read() {
             Some(Ok(item)) => Some(item),
-            Some(Err(e)) => return Err(usage(e)),
+            Some(Err(e)) => return Err(unusable(e)),
             None => {
                 let others: Vec<&str> = recording.reader.other_topics().collect();
                 let what = match (topic, others.is_empty()) {
@@ -44,7 +44,7 @@ impl Recording {
                     }
                 };
                 let broken = recording.reader.broken().map(|why| format!("; it {why}")).unwrap_or_default();
-                return Err(usage(format!("{}: {what}{broken}", path.display())));
+                return Err(unusable(format!("{}: {what}{broken}", path.display())));
             }
         };
         Ok(recording)

@@ -1,0 +1,65 @@
+//! Results that were written before, read again.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use hzn_mcap::{Contents, Reader, Row};
+
+use crate::error::{Error, failed, unusable};
+use crate::source::ending;
+
+/// Rows of results, and the sensor.toml that an MCAP holds.
+///
+/// # Errors
+/// No such file, none of `hzn run`, or a broken one.
+pub fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Error> {
+    if !file.is_file() {
+        return Err(unusable(format!("{}: no such file", file.display())));
+    }
+    match ending(file).as_str() {
+        "mcap" => {
+            let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
+            let rows = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
+            Ok((rows, reader.sensor_toml().map(str::to_owned)))
+        }
+        kind @ ("csv" | "jsonl") => Ok((rows(file, kind)?.collect::<Result<_, _>>()?, None)),
+        _ => Err(unusable(format!("{}: results of `hzn run` are expected: .mcap, .csv or .jsonl", file.display()))),
+    }
+}
+
+/// Rows, one after the other.
+pub type AllRows = Box<dyn Iterator<Item = Result<Row, Error>>>;
+
+/// Rows of a table of results: `kind` is its ending, `csv` or `jsonl`. What an unfinished one (`.part`) ends with in the
+/// middle of a row is left out.
+///
+/// # Errors
+/// Another kind of file, or one that cannot be read; a row that is none of results.
+pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
+    let name = file.display().to_string();
+    let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
+    match kind {
+        "csv" => {
+            let reader = csv::Reader::from_path(file).map_err(failed)?;
+            let why = |e: csv::Error| match e.kind() {
+                // The line stands before it already.
+                csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
+                _ => e.to_string(),
+            };
+            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| not(i as u64 + 2, why(e)));
+            Ok(whole(Box::new(reader.into_deserialize().enumerate().map(row)), file))
+        }
+        "jsonl" => {
+            let lines = std::io::BufReader::new(std::fs::File::open(file)?).lines();
+            let row = move |(i, line): (usize, std::io::Result<String>)| {
+                serde_json::from_str(&line?).map_err(|e| not(i as u64 + 1, e.to_string()))
+            };
+            Ok(whole(Box::new(lines.enumerate().map(row)), file))
+        }
+        _ => Err(unusable(format!("{}: .mcap, .csv or .jsonl is expected", file.display()))),
+    }
+}
+
+fn whole(rows: AllRows, file: &Path) -> AllRows {
+    if ending(file) == "part" { Box::new(rows.take_while(Result::is_ok)) } else { rows }
+}
