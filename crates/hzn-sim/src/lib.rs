@@ -24,8 +24,7 @@
 //! | [`truth`] | what is true of a scene |
 //! | [`scenario`] | a whole sequence in one description: scene.toml |
 //! | [`trajectory`] | rocket, orbit, table; attitude; inertial sensors and satellite receiver |
-//! | [`ephemeris`] | where Sun and Moon stand |
-//! | [`utc`] | dates, seconds, terrestrial time |
+//! | [`utc`] | dates and seconds |
 //! | [`evaluate`] | answers beside their truth: how many, how good, how honest |
 //! | [`sensitivity`] | covariances by design, without rendering |
 //! | [`painted`] | even discs, painted in no time |
@@ -34,7 +33,6 @@
 pub mod artefact;
 mod counter;
 pub mod detector;
-pub mod ephemeris;
 pub mod error;
 pub mod evaluate;
 pub mod flight;

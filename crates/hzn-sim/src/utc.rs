@@ -1,4 +1,4 @@
-//! UTC as seconds since 1970, as text, and the step to terrestrial time.
+//! UTC as seconds since 1970 and as text.
 
 use jiff::Timestamp;
 use jiff::civil::DateTime;
@@ -19,23 +19,6 @@ pub fn unix_s(time: &toml::value::Datetime) -> Option<f64> {
 pub fn iso8601(unix_s: f64) -> String {
     let time = Timestamp::from_millisecond((unix_s * 1e3).round() as i64).unwrap_or_default();
     format!("{time:.3}")
-}
-
-/// TAI − UTC in seconds. Dates before 1999 count as 1999, and no leap second is foreseen.
-fn tai_minus_utc_s(unix_s: f64) -> f64 {
-    // 2006, 2009, 2012-07, 2015-07, 2017 (IERS Bulletin C).
-    let since = [1_136_073_600.0, 1_230_768_000.0, 1_341_100_800.0, 1_435_708_800.0, 1_483_228_800.0];
-    32.0 + since.iter().filter(|&&from| unix_s >= from).count() as f64
-}
-
-/// Days of terrestrial time since J2000 (2000-01-01T12:00 TT).
-pub(crate) fn tt_days_since_j2000(unix_s: f64) -> f64 {
-    ut_days_since_j2000(unix_s) + (tai_minus_utc_s(unix_s) + 32.184) / 86_400.0
-}
-
-/// Days of UTC, which stands for UT1, since 2000-01-01T12:00.
-pub(crate) fn ut_days_since_j2000(unix_s: f64) -> f64 {
-    (unix_s - 946_728_000.0) / 86_400.0
 }
 
 #[cfg(test)]

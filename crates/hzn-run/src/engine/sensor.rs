@@ -11,7 +11,7 @@ use hzn_core::image::{ImageView, Pixels};
 use hzn_core::pipeline::{Candidate, Free};
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Observer, Report, Solution};
-use hzn_sim::ephemeris;
+use hzn_nav::ephemeris;
 
 use super::trace::{Clock, Traces, Watch};
 

@@ -6,13 +6,13 @@ use hzn_core::region;
 
 use super::{Format, Scenario, ScenarioError};
 use crate::counter::{Counter, Stream};
-use crate::ephemeris;
 use crate::flight::{Flight, FlightFrame};
 use crate::foreground::Foreground;
 use crate::motion::Motion;
 use crate::scene::{Light, Scene, World};
 use crate::trajectory::Path;
 use crate::utc;
+use hzn_nav::ephemeris;
 
 /// Most pictures before a wanted one that the exposure is followed over.
 const LEADS_MOST: f64 = 32.0;

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Path, Way, from_ecef};
 use crate::counter::{Counter, Stream};
-use crate::ephemeris;
 use crate::pose::{Look, Pose};
+use hzn_nav::ephemeris;
 
 /// How the vehicle turns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

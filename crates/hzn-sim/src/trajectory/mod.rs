@@ -22,8 +22,8 @@ pub use table::Table;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::ephemeris;
 use crate::pose::Pose;
+use hzn_nav::ephemeris;
 
 /// Gravitational parameter of the Earth, m³/s² (WGS-84).
 pub(crate) const MU: f64 = 3.986_004_418e14;

@@ -7,8 +7,8 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{EARTH_RATE, MU, Point, to_ecef};
-use crate::ephemeris;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
+use hzn_nav::ephemeris;
 
 /// An orbit, by its elements at time 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

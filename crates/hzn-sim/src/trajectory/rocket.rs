@@ -4,10 +4,10 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{EARTH_RATE, Point, from_ecef, gravity, to_ecef};
-use crate::ephemeris;
 use crate::globe::Globe;
 use crate::pose::position_m;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M};
+use hzn_nav::ephemeris;
 
 /// The ascent. The stages' acceleration follows from the apogee.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

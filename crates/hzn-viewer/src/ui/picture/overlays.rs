@@ -69,13 +69,13 @@ fn sky(viewer: &Viewer, sight: &Sight, stage: &Stage<'_>) -> Vec<(&'static str, 
     let truth = viewer.truth.get(&sight.name).and_then(|t| t.first());
     let given = sight.data.as_ref();
     let sun = given.and_then(|d| d.sun_camera).or_else(|| Some([truth?.sun_x?, truth?.sun_y?, truth?.sun_z?]));
-    add("Sun", sun.or_else(|| from_ephemeris(given?, hzn_sim::ephemeris::sun)));
+    add("Sun", sun.or_else(|| from_ephemeris(given?, hzn_nav::ephemeris::sun)));
     let moon = truth.and_then(|t| Some([t.moon_x?, t.moon_y?, t.moon_z?]));
-    add("Moon", moon.or_else(|| from_ephemeris(given?, hzn_sim::ephemeris::moon)));
+    add("Moon", moon.or_else(|| from_ephemeris(given?, hzn_nav::ephemeris::moon)));
     out
 }
 
-fn from_ephemeris(data: &hzn_calib::FrameData, place: impl Fn(f64) -> hzn_sim::ephemeris::Place) -> Option<[f64; 3]> {
+fn from_ephemeris(data: &hzn_calib::FrameData, place: impl Fn(f64) -> hzn_nav::ephemeris::Place) -> Option<[f64; 3]> {
     use hzn_core::frames::{Cam, Ecef, Rotation, UnitVec3};
     let turn = Rotation::<Cam, Ecef, f64>::assume_from_quaternion(data.camera_to_ecef_wxyz?)?.inverse();
     let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3));

@@ -1,0 +1,12 @@
+//! Navigation beside the horizon sensor, without the standard library and without a heap.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`ephemeris`] | where Sun and Moon stand |
+//! | [`time`] | leap seconds, and days of the time scales that an ephemeris counts in |
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+pub mod ephemeris;
+pub mod time;

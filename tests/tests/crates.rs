@@ -1,0 +1,48 @@
+//! The order of the crates: each imports from those below it alone.
+
+use std::fs;
+use std::path::Path;
+
+/// Every crate below `crates/`, with those of ours that it may import from.
+const MAY_IMPORT: &[(&str, &[&str])] = &[
+    ("hzn-fpu", &[]),
+    ("hzn-core", &["hzn-fpu"]),
+    ("hzn-nav", &["hzn-core"]),
+    ("hzn-calib", &["hzn-core", "hzn-nav"]),
+    ("hzn-sim", &["hzn-core", "hzn-nav", "hzn-calib"]),
+    ("hzn-flight", &["hzn-core", "hzn-nav"]),
+    ("hzn-mcap", &["hzn-core", "hzn-nav"]),
+    ("hzn-run", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap"]),
+    ("hzn-cli", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run"]),
+    ("hzn-py", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run"]),
+    ("hzn-viewer", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run"]),
+];
+
+/// The crates of ours that a Cargo.toml names among its dependencies, those for tests and builds left out.
+fn imports(manifest: &Path) -> Vec<String> {
+    let text = fs::read_to_string(manifest).unwrap();
+    let table = text.split("\n[").find(|table| table.starts_with("dependencies]")).unwrap_or_default();
+    let name = |line: &str| line.split(['.', ' ', '=']).next().unwrap_or_default().to_owned();
+    table.lines().skip(1).map(name).filter(|name| name.starts_with("hzn-")).collect()
+}
+
+#[test]
+fn crates_import_from_below() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates");
+    let mut seen = 0;
+    for entry in fs::read_dir(&crates).unwrap() {
+        let manifest = entry.unwrap().path().join("Cargo.toml");
+        let name = manifest.parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
+        let (_, may) = MAY_IMPORT.iter().find(|(of, _)| *of == name).unwrap_or_else(|| panic!("{name} has no place"));
+        for import in imports(&manifest) {
+            assert!(may.contains(&import.as_str()), "{name} imports {import}, which is not below it");
+            seen += 1;
+        }
+    }
+    assert!(seen > 20, "{seen} imports were read");
+    // Nothing that parses arguments, catches signals or draws progress is linked into the library.
+    let run = fs::read_to_string(crates.join("hzn-run/Cargo.toml")).unwrap();
+    for theirs in ["clap", "ctrlc", "indicatif", "plotters"] {
+        assert!(!run.contains(theirs), "hzn-run imports {theirs}");
+    }
+}
