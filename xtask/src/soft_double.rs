@@ -23,11 +23,12 @@ const STAGES: [&str; 10] = [
 ];
 /// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
 /// places where they do.
-const ONCE: [(&str, usize); 11] = [
+const ONCE: [(&str, usize); 12] = [
     ("hzn_core::binarize::Config::fixed_level", 4),
     ("hzn_core::binarize::Histogram::mean", 2),
     ("hzn_core::binarize::Histogram::otsu", 3),
     ("hzn_core::reject::keep", 2),
+    ("hzn_core::reject::Threshold<T>::of", 3),
     ("hzn_core::estimate::fit", 4),
     ("hzn_core::covariance::fuse", 5),
     ("hzn_core::select::attitude::verdict", 4),

@@ -118,8 +118,7 @@ pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
             Error::DiskFull { folder: folder_of(path), part: path.to_path_buf() }
         }
         io::ErrorKind::FileTooLarge => {
-            let what =
-                "larger than files may be here (ulimit -f); finished frames are kept, and --resume goes on with them";
+            let what = "larger than files may be here (ulimit -f); finished frames are kept; resume the run to go on with them";
             Error::Write { path: path.to_path_buf(), source: io::Error::new(io::ErrorKind::FileTooLarge, what) }
         }
         io::ErrorKind::PermissionDenied
