@@ -85,7 +85,7 @@ impl Config {
 pub(crate) struct Threshold<T> {
     /// The distance in pixels.
     pub(crate) px: T,
-    /// How many times `threshold_px` it is, 1 or more: by as much larger may the residuals be.
+    /// The distance over `threshold_px`, 1 or more. The largest RMS of the fit grows with it.
     pub(crate) raised: T,
 }
 
@@ -97,8 +97,8 @@ impl<T: Real> Threshold<T> {
     }
     /// The threshold for the first `count` points of the blocks, which are rays in the order of the edge.
     ///
-    /// It is raised for noise to no more than the sigma of the limb's own height: so far its air may spread it, and an
-    /// edge that scatters more is another's.
+    /// Noise raises it to no more than the sigma of the limb's own height. The air spreads a limb no farther, so an edge
+    /// that scatters more belongs to something else.
     pub(crate) fn of(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
         let told = T::of(config.threshold_px);
         let most = if expected.free { told } else { told.most(expected.limb_sigma_rad() * focal_px) };

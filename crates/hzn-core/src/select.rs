@@ -283,8 +283,8 @@ pub(crate) struct Judged<T> {
     pub(crate) support: T,
 }
 
-/// Looks a fit over, with the points that carry it; `points` of the edge were made, and the noise of the edge has
-/// `raised` the threshold of the rejection so many times.
+/// Looks a fit over, with the points that carry it. `points` of the edge were made. `raised` is how many times larger the
+/// noise of the edge makes the threshold of the rejection, and with it the largest RMS.
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,

@@ -1,4 +1,4 @@
-//! Navigation beside the horizon sensor, without the standard library and without a heap.
+//! This crate holds what navigation needs beside the horizon sensor. It needs neither the standard library nor a heap.
 //!
 //! | module | what it holds |
 //! |---|---|
