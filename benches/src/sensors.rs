@@ -65,8 +65,8 @@ fn picture<'a>(case: &Case, frame: &'a Picture) -> Result<Grey<'a, u8>, String> 
 
 fn known<T: Real>(frame: &Picture) -> Frame<T> {
     Frame {
-        altitude_m: frame.known.altitude_m.map(T::of),
-        position_m: frame.known.position_m.map(|p| p.map(T::of)),
+        altitude_m: frame.known.altitude_m.map(T::from_f64),
+        position_m: frame.known.position_m.map(|p| p.map(T::from_f64)),
         ..Frame::default()
     }
 }
@@ -94,7 +94,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
             level: report.level,
             status: report.status,
             points: report.counters.edge_points,
-            axis: report.solution.map(|s| s.axis.xyz().map(Real::f64)),
+            axis: report.solution.map(|s| s.axis.xyz().map(Real::to_f64)),
         })
     }
 

@@ -4,9 +4,9 @@
 
 use std::process::{Command, ExitCode};
 
-use hzn_core::binarize::Method;
-use hzn_core::pipeline::Preset;
+use hzn_core::Preset;
 use hzn_core::status::Stage;
+use hzn_core::threshold::Method;
 use hzn_core::{Config, Frame, camera};
 use hzn_sim::flight::rocket;
 use hzn_sim::{Disc, FlightFrame, Sky};

@@ -7,7 +7,7 @@ use hzn_core::Config;
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Channel, ImageView, Layout};
-use hzn_core::pipeline::Observer;
+use hzn_core::observer::Observer;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
 use image::RgbImage;
@@ -173,19 +173,14 @@ impl<T: Real> Observer<T> for Watch {
         self.all.borrow_mut().clear();
     }
     fn point(&self, _: u32, p: ImagePoint<T>) {
-        self.all.borrow_mut().push(([p.u.f64(), p.v.f64()], 0.0));
+        self.all.borrow_mut().push(([p.u.to_f64(), p.v.to_f64()], 0.0));
     }
     fn weight(&self, _: u32, point: u32, weight: T) {
         if let Some(p) = self.all.borrow_mut().get_mut(point as usize) {
-            p.1 = weight.f64();
+            p.1 = weight.to_f64();
         }
     }
-    fn verdict(
-        &self,
-        _: u32,
-        _: &hzn_core::pipeline::Candidate<T>,
-        solution: Option<&hzn_core::pipeline::Solution<T>>,
-    ) {
+    fn verdict(&self, _: u32, _: &hzn_core::report::Candidate<T>, solution: Option<&hzn_core::report::Solution<T>>) {
         if solution.is_some() {
             self.best.borrow_mut().chosen.clone_from(&self.all.borrow());
         }

@@ -2,7 +2,7 @@
 
 use hzn_core::body::Kind;
 use hzn_core::image::Pixels;
-use hzn_core::pipeline::{Observer, Unobserved};
+use hzn_core::observer::{Observer, Unobserved};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report};
@@ -66,8 +66,8 @@ pub fn known<T: Real>(scene: &Scene) -> Frame<T> {
     let position_m = scene.pose.position_m;
     let altitude_m = Globe::of(&scene.body).altitude_m(position_m);
     Frame {
-        altitude_m: Some(T::of(altitude_m)),
-        position_m: (scene.body.kind == Kind::Earth).then(|| position_m.map(T::of)),
+        altitude_m: Some(T::from_f64(altitude_m)),
+        position_m: (scene.body.kind == Kind::Earth).then(|| position_m.map(T::from_f64)),
         ..Frame::default()
     }
 }
@@ -113,11 +113,11 @@ impl Answer {
     pub fn of<T: Real>(report: &Report<T>) -> Option<Self> {
         let s = report.solution.as_ref()?;
         Some(Self {
-            axis: s.axis.xyz().map(Real::f64),
-            covariance_rad2: s.covariance.rows().map(|row| row.map(Real::f64)),
-            half_angle_rad: s.fused_half_angle_rad.f64(),
-            free_half_angle_rad: s.half_angle_rad.f64(),
-            rms_px: s.rms_px.f64(),
+            axis: s.axis.xyz().map(Real::to_f64),
+            covariance_rad2: s.covariance.rows().map(|row| row.map(Real::to_f64)),
+            half_angle_rad: s.fused_half_angle_rad.to_f64(),
+            free_half_angle_rad: s.half_angle_rad.to_f64(),
+            rms_px: s.rms_px.to_f64(),
             inliers: s.inliers,
             points: report.counters.edge_points,
             dropped: report.counters.dropped,

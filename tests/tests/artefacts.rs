@@ -1,7 +1,7 @@
 //! Dark skies with artefacts instead of a limb are not answered, and limbs next to artefacts are. The campaign with ten
 //! times as many pictures is `cargo xtask reproduce artefacts`.
 
-use hzn_core::pipeline::Unobserved;
+use hzn_core::observer::Unobserved;
 use hzn_core::{Config, HostHorizon, camera};
 use hzn_sim::artefact::{Kind, Outcome, Told, Trial, look};
 

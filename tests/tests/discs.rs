@@ -19,7 +19,7 @@ fn config(preset: Preset, focal_px: f64) -> Config {
 }
 
 fn frame<T: Real>(sun: Option<[f64; 3]>) -> Frame<T> {
-    Frame { sun: sun.and_then(|s| UnitVec3::try_new(s.map(T::of))), ..Frame::default() }
+    Frame { sun: sun.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))), ..Frame::default() }
 }
 
 /// What both precisions say.
@@ -160,7 +160,7 @@ fn the_moon_is_no_larger_than_it_blooms() {
 #[test]
 fn the_level_follows_the_limb_of_the_picture_before() {
     let mut config = config(Preset::Sun, 800.0);
-    config.binarize.method = hzn_core::binarize::Method::Track;
+    config.binarize.method = hzn_core::threshold::Method::Track;
     let mut sensors = Sensors::new(&config);
     let axis = direction(&config, 310.2, 250.4);
     // Two thirds of the brightness from picture to picture: no fixed level would do, and the disc is too small for otsu's

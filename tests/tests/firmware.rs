@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use hzn_core::binarize;
 use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::status::Status;
+use hzn_core::threshold;
 use hzn_core::{Config, FlightHorizon, Frame, camera};
 use hzn_flight::flight::{Buffers, Lists};
 use hzn_flight::{Parameters, table};
@@ -87,7 +87,7 @@ fn same_bits_as_here() {
 #[ignore = "needs the images: cargo xtask firmware"]
 fn rows_have_the_bits_of_the_picture() {
     let mut flight = rocket(640, 480, 8, 6);
-    flight.sensor.binarize = binarize::Config { method: binarize::Method::Fixed, level: 60.0, ..Default::default() };
+    flight.sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
     let cases: Vec<Case> = flight
         .frames
         .iter()

@@ -3,7 +3,7 @@
 use hzn_core::camera::{Config as Camera, Model};
 use hzn_core::image::{Channel, ImageView, Layout};
 use hzn_core::status::Status;
-use hzn_core::{Config, binarize, body, covariance};
+use hzn_core::{Config, body, covariance, threshold};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Band, Clouds, Detector, Disc, EdgeNoise, Foreground, Light, Look, Pose, Samples, Scene};
 use hzn_tests::{Answer, Sensors};
@@ -211,7 +211,7 @@ fn depth_and_colour_change_nothing() {
     let answer = |view: &ImageView<'_>, level: f64| -> [Result<Answer, Status>; 2] {
         let mut sensor = sensor(&s);
         // Fixed, so that rounding of a level between two counts plays no part.
-        sensor.binarize = binarize::Config { method: binarize::Method::Fixed, level, ..binarize::Config::default() };
+        sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level, ..threshold::Config::default() };
         let (host, flight) = Sensors::new(&sensor).both(view, &s);
         [host, flight]
     };

@@ -1,12 +1,12 @@
 //! What keeps a picture from being refused for the search's own sake: discs under an image circle, a dark frame, levels that
 //! follow the clouds, arrays of few pixels, words of which few bits are used.
 
-use hzn_core::binarize::{self, Method};
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
+use hzn_core::threshold::{self, Method};
 use hzn_core::{Config, Frame, HostHorizon, Report};
 use hzn_sim::painted::UnderCircle;
 use hzn_sim::pose::position_m;
@@ -26,7 +26,7 @@ fn told(lens: &camera::Config, altitude_km: f64, level: f64) -> Config {
         limb_height_sigma_km: 2.0,
         ..config.body
     };
-    config.binarize = binarize::Config { method: Method::Fixed, level, ..config.binarize };
+    config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
     config
 }
 
@@ -87,7 +87,7 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let mut axes = vec![answer(&p.sensor).axis];
     for level in [0.08, 0.12, 0.16, 0.2, 0.3, 0.4, 0.5] {
         let mut sensor = p.sensor.clone();
-        sensor.binarize = binarize::Config { method: Method::Fixed, level, ..sensor.binarize };
+        sensor.binarize = threshold::Config { method: Method::Fixed, level, ..sensor.binarize };
         let found = answer(&sensor);
         println!(
             "level {level}: {} of {} points, RMS {:.2} px, {:.5?}",
@@ -99,7 +99,7 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     }
     // With the frame, the picture's own outline belongs to the edge: fewer points, or none.
     p.sensor.recover.frame_px = 0;
-    p.sensor.binarize = binarize::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
+    p.sensor.binarize = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
     let with = look(&mut Sensors::new(&p.sensor).host, &p.view(), &Frame::default());
     assert!(
         with.is_err() || with.is_ok_and(|a| 2 * a.inliers < a.points && a.error_deg(axes[0]) < a.sigma_deg()),
@@ -169,7 +169,7 @@ fn a_thermal_array_answers_by_default() {
     sensor.body.kind = Kind::EarthSphere;
     let mut known = sensor.clone();
     // The bound: a known half-angle, independent points, each as wrong as those of the picture are.
-    known.estimate.half_angle = hzn_core::estimate::HalfAngle::Known;
+    known.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
     (known.covariance.sigma_px, known.covariance.correlation_px) = (1e-3, 0.0);
     let [mut sensor, mut known] = [sensor, known].map(|c| HostHorizon::boxed(&c).unwrap());
     let (mut tally, mut bound_deg2, mut count) = (Tally::default(), 0.0, 0.0);

@@ -1,8 +1,8 @@
 //! The presets of published systems on rendered scenes: they answer what they should, as well as their methods can.
 
 use hzn_core::camera::{self, Camera, Model};
-use hzn_core::candidates::SubPixel;
-use hzn_core::{Config, Preset, estimate};
+use hzn_core::edge_points::SubPixel;
+use hzn_core::{Config, Preset, fit};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Detector, Disc, EdgeNoise, Look, Pose, Scene};
@@ -47,7 +47,7 @@ fn braun_barf_with_payload_in_view() {
     let tally = fly(&flight, Preset::Dlr2022, |_| {});
     assert_eq!(tally.answered(), tally.frames, "{tally}");
     assert!(tally.rms_deg() < 0.3 && tally.worst_deg() < 1.0, "{tally}");
-    let tally = fly(&flight, Preset::Dlr2022, |config| config.estimate.method = estimate::Method::Conic);
+    let tally = fly(&flight, Preset::Dlr2022, |config| config.estimate.method = fit::Method::Conic);
     assert!(tally.answered() * 2 >= tally.frames && tally.worst_deg() < 20.0, "{tally}");
 }
 

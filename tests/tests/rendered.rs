@@ -89,7 +89,7 @@ fn white_noise_against_the_bound() {
     let camera = Camera::ideal(Model::Pinhole, 320, 240, 277.0);
     let mut sensor = hzn_core::Config::new(camera.clone());
     sensor.body.kind = hzn_core::body::Kind::EarthSphere;
-    sensor.estimate.half_angle = hzn_core::estimate::HalfAngle::Known;
+    sensor.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
     // Less than any edge point is wrong by, so that the covariance goes by the residuals.
     sensor.covariance = hzn_core::covariance::Config::told(1e-3, 0.0);
     let look = Look { azimuth_rad: 0.3, depression_rad: 0.25, roll_rad: 0.2 };

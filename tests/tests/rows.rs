@@ -3,12 +3,15 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use hzn_core::binarize::Method;
 use hzn_core::image::{Grey, Layout, Pixels};
-use hzn_core::pipeline::{HELD, Observer, Rows, Workspace};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
+use hzn_core::threshold::Method;
 use hzn_core::{Config, Frame, Report, Sensor};
+use hzn_core::{
+    observer::Observer,
+    pipeline::{HELD, Rows, Workspace},
+};
 use hzn_sim::flight::{leo_infrared, rocket};
 use hzn_tests::real::Photograph;
 
@@ -145,7 +148,7 @@ fn memory_without_a_frame() {
         for row in case.bytes.chunks(640) {
             stream.push_row(row).unwrap();
         }
-        let report = stream.finish(&mut Box::new(Short::new()), &hzn_core::pipeline::Unobserved);
+        let report = stream.finish(&mut Box::new(Short::new()), &hzn_core::observer::Unobserved);
         println!("{}: {} border pixels left out", frame.file, report.counters.dropped);
         assert_eq!(report.status, Status::Ok, "{:?}", report.counters);
     }

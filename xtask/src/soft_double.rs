@@ -24,17 +24,17 @@ const STAGES: [&str; 10] = [
 /// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
 /// places where they do.
 const ONCE: [(&str, usize); 12] = [
-    ("hzn_core::binarize::Config::fixed_level", 4),
-    ("hzn_core::binarize::Histogram::mean", 2),
-    ("hzn_core::binarize::Histogram::otsu", 3),
-    ("hzn_core::reject::keep", 2),
-    ("hzn_core::reject::Threshold<T>::of", 3),
-    ("hzn_core::estimate::fit", 4),
+    ("hzn_core::threshold::Config::fixed_level", 4),
+    ("hzn_core::threshold::Histogram::mean", 2),
+    ("hzn_core::threshold::Histogram::otsu", 3),
+    ("hzn_core::consensus::keep", 2),
+    ("hzn_core::consensus::Threshold<T>::of", 3),
+    ("hzn_core::fit::fit", 4),
     ("hzn_core::covariance::fuse", 5),
-    ("hzn_core::select::attitude::verdict", 4),
-    ("hzn_core::select::judge", 18),
-    ("hzn_core::select::rivals", 14),
-    ("hzn_core::select::surroundings", 7),
+    ("hzn_core::gates::attitude::verdict", 4),
+    ("hzn_core::gates::judge", 18),
+    ("hzn_core::gates::rivals", 14),
+    ("hzn_core::gates::surroundings", 7),
     ("hzn_core::pipeline::judge::Judge<T,O>::piece", 14),
 ];
 /// Loops that must be found, or the check would say nothing.
@@ -92,9 +92,9 @@ mod tests {
 
     #[test]
     fn calls_are_counted_by_function() {
-        let text = "00000400 <hzn_core::reject::keep>:\n     400:\tbl\t28642 <__aeabi_dmul>\n     404:\tb.w\t100 <__aeabi_f2d>\n\
-                    \n00000500 <other>:\n     500:\tbl\t400 <hzn_core::reject::keep>\n     504:\tbl\t3 <__aeabi_fadd>\n";
+        let text = "00000400 <hzn_core::consensus::keep>:\n     400:\tbl\t28642 <__aeabi_dmul>\n     404:\tb.w\t100 <__aeabi_f2d>\n\
+                    \n00000500 <other>:\n     500:\tbl\t400 <hzn_core::consensus::keep>\n     504:\tbl\t3 <__aeabi_fadd>\n";
         let calls = calls_by_function(text);
-        assert_eq!(calls, [("hzn_core::reject::keep".to_owned(), 2), ("other".to_owned(), 0)].into());
+        assert_eq!(calls, [("hzn_core::consensus::keep".to_owned(), 2), ("other".to_owned(), 0)].into());
     }
 }

@@ -8,10 +8,10 @@ use std::time::Instant;
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera, Model};
+use hzn_core::consensus::{self, Method};
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pipeline::edges::Edges;
 use hzn_core::pixel::ImagePoint;
-use hzn_core::reject::{self, Method};
 use hzn_core::{Config, Frame, HostHorizon};
 
 const HELP: &str = "usage: cargo xtask bench ransac [--runs N]
@@ -52,13 +52,14 @@ struct Set {
 /// One method under comparison.
 struct Contender {
     name: &'static str,
-    method: Option<reject::Config>,
+    method: Option<consensus::Config>,
 }
 
 fn contenders() -> Vec<Contender> {
     // 1° of their threshold is 1.6 px with 92 px/rad.
-    let sampler =
-        |method, max_draws| Some(reject::Config { method, max_draws, threshold_px: 1.6, ..reject::Config::default() });
+    let sampler = |method, max_draws| {
+        Some(consensus::Config { method, max_draws, threshold_px: 1.6, ..consensus::Config::default() })
+    };
     vec![
         Contender { name: "`two-point`", method: sampler(Method::TwoPoint, 800) },
         Contender { name: "`ransac-preverify`", method: sampler(Method::RansacPreverify, 20_000) },
@@ -127,7 +128,7 @@ fn compare(runs: u32) -> Result<(), String> {
                 let start = Instant::now();
                 let found = match &contender.method {
                     Some(method) => {
-                        let method = reject::Config { seed, ..*method };
+                        let method = consensus::Config { seed, ..*method };
                         let found = edges.reject(&expected, &method);
                         // Without an answer all draws were made.
                         (found.map(|a| a.axis), found.map_or(method.max_draws, |a| a.draws))

@@ -77,14 +77,14 @@ impl FrameData {
     /// The same for the pipeline, in metres. `altitude_km` of the row beats `default_altitude_km`.
     pub fn to_frame<T: Real>(&self, default_altitude_km: Option<f64>) -> Frame<T> {
         Frame {
-            altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::of(km * 1e3)),
-            position_m: self.position_km.map(|p| p.map(|km| T::of(km * 1e3))),
-            cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::of))),
-            attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::of(deg.to_radians())),
+            altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::from_f64(km * 1e3)),
+            position_m: self.position_km.map(|p| p.map(|km| T::from_f64(km * 1e3))),
+            cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::from_f64))),
+            attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::from_f64(deg.to_radians())),
             level: None,
-            sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::of))),
+            sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))),
             last: None,
-            rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::of)),
+            rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::from_f64)),
         }
     }
 }

@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use hzn_core::body::MAX_LATITUDES;
+use hzn_core::config::lacking;
 use hzn_core::error::{ConfigError, Limit};
-use hzn_core::pipeline::lacking;
 use hzn_core::region::{MAX_CORNERS, MAX_POLYGONS};
 use toml::de::{DeTable, DeValue};
 

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use hzn_core::camera::{self, Camera, Model};
 use hzn_core::error::ConfigError;
-use hzn_core::pipeline::MAX_BODIES;
+use hzn_core::report::MAX_BODIES;
 use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn methods_behind_features_are_taken_or_the_feature_is_named() {
-        for o in hzn_core::pipeline::OPTIONAL {
+        for o in hzn_core::config::OPTIONAL {
             let line = match o.key.split_once('.') {
                 Some((section, key)) => format!("{CAMERA}[{section}]\n{key} = {:?}\n", o.value),
                 None => format!("{} = {:?}\n{CAMERA}", o.key, o.value),

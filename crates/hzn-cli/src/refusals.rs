@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use hzn_core::pipeline::Verdict;
 use hzn_core::status::Status;
-use hzn_core::{Report, select};
+use hzn_core::verdict::Verdict;
+use hzn_core::{Report, gates};
 
 use hzn_run::engine::Finished;
 use hzn_run::explain;
@@ -27,7 +27,7 @@ impl Why {
         Some(most.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
     }
 
-    fn text(self, limits: &select::Config) -> String {
+    fn text(self, limits: &gates::Config) -> String {
         match self {
             Self::Verdict(verdict) => format!("{}: {}", verdict.name(), explain::why(verdict, limits)),
             Self::Status(status) => format!("{status}: {}", explain::without_edges(status)),
@@ -69,7 +69,7 @@ impl Refusals {
     }
 
     /// The commonest reason in words, and the number of the first frame with it; of reasons that are as common, the first.
-    pub(crate) fn commonest(&self, limits: &select::Config) -> Option<(String, Option<u64>)> {
+    pub(crate) fn commonest(&self, limits: &gates::Config) -> Option<(String, Option<u64>)> {
         let (why, n, first) = self.each.iter().rev().max_by_key(|(_, n, _)| *n)?;
         let share = if *n == self.total { "all".to_owned() } else { format!("{n}") };
         Some((format!("{} refused, {share} as {}", self.total, why.text(limits)), *first))

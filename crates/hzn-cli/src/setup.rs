@@ -8,7 +8,7 @@ use clap::Args;
 use hzn_calib::{FrameData, Frames, Sensor, plausible};
 use hzn_core::Config;
 use hzn_core::body::{self, FrameError};
-use hzn_core::pipeline::Orient;
+use hzn_core::config::Orient;
 use hzn_sim::Truth;
 
 use crate::exit::{Exit, Stop, usage};

@@ -11,14 +11,14 @@
 //!
 //! | stage | parameters | from | to |
 //! |---|---|---|---|
-//! | [`binarize`] | [`binarize::Config`], [`binarize::Gate`] | a sparse sample of the picture | the level between dark and lit |
+//! | [`binarize`] | [`threshold::Config`], [`threshold::Gate`] | a sparse sample of the picture | the level between dark and lit |
 //! | [`contour`] | [`contour::Config`] | pixels at the border, then along the edges | border pixels of one edge after another |
-//! | [`candidates`] | [`candidates::Config`] | border pixels | sub-pixel points at the local mid-level |
+//! | [`candidates`] | [`edge_points::Config`] | border pixels | sub-pixel points at the local mid-level |
 //! | undistort | [`camera::Config`] | points | unit rays with their derivatives |
-//! | [`reject`] | [`reject::Config`] | rays | the cone that most agree on |
-//! | [`estimate`] | [`estimate::Config`] | that cone and the rays | the fitted cone, half-angle free, and weights |
+//! | [`reject`] | [`consensus::Config`] | rays | the cone that most agree on |
+//! | [`estimate`] | [`fit::Config`] | that cone and the rays | the fitted cone, half-angle free, and weights |
 //! | [`covariance`] | [`covariance::Config`] | the fit and the noise model | covariance, and the expected half-angle fused |
-//! | [`select`] | [`select::Config`] | the answer | a verdict; the best of all candidates |
+//! | [`select`] | [`gates::Config`] | the answer | a verdict; the best of all candidates |
 //!
 //! Each module begins with its equations and their source; the project's docs/math.md has them in one place. They are tested
 //! beside the code, and against data of other programs (`golden`).
@@ -62,44 +62,28 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
-// Vocabulary.
-mod block;
-pub mod body;
-pub mod camera;
-#[cfg(any(feature = "horace", feature = "zju"))]
-mod circle;
-pub mod ellipsoid;
-pub mod error;
-pub mod frames;
+// Each folder knows those above it in this list and none below it; `tests/architecture.rs` holds that.
+mod base;
+pub mod config;
+mod geometry;
 pub mod image;
-mod limb;
-mod linalg;
-mod median;
-pub mod pixel;
-pub mod real;
-pub mod region;
-mod rng;
-#[cfg(feature = "dlr")]
-pub mod section;
-#[cfg(any(feature = "horace", feature = "zju"))]
-mod sort;
-pub mod status;
-pub mod work;
-
-// Stages, in the order of the data's way.
-pub mod binarize;
-pub mod candidates;
-pub mod contour;
-pub mod covariance;
-pub mod estimate;
-pub mod recover;
-pub mod reject;
-pub mod select;
-mod undistort;
-
-// The whole.
+mod model;
+mod papers;
 pub mod pipeline;
+mod stages;
+
+pub use base::{error, real};
+pub use config::retry;
+#[cfg(feature = "dlr")]
+pub use geometry::section;
+pub use geometry::{camera, ellipsoid, frames, pixel};
+pub use image::region;
+pub use model::{body, edge_noise, error_budget, observer, report, status, verdict, work};
+pub use stages::{consensus, contour, covariance, edge_points, fit, gates, threshold};
 
 pub use body::{Expected, Frame};
-pub use pipeline::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Preset, Report, Solution};
-pub use pipeline::{FlightWorkspace, HostWorkspace, Sensor, Workspace};
+pub use config::Config;
+pub use observer::{Observer, Unobserved};
+pub use papers::Preset;
+pub use pipeline::{FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, Workspace};
+pub use report::{Report, Solution};

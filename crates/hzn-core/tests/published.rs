@@ -8,14 +8,14 @@ use std::cell::{Cell, RefCell};
 use common::{KINDS, garbage};
 use hzn_core::body::{Frame, Kind};
 use hzn_core::camera::{self, Model};
-use hzn_core::candidates::SubPixel;
+use hzn_core::edge_points::SubPixel;
 use hzn_core::image::{Grey, Layout};
-use hzn_core::pipeline::Verdict;
 use hzn_core::pixel::{ImagePoint, Pixel};
-use hzn_core::recover::Combine;
+use hzn_core::retry::Combine;
 use hzn_core::status::Status;
-use hzn_core::{Config, FlightHorizon, HostHorizon, Observer, Preset, Report, contour, covariance, estimate, recover};
-use hzn_core::{binarize, reject};
+use hzn_core::verdict::Verdict;
+use hzn_core::{Config, FlightHorizon, HostHorizon, Observer, Preset, Report, contour, covariance, fit, retry};
+use hzn_core::{consensus, threshold};
 use proptest::prelude::*;
 
 /// A sphere 20° in radius seen by a pinhole of 60 px: a disc of 21.8 px.
@@ -173,11 +173,11 @@ fn halves_answer_where_the_whole_does_not() {
     let mut config = config(Preset::Horace2015, 4);
     config.select.radius_margin = 0.03;
     let data = spoilt(&config);
-    config.recover.method = recover::Method::None;
+    config.recover.method = retry::Method::None;
     let report = answer(&config, &data, &Watch::default());
     assert_eq!(report.status, Status::Rejected, "{:?}", report.candidates);
     assert!(report.candidates.iter().any(|c| c.verdict == Verdict::Radius));
-    config.recover.method = recover::Method::Division;
+    config.recover.method = retry::Method::Division;
     for combine in [Combine::Median, Combine::Mean] {
         config.recover.combine = combine;
         let watch = Watch::default();
@@ -207,7 +207,7 @@ fn the_radius_check_of_horace_is_in_pixels() {
     assert!((own.select.radius_margin_px * 768.0 / 240.0 - 5000.0).abs() < 1e-9);
     // The disc's radius is 87.4 px; limits that begin 3 px above it refuse it, unless the margin is wider.
     let mut config = config(Preset::Horace2015, 4);
-    config.recover.method = recover::Method::None;
+    config.recover.method = retry::Method::None;
     let data = disc(&config, 191.5, 127.5, 240.0 * 20f64.to_radians().tan());
     let altitude_of = |radius_px: f64| 1000.0 / (radius_px / 240.0).atan().sin() - 1000.0;
     config.select.radius_margin = 0.0;
@@ -241,7 +241,7 @@ fn division_ends_at_pictures_that_are_too_dark_or_too_bright() {
 #[test]
 fn a_picture_with_more_pixels_than_bits_is_truncated() {
     let mut config = config(Preset::Horace2015, 4);
-    config.recover.method = recover::Method::None;
+    config.recover.method = retry::Method::None;
     let data = disc(&config, 191.5, 127.5, 87.0);
     let mut flight = FlightHorizon::boxed(&config).unwrap();
     let expected = flight.expect(&Frame::default()).unwrap();
@@ -298,23 +298,23 @@ proptest! {
         let pick = methods.map(|m| m % 3);
         config.contour.method = CONTOURS[methods[0] % 4];
         config.reject.method = [
-            reject::Method::None, reject::Method::Ransac, reject::Method::TwoPoint, reject::Method::RansacPreverify,
-            reject::Method::Mlesac,
+            consensus::Method::None, consensus::Method::Ransac, consensus::Method::TwoPoint, consensus::Method::RansacPreverify,
+            consensus::Method::Mlesac,
         ][methods[1] % 5];
         config.estimate.method = [
-            estimate::Method::Sphere, estimate::Method::Direct, estimate::Method::Conic, estimate::Method::Circle,
-            estimate::Method::Tls, estimate::Method::Wtls,
+            fit::Method::Sphere, fit::Method::Direct, fit::Method::Conic, fit::Method::Circle,
+            fit::Method::Tls, fit::Method::Wtls,
         ][methods[2]];
         config.estimate.half_angle = [
-            estimate::HalfAngle::Free, estimate::HalfAngle::Fused, estimate::HalfAngle::Known,
+            fit::HalfAngle::Free, fit::HalfAngle::Fused, fit::HalfAngle::Known,
         ][pick[3]];
         config.covariance.method = [covariance::Method::Sandwich, covariance::Method::BraunBarf][pick[4] % 2];
         config.covariance.overbound = pick[5] == 0;
         config.candidates.sub_pixel =
             [SubPixel::None, SubPixel::Linear, SubPixel::Zernike, SubPixel::Erf][methods[4] % 4];
-        config.binarize.method = [binarize::Method::Otsu, binarize::Method::Dynamic, binarize::Method::Fixed][pick[5]];
+        config.binarize.method = [threshold::Method::Otsu, threshold::Method::Dynamic, threshold::Method::Fixed][pick[5]];
         config.input.scale_to_height = scaled.then_some(33);
-        config.recover.method = if divided { recover::Method::Division } else { recover::Method::None };
+        config.recover.method = if divided { retry::Method::Division } else { retry::Method::None };
         let data = garbage(kind, seed, level);
         let report = answer(&config, &data, &Watch::default());
         prop_assert_eq!(report.status == Status::Ok, report.solution.is_some());

@@ -2,13 +2,16 @@
 
 use std::cell::RefCell;
 
-use hzn_core::binarize::Method;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
-use hzn_core::pipeline::{HELD, Observer, Rows, RowsError, Unobserved};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
+use hzn_core::threshold::Method;
 use hzn_core::{Config, FlightWorkspace, Frame, Report, Sensor};
+use hzn_core::{
+    observer::{Observer, Unobserved},
+    pipeline::{HELD, Rows, RowsError},
+};
 use proptest::prelude::*;
 
 const W: usize = 96;

@@ -7,10 +7,10 @@ use hzn_core::body::{Frame, Kind};
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
-use hzn_core::pipeline::{MAX_LISTED, Verdict};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Preset, Report};
+use hzn_core::{report::MAX_LISTED, verdict::Verdict};
 use proptest::prelude::*;
 
 fn config(model: Model, circle: bool, mask: bool, kind: Kind) -> Config {

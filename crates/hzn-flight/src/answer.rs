@@ -1,9 +1,12 @@
 //! A report as bytes, with every bit of its numbers: what science telemetry carries.
 
 use hzn_core::frames::{Cov3, UnitVec3};
-use hzn_core::pipeline::{Candidate, Counters, MAX_LISTED, Verdict};
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Report, Solution};
+use hzn_core::{
+    report::{Candidate, Counters, MAX_LISTED},
+    verdict::Verdict,
+};
 
 use crate::bytes::{Reader, Writer};
 
@@ -20,7 +23,7 @@ pub struct Edge {
     pub inliers: u32,
     /// RMS distance from the limb in pixels; NaN without a fit.
     pub rms_px: f32,
-    /// [`hzn_core::pipeline::Verdict`] as a number.
+    /// [`hzn_core::verdict::Verdict`] as a number.
     pub verdict: u8,
 }
 

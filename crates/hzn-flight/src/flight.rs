@@ -4,7 +4,7 @@ use core::cell::RefCell;
 
 use hzn_core::body::Last;
 use hzn_core::image::{Grey, Layout};
-use hzn_core::pipeline::Observer;
+use hzn_core::observer::Observer;
 use hzn_core::pixel::Pixel;
 use hzn_core::status::Status;
 use hzn_core::{Frame, Sensor, Workspace};

@@ -3,16 +3,16 @@
 //! A value is a double, whatever the parameter: whole numbers and choices are refused when they are not whole, and a
 //! parameter that may be left out is NaN when it is.
 
-use hzn_core::binarize;
 use hzn_core::body::{AltitudeReference, Kind};
 use hzn_core::camera::{Camera, Model};
-use hzn_core::candidates::SubPixel;
+use hzn_core::config::Mount;
 use hzn_core::covariance::Noise;
+use hzn_core::edge_points::SubPixel;
 use hzn_core::error::ConfigError;
-use hzn_core::estimate::HalfAngle;
-use hzn_core::pipeline::Mount;
+use hzn_core::fit::HalfAngle;
 use hzn_core::region::{MAX_CORNERS, MAX_POLYGONS, Polygon};
-use hzn_core::{Config, camera, reject};
+use hzn_core::threshold;
+use hzn_core::{Config, camera, consensus};
 
 /// What a flight computer can be told: the sensor, and how often it tells about itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,9 +111,9 @@ impl FromWhole for u8 {
 choice! {
     Model { 0 KannalaBrandt, 1 Equidistant, 2 Pinhole, 3 BrownConrady }
     Kind { 0 Earth, 1 EarthSphere, 2 Sun, 3 Moon, 4 Sphere }
-    binarize::Method { 0 Otsu, 1 Fixed, 2 Dynamic }
+    threshold::Method { 0 Otsu, 1 Fixed, 2 Dynamic }
     SubPixel { 0 Linear, 1 None }
-    reject::Method { 0 TwoPoint, 1 None }
+    consensus::Method { 0 TwoPoint, 1 None }
     HalfAngle { 0 Fused, 1 Known, 2 Free }
     AltitudeReference { 0 Ellipsoid, 1 Sphere }
     Noise { 0 Told, 1 Rms }

@@ -59,11 +59,11 @@ pub struct CandidateEdge {
 impl CandidateEdge {
     /// The candidates of a report, in order.
     pub fn from_report<T: Real>(report: &Report<T>) -> Vec<Self> {
-        let edge = |c: &hzn_core::pipeline::Candidate<T>| Self {
+        let edge = |c: &hzn_core::report::Candidate<T>| Self {
             length_px: c.length_px,
             points: c.points,
             inliers: c.inliers,
-            rms_px: Some(c.rms_px.f64()).filter(|x| x.is_finite()),
+            rms_px: Some(c.rms_px.to_f64()).filter(|x| x.is_finite()),
             verdict: c.verdict.name().to_owned(),
         };
         report.candidates.iter().map(edge).collect()

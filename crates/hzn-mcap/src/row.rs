@@ -193,8 +193,8 @@ impl Row {
     }
 
     fn answer<T: Real>(&mut self, s: &Solution<T>) {
-        let of = |x: T| finite(x.f64());
-        let deg = |x: T| finite(x.f64().to_degrees());
+        let of = |x: T| finite(x.to_f64());
+        let deg = |x: T| finite(x.to_f64().to_degrees());
         [self.axis_x, self.axis_y, self.axis_z] = s.axis.xyz().map(of);
         [self.cov_xx, self.cov_xy, self.cov_xz, self.cov_yy, self.cov_yz, self.cov_zz] =
             s.covariance.upper_rad2.map(of);
@@ -204,7 +204,7 @@ impl Row {
         }
         self.half_angle_deg = deg(s.half_angle_rad);
         if let Some((altitude_m, sigma_m)) = s.altitude_m {
-            let km = |x: T| finite(x.f64() / 1e3);
+            let km = |x: T| finite(x.to_f64() / 1e3);
             (self.altitude_est_km, self.altitude_est_sigma_km) = (km(altitude_m), km(sigma_m));
         }
         self.rms_px = of(s.rms_px);
@@ -227,7 +227,7 @@ impl Row {
 /// side (+y) down, −180 to 180; positive pitch puts the nose (+x) up, −90 to 90. In the order yaw, pitch, roll the
 /// direction is (−sin p, sin r cos p, cos r cos p).
 pub fn roll_pitch_deg<T: Real>(to_body: &UnitVec3<Body, T>) -> [f64; 2] {
-    let [x, y, z] = to_body.xyz().map(Real::f64);
+    let [x, y, z] = to_body.xyz().map(Real::to_f64);
     [y.atan2(z).to_degrees(), (-x).atan2(y.hypot(z)).to_degrees()]
 }
 
@@ -281,7 +281,7 @@ mod status_name {
 mod tests {
     use super::*;
     use hzn_core::frames::Cov3;
-    use hzn_core::pipeline::Counters;
+    use hzn_core::report::Counters;
     use hzn_core::status::Stage;
 
     fn meta() -> RowMeta {
@@ -289,7 +289,7 @@ mod tests {
     }
 
     fn report<T: Real>(status: Status) -> Report<T> {
-        let of = T::of;
+        let of = T::from_f64;
         let solution = Solution {
             axis: UnitVec3::try_new([of(0.0), of(0.6), of(0.8)]).unwrap(),
             covariance: Cov3::from_upper([of(4e-8), of(0.0), of(0.0), of(1e-8), of(0.0), of(0.0)]),

@@ -1,7 +1,7 @@
 //! Arrays as pictures.
 
+use hzn_core::config::Input;
 use hzn_core::image::{Channel, ImageView, Layout, Pixels};
-use hzn_core::pipeline::Input;
 use hzn_run::source::picture;
 use numpy::ndarray::{Array3, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};

@@ -1,12 +1,12 @@
 //! What happened to a picture, in words and numbers for people.
 
 use hzn_core::covariance::Term;
-use hzn_core::pipeline::Verdict;
 use hzn_core::status::{Stage, Status};
-use hzn_core::{Report, Solution, select};
+use hzn_core::verdict::Verdict;
+use hzn_core::{Report, Solution, gates};
 
 /// What a verdict means, with the limit that was not met.
-pub fn why(verdict: Verdict, s: &select::Config) -> String {
+pub fn why(verdict: Verdict, s: &gates::Config) -> String {
     match verdict {
         Verdict::Chosen => "the answer".into(),
         Verdict::Passed => "passed every gate, but another fits better".into(),

@@ -16,9 +16,12 @@ use anyhow::{Context, anyhow};
 use clap::Parser;
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
-use hzn_core::pipeline::{Candidate, Observer, Solution};
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::{Config, HostHorizon};
+use hzn_core::{
+    observer::Observer,
+    report::{Candidate, Solution},
+};
 use hzn_sim::artefact::{Kind, Outcome, Told, Trial, look};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;

@@ -9,7 +9,7 @@ use core::mem::{align_of, size_of};
 use core::ptr::{self, NonNull};
 
 use hzn_core::image::{Grey, Layout};
-use hzn_core::pipeline::Unobserved;
+use hzn_core::observer::Unobserved;
 use hzn_core::{FlightWorkspace, Frame, Sensor};
 use hzn_flight::Parameters;
 use hzn_flight::answer::Answer;

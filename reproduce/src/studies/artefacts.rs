@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use hzn_core::pipeline::{Unobserved, Verdict};
 use hzn_core::{Config, HostHorizon};
+use hzn_core::{observer::Unobserved, verdict::Verdict};
 use hzn_sim::artefact::{FALSE_SIGMAS, GROSS_DEG, Kind, Outcome, Told, Trial, look};
 use rayon::prelude::*;
 

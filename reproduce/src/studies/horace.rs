@@ -1,8 +1,8 @@
 //! Barf 2014 and Barf et al. 2015: HORACE's own criteria.
 
 use anyhow::{Context, anyhow};
+use hzn_core::Preset;
 use hzn_core::camera::{self, Model};
-use hzn_core::pipeline::Preset;
 use hzn_core::{Config, body};
 use hzn_sim::evaluate::Evaluation;
 use hzn_sim::flight::rocket;

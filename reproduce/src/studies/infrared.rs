@@ -1,7 +1,7 @@
 //! Wang, Wang & Jin 2022, figures 5 to 8, and the infrared flight in low orbit.
 
 use hzn_cli::plot::{Chart, Series, Style};
-use hzn_core::pipeline::Preset;
+use hzn_core::Preset;
 use hzn_core::{Config, body};
 use hzn_sim::evaluate::{Case, Evaluation};
 use hzn_sim::flight::leo_infrared;

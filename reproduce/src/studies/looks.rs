@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use anyhow::Context;
-use hzn_core::binarize::{self, Method};
 use hzn_core::body::{self, Kind};
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
+use hzn_core::threshold::{self, Method};
 use hzn_core::{Config, Frame, HostHorizon};
 use hzn_sim::Scenario;
 use hzn_sim::painted::UnderCircle;
@@ -70,7 +70,7 @@ fn under_a_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
                 ..config.body
             };
             let level = disc.dark + (disc.lit - disc.dark) * part;
-            config.binarize = binarize::Config { method: Method::Fixed, level, ..config.binarize };
+            config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
             let mut horizon = HostHorizon::boxed(&config)?;
             let layout = Layout::packed(under.lens.width.into(), under.lens.height.into(), 1, 8);
             let expected = horizon.expect(&Frame::default())?;
@@ -230,7 +230,7 @@ impl Photograph {
     /// The answer at a fixed level and a threshold.
     fn at(&self, level: f64, threshold_px: f64) -> anyhow::Result<Option<Found>> {
         let mut config = self.sensor.clone();
-        config.binarize = binarize::Config { method: Method::Fixed, level, ..config.binarize };
+        config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
         config.reject.threshold_px = threshold_px;
         let mut horizon = HostHorizon::boxed(&config)?;
         let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);

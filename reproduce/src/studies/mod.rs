@@ -11,8 +11,8 @@ mod presets;
 mod scenes;
 
 use anyhow::{Context, anyhow};
+use hzn_core::Preset;
 use hzn_core::body::Kind;
-use hzn_core::pipeline::Preset;
 use hzn_core::{Config, body, covariance};
 use hzn_sim::scenario::{Fit, MEASURED};
 use hzn_sim::{Flight, Scenario, truth};

@@ -2,9 +2,9 @@
 
 use anyhow::anyhow;
 use hzn_core::HostHorizon;
+use hzn_core::Preset;
 use hzn_core::body::Kind;
 use hzn_core::image::Pixels;
-use hzn_core::pipeline::Preset;
 use hzn_sim::evaluate::Case;
 use hzn_sim::{Flight, Picture};
 

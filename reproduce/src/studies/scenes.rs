@@ -1,6 +1,6 @@
 //! The scenes of `hzn simulate`: accuracy and honesty as a user finds them with simulate, run and evaluate.
 
-use hzn_core::pipeline::Preset;
+use hzn_core::Preset;
 use hzn_sim::Flight;
 use hzn_sim::evaluate::Case;
 use hzn_sim::scenario::MEASURED;

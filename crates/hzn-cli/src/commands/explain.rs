@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use hzn_calib::FrameData;
 use hzn_core::status::{Stage, Status};
-use hzn_core::{Config, Report, Solution, binarize, body};
+use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_mcap::Annotations;
 
 use crate::exit::{Exit, Outcome, usage};
@@ -134,7 +134,7 @@ struct Told<'a> {
     name: &'a str,
     config: &'a Config,
     body: &'a body::Config,
-    levels: &'a binarize::Config,
+    levels: &'a threshold::Config,
     data: Option<&'a FrameData>,
     picture: &'a Picture,
     trace: &'a Trace,

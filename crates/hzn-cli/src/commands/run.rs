@@ -4,7 +4,7 @@ use hzn_run::explain;
 use std::path::{Path, PathBuf};
 
 use hzn_calib::Frames;
-use hzn_core::pipeline::Orient;
+use hzn_core::config::Orient;
 use hzn_core::status::Status;
 use hzn_mcap::{Row, part_path};
 

@@ -1,8 +1,8 @@
 //! The account that a picture's work is drawn on, by the methods that were chosen.
 
-use super::config::Config;
-use crate::candidates::SubPixel;
-use crate::work::{POINT, Work};
+use crate::config::Config;
+use crate::model::work::{POINT, Work};
+use crate::stages::edge_points::SubPixel;
 
 /// With all that a picture may cost, for lists that hold so many border pixels.
 pub(super) fn open(config: &Config, pixels: usize) -> Work {

@@ -6,24 +6,28 @@
 //! Sensor::level → Sensor::borders → Edges::pick → reject → fit → fuse
 //! ```
 
-use super::observer::{Observer, Unobserved};
-use super::report::Report;
+use super::found_limb::FoundLimb;
 use super::sensor::Sensor;
-use super::taken::Taken;
 use super::workspace::{HOST_POINTS, HOST_WORDS, Lists};
-use crate::binarize::{self, Level};
-use crate::block::{Block, LANES, Lit};
-use crate::body::Expected;
-use crate::camera::Camera;
-use crate::contour::Scene;
-use crate::frames::{Cam, Cov3, UnitVec3};
+use crate::base::linalg::basis;
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES, Lit};
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::{Cam, Cov3, UnitVec3};
+use crate::geometry::pixel::{ImagePoint, Pixel};
 use crate::image::Pixels;
-use crate::linalg::basis;
-use crate::pixel::{ImagePoint, Pixel};
-use crate::real::Real;
-use crate::status::Status;
-use crate::work::Work;
-use crate::{candidates, covariance, estimate, reject, undistort};
+use crate::model::body::Expected;
+use crate::model::observer::{Observer, Unobserved};
+use crate::model::report::Report;
+use crate::model::status::Status;
+use crate::model::work::Work;
+use crate::stages::consensus;
+use crate::stages::contour::Scene;
+use crate::stages::covariance;
+use crate::stages::edge_points;
+use crate::stages::fit;
+use crate::stages::rays;
+use crate::stages::threshold::{self, Level};
 use std::cell::RefCell;
 use std::vec;
 use std::vec::Vec;
@@ -53,7 +57,7 @@ pub struct Agreed<T> {
 
 /// A cone that was fitted, with its normal equations.
 #[derive(Debug, Clone, Copy)]
-pub struct Fitted<T>(estimate::Fit<T>);
+pub struct Fitted<T>(fit::Fit<T>);
 
 impl<T: Real> Fitted<T> {
     /// Axis of the cone, towards the body.
@@ -94,7 +98,7 @@ impl<T: Real> Sensor<T> {
         let config = self.config();
         let levels = config.levels_of(expected.which);
         let seed = config.reject.seed;
-        binarize::split(picture, self.region(), &config.gate, levels, expected.level, seed, &Unobserved)
+        threshold::split(picture, self.region(), &config.gate, levels, expected.level, seed, &Unobserved)
     }
 
     /// Border pixels of every edge of a picture at a level, in order along each; the edges in the order in which the
@@ -145,9 +149,9 @@ impl<T: Real> Edges<T> {
     pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
         let scene = Scene::new(picture, sensor.region(), level, &Unobserved).blooming(sensor.config().body.blooms());
         let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
-        let made = candidates::pick(&scene, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
+        let made = edge_points::pick(&scene, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
         let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
-        let clipped = T::of_i32(made.clipped as i32) / T::of_i32(made.count.max(1) as i32);
+        let clipped = T::from_i32(made.clipped as i32) / T::from_i32(made.count.max(1) as i32);
         Self { clipped, ..Self::of(sensor.camera(), (0..made.count as usize).map(point).collect()) }
     }
 
@@ -156,9 +160,9 @@ impl<T: Real> Edges<T> {
         for (i, &(point, lit)) in points.iter().enumerate() {
             blocks[i / LANES].set_point(i % LANES, point, lit);
         }
-        undistort::to_rays(camera, &mut blocks);
+        rays::to_rays(camera, &mut blocks);
         let (fx, fy) = camera.focal_px();
-        Self { blocks, points, focal_px: (fx + fy) * T::of(0.5), clipped: T::ZERO }
+        Self { blocks, points, focal_px: (fx + fy) * T::from_f64(0.5), clipped: T::ZERO }
     }
 
     /// The points in the picture, and on which side of each the light is: a step along u or v.
@@ -188,23 +192,23 @@ impl<T: Real> Edges<T> {
 
     /// Takes out the points on the limb of another body, which was found before; how many there were. The pipeline tries
     /// an edge no further that has more than half of its points there.
-    pub fn withdraw(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T, config: &reject::Config) -> u32 {
-        let taken = Taken { e: *axis.v(), c: cos_half_angle };
-        taken.withdraw(&mut self.blocks, T::of(config.threshold_px))
+    pub fn withdraw(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T, config: &consensus::Config) -> u32 {
+        let taken = FoundLimb { e: *axis.v(), c: cos_half_angle };
+        taken.withdraw(&mut self.blocks, T::from_f64(config.threshold_px))
     }
 
     /// The distance from the limb up to which a point can be an inlier: by the noise from point to point, whatever the
     /// weights are.
-    fn threshold(&self, expected: &Expected<T>, config: &reject::Config) -> reject::Threshold<T> {
-        reject::Threshold::of(&self.blocks, self.points.len() as u32, expected, self.focal_px, config)
+    fn threshold(&self, expected: &Expected<T>, config: &consensus::Config) -> consensus::Threshold<T> {
+        consensus::Threshold::of(&self.blocks, self.points.len() as u32, expected, self.focal_px, config)
     }
 
     /// Rejects outliers.
-    pub fn reject(&mut self, expected: &Expected<T>, config: &reject::Config) -> Option<Agreed<T>> {
+    pub fn reject(&mut self, expected: &Expected<T>, config: &consensus::Config) -> Option<Agreed<T>> {
         let (count, mut work) = (self.points.len() as u32, Work::unlimited());
         let expected = &expected.clipped(self.clipped);
         let threshold = self.threshold(expected, config);
-        let found = reject::keep(&mut self.blocks, count, expected, self.focal_px, threshold, config, &mut work)?;
+        let found = consensus::keep(&mut self.blocks, count, expected, self.focal_px, threshold, config, &mut work)?;
         let axis = UnitVec3::assume_unit(found.e);
         Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
     }
@@ -214,16 +218,15 @@ impl<T: Real> Edges<T> {
         let config = sensor.config();
         let expected = &expected.clipped(self.clipped);
         let start =
-            reject::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
+            consensus::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
         let threshold = self.threshold(expected, &config.reject).px;
         let noise = sensor.config.noise_of(expected.which);
-        estimate::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise)
-            .map(Fitted)
+        fit::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise).map(Fitted)
     }
 
     /// The cone that somebody else has fitted, with the normal equations of the points at it, by their weights.
     pub fn given(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T) -> Option<Fitted<T>> {
-        estimate::given(&mut self.blocks, *axis.v(), cos_half_angle).map(Fitted)
+        fit::given(&mut self.blocks, *axis.v(), cos_half_angle).map(Fitted)
     }
 
     /// The covariance of a fit, and the expected half-angle fused with it.

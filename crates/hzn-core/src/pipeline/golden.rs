@@ -9,18 +9,19 @@ mod lens;
 #[cfg(feature = "zju")]
 mod zju;
 
-use crate::block::{Block, LANES};
-use crate::body::{self, Expected, Frame};
-use crate::camera::{Camera, Config as CameraConfig, Model};
-use crate::ellipsoid::LimbCone;
-use crate::estimate::{self, HalfAngle};
-use crate::frames::{Cam, Cov3, Ecef, Rotation, UnitVec3};
-use crate::linalg::{V3, basis, invert_spd2, unit};
+use crate::base::linalg::{V3, basis, invert_spd2, unit};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::{Camera, Config as CameraConfig, Model};
+use crate::geometry::ellipsoid::LimbCone;
+use crate::geometry::frames::{Cam, Cov3, Ecef, Rotation, UnitVec3};
+use crate::geometry::pixel::ImagePoint;
+use crate::model::body::{self, Expected, Frame};
+use crate::model::work::Work;
 use crate::pipeline::edges::Edges;
-use crate::pixel::ImagePoint;
-use crate::real::Real;
-use crate::work::Work;
-use crate::{covariance, reject};
+use crate::stages::consensus;
+use crate::stages::covariance;
+use crate::stages::fit::{self, HalfAngle};
 use serde_json::Value;
 use std::vec::Vec;
 
@@ -51,12 +52,12 @@ fn camera_config(v: &Value) -> CameraConfig {
     }
 }
 fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
-    UnitVec3::try_new(v.map(T::of)).unwrap()
+    UnitVec3::try_new(v.map(T::from_f64)).unwrap()
 }
 
 /// Edge points as the candidates stage leaves them; the lit side is where the axis `e` lies.
 fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
-    let points: Vec<_> = points.iter().map(|&(u, v)| ImagePoint { u: T::of(u), v: T::of(v) }).collect();
+    let points: Vec<_> = points.iter().map(|&(u, v)| ImagePoint { u: T::from_f64(u), v: T::from_f64(v) }).collect();
     Edges::new(camera, &points, e).blocks
 }
 
@@ -80,11 +81,16 @@ fn lens<T: Real>(tolerance_rad: f64, tolerance_px: f64) {
         let mut compared = 0;
         let mut check = |ray: &Value, pixel: &Value| {
             let d = direction::<T>(triple(ray));
-            let p = ImagePoint { u: T::of(num(&pixel[0])), v: T::of(num(&pixel[1])) };
+            let p = ImagePoint { u: T::from_f64(num(&pixel[0])), v: T::from_f64(num(&pixel[1])) };
             let Some(back) = camera.unproject(p) else { return };
-            assert!(back.angle_rad(&d).f64() < tolerance_rad, "{} {p:?}: {:e}", case["name"], back.angle_rad(&d).f64());
+            assert!(
+                back.angle_rad(&d).to_f64() < tolerance_rad,
+                "{} {p:?}: {:e}",
+                case["name"],
+                back.angle_rad(&d).to_f64()
+            );
             if let Some(q) = camera.project(&d) {
-                assert!((q.u - p.u).abs().f64() < tolerance_px && (q.v - p.v).abs().f64() < tolerance_px);
+                assert!((q.u - p.u).abs().to_f64() < tolerance_px && (q.v - p.v).abs().to_f64() < tolerance_px);
             }
             compared += 1;
         };
@@ -100,7 +106,7 @@ fn lens<T: Real>(tolerance_rad: f64, tolerance_px: f64) {
         if let Some(limit) = limit {
             let error = Camera::<T>::try_new(&CameraConfig { theta_max_deg: Some((limit - 1.0).min(175.0)), ..config })
                 .unwrap_err();
-            let crate::error::Limit::Monotone(got) = error.limit else { panic!("{error}") };
+            let crate::base::error::Limit::Monotone(got) = error.limit else { panic!("{error}") };
             assert!((got - limit).abs() < 1e-3, "{}: {got} {limit}", case["name"]);
         }
     }
@@ -119,19 +125,19 @@ fn limb_cone<T: Real>(tolerance_deg: f64) {
         let d = num(&case["atmosphere_d_m"]);
         let (mut a, mut b) = (num(&case["a_m"]), num(&case["b_m"]));
         // a_m and b_m include the atmosphere.
-        if a < crate::ellipsoid::WGS84_A_M + d - 1.0 {
+        if a < crate::geometry::ellipsoid::WGS84_A_M + d - 1.0 {
             (a, b) = (a + d, b + d);
         }
         let position = triple(&case["r_ecef_m"]);
-        let cone = LimbCone::<T>::try_new(position.map(T::of), T::of(a), T::of(b)).unwrap();
-        let want = UnitVec3::<Ecef, T>::try_new(triple(&case["limb_axis_ecef"]).map(T::of)).unwrap();
-        let off = cone.axis.angle_rad(&want).f64().to_degrees();
+        let cone = LimbCone::<T>::try_new(position.map(T::from_f64), T::from_f64(a), T::from_f64(b)).unwrap();
+        let want = UnitVec3::<Ecef, T>::try_new(triple(&case["limb_axis_ecef"]).map(T::from_f64)).unwrap();
+        let off = cone.axis.angle_rad(&want).to_f64().to_degrees();
         assert!(off < tolerance_deg, "{}: axis {off:e}", case["id"]);
         let (east, meridian) = cone.half_angles_rad();
         for (got, want) in
             [(east, &case["cone_half_angle_east_deg"]), (meridian, &case["cone_half_angle_meridian_deg"])]
         {
-            let off = (got.f64().to_degrees() - num(want)).abs();
+            let off = (got.to_f64().to_degrees() - num(want)).abs();
             assert!(off < tolerance_deg, "{}: half-angle {off:e}", case["id"]);
         }
     }
@@ -213,20 +219,20 @@ fn solve<T: Real>(
     correlation_px: f64,
 ) -> Option<Answer<T>> {
     let mut blocks = blocks(camera, points, lit_towards);
-    let config = reject::Config::default();
+    let config = consensus::Config::default();
     let (fx, _) = camera.focal_px();
-    let start = reject::keep(
+    let start = consensus::keep(
         &mut blocks,
         points.len() as u32,
         expected,
         fx,
-        reject::Threshold::told(&config),
+        consensus::Threshold::told(&config),
         &config,
         &mut Work::unlimited(),
     )?;
-    let estimate = estimate::Config { half_angle, ..Default::default() };
+    let estimate = fit::Config { half_angle, ..Default::default() };
     let noise = covariance::Config::told(sigma_px, correlation_px);
-    let fit = estimate::fit(&mut blocks, &start, expected, camera, T::of(config.threshold_px), &estimate, &noise)?;
+    let fit = fit::fit(&mut blocks, &start, expected, camera, T::from_f64(config.threshold_px), &estimate, &noise)?;
     let fused = covariance::fuse(&blocks, &fit, expected, &noise, &estimate, camera, None)?;
     let (b1, b2) = basis(&fused.e);
     Some(Answer {
@@ -250,7 +256,7 @@ fn sphere(altitude_m: f64, radius_m: f64, limb_sigma_km: f64) -> (body::Config, 
 }
 
 fn single<T: Real>(frame: &Frame<f64>) -> Frame<T> {
-    Frame { altitude_m: frame.altitude_m.map(T::of), ..Frame::default() }
+    Frame { altitude_m: frame.altitude_m.map(T::from_f64), ..Frame::default() }
 }
 
 /// `nadir_cases.json`: scipy maximum-likelihood fits.
@@ -276,7 +282,7 @@ fn nadir<T: Real>(noise_free_deg: f64) {
             let want = direction::<T>(triple(&reference[key]));
             // The reference weighs all inliers alike: so does the fit without robust weights.
             let got = plain(&camera, &inliers, &truth, &expected, which);
-            let off = got.angle_rad(&want).f64().to_degrees();
+            let off = got.angle_rad(&want).to_f64().to_degrees();
             let limit = if sigma == 0.0 {
                 clean += 1;
                 noise_free_deg
@@ -293,7 +299,7 @@ fn nadir<T: Real>(noise_free_deg: f64) {
         // And with the outliers in, the whole chain stays within the noise.
         if outlier.iter().any(|o| *o) {
             let answer = solve(&camera, &points, &truth, &expected, HalfAngle::Known, sigma.max(0.1), 0.0).unwrap();
-            let off = answer.axis.angle_rad(&truth).f64().to_degrees();
+            let off = answer.axis.angle_rad(&truth).to_f64().to_degrees();
             let bound = reference["white_crlb_known_alpha_deg"].as_f64().unwrap_or(0.05);
             assert!(off < 6.0 * bound, "{}: {off} with outliers, bound {bound}", case["id"]);
             assert!(f64::from(answer.inliers) > 0.8 * inliers.len() as f64);
@@ -312,12 +318,16 @@ fn plain<T: Real>(
 ) -> UnitVec3<Cam, T> {
     let mut blocks = blocks(camera, points, truth);
     let (b1, _) = basis(truth.v());
-    let start =
-        reject::Consensus { e: unit(&(truth.v() + b1 * T::of(0.03))).unwrap(), c: expected.cos, draws: 0, all: false };
-    let estimate = estimate::Config { half_angle: which, ..Default::default() };
+    let start = consensus::Consensus {
+        e: unit(&(truth.v() + b1 * T::from_f64(0.03))).unwrap(),
+        c: expected.cos,
+        draws: 0,
+        all: false,
+    };
+    let estimate = fit::Config { half_angle: which, ..Default::default() };
     // A threshold so wide that Tukey's weights are one.
     let fit =
-        estimate::fit(&mut blocks, &start, expected, camera, T::of(1e5), &estimate, &covariance::Config::default())
+        fit::fit(&mut blocks, &start, expected, camera, T::from_f64(1e5), &estimate, &covariance::Config::default())
             .unwrap();
     UnitVec3::assume_unit(fit.e)
 }
@@ -337,14 +347,14 @@ fn sandwich<T: Real>(tolerance: f64) {
             case["pixels"].as_array().unwrap().iter().map(|p| (num(&p[0]), num(&p[1]))).collect();
         let mut blocks = blocks(&camera, &points, &e);
         for (i, step) in case["step_px"].as_array().unwrap().iter().enumerate() {
-            blocks[(i + 1) / LANES].step_px[(i + 1) % LANES] = T::of(num(step));
+            blocks[(i + 1) / LANES].step_px[(i + 1) % LANES] = T::from_f64(num(step));
         }
         let (b1, b2) = basis(e.v());
-        let c = T::of(num(&case["cos_alpha"]));
-        let mean = estimate::means(&blocks, &b1, &b2);
-        let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, T::one() - c, mean, &estimate::Weights::Kept, None);
-        let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::of(num(&case["L_px"])));
-        let variance = T::of(num(&case["R_px2"]));
+        let c = T::from_f64(num(&case["cos_alpha"]));
+        let mean = fit::means(&blocks, &b1, &b2);
+        let sums = fit::pass(&mut blocks, e.v(), &b1, &b2, T::one() - c, mean, &fit::Weights::Kept, None);
+        let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::from_f64(num(&case["L_px"])));
+        let variance = T::from_f64(num(&case["R_px2"]));
         let [known, free] = [false, true]
             .map(|free| covariance::sandwich(&covariance::response(&sums, mean, free).unwrap(), &x) * variance);
         let known = [known.m11, known.m12, known.m22];
@@ -354,7 +364,7 @@ fn sandwich<T: Real>(tolerance: f64) {
             let scale = want.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
             for i in 0..3 {
                 for j in 0..3 {
-                    let off = (got[i][j].f64() - want[i][j]).abs() / scale;
+                    let off = (got[i][j].to_f64() - want[i][j]).abs() / scale;
                     assert!(off < tolerance, "{} {name} [{i}][{j}]: {off:e}", case["id"]);
                 }
             }
@@ -362,7 +372,7 @@ fn sandwich<T: Real>(tolerance: f64) {
         compare("wls_sandwich", known);
         compare("free_alpha_wls_sandwich", [free.m11, free.m12, free.m22]);
         let want = num(&case["tangent"]["var_cos_alpha_free"]);
-        assert!((free.m33.f64() / want - 1.0).abs() < tolerance, "{}: var cos", case["id"]);
+        assert!((free.m33.to_f64() / want - 1.0).abs() < tolerance, "{}: var cos", case["id"]);
     }
 }
 
@@ -386,7 +396,7 @@ fn dense<T: Real>(
     let arc: Vec<f64> = (0..count)
         .map(|i| {
             let (block, l) = lane(i);
-            along += if i == 0 { 0.0 } else { block.step_px[l].f64() };
+            along += if i == 0 { 0.0 } else { block.step_px[l].to_f64() };
             along
         })
         .collect();
@@ -395,10 +405,10 @@ fn dense<T: Real>(
     let mut n = Matrix3::<f64>::zeros();
     for i in 0..count {
         let (block, l) = lane(i);
-        let g = block.gradient_at(l, e).map(Real::f64);
+        let g = block.gradient_at(l, e).map(Real::to_f64);
         let s = block.ray(l);
-        let h = nalgebra::Vector3::new(s.dot(b1).f64(), s.dot(b2).f64(), -1.0);
-        let w = block.weight[l].f64() / (g[0] * g[0] + g[1] * g[1]);
+        let h = nalgebra::Vector3::new(s.dot(b1).to_f64(), s.dot(b2).to_f64(), -1.0);
+        let w = block.weight[l].to_f64() / (g[0] * g[0] + g[1] * g[1]);
         n += h * h.transpose() * w;
         for k in 0..2 {
             wh[k].set_row(i, &(h * (w * g[k])).transpose());
@@ -417,7 +427,7 @@ fn recursion<T: Real>(tolerance: f64) {
     let (camera, e) = rocket_camera();
     let c = 0.157;
     // Steps of one pixel and more, as a thinned border has them.
-    let mut rng = crate::rng::Rng::new(11);
+    let mut rng = crate::base::rng::Rng::new(11);
     let points: Vec<_> = limb(&camera, &e, c, 1.0).into_iter().filter(|_| rng.below(3) > 0).collect();
     let camera =
         Camera::<T>::try_new(&CameraConfig::ideal(Model::Pinhole, camera.width(), camera.height(), 888.97)).unwrap();
@@ -425,10 +435,10 @@ fn recursion<T: Real>(tolerance: f64) {
     let (b1, b2) = basis(e.v());
     for length_px in [3.0, 300.0, 1e4] {
         let mut blocks = blocks(&camera, &points, &e);
-        let mean = estimate::means(&blocks, &b1, &b2);
-        let weights = estimate::Weights::Kept;
-        let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, T::of(1.0 - c), mean, &weights, None);
-        let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::of(length_px));
+        let mean = fit::means(&blocks, &b1, &b2);
+        let weights = fit::Weights::Kept;
+        let sums = fit::pass(&mut blocks, e.v(), &b1, &b2, T::from_f64(1.0 - c), mean, &weights, None);
+        let x = covariance::correlated(&blocks, e.v(), &b1, &b2, mean, T::from_f64(length_px));
         let [known, free] =
             [false, true].map(|free| covariance::sandwich(&covariance::response(&sums, mean, free).unwrap(), &x));
         let [a, b, d] = [known.m11, known.m12, known.m22];
@@ -437,12 +447,12 @@ fn recursion<T: Real>(tolerance: f64) {
         for i in 0..3 {
             for j in 0..3 {
                 let scale = libm::sqrt(want[(i, i)] * want[(j, j)]);
-                worst = worst.max((free[(i, j)].f64() - want[(i, j)]).abs() / scale);
+                worst = worst.max((free[(i, j)].to_f64() - want[(i, j)]).abs() / scale);
             }
         }
         let scale = want_known.trace();
         for (got, want) in [(a, want_known[(0, 0)]), (b, want_known[(0, 1)]), (d, want_known[(1, 1)])] {
-            worst = worst.max((got.f64() - want).abs() / scale);
+            worst = worst.max((got.to_f64() - want).abs() / scale);
         }
         assert!(worst < tolerance, "{} points, {length_px} px: {worst:e}", points.len());
     }
@@ -455,7 +465,7 @@ fn the_recursion_equals_the_dense_product() {
 }
 
 /// Gaussian numbers for the Monte Carlo, by the sum of twelve.
-struct Gauss(crate::rng::Rng);
+struct Gauss(crate::base::rng::Rng);
 impl Gauss {
     fn next(&mut self) -> f64 {
         (0..12).map(|_| f64::from(self.0.below(1 << 24)) / f64::from(1 << 24)).sum::<f64>() - 6.0
@@ -519,11 +529,11 @@ struct Errors {
 
 impl Errors {
     fn add<T: Real>(&mut self, answer: &Answer<T>, truth: &UnitVec3<Cam, f64>) {
-        let axis = V3::from(answer.axis.xyz().map(Real::f64));
+        let axis = V3::from(answer.axis.xyz().map(Real::to_f64));
         let (b1, b2) = basis(&axis);
         let off = V3::from(truth.xyz()) - axis;
         let (x, y) = (off.dot(&b1), off.dot(&b2));
-        let p = answer.p.map(Real::f64);
+        let p = answer.p.map(Real::to_f64);
         let [a, b, d] = invert_spd2(p).expect("a covariance");
         self.runs += 1;
         self.squares += x * x + y * y;
@@ -552,7 +562,7 @@ fn monte_carlo(
     let radius = 6_371_008.8;
     let (body, frame) = sphere(altitude_m, radius, limb_sigma_km);
     let expected = Expected::new(&body, &frame).unwrap();
-    let mut gauss = Gauss(crate::rng::Rng::new(7));
+    let mut gauss = Gauss(crate::base::rng::Rng::new(7));
     let mut errors = Errors::default();
     for _ in 0..runs {
         // The limb height is what the prior says, give or take its sigma.
@@ -586,7 +596,7 @@ fn bound_deg(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, altitude_m: f64, sigm
     let c = libm::sqrt(1.0 - sin * sin);
     let mut blocks = blocks(camera, &limb(camera, e, c, 3.0), e);
     let (b1, b2) = basis(e.v());
-    let sums = estimate::pass(&mut blocks, e.v(), &b1, &b2, 1.0 - c, [0.0; 2], &estimate::Weights::Kept, None);
+    let sums = fit::pass(&mut blocks, e.v(), &b1, &b2, 1.0 - c, [0.0; 2], &fit::Weights::Kept, None);
     let [a, _, d] = invert_spd2(sums.known([0.0; 2])).unwrap();
     (libm::sqrt(a + d) * sigma_px).to_degrees()
 }
@@ -625,7 +635,7 @@ fn correlated_errors_are_told_honestly() {
 /// Errors with a panoramic lens of 92 px/rad at 600 km above the ellipsoid: white errors of 0.2 px, the attitude about
 /// the axis known to 5°, places and attitudes all around.
 fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
-    use crate::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic};
+    use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic};
     use core::f64::consts::{PI, TAU};
     const SIGMA_PX: f64 = 0.2;
     const YAW_SIGMA_RAD: f64 = PI / 36.0;
@@ -637,8 +647,8 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         limb_height_sigma_km: 0.1,
         ..body::Config::default()
     };
-    let mut rng = crate::rng::Rng::new(21);
-    let mut gauss = Gauss(crate::rng::Rng::new(22));
+    let mut rng = crate::base::rng::Rng::new(21);
+    let mut gauss = Gauss(crate::base::rng::Rng::new(22));
     let mut errors = Errors::default();
     for _ in 0..runs {
         let mut even = || f64::from(rng.below(1 << 24)) / f64::from(1 << 24);
@@ -673,9 +683,9 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         let columns = [x, y, z].map(|axis| turned * nalgebra::Vector3::new(axis.x, axis.y, axis.z));
         let attitude: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]));
         let frame = Frame::<T> {
-            position_m: Some(position.map(T::of)),
-            cam_to_ecef: Rotation::assume_from_quaternion(quaternion(&attitude).map(T::of)),
-            attitude_sigma_rad: Some(T::of(YAW_SIGMA_RAD)),
+            position_m: Some(position.map(T::from_f64)),
+            cam_to_ecef: Rotation::assume_from_quaternion(quaternion(&attitude).map(T::from_f64)),
+            attitude_sigma_rad: Some(T::from_f64(YAW_SIGMA_RAD)),
             ..Frame::default()
         };
         let expected = Expected::new(&body, &frame).unwrap();
@@ -704,8 +714,8 @@ fn eighty_percent_outliers() {
     let (body, frame) = sphere(120e3, 6_371_008.8, 0.5);
     let expected = Expected::new(&body, &frame).unwrap();
     let exact = limb(&camera, &e, expected.cos, 1.0);
-    let mut rng = crate::rng::Rng::new(3);
-    let mut gauss = Gauss(crate::rng::Rng::new(4));
+    let mut rng = crate::base::rng::Rng::new(3);
+    let mut gauss = Gauss(crate::base::rng::Rng::new(4));
     let mut found = 0;
     let runs = 200;
     for _ in 0..runs {
@@ -731,6 +741,6 @@ fn eighty_percent_outliers() {
 #[test]
 fn workspaces_fit_their_budgets() {
     // 96 KiB beside the frame, with room for the stack.
-    assert!(size_of::<crate::FlightHorizon>() < 92 * 1024, "{}", size_of::<crate::FlightHorizon>());
-    assert!(size_of::<crate::HostHorizon>() < 1536 * 1024, "{}", size_of::<crate::HostHorizon>());
+    assert!(size_of::<crate::pipeline::FlightHorizon>() < 92 * 1024, "{}", size_of::<crate::pipeline::FlightHorizon>());
+    assert!(size_of::<crate::pipeline::HostHorizon>() < 1536 * 1024, "{}", size_of::<crate::pipeline::HostHorizon>());
 }

@@ -1,16 +1,17 @@
 //! The sensor with its lists: what most programs hold.
 
-use super::config::{Config, MAX_BODIES};
-use super::observer::{Observer, Unobserved};
-use super::report::{Report, Reports};
 use super::sensor::Sensor;
 use super::workspace::{HOST_POINTS, HOST_WORDS, Workspace};
-use crate::body::{Expected, Frame, FrameError};
-use crate::camera::Camera;
-use crate::error::ConfigError;
+use crate::base::error::ConfigError;
+use crate::base::real::Real;
+use crate::config::Config;
+use crate::geometry::camera::Camera;
 use crate::image::Pixels;
-use crate::real::Real;
-use crate::region::Region;
+use crate::image::region::Region;
+use crate::model::body::{Expected, Frame, FrameError};
+use crate::model::observer::{Observer, Unobserved};
+use crate::model::report::MAX_BODIES;
+use crate::model::report::{Report, Reports};
 
 /// The sensor of a workstation: f64, 16384 points.
 pub type HostHorizon = Horizon<f64, HOST_POINTS, 2048, HOST_WORDS>;

@@ -7,32 +7,22 @@
 //! picture without an answer is looked at again, at other levels (`[recover]`).
 
 mod account;
-mod config;
 #[cfg(any(test, feature = "_edges"))]
 pub mod edges;
+mod found_limb;
+mod further_looks;
 mod horizon;
-mod judge;
-mod looks;
-mod observer;
-mod optional;
-#[cfg(feature = "horace")]
-mod parts;
-mod preset;
-mod report;
+mod row_stream;
+mod search;
 mod sensor;
-mod stream;
-mod taken;
+#[cfg(feature = "horace")]
+mod subdivide;
 mod workspace;
 
 #[cfg(test)]
 mod golden;
 
-pub use config::{Config, Input, MAX_BODIES, Mount, Orient};
 pub use horizon::{FlightHorizon, Horizon, HostHorizon};
-pub use observer::{Observer, Unobserved};
-pub use optional::{OPTIONAL, Optional, lacking};
-pub use preset::Preset;
-pub use report::{Candidate, Counters, Free, MAX_LISTED, Report, Reports, Solution, Verdict};
+pub use row_stream::{HELD, Rows, RowsError, Stream};
 pub use sensor::Sensor;
-pub use stream::{HELD, Rows, RowsError, Stream};
 pub use workspace::{FlightWorkspace, HostWorkspace, Workspace};

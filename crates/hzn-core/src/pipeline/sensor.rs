@@ -1,22 +1,23 @@
 //! A configuration that was accepted, and the order of the stages.
 
-use super::config::{Config, MAX_BODIES, Mount};
-use super::judge::Judge;
-use super::observer::Observer;
-use super::report::{Report, Reports};
-use super::taken::Taken;
+use super::found_limb::FoundLimb;
+use super::search::Search;
 use super::workspace::{Lists, Workspace};
-use crate::binarize;
-use crate::body::{Expected, Frame, FrameError};
-use crate::camera::Camera;
-use crate::contour::{self, Scene};
-use crate::error::ConfigError;
-use crate::frames::{Body, Cam, Rotation};
+use crate::base::error::ConfigError;
+use crate::base::real::Real;
+use crate::config::{Config, Mount};
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::{Body, Cam, Rotation};
 use crate::image::Pixels;
-use crate::real::Real;
-use crate::region::Region;
-use crate::status::Stage;
-use crate::work::Work;
+use crate::image::region::Region;
+use crate::model::body::{Expected, Frame, FrameError};
+use crate::model::observer::Observer;
+use crate::model::report::MAX_BODIES;
+use crate::model::report::{Report, Reports};
+use crate::model::status::Stage;
+use crate::model::work::Work;
+use crate::stages::contour::{self, Scene};
+use crate::stages::threshold;
 
 /// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
 /// that a picture needs are in a [`Workspace`]. [`Horizon`](super::Horizon) is both together.
@@ -38,7 +39,7 @@ impl<T: Real> Sensor<T> {
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
         let camera = Camera::try_new(&config.camera)?;
-        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::of));
+        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::from_f64));
         Ok(Self {
             region: Region::new(&config.mask, &camera),
             cam_to_body: config.mount.and_then(turn),
@@ -94,12 +95,12 @@ impl<T: Real> Sensor<T> {
         observer: &O,
     ) -> Reports<T> {
         let mut reports = Reports::new();
-        let mut taken = heapless::Vec::<Taken<T>, MAX_BODIES>::new();
+        let mut taken = heapless::Vec::<FoundLimb<T>, MAX_BODIES>::new();
         for one in expected {
             observer.body(one.which);
             let report = self.process_beside(workspace.lists(), picture, one, &taken, observer);
             let found = report.solution.as_ref();
-            let found = found.map(|s| Taken { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
+            let found = found.map(|s| FoundLimb { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
             // There is room for as many as there can be bodies.
             if reports.push(report).is_err() || found.is_some_and(|f| taken.push(f).is_err()) {
                 break;
@@ -113,7 +114,7 @@ impl<T: Real> Sensor<T> {
         lists: Lists<'_, T>,
         picture: &P,
         expected: &Expected<T>,
-        taken: &[Taken<T>],
+        taken: &[FoundLimb<T>],
         observer: &O,
     ) -> Report<T> {
         let mut report = Report::of_nothing();
@@ -138,14 +139,14 @@ impl<T: Real> Sensor<T> {
         lists: Lists<'_, T>,
         picture: &P,
         expected: &Expected<T>,
-        taken: &[Taken<T>],
+        taken: &[FoundLimb<T>],
         observer: &O,
         report: &mut Report<T>,
     ) {
         observer.enter(Stage::Binarize);
         let config = &self.config;
         let levels = config.levels_of(expected.which);
-        let level = match binarize::split(
+        let level = match threshold::split(
             picture,
             &self.region,
             &config.gate,
@@ -171,7 +172,7 @@ impl<T: Real> Sensor<T> {
         scene: &Scene<'_, T, P, O>,
         work: Work,
         expected: &Expected<T>,
-        taken: &[Taken<T>],
+        taken: &[FoundLimb<T>],
         report: &mut Report<T>,
     ) -> Work {
         let config = &self.config;
@@ -179,18 +180,18 @@ impl<T: Real> Sensor<T> {
         scene.observer.enter(Stage::Contour);
         let turning = self.turning(expected);
         let camera = turning.as_ref().unwrap_or(&self.camera);
-        let mut judge = Judge::new(self, camera, expected, taken, scene.observer, lists.blocks, work, report);
+        let mut search = Search::new(self, camera, expected, taken, scene.observer, lists.blocks, work, report);
         match config.contour.method {
-            contour::Method::BorderFollowing => judge.border_following(scene, lists.border, lists.marks),
+            contour::Method::BorderFollowing => search.border_following(scene, lists.border, lists.marks),
             #[cfg(feature = "horace")]
-            contour::Method::Raster => judge.raster(scene, lists.border, lists.marks),
+            contour::Method::Raster => search.raster(scene, lists.border, lists.marks),
             #[cfg(feature = "horace")]
             contour::Method::Erode => {
-                judge.whole(scene, |work| contour::erode::edges(scene, &config.contour, lists.border, work));
+                search.whole(scene, |work| contour::erode::edges(scene, &config.contour, lists.border, work));
             }
             #[cfg(feature = "zju")]
-            contour::Method::Sobel => judge.whole(scene, |work| contour::sobel::edges(scene, lists.border, work)),
+            contour::Method::Sobel => search.whole(scene, |work| contour::sobel::edges(scene, lists.border, work)),
         }
-        judge.conclude()
+        search.conclude()
     }
 }

@@ -1,8 +1,8 @@
 //! The lists that a picture needs, in memory of fixed size.
 
-use crate::block::Block;
-use crate::pixel::Pixel;
-use crate::real::Real;
+use crate::base::real::Real;
+use crate::geometry::block::Block;
+use crate::geometry::pixel::Pixel;
 
 /// Border pixels of an edge that a workstation stores.
 pub(super) const HOST_POINTS: usize = 16384;

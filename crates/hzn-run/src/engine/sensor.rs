@@ -8,8 +8,8 @@ use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
 use hzn_core::frames::{Cov3, Ecef, UnitVec3};
 use hzn_core::image::{ImageView, Pixels};
-use hzn_core::pipeline::{Candidate, Free};
 use hzn_core::real::Real;
+use hzn_core::report::{Candidate, Free};
 use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Observer, Report, Solution};
 use hzn_nav::ephemeris;
 
@@ -52,8 +52,8 @@ impl Answered {
         })
     }
     fn to_last<T: Real>(self, now_s: f64) -> Option<body::Last<T>> {
-        let axis = UnitVec3::try_new(self.axis.map(T::of))?;
-        Some(body::Last { axis, sigma_rad: T::of(self.sigma_rad), age_s: T::of(now_s - self.time_s) })
+        let axis = UnitVec3::try_new(self.axis.map(T::from_f64))?;
+        Some(body::Last { axis, sigma_rad: T::from_f64(self.sigma_rad), age_s: T::from_f64(now_s - self.time_s) })
     }
 }
 

@@ -3,10 +3,10 @@
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
-use hzn_core::covariance::{Budget, Term};
-use hzn_core::pipeline::Candidate;
+use hzn_core::covariance::{ErrorBudget, Term};
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::real::Real;
+use hzn_core::report::Candidate;
 use hzn_core::status::Stage;
 use hzn_core::{Observer, Solution};
 
@@ -180,7 +180,7 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn wants_budget(&self) -> bool {
         self.now().is_some()
     }
-    fn budget(&self, candidate: u32, budget: &Budget<T>) {
+    fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
         self.now().into_iter().for_each(|t| t.budget(candidate, budget));
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
@@ -224,7 +224,7 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     fn wants_budget(&self) -> bool {
         true
     }
-    fn budget(&self, candidate: u32, budget: &Budget<T>) {
+    fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
         self.with(candidate, |e| {
             e.budget_rad = Term::ALL.map(|term| (term, budget.of(term).sigma_max_rad().into())).into();
         });

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::{FrameData, Frames};
 use hzn_core::Config;
+use hzn_core::config::Orient;
 use hzn_core::image::Channel;
-use hzn_core::pipeline::Orient;
 
 pub use bits::{FoundBits, find_bits, with_key};
 pub use picture::Picture;

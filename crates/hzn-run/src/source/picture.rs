@@ -3,8 +3,8 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use hzn_core::config::Input;
 use hzn_core::image::{Channel, ImageError, ImageView, Layout};
-use hzn_core::pipeline::Input;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 

@@ -1,7 +1,7 @@
 //! Turning a picture, as `input.orient` or its EXIF says.
 
+use hzn_core::config::Orient;
 use hzn_core::image::Layout;
-use hzn_core::pipeline::Orient;
 use image::metadata::Orientation;
 
 use super::picture::{Picture, Samples};

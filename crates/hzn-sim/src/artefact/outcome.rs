@@ -1,9 +1,9 @@
 //! What a sensor says of a trial, and whether that is false.
 
 use hzn_core::body::Expected;
-use hzn_core::pipeline::{Candidate, Observer};
 use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon};
+use hzn_core::{observer::Observer, report::Candidate};
 
 use super::trial::Trial;
 use crate::error::SceneError;

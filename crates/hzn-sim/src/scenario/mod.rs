@@ -16,8 +16,8 @@ use std::path::{Path as FilePath, PathBuf};
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera;
+use hzn_core::config::Mount;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
-use hzn_core::pipeline::Mount;
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;

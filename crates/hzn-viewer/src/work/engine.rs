@@ -8,7 +8,7 @@ use std::time::Instant;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_core::Config;
 use hzn_core::camera::Camera;
-use hzn_core::pipeline::{Input, Orient};
+use hzn_core::config::{Input, Orient};
 use hzn_run::engine::AnySensor;
 use hzn_run::source::Picture;
 use hzn_run::source::picture::Samples;

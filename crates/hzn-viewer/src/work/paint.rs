@@ -2,8 +2,8 @@
 
 use egui::{Color32, ColorImage};
 use hzn_core::camera::Camera;
+use hzn_core::config::Orient;
 use hzn_core::image::{Channel, ImageView, Pixels};
-use hzn_core::pipeline::Orient;
 use hzn_run::source::{Picture, picture::Samples};
 
 use crate::model::{Look, Plane};

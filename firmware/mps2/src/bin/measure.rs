@@ -13,7 +13,7 @@ use core::cell::Cell;
 
 use cortex_m_rt::entry;
 use hzn_core::image::{Grey, Layout};
-use hzn_core::pipeline::{Observer, Unobserved};
+use hzn_core::observer::{Observer, Unobserved};
 use hzn_core::status::Stage;
 use hzn_core::{FlightWorkspace, Frame};
 use hzn_flight::answer::Answer;

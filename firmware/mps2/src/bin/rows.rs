@@ -6,8 +6,8 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use hzn_core::pipeline::{HELD, Rows, Unobserved, Workspace};
 use hzn_core::{Frame, Sensor};
+use hzn_core::{observer::Unobserved, pipeline::{HELD, Rows, Workspace}};
 use hzn_flight::answer::Answer;
 use hzn_flight::bytes::Writer;
 use hzn_flight::table;

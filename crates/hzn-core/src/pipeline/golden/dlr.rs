@@ -1,10 +1,10 @@
 //! The methods of Braun & Barf 2022 against reference data, and each erratum of the paper against its printed form.
 
 use super::*;
-use crate::covariance::braun_barf;
-use crate::estimate::{conic, direct};
-use crate::linalg::{M3, symmetric_eigen};
-use crate::work::Work;
+use crate::base::linalg::{M3, symmetric_eigen};
+use crate::model::work::Work;
+use crate::stages::covariance::braun_barf;
+use crate::stages::fit::{conic, direct};
 
 /// `nadir_cases.json`: (24) by scipy, inliers only, pinholes only.
 fn directions<T: Real>(tolerance_deg: f64) {
@@ -25,11 +25,11 @@ fn directions<T: Real>(tolerance_deg: f64) {
         let truth = direction::<T>(triple(&case["true_nadir_c"]));
         let (e, c) = direct::fit(&blocks(&camera, &points, &truth)).unwrap();
         let want = direction::<T>(triple(&case["reference"]["eq24_direction_c"]));
-        let off = UnitVec3::<Cam, T>::assume_unit(e).angle_rad(&want).f64().to_degrees();
+        let off = UnitVec3::<Cam, T>::assume_unit(e).angle_rad(&want).to_f64().to_degrees();
         assert!(off < tolerance_deg, "{}: {off:e}", case["id"]);
         if num(&case["noise_sigma_px"]) == 0.0 {
             // Its length is the half-angle, whatever is assumed: the paper's "needs α" does not hold.
-            assert!((c.f64() - num(&case["cos_alpha"])).abs() < 1e-6, "{}: {c}", case["id"]);
+            assert!((c.to_f64() - num(&case["cos_alpha"])).abs() < 1e-6, "{}: {c}", case["id"]);
         }
         compared += 1;
     }
@@ -88,25 +88,25 @@ fn covariances<T: Real>(tolerance: f64) {
                     "eq33" => -length * libm::log(1.0 - 1.0 / length),
                     _ => num(step),
                 };
-                blocks[(i + 1) / LANES].step_px[(i + 1) % LANES] = T::of(step);
+                blocks[(i + 1) / LANES].step_px[(i + 1) % LANES] = T::from_f64(step);
             }
-            let got = braun_barf::of(&blocks, e.v(), T::of(length)).unwrap() * T::of(num(&case["R_px2"]));
+            let got = braun_barf::of(&blocks, e.v(), T::from_f64(length)).unwrap() * T::from_f64(num(&case["R_px2"]));
             let want = rows(&case[form]["P_c"]);
             let scale = want.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
             for i in 0..3 {
                 for j in 0..3 {
-                    let off = (got[(i, j)].f64() - want[i][j]).abs() / scale;
+                    let off = (got[(i, j)].to_f64() - want[i][j]).abs() / scale;
                     assert!(off < tolerance, "{} {form} [{i}][{j}]: {off:e}", case["id"]);
                 }
             }
             let [bound, zero, same] = braun_barf::across(&got, e.v(), true);
             if form == "eq33" {
-                assert!((bound.f64() / num(&case[form]["lambda_max"]) - 1.0).abs() < tolerance);
+                assert!((bound.to_f64() / num(&case[form]["lambda_max"]) - 1.0).abs() < tolerance);
             }
             assert!(zero == T::ZERO && same == bound);
             // Across the axis nothing is larger than the overbound.
             let [a, b, d] = braun_barf::across(&got, e.v(), false);
-            assert!(a > T::ZERO && a * d > b * b && a + d < (bound + bound) * T::of(1.0001));
+            assert!(a > T::ZERO && a * d > b * b && a + d < (bound + bound) * T::from_f64(1.0001));
         }
     }
     assert_eq!(compared, 6);
@@ -167,7 +167,7 @@ fn covariance_goes_through_the_lens() {
     let sin: f64 = 6371.0 / (6371.0 + 800.0);
     let c = libm::sqrt(1.0 - sin * sin);
     let exact = limb(&camera, &e, c, 3.0);
-    let mut gauss = Gauss(crate::rng::Rng::new(5));
+    let mut gauss = Gauss(crate::base::rng::Rng::new(5));
     let (sigma, runs) = (0.05, 200);
     let mut measured = M3::zeros();
     for _ in 0..runs {
@@ -185,7 +185,7 @@ fn covariance_goes_through_the_lens() {
     let printed: Vec<(f64, f64)> = exact
         .iter()
         .map(|&(u, v)| {
-            let ray = camera.unproject(crate::pixel::ImagePoint { u, v }).unwrap();
+            let ray = camera.unproject(crate::geometry::pixel::ImagePoint { u, v }).unwrap();
             flat.project(&ray).map(|p| (p.u, p.v)).unwrap()
         })
         .collect();
@@ -201,7 +201,7 @@ fn covariance_is_honest_and_the_overbound_is_not() {
     let (camera, e) = rocket_camera();
     let sin: f64 = 6_371_008.8 / (6_371_008.8 + 200e3);
     let exact = limb(&camera, &e, libm::sqrt(1.0 - sin * sin), 1.0);
-    let mut gauss = Gauss(crate::rng::Rng::new(11));
+    let mut gauss = Gauss(crate::base::rng::Rng::new(11));
     let (runs, rho) = (200, libm::exp(-1.0 / 300.0));
     let (mut squares, mut nees, mut bounded) = (0.0, 0.0, 0.0);
     for _ in 0..runs {
@@ -291,9 +291,9 @@ fn exact<T: Real>(altitude_km: f64, tilt_deg: f64, tolerance_deg: f64) {
     let blocks = blocks(&camera, &points, &e);
     for (name, got) in [("conic", conic::fit(&blocks)), ("direct", direct::fit(&blocks))] {
         let (got, got_c) = got.unwrap_or_else(|| panic!("{name} {altitude_km} {tilt_deg}"));
-        let off = UnitVec3::<Cam, T>::assume_unit(got).angle_rad(&e).f64().to_degrees();
+        let off = UnitVec3::<Cam, T>::assume_unit(got).angle_rad(&e).to_f64().to_degrees();
         assert!(off < tolerance_deg, "{name} {altitude_km} km {tilt_deg}°: {off:e}");
-        assert!((got_c.f64() - cos).abs() < tolerance_deg, "{name} {got_c} {cos}");
+        assert!((got_c.to_f64() - cos).abs() < tolerance_deg, "{name} {got_c} {cos}");
     }
 }
 
@@ -314,7 +314,7 @@ fn conic_bears_noise_on_a_whole_disc() {
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1000, 1000, 500.0)).unwrap();
     let e = direction::<f64>([0.1, 0.15, 1.0]);
     let exact = limb(&camera, &e, libm::cos(0.5), 3.0);
-    let mut gauss = Gauss(crate::rng::Rng::new(9));
+    let mut gauss = Gauss(crate::base::rng::Rng::new(9));
     let points: Vec<(f64, f64)> = exact.iter().map(|p| (p.0 + 0.3 * gauss.next(), p.1 + 0.3 * gauss.next())).collect();
     let (got, c) = conic::fit(&blocks(&camera, &points, &e)).unwrap();
     assert!(UnitVec3::<Cam, f64>::assume_unit(got).angle_rad(&e).to_degrees() < 0.02);
@@ -355,7 +355,7 @@ fn degenerate_points_give_no_cone() {
 #[test]
 fn ransac_leaves_outliers_out() {
     let (camera, e, c, exact) = rocket();
-    let mut rng = crate::rng::Rng::new(3);
+    let mut rng = crate::base::rng::Rng::new(3);
     let points: Vec<(f64, f64)> = exact
         .iter()
         .map(|&p| match rng.below(2) {
@@ -364,15 +364,15 @@ fn ransac_leaves_outliers_out() {
         })
         .collect();
     let mut blocks = blocks(&camera, &points, &e);
-    let body = crate::body::Config { altitude_km: Some(120.0), ..Default::default() };
-    let expected = crate::body::Expected::new(&body, &crate::body::Frame::default()).unwrap();
-    let config = reject::Config { method: reject::Method::Ransac, threshold_px: 1.0, ..Default::default() };
-    let found = reject::keep(
+    let body = crate::model::body::Config { altitude_km: Some(120.0), ..Default::default() };
+    let expected = crate::model::body::Expected::new(&body, &crate::model::body::Frame::default()).unwrap();
+    let config = consensus::Config { method: consensus::Method::Ransac, threshold_px: 1.0, ..Default::default() };
+    let found = consensus::keep(
         &mut blocks,
         points.len() as u32,
         &expected,
         888.97,
-        reject::Threshold::told(&config),
+        consensus::Threshold::told(&config),
         &config,
         &mut Work::unlimited(),
     )
@@ -386,12 +386,12 @@ fn ransac_leaves_outliers_out() {
     }
     let (got, got_c) = direct::fit(&blocks).unwrap();
     assert!(UnitVec3::<Cam, f64>::assume_unit(got).angle_rad(&e).to_degrees() < 0.2 && (got_c - c).abs() < 0.01);
-    let few = reject::keep(
+    let few = consensus::keep(
         &mut blocks[..1],
         2,
         &expected,
         888.97,
-        reject::Threshold::told(&config),
+        consensus::Threshold::told(&config),
         &config,
         &mut Work::unlimited(),
     );

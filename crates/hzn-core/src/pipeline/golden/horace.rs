@@ -1,8 +1,8 @@
 //! HORACE's circle against exact limbs, and each erratum of the theses against its printed form.
 
 use super::*;
-use crate::estimate::Method;
-use crate::reject::Consensus;
+use crate::stages::consensus::Consensus;
+use crate::stages::fit::Method;
 
 const RADIUS_KM: f64 = 6371.0;
 
@@ -23,9 +23,9 @@ fn fitted<T: Real>(
     expected: &Expected<T>,
 ) -> Option<(UnitVec3<Cam, T>, T)> {
     let start = Consensus { e: *direction::<T>([0.0, 0.0, 1.0]).v(), c: expected.cos, draws: 0, all: true };
-    let config = estimate::Config { method: Method::Circle, half_angle: HalfAngle::Free, ..Default::default() };
+    let config = fit::Config { method: Method::Circle, half_angle: HalfAngle::Free, ..Default::default() };
     let noise = covariance::Config::default();
-    let fit = estimate::fit(blocks, &start, expected, camera, T::of(3.0), &config, &noise)?;
+    let fit = fit::fit(blocks, &start, expected, camera, T::from_f64(3.0), &config, &noise)?;
     Some((UnitVec3::assume_unit(fit.e), fit.c))
 }
 
@@ -50,10 +50,10 @@ fn eighty_kilometres<T: Real>(tolerance_m: f64) {
     let known = expected::<T>(80.0);
     let mut blocks = blocks(&camera, &points, &direction(e.xyz()));
     let (axis, c) = fitted(&mut blocks, &camera, &known).unwrap();
-    assert!(axis.angle_rad(&direction(e.xyz())).f64() < 1e-5);
+    assert!(axis.angle_rad(&direction(e.xyz())).to_f64() < 1e-5);
     let (altitude, _) = known.altitude(c, T::ZERO).unwrap();
-    assert!((altitude.f64() - 80e3).abs() < tolerance_m, "{altitude}");
-    let sin = libm::sqrt(1.0 - c.f64() * c.f64());
+    assert!((altitude.to_f64() - 80e3).abs() < tolerance_m, "{altitude}");
+    let sin = libm::sqrt(1.0 - c.to_f64() * c.to_f64());
     assert!((sin - 0.98760).abs() < 5e-6);
     // sin α = (R − h)/R: h = R (1 − sin α).
     let printed_m = RADIUS_KM * 1e3 * (1.0 - sin);

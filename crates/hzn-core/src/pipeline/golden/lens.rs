@@ -1,8 +1,8 @@
 //! What a wrong calibration does to a fit, against what the covariance says it does.
 
 use super::*;
-use crate::camera::{Covariance, Intrinsic};
-use crate::covariance::{Budget, Noise, Term};
+use crate::geometry::camera::{Covariance, Intrinsic};
+use crate::stages::covariance::{ErrorBudget, Noise, Term};
 use std::vec;
 
 /// A lens, its limb's half-angle, and the axis.
@@ -37,7 +37,7 @@ fn fitted(
     used: &CameraConfig,
     half_angle_deg: f64,
     towards: [f64; 3],
-) -> (V3<f64>, f64, Budget<f64>) {
+) -> (V3<f64>, f64, ErrorBudget<f64>) {
     let e = direction::<f64>(towards);
     let points = limb(&Camera::try_new(right).unwrap(), &e, libm::cos(half_angle_deg.to_radians()), 2.0);
     let camera = Camera::<f64>::try_new(used).unwrap();
@@ -45,22 +45,22 @@ fn fitted(
     let (body, frame) = sphere(altitude, 6_371_008.8, 300.0);
     let expected = Expected::new(&body, &frame).unwrap();
     let mut blocks = blocks(&camera, &points, &e);
-    let config = reject::Config { threshold_px: 30.0, ..reject::Config::default() };
+    let config = consensus::Config { threshold_px: 30.0, ..consensus::Config::default() };
     let (fx, _) = camera.focal_px();
-    let start = reject::keep(
+    let start = consensus::keep(
         &mut blocks,
         points.len() as u32,
         &expected,
         fx,
-        reject::Threshold::told(&config),
+        consensus::Threshold::told(&config),
         &config,
         &mut Work::unlimited(),
     )
     .unwrap();
-    let estimate = estimate::Config { half_angle: HalfAngle::Free, ..Default::default() };
+    let estimate = fit::Config { half_angle: HalfAngle::Free, ..Default::default() };
     let noise = covariance::Config::told(0.1, 60.0);
-    let fit = estimate::fit(&mut blocks, &start, &expected, &camera, 30.0, &estimate, &noise).unwrap();
-    let mut budget = Budget::new();
+    let fit = fit::fit(&mut blocks, &start, &expected, &camera, 30.0, &estimate, &noise).unwrap();
+    let mut budget = ErrorBudget::new();
     covariance::fuse(&blocks, &fit, &expected, &noise, &estimate, &camera, Some(&mut budget)).unwrap();
     (fit.e, fit.c, budget)
 }
@@ -169,31 +169,31 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
             &Frame { altitude_m: Some(altitude.max(30e3)), ..Frame::default() },
         )
         .unwrap();
-        let mut gauss = Gauss(crate::rng::Rng::new(3));
+        let mut gauss = Gauss(crate::base::rng::Rng::new(3));
         let points: Vec<_> = limb(&camera, &e, expected.cos, 2.0)
             .into_iter()
             .map(|(u, v)| (u + 0.3 * gauss.next(), v + 0.3 * gauss.next()))
             .collect();
-        let config = reject::Config::default();
+        let config = consensus::Config::default();
         let (fx, _) = camera.focal_px();
-        let estimate = estimate::Config::default();
+        let estimate = fit::Config::default();
         let mut told = None;
         for noise in [Noise::Told, Noise::Rms] {
             let mut blocks = blocks(&camera, &points, &e);
             let mut work = Work::unlimited();
-            let start = reject::keep(
+            let start = consensus::keep(
                 &mut blocks,
                 points.len() as u32,
                 &expected,
                 fx,
-                reject::Threshold::told(&config),
+                consensus::Threshold::told(&config),
                 &config,
                 &mut work,
             )
             .unwrap();
             let noise = covariance::Config { noise, ..Default::default() };
-            let fit = estimate::fit(&mut blocks, &start, &expected, &camera, 3.0, &estimate, &noise).unwrap();
-            let mut budget = Budget::new();
+            let fit = fit::fit(&mut blocks, &start, &expected, &camera, 3.0, &estimate, &noise).unwrap();
+            let mut budget = ErrorBudget::new();
             let fused =
                 covariance::fuse(&blocks, &fit, &expected, &noise, &estimate, &camera, Some(&mut budget)).unwrap();
             let mut sum = [0.0; 6];

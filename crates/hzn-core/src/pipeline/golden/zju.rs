@@ -1,10 +1,10 @@
 //! The elliptic cone of Wang et al. 2022: reference solutions, errata, degenerate points, and honesty.
 
 use super::*;
-use crate::estimate::{Fit, Method, Quadric};
-use crate::linalg::{M3, Triangle};
-use crate::reject::Consensus;
-use crate::work::Work;
+use crate::base::linalg::{M3, Triangle};
+use crate::model::work::Work;
+use crate::stages::consensus::Consensus;
+use crate::stages::fit::{Fit, Method, Quadric};
 
 fn file() -> Value {
     serde_json::from_str(include_str!("../../../tests/golden/tls_cases.json")).unwrap()
@@ -19,17 +19,17 @@ fn pairs(v: &Value) -> Vec<(f64, f64)> {
 /// A sphere of the Earth's size seen from 600 km.
 fn expected<T: Real>() -> Expected<T> {
     let body = body::Config { kind: body::Kind::EarthSphere, ..body::Config::default() };
-    Expected::new(&body, &Frame { altitude_m: Some(T::of(600e3)), ..Frame::default() }).unwrap()
+    Expected::new(&body, &Frame { altitude_m: Some(T::from_f64(600e3)), ..Frame::default() }).unwrap()
 }
 
 /// The fit alone, through all the points.
 fn fit<T: Real>(blocks: &mut [Block<T>], method: Method, weigh_above_deg: f64) -> Option<Fit<T>> {
     let zero = T::ZERO;
-    let start = Consensus { e: V3::new(zero, zero, T::one()), c: T::of(0.5), draws: 1, all: true };
+    let start = Consensus { e: V3::new(zero, zero, T::one()), c: T::from_f64(0.5), draws: 1, all: true };
     let expected = expected();
-    let config = estimate::Config { method, half_angle: HalfAngle::Free, weigh_above_deg };
+    let config = fit::Config { method, half_angle: HalfAngle::Free, weigh_above_deg };
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 2, 2, 1.0)).unwrap();
-    estimate::fit(blocks, &start, &expected, &camera, T::of(3.0), &config, &covariance::Config::default())
+    fit::fit(blocks, &start, &expected, &camera, T::from_f64(3.0), &config, &covariance::Config::default())
 }
 
 /// Reference solutions: total least squares by SVD, weighted with the dense cofactor matrix.
@@ -41,10 +41,10 @@ fn references<T: Real>(tolerance: f64) {
             let mut blocks = blocks(&camera, &pairs(&case["pixels"]), &e);
             let got = fit(&mut blocks, method, 0.0).unwrap();
             let expected = V3::from(triple(&case[axis]));
-            let error = (got.e.map(Real::f64) - expected).norm();
+            let error = (got.e.map(Real::to_f64) - expected).norm();
             assert!(error < tolerance, "{} {axis}: {error:e}", case["id"]);
             // Theirs has M₃₃ = 1.
-            let [v1, v2, v3, v4, v5, v6] = got.quadric.unwrap().numbers().map(Real::f64);
+            let [v1, v2, v3, v4, v5, v6] = got.quadric.unwrap().numbers().map(Real::to_f64);
             let ours = M3::new(v1 + v6, v2 / 2.0, v4 / 2.0, v2 / 2.0, v3 + v6, v5 / 2.0, v4 / 2.0, v5 / 2.0, v6) / v6;
             let theirs = M3::from(rows(&case[m]));
             let error = (ours - theirs).norm() / theirs.norm();
@@ -151,7 +151,7 @@ fn elliptic_cones_are_told_honestly() {
             let sigma_px = 0.2;
             let rho = if length_px > 0.0 { libm::exp(-1.0 / length_px) } else { 0.0 };
             let fresh = libm::sqrt(1.0 - rho * rho) * sigma_px;
-            let mut gauss = Gauss(crate::rng::Rng::new(7));
+            let mut gauss = Gauss(crate::base::rng::Rng::new(7));
             let (runs, mut nees) = (200, 0.0);
             for _ in 0..runs {
                 let (mut du, mut dv) = (gauss.next() * sigma_px, gauss.next() * sigma_px);
@@ -167,7 +167,7 @@ fn elliptic_cones_are_told_honestly() {
                 let got = fit(&mut blocks, method, 0.0).unwrap();
                 let noise = covariance::Config::told(sigma_px, length_px);
                 let expected = expected();
-                let config = estimate::Config { half_angle: HalfAngle::Free, ..estimate::Config::default() };
+                let config = fit::Config { half_angle: HalfAngle::Free, ..fit::Config::default() };
                 let fused = covariance::fuse(&blocks, &got, &expected, &noise, &config, &camera, None).unwrap();
                 let (b1, b2) = basis(&fused.e);
                 let off = V3::from(e.xyz()) - fused.e;
@@ -211,11 +211,11 @@ proptest::proptest! {
             for method in [Method::Tls, Method::Wtls] {
                 let mut blocks = blocks(&camera, points, &e);
                 if let Some(got) = fit(&mut blocks, method, 0.0) {
-                    proptest::prop_assert!((got.e.dot(&got.e).f64() - 1.0).abs() < 1e-5 && got.c.is_finite());
+                    proptest::prop_assert!((got.e.dot(&got.e).to_f64() - 1.0).abs() < 1e-5 && got.c.is_finite());
                     let expected = expected();
                     let noise = covariance::Config::default();
-                    if let Some(fused) = covariance::fuse(&blocks, &got, &expected, &noise, &estimate::Config::default(), &camera, None) {
-                        proptest::prop_assert!(fused.p.iter().all(|x| !x.f64().is_nan()), "{:?}", fused.p);
+                    if let Some(fused) = covariance::fuse(&blocks, &got, &expected, &noise, &fit::Config::default(), &camera, None) {
+                        proptest::prop_assert!(fused.p.iter().all(|x| !x.to_f64().is_nan()), "{:?}", fused.p);
                     }
                 }
             }
@@ -246,8 +246,8 @@ fn points_without_a_weight_do_not_count() {
 
 /// 400 points, a share of them anywhere in the picture, the others on the limb within 0.3 px.
 fn scattered(camera: &Camera<f64>, exact: &[(f64, f64)], outliers: f64, seed: u32) -> Vec<(f64, f64)> {
-    let mut rng = crate::rng::Rng::new(seed);
-    let mut gauss = Gauss(crate::rng::Rng::new(seed + 1));
+    let mut rng = crate::base::rng::Rng::new(seed);
+    let mut gauss = Gauss(crate::base::rng::Rng::new(seed + 1));
     (0..400)
         .map(|_| {
             if f64::from(rng.below(1000)) < outliers * 1000.0 {
@@ -261,19 +261,19 @@ fn scattered(camera: &Camera<f64>, exact: &[(f64, f64)], outliers: f64, seed: u3
 }
 
 /// How many of `runs` sets of points with such a share of outliers a method solves to 2 degrees.
-fn solved(config: &reject::Config, outliers: f64, runs: u32) -> u32 {
+fn solved(config: &consensus::Config, outliers: f64, runs: u32) -> u32 {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0)).unwrap();
     let e = direction([0.3, 0.4, 0.8]);
     let exact = limb(&camera, &e, libm::cos(66f64.to_radians()), 1.0);
     let solved = |seed: &u32| {
         let mut blocks = blocks(&camera, &scattered(&camera, &exact, outliers, 2 * *seed), &e);
-        let config = reject::Config { seed: *seed, ..*config };
-        let found = reject::keep(
+        let config = consensus::Config { seed: *seed, ..*config };
+        let found = consensus::keep(
             &mut blocks,
             400,
             &expected(),
             92.0,
-            reject::Threshold::told(&config),
+            consensus::Threshold::told(&config),
             &config,
             &mut Work::unlimited(),
         );
@@ -284,14 +284,14 @@ fn solved(config: &reject::Config, outliers: f64, runs: u32) -> u32 {
 
 #[test]
 fn published_samplers_find_the_limb() {
-    use reject::Method::{Mlesac, RansacPreverify};
+    use consensus::Method::{Mlesac, RansacPreverify};
     for (method, threshold_px, max_draws, outliers) in [
         (RansacPreverify, 1.6, 20_000, 0.7),
         (Mlesac, 1.6, 2000, 0.6),
         (RansacPreverify, 1.6, 2000, 0.1),
         (Mlesac, 1.6, 200, 0.1),
     ] {
-        let config = reject::Config { method, threshold_px, max_draws, ..reject::Config::default() };
+        let config = consensus::Config { method, threshold_px, max_draws, ..consensus::Config::default() };
         let solved = solved(&config, outliers, 30);
         assert!(solved >= 28, "{method:?} with {outliers} outliers: {solved} of 30");
     }
@@ -300,13 +300,13 @@ fn published_samplers_find_the_limb() {
 /// Printed (25) ends after 286 draws; the five-point test lets one in 3000 through when 80 % are outliers.
 #[test]
 fn printed_equation_25_ends_too_early() {
-    let config = reject::Config {
-        method: reject::Method::RansacPreverify,
+    let config = consensus::Config {
+        method: consensus::Method::RansacPreverify,
         threshold_px: 1.6,
         max_draws: 20_000,
-        ..reject::Config::default()
+        ..consensus::Config::default()
     };
-    let printed = solved(&reject::Config { max_draws: 286, ..config }, 0.8, 40);
+    let printed = solved(&consensus::Config { max_draws: 286, ..config }, 0.8, 40);
     let right = solved(&config, 0.8, 40);
     assert!(printed <= 10, "{printed} of 40 with 286 draws");
     assert!(right >= 36, "{right} of 40");
@@ -328,10 +328,10 @@ proptest::proptest! {
                 _ => points[0],
             })
             .collect();
-        for method in [reject::Method::RansacPreverify, reject::Method::Mlesac] {
+        for method in [consensus::Method::RansacPreverify, consensus::Method::Mlesac] {
             let mut blocks = blocks(&camera, &points, &direction([0.0, 0.0, 1.0]));
-            let config = reject::Config { method, max_draws: 300, ..reject::Config::default() };
-            if let Some(found) = reject::keep(&mut blocks, points.len() as u32, &expected(), 92.0, reject::Threshold::told(&config), &config, &mut Work::unlimited()) {
+            let config = consensus::Config { method, max_draws: 300, ..consensus::Config::default() };
+            if let Some(found) = consensus::keep(&mut blocks, points.len() as u32, &expected(), 92.0, consensus::Threshold::told(&config), &config, &mut Work::unlimited()) {
                 proptest::prop_assert!((found.e.dot(&found.e) - 1.0).abs() < 1e-4 && found.c.is_finite());
             }
         }

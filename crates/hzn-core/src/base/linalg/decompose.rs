@@ -1,0 +1,302 @@
+//! Decompositions of small matrices by rotations: of a symmetric one by Jacobi's, of a tall one row by row by Givens'.
+
+use crate::base::real::Real;
+
+/// Most sweeps over all pairs. Convergence is quadratic: six are enough for 6×6 in double precision.
+const SWEEPS: usize = 16;
+
+/// Eigenvalues of a symmetric N×N matrix, smallest first, and the unit eigenvectors as rows in the same order.
+///
+/// Cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, 8.5). Total: a matrix that is not finite gives
+/// values that are not finite, in a bounded time.
+pub(crate) fn symmetric_eigen<T: Real, const N: usize>(mut m: [[T; N]; N]) -> ([T; N], [[T; N]; N]) {
+    let mut vectors = identity();
+    for _ in 0..SWEEPS {
+        let mut off = T::ZERO;
+        let mut all = T::ZERO;
+        for (i, row) in m.iter().enumerate() {
+            for (j, x) in row.iter().enumerate() {
+                all += *x * *x;
+                off += if i == j { T::ZERO } else { *x * *x };
+            }
+        }
+        if !(off > all * T::EPSILON * T::EPSILON * T::from_f64(0.01)) {
+            break;
+        }
+        for p in 0..N {
+            for q in p + 1..N {
+                // The rotation that makes m[p][q] zero.
+                let Some((c, s)) = rotation(m[p][p], m[q][q], m[p][q]) else { continue };
+                for row in &mut m {
+                    (row[p], row[q]) = turned(row[p], row[q], c, s);
+                }
+                for j in 0..N {
+                    (m[p][j], m[q][j]) = turned(m[p][j], m[q][j], c, s);
+                    (vectors[p][j], vectors[q][j]) = turned(vectors[p][j], vectors[q][j], c, s);
+                }
+            }
+        }
+    }
+    let mut values = [T::ZERO; N];
+    for i in 0..N {
+        values[i] = m[i][i];
+    }
+    sort(&mut values, &mut vectors);
+    (values, vectors)
+}
+
+/// The triangle R of a tall matrix's QR decomposition, fed row by row: RᵀR is the sum of the rows' squares, without
+/// ever squaring, so that single precision is enough.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Triangle<T, const N: usize>([[T; N]; N]);
+
+impl<T: Real, const N: usize> Triangle<T, N> {
+    /// No rows.
+    pub(crate) fn new() -> Self {
+        Self([[T::ZERO; N]; N])
+    }
+
+    /// One more row, turned into the triangle by Givens rotations.
+    pub(crate) fn push(&mut self, mut row: [T; N]) {
+        for i in 0..N {
+            let (a, b) = (self.0[i][i], row[i]);
+            let h2 = a * a + b * b;
+            if b == T::ZERO || !(h2 > T::ZERO) {
+                continue;
+            }
+            let per = T::one() / h2.sqrt();
+            let (c, s) = (a * per, b * per);
+            for j in i..N {
+                let (x, y) = (self.0[i][j], row[j]);
+                self.0[i][j] = c * x + s * y;
+                row[j] = c * y - s * x;
+            }
+        }
+    }
+
+    /// Its rows.
+    pub(crate) fn rows(&self) -> &[[T; N]; N] {
+        &self.0
+    }
+
+    /// Singular values of the fed rows, smallest first, and the right singular vectors as rows in the same order: one
+    /// column of R after another is made orthogonal to the rest (Hestenes 1958), which keeps small values exact.
+    pub(crate) fn singular(&self) -> ([T; N], [[T; N]; N]) {
+        // Columns of R as rows of `u`.
+        let mut u = [[T::ZERO; N]; N];
+        for i in 0..N {
+            for j in 0..N {
+                u[j][i] = self.0[i][j];
+            }
+        }
+        let mut v = identity();
+        for _ in 0..SWEEPS {
+            let mut moved = false;
+            for p in 0..N {
+                for q in p + 1..N {
+                    let (a, b, d) = (dot(&u[p], &u[p]), dot(&u[q], &u[q]), dot(&u[p], &u[q]));
+                    if !(d * d > a * b * T::EPSILON * T::EPSILON) {
+                        continue;
+                    }
+                    let Some((c, s)) = rotation(a, b, d) else { continue };
+                    moved = true;
+                    for j in 0..N {
+                        (u[p][j], u[q][j]) = turned(u[p][j], u[q][j], c, s);
+                        (v[p][j], v[q][j]) = turned(v[p][j], v[q][j], c, s);
+                    }
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+        let mut values = u.map(|column| dot(&column, &column).sqrt());
+        sort(&mut values, &mut v);
+        (values, v)
+    }
+
+    /// The least-squares solution: x with last component 1 for which the rows' products with it are smallest; `None`
+    /// where the rows do not determine it in this precision.
+    pub(crate) fn kernel(&self) -> Option<[T; N]> {
+        let floor = self.floor(N.saturating_sub(1))?;
+        let mut x = [T::ZERO; N];
+        if let Some(last) = x.last_mut() {
+            *last = T::one();
+        }
+        for i in (0..N.saturating_sub(1)).rev() {
+            if !(self.0[i][i].abs() > floor) {
+                return None;
+            }
+            let sum = dot(&self.0[i], &x);
+            x[i] = -sum / self.0[i][i];
+        }
+        Some(x)
+    }
+
+    /// What an element of the diagonal must exceed among the first `n`; `None` when nothing was fed, or not finite.
+    fn floor(&self, n: usize) -> Option<T> {
+        let largest = (0..n.min(N)).fold(T::ZERO, |l, i| l.max(self.0[i][i].abs()));
+        (largest > T::ZERO && largest.is_finite()).then(|| largest * T::EPSILON * T::from_f64(N as f64))
+    }
+
+    /// x with RᵀR x = b; `None` where the rows do not determine it in this precision.
+    pub(crate) fn solve(&self, b: [T; N]) -> Option<[T; N]> {
+        let floor = self.floor(N)?;
+        if (0..N).any(|i| !(self.0[i][i].abs() > floor)) {
+            return None;
+        }
+        let mut x = b;
+        for i in 0..N {
+            for j in 0..i {
+                x[i] -= self.0[j][i] * x[j];
+            }
+            x[i] /= self.0[i][i];
+        }
+        for i in (0..N).rev() {
+            for j in i + 1..N {
+                x[i] -= self.0[i][j] * x[j];
+            }
+            x[i] /= self.0[i][i];
+        }
+        Some(x)
+    }
+}
+
+/// Cosine and sine of the turn that makes [[a, d], [d, b]] diagonal; `None` when it is.
+fn rotation<T: Real>(a: T, b: T, d: T) -> Option<(T, T)> {
+    if d == T::ZERO {
+        return None;
+    }
+    let one = T::one();
+    let tau = (b - a) / (d + d);
+    let t = one / (tau.abs() + (one + tau * tau).sqrt());
+    let t = if tau < T::ZERO { -t } else { t };
+    let c = one / (one + t * t).sqrt();
+    (t.is_finite() && c.is_finite()).then_some((c, t * c))
+}
+
+#[inline(always)]
+fn turned<T: Real>(x: T, y: T, c: T, s: T) -> (T, T) {
+    (c * x - s * y, s * x + c * y)
+}
+
+/// Product of two vectors.
+pub(crate) fn dot<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+    a.iter().zip(b).fold(T::ZERO, |sum, (x, y)| sum + *x * *y)
+}
+
+fn identity<T: Real, const N: usize>() -> [[T; N]; N] {
+    let mut m = [[T::ZERO; N]; N];
+    for (i, row) in m.iter_mut().enumerate() {
+        row[i] = T::one();
+    }
+    m
+}
+
+/// Smallest first, by insertion.
+fn sort<T: Real, const N: usize>(values: &mut [T; N], vectors: &mut [[T; N]; N]) {
+    for end in 1..N {
+        for i in (1..=end).rev() {
+            let (Ok([before, value]), Ok(vectors)) =
+                (values.get_disjoint_mut([i - 1, i]), vectors.get_disjoint_mut([i - 1, i]))
+            else {
+                return;
+            };
+            if !(*value < *before) {
+                break;
+            }
+            core::mem::swap(before, value);
+            let [before, vector] = vectors;
+            core::mem::swap(before, vector);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn matrix() -> impl Strategy<Value = [[f64; 6]; 6]> {
+        proptest::array::uniform6(proptest::array::uniform6(-3.0..3.0f64)).prop_map(|m| {
+            let mut s = m;
+            for i in 0..6 {
+                for j in 0..6 {
+                    s[i][j] = m[i][j] + m[j][i];
+                }
+            }
+            s
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn eigenvectors_are_orthonormal_and_belong_to_their_values(m in matrix()) {
+            let (values, vectors) = symmetric_eigen(m);
+            for k in 0..6 {
+                prop_assert!(k == 0 || values[k - 1] <= values[k]);
+                for l in 0..6 {
+                    let product = dot(&vectors[k], &vectors[l]);
+                    prop_assert!((product - f64::from(u8::from(k == l))).abs() < 1e-13);
+                    prop_assert!((dot(&m[l], &vectors[k]) - values[k] * vectors[k][l]).abs() < 1e-12);
+                }
+            }
+        }
+
+        #[test]
+        fn singular_values_are_the_roots_of_the_eigenvalues(rows in proptest::collection::vec(proptest::array::uniform6(-3.0..3.0f64), 6..40)) {
+            let mut triangle = Triangle::new();
+            let mut square = [[0.0; 6]; 6];
+            for row in &rows {
+                triangle.push(*row);
+                for i in 0..6 {
+                    for j in 0..6 {
+                        square[i][j] += row[i] * row[j];
+                    }
+                }
+            }
+            let (values, vectors) = triangle.singular();
+            let (squares, _) = symmetric_eigen(square);
+            for k in 0..6 {
+                prop_assert!((values[k] * values[k] - squares[k]).abs() < 1e-11 * squares[5]);
+                for l in 0..6 {
+                    prop_assert!((dot(&square[l], &vectors[k]) - values[k] * values[k] * vectors[k][l]).abs() < 1e-11 * squares[5]);
+                }
+            }
+            prop_assume!(values[0] > 1e-3);
+            let b = [1.0, -2.0, 0.5, 3.0, 0.0, 1.0];
+            let x = triangle.solve(b).unwrap();
+            for l in 0..6 {
+                prop_assert!((dot(&square[l], &x) - b[l]).abs() < 1e-5);
+            }
+        }
+
+        #[test]
+        fn garbage_comes_to_an_end(m in proptest::array::uniform3(proptest::array::uniform3(any::<f32>()))) {
+            let _ = symmetric_eigen(m);
+            let mut triangle = Triangle::new();
+            for row in m {
+                triangle.push(row);
+            }
+            let _ = triangle.singular();
+            if let Some(x) = triangle.solve([1.0; 3]) {
+                prop_assert!(!x[0].is_nan() || m.iter().flatten().any(|x| !x.is_finite() || x.abs() > 1e15 || x.abs() < 1e-15));
+            }
+        }
+    }
+
+    #[test]
+    fn small_singular_values_survive_single_precision() {
+        // Nearly dependent columns: squaring would leave nothing of 1e-5 beside 1 in f32.
+        let mut triangle = Triangle::<f32, 2>::new();
+        for i in 0..100 {
+            let x = (i as f32 * 0.37).sin();
+            triangle.push([x, x + 1e-5 * (i as f32 * 1.7).cos()]);
+        }
+        let ([small, _], [v, _]) = triangle.singular();
+        // |noise| / √2 over the root of a hundred points of 1/2.
+        assert!((small / (1e-5 * 7.07 / 1.414) - 1.0).abs() < 0.1, "{small}");
+        assert!((v[0] + v[1]).abs() < 1e-4);
+        assert!(Triangle::<f32, 2>::new().solve([1.0, 1.0]).is_none());
+    }
+}

@@ -1,0 +1,46 @@
+//! Medians by halving the range: sorting would need a panic path, and would change the order.
+
+use crate::base::real::Real;
+
+/// The median of values from 0 to `most`, to a part in 4096 of `most`.
+pub(crate) fn of_reals<T: Real>(values: &[T], most: T) -> T {
+    let (mut low, mut high) = (T::ZERO, most);
+    for _ in 0..12 {
+        let middle = (low + high) * T::from_f64(0.5);
+        let below = values.iter().filter(|v| **v <= middle).count();
+        if 2 * below >= values.len() { high = middle } else { low = middle }
+    }
+    high
+}
+
+/// The smallest value that half of the values do not exceed, by halving; 0 of none.
+pub(crate) fn of_counts(values: &[u16]) -> u16 {
+    let (mut low, mut high) = (0u32, values.iter().fold(0, |most, &v| most.max(v)).into());
+    while low < high {
+        let middle = (low + high) / 2;
+        let below = values.iter().filter(|&&v| u32::from(v) <= middle).count();
+        if 2 * below >= values.len() { high = middle } else { low = middle + 1 }
+    }
+    low as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{of_counts, of_reals};
+
+    #[test]
+    fn medians_of_few_and_many_counts() {
+        assert_eq!(of_counts(&[]), 0);
+        assert_eq!(of_counts(&[7]), 7);
+        assert_eq!(of_counts(&[9, 1, 5]), 5);
+        assert_eq!(of_counts(&[65535, 65535, 3, 65535]), 65535);
+        assert_eq!(of_counts(&[4, 2, 8, 6]), 4);
+    }
+
+    #[test]
+    fn medians_of_reals() {
+        assert_eq!(of_reals(&[0.0, 0.0, 4096.0], 4096.0), 1.0);
+        assert_eq!(of_reals(&[3.0, 1.0, 2.0, 4.0], 4.0), 2.0);
+        assert!((of_reals(&[0.1, 0.7, 0.3_f32], 0.7) - 0.3).abs() < 2e-4);
+    }
+}

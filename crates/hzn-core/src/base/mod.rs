@@ -1,0 +1,9 @@
+//! Numbers: what has nothing to do with pictures.
+
+pub mod error;
+pub(crate) mod linalg;
+pub(crate) mod median;
+pub mod real;
+pub(crate) mod rng;
+#[cfg(any(feature = "horace", feature = "zju"))]
+pub(crate) mod sort;

@@ -1,0 +1,181 @@
+//! Edge points in blocks of eight lanes: what the numerical stages loop over.
+//!
+//! A block is a structure of arrays, so that each loop over its lanes becomes vector instructions where there are
+//! any; a slice of blocks is a view without a capacity, so that stages are compiled once. Sums are kept by lane and
+//! added at the end, in the same order on every target.
+
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::geometry::camera::Ray;
+use crate::geometry::pixel::ImagePoint;
+
+/// Lanes of a block.
+pub(crate) const LANES: usize = 8;
+/// Lanes in which many sums are kept at once: eight of each would not stay in registers.
+pub(crate) const HALF: usize = LANES / 2;
+
+/// Where the lit side lies: the direction of the brightness gradient along the axis on which the edge was located.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Lit {
+    /// At larger u.
+    Right = 0,
+    /// At smaller u.
+    Left = 1,
+    /// At larger v.
+    Below = 2,
+    /// At smaller v.
+    Above = 3,
+}
+
+#[cfg(any(test, feature = "_edges"))]
+impl Lit {
+    /// The side on which a direction (u, v) in the picture lies.
+    pub(crate) fn towards<T: Real>(g: [T; 2]) -> Self {
+        match (g[0].abs() >= g[1].abs(), g[0] > T::ZERO, g[1] > T::ZERO) {
+            (true, true, _) => Self::Right,
+            (true, false, _) => Self::Left,
+            (false, _, true) => Self::Below,
+            (false, _, false) => Self::Above,
+        }
+    }
+    /// The other way: a step of one pixel (u, v) towards the light.
+    pub(crate) fn step(self) -> [i8; 2] {
+        let (dx, dy) = self.towards_dark();
+        [-dx as i8, -dy as i8]
+    }
+}
+
+impl Lit {
+    /// The step (dx, dy) away from the light.
+    #[inline(always)]
+    pub(crate) fn towards_dark(self) -> (i32, i32) {
+        match self {
+            Self::Right => (-1, 0),
+            Self::Left => (1, 0),
+            Self::Below => (0, -1),
+            Self::Above => (0, 1),
+        }
+    }
+}
+
+/// Eight edge points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Block<T> {
+    /// Unit rays, x, y, z. Between the stages `candidates` and `undistort` the first two hold the image point (u, v).
+    pub(crate) s: [[T; LANES]; 3],
+    /// Their derivatives, as in [`Ray`].
+    pub(crate) m: [[T; LANES]; 4],
+    /// Distance in pixels from the point before along the edge.
+    pub(crate) step_px: [T; LANES],
+    /// 1 for a point that may count and 0 for one that may not; after the fit the weight it had.
+    pub(crate) weight: [T; LANES],
+    /// Two bits a lane: [`Lit`].
+    lit: u16,
+}
+
+impl<T: Real> Default for Block<T> {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
+impl<T: Real> Block<T> {
+    /// No points.
+    pub(crate) const EMPTY: Self = Self {
+        s: [[T::ZERO; LANES]; 3],
+        m: [[T::ZERO; LANES]; 4],
+        step_px: [T::ZERO; LANES],
+        weight: [T::ZERO; LANES],
+        lit: 0,
+    };
+
+    pub(crate) fn set_point(&mut self, lane: usize, p: ImagePoint<T>, lit: Lit) {
+        self.s[0][lane & 7] = p.u;
+        self.s[1][lane & 7] = p.v;
+        self.weight[lane & 7] = T::one();
+        self.lit |= (lit as u16) << (2 * (lane & 7));
+    }
+    pub(crate) fn point(&self, lane: usize) -> ImagePoint<T> {
+        ImagePoint { u: self.s[0][lane & 7], v: self.s[1][lane & 7] }
+    }
+    #[cfg(any(test, feature = "_edges"))]
+    pub(crate) fn lit(&self, lane: usize) -> Lit {
+        match (self.lit >> (2 * (lane & 7))) & 3 {
+            0 => Lit::Right,
+            1 => Lit::Left,
+            2 => Lit::Below,
+            _ => Lit::Above,
+        }
+    }
+    pub(crate) fn set_ray(&mut self, lane: usize, ray: &Ray<T>) {
+        let l = lane & 7;
+        (self.s[0][l], self.s[1][l], self.s[2][l]) = (ray.s.x, ray.s.y, ray.s.z);
+        for k in 0..4 {
+            self.m[k][l] = ray.m[k];
+        }
+    }
+    /// A point that cannot count: weight 0, and no distance from any limb that is finite.
+    pub(crate) fn clear(&mut self, lane: usize) {
+        let l = lane & 7;
+        (self.s[0][l], self.s[1][l], self.s[2][l]) = (T::ZERO, T::ZERO, T::one());
+        self.m.iter_mut().for_each(|m| m[l] = T::ZERO);
+        self.weight[l] = T::ZERO;
+    }
+    pub(crate) fn ray(&self, lane: usize) -> V3<T> {
+        let l = lane & 7;
+        V3::new(self.s[0][l], self.s[1][l], self.s[2][l])
+    }
+
+    /// The derivative of s·e by (u, v), in radians a pixel, lane by lane.
+    #[inline(always)]
+    pub(crate) fn gradient(&self, e: &V3<T>) -> [[T; LANES]; 2] {
+        let mut g = [[T::ZERO; LANES]; 2];
+        for l in 0..LANES {
+            let [gu, gv] = self.gradient_at(l, e);
+            g[0][l] = gu;
+            g[1][l] = gv;
+        }
+        g
+    }
+    #[inline(always)]
+    pub(crate) fn gradient_at(&self, l: usize, e: &V3<T>) -> [T; 2] {
+        let (x, y, z) = (self.s[0][l & 7], self.s[1][l & 7], self.s[2][l & 7]);
+        // The tangent basis of `camera::tangent` times e.
+        let w = (x * e.x + y * e.y) / (T::one() + z) + e.z;
+        let (a, b) = (e.x - x * w, e.y - y * w);
+        [self.m[0][l & 7] * a + self.m[2][l & 7] * b, self.m[1][l & 7] * a + self.m[3][l & 7] * b]
+    }
+
+    /// Whether the lit side lies towards `e`, as it does on the limb of a body.
+    #[inline]
+    pub(crate) fn faces(&self, l: usize, e: &V3<T>) -> bool {
+        self.faces_along(l, self.gradient_at(l, e))
+    }
+    /// As [`Self::faces`], from the gradient.
+    #[inline(always)]
+    pub(crate) fn faces_along(&self, l: usize, [gu, gv]: [T; 2]) -> bool {
+        match (self.lit >> (2 * (l & 7))) & 3 {
+            0 => gu > T::ZERO,
+            1 => gu < T::ZERO,
+            2 => gv > T::ZERO,
+            _ => gv < T::ZERO,
+        }
+    }
+}
+
+/// Sum of the lanes, in a fixed order.
+#[inline(always)]
+pub(crate) fn sum<T: Real>(lanes: &[T; LANES]) -> T {
+    let [a, b, c, d, e, f, g, h] = *lanes;
+    ((a + b) + (c + d)) + ((e + f) + (g + h))
+}
+
+/// exp(−x) for each lane, x ≥ 0. Together where all are small, as they are between neighbouring points of an edge.
+#[inline(always)]
+pub(crate) fn exp_neg<T: Real>(lanes: &[T; LANES]) -> [T; LANES] {
+    if lanes.iter().any(|&x| !(x <= T::EXP_SERIES)) {
+        return lanes.map(T::exp_neg);
+    }
+    lanes.map(T::exp_neg_series)
+}

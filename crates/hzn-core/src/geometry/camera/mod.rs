@@ -1,0 +1,342 @@
+//! Lens models: from a pixel to a unit ray with its derivative, and back.
+//!
+//! Unit rays, never the plane z = f: the plane cannot represent 90° and more off axis, and is badly conditioned in
+//! single precision. Radial lenses share one code path; Brown-Conrady has its own.
+
+mod brown;
+mod config;
+mod radial;
+mod shutter;
+mod uncertain;
+
+pub use config::{Config, Covariance, Intrinsic, Model};
+pub(crate) use uncertain::INTRINSICS;
+
+use crate::base::error::{ConfigError, Limit, require};
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+#[cfg(feature = "horace")]
+use crate::geometry::crop::Crop;
+use crate::geometry::frames::{Cam, UnitVec3};
+use crate::geometry::pixel::ImagePoint;
+
+/// A lens, checked and ready: every function on it is total.
+#[derive(Debug, Clone)]
+pub struct Camera<T> {
+    width: u16,
+    height: u16,
+    fx: T,
+    fy: T,
+    inv_fx: T,
+    inv_fy: T,
+    cx: T,
+    cy: T,
+    /// Largest distance from the principal point, in units of the focal length, that has a ray.
+    rho_max: T,
+    /// Largest angle off axis that the lens is used for.
+    theta_max: T,
+    circle: bool,
+    lens: Lens<T>,
+    /// What the calibration leaves open.
+    modes: uncertain::Modes<T>,
+    /// From one row to the next, seconds, and the row that is exposed at the picture's time.
+    row_s: T,
+    middle_row: T,
+    /// How the camera turns while this picture is read out.
+    turning: Option<shutter::Turning<T>>,
+}
+
+#[derive(Debug, Clone)]
+enum Lens<T> {
+    Radial(radial::Radial<T>),
+    Pinhole,
+    Brown(brown::Brown<T>),
+}
+
+/// The ray of a pixel and how it moves with the pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray<T> {
+    /// Unit vector in the camera frame.
+    pub(crate) s: V3<T>,
+    /// `[∂a/∂u, ∂a/∂v, ∂b/∂u, ∂b/∂v]`, where a and b are the coordinates of the ray's change in the tangent basis
+    /// that [`tangent`] spans at `s`; radians a pixel.
+    pub(crate) m: [T; 4],
+}
+
+/// The tangent basis at `s`: the images of x and y under the rotation that takes z to `s` the short way. It is
+/// smooth everywhere but at `s` = −z, which no lens sees.
+#[inline(always)]
+pub(crate) fn tangent<T: Real>(s: &V3<T>) -> [V3<T>; 2] {
+    let one = T::one();
+    let q = one / (one + s.z);
+    let xy = -s.x * s.y * q;
+    [V3::new(one - s.x * s.x * q, xy, -s.x), V3::new(xy, one - s.y * s.y * q, -s.y)]
+}
+
+impl<T: Real> Ray<T> {
+    /// The direction.
+    pub fn direction(&self) -> UnitVec3<Cam, T> {
+        UnitVec3::assume_unit(self.s)
+    }
+    /// The derivative of the ray by (u, v): rows x, y, z; radians a pixel.
+    pub fn jacobian(&self) -> [[T; 2]; 3] {
+        let [a, b] = tangent(&self.s);
+        let [au, av, bu, bv] = self.m;
+        let row = |a: T, b: T| [a * au + b * bu, a * av + b * bv];
+        [row(a.x, b.x), row(a.y, b.y), row(a.z, b.z)]
+    }
+}
+
+impl<T: Real> Camera<T> {
+    /// Checks the calibration and prepares the lens.
+    ///
+    /// # Errors
+    /// A field out of its limits, or a lens that is not monotone up to `min(theta_max_deg, the farthest corner)`.
+    pub fn try_new(config: &Config) -> Result<Self, ConfigError> {
+        config.check()?;
+        let c = config;
+        let corner = |x: f64, y: f64| ((x - c.cx_px) / c.fx_px).hypot_((y - c.cy_px) / c.fy_px);
+        let (right, bottom) = (f64::from(c.width) - 0.5, f64::from(c.height) - 0.5);
+        let rho_corner =
+            corner(-0.5, -0.5).max(corner(right, -0.5)).max(corner(-0.5, bottom)).max(corner(right, bottom));
+        let (lens, rho_max, theta_max) = match c.model {
+            Model::KannalaBrandt | Model::Equidistant => {
+                let (lens, rho, theta) = radial::Radial::try_new(c, rho_corner)?;
+                (Lens::Radial(lens), rho, theta)
+            }
+            Model::Pinhole => {
+                let theta = match c.theta_max_deg {
+                    Some(deg) => {
+                        require(
+                            deg < 89.0,
+                            "camera.theta_max_deg",
+                            deg,
+                            Limit::Rule("a pinhole ends before 89 degrees"),
+                        )?;
+                        deg.to_radians().min(libm::atan(rho_corner))
+                    }
+                    None => libm::atan(rho_corner),
+                };
+                (Lens::Pinhole, libm::tan(theta), theta)
+            }
+            Model::BrownConrady => {
+                let (lens, rho, theta) = brown::Brown::try_new(c, rho_corner)?;
+                (Lens::Brown(lens), rho, theta)
+            }
+        };
+        Ok(Self {
+            width: c.width,
+            height: c.height,
+            fx: T::from_f64(c.fx_px),
+            fy: T::from_f64(c.fy_px),
+            inv_fx: T::from_f64(1.0 / c.fx_px),
+            inv_fy: T::from_f64(1.0 / c.fy_px),
+            cx: T::from_f64(c.cx_px),
+            cy: T::from_f64(c.cy_px),
+            rho_max: T::from_f64(rho_max),
+            theta_max: T::from_f64(theta_max),
+            circle: rho_max < rho_corner * (1.0 - 1e-6),
+            lens,
+            modes: uncertain::modes(c)?,
+            row_s: T::from_f64(c.readout_s / (f64::from(c.height) - 1.0)),
+            middle_row: T::from_f64((f64::from(c.height) - 1.0) * 0.5),
+            turning: None,
+        })
+    }
+
+    /// The camera that takes a part of this one's pictures, or smaller ones.
+    #[cfg(feature = "horace")]
+    pub(crate) fn through(&self, crop: &Crop) -> Self {
+        let ([sx, sy], centre) = (crop.scale::<T>(), crop.of_picture(self.principal_point()));
+        Self {
+            width: crop.width,
+            height: crop.height,
+            fx: self.fx / sx,
+            fy: self.fy / sy,
+            inv_fx: self.inv_fx * sx,
+            inv_fy: self.inv_fy * sy,
+            cx: centre.u,
+            cy: centre.v,
+            row_s: self.row_s * sy,
+            middle_row: crop.of_picture(ImagePoint { u: T::ZERO, v: self.middle_row }).v,
+            ..self.clone()
+        }
+    }
+
+    /// Columns of the picture.
+    pub fn width(&self) -> u16 {
+        self.width
+    }
+    /// Rows of the picture.
+    pub fn height(&self) -> u16 {
+        self.height
+    }
+    /// Largest angle off axis in use, radians: the image circle or the farthest corner; of `brown-conrady` 1 % of the radius
+    /// beyond the corner, which tangential terms move.
+    pub fn theta_max_rad(&self) -> T {
+        self.theta_max
+    }
+    /// The image circle when it cuts the picture: centre (u, v) and semi-axes along x and y, in pixels.
+    pub fn image_circle_px(&self) -> Option<(ImagePoint<T>, T, T)> {
+        self.circle.then(|| (ImagePoint { u: self.cx, v: self.cy }, self.rho_max * self.fx, self.rho_max * self.fy))
+    }
+    /// Focal lengths (fx, fy) in pixels.
+    pub fn focal_px(&self) -> (T, T) {
+        (self.fx, self.fy)
+    }
+    /// Where the optical axis meets the picture.
+    pub fn principal_point(&self) -> ImagePoint<T> {
+        ImagePoint { u: self.cx, v: self.cy }
+    }
+
+    /// The ray of an image point with its derivative; `None` beyond the image circle.
+    #[inline]
+    pub fn ray(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
+        let ray = self.ray_at_its_row(p)?;
+        Some(match &self.turning {
+            None => ray,
+            Some(turning) => turning.to_frame_time(&ray, p.v),
+        })
+    }
+
+    /// As [`Self::ray`], in the camera as it stands when the point's row is exposed.
+    #[inline(always)]
+    fn ray_at_its_row(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
+        let x = (p.u - self.cx) * self.inv_fx;
+        let y = (p.v - self.cy) * self.inv_fy;
+        let rho2 = x * x + y * y;
+        if !(rho2 <= self.rho_max * self.rho_max) {
+            return None;
+        }
+        let (s, [a, b, c, d]) = match &self.lens {
+            Lens::Radial(lens) => lens.ray(x, y, rho2),
+            Lens::Pinhole => {
+                let sz = T::one() / (T::one() + rho2).sqrt();
+                radial_ray(x, y, sz, sz, sz * sz)
+            }
+            Lens::Brown(lens) => lens.ray(x, y)?,
+        };
+        Some(Ray { s, m: [a * self.inv_fx, b * self.inv_fy, c * self.inv_fx, d * self.inv_fy] })
+    }
+
+    /// Rays of a block of image points in place, as [`Self::ray`]; a point beyond the image circle is cleared.
+    #[inline(always)]
+    pub(crate) fn rays(&self, block: &mut Block<T>) {
+        if let (Lens::Radial(lens), None) = (&self.lens, &self.turning) {
+            let (mut x, mut y) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+            for l in 0..LANES {
+                x[l] = (block.s[0][l] - self.cx) * self.inv_fx;
+                y[l] = (block.s[1][l] - self.cy) * self.inv_fy;
+            }
+            if let Some((s, [a, b, c, d])) = lens.rays(&x, &y) {
+                for l in 0..LANES {
+                    let within = x[l] * x[l] + y[l] * y[l] <= self.rho_max * self.rho_max;
+                    let counts = within && block.weight[l] > T::ZERO;
+                    // As `Block::clear`.
+                    let or_zero = |value: T| if counts { value } else { T::ZERO };
+                    block.s[0][l] = or_zero(s[0][l]);
+                    block.s[1][l] = or_zero(s[1][l]);
+                    block.s[2][l] = if counts { s[2][l] } else { T::one() };
+                    block.m[0][l] = or_zero(a[l] * self.inv_fx);
+                    block.m[1][l] = or_zero(b[l] * self.inv_fy);
+                    block.m[2][l] = or_zero(c[l] * self.inv_fx);
+                    block.m[3][l] = or_zero(d[l] * self.inv_fy);
+                    block.weight[l] = if counts { block.weight[l] } else { T::ZERO };
+                }
+                return;
+            }
+        }
+        self.rays_one_by_one(block);
+    }
+
+    /// As [`Self::rays`], for lenses without series and pictures whose rows have a time of their own.
+    // Once in flash: inlined it would stand there for every lane.
+    #[inline(never)]
+    fn rays_one_by_one(&self, block: &mut Block<T>) {
+        for l in 0..LANES {
+            match self.ray(block.point(l)).filter(|_| block.weight[l] > T::ZERO) {
+                Some(ray) => block.set_ray(l, &ray),
+                None => block.clear(l),
+            }
+        }
+    }
+
+    /// An image point from the principal point on, in focal lengths.
+    #[cfg(feature = "horace")]
+    pub(crate) fn in_focal_lengths(&self, p: ImagePoint<T>) -> [T; 2] {
+        [(p.u - self.cx) * self.inv_fx, (p.v - self.cy) * self.inv_fy]
+    }
+
+    /// The direction of a point so far from the principal point, in focal lengths, also beyond the picture and the image
+    /// circle: a radial lens goes on as it ends there, up to 180° off axis, and others go on as a pinhole. `None` for
+    /// what is not finite.
+    #[cfg(feature = "horace")]
+    pub(crate) fn continued(&self, [x, y]: [T; 2]) -> Option<UnitVec3<Cam, T>> {
+        let rho2 = x * x + y * y;
+        let Lens::Radial(lens) = &self.lens else { return UnitVec3::try_new([x, y, T::one()]) };
+        if rho2 <= self.rho_max * self.rho_max {
+            return Some(UnitVec3::assume_unit(lens.ray(x, y, rho2).0));
+        }
+        let rho = rho2.sqrt();
+        let (s, c) = lens.beyond(rho).sin_cos();
+        UnitVec3::try_new([x / rho * s, y / rho * s, c])
+    }
+
+    /// The direction of an image point; `None` beyond the image circle.
+    pub fn unproject(&self, p: ImagePoint<T>) -> Option<UnitVec3<Cam, T>> {
+        self.ray(p).map(|r| r.direction())
+    }
+
+    /// The image point of a direction; `None` beyond the image circle. It may lie outside the picture.
+    pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
+        match &self.turning {
+            None => self.project_at_its_row(d.v()),
+            Some(turning) => turning.project(self, d.v()),
+        }
+    }
+
+    /// As [`Self::project`], of a direction in the camera as it stands when the point's row is exposed.
+    fn project_at_its_row(&self, s: &V3<T>) -> Option<ImagePoint<T>> {
+        let h = (s.x * s.x + s.y * s.y).sqrt();
+        let theta = h.atan2(s.z);
+        if !(theta <= self.theta_max) {
+            return None;
+        }
+        let (x, y) = match &self.lens {
+            Lens::Radial(lens) => {
+                let scale = if h > T::zero() { lens.radius(theta) / h } else { T::one() };
+                (s.x * scale, s.y * scale)
+            }
+            Lens::Pinhole => (s.x / s.z, s.y / s.z),
+            Lens::Brown(lens) => lens.distort(s.x / s.z, s.y / s.z),
+        };
+        Some(ImagePoint { u: x * self.fx + self.cx, v: y * self.fy + self.cy })
+    }
+}
+
+/// A ray and its derivative for a radially symmetric lens: `scale` = sin θ / ρ, `cos` = cos θ, `dtheta` = dθ/dρ.
+///
+/// In the tangent basis of [`tangent`] the derivative by (x, y) is `scale`·I + (`dtheta` − `scale`)·u uᵀ with u the
+/// unit vector of (x, y) (math: J = t_r dθ/dρ uᵀ + t_φ (sin θ/ρ) u⊥ᵀ, and the basis turns t_r to u, t_φ to u⊥).
+#[inline(always)]
+fn radial_ray<T: Real>(x: T, y: T, scale: T, cos: T, dtheta: T) -> (V3<T>, [T; 4]) {
+    let s = V3::new(x * scale, y * scale, cos);
+    let rho2 = x * x + y * y;
+    let k = if rho2 > T::from_f64(1e-24) { (dtheta - scale) / rho2 } else { T::zero() };
+    let xy = k * x * y;
+    (s, [scale + k * x * x, xy, xy, scale + k * y * y])
+}
+
+/// `hypot` for the load-time checks, from the same library on every target.
+trait Hypot {
+    fn hypot_(self, other: f64) -> f64;
+}
+impl Hypot for f64 {
+    fn hypot_(self, other: f64) -> f64 {
+        libm::sqrt(self * self + other * other)
+    }
+}
+
+#[cfg(test)]
+mod tests;

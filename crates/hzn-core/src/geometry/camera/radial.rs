@@ -1,0 +1,255 @@
+//! Kannala-Brandt and equidistant lenses.
+//!
+//! The inverse θ(ρ) has no closed form. On loading it is solved by Newton's method at Chebyshev nodes, and what a
+//! ray needs (sin θ/ρ, cos θ, dθ/dρ) is kept as three polynomials in ρ², made from Chebyshev series. They are checked
+//! against Newton between the nodes; where they do not reach the precision of `T` (close to the end of monotony), rays
+//! are solved by Newton instead.
+
+use super::config::Config;
+use super::radial_ray;
+use crate::base::error::{ConfigError, Limit, require};
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::geometry::block::LANES;
+
+/// Most terms of each series; as many are used as the precision of `T` asks for.
+const TERMS: usize = 24;
+
+#[derive(Debug, Clone)]
+pub(super) struct Radial<T> {
+    k: [T; 4],
+    theta_max: T,
+    r_max: T,
+    inverse: Inverse<T>,
+}
+
+#[derive(Debug, Clone)]
+enum Inverse<T> {
+    Newton,
+    /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds one power's coefficients of the three polynomials
+    /// (sin θ/ρ, cos θ, dθ/dρ), lowest first; the first `used` count.
+    Series {
+        scale: T,
+        used: usize,
+        terms: [[T; 3]; TERMS],
+    },
+}
+
+/// Eight unit vectors, and eight derivatives in the tangent basis.
+pub(super) type Lanes<T> = ([[T; LANES]; 3], [[T; LANES]; 4]);
+
+/// r(θ) and r'(θ).
+fn forward<T: Real>(k: &[T; 4], theta: T) -> (T, T) {
+    let t2 = theta * theta;
+    let [k1, k2, k3, k4] = *k;
+    let one = T::one();
+    let r = theta * (one + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))));
+    let d = one
+        + t2 * (T::from_f64(3.0) * k1
+            + t2 * (T::from_f64(5.0) * k2 + t2 * (T::from_f64(7.0) * k3 + t2 * T::from_f64(9.0) * k4)));
+    (r, d)
+}
+
+/// First root of r'(θ) below 180°, in radians: bracketed on a fine grid, then halved.
+pub(super) fn monotonic_limit(k: &[f64; 4]) -> Option<f64> {
+    const STEPS: i32 = 1800;
+    let at = |i: i32| core::f64::consts::PI * f64::from(i) / f64::from(STEPS);
+    let (mut low, mut high) = (1..=STEPS).find(|&i| forward(k, at(i)).1 <= 0.0).map(|i| (at(i - 1), at(i)))?;
+    for _ in 0..60 {
+        let mid = 0.5 * (low + high);
+        if forward(k, mid).1 > 0.0 { low = mid } else { high = mid }
+    }
+    Some(low)
+}
+
+/// θ with r(θ) = ρ: Newton clamped to 0…θ_max from ρ θ_max/r(θ_max).
+#[inline(never)]
+fn invert<T: Real>(k: &[T; 4], rho: T, theta_max: T, r_max: T) -> T {
+    let mut theta = rho * theta_max / r_max;
+    for _ in 0..8 {
+        let (r, d) = forward(k, theta);
+        let step = (r - rho) / d;
+        theta = (theta - step).max(T::zero()).min(theta_max);
+        if step.abs() <= T::EPSILON * theta {
+            break;
+        }
+    }
+    theta
+}
+
+impl<T: Real> Radial<T> {
+    /// The lens, ρ_max and θ_max in radians.
+    pub(super) fn try_new(config: &Config, rho_corner: f64) -> Result<(Self, f64, f64), ConfigError> {
+        let k: [f64; 4] = core::array::from_fn(|i| config.coefficient(i));
+        let limit = monotonic_limit(&k).unwrap_or(core::f64::consts::PI);
+        let margin = 2f64.to_radians();
+        let usable = limit - margin;
+        // Where the corner is reached, if it is reached before the lens folds back.
+        let corner =
+            (forward(&k, usable).0 >= rho_corner).then(|| invert(&k, rho_corner, usable, forward(&k, usable).0));
+        let theta_max = match (config.theta_max_deg.map(f64::to_radians), corner) {
+            (Some(circle), Some(corner)) => circle.min(corner),
+            (None, Some(corner)) => corner,
+            (Some(circle), None) => {
+                let deg = circle.to_degrees();
+                require(circle <= usable, "camera.theta_max_deg", deg, Limit::Monotone(limit.to_degrees()))?;
+                circle
+            }
+            (None, None) => {
+                return Err(ConfigError {
+                    field: "camera.k",
+                    value: config.coefficient(0),
+                    limit: Limit::Monotone(limit.to_degrees()),
+                    body: None,
+                });
+            }
+        };
+        let r_max = forward(&k, theta_max).0;
+        let (kt, tt, rt) = (k.map(T::from_f64), T::from_f64(theta_max), T::from_f64(r_max));
+        let inverse = Self::series(&k, theta_max, r_max);
+        Ok((Self { k: kt, theta_max: tt, r_max: rt, inverse }, r_max, theta_max))
+    }
+
+    /// The three series, or Newton where they are not good enough.
+    fn series(k: &[f64; 4], theta_max: f64, r_max: f64) -> Inverse<T> {
+        let values = |rho: f64| -> [f64; 3] {
+            if rho == 0.0 {
+                return [1.0, 1.0, 1.0];
+            }
+            let theta = invert(k, rho, theta_max, r_max);
+            let (sin, cos) = libm::sincos(theta);
+            [sin / rho, cos, 1.0 / forward(k, theta).1]
+        };
+        let rho_of = |t: f64| libm::sqrt(0.5 * (t + 1.0)) * r_max;
+        let mut terms = [[0.0f64; 3]; TERMS];
+        let n = TERMS as f64;
+        for node in 0..TERMS {
+            let angle = core::f64::consts::PI * (node as f64 + 0.5) / n;
+            let v = values(rho_of(libm::cos(angle)));
+            for (order, term) in terms.iter_mut().enumerate() {
+                let weight = libm::cos(order as f64 * angle) * if order == 0 { 1.0 } else { 2.0 } / n;
+                for (c, v) in term.iter_mut().zip(v) {
+                    *c += weight * v;
+                }
+            }
+        }
+        let scale = 2.0 / (r_max * r_max);
+        // Direction to the working precision; the derivative only weighs points, so 1e-6 is ample.
+        let tolerance = (T::EPSILON.to_f64() * 2.0).max(1e-14);
+        let good = |powers: &[[f64; 3]]| {
+            (0..=64).all(|i| {
+                let rho = r_max * f64::from(i) / 64.0;
+                let (got, want) = (horner(powers, scale * rho * rho - 1.0), values(rho));
+                let direction = ((got[0] - want[0]).abs() * rho).max((got[1] - want[1]).abs());
+                direction <= tolerance && (got[2] - want[2]).abs() <= (1e-6 * want[2]).max(tolerance)
+            })
+        };
+        for used in 4..=TERMS {
+            let powers = powers(terms.get(..used).unwrap_or_default());
+            if good(powers.get(..used).unwrap_or_default()) {
+                return Inverse::Series {
+                    scale: T::from_f64(scale),
+                    used,
+                    terms: powers.map(|row| row.map(T::from_f64)),
+                };
+            }
+        }
+        Inverse::Newton
+    }
+
+    /// Rays of eight points (x, y) at once, where there are series: unit vectors and derivatives in the tangent basis.
+    #[inline(always)]
+    pub(super) fn rays(&self, x: &[T; LANES], y: &[T; LANES]) -> Option<Lanes<T>> {
+        let Inverse::Series { scale, used, terms } = &self.inverse else { return None };
+        let (last, rest) = terms.get(..*used)?.split_last()?;
+        let zero = [T::ZERO; LANES];
+        let (mut rho2, mut t) = (zero, zero);
+        for l in 0..LANES {
+            rho2[l] = x[l] * x[l] + y[l] * y[l];
+            t[l] = *scale * rho2[l] - T::one();
+        }
+        let [mut sin, mut cos, mut dtheta] = last.map(|highest| [highest; LANES]);
+        for term in rest.iter().rev() {
+            for l in 0..LANES {
+                sin[l] = sin[l] * t[l] + term[0];
+                cos[l] = cos[l] * t[l] + term[1];
+                dtheta[l] = dtheta[l] * t[l] + term[2];
+            }
+        }
+        let (mut s, mut m) = ([zero; 3], [zero; 4]);
+        for l in 0..LANES {
+            let k = (dtheta[l] - sin[l]) / rho2[l].max(T::from_f64(1e-24));
+            let xy = k * x[l] * y[l];
+            s[0][l] = x[l] * sin[l];
+            s[1][l] = y[l] * sin[l];
+            s[2][l] = cos[l];
+            m[0][l] = sin[l] + k * x[l] * x[l];
+            m[1][l] = xy;
+            m[2][l] = xy;
+            m[3][l] = sin[l] + k * y[l] * y[l];
+        }
+        Some((s, m))
+    }
+
+    /// The ray of (x, y) in units of the focal length and its derivative in the tangent basis.
+    #[inline(always)]
+    pub(super) fn ray(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
+        match &self.inverse {
+            Inverse::Series { scale, used, terms } => {
+                let [s, c, d] = horner(terms.get(..*used).unwrap_or_default(), *scale * rho2 - T::one());
+                radial_ray(x, y, s, c, d)
+            }
+            Inverse::Newton => self.ray_by_newton(x, y, rho2),
+        }
+    }
+
+    /// As [`Self::ray`], where there are no series.
+    // Once in flash, not at every caller.
+    #[inline(never)]
+    fn ray_by_newton(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
+        let rho = rho2.sqrt();
+        let theta = invert(&self.k, rho, self.theta_max, self.r_max);
+        let (sin, cos) = theta.sin_cos();
+        let s = if rho > T::from_f64(1e-12) { sin / rho } else { T::one() };
+        radial_ray(x, y, s, cos, T::one() / forward(&self.k, theta).1)
+    }
+
+    /// θ beyond the largest radius, along the tangent there.
+    #[cfg(feature = "horace")]
+    pub(super) fn beyond(&self, rho: T) -> T {
+        let (r, d) = forward(&self.k, self.theta_max);
+        (self.theta_max + (rho - r) / d).min(T::from_f64(core::f64::consts::PI))
+    }
+
+    /// r(θ) in units of the focal length.
+    pub(super) fn radius(&self, theta: T) -> T {
+        forward(&self.k, theta).0
+    }
+}
+
+/// The three polynomials at t.
+#[inline(always)]
+fn horner<T: Real>(terms: &[[T; 3]], t: T) -> [T; 3] {
+    terms.iter().rev().fold([T::zero(); 3], |sum, term| core::array::from_fn(|i| sum[i] * t + term[i]))
+}
+
+/// The coefficients by powers of t of three Chebyshev series, by T₀ = 1, T₁ = t, Tₙ₊₁ = 2 t Tₙ − Tₙ₋₁.
+fn powers(series: &[[f64; 3]]) -> [[f64; 3]; TERMS] {
+    let mut sums = [[0.0; 3]; TERMS];
+    let (mut before, mut this) = ([0.0; TERMS], [0.0; TERMS]);
+    for (order, term) in series.iter().enumerate() {
+        let next: [f64; TERMS] = core::array::from_fn(|power| match (order, power) {
+            (0, 0) | (1, 1) => 1.0,
+            (0 | 1, _) => 0.0,
+            (_, 0) => -before[0],
+            _ => 2.0 * this[power - 1] - before[power],
+        });
+        (before, this) = (this, next);
+        for (sum, factor) in sums.iter_mut().zip(this) {
+            for (s, c) in sum.iter_mut().zip(term) {
+                *s += factor * c;
+            }
+        }
+    }
+    sums
+}

@@ -1,0 +1,181 @@
+//! What a wrong calibration does: 1-sigma modes of the intrinsic parameters, and how each parameter moves the image point of
+//! a ray.
+//!
+//! Parameters are relative: focal lengths as parts of themselves, the principal point in focal lengths. In these units a
+//! part of the picture and a scaled one have the same numbers.
+
+use super::config::{Config, Intrinsic, Model};
+use super::{Camera, Lens};
+use crate::base::error::{ConfigError, Limit, require};
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+
+/// Most intrinsic parameters: two focal lengths, two of the principal point, five coefficients.
+pub(crate) const INTRINSICS: usize = 9;
+
+/// 1-sigma changes of all parameters at once that are independent of each other; their outer products add up to the
+/// covariance.
+pub(super) type Modes<T> = heapless::Vec<[T; INTRINSICS], INTRINSICS>;
+
+/// The modes of a calibration: those of its covariance, else those of its scalar sigmas; none when all are 0.
+pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
+    let mut modes = Modes::new();
+    if let Some(given) = &config.covariance {
+        let order = &given.order;
+        let field = "camera.covariance.order";
+        let places = order.iter().map(|i| i.place(config.model));
+        for (n, place) in places.clone().enumerate() {
+            let rule = "a parameter that this lens model does not have";
+            require(place.is_some(), field, n as f64, Limit::Rule(rule))?;
+            require(!places.clone().take(n).any(|p| p == place), field, n as f64, Limit::Rule("stands twice"))?;
+        }
+        let n = order.len();
+        let square = given.rows.len() == n && given.rows.iter().all(|row| row.len() == n);
+        let field = "camera.covariance.rows";
+        let rule = "must have as many rows, and as many values in each, as order has names";
+        require(square && n > 0, field, given.rows.len() as f64, Limit::Rule(rule))?;
+        for column in triangle(&given.rows)?.iter().take(n) {
+            let mut mode = [T::ZERO; INTRINSICS];
+            for ((value, intrinsic), place) in column.iter().zip(order).zip(places.clone()) {
+                if let Some(slot) = place.and_then(|p| mode.get_mut(p)) {
+                    *slot = T::from_f64(value / intrinsic.unit(config));
+                }
+            }
+            // There is room for as many as there are parameters.
+            let _ = modes.push(mode);
+        }
+        return Ok(modes);
+    }
+    let focal = config.focal_sigma_percent * 0.01;
+    let mut push = |mode: [(usize, f64); 2]| {
+        if mode.iter().any(|(_, sigma)| *sigma > 0.0) {
+            let _ = modes.push(core::array::from_fn(|i| {
+                T::from_f64(mode.iter().filter(|(place, _)| *place == i).map(|(_, sigma)| *sigma).sum())
+            }));
+        }
+    };
+    // Both focal lengths alike: a scale, as a distance or a temperature makes it.
+    push([(0, focal), (1, focal)]);
+    push([(2, config.centre_sigma_px / config.fx_px), (2, 0.0)]);
+    push([(3, config.centre_sigma_px / config.fy_px), (3, 0.0)]);
+    Ok(modes)
+}
+
+/// A number is 0 to rounding when it is below this part of what it was subtracted from.
+const ROUNDING: f64 = 1e-9;
+
+/// Columns of the lower triangle L with L Lᵀ = `rows`, refusing what is not symmetric and positive semidefinite.
+fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS]; INTRINSICS], ConfigError> {
+    let field = "camera.covariance.rows";
+    let at = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0.0);
+    let refused = |value: f64, rule: &'static str| require(false, field, value, Limit::Rule(rule));
+    let mut columns = [[0.0f64; INTRINSICS]; INTRINSICS];
+    let n = rows.len().min(INTRINSICS);
+    for j in 0..n {
+        for i in 0..n {
+            require(at(i, j).is_finite(), field, at(i, j), Limit::Finite)?;
+            let scale = libm::sqrt((at(i, i) * at(j, j)).abs());
+            if (at(i, j) - at(j, i)).abs() > 1e-6 * scale {
+                refused(at(i, j), "must be symmetric")?;
+            }
+        }
+    }
+    for j in 0..n {
+        let left = |columns: &[[f64; INTRINSICS]; INTRINSICS], i: usize| {
+            at(i, j) - columns.iter().take(j).map(|c| c[i] * c[j]).sum::<f64>()
+        };
+        let pivot = left(&columns, j);
+        let rule = "must be positive semidefinite";
+        if !(pivot >= -ROUNDING * at(j, j).abs()) || at(j, j) < 0.0 {
+            refused(pivot, rule)?;
+        }
+        let is_zero = pivot <= ROUNDING * at(j, j);
+        let root = if is_zero { 0.0 } else { libm::sqrt(pivot) };
+        for i in j..n {
+            let value = left(&columns, i);
+            if is_zero && value.abs() > libm::sqrt(ROUNDING * at(i, i).abs() * at(j, j)) {
+                refused(value, rule)?;
+            }
+            columns[j][i] = if is_zero { 0.0 } else { value / root };
+        }
+    }
+    Ok(columns)
+}
+
+impl<T: Real> Camera<T> {
+    /// 1-sigma modes of the intrinsic parameters; `None` of a lens that is known exactly.
+    pub(crate) fn uncertain(&self) -> Option<&[[T; INTRINSICS]]> {
+        (!self.modes.is_empty()).then_some(&self.modes)
+    }
+
+    /// How far the image point of the ray `s` moves, in pixels (u, v), when each parameter grows by 1, in the parameters'
+    /// relative units.
+    pub(crate) fn moves(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
+        let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
+        let h2 = s.x * s.x + s.y * s.y;
+        // Where it falls, in focal lengths, and how the coefficients move it.
+        let (x, y, by_k): (T, T, [[T; 2]; 5]) = match &self.lens {
+            Lens::Radial(lens) => {
+                let h = h2.sqrt();
+                let theta = h.atan2(s.z);
+                let per = if h > zero { one / h } else { zero };
+                let radius = if h > zero { lens.radius(theta) * per } else { one };
+                let q = theta * theta;
+                let mut power = theta * q * per;
+                let by_k = core::array::from_fn(|_| {
+                    let this = power;
+                    power *= q;
+                    [s.x * this, s.y * this]
+                });
+                (s.x * radius, s.y * radius, by_k)
+            }
+            Lens::Pinhole => (s.x / s.z, s.y / s.z, [[zero; 2]; 5]),
+            Lens::Brown(lens) => {
+                let (x, y) = (s.x / s.z, s.y / s.z);
+                let q = x * x + y * y;
+                let (dx, dy) = lens.distort(x, y);
+                let by_k = [
+                    [x * q, y * q],
+                    [x * q * q, y * q * q],
+                    [two * x * y, q + two * y * y],
+                    [q + two * x * x, two * x * y],
+                    [x * q * q * q, y * q * q * q],
+                ];
+                (dx, dy, by_k)
+            }
+        };
+        let [k1, k2, k3, k4, k5] = by_k;
+        [[x, zero], [zero, y], [one, zero], [zero, one], k1, k2, k3, k4, k5].map(|[u, v]| [u * self.fx, v * self.fy])
+    }
+}
+
+impl Intrinsic {
+    /// Its place among the parameters of a model; `None` where the model has no such parameter.
+    fn place(self, model: Model) -> Option<usize> {
+        let is_radial = model == Model::KannalaBrandt;
+        let is_brown = model == Model::BrownConrady;
+        Some(match self {
+            Self::FxPx => 0,
+            Self::FyPx => 1,
+            Self::CxPx => 2,
+            Self::CyPx => 3,
+            Self::K1 if is_radial || is_brown => 4,
+            Self::K2 if is_radial || is_brown => 5,
+            Self::K3 if is_radial => 6,
+            Self::K4 if is_radial => 7,
+            Self::P1 if is_brown => 6,
+            Self::P2 if is_brown => 7,
+            Self::K3 if is_brown => 8,
+            _ => return None,
+        })
+    }
+
+    /// One relative unit in its own.
+    fn unit(self, config: &Config) -> f64 {
+        match self {
+            Self::FxPx | Self::CxPx => config.fx_px,
+            Self::FyPx | Self::CyPx => config.fy_px,
+            _ => 1.0,
+        }
+    }
+}

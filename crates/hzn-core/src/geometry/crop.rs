@@ -1,0 +1,90 @@
+//! A rectangle of a picture, or of a smaller copy of it: the parts that the division of a picture looks at.
+
+use crate::base::real::Real;
+use crate::geometry::pixel::{ImagePoint, Pixel};
+
+/// A rectangle of the picture's smaller copy, and how much smaller that is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Crop {
+    /// First column and row in the copy.
+    pub(crate) x0: u16,
+    pub(crate) y0: u16,
+    /// Columns and rows.
+    pub(crate) width: u16,
+    pub(crate) height: u16,
+    /// The picture's columns and rows, and the copy's.
+    pub(crate) full: [u16; 2],
+    pub(crate) copy: [u16; 2],
+}
+
+impl Crop {
+    /// All of a copy of `height` rows (all of the picture itself, when it has no more).
+    pub(crate) fn whole(picture: [u16; 2], height: Option<u16>) -> Self {
+        let copy = match height {
+            Some(h) if h < picture[1] => {
+                let (w, h, full) = (u32::from(picture[0]), u32::from(h), u32::from(picture[1]));
+                [((w * h + full / 2) / full).min(w).max(1) as u16, h.max(1) as u16]
+            }
+            _ => picture,
+        };
+        Self { x0: 0, y0: 0, width: copy[0], height: copy[1], full: picture, copy }
+    }
+
+    /// Whether it is the picture itself.
+    pub(crate) fn is_all(&self) -> bool {
+        [self.width, self.height] == self.full
+    }
+
+    /// Pixels.
+    pub(crate) fn area(&self) -> u32 {
+        u32::from(self.width) * u32::from(self.height)
+    }
+
+    /// Its halves across the longer side; `None` when there is only a pixel.
+    pub(crate) fn halves(&self) -> Option<[Self; 2]> {
+        let (mut a, mut b) = (*self, *self);
+        if self.width >= self.height {
+            a.width = self.width / 2;
+            b.width = self.width - a.width;
+            b.x0 = self.x0 + a.width;
+        } else {
+            a.height = self.height / 2;
+            b.height = self.height - a.height;
+            b.y0 = self.y0 + a.height;
+        }
+        (a.area() > 0).then_some([a, b])
+    }
+
+    /// Pixels of the picture a pixel of the crop, in x and y.
+    pub(crate) fn scale<T: Real>(&self) -> [T; 2] {
+        [0, 1].map(|k| T::from_f64(f64::from(self.full[k]) / f64::from(self.copy[k])))
+    }
+
+    /// A place of the crop in the picture.
+    pub(crate) fn in_picture<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
+        let ([sx, sy], half) = (self.scale(), T::from_f64(0.5));
+        ImagePoint {
+            u: (p.u + half + T::from_f64(f64::from(self.x0))) * sx - half,
+            v: (p.v + half + T::from_f64(f64::from(self.y0))) * sy - half,
+        }
+    }
+
+    /// A place of the picture in the crop.
+    pub(crate) fn of_picture<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
+        let ([sx, sy], half) = (self.scale(), T::from_f64(0.5));
+        ImagePoint {
+            u: (p.u + half) / sx - half - T::from_f64(f64::from(self.x0)),
+            v: (p.v + half) / sy - half - T::from_f64(f64::from(self.y0)),
+        }
+    }
+
+    /// The picture's pixel in which the centre of a pixel of the crop lies.
+    pub(crate) fn pixel(&self, x: u16, y: u16) -> Pixel {
+        let place = |at: u16, first: u16, k: usize| {
+            let at = 2 * (u64::from(at) + u64::from(first)) + 1;
+            let last = u64::from(self.full[k]).saturating_sub(1);
+            (at * u64::from(self.full[k]) / (2 * u64::from(self.copy[k].max(1)))).min(last) as u16
+        };
+        Pixel { x: place(x, self.x0, 0), y: place(y, self.y0, 1) }
+    }
+}

@@ -1,0 +1,14 @@
+//! Directions, places in a picture, and the shapes that they make.
+
+pub(crate) mod block;
+pub mod camera;
+#[cfg(any(feature = "horace", feature = "zju"))]
+pub(crate) mod circle;
+pub(crate) mod cone;
+#[cfg(feature = "horace")]
+pub(crate) mod crop;
+pub mod ellipsoid;
+pub mod frames;
+pub mod pixel;
+#[cfg(feature = "dlr")]
+pub mod section;

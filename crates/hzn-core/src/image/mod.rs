@@ -1,0 +1,487 @@
+//! The picture at the door: checked once, after which no read can fail.
+//!
+//! A picture is a borrowed slice of 8- or 16-bit samples, grey or interleaved colour, with any row stride. The
+//! pipeline is generic over [`Pixels`], so each kind gets its own compiled copy and a flight computer links only
+//! the one it uses.
+
+#[cfg(feature = "horace")]
+mod cropped;
+pub mod region;
+
+use core::fmt;
+
+use crate::geometry::block::Lit;
+
+#[cfg(feature = "horace")]
+pub(crate) use cropped::Cropped;
+
+/// What the pipeline reads: one brightness per pixel.
+pub trait Pixels {
+    /// The picture is gone, and of its edges only [`Self::passed`] is left.
+    const PASSED: bool = false;
+    /// Columns, 1 to 65535.
+    fn width(&self) -> u16;
+    /// Rows, 1 to 65535.
+    fn height(&self) -> u16;
+    /// The largest value a sample can have, such as 255 or 4095.
+    fn full_scale(&self) -> u16;
+    /// Where column `x`, row `y` stands in memory, for [`Self::read`].
+    fn index(&self, x: u16, y: u16) -> usize;
+    /// Index distance from a column to the next.
+    fn across(&self) -> usize;
+    /// Index distance from a row to the next.
+    fn down(&self) -> usize;
+    /// Brightness at an index; 0 beyond the end.
+    fn read(&self, index: usize) -> u16;
+    /// Brightness at an index and at the two columns to the right of it.
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        [0, 1, 2].map(|k| self.read(index + k * self.across()))
+    }
+    /// Of `count` pixels from an index to the right, how many before the first that is not as `lit` says: at `level` or
+    /// brighter.
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()
+    }
+    /// The edge point of a border pixel, of a picture that came row by row: it was measured when the rows around it were
+    /// there.
+    fn passed(&self, _x: u16, _y: u16) -> Option<Passed> {
+        None
+    }
+    /// Brightness at column `x`, row `y`. The caller stays within the picture: beyond, it is some pixel or 0.
+    #[inline(always)]
+    fn at(&self, x: u16, y: u16) -> u16 {
+        self.read(self.index(x, y))
+    }
+}
+
+/// An edge point as it is kept beside its border pixel, see [`Pixels::passed`].
+#[derive(Debug, Clone, Copy)]
+pub struct Passed {
+    /// From the pixel's centre, away from the light.
+    pub(crate) towards_dark_px: f32,
+    pub(crate) lit: Lit,
+    /// It stands at the global level.
+    pub(crate) fallback: bool,
+    /// Its lit side is clipped at full scale.
+    pub(crate) clipped: bool,
+    /// Its plateaus were not within what was held.
+    pub(crate) cut: bool,
+}
+
+impl<P: Pixels> Pixels for &P {
+    const PASSED: bool = P::PASSED;
+    fn passed(&self, x: u16, y: u16) -> Option<Passed> {
+        (**self).passed(x, y)
+    }
+    fn width(&self) -> u16 {
+        (**self).width()
+    }
+    fn height(&self) -> u16 {
+        (**self).height()
+    }
+    fn full_scale(&self) -> u16 {
+        (**self).full_scale()
+    }
+    #[inline(always)]
+    fn index(&self, x: u16, y: u16) -> usize {
+        (**self).index(x, y)
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        (**self).across()
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        (**self).down()
+    }
+    #[inline(always)]
+    fn read(&self, index: usize) -> u16 {
+        (**self).read(index)
+    }
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        (**self).three(index)
+    }
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        (**self).alike(index, count, level, lit)
+    }
+}
+
+/// Why a picture was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageError {
+    /// Width or height is zero, or above 65535.
+    Size,
+    /// The stride is shorter than a row of samples.
+    Stride,
+    /// The slice ends before the last row does.
+    TooShort,
+    /// No channel of that number, or a channel count of zero.
+    Channel,
+    /// Bits per sample must be 8 for bytes, 9 to 16 for words.
+    Bits,
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Size => "width and height must be 1 to 65535 pixels",
+            Self::Stride => "the row stride is shorter than a row of samples",
+            Self::TooShort => "the picture's data end before its last row",
+            Self::Channel => "there is no channel of that number",
+            Self::Bits => "bits per sample must be 8 for bytes and 8 to 16 for words",
+        })
+    }
+}
+impl core::error::Error for ImageError {}
+
+/// Which brightness a colour pixel has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Channel {
+    /// The mean of the first three channels (of all, when there are fewer), rounded down.
+    #[default]
+    Mean,
+    /// The first channel (red, in RGB order).
+    Red,
+    /// The second channel.
+    Green,
+    /// The third channel.
+    Blue,
+}
+
+/// Shape of a picture in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples from the start of a row to the start of the next; at least `width * channels`.
+    pub stride: usize,
+    /// Interleaved samples a pixel: 1 grey, 3 RGB, 4 RGBA.
+    pub channels: u8,
+    /// Significant bits of a sample: 8 for bytes, 8 to 16 for words.
+    pub bits: u8,
+}
+
+impl Layout {
+    /// A picture without padding.
+    pub const fn packed(width: u32, height: u32, channels: u8, bits: u8) -> Self {
+        Self { width, height, stride: width as usize * channels as usize, channels, bits }
+    }
+}
+
+/// A byte or a 16-bit word.
+pub trait Sample: Copy + Into<u16> {
+    /// Largest number of significant bits.
+    const BITS: u8;
+    /// 0.
+    const ZERO: Self;
+    /// How many samples stand before the first that is not as `lit` says: at `level` or above.
+    #[inline(always)]
+    fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
+        samples.iter().take_while(|&&s| (s.into() >= level) == lit).count()
+    }
+}
+impl Sample for u8 {
+    const BITS: u8 = 8;
+    const ZERO: Self = 0;
+    /// Eight at once. Whether a byte is at the level or above stands in its high bit: its own high bit and that of the rest
+    /// of it less the rest of the level, both of them for a level with a high bit, either for one without.
+    #[inline(always)]
+    fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
+        const EACH: u64 = 0x0101_0101_0101_0101;
+        const HIGH: u64 = 0x80 * EACH;
+        if level > 255 {
+            return if lit { 0 } else { samples.len() };
+        }
+        let all = |yes: bool| if yes { u64::MAX } else { 0 };
+        let rest_of_level = u64::from(level & 0x7f) * EACH;
+        let either = all(level < 128);
+        let turn = either ^ all(lit);
+        let (eights, last) = samples.as_chunks();
+        let mut count = 0;
+        for eight in eights {
+            let bytes = u64::from_le_bytes(*eight);
+            let rest = (bytes | HIGH).wrapping_sub(rest_of_level);
+            let others = (((bytes ^ either) & (rest ^ either)) ^ turn) & HIGH;
+            if others != 0 {
+                return count + (others.trailing_zeros() / 8) as usize;
+            }
+            count += 8;
+        }
+        count + last.iter().take_while(|&&s| (u16::from(s) >= level) == lit).count()
+    }
+}
+impl Sample for u16 {
+    const BITS: u8 = 16;
+    const ZERO: Self = 0;
+}
+
+/// A picture with one sample a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Grey<'a, S> {
+    data: &'a [S],
+    stride: usize,
+    width: u16,
+    height: u16,
+    full_scale: u16,
+}
+
+/// A picture with interleaved colours, read as one brightness a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Colour<'a, S> {
+    grey: Grey<'a, S>,
+    channels: usize,
+    first: usize,
+    mean: bool,
+}
+
+fn check<S: Sample>(data: &[S], l: Layout) -> Result<Grey<'_, S>, ImageError> {
+    let (Ok(width @ 1..), Ok(height @ 1..)) = (u16::try_from(l.width), u16::try_from(l.height)) else {
+        return Err(ImageError::Size);
+    };
+    if l.channels == 0 {
+        return Err(ImageError::Channel);
+    }
+    if l.bits < 8 || l.bits > S::BITS {
+        return Err(ImageError::Bits);
+    }
+    let row = usize::from(width) * usize::from(l.channels);
+    if l.stride < row {
+        return Err(ImageError::Stride);
+    }
+    let need = l.stride.checked_mul(usize::from(height) - 1).and_then(|n| n.checked_add(row));
+    if need.is_none_or(|n| n > data.len()) {
+        return Err(ImageError::TooShort);
+    }
+    let full_scale = ((1u32 << l.bits) - 1) as u16;
+    Ok(Grey { data, stride: l.stride, width, height, full_scale })
+}
+
+impl<'a, S: Sample> Grey<'a, S> {
+    /// A grey picture; `layout.channels` must be 1.
+    pub fn try_new(data: &'a [S], layout: Layout) -> Result<Self, ImageError> {
+        if layout.channels != 1 {
+            return Err(ImageError::Channel);
+        }
+        check(data, layout)
+    }
+}
+
+impl<'a, S: Sample> Colour<'a, S> {
+    /// An interleaved colour picture, or grey with alpha (2 channels, of which the mean is the first).
+    pub fn try_new(data: &'a [S], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
+        let grey = check(data, layout)?;
+        let colours: usize = match layout.channels {
+            1 | 2 => 1,
+            _ => 3,
+        };
+        let (first, mean) = match channel {
+            Channel::Mean => (0, colours == 3),
+            Channel::Red => (0, false),
+            Channel::Green => (1, false),
+            Channel::Blue => (2, false),
+        };
+        if first >= colours {
+            return Err(ImageError::Channel);
+        }
+        Ok(Self { grey, channels: usize::from(layout.channels), first, mean })
+    }
+}
+
+impl<S: Sample> Pixels for Grey<'_, S> {
+    fn width(&self) -> u16 {
+        self.width
+    }
+    fn height(&self) -> u16 {
+        self.height
+    }
+    fn full_scale(&self) -> u16 {
+        self.full_scale
+    }
+    #[inline(always)]
+    fn index(&self, x: u16, y: u16) -> usize {
+        usize::from(y) * self.stride + usize::from(x)
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        1
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        self.stride
+    }
+    #[inline(always)]
+    fn read(&self, index: usize) -> u16 {
+        self.data.get(index).map_or(0, |&s| s.into())
+    }
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        match self.data.get(index..index + 3) {
+            Some(&[a, b, c]) => [a.into(), b.into(), c.into()],
+            _ => [0, 1, 2].map(|k| self.read(index + k)),
+        }
+    }
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        self.data.get(index..index + count).map_or(0, |samples| S::alike(samples, level, lit))
+    }
+}
+
+impl<S: Sample> Pixels for Colour<'_, S> {
+    fn width(&self) -> u16 {
+        self.grey.width
+    }
+    fn height(&self) -> u16 {
+        self.grey.height
+    }
+    fn full_scale(&self) -> u16 {
+        self.grey.full_scale
+    }
+    #[inline(always)]
+    fn index(&self, x: u16, y: u16) -> usize {
+        usize::from(y) * self.grey.stride + usize::from(x) * self.channels + self.first
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        self.channels
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        self.grey.stride
+    }
+    #[inline(always)]
+    fn read(&self, index: usize) -> u16 {
+        if self.mean {
+            match self.grey.data.get(index..index + 3) {
+                Some(&[r, g, b]) => ((u32::from(r.into()) + u32::from(g.into()) + u32::from(b.into())) / 3) as u16,
+                _ => 0,
+            }
+        } else {
+            self.grey.read(index)
+        }
+    }
+}
+
+/// A picture whose kind is known only when the program runs, as on a workstation.
+#[derive(Debug, Clone, Copy)]
+pub enum ImageView<'a> {
+    /// One byte a pixel.
+    Grey8(Grey<'a, u8>),
+    /// One word a pixel.
+    Grey16(Grey<'a, u16>),
+    /// Several bytes a pixel.
+    Colour8(Colour<'a, u8>),
+    /// Several words a pixel.
+    Colour16(Colour<'a, u16>),
+}
+
+impl<'a> ImageView<'a> {
+    /// A picture of bytes.
+    pub fn from_bytes(data: &'a [u8], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
+        Ok(if layout.channels == 1 {
+            Self::Grey8(Grey::try_new(data, layout)?)
+        } else {
+            Self::Colour8(Colour::try_new(data, layout, channel)?)
+        })
+    }
+    /// A picture of 16-bit words.
+    pub fn from_words(data: &'a [u16], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
+        Ok(if layout.channels == 1 {
+            Self::Grey16(Grey::try_new(data, layout)?)
+        } else {
+            Self::Colour16(Colour::try_new(data, layout, channel)?)
+        })
+    }
+}
+
+macro_rules! forward {
+    ($self:ident, $p:ident => $e:expr) => {
+        match $self {
+            ImageView::Grey8($p) => $e,
+            ImageView::Grey16($p) => $e,
+            ImageView::Colour8($p) => $e,
+            ImageView::Colour16($p) => $e,
+        }
+    };
+}
+
+impl Pixels for ImageView<'_> {
+    fn width(&self) -> u16 {
+        forward!(self, p => p.width())
+    }
+    fn height(&self) -> u16 {
+        forward!(self, p => p.height())
+    }
+    fn full_scale(&self) -> u16 {
+        forward!(self, p => p.full_scale())
+    }
+    fn index(&self, x: u16, y: u16) -> usize {
+        forward!(self, p => p.index(x, y))
+    }
+    fn across(&self) -> usize {
+        forward!(self, p => p.across())
+    }
+    fn down(&self) -> usize {
+        forward!(self, p => p.down())
+    }
+    fn read(&self, index: usize) -> u16 {
+        forward!(self, p => p.read(index))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_pixels_at_once_are_as_one_by_one() {
+        // Every level, and one that no byte reaches, beside samples at it, around it and far from it.
+        for level in 0..=300u16 {
+            for seed in 0..64u32 {
+                let near = |k: usize| match seed.wrapping_mul(0x9E37_79B1).rotate_left(5 * k as u32) % 64 {
+                    0 => 0,
+                    1 => 255,
+                    n => (i32::from(level) + n as i32 / 8 - if seed % 2 == 0 { 7 } else { 0 }).clamp(0, 255) as u8,
+                };
+                let bytes: [u8; 21] = core::array::from_fn(near);
+                let words = bytes.map(u16::from);
+                for lit in [false, true] {
+                    assert_eq!(u8::alike(&bytes, level, lit), u16::alike(&words, level, lit), "{bytes:?} at {level}");
+                }
+            }
+        }
+        // Beyond the picture's end nothing is said.
+        let picture = Grey::try_new(&[9u8; 10], Layout::packed(10, 1, 1, 8)).unwrap();
+        assert_eq!([0, 2, 3, 10].map(|i| picture.alike(i, 8, 5, true)), [8, 8, 0, 0]);
+    }
+
+    #[test]
+    fn stride_and_channels_are_honoured() {
+        let data = [1u8, 2, 3, 9, 9, 30, 60, 90, 9, 9];
+        let l = Layout { width: 1, height: 2, stride: 5, channels: 3, bits: 8 };
+        let mean = Colour::try_new(&data, l, Channel::Mean).unwrap();
+        assert_eq!((mean.at(0, 0), mean.at(0, 1)), (2, 60));
+        let blue = Colour::try_new(&data, l, Channel::Blue).unwrap();
+        assert_eq!((blue.at(0, 0), blue.at(0, 1)), (3, 90));
+    }
+
+    #[test]
+    fn short_or_odd_pictures_are_refused() {
+        let data = [0u8; 11];
+        assert_eq!(Grey::try_new(&data, Layout::packed(4, 3, 1, 8)).unwrap_err(), ImageError::TooShort);
+        assert_eq!(Grey::try_new(&data, Layout::packed(0, 3, 1, 8)).unwrap_err(), ImageError::Size);
+        assert_eq!(Grey::try_new(&data, Layout::packed(70_000, 1, 1, 8)).unwrap_err(), ImageError::Size);
+        assert_eq!(Grey::try_new(&data, Layout::packed(3, 3, 1, 12)).unwrap_err(), ImageError::Bits);
+        let l = Layout { width: 4, height: 2, stride: 3, channels: 1, bits: 8 };
+        assert_eq!(Grey::try_new(&data, l).unwrap_err(), ImageError::Stride);
+        // The last row need not be padded.
+        let l = Layout { width: 1, height: 2, stride: 10, channels: 1, bits: 8 };
+        assert!(Grey::try_new(&data, l).is_ok());
+    }
+}

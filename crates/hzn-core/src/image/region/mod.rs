@@ -1,0 +1,366 @@
+//! The part of the picture that counts: the picture itself, cut by the image circle and by masked polygons.
+
+mod ring;
+
+pub(crate) use ring::Run;
+
+use crate::base::error::{ConfigError, Limit, between, require};
+use crate::base::real::Real;
+use crate::geometry::camera::{self, Camera};
+#[cfg(feature = "horace")]
+use crate::geometry::crop::Crop;
+#[cfg(feature = "horace")]
+use crate::geometry::pixel::ImagePoint;
+
+/// Most corners of one polygon.
+pub const MAX_CORNERS: usize = 16;
+/// Most polygons.
+pub const MAX_POLYGONS: usize = 8;
+
+/// Rim of the image circle that does not count, in pixels: blur makes it neither lit nor dark.
+const RIM_PX: f64 = 3.0;
+
+/// Corners (x, y) of a polygon in pixels; the last is joined to the first.
+pub type Polygon = heapless::Vec<[f64; 2], MAX_CORNERS>;
+
+/// `[mask]` of sensor.toml.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Config {
+    /// Up to 8 polygons of 3 to 16 corners each; what lies inside is never lit, and its outline never an edge.
+    pub polygons_px: heapless::Vec<Polygon, MAX_POLYGONS>,
+}
+
+impl Config {
+    pub(crate) fn check(&self, camera: &camera::Config) -> Result<(), ConfigError> {
+        let reach = f64::from(camera.width.max(camera.height)) * 4.0;
+        for polygon in &self.polygons_px {
+            let n = polygon.len();
+            require(n >= 3, "mask.polygons_px", n as f64, Limit::Rule("a polygon needs at least 3 corners"))?;
+            for corner in polygon {
+                between("mask.polygons_px", corner[0], -reach, reach)?;
+                between("mask.polygons_px", corner[1], -reach, reach)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The picture cut by the image circle, and the polygons that lie over it.
+///
+/// Beyond the region an edge ends; under a polygon nothing is lit, and the polygon's outline is no edge.
+#[derive(Debug, Clone)]
+pub struct Region<T> {
+    width: u16,
+    height: u16,
+    /// Pixels along each side of the picture that do not count.
+    frame: u16,
+    circle: Option<Circle<T>>,
+    polygons: heapless::Vec<Outline<T>, MAX_POLYGONS>,
+}
+
+/// An ellipse along the axes: the image circle, seen through fx and fy.
+#[derive(Debug, Clone, Copy)]
+struct Circle<T> {
+    cx: T,
+    cy: T,
+    semi_x: T,
+    inv_x: T,
+    inv_y: T,
+}
+
+#[derive(Debug, Clone)]
+struct Outline<T> {
+    low: [T; 2],
+    high: [T; 2],
+    corners: heapless::Vec<[T; 2], MAX_CORNERS>,
+}
+
+impl<T: Real> Region<T> {
+    /// The region of a checked configuration.
+    pub fn new(config: &Config, camera: &Camera<T>) -> Self {
+        let circle = camera
+            .image_circle_px()
+            .map(|(c, x, y)| (c, x - T::from_f64(RIM_PX), y - T::from_f64(RIM_PX)))
+            .filter(|(_, x, y)| *x > T::one() && *y > T::one())
+            .map(|(c, x, y)| Circle { cx: c.u, cy: c.v, semi_x: x, inv_x: T::one() / x, inv_y: T::one() / y });
+        let mut polygons = heapless::Vec::new();
+        for polygon in &config.polygons_px {
+            // Pushed one by one: both lists are as long as the configuration's, and `collect` could panic.
+            let mut outline =
+                Outline { low: [T::from_f64(1e9); 2], high: [T::from_f64(-1e9); 2], corners: heapless::Vec::new() };
+            for &[x, y] in polygon {
+                let c = [T::from_f64(x), T::from_f64(y)];
+                for k in 0..2 {
+                    outline.low[k] = outline.low[k].min(c[k]);
+                    outline.high[k] = outline.high[k].max(c[k]);
+                }
+                let _ = outline.corners.push(c);
+            }
+            let _ = polygons.push(outline);
+        }
+        Self { width: camera.width(), height: camera.height(), frame: 0, circle, polygons }
+    }
+
+    /// A whole picture without mask.
+    pub fn whole(width: u16, height: u16) -> Self {
+        Self { width, height, frame: 0, circle: None, polygons: heapless::Vec::new() }
+    }
+
+    /// The region without a frame of `px` pixels along each side of the picture, which must be narrower than half of it.
+    pub(crate) fn within(&self, px: u16) -> Self {
+        Self { frame: px, ..self.clone() }
+    }
+    /// First and last column, or row, that counts on a side of `length` pixels.
+    #[inline(always)]
+    fn ends(&self, length: u16) -> (u16, u16) {
+        (self.frame, length.saturating_sub(1).saturating_sub(self.frame))
+    }
+    #[inline(always)]
+    fn columns(&self) -> (u16, u16) {
+        self.ends(self.width)
+    }
+    #[inline(always)]
+    fn rows(&self) -> (u16, u16) {
+        self.ends(self.height)
+    }
+
+    /// The part of it in the first rows of the picture.
+    pub(crate) fn above(&self, rows: u16) -> Self {
+        Self { height: rows.min(self.height), ..self.clone() }
+    }
+
+    /// The region as it lies in a part of the picture, or in a smaller copy.
+    #[cfg(feature = "horace")]
+    pub(crate) fn through(&self, crop: &Crop) -> Self {
+        let [sx, sy] = crop.scale::<T>();
+        let place = |[u, v]: [T; 2]| {
+            let p = crop.of_picture(ImagePoint { u, v });
+            [p.u, p.v]
+        };
+        let mut polygons = heapless::Vec::new();
+        for o in &self.polygons {
+            let mut corners = o.corners.clone();
+            corners.iter_mut().for_each(|c| *c = place(*c));
+            let _ = polygons.push(Outline { low: place(o.low), high: place(o.high), corners });
+        }
+        Self {
+            width: crop.width,
+            height: crop.height,
+            frame: 0,
+            circle: self.circle.map(|c| {
+                let [cx, cy] = place([c.cx, c.cy]);
+                Circle { cx, cy, semi_x: c.semi_x / sx, inv_x: c.inv_x * sx, inv_y: c.inv_y * sy }
+            }),
+            polygons,
+        }
+    }
+
+    /// Columns of the picture.
+    pub fn width(&self) -> u16 {
+        self.width
+    }
+    /// Rows of the picture.
+    pub fn height(&self) -> u16 {
+        self.height
+    }
+
+    /// Whether the pixel lies in the picture and in the image circle.
+    #[inline(always)]
+    pub fn contains(&self, x: u16, y: u16) -> bool {
+        let ((left, right), (top, bottom)) = (self.columns(), self.rows());
+        (left..=right).contains(&x)
+            && (top..=bottom).contains(&y)
+            && self.circle.as_ref().is_none_or(|c| c.contains(x, y))
+    }
+
+    /// Whether every pixel up to `margin` away in x and y is in the region. (Polygons are not looked at.)
+    #[inline(always)]
+    pub(crate) fn is_inside_by(&self, x: u16, y: u16, margin: u16) -> bool {
+        let (w, h) = (u32::from(self.width), u32::from(self.height));
+        let (x32, y32, m) = (u32::from(x), u32::from(y), u32::from(margin));
+        let side = m + u32::from(self.frame);
+        x32 >= side
+            && y32 >= side
+            && x32 + side < w
+            && y32 + side < h
+            && self.circle.as_ref().is_none_or(|c| c.clear(x, y, T::from_i32(i32::from(margin))))
+    }
+
+    /// Pixels, up to `most`, that can be walked from here in any direction without leaving the region or coming to a
+    /// masked polygon. Less where that takes longer to find out than to walk.
+    #[inline(always)]
+    pub(crate) fn clearance(&self, x: u16, y: u16, most: u16) -> u16 {
+        let sides = x
+            .min(y)
+            .min(self.width.saturating_sub(1).saturating_sub(x))
+            .min(self.height.saturating_sub(1).saturating_sub(y))
+            .saturating_sub(self.frame);
+        let most = most.min(sides);
+        let clear = |n: u16| {
+            let margin = T::from_i32(i32::from(n));
+            self.circle.as_ref().is_none_or(|c| c.clear(x, y, margin))
+                && (self.polygons.is_empty() || self.polygons.iter().all(|p| p.clear(x, y, margin)))
+        };
+        [most, most / 4].into_iter().find(|&n| clear(n)).unwrap_or(0)
+    }
+
+    /// Whether there is a polygon.
+    pub(crate) fn has_mask(&self) -> bool {
+        !self.polygons.is_empty()
+    }
+    /// What it costs at most to see whether a pixel is masked, in the unit of [`crate::model::work`], which is four sides.
+    pub(crate) fn mask_cost(&self) -> u32 {
+        self.polygons.iter().map(|p| 1 + p.corners.len() as u32 / 4).sum()
+    }
+
+    /// Whether a polygon covers the pixel.
+    #[inline(always)]
+    pub fn masked(&self, x: u16, y: u16) -> bool {
+        self.has_mask() && self.covered(x, y)
+    }
+
+    /// Whether there is such a pixel, in the region and not masked. For reads that need it seldom: once in flash.
+    #[inline(never)]
+    pub(crate) fn counts(&self, x: i32, y: i32) -> bool {
+        let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
+        self.contains(x, y) && !self.masked(x, y)
+    }
+
+    #[inline(never)]
+    fn covered(&self, x: u16, y: u16) -> bool {
+        let p = [T::from_i32(i32::from(x)), T::from_i32(i32::from(y))];
+        self.polygons.iter().any(|polygon| polygon.covers(p))
+    }
+
+    /// First and last column of a row; `None` when the circle leaves nothing of it.
+    pub fn span(&self, y: u16) -> Option<(u16, u16)> {
+        let ((first, last), (top, bottom)) = (self.columns(), self.rows());
+        if !(top..=bottom).contains(&y) {
+            return None;
+        }
+        let Some(c) = &self.circle else { return Some((first, last)) };
+        let dy = (T::from_i32(i32::from(y)) - c.cy) * c.inv_y;
+        let left = T::one() - dy * dy;
+        if !(left > T::zero()) {
+            return None;
+        }
+        let half = c.semi_x * left.sqrt();
+        // A region has columns; said once more, so that `clamp` is seen not to fail.
+        let (first, last) = (i32::from(first), i32::from(last.max(first)));
+        // Start one pixel inside and grow while the exact test holds: the ring and `contains` must agree.
+        let mut x0 = ((c.cx - half).floor().to_i32() + 2).clamp(first, last);
+        let mut x1 = ((c.cx + half).floor().to_i32() - 1).clamp(first, last);
+        if x0 > x1 {
+            let mid = c.cx.to_i32().clamp(first, last);
+            (x0, x1) = (mid, mid);
+            if !self.contains(mid as u16, y) {
+                return None;
+            }
+        }
+        for _ in 0..4 {
+            if x0 > first && self.contains((x0 - 1) as u16, y) {
+                x0 -= 1;
+            }
+            if x1 < last && self.contains((x1 + 1) as u16, y) {
+                x1 += 1;
+            }
+        }
+        (self.contains(x0 as u16, y) && self.contains(x1 as u16, y)).then_some((x0 as u16, x1 as u16))
+    }
+}
+
+impl<T: Real> Circle<T> {
+    #[inline(always)]
+    fn contains(&self, x: u16, y: u16) -> bool {
+        self.clear(x, y, T::ZERO)
+    }
+    /// The square of `margin` pixels to each side lies within.
+    #[inline(always)]
+    fn clear(&self, x: u16, y: u16, margin: T) -> bool {
+        let dx = ((T::from_i32(i32::from(x)) - self.cx).abs() + margin) * self.inv_x;
+        let dy = ((T::from_i32(i32::from(y)) - self.cy).abs() + margin) * self.inv_y;
+        dx * dx + dy * dy <= T::one()
+    }
+}
+
+impl<T: Real> Outline<T> {
+    /// Whether it lies outside of the square of `margin` pixels to each side.
+    fn clear(&self, x: u16, y: u16, margin: T) -> bool {
+        let p = [T::from_i32(i32::from(x)), T::from_i32(i32::from(y))];
+        (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k]) || self.clear_within(p, margin)
+    }
+    /// As [`Self::clear`], where the bounding box does not tell: no side crosses the square, and its centre is outside.
+    #[inline(never)]
+    fn clear_within(&self, p: [T; 2], margin: T) -> bool {
+        let Some(&last) = self.corners.last() else { return true };
+        let mut a = last;
+        for &b in &self.corners {
+            let apart = (0..2).any(|k| {
+                let (low, high) = (a[k].min(b[k]), a[k].max(b[k]));
+                p[k] + margin < low || p[k] - margin > high
+            });
+            let d = [b[0] - a[0], b[1] - a[1]];
+            let off = (d[0] * (p[1] - a[1]) - d[1] * (p[0] - a[0])).abs();
+            // Half a pixel more, for rounding.
+            if !apart && !(off > (d[0].abs() + d[1].abs()) * (margin + T::from_f64(0.5))) {
+                return false;
+            }
+            a = b;
+        }
+        !self.covers(p)
+    }
+    /// Even-odd rule.
+    fn covers(&self, [x, y]: [T; 2]) -> bool {
+        if x < self.low[0] || x > self.high[0] || y < self.low[1] || y > self.high[1] {
+            return false;
+        }
+        let Some(&last) = self.corners.last() else { return false };
+        let (mut inside, mut a) = (false, last);
+        for &b in &self.corners {
+            if (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0] {
+                inside = !inside;
+            }
+            a = b;
+        }
+        inside
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::camera::{Config as CameraConfig, Model};
+
+    #[test]
+    fn what_is_clear_is_not_masked() {
+        let camera = Camera::<f32>::try_new(&CameraConfig::ideal(Model::Pinhole, 64, 48, 50.0)).unwrap();
+        let mut config = Config::default();
+        for polygon in [
+            [[5.0, 3.0], [9.0, 3.0], [60.0, 44.0], [56.0, 44.0]],
+            [[50.0, 2.0], [58.0, 8.0], [40.0, 12.0], [49.0, 5.0]],
+        ] {
+            config.polygons_px.push(polygon.into_iter().collect()).unwrap();
+        }
+        let region = Region::new(&config, &camera);
+        let mut clear = 0;
+        for (x, y) in (0..48u16).flat_map(|y| (0..64u16).map(move |x| (x, y))) {
+            let n = region.clearance(x, y, 6);
+            clear += u32::from(n == 6);
+            for (i, j) in (0..=2 * n).flat_map(|j| (0..=2 * n).map(move |i| (i, j))) {
+                assert!(n == 0 || !region.masked(x + i - n, y + j - n), "{x} {y}: {n}");
+            }
+        }
+        // Also between the corners of their bounding boxes, which cover most of the picture.
+        assert!(clear > 400, "{clear}");
+    }
+
+    #[test]
+    fn polygons_cover_their_inside() {
+        let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Pinhole, 40, 30, 50.0)).unwrap();
+        let mut config = Config::default();
+        config.polygons_px.push(heapless::Vec::from_slice(&[[10.0, 5.0], [20.0, 5.0], [10.0, 15.0]]).unwrap()).unwrap();
+        let region = Region::new(&config, &camera);
+        assert!(region.masked(12, 8) && !region.masked(19, 14) && !region.masked(9, 8));
+    }
+}

@@ -1,0 +1,213 @@
+//! The way around a region along its outermost pixels.
+
+use crate::base::real::Real;
+use crate::geometry::pixel::Pixel;
+
+use super::Region;
+
+/// Rows of the ring taken at once along the picture's sides.
+const LEAP: u16 = 64;
+
+impl<T: Real> Region<T> {
+    /// Gives the outermost pixels of the region once around as straight runs, clockwise as seen on the screen, from
+    /// the left end of the top row, until `visit` says to stop. They are the pixels with an outer 4-neighbour.
+    pub(crate) fn each_run(&self, mut visit: impl FnMut(Run) -> bool) {
+        let run = |x: u16, y: u16, dx: i32, dy: i32, len: u16| Run { x, y, dx, dy, len };
+        let ((first, last), (upper, lower)) = (self.columns(), self.rows());
+        if self.circle.is_none() {
+            let (across, down) = (last.saturating_sub(first), lower.saturating_sub(upper));
+            let sides = [
+                run(first, upper, 1, 0, across + 1),
+                run(last, upper + 1, 0, 1, down),
+                run(last.saturating_sub(1), lower, -1, 0, across),
+                run(first, lower.saturating_sub(1), 0, -1, down.saturating_sub(1)),
+            ];
+            for side in sides {
+                if side.len > 0 && !visit(side) {
+                    return;
+                }
+            }
+            return;
+        }
+        let Some((top, (left, right))) = (upper..=lower).find_map(|y| self.span(y).map(|s| (y, s))) else { return };
+        // The rows of a convex region follow each other.
+        let Some((bottom, (low, _))) = (top..=lower).rev().find_map(|y| self.span(y).map(|s| (y, s))) else { return };
+        if !visit(run(left, top, 1, 0, right - left + 1)) {
+            return;
+        }
+        // Down the right side: the end of each row is found from that of the row above.
+        let mut x = right;
+        let mut y = top + 1;
+        while y <= bottom {
+            let mut end = x;
+            if self.contains(x, y) {
+                while end < last && self.contains(end + 1, y) {
+                    end += 1;
+                }
+            } else {
+                while end > first && !self.contains(end, y) {
+                    end -= 1;
+                }
+            }
+            if end == x {
+                // As far down as the column goes on as it is.
+                let from = y;
+                // Along the picture's side the region is convex: what holds at both ends holds between.
+                while x == last && y + LEAP <= bottom && self.contains(x, y + LEAP) {
+                    y += LEAP;
+                }
+                while y <= bottom && self.contains(x, y) && (x == last || !self.contains(x + 1, y)) {
+                    y += 1;
+                }
+                if !visit(run(x, from, 0, 1, y - from)) {
+                    return;
+                }
+                continue;
+            }
+            // Inwards along the row above, then outwards along this one.
+            if x > end + 1 && !visit(run(x - 1, y - 1, -1, 0, x - end - 1)) {
+                return;
+            }
+            let from = if end > x { x + 1 } else { end };
+            if !visit(run(from, y, 1, 0, end - from + 1)) {
+                return;
+            }
+            x = end;
+            y += 1;
+        }
+        if bottom == top {
+            return;
+        }
+        if x > low && !visit(run(x - 1, bottom, -1, 0, x - low)) {
+            return;
+        }
+        // Up the left side, in the same way.
+        x = low;
+        y = bottom - 1;
+        while y > top {
+            let mut start = x;
+            if self.contains(x, y) {
+                while start > first && self.contains(start - 1, y) {
+                    start -= 1;
+                }
+            } else {
+                while start < last && !self.contains(start, y) {
+                    start += 1;
+                }
+            }
+            if start == x {
+                let from = y;
+                while x == first && y > top + LEAP && self.contains(x, y - LEAP) {
+                    y -= LEAP;
+                }
+                while y > top && self.contains(x, y) && (x == first || !self.contains(x - 1, y)) {
+                    y -= 1;
+                }
+                if !visit(run(x, from, 0, -1, from - y)) {
+                    return;
+                }
+                continue;
+            }
+            if x + 1 < start && !visit(run(x + 1, y + 1, 1, 0, start - x - 1)) {
+                return;
+            }
+            let from = if start < x { x - 1 } else { start };
+            if !visit(run(from, y, -1, 0, from - start + 1)) {
+                return;
+            }
+            x = start;
+            y -= 1;
+        }
+        // Up to the left end of the top row, along the second row where the top row is shorter.
+        if x + 1 < left {
+            visit(run(x + 1, top + 1, 1, 0, left - x - 1));
+        }
+    }
+}
+
+/// A straight piece of the ring: `len` pixels from (x, y) on, each (dx, dy) further.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Run {
+    x: u16,
+    y: u16,
+    dx: i32,
+    dy: i32,
+    pub(crate) len: u16,
+}
+
+impl Run {
+    #[inline(always)]
+    pub(crate) fn at(&self, i: u16) -> Pixel {
+        let i = i32::from(i);
+        Pixel { x: (i32::from(self.x) + self.dx * i) as u16, y: (i32::from(self.y) + self.dy * i) as u16 }
+    }
+    /// From a pixel to the next, (dx, dy).
+    pub(crate) fn step(&self) -> (i32, i32) {
+        (self.dx, self.dy)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Config;
+    use super::*;
+    use crate::geometry::camera::{Camera, Config as CameraConfig, Model};
+    use std::collections::HashSet;
+    use std::vec::Vec;
+
+    fn ring(region: &Region<f64>) -> Vec<(u16, u16)> {
+        let mut ring = Vec::new();
+        region.each_run(|run| {
+            ring.extend((0..run.len).map(|i| run.at(i)).map(|p| (p.x, p.y)));
+            true
+        });
+        ring
+    }
+
+    /// Closed, without repeats, and exactly the pixels of the region with a 4-neighbour outside it.
+    fn check(region: &Region<f64>) {
+        let ring = ring(region);
+        let set: HashSet<_> = ring.iter().copied().collect();
+        assert_eq!(set.len(), ring.len(), "a pixel is visited twice");
+        for (i, a) in ring.iter().enumerate() {
+            let b = ring[(i + 1) % ring.len()];
+            assert!(a.0.abs_diff(b.0) <= 1 && a.1.abs_diff(b.1) <= 1, "gap between {a:?} and {b:?}");
+        }
+        for y in 0..region.height() {
+            for x in 0..region.width() {
+                let outside = |dx: i32, dy: i32| {
+                    let (x, y) = (i32::from(x) + dx, i32::from(y) + dy);
+                    x < 0 || y < 0 || !region.contains(x as u16, y as u16)
+                };
+                let border =
+                    region.contains(x, y) && (outside(1, 0) || outside(-1, 0) || outside(0, 1) || outside(0, -1));
+                assert_eq!(border, set.contains(&(x, y)), "{x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn ring_of_a_rectangle() {
+        check(&Region::whole(7, 5));
+        check(&Region::whole(2, 2));
+        check(&Region::whole(9, 8).within(2));
+        check(&Region::whole(5, 6).within(2));
+    }
+
+    #[test]
+    fn ring_of_image_circles() {
+        for (w, h, f, deg) in [(80, 60, 30.0, 40.0), (80, 60, 30.0, 60.0), (61, 61, 20.0, 80.0), (90, 40, 33.3, 70.0)] {
+            let config = CameraConfig {
+                theta_max_deg: Some(deg),
+                fy_px: f * 1.1,
+                cx_px: f64::from(w) * 0.47,
+                ..CameraConfig::ideal(Model::Equidistant, w, h, f)
+            };
+            let camera = Camera::try_new(&config).unwrap();
+            assert!(camera.image_circle_px().is_some());
+            let region = Region::new(&Config::default(), &camera);
+            check(&region);
+            check(&region.within(3));
+        }
+    }
+}

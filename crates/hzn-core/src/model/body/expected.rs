@@ -1,0 +1,397 @@
+//! The cone that is expected, from what is known about one picture.
+
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::geometry::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
+use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
+
+use super::{
+    AU_KM, AltitudeReference, Config, Frame, FrameError, Kind, LOWEST_ALTITUDE_M, Last, MOON_DISTANCE_KM,
+    MOON_RADIUS_KM, SUN_RADIUS_KM, shape,
+};
+
+/// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
+const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
+/// 1-sigma of an attitude that comes without one: 5 degrees.
+const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
+
+/// Nothing that takes pictures turns faster.
+const MAX_RATE_RAD_S: f64 = 1000.0;
+
+/// The cone that is expected: cosine of its half-angle with its sigma, and what turns a half-angle into an altitude.
+#[derive(Debug, Clone, Copy)]
+pub struct Expected<T> {
+    /// cos α₀ of the best single cone.
+    pub(crate) cos: T,
+    /// sin α₀.
+    pub(crate) sin: T,
+    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
+    pub(crate) sigma_cos: T,
+    /// 1-sigmas of the limb height that this comes of: of the limb itself, of the altitude, of the unknown radius, of clipping;
+    /// metres.
+    pub(crate) sigma_parts: [T; 4],
+    /// What clipping adds to the height of a limb that is clipped all along, and its 1-sigma; metres.
+    pub(crate) clipped_m: [T; 2],
+    /// The limb cone of the ellipsoid, when the position is known.
+    pub(crate) ellipsoid: Option<LimbCone<T>>,
+    /// Prior attitude, camera to ECEF.
+    pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// How the limb differs from the mean cone by azimuth about the axis: first and second harmonic of cos α, from north.
+    pub(crate) harmonics_cos: [T; 2],
+    /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct: because the azimuth of north is
+    /// unknown, or because the position is.
+    pub(crate) uneven_cos: [T; 2],
+    /// Level that the picture before asks for, counts.
+    pub(crate) level: Option<u16>,
+    /// Direction to the Sun in the camera, where only the limb that it lights is limb.
+    pub(crate) sun: Option<V3<T>>,
+    /// The Sun's direction for the gate of what it does not light, where the body is seen in its light.
+    pub(crate) sun_seen: Option<V3<T>>,
+    /// The axis in the camera by the given attitude and position, and its 1-sigma in radians.
+    pub(crate) predicted: Option<(V3<T>, T)>,
+    /// The last answer.
+    pub(crate) last: Option<Last<T>>,
+    /// The camera's rate of rotation in its own axes, rad/s.
+    pub(crate) rate_rad_s: Option<[T; 3]>,
+    /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
+    pub(crate) radius_m: T,
+    /// Limb height in metres and its sigma.
+    pub(crate) limb_m: T,
+    pub(crate) limb_sigma_m: T,
+    /// The half-angle says nothing about the distance (Sun, Moon).
+    pub(crate) free: bool,
+    /// It may be seen as a crescent.
+    pub(crate) phases: bool,
+    /// Which of the sensor's bodies it is, from 0.
+    pub(crate) which: u8,
+}
+
+impl<T> Expected<T> {
+    /// As [`Config::blooms`].
+    pub(crate) fn blooms(&self) -> bool {
+        self.free && !self.phases
+    }
+}
+
+impl<T: Real> Expected<T> {
+    /// Expected half-angle in radians.
+    pub fn half_angle_rad(&self) -> T {
+        self.sin.atan2(self.cos)
+    }
+
+    /// sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    pub(crate) fn new(body: &Config, frame: &Frame<T>) -> Result<Self, FrameError> {
+        let km = T::from_f64(1000.0);
+        let mut limb = T::from_f64(body.limb_height_km) * km;
+        let mut harmonics = [T::zero(); 2];
+        let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
+        let mut altitude_sigma = T::from_f64(body.altitude_sigma_km) * km;
+        let lowest = T::from_f64(LOWEST_ALTITUDE_M);
+        let below = |h: T, limb: T| FrameError::BelowLimb { altitude_m: rounded_m(h), limb_m: rounded_m(limb) };
+        let given = match frame.altitude_m {
+            Some(h) if !(h > lowest && h.is_finite()) => return Err(FrameError::Altitude),
+            Some(h) => Some(h),
+            None => body.altitude_km.map(|h| T::from_f64(h) * km),
+        };
+        let position = match frame.position_m {
+            Some(p) if !p.iter().all(|x| x.is_finite()) => return Err(FrameError::Position),
+            other => other,
+        };
+        let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(T::from_f64(ATTITUDE_SIGMA_RAD));
+        if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
+            return Err(FrameError::AttitudeSigma);
+        }
+        if frame.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::from_f64(MAX_RATE_RAD_S))) {
+            return Err(FrameError::Rate);
+        }
+        let mut ellipsoid = None;
+        let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
+        let (radius, altitude, sin) = match (body.kind, position) {
+            (Kind::Earth, Some(p)) => {
+                let raised = |limb: T| {
+                    let (a, b) = (T::from_f64(WGS84_A_M) + limb, T::from_f64(WGS84_B_M) + limb);
+                    LimbCone::try_new(p, a, b).ok_or(FrameError::Position)
+                };
+                let (h, latitude) = geodetic(p, T::from_f64(WGS84_A_M), T::from_f64(WGS84_B_M));
+                if !(h > lowest && h.is_finite()) {
+                    return Err(FrameError::Position);
+                }
+                let mut cone = raised(limb);
+                if !body.limb_height_by_latitude_km.is_empty() {
+                    // Below the limb height the limb is all around at the camera's own latitude.
+                    let sin = cone.as_ref().map_or(T::one(), |cone| cone.mean_half_angle_rad().sin_cos().0);
+                    let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
+                    (limb, harmonics) = (mean * km, [first * km, second * km]);
+                    cone = raised(limb);
+                }
+                if !(h > limb) {
+                    return Err(below(h, limb));
+                }
+                let cone = cone?;
+                let (sin, _) = cone.mean_half_angle_rad().sin_cos();
+                ellipsoid = Some(cone);
+                // The sphere with this half-angle at this altitude.
+                ((sin * h - limb) / (T::one() - sin), h, sin)
+            }
+            (_, position) => {
+                let r = T::from_f64(body.mean_radius_km()) * km;
+                let altitude = match (position, given, body.kind) {
+                    (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
+                        let h = (x * x + y * y + z * z).sqrt() - r;
+                        if !(h > lowest && h.is_finite()) {
+                            return Err(FrameError::Position);
+                        }
+                        h
+                    }
+                    (_, _, Kind::Sun) => T::from_f64((AU_KM - SUN_RADIUS_KM) * 1e3),
+                    (_, _, Kind::Moon) => T::from_f64((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
+                    (_, Some(h), _) => h,
+                    (_, None, _) => return Err(FrameError::NoAltitude),
+                };
+                let sin = (r + limb) / (r + altitude);
+                if body.kind == Kind::Earth {
+                    // A height above the ellipsoid rises with the local radius: most of its error cancels.
+                    let counts = match body.altitude_reference {
+                        AltitudeReference::Ellipsoid => (altitude - limb) / (r + altitude),
+                        AltitudeReference::Sphere => T::one(),
+                    };
+                    unknown_m = shape::radius_sigma_m(sin) * counts;
+                    unknown_second_m = shape::second_harmonic_m(sin);
+                }
+                (r, altitude, sin)
+            }
+        };
+        let cos2 = T::one() - sin * sin;
+        if !(sin > T::zero() && cos2 > T::EPSILON) {
+            return Err(below(altitude, limb));
+        }
+        let cos = cos2.sqrt();
+        if body.half_angle_is_free() {
+            altitude_sigma = T::zero();
+        }
+        // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
+        let tan = sin / cos;
+        let scale = tan / (radius + altitude);
+        let known = frame.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
+        // A higher limb is a wider cone. Of the ellipsoid's own shape half the difference of its half-angles' cosines.
+        let harmonics_cos = harmonics.map(|h| -scale * h);
+        let own = ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
+            let (east, meridian) = cone.half_angles_rad();
+            (meridian.sin_cos().1 - east.sin_cos().1) * T::from_f64(0.5)
+        });
+        let uneven = |k: f64, amplitude: T| match known {
+            // An attitude that is off by ψ leaves k ψ of the k-th harmonic.
+            Some(_) => amplitude.abs() * (attitude_sigma * T::from_f64(k)).min(T::one()),
+            None => amplitude.abs(),
+        };
+        let sigma_parts = [limb_sigma, sin * altitude_sigma, unknown_m, T::zero()];
+        let variance = sigma_parts.iter().fold(T::zero(), |sum, s| sum + *s * *s);
+        let axis_ecef = match (&ellipsoid, position, body.kind) {
+            (Some(cone), ..) => Some(cone.axis),
+            (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
+            _ => None,
+        };
+        Ok(Self {
+            cos,
+            sin,
+            sigma_cos: scale * variance.sqrt(),
+            sigma_parts,
+            clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::from_f64(h) * km),
+            ellipsoid,
+            cam_to_ecef: known,
+            harmonics_cos,
+            uneven_cos: [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * unknown_second_m],
+            level: frame.level,
+            sun: frame.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
+            sun_seen: frame.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
+            predicted: frame.cam_to_ecef.zip(axis_ecef).map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
+            last: frame.last,
+            rate_rad_s: frame.rate_rad_s,
+            radius_m: radius,
+            limb_m: limb,
+            limb_sigma_m: (limb_sigma * limb_sigma + unknown_m * unknown_m).sqrt(),
+            free: body.half_angle_is_free(),
+            phases: body.kind != Kind::Sun,
+            which: 0,
+        })
+    }
+
+    /// 1-sigma of the half-angle from the limb's own height alone, radians: over the way to the limb, (R + d)/tan α.
+    pub(crate) fn limb_sigma_rad(&self) -> T {
+        self.sigma_parts[0] * self.sin / (self.cos.max(T::from_f64(1e-6)) * (self.radius_m + self.limb_m))
+    }
+
+    /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Full scale cuts its light off at 1/B
+    /// of the peak. Half of full scale then lies h ln B above half of the light; over the height h the air thins out to 1/e. B is
+    /// not known and differs along the limb. What differs counts as a first harmonic of the azimuth: between points
+    /// that are clipped and such that are not, part (1 − part) of the height squared; and of two ends whose heights differ
+    /// independently, each by σ, half the difference is σ/√2.
+    pub(crate) fn clipped(&self, part: T) -> Self {
+        if self.free || !(part > T::zero()) {
+            return *self;
+        }
+        let [height, sigma] = self.clipped_m.map(|h| h * part);
+        let distance = (self.radius_m + self.limb_m) / self.sin;
+        let sin = (self.sin + height / distance).min(T::one() - T::from_f64(1e-6));
+        let cos = (T::one() - sin * sin).sqrt();
+        // ∂cos/∂d = −tan/(R + H), as in `new`.
+        let scale = sin / (cos * distance);
+        let [limb, altitude, radius, _] = self.sigma_parts;
+        let sigma_parts = [limb, altitude, radius, sigma];
+        let one = T::one();
+        let apart = self.clipped_m[0] * (part * (one - part)).max(T::zero()).sqrt();
+        let root = |parts: &[T]| parts.iter().fold(T::zero(), |sum, s| sum + *s * *s).sqrt();
+        let [first, second] = self.uneven_cos;
+        Self {
+            cos,
+            sin,
+            sigma_cos: scale * root(&sigma_parts),
+            sigma_parts,
+            uneven_cos: [
+                root(&[first, scale * apart, scale * sigma * T::from_f64(core::f64::consts::FRAC_1_SQRT_2)]),
+                second,
+            ],
+            limb_m: self.limb_m + height,
+            limb_sigma_m: root(&[self.limb_sigma_m, sigma]),
+            ..*self
+        }
+    }
+
+    /// Altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle says
+    /// nothing about the distance.
+    pub(crate) fn altitude(&self, cos: T, var_cos: T) -> Option<(T, T)> {
+        let sin = (T::one() - cos * cos).sqrt();
+        if self.free || !(sin > T::zero() && cos > T::zero()) {
+            return None;
+        }
+        let distance = (self.radius_m + self.limb_m) / sin;
+        // dH/dcos = (R + d) cos/sin³, dH/dd = 1/sin − 1 + 1 for a shift of the limb at fixed radius.
+        let by_cos = distance * cos / (sin * sin);
+        let by_limb = T::one() / sin;
+        let variance = by_cos * by_cos * var_cos + by_limb * by_limb * self.limb_sigma_m * self.limb_sigma_m;
+        Some((distance - self.radius_m, variance.sqrt()))
+    }
+
+    /// Limb height in metres that a measured cos α asks for at the expected altitude, and how it changes with cos α:
+    /// d = (R + H) sin α − R, ∂d/∂cos = −(R + H) cot α, m. With the body's limb raised to d, the expected half-angle is the
+    /// measured one. `None` when the half-angle says nothing about the distance.
+    pub fn limb_height_m(&self, cos: T) -> Option<(T, T)> {
+        let sin = (T::one() - cos * cos).sqrt();
+        if self.free || !(sin > T::zero() && cos > T::zero()) {
+            return None;
+        }
+        let distance = (self.radius_m + self.limb_m) / self.sin;
+        // The difference of the sines, so that single precision keeps the metres.
+        let height = self.limb_m + distance * (self.cos - cos) * (self.cos + cos) / (sin + self.sin);
+        Some((height, -distance * cos / sin))
+    }
+
+    /// The axis in ECEF, when the position is known.
+    pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
+        self.ellipsoid.as_ref().map(|c| c.axis)
+    }
+}
+
+/// A length to the nearest metre, for messages.
+fn rounded_m<T: Real>(m: T) -> i32 {
+    (m + T::from_f64(0.5)).floor().to_i32()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::string::ToString;
+
+    use super::*;
+
+    #[test]
+    fn a_cone_of_a_raised_limb_asks_for_its_height() {
+        let frame = Frame { altitude_m: Some(400e3), ..Frame::default() };
+        let at = |km: f64| {
+            Expected::<f64>::new(&Config { limb_height_km: km, kind: Kind::EarthSphere, ..Config::default() }, &frame)
+                .unwrap()
+        };
+        let (told, raised) = (at(10.0), at(25.0));
+        let (height, slope) = told.limb_height_m(raised.cos).unwrap();
+        assert!((height - 25e3).abs() < 1e-6, "{height}");
+        let (higher, _) = told.limb_height_m(raised.cos - 1e-6).unwrap();
+        assert!(((higher - height) / -1e-6 / slope - 1.0).abs() < 1e-4);
+        let single = Expected::<f32>::new(
+            &Config { kind: Kind::EarthSphere, ..Config::default() },
+            &Frame { altitude_m: Some(400e3), ..Frame::default() },
+        );
+        assert!((single.unwrap().limb_height_m(raised.cos as f32).unwrap().0 - 25e3).abs() < 10.0);
+    }
+
+    #[test]
+    fn a_clipped_limb_is_expected_higher_and_less_surely() {
+        let at = |km: f64, sigma_km: f64, kind| {
+            let body = Config { limb_height_km: km, limb_height_sigma_km: sigma_km, kind, ..Config::default() };
+            Expected::<f64>::new(&body, &Frame { altitude_m: Some(400e3), ..Frame::default() }).unwrap()
+        };
+        let told = at(17.0, 7.0, Kind::EarthSphere);
+        for part in [0.0, 0.3, 1.0] {
+            let higher = at(17.0 + 7.8 * part, libm::hypot(7.0, 4.5 * part), Kind::EarthSphere);
+            let clipped = told.clipped(part);
+            let same = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-5;
+            assert!(same(clipped.cos, higher.cos) && same(clipped.sin, higher.sin), "{part}");
+            assert!(same(clipped.sigma_cos, higher.sigma_cos) && same(clipped.limb_m, higher.limb_m), "{part}");
+            assert_eq!(clipped.uneven_cos[0] > 0.0, part > 0.0);
+        }
+        // Nothing is expected of how large a Moon looks.
+        let moon = at(0.0, 0.0, Kind::Moon);
+        assert_eq!(moon.clipped(1.0).cos, moon.cos);
+    }
+
+    #[test]
+    fn a_better_attitude_leaves_less_of_the_shape_open() {
+        let body = Config::default();
+        let frame = Frame {
+            position_m: Some([4.9e6, 0.0, 4.9e6]),
+            cam_to_ecef: Rotation::assume_from_quaternion([1.0, 0.0, 0.0, 0.0]),
+            ..Frame::default()
+        };
+        let sigma = |deg: f64| {
+            let frame = Frame { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
+            Expected::<f64>::new(&body, &frame).unwrap().uneven_cos[1]
+        };
+        let [_, none] = Expected::new(&body, &Frame { cam_to_ecef: None, ..frame }).unwrap().uneven_cos;
+        assert!(none > 1e-5);
+        assert_eq!(sigma(0.0), 0.0);
+        assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);
+        // No better than none, and then it is not used.
+        assert_eq!(sigma(40.0), none);
+        assert_eq!(Expected::new(&body, &frame).unwrap().uneven_cos[1], sigma(5.0));
+        for deg in [f64::NAN, -1.0, f64::INFINITY] {
+            let frame = Frame { attitude_sigma_rad: Some(deg), ..frame };
+            assert_eq!(Expected::new(&body, &frame).unwrap_err(), FrameError::AttitudeSigma);
+        }
+    }
+
+    #[test]
+    fn a_camera_below_the_limb_height_is_told_apart_from_impossible_ones() {
+        let with = |kind| Config { kind, limb_height_km: 17.0, radius_km: None, ..Config::default() };
+        let body = with(Kind::Earth);
+        let at = |body: &Config, frame: Frame<f64>| Expected::<f64>::new(body, &frame).unwrap_err();
+        let altitude = |h: f64| Frame { altitude_m: Some(h), ..Frame::default() };
+        let told = FrameError::BelowLimb { altitude_m: 3200, limb_m: 17_000 };
+        assert_eq!(at(&body, altitude(3200.0)), told);
+        assert_eq!(told.to_string(), "altitude 3.2 km is below the limb height 17 km");
+        let pad = crate::geometry::ellipsoid::from_geodetic(1.18, 0.37, 3200.0, WGS84_A_M, WGS84_B_M);
+        assert_eq!(at(&body, Frame { position_m: Some(pad), ..Frame::default() }), told);
+        let rows = [[-90.0, 16.0], [0.0, 18.0], [90.0, 16.0]].into_iter().collect();
+        let by_latitude = Config { limb_height_by_latitude_km: rows, ..body.clone() };
+        let FrameError::BelowLimb { altitude_m: 3200, limb_m: 16_000..17_000 } =
+            at(&by_latitude, Frame { position_m: Some(pad), ..Frame::default() })
+        else {
+            panic!()
+        };
+        let sphere = with(Kind::EarthSphere);
+        let near = Frame { position_m: Some([0.0, 6371.0088e3 + 3200.0, 0.0]), ..Frame::default() };
+        assert_eq!(at(&sphere, near), told);
+        // The pad may stand below the ellipsoid. At the limb height itself nothing is seen either.
+        assert!(matches!(at(&body, altitude(-20.0)), FrameError::BelowLimb { altitude_m: -20, .. }));
+        assert!(at(&body, altitude(17_000.0)).to_string().contains("is not above the limb height"));
+        assert_eq!(at(&body, altitude(-1000.0)), FrameError::Altitude);
+        assert!(Expected::<f64>::new(&body, &altitude(17_500.0)).is_ok());
+    }
+}

@@ -1,0 +1,346 @@
+//! The body whose limb is looked for, and what a position and an altitude say about its cone.
+
+mod expected;
+mod shape;
+
+use crate::base::error::{ConfigError, Limit, above, between, require};
+use crate::base::real::Real;
+use crate::geometry::ellipsoid::EARTH_MEAN_RADIUS_M;
+use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
+use crate::model::edge_noise;
+use crate::model::threshold;
+
+pub use expected::Expected;
+
+/// Radius of the Sun's photosphere in kilometres (IAU 2015).
+pub const SUN_RADIUS_KM: f64 = 695_700.0;
+/// Mean radius of the Moon in kilometres.
+pub const MOON_RADIUS_KM: f64 = 1737.4;
+/// One astronomical unit in kilometres.
+pub const AU_KM: f64 = 149_597_870.7;
+/// Mean distance of the Moon in kilometres.
+pub const MOON_DISTANCE_KM: f64 = 384_400.0;
+
+/// No camera stands lower than this above its body, in metres: the lowest dry land is 0.4 km below WGS-84.
+pub const LOWEST_ALTITUDE_M: f64 = -1000.0;
+
+/// Most rows of a limb height by latitude.
+pub const MAX_LATITUDES: usize = 16;
+/// Places on one half of the limb at which a height by latitude is looked up.
+const PLACES: usize = 8;
+
+/// Which body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Kind {
+    /// WGS-84. Without a position a sphere of the mean radius, and the covariance holds the unknown latitude.
+    #[default]
+    Earth,
+    /// A sphere of 6371.0088 km.
+    EarthSphere,
+    /// A disc of 0.2666° half-angle at 1 au; it blooms, so its half-angle is free.
+    Sun,
+    /// A disc of about 0.26° half-angle; its half-angle is free.
+    Moon,
+    /// A sphere of `radius_km`.
+    Sphere,
+}
+
+/// What an altitude without a position is measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum AltitudeReference {
+    /// The ellipsoid, as satellite navigation gives it. A local radius that differs from the mean one moves the camera with
+    /// the surface, and shows in the half-angle by (H − d)/(R + H) of itself only.
+    #[default]
+    Ellipsoid,
+    /// A sphere, such as orbit radius minus 6371 km. The local radius is unknown in full.
+    Sphere,
+}
+
+/// `[body]` of sensor.toml, or one of several `[[bodies]]`.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Config {
+    /// Which body.
+    pub kind: Kind,
+    /// Radius in kilometres, above 0; for `sphere`, and only there.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub radius_km: Option<f64>,
+    /// Altitude of the camera in kilometres when a frame brings none: above WGS-84 for `earth`, else above the
+    /// radius. Above 0.
+    pub altitude_km: Option<f64>,
+    /// 1-sigma of the altitude in kilometres, 0 or more.
+    pub altitude_sigma_km: f64,
+    /// What an altitude without a position is measured from, for `earth`: the WGS-84 ellipsoid, or a sphere of 6371 km,
+    /// which leaves the local radius open by some 17 km (1σ).
+    pub altitude_reference: AltitudeReference,
+    /// Effective height of the visible limb above the surface in kilometres, −50 to 500: where the edge at half
+    /// brightness stands. Too high a value makes the cone too wide. The default, 17 km, is where a cloudless limb in sunlight
+    /// has half of its brightness at 550 nm.
+    pub limb_height_km: f64,
+    /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts. The default,
+    /// 7 km, spans the visible wavelengths (24 km at 440 nm, 12 km at 650 nm) and levels between a quarter and three quarters.
+    pub limb_height_sigma_km: f64,
+    /// What clipping adds to the limb's height in kilometres, 0 to 500: where the limb is overexposed, half of full scale lies
+    /// h ln B above half of the light, h being the height over which the air thins out to 1/e (7.5 km) and B how far the light
+    /// exceeds full scale. The default, 7.8 km, is the mean over B from 1 to 8, evenly distributed in its logarithm. Only the
+    /// part of the limb counts whose lit side is clipped.
+    pub clipped_height_km: f64,
+    /// 1-sigma of that in kilometres, 0 or more; 4.5 km over the same B. It varies along the limb.
+    pub clipped_sigma_km: f64,
+    /// Limb height by latitude instead of `limb_height_km`: up to 16 rows of (geodetic latitude in degrees, height in
+    /// kilometres), latitudes rising, linear between them and constant beyond. For `earth` with a position; an attitude
+    /// is needed to make use of how the height varies along the limb, without one it widens the covariance.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "heapless::Vec::is_empty"))]
+    pub limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES>,
+    /// Whether the body is seen by sunlight, so that, where the direction to the Sun is known, only the limb that it
+    /// lights is limb. Left out: yes for `moon` and `sphere`.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub sunlit: Option<bool>,
+    /// Its own level between dark and lit, where it differs from the sensor's: the Sun's is far above the Earth's.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub binarize: Option<threshold::Config>,
+    /// Its own edge errors, where they differ from the sensor's.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub covariance: Option<edge_noise::Config>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            kind: Kind::Earth,
+            radius_km: None,
+            altitude_km: None,
+            altitude_sigma_km: 0.5,
+            altitude_reference: AltitudeReference::Ellipsoid,
+            limb_height_km: 17.0,
+            limb_height_sigma_km: 7.0,
+            clipped_height_km: 7.8,
+            clipped_sigma_km: 4.5,
+            limb_height_by_latitude_km: heapless::Vec::new(),
+            sunlit: None,
+            binarize: None,
+            covariance: None,
+        }
+    }
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        match (self.kind, self.radius_km) {
+            (Kind::Sphere, Some(r)) => above("body.radius_km", r, 0.0)?,
+            (Kind::Sphere, None) => {
+                require(false, "body.radius_km", f64::NAN, Limit::Rule("a sphere needs its radius in km"))?
+            }
+            (_, Some(r)) => {
+                require(false, "body.radius_km", r, Limit::Rule("only body.kind = \"sphere\" takes a radius"))?
+            }
+            (_, None) => {}
+        }
+        if let Some(h) = self.altitude_km {
+            above("body.altitude_km", h, 0.0)?;
+        }
+        between("body.altitude_sigma_km", self.altitude_sigma_km, 0.0, 1e6)?;
+        between("body.limb_height_km", self.limb_height_km, -50.0, 500.0)?;
+        between("body.limb_height_sigma_km", self.limb_height_sigma_km, 0.0, 1e4)?;
+        between("body.clipped_height_km", self.clipped_height_km, 0.0, 500.0)?;
+        between("body.clipped_sigma_km", self.clipped_sigma_km, 0.0, 1e4)?;
+        let rows = &self.limb_height_by_latitude_km;
+        let field = "body.limb_height_by_latitude_km";
+        for [latitude, height] in rows {
+            between(field, *latitude, -90.0, 90.0)?;
+            between(field, *height, -50.0, 500.0)?;
+        }
+        let rising = rows.windows(2).all(|w| matches!(w, [[a, _], [b, _]] if a < b));
+        require(rising, field, rows.len() as f64, Limit::Rule("latitudes must rise from row to row"))?;
+        require(
+            rows.is_empty() || self.kind == Kind::Earth,
+            field,
+            rows.len() as f64,
+            Limit::Rule("only body.kind = \"earth\" has latitudes"),
+        )?;
+        self.binarize.map_or(Ok(()), |b| b.check())?;
+        self.covariance.map_or(Ok(()), |c| c.check())
+    }
+
+    /// Radius of the sphere that stands for the body where no position is known, kilometres.
+    pub fn mean_radius_km(&self) -> f64 {
+        match self.kind {
+            Kind::Earth | Kind::EarthSphere => EARTH_MEAN_RADIUS_M / 1e3,
+            Kind::Sun => SUN_RADIUS_KM,
+            Kind::Moon => MOON_RADIUS_KM,
+            Kind::Sphere => self.radius_km.unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Limb height in kilometres at a geodetic latitude in degrees.
+    fn limb_height_km(&self, latitude_deg: f64) -> f64 {
+        let rows = &self.limb_height_by_latitude_km;
+        let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return self.limb_height_km };
+        if latitude_deg <= first[0] {
+            return first[1];
+        }
+        for w in rows.windows(2) {
+            if let [[a, low], [b, high]] = w
+                && latitude_deg <= *b
+            {
+                return low + (high - low) * (latitude_deg - a) / (b - a);
+            }
+        }
+        last[1]
+    }
+
+    /// Mean height along the limb seen from a geodetic latitude, and the first and second harmonic of its azimuth from
+    /// north, kilometres. `sin` of the half-angle is the cosine of the limb's distance from the nadir on the ground.
+    fn limb_harmonics_km<T: Real>(&self, latitude_rad: T, sin: T) -> [T; 3] {
+        let (one, cos) = (T::one(), (T::one() - sin * sin).max(T::zero()).sqrt());
+        let (here, across) = latitude_rad.sin_cos();
+        let mut sums = [T::zero(); 3];
+        for k in 0..PLACES {
+            let azimuth = T::from_f64((k as f64 + 0.5) * core::f64::consts::PI / PLACES as f64);
+            let (_, c) = azimuth.sin_cos();
+            let s = here * sin + across * cos * c;
+            let latitude = s.atan2((one - s * s).max(T::zero()).sqrt());
+            let height = T::from_f64(self.limb_height_km(latitude.to_f64().to_degrees()));
+            sums = [
+                sums[0] + height,
+                sums[1] + height * c * T::from_f64(2.0),
+                sums[2] + height * (c * c * T::from_f64(4.0) - T::from_f64(2.0)),
+            ];
+        }
+        sums.map(|s| s / T::from_f64(PLACES as f64))
+    }
+
+    /// Sun and Moon bloom or show phases: their apparent radius is no prior.
+    pub fn half_angle_is_free(&self) -> bool {
+        matches!(self.kind, Kind::Sun | Kind::Moon)
+    }
+
+    /// Whether it is a whole disc in a glare of its own: the Sun.
+    pub fn blooms(&self) -> bool {
+        self.kind == Kind::Sun
+    }
+
+    /// Whether it is seen in the Sun's light, as far as is known: not where `sunlit = false` says that it shines by itself, as
+    /// in the thermal infrared.
+    pub fn is_seen_in_sunlight(&self) -> bool {
+        self.sunlit != Some(false) && self.kind != Kind::Sun
+    }
+
+    /// Whether only the limb that the Sun lights is limb, where its direction is known.
+    pub fn is_sunlit(&self) -> bool {
+        self.sunlit.unwrap_or(matches!(self.kind, Kind::Moon | Kind::Sphere))
+    }
+}
+
+/// What is known about one picture besides the picture itself. Everything may be missing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Frame<T> {
+    /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. Above the limb height.
+    pub altitude_m: Option<T>,
+    /// Position of the camera in ECEF, metres. It beats the altitude.
+    pub position_m: Option<[T; 3]>,
+    /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction, and is a
+    /// gate where the position is known, see `select.max_attitude_sigma`.
+    pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// Level between dark and lit that the picture before asks for, in counts: its report's `next_level`, for
+    /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) remembers it itself.
+    pub level: Option<u16>,
+    /// Direction to the Sun in the camera. It is a gate, see `select.max_unlit`.
+    pub sun: Option<UnitVec3<Cam, T>>,
+    /// 1-sigma of that attitude about the axis in radians, 0 or more; 5 degrees when it is left out. It widens the
+    /// covariance by what the ellipsoid's shape then leaves open; above 30 degrees the attitude is not used.
+    pub attitude_sigma_rad: Option<T>,
+    /// The last answer, for `select.max_rate_deg_s`.
+    pub last: Option<Last<T>>,
+    /// The camera's rate of rotation in its own axes, rad/s, up to 1000: for a camera with a rolling shutter
+    /// (`camera.readout_s`), whose rows are taken at different times. The frame's time is that of its middle row.
+    pub rate_rad_s: Option<[T; 3]>,
+}
+
+/// An answer to a picture before.
+#[derive(Debug, Clone, Copy)]
+pub struct Last<T> {
+    /// Its axis in the camera.
+    pub axis: UnitVec3<Cam, T>,
+    /// Its 1-sigma in radians, 0 or more.
+    pub sigma_rad: T,
+    /// How long ago its picture was taken, seconds.
+    pub age_s: T,
+}
+
+/// Why a frame's own data were refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameError {
+    /// The altitude is not a finite number, or no camera is that low.
+    Altitude,
+    /// The position is not finite, or inside the body.
+    Position,
+    /// The camera is not above the limb height, where the limb encloses it and no cone is seen. A rocket begins there.
+    BelowLimb {
+        /// Altitude of the camera in metres.
+        altitude_m: i32,
+        /// Limb height in metres.
+        limb_m: i32,
+    },
+    /// Neither the frame nor the configuration gives an altitude.
+    NoAltitude,
+    /// The sigma of the attitude is not a finite number of 0 or more.
+    AttitudeSigma,
+    /// The rate of rotation is not finite, or absurd.
+    Rate,
+    /// The sensor has no body of that number.
+    NoBody,
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Altitude => "altitude_km must be a finite number above -1 (kilometres)",
+            Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
+            Self::BelowLimb { altitude_m, limb_m } => {
+                let [altitude, limb] = [altitude_m, limb_m].map(|m| f64::from(*m) / 1e3);
+                let place = if altitude < limb { "below" } else { "not above" };
+                return write!(f, "altitude {altitude} km is {place} the limb height {limb} km");
+            }
+            Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
+            Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
+            Self::NoAltitude => {
+                "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
+            }
+            Self::NoBody => "the sensor has fewer bodies",
+        })
+    }
+}
+impl core::error::Error for FrameError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heights_by_latitude_become_a_mean_and_harmonics() {
+        let rows = [[-90.0, 20.0], [0.0, 25.0], [90.0, 40.0]];
+        let body = Config { limb_height_by_latitude_km: rows.into_iter().collect(), ..Config::default() };
+        assert_eq!(body.check(), Ok(()));
+        for (latitude, height) in [(-90.0, 20.0), (-45.0, 22.5), (0.0, 25.0), (45.0, 32.5), (90.0, 40.0)] {
+            assert_eq!(body.limb_height_km(latitude), height);
+        }
+        // Where the height is linear in latitude, the limb to the north is as much higher as that to the south is lower.
+        let sin = 66f64.to_radians().sin();
+        let [mean, first, second] = body.limb_harmonics_km(45f64.to_radians(), sin);
+        assert!(
+            (mean - 32.2).abs() < 0.4 && (first - 24.0 / 6.0).abs() < 0.3 && second.abs() < 0.4,
+            "{mean} {first} {second}"
+        );
+        let wrong = |rows: &[[f64; 2]], kind| {
+            Config { limb_height_by_latitude_km: rows.iter().copied().collect(), kind, ..Config::default() }
+                .check()
+                .is_err()
+        };
+        assert!(wrong(&[[10.0, 5.0], [10.0, 6.0]], Kind::Earth));
+        assert!(wrong(&[[91.0, 5.0]], Kind::Earth) && wrong(&[[0.0, 900.0]], Kind::Earth));
+        assert!(wrong(&[[0.0, 5.0]], Kind::EarthSphere));
+    }
+}

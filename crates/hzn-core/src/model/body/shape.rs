@@ -1,0 +1,76 @@
+//! How far the flattened Earth is from a sphere for a camera that knows its height but not its position.
+//!
+//! To first order in the flattening f a plane that touches the ellipsoid, with its normal at latitude φ', lies
+//! R − k P₂(sin φ') from the centre, k = ⅔ a f. The limb seen from latitude φ has these normals on a circle about the
+//! nadir; by the addition theorem their mean along it is P₂(sin φ) P₂(s), with s = sin α, and their second harmonic in
+//! azimuth ¾ cos²φ cos²α. The first harmonic tilts the axis, which is the limb's own. So
+//!
+//! - the sphere with this half-angle at this height above the ellipsoid has the radius R + k P₂(sin φ) (3 s + 1)/2,
+//! - the limb is uneven by a second harmonic of height with the amplitude ¾ k cos²φ cos²α.
+//!
+//! What remains is how latitudes are distributed. A polar orbit spends as much time at each, which leaves the radius
+//! widest open (RMS of P₂ 0.586, against 0.447 for places evenly distributed over the globe); places on the globe lie nearer
+//! to the equator, which leaves the second harmonic widest open (RMS of cos²φ 0.730, against 0.612).
+
+use crate::base::real::Real;
+use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M};
+
+/// ⅔ a f.
+const K_M: f64 = (WGS84_A_M - WGS84_B_M) * 2.0 / 3.0;
+/// RMS of P₂(sin φ) over evenly distributed latitudes: √(11/32).
+const RADIUS_RMS: f64 = 0.586_301_969_977_929_6;
+/// RMS of cos²φ over the globe: √(8/15).
+const SECOND_RMS: f64 = 0.730_296_743_340_221_5;
+
+/// 1-sigma of the radius of the sphere that looks alike, about the mean radius, metres: 16.7 km low down, 6 km far off.
+pub(super) fn radius_sigma_m<T: Real>(sin: T) -> T {
+    (T::from_f64(3.0) * sin + T::one()) * T::from_f64(0.5 * K_M * RADIUS_RMS)
+}
+
+/// 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km, 1.3 km at 600 km.
+pub(super) fn second_harmonic_m<T: Real>(sin: T) -> T {
+    (T::one() - sin * sin) * T::from_f64(0.75 * K_M * SECOND_RMS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone};
+    use std::vec::Vec;
+
+    /// The radius of the sphere that looks alike, and the amplitude of the second harmonic, from the exact cone.
+    fn exact(latitude_deg: f64, altitude_m: f64) -> (f64, f64) {
+        let (s, c) = libm::sincos(latitude_deg.to_radians());
+        let e2 = 1.0 - (WGS84_B_M / WGS84_A_M) * (WGS84_B_M / WGS84_A_M);
+        let n = WGS84_A_M / libm::sqrt(1.0 - e2 * s * s);
+        let position = [(n + altitude_m) * c, 0.0, (n * (1.0 - e2) + altitude_m) * s];
+        let cone = LimbCone::<f64>::try_new(position, WGS84_A_M, WGS84_B_M).unwrap();
+        let sin = libm::sin(cone.mean_half_angle_rad());
+        let (east, meridian) = cone.half_angles_rad();
+        let distance = EARTH_MEAN_RADIUS_M + altitude_m;
+        (sin * altitude_m / (1.0 - sin), (libm::sin(east) - libm::sin(meridian)).abs() * 0.5 * distance)
+    }
+
+    #[test]
+    fn sigmas_are_those_of_the_exact_cone() {
+        for (km, radius_km, second_km) in
+            [(60.0, 16.6, 0.15), (200.0, 16.3, 0.47), (600.0, 15.5, 1.27), (2000.0, 13.7, 3.3), (35786.0, 6.1, 7.6)]
+        {
+            let altitude = km * 1e3;
+            let sin = EARTH_MEAN_RADIUS_M / (EARTH_MEAN_RADIUS_M + altitude);
+            let latitudes: Vec<f64> = (0..90).map(|i| f64::from(i) + 0.5).collect();
+            let mean_square = |f: &dyn Fn(f64) -> f64, weight: &dyn Fn(f64) -> f64| {
+                let total: f64 = latitudes.iter().map(|&l| weight(l)).sum();
+                libm::sqrt(latitudes.iter().map(|&l| f(l) * f(l) * weight(l)).sum::<f64>() / total)
+            };
+            let radius = mean_square(&|l| exact(l, altitude).0 - EARTH_MEAN_RADIUS_M, &|_| 1.0);
+            let second = mean_square(&|l| exact(l, altitude).1, &|l| libm::cos(l.to_radians()));
+            for (got, want, rounded) in
+                [(radius_sigma_m(sin), radius, radius_km), (second_harmonic_m(sin), second, second_km)]
+            {
+                assert!((got / want - 1.0).abs() < 0.03, "{km} km: {got} {want}");
+                assert!((got * 1e-3 / rounded - 1.0).abs() < 0.06, "{km} km: {got} {rounded}");
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28), 7.3).
+
+use super::{told, trust_every_fit};
+use crate::base::linalg::{V3, basis};
+use crate::base::real::Real;
+use crate::config::Config;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::UnitVec3;
+use crate::geometry::section::Section;
+use crate::image::region::Region;
+use crate::model::body::Expected;
+use crate::model::verdict::Verdict;
+use crate::stages::fit::Fit;
+use crate::stages::gates;
+use crate::stages::{consensus, covariance, edge_points, fit, threshold};
+
+/// Braun & Barf 2022 as flown on ATEK: fixed threshold, whole pixels, RANSAC on three points, the direct nadir, the
+/// overbound of its covariance, and none of the gates that came with `hzn`.
+pub(super) fn preset(config: &mut Config) {
+    told(config);
+    config.binarize.method = threshold::Method::Fixed;
+    config.candidates.sub_pixel = edge_points::SubPixel::None;
+    config.candidates.keep_points = 0;
+    config.reject.method = consensus::Method::Ransac;
+    config.estimate.method = fit::Method::Direct;
+    config.estimate.half_angle = fit::HalfAngle::Free;
+    config.covariance.method = covariance::Method::BraunBarf;
+    config.covariance.overbound = true;
+    trust_every_fit(config);
+    config.select.limb_in_view = true;
+    // Section 7.3, for the Earth. Ours is the mean and not the sum, in focal lengths squared.
+    config.select.max_section_residual = Some(0.025);
+}
+
+/// `Passed`, or the gate that the fit fails.
+pub(super) fn verdict<T: Real>(
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+    blocks: &[Block<T>],
+    camera: &Camera<T>,
+    region: &Region<T>,
+    config: &gates::Config,
+) -> Verdict {
+    let cos = if expected.free { fit.c } else { expected.cos };
+    if config.limb_in_view && !in_view(&fit.e, cos, camera, region) {
+        return Verdict::OutOfView;
+    }
+    match config.max_section_residual {
+        Some(limit) if !section_residual(&fit.e, cos, blocks).is_some_and(|r| r <= T::from_f64(limit)) => {
+            Verdict::Residuals
+        }
+        _ => Verdict::Passed,
+    }
+}
+
+/// Places around the limb that are looked at.
+const PLACES: i32 = 128;
+
+/// Whether any of the limb of the cone (e, c) lies in the region: a nadir from the edge of something else puts it
+/// elsewhere (Braun & Barf 2022, 3.5).
+fn in_view<T: Real>(e: &V3<T>, c: T, camera: &Camera<T>, region: &Region<T>) -> bool {
+    let (b1, b2) = basis(e);
+    let sin = (T::one() - c * c).max(T::ZERO).sqrt();
+    (0..PLACES).any(|i| {
+        let (s, cos) = T::from_f64(f64::from(i) * core::f64::consts::TAU / f64::from(PLACES)).sin_cos();
+        let Some(p) = camera.project(&UnitVec3::assume_unit(e * c + (b1 * cos + b2 * s) * sin)) else { return false };
+        let half = T::from_f64(0.5);
+        let inside = p.u > -half && p.v > -half;
+        let (x, y) = ((p.u + half).to_i32(), (p.v + half).to_i32());
+        inside && u16::try_from(x).is_ok_and(|x| u16::try_from(y).is_ok_and(|y| region.contains(x, y)))
+    })
+}
+
+/// Mean square of the points' distances from the conic section of the cone (e, c), along its principal x axis, in
+/// focal lengths squared: (28) as a mean, so that it does not grow with the edge. `None` where there is no section or
+/// no point.
+fn section_residual<T: Real>(e: &V3<T>, c: T, blocks: &[Block<T>]) -> Option<T> {
+    let section = Section::new(&UnitVec3::assume_unit(*e), c)?;
+    let (mut total, mut count) = (T::ZERO, T::ZERO);
+    for b in blocks {
+        for l in 0..LANES {
+            if b.weight[l] > T::ZERO && b.s[2][l] > T::from_f64(0.03) {
+                let d = section.distance([b.s[0][l] / b.s[2][l], b.s[1][l] / b.s[2][l]]);
+                total += d * d;
+                count += T::one();
+            }
+        }
+    }
+    (count > T::ZERO).then(|| total / count)
+}

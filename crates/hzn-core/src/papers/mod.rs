@@ -1,0 +1,191 @@
+//! Named starting values, and what published systems have of their own: a preset, and gates.
+
+#[cfg(feature = "dlr")]
+mod braun_barf_2022;
+#[cfg(feature = "horace")]
+mod horace_2015;
+#[cfg(feature = "zju")]
+mod wang_2022;
+
+use crate::base::real::Real;
+use crate::config::Config;
+use crate::geometry::block::Block;
+use crate::geometry::camera;
+use crate::geometry::camera::Camera;
+use crate::image::region::Region;
+use crate::model::body::Expected;
+use crate::model::body::Kind;
+use crate::model::verdict::Verdict;
+use crate::stages::covariance;
+use crate::stages::fit::Fit;
+use crate::stages::gates;
+use crate::stages::threshold;
+
+/// Starting values of a whole sensor: what is written besides beats them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preset {
+    /// The best chain that is known: every value at its default.
+    #[default]
+    Hzn,
+    /// The Sun: a disc whose apparent size is no measure, because it blooms.
+    Sun,
+    /// The Moon, lit from any side.
+    Moon,
+    /// The optical horizon sensor of Braun & Barf 2022.
+    #[cfg(feature = "dlr")]
+    Dlr2022,
+    /// The infrared Earth sensor of Wang et al. 2022.
+    #[cfg(feature = "zju")]
+    Zju2022,
+    /// HORACE on REXUS-16 (Barf 2014, Barf et al. 2015).
+    #[cfg(feature = "horace")]
+    Horace2015,
+}
+
+impl Preset {
+    /// Every preset of this build.
+    pub const ALL: &[Self] = &[
+        Self::Hzn,
+        Self::Sun,
+        Self::Moon,
+        #[cfg(feature = "dlr")]
+        Self::Dlr2022,
+        #[cfg(feature = "zju")]
+        Self::Zju2022,
+        #[cfg(feature = "horace")]
+        Self::Horace2015,
+    ];
+
+    /// The name used in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hzn => "hzn",
+            Self::Sun => "sun",
+            Self::Moon => "moon",
+            #[cfg(feature = "dlr")]
+            Self::Dlr2022 => "dlr-2022",
+            #[cfg(feature = "zju")]
+            Self::Zju2022 => "zju-2022",
+            #[cfg(feature = "horace")]
+            Self::Horace2015 => "horace-2015",
+        }
+    }
+
+    /// The preset of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|p| p.name() == name)
+    }
+}
+
+impl Config {
+    /// A sensor with this camera and every other value as the preset has it.
+    pub fn preset(preset: Preset, camera: camera::Config) -> Self {
+        let mut config = Self::new(camera);
+        match preset {
+            Preset::Hzn => {}
+            // It saturates any camera that was not made for it; the sky beside it does not.
+            Preset::Sun => disc(&mut config, Kind::Sun, threshold::SUN.level),
+            Preset::Moon => {
+                disc(&mut config, Kind::Moon, 0.25);
+                // Half of its limb is lit at most, and less of it bright.
+                config.select.min_support = 0.25;
+            }
+            #[cfg(feature = "dlr")]
+            Preset::Dlr2022 => braun_barf_2022::preset(&mut config),
+            #[cfg(feature = "zju")]
+            Preset::Zju2022 => wang_2022::preset(&mut config),
+            #[cfg(feature = "horace")]
+            Preset::Horace2015 => horace_2015::preset(&mut config),
+        }
+        config
+    }
+}
+
+/// A disc with a level (fraction of full scale) that it stands above: its histogram is nearly all sky. The edge of a
+/// blooming disc stands within 3 px, alike all around (Braun & Barf 2022, section 5).
+fn disc(config: &mut Config, kind: Kind, level: f64) {
+    config.body.kind = kind;
+    config.binarize = threshold::Config { method: threshold::Method::Fixed, level, ..config.binarize };
+    config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, bias_px: 0.0, ..config.covariance };
+}
+
+/// The noise model and limb height that the published systems' presets have always had: told values, for comparison.
+#[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
+fn told(config: &mut Config) {
+    config.body.limb_height_km = 10.0;
+    config.body.limb_height_sigma_km = 2.0;
+    [config.body.clipped_height_km, config.body.clipped_sigma_km] = [0.0; 2];
+    config.covariance = covariance::Config::told(1.0, 300.0);
+    config.reject.noise_sigma = 0.0;
+}
+
+/// Only what every fit must have, and what these methods cost, of which some look at every pixel and every point.
+#[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
+fn trust_every_fit(config: &mut Config) {
+    config.limits.max_work = Some(200_000_000);
+    // They looked once.
+    config.recover.levels.clear();
+    config.recover.frame_px = 0;
+    config.select.min_arc_px = Some(0.0);
+    config.select.max_rms_px = 1e6;
+    config.select.max_half_angle_sigma = 1e6;
+    config.select.max_sigma_deg = 180.0;
+    config.select.min_support = 0.0;
+    config.select.max_lit_sky = 1.0;
+    config.select.trust_every_shape();
+}
+
+/// The gates of published systems, which come after those of every fit: `Passed`, or the first that the fit fails.
+pub(crate) fn verdict<T: Real>(
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+    blocks: &[Block<T>],
+    camera: &Camera<T>,
+    region: &Region<T>,
+    config: &gates::Config,
+) -> Verdict {
+    // A build without a feature leaves some of them unread.
+    let _ = (fit, expected, blocks, camera, region, config);
+    let verdict = Verdict::Passed;
+    #[cfg(feature = "dlr")]
+    let verdict = match verdict {
+        Verdict::Passed => braun_barf_2022::verdict(fit, expected, blocks, camera, region, config),
+        failed => failed,
+    };
+    #[cfg(feature = "horace")]
+    let verdict = match verdict {
+        Verdict::Passed => horace_2015::verdict(fit, expected, camera, config),
+        failed => failed,
+    };
+    verdict
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::camera::Model;
+
+    #[test]
+    fn every_preset_is_accepted_and_found_by_its_name() {
+        for &preset in Preset::ALL {
+            let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+            assert_eq!(config.check(), Ok(()), "{}", preset.name());
+            assert_eq!(Preset::named(preset.name()), Some(preset));
+        }
+        assert_eq!(Preset::named("hznn"), None);
+    }
+
+    #[test]
+    #[cfg(all(feature = "dlr", feature = "horace", feature = "zju"))]
+    fn published_systems_keep_their_noise_and_limb() {
+        for preset in [Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015] {
+            let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+            let covariance::Config { noise, sigma_px, correlation_px, bias_px, tilt_px, .. } = config.covariance;
+            assert_eq!(noise, covariance::Noise::Told);
+            assert_eq!([sigma_px, correlation_px, bias_px, tilt_px], [1.0, 300.0, 0.0, 0.0]);
+            assert_eq!([config.body.limb_height_km, config.body.limb_height_sigma_km], [10.0, 2.0]);
+            let braun_barf = config.covariance.method == covariance::Method::BraunBarf;
+            assert_eq!(braun_barf, preset == Preset::Dlr2022);
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! A second look before a refusal: other levels, and the picture without a dark frame around it.
+//!
+//! Otsu's level follows what is brightest. Of a disc half lit, with clouds, most of the limb may lie below it; of a limb
+//! under a glare all of it. So a picture without an answer is looked at again, a few times, each at another level
+//! and all on the account of one picture. Each look is another chance for a false answer, too: the gates are the same for
+//! all of them, and there are few.
+
+use super::account;
+use super::found_limb::FoundLimb;
+use super::sensor::Sensor;
+use super::workspace::Lists;
+use crate::base::real::Real;
+use crate::image::Pixels;
+use crate::model::body::Expected;
+use crate::model::observer::Observer;
+use crate::model::report::Report;
+use crate::model::status::Status;
+use crate::model::work;
+use crate::stages::contour::Scene;
+use crate::stages::threshold::{self, Level};
+
+/// A look without an answer, after which another may have one.
+fn goes_on(status: Status) -> bool {
+    matches!(status, Status::NoLimb | Status::TooFewPoints | Status::Rejected)
+}
+
+impl<T: Real> Sensor<T> {
+    /// Everything after the first level: the looks, one after the other, until there is an answer or nothing is left to
+    /// try. Without an answer the level is that of the first look, and the status, too, unless a later one came further.
+    pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(
+        &self,
+        mut lists: Lists<'_, T>,
+        picture: &P,
+        first: &Level<T>,
+        expected: &Expected<T>,
+        taken: &[FoundLimb<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let config = &self.config;
+        // A level that is told to be fixed is kept.
+        let fixed = config.levels_of(expected.which).method == threshold::Method::Fixed;
+        let mut others = if fixed { [].iter() } else { config.recover.levels.iter() };
+        let mut work = account::open(config, lists.border.len());
+        let mut within = None;
+        let mut status = None;
+        let mut lowest = None;
+        report.level = first.level;
+        loop {
+            let look = |region| {
+                Scene::new(picture, region, report.level, observer)
+                    .blooming(expected.blooms())
+                    .contrasting(first.contrast)
+            };
+            if within.is_none() {
+                let frame = look(&self.region).dark_frame_px(config.recover.frame_px, &mut work);
+                if frame > 0 {
+                    observer.frame(frame);
+                    within = Some(self.region.within(frame));
+                }
+            }
+            let scene = look(within.as_ref().unwrap_or(&self.region));
+            work = self.search(lists.again(), &scene, work, expected, taken, report);
+            if !goes_on(report.status) {
+                break;
+            }
+            if status != Some(Status::Rejected) {
+                status = Some(report.status);
+            }
+            if others.len() == 0 || !work.spend(work::LOOK) {
+                break;
+            }
+            let lowest = *lowest.get_or_insert_with(|| {
+                let noise = threshold::dark_noise(picture, &self.region, first.level, config.reject.seed, observer);
+                first.dark + noise * T::from_f64(config.recover.min_sigma)
+            });
+            let mut levels = others.by_ref().map(|&part| first.part(part));
+            let Some(level) = levels.find(|&level| T::from_i32(level.into()) >= lowest) else { break };
+            report.level = level;
+            observer.look(report.counters.looks, report.level);
+        }
+        if let Some(status) = status
+            && report.solution.is_none()
+        {
+            (report.status, report.level) = (status, first.level);
+        }
+    }
+}

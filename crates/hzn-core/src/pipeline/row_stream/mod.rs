@@ -1,0 +1,329 @@
+//! A picture that comes row by row, for a flight computer without room for a whole one.
+//!
+//! As a row comes it is turned into runs of lit and dark pixels ([`runs`]), and pixels that a border can pass through
+//! become edge points once the rows around them are there ([`window`], [`points`]). After the last row the stages from
+//! `contour` on go over runs and points as they go over a picture in memory: the same edges, the same points, the same
+//! answer. So the level must be known beforehand: it is `fixed`, or the one that the picture before gave.
+//!
+//! What is not in memory any more cannot be asked for. When runs or points do not fit, the picture ends with the last row
+//! that did, or pixels are left out evenly: `dropped` counts them. An edge so wide that its plateau is not within the rows
+//! held has the last of them for a plateau: `cut_points`. There is one look: `[recover]` does not count, a
+//! dark frame is not found, and a picture without an answer stays without one. The contrast that an edge's own mid-level needs
+//! is a part of full scale, as what the picture has is known only after its last row.
+
+mod points;
+mod recent_rows;
+mod runs;
+
+use core::fmt;
+
+use super::account;
+use super::search::Search;
+use super::sensor::Sensor;
+use super::workspace::Workspace;
+use crate::base::real::Real;
+use crate::geometry::pixel::Pixel;
+use crate::image::region::Region;
+use crate::image::{Passed, Pixels, Sample};
+use crate::model::body::Expected;
+use crate::model::observer::{Observer, Unobserved};
+use crate::model::report::Report;
+use crate::model::status::{Stage, Status};
+use crate::stages::contour::{self, Scene};
+use crate::stages::edge_points::{self, SubPixel};
+use crate::stages::threshold;
+use crate::stages::threshold::Passing;
+use points::{Point, Points};
+use recent_rows::RecentRows;
+use runs::Runs;
+
+/// Rows of the picture that are held.
+pub const HELD: u16 = 32;
+/// Rows that must have come after a border pixel's before it is measured; not fewer are held before it.
+const AHEAD: u16 = 15;
+
+/// What a picture of passing rows needs besides a [`Workspace`]: `WINDOW` samples, [`HELD`] times the width; `HEIGHT` rows;
+/// `TURNS` changes between dark and lit in a row, of all rows together; `POINTS` edge points of all edges together.
+///
+/// A new one is all zeros: in a `static` it takes no room in flash.
+#[derive(Debug)]
+pub struct Rows<S, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize> {
+    window: [S; WINDOW],
+    run_ends: [u16; HEIGHT],
+    turns: [u16; TURNS],
+    point_ends: [u16; HEIGHT],
+    points: [Point; POINTS],
+}
+
+impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize> Default
+    for Rows<S, WINDOW, HEIGHT, TURNS, POINTS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize>
+    Rows<S, WINDOW, HEIGHT, TURNS, POINTS>
+{
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            window: [S::ZERO; WINDOW],
+            run_ends: [0; HEIGHT],
+            turns: [0; TURNS],
+            point_ends: [0; HEIGHT],
+            points: [Point::NONE; POINTS],
+        }
+    }
+}
+
+/// Why a picture cannot be taken by rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowsError {
+    /// [`Rows`] has no room for it: so many samples and rows are needed.
+    Room {
+        /// `WINDOW`.
+        window: usize,
+        /// `HEIGHT`.
+        height: usize,
+    },
+    /// A method that needs the whole picture: the key of sensor.toml.
+    Method(&'static str),
+    /// Bits per sample.
+    Bits,
+    /// A row of another length than the picture is wide, which was not taken.
+    Length,
+    /// More rows than the picture has.
+    Finished,
+}
+
+impl fmt::Display for RowsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Room { window, height } => {
+                write!(f, "the picture needs room for {window} samples in the window and for {height} rows")
+            }
+            Self::Method(key) => write!(f, "{key}: this method needs the whole picture; leave it at its default"),
+            Self::Bits => f.write_str("bits per sample must be 8 for bytes and 8 to 16 for words"),
+            Self::Length => f.write_str("a row must be as long as the picture is wide"),
+            Self::Finished => f.write_str("the picture has no more rows"),
+        }
+    }
+}
+impl core::error::Error for RowsError {}
+
+/// A picture of which rows are taken.
+#[derive(Debug)]
+pub struct Stream<'a, T, S> {
+    sensor: &'a Sensor<T>,
+    expected: &'a Expected<T>,
+    /// `None`: the picture is for the next one's level only.
+    level: Option<u16>,
+    samples: Passing,
+    window: RecentRows<'a, S>,
+    runs: Runs<'a>,
+    points: Points<'a>,
+    /// Rows that came.
+    rows: u16,
+    /// A row did not fit: what comes is not looked at.
+    full: bool,
+}
+
+impl<T: Real> Sensor<T> {
+    /// Begins a picture whose rows will be given one by one, of samples with `bits` significant bits.
+    ///
+    /// With the level `fixed` every picture has an answer. With every other method the level is `expected.level`, to which
+    /// the caller gives the last report's `next_level`; without one the status is `no-limb` at the first stage, with the
+    /// level for the next picture.
+    ///
+    /// # Errors
+    /// No room, or a method that needs the whole picture.
+    pub fn rows<'a, S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize>(
+        &'a self,
+        rows: &'a mut Rows<S, WINDOW, HEIGHT, TURNS, POINTS>,
+        bits: u8,
+        expected: &'a Expected<T>,
+    ) -> Result<Stream<'a, T, S>, RowsError> {
+        let config = &self.config;
+        let (width, height) = (self.camera.width(), self.camera.height());
+        let window = usize::from(HELD) * usize::from(width);
+        if WINDOW < window || HEIGHT < usize::from(height) {
+            return Err(RowsError::Room { window, height: height.into() });
+        }
+        if !matches!(config.candidates.sub_pixel, SubPixel::Linear | SubPixel::None) {
+            return Err(RowsError::Method("candidates.sub_pixel"));
+        }
+        if config.contour.method != contour::Method::BorderFollowing {
+            return Err(RowsError::Method("contour.method"));
+        }
+        #[cfg(feature = "horace")]
+        {
+            if config.recover.method != crate::config::retry::Method::None {
+                return Err(RowsError::Method("recover.method"));
+            }
+            if config.input.scale_to_height.is_some() {
+                return Err(RowsError::Method("input.scale_to_height"));
+            }
+        }
+        if bits < 8 || bits > S::BITS {
+            return Err(RowsError::Bits);
+        }
+        let full_scale = ((1u32 << bits) - 1) as u16;
+        let levels = config.levels_of(expected.which);
+        Ok(Stream {
+            sensor: self,
+            expected,
+            level: threshold::fixed_level::<T>(levels, full_scale).or(expected.level),
+            samples: Passing::new(config.reject.seed, full_scale, &self.region),
+            window: RecentRows::new(&mut rows.window, width, height, full_scale),
+            runs: Runs::new(&mut rows.run_ends, &mut rows.turns, width),
+            points: Points::new(&mut rows.point_ends, &mut rows.points),
+            rows: 0,
+            full: false,
+        })
+    }
+}
+
+impl<T: Real, S: Sample> Stream<'_, T, S> {
+    /// Takes the next row, from the top.
+    ///
+    /// # Errors
+    /// A row of another length, or one too many: nothing has changed.
+    pub fn push_row(&mut self, row: &[S]) -> Result<(), RowsError> {
+        let camera = &self.sensor.camera;
+        if row.len() != usize::from(camera.width()) {
+            return Err(RowsError::Length);
+        }
+        if self.rows == camera.height() {
+            return Err(RowsError::Finished);
+        }
+        self.samples.row(&self.sensor.region, self.rows, row, &Unobserved);
+        self.rows += 1;
+        if let (Some(level), false) = (self.level, self.full) {
+            self.window.push(row);
+            self.full = !self.runs.push(row.iter().map(|&s| s.into() >= level));
+            if !self.full
+                && let Some(y) = self.runs.rows().checked_sub(AHEAD + 1)
+            {
+                self.measure(y, level, &self.sensor.region);
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows are through: finds the limb. With fewer rows than the picture has, `rejected` at the first stage.
+    pub fn finish<O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+        mut self,
+        workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
+        observer: &O,
+    ) -> Report<T> {
+        let mut report = Report::of_nothing();
+        if self.rows == self.sensor.camera.height() {
+            self.look(workspace, observer, &mut report);
+        }
+        observer.leave();
+        report
+    }
+
+    fn look<O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        observer.enter(Stage::Binarize);
+        let config = &self.sensor.config;
+        let levels = config.levels_of(self.expected.which);
+        let next = match self.samples.split::<T, O>(&config.gate, levels, None, observer) {
+            Ok(found) => found.level,
+            Err(status) => {
+                report.status = status;
+                return;
+            }
+        };
+        report.next_level = Some(next);
+        let Some(level) = self.level else {
+            report.status = Status::NoLimb;
+            return;
+        };
+        report.level = level;
+        report.stage = Stage::Contour;
+        observer.enter(Stage::Contour);
+        let region = self.sensor.region.above(self.runs.rows());
+        for y in self.runs.rows().saturating_sub(AHEAD)..self.runs.rows() {
+            self.measure(y, level, &region);
+        }
+        let picture = Memory { runs: &self.runs, points: &self.points, width: region.width(), height: region.height() };
+        let lists = workspace.lists();
+        if picture.height > 1 {
+            let scene = Scene::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
+            let work = account::open(&self.sensor.config, lists.border.len());
+            let turning = self.sensor.turning(self.expected);
+            let camera = turning.as_ref().unwrap_or(&self.sensor.camera);
+            let mut judge = Search::new(self.sensor, camera, self.expected, &[], observer, lists.blocks, work, report);
+            judge.border_following(&scene, lists.border, lists.marks);
+            judge.conclude();
+        }
+        report.next_level = Some(next);
+        report.counters.dropped += self.points.dropped();
+        if self.full {
+            report.counters.dropped += u32::from(self.rows - self.runs.rows()) * u32::from(picture.width);
+            if report.solution.is_none() {
+                report.status = Status::Truncated;
+            }
+        }
+    }
+
+    /// Measures the edge points of a row, the rows around which have come.
+    fn measure(&mut self, y: u16, level: u16, region: &Region<T>) {
+        let config = &self.sensor.config.candidates;
+        let scene = Scene::new(&self.window, region, level, &Unobserved).blooming(self.expected.blooms());
+        self.runs.each_border(y, |x| {
+            if region.contains(x, y)
+                && self.points.wants(x, y)
+                && let Some(found) = edge_points::pass(&scene, config, Pixel { x, y })
+            {
+                self.points.push(x, Passed { cut: self.window.went_beyond(), ..found });
+            }
+        });
+        self.points.end_row();
+    }
+}
+
+/// What is left of the rows: two shades, and edge points.
+struct Memory<'a> {
+    runs: &'a Runs<'a>,
+    points: &'a Points<'a>,
+    width: u16,
+    height: u16,
+}
+
+impl Pixels for Memory<'_> {
+    const PASSED: bool = true;
+    fn width(&self) -> u16 {
+        self.width
+    }
+    fn height(&self) -> u16 {
+        self.height
+    }
+    fn full_scale(&self) -> u16 {
+        1
+    }
+    fn index(&self, x: u16, y: u16) -> usize {
+        usize::from(y) << 16 | usize::from(x)
+    }
+    fn across(&self) -> usize {
+        1
+    }
+    fn down(&self) -> usize {
+        1 << 16
+    }
+    #[inline]
+    fn read(&self, index: usize) -> u16 {
+        u16::from(self.runs.lit((index & 0xFFFF) as u16, (index >> 16) as u16))
+    }
+    fn passed(&self, x: u16, y: u16) -> Option<Passed> {
+        self.points.get(x, y)
+    }
+}

@@ -1,0 +1,130 @@
+//! Edge points by the border pixel that they were measured at, in the order of the rows.
+
+use crate::geometry::block::Lit;
+use crate::image::Passed;
+
+/// An edge point: the column of its border pixel, and where it lies from there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    towards_dark_px: f32,
+    x: u16,
+    lit: Lit,
+    /// [`FALLBACK`], [`CUT`] and [`CLIPPED`].
+    marks: u8,
+}
+
+const FALLBACK: u8 = 1;
+const CUT: u8 = 2;
+const CLIPPED: u8 = 4;
+
+impl Point {
+    pub(super) const NONE: Self = Self { towards_dark_px: 0.0, x: 0, lit: Lit::Right, marks: 0 };
+}
+
+/// The points of the rows so far; views of memory that belongs to someone else. When it is full, every second pixel is
+/// left out, here and from then on, by a number that has nothing to do with where edges run.
+#[derive(Debug)]
+pub(super) struct Points<'a> {
+    /// Where each row ends in `points`.
+    ends: &'a mut [u16],
+    points: &'a mut [Point],
+    rows: u16,
+    used: usize,
+    /// Of 2^thinned pixels one is measured.
+    thinned: u32,
+    dropped: u32,
+}
+
+impl<'a> Points<'a> {
+    pub(super) fn new(ends: &'a mut [u16], points: &'a mut [Point]) -> Self {
+        let room = points.len().min(usize::from(u16::MAX));
+        let points = points.get_mut(..room).unwrap_or_default();
+        Self { ends, points, rows: 0, used: 0, thinned: 0, dropped: 0 }
+    }
+
+    /// Border pixels left out.
+    pub(super) fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    fn kept(x: u16, y: u16, thinned: u32) -> bool {
+        let n = (u32::from(y) << 16 | u32::from(x)).wrapping_mul(0x9E37_79B1);
+        (n ^ n >> 15).wrapping_mul(0x2C1B_3C6D).checked_shr(32 - thinned).unwrap_or(0) == 0
+    }
+
+    /// Whether the pixel is to be measured; makes room for it.
+    pub(super) fn wants(&mut self, x: u16, y: u16) -> bool {
+        while Self::kept(x, y, self.thinned) {
+            if self.used < self.points.len() {
+                return true;
+            }
+            if self.thinned > 24 {
+                break;
+            }
+            self.halve(y);
+        }
+        self.dropped += 1;
+        false
+    }
+
+    /// Leaves every second pixel out, of the finished rows and of `y`, which is not finished.
+    #[cold]
+    fn halve(&mut self, y: u16) {
+        self.thinned += 1;
+        let (mut from, mut to) = (0, 0);
+        for row in 0..=y {
+            let end = if row < self.rows {
+                self.ends.get(usize::from(row)).map_or(0, |&e| usize::from(e))
+            } else {
+                self.used
+            };
+            for i in from..end {
+                let Some(&point) = self.points.get(i) else { break };
+                if Self::kept(point.x, row, self.thinned)
+                    && let Some(place) = self.points.get_mut(to)
+                {
+                    *place = point;
+                    to += 1;
+                } else {
+                    self.dropped += 1;
+                }
+            }
+            from = end;
+            if row < self.rows
+                && let Some(place) = self.ends.get_mut(usize::from(row))
+            {
+                *place = to as u16;
+            }
+        }
+        self.used = to;
+    }
+
+    /// Adds a point of the row that is not finished; columns rise.
+    pub(super) fn push(&mut self, x: u16, found: Passed) {
+        if let Some(place) = self.points.get_mut(self.used) {
+            let marks =
+                u8::from(found.fallback) * FALLBACK + u8::from(found.cut) * CUT + u8::from(found.clipped) * CLIPPED;
+            *place = Point { towards_dark_px: found.towards_dark_px, x, lit: found.lit, marks };
+            self.used += 1;
+        }
+    }
+
+    /// The row is finished.
+    pub(super) fn end_row(&mut self) {
+        if let Some(end) = self.ends.get_mut(usize::from(self.rows)) {
+            *end = self.used as u16;
+        }
+        self.rows += 1;
+    }
+
+    /// The point of a border pixel of a finished row.
+    pub(super) fn get(&self, x: u16, y: u16) -> Option<Passed> {
+        let at = |y: u16| self.ends.get(usize::from(y)).map_or(0, |&e| usize::from(e));
+        let start = if y == 0 { 0 } else { at(y - 1) };
+        let row = self.points.get(start..at(y))?;
+        let found = row.get(row.partition_point(|p| p.x < x)).filter(|p| p.x == x)?;
+        let Point { towards_dark_px, lit, marks, .. } = *found;
+        let has = |mark: u8| marks & mark > 0;
+        Some(Passed { towards_dark_px, lit, fallback: has(FALLBACK), clipped: has(CLIPPED), cut: has(CUT) })
+    }
+}

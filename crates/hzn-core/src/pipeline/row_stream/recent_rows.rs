@@ -1,0 +1,74 @@
+//! The last rows of a picture that passes.
+
+use core::cell::Cell;
+
+use super::HELD;
+use crate::image::{Pixels, Sample};
+
+/// The last [`HELD`] rows. Where others are asked for, the first or the last of them stands for them, which is counted.
+#[derive(Debug)]
+pub(super) struct RecentRows<'a, S> {
+    samples: &'a mut [S],
+    width: u16,
+    height: u16,
+    full_scale: u16,
+    /// Rows so far.
+    rows: u16,
+    beyond: Cell<u32>,
+}
+
+impl<'a, S: Sample> RecentRows<'a, S> {
+    pub(super) fn new(samples: &'a mut [S], width: u16, height: u16, full_scale: u16) -> Self {
+        Self { samples, width, height, full_scale, rows: 0, beyond: Cell::new(0) }
+    }
+    fn start(&self, y: u16) -> usize {
+        usize::from(y % HELD) * usize::from(self.width)
+    }
+    /// Takes the next row in the place of the oldest.
+    pub(super) fn push(&mut self, row: &[S]) {
+        let start = self.start(self.rows);
+        if let Some(place) = self.samples.get_mut(start..start + usize::from(self.width))
+            && place.len() == row.len()
+        {
+            place.copy_from_slice(row);
+        }
+        self.rows += 1;
+    }
+    /// Whether rows were asked for, since the last time, that are not held.
+    pub(super) fn went_beyond(&self) -> bool {
+        self.beyond.replace(0) > 0
+    }
+}
+
+impl<S: Sample> Pixels for RecentRows<'_, S> {
+    fn width(&self) -> u16 {
+        self.width
+    }
+    fn height(&self) -> u16 {
+        self.height
+    }
+    fn full_scale(&self) -> u16 {
+        self.full_scale
+    }
+    #[inline(always)]
+    fn index(&self, x: u16, y: u16) -> usize {
+        usize::from(y) << 16 | usize::from(x)
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        1
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        1 << 16
+    }
+    #[inline]
+    fn read(&self, index: usize) -> u16 {
+        let (x, y) = (index & 0xFFFF, (index >> 16) as u16);
+        let held = y.max(self.rows.saturating_sub(HELD)).min(self.rows.saturating_sub(1));
+        if held != y {
+            self.beyond.set(self.beyond.get() + 1);
+        }
+        self.samples.get(self.start(held) + x).map_or(0, |&s| s.into())
+    }
+}

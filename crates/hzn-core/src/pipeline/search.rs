@@ -1,0 +1,501 @@
+//! The edges of one picture, one after the other from border to verdict, and which of them is the limb.
+
+use super::account;
+use super::found_limb::FoundLimb;
+use super::sensor::Sensor;
+use crate::base::linalg::basis;
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::{Cov3, UnitVec3};
+use crate::geometry::pixel::Pixel;
+use crate::image::Pixels;
+use crate::model::body::Expected;
+use crate::model::error_budget::ErrorBudget;
+use crate::model::observer::Observer;
+use crate::model::report::{Candidate, Free, Report, Solution};
+use crate::model::status::{Stage, Status};
+use crate::model::verdict::Verdict;
+use crate::model::work::{self, Work};
+use crate::papers;
+use crate::stages::consensus;
+#[cfg(feature = "horace")]
+use crate::stages::contour;
+use crate::stages::contour::{End, Marks, Scene, Thinned};
+use crate::stages::covariance;
+use crate::stages::edge_points;
+use crate::stages::fit;
+use crate::stages::gates;
+use crate::stages::rays;
+use crate::stages::threshold;
+
+/// Words that search lines are marked in, at most: more of them find nothing new.
+const LINE_WORDS: usize = 16384;
+
+/// The shorter side of the border is looked at in about this many places: a limb's dark and lit stretches are longer
+/// than what lies between, and each look at a column is a page of memory.
+const BORDER_LOOKS: u16 = 128;
+
+/// Rows between search lines, and the most where memory is short: the least extent of the body's disc; a quarter of it
+/// where there are crescents, which are to be crossed too.
+///
+/// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows; the lens's own minimum is taken for half of f,
+/// which every lens in use exceeds.
+fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u16) {
+    let (_, fy) = camera.focal_px();
+    let disc = expected.half_angle_rad() * fy;
+    let narrow = if expected.phases { disc * T::from_f64(0.25) } else { disc };
+    (narrow.to_i32().clamp(1, 64) as u16, disc.to_i32().clamp(1, 256) as u16)
+}
+
+/// The edges of one picture, judged one by one.
+pub(super) struct Search<'a, T, O> {
+    sensor: &'a Sensor<T>,
+    /// The sensor's, or as it turns while the picture is read out.
+    camera: &'a Camera<T>,
+    expected: &'a Expected<T>,
+    taken: &'a [FoundLimb<T>],
+    noise: &'a covariance::Config,
+    /// The answer's level is asked for.
+    tracks: bool,
+    /// Shortest edge, border pixels.
+    min_points: u16,
+    observer: &'a O,
+    blocks: &'a mut [Block<T>],
+    /// What may still be done.
+    work: Work,
+    best: Option<Best<T>>,
+    /// The best score of an answer that points elsewhere.
+    rival: Option<T>,
+    /// Edges with too few points.
+    short: u32,
+    /// An edge was fitted, whatever became of it.
+    fitted: bool,
+    report: &'a mut Report<T>,
+}
+
+/// Whether an edge begins on the border between two of its strides.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Missed {
+    /// Nothing says so.
+    Unknown,
+    /// At least one does.
+    Some,
+    /// They were looked for pixel by pixel.
+    Found,
+}
+
+struct Best<T> {
+    solution: Solution<T>,
+    outcome: Candidate<T>,
+    /// Level for the next picture.
+    level: Option<u16>,
+    score: T,
+    /// It explains most of the limb in view, and most of its edge or with small residuals: no need to look further.
+    certain: bool,
+}
+
+impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
+    /// Nothing looked at yet. `camera` is the sensor's or [`Sensor::turning`]; `taken` are the bodies found before; `blocks` is
+    /// the room for one edge's points, `work` what the look may cost.
+    pub(super) fn new(
+        sensor: &'a Sensor<T>,
+        camera: &'a Camera<T>,
+        expected: &'a Expected<T>,
+        taken: &'a [FoundLimb<T>],
+        observer: &'a O,
+        blocks: &'a mut [Block<T>],
+        work: Work,
+        report: &'a mut Report<T>,
+    ) -> Self {
+        let config = &sensor.config;
+        Self {
+            expected,
+            taken,
+            noise: config.noise_of(expected.which),
+            tracks: config.levels_of(expected.which).method == threshold::Method::Track,
+            min_points: config
+                .candidates
+                .min_points
+                .min(gates::small(expected.sin, &sensor.camera, 2))
+                .min(gates::few_rows(&sensor.camera, 2)),
+            observer,
+            work,
+            blocks,
+            best: None,
+            rival: None,
+            short: 0,
+            fitted: false,
+            report,
+            camera,
+            sensor,
+        }
+    }
+
+    /// Nothing more to look for: the limb is found, or the picture may cost no more.
+    fn done(&self) -> bool {
+        self.work.is_spent() || self.best.as_ref().is_some_and(|b| b.certain)
+    }
+
+    /// Edges from the border of the picture, the likeliest first, then those that search lines meet.
+    #[inline(always)]
+    pub(super) fn border_following<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        border: &mut [Pixel],
+        bits: &mut [u32],
+    ) {
+        let (narrow, widest) = line_spacing(self.expected, &self.sensor.camera);
+        let (spacing, widest) =
+            self.sensor.config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
+        let bits = bits.get_mut(..LINE_WORDS.min(bits.len())).unwrap_or_default();
+        let (width, height) = (scene.region.width(), scene.region.height());
+        let mut marks = Marks::new(bits, width, height, spacing, widest);
+        // What is narrower on the border than a search line is apart from the next is no limb.
+        let stride = spacing.min(width.min(height) / BORDER_LOOKS).max(1);
+        let ranked = scene.ranked_starts(stride);
+        self.work.pay(scene.cost());
+        for start in &ranked {
+            if self.done() {
+                break;
+            }
+            self.edge(scene, start.pixel, start.dark, border, &mut marks);
+        }
+        if !self.done() {
+            scene.each_start(stride, &mut |start| {
+                if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
+                    self.edge(scene, start.pixel, start.dark, border, &mut marks);
+                }
+                self.work.pay(scene.cost());
+                !self.done()
+            });
+        }
+        if self.best.is_some() {
+            return;
+        }
+        let mut missed = Missed::Unknown;
+        for y in marks.rows(height) {
+            let Some((x0, x1)) = scene.region.span(y) else { continue };
+            if self.done() || !self.work.spend(work::line(x0, x1)) {
+                break;
+            }
+            let crossings = scene.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
+                self.edge_on_line(scene, pixel, dark, border, marks, &mut missed);
+                !self.done()
+            });
+            self.work.pay(crossings * work::CROSSING + scene.cost());
+            if missed == Missed::Some {
+                missed = Missed::Found;
+                if !self.work.spend(work::ring(width, height)) {
+                    break;
+                }
+                scene.each_narrow_start(stride, &mut |start| {
+                    self.edge(scene, start.pixel, start.dark, border, &mut marks);
+                    self.work.pay(scene.cost());
+                    !self.done()
+                });
+            }
+        }
+    }
+
+    /// An edge that a search line meets. When it ends at the border, it began there too, where the border's strides passed
+    /// over it: half of an edge is not judged, but asked for whole.
+    fn edge_on_line<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        pixel: Pixel,
+        dark: u8,
+        border: &mut [Pixel],
+        marks: &mut Marks<'_>,
+        missed: &mut Missed,
+    ) {
+        let mut edge = Thinned::new(border);
+        match self.follow(scene, pixel, dark, &mut edge, marks) {
+            Some(End::Open) if *missed != Missed::Found => *missed = Missed::Some,
+            Some(_) => self.piece(scene, &edge),
+            None => {}
+        }
+    }
+
+    /// Every outer border of the picture.
+    #[cfg(feature = "horace")]
+    pub(super) fn raster<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, border: &mut [Pixel], bits: &mut [u32]) {
+        let most = self.work.left();
+        let mut steps = most;
+        let ended = contour::raster::each_border(scene, bits, border, &mut steps, |edge| {
+            self.piece(scene, edge);
+            !self.work.is_spent()
+        });
+        self.report.counters.followed += most - steps;
+        self.work.pay(most - steps);
+        if ended == contour::raster::Scanned::Truncated {
+            self.work.lack();
+        }
+    }
+
+    /// Every edge pixel of the picture as one edge, by a method that finds them so.
+    #[cfg(any(feature = "horace", feature = "zju"))]
+    pub(super) fn whole<'b, P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        edges: impl FnOnce(&mut Work) -> Thinned<'b>,
+    ) {
+        let edge = edges(&mut self.work);
+        self.piece(scene, &edge);
+    }
+
+    /// Follows one edge and takes it through every stage.
+    fn edge<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        pixel: Pixel,
+        dark: u8,
+        border: &mut [Pixel],
+        marks: &mut Marks<'_>,
+    ) {
+        let mut edge = Thinned::new(border);
+        if self.follow(scene, pixel, dark, &mut edge, marks).is_some() {
+            self.piece(scene, &edge);
+        }
+    }
+
+    /// Follows one edge, and says how it ended; `None` when it is none, or cannot be paid for.
+    fn follow<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        pixel: Pixel,
+        dark: u8,
+        edge: &mut Thinned<'_>,
+        marks: &mut Marks<'_>,
+    ) -> Option<End> {
+        if !self.work.spend(work::EDGE) {
+            return None;
+        }
+        let end = self.work.on_edge(|steps| scene.follow(pixel, dark, edge, marks, steps));
+        self.report.counters.followed += edge.total();
+        // A hole: sky or ground seen through something.
+        let hole = matches!(end, End::Closed { twice_area } if twice_area > 0);
+        (!hole).then_some(end)
+    }
+
+    /// Takes an edge through every stage.
+    pub(super) fn piece<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, edge: &Thinned<'_>) {
+        let counters = &mut self.report.counters;
+        let length = edge.total();
+        if length < u32::from(self.min_points) {
+            self.short += 1;
+            return;
+        }
+        let keep = u32::from(self.sensor.config.candidates.keep_points);
+        let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
+        let point = account::point(self.sensor.config.candidates.sub_pixel, scene.mask_cost());
+        if !self.work.spend(points.saturating_mul(point)) {
+            return;
+        }
+        let number = counters.candidates;
+        counters.candidates += 1;
+        counters.dropped += length - length.div_ceil(edge.stride().max(1));
+        self.observer.edge(number, edge.pixels().iter().copied(), edge.stride());
+        if !self.observer.wants(number) {
+            return;
+        }
+        let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
+        self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
+        if let Some(new) = solution {
+            self.weigh(new);
+        }
+        self.fitted |=
+            !matches!(outcome.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken);
+        // Full: only counted, unless it is chosen in the end.
+        let _ = self.report.candidates.push(outcome);
+        self.observer.enter(Stage::Contour);
+    }
+
+    fn candidate<P: Pixels>(
+        &mut self,
+        scene: &Scene<'_, T, P, O>,
+        number: u32,
+        length: u32,
+        border: &[Pixel],
+    ) -> (Candidate<T>, Option<Best<T>>) {
+        let Sensor { config, cam_to_body, .. } = self.sensor;
+        let camera = self.camera;
+        let mut outcome = Candidate {
+            number,
+            length_px: length,
+            points: 0,
+            inliers: 0,
+            rms_px: T::from_f64(f64::NAN),
+            verdict: Verdict::NoConsensus,
+        };
+
+        self.enter(Stage::Candidates);
+        let slow = work::slow_point(scene.mask_cost());
+        let most_slow = self.work.left() / slow;
+        let points = edge_points::pick(scene, &config.candidates, border, number, self.blocks, most_slow);
+        if points.slow == most_slow {
+            self.work.cut();
+            return (outcome, None);
+        }
+        self.work.pay(points.slow * slow);
+        outcome.points = points.count;
+        self.report.counters.edge_points += points.count;
+        self.report.counters.fallback_points += points.fallback;
+        self.report.counters.cut_points += points.cut;
+        let used = (points.count as usize).div_ceil(LANES);
+        let Some(blocks) = self.blocks.get_mut(..used) else { return (outcome, None) };
+
+        let clipped = T::from_i32(points.clipped as i32) / T::from_i32(points.count.max(1) as i32);
+        let expected = &self.expected.clipped(clipped);
+        enter(self.report, self.observer, Stage::Undistort);
+        rays::to_rays(camera, blocks);
+
+        enter(self.report, self.observer, Stage::Reject);
+        let told_px = T::from_f64(config.reject.threshold_px);
+        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, told_px)).sum();
+        if on_another * 2 > points.count {
+            outcome.verdict = Verdict::Taken;
+            return (outcome, None);
+        }
+        let (fx, fy) = camera.focal_px();
+        let focal = (fx + fy) * T::from_f64(0.5);
+        let threshold = consensus::Threshold::of(blocks, points.count, expected, focal, &config.reject);
+        let consensus =
+            consensus::keep(blocks, points.count, expected, focal, threshold, &config.reject, &mut self.work);
+        let Some(consensus) = consensus else {
+            return (outcome, None);
+        };
+        self.report.counters.draws += consensus.draws;
+
+        enter(self.report, self.observer, Stage::Estimate);
+        outcome.verdict = Verdict::NoFit;
+        if !self.work.spend(used as u32 * work::FIT + work::GATES) {
+            return (outcome, None);
+        }
+        let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.estimate, self.noise);
+        let Some(fit) = fit else { return (outcome, None) };
+        outcome.inliers = fit.inliers;
+        outcome.rms_px = fit.rms_px;
+        for place in 0..points.count {
+            if let Some(block) = blocks.get(place as usize / LANES) {
+                self.observer.weight(number, place, block.weight[place as usize % LANES]);
+            }
+        }
+
+        enter(self.report, self.observer, Stage::Covariance);
+        let mut budget = self.observer.wants_budget().then(ErrorBudget::new);
+        let fused = covariance::fuse(blocks, &fit, expected, self.noise, &config.estimate, camera, budget.as_mut());
+        let Some(fused) = fused else { return (outcome, None) };
+        if let Some(budget) = &budget {
+            self.observer.budget(number, budget);
+        }
+
+        enter(self.report, self.observer, Stage::Select);
+        let (b1, b2) = basis(&fused.e);
+        let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
+        let sigma = covariance.sigma_max_rad();
+        let (made, raised) = (points.count, threshold.raised);
+        let judged = gates::judge(&fit, &fused, sigma, expected, blocks, made, raised, scene, camera, &config.select);
+        outcome.verdict = match judged.verdict {
+            Verdict::Passed => papers::verdict(&fit, expected, blocks, camera, scene.region, &config.select),
+            failed => failed,
+        };
+        let most = T::from_i32(points.count as i32) * T::from_f64(config.recover.min_part);
+        if self.report.counters.looks > 0 && T::from_i32(fit.inliers as i32) < most {
+            outcome.verdict = Verdict::NoConsensus;
+            return (outcome, None);
+        }
+        if outcome.verdict != Verdict::Passed || !sigma.is_finite() {
+            return (outcome, None);
+        }
+        let axis = UnitVec3::assume_unit(fused.e);
+        let one = T::one();
+        let half_angle = |k: T| (k * (one + one - k)).max(T::ZERO).sqrt().atan2(one - k);
+        let solution = Solution {
+            axis,
+            covariance,
+            axis_ecef: expected.axis_ecef(),
+            axis_body: cam_to_body.as_ref().map(|r| r.apply(&axis)),
+            half_angle_rad: half_angle(fit.k),
+            fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
+            altitude_m: fused.var_free_cos.and_then(|v| expected.altitude(fit.c, v)),
+            free: fused.var_free_cos.map(|var_cos| Free {
+                axis: UnitVec3::assume_unit(fit.e),
+                cos: fit.c,
+                var_cos,
+                cos_per_px: fit.sums.cos_per_px(),
+            }),
+            rms_px: fit.rms_px,
+            inliers: fit.inliers,
+            arc_px: fit.arc_px,
+            candidate: number,
+        };
+        // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself asks for
+        // must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of so many variances.
+        let sides = T::from_f64(config.select.min_side_sigma);
+        let curved = fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0));
+        if config.estimate.half_angle == fit::HalfAngle::Fused && !curved && !expected.free {
+            outcome.verdict = Verdict::Straight;
+            return (outcome, None);
+        }
+        let share = T::from_i32(fit.inliers as i32)
+            > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
+        let certain = judged.support > T::from_f64(config.select.certain_support)
+            && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
+        let tracks = (self.tracks && !P::PASSED).then(|| gates::middle_level(&fused.e, blocks, scene, camera));
+        (outcome, Some(Best { solution, outcome, score: judged.score, certain, level: tracks.flatten() }))
+    }
+
+    /// Keeps the better of two answers, and remembers how good the other was if it says something else.
+    fn weigh(&mut self, new: Best<T>) {
+        let Some(old) = self.best.take() else {
+            self.best = Some(new);
+            return;
+        };
+        let apart = new.solution.axis.angle_rad(&old.solution.axis)
+            > T::from_f64(self.sensor.config.select.ambiguous_deg.to_radians());
+        let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
+        if apart {
+            self.rival = Some(self.rival.map_or(other.score, |r| r.min(other.score)));
+        }
+        self.best = Some(better);
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        enter(self.report, self.observer, stage);
+    }
+
+    /// Writes the answer into the report. Gives back what is left of the account.
+    pub(super) fn conclude(self) -> Work {
+        let (report, work) = (self.report, self.work);
+        report.counters.work = work.done();
+        report.counters.looks += 1;
+        if let Some(best) = self.best {
+            let factor = T::from_f64(self.sensor.config.select.ambiguous_score);
+            if !best.certain && self.rival.is_some_and(|r| r < best.score * factor) {
+                report.status = Status::Ambiguous;
+                return work;
+            }
+            report.choose(best.outcome);
+            report.status = Status::Ok;
+            report.next_level = best.level;
+            report.solution = Some(best.solution);
+            return work;
+        }
+        report.status = if work.was_cut() {
+            Status::Truncated
+        } else if self.fitted {
+            Status::Rejected
+        } else if report.counters.candidates == 0 && self.short > 0 {
+            Status::TooFewPoints
+        } else {
+            Status::NoLimb
+        };
+        work
+    }
+}
+
+fn enter<T, O: Observer<T>>(report: &mut Report<T>, observer: &O, stage: Stage) {
+    report.stage = report.stage.max(stage);
+    observer.enter(stage);
+}

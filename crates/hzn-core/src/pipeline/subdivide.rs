@@ -1,0 +1,235 @@
+//! A picture in parts: a smaller copy of it, and halves of halves where the whole gives no answer (Barf et al. 2015,
+//! 4.2.1; Barf 2014, 2.2.6).
+//!
+//! A part is a picture of its own, with the camera's principal point moved and its focal length scaled; what is watched
+//! of it is told in the whole picture's coordinates. (2.39) ends the division where a part is too small *and* too
+//! bright and too dark at once; it ends where a part is too small, or too bright, or too dark.
+
+use super::account;
+use super::found_limb::FoundLimb;
+use super::sensor::Sensor;
+use super::workspace::Lists;
+use crate::base::linalg::{V3, basis, unit};
+use crate::base::real::Real;
+use crate::base::sort;
+use crate::config::retry::{Combine, Method};
+use crate::geometry::crop::Crop;
+use crate::geometry::frames::{Cov3, UnitVec3};
+use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::image::{Cropped, Pixels};
+use crate::model::body::Expected;
+use crate::model::error_budget::ErrorBudget;
+use crate::model::observer::Observer;
+use crate::model::report::{Candidate, Report, Solution};
+use crate::model::status::{Stage, Status};
+use crate::model::verdict::Verdict;
+use crate::model::work;
+
+/// Most parts that can answer.
+const ANSWERS: usize = 64;
+/// Parts that wait: one a halving.
+const WAITING: usize = 16;
+
+type Answers<T> = heapless::Vec<Solution<T>, ANSWERS>;
+
+impl<T: Real> Sensor<T> {
+    /// The whole picture, scaled if that is asked for, and its parts when it has no answer.
+    pub(super) fn look_at_parts<P: Pixels, O: Observer<T>>(
+        &self,
+        mut lists: Lists<'_, T>,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[FoundLimb<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let whole = Crop::whole([picture.width(), picture.height()], self.config.input.scale_to_height);
+        if whole.is_all() {
+            self.look(lists.again(), picture, expected, taken, observer, report);
+        } else {
+            self.look_through(lists.again(), whole, picture, expected, taken, observer, None, report);
+        }
+        let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright);
+        if self.config.recover.method == Method::Division && divisible {
+            self.divide(lists, whole, picture, expected, taken, observer, report);
+        }
+    }
+
+    fn divide<P: Pixels, O: Observer<T>>(
+        &self,
+        mut lists: Lists<'_, T>,
+        whole: Crop,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[FoundLimb<T>],
+        observer: &O,
+        report: &mut Report<T>,
+    ) {
+        let (status, level) = (report.status, report.level);
+        // What the whole picture left.
+        let mut work = account::open(&self.config, lists.border.len());
+        work.pay(report.counters.work);
+        let mut cut = false;
+        let least = f64::from(whole.area()) * self.config.recover.least_part;
+        let mut answers = Answers::<T>::new();
+        let mut chosen = heapless::Vec::<Candidate<T>, ANSWERS>::new();
+        let mut waiting = heapless::Vec::<Crop, WAITING>::new();
+        // A half at a time: as many wait as there have been halvings.
+        let _ = waiting.extend_from_slice(whole.halves().as_ref().map_or(&[][..], |h| h));
+        while let Some(part) = waiting.pop() {
+            if !work.spend(work::PART) {
+                break;
+            }
+            report.counters.work = 0;
+            self.look_through(lists.again(), part, picture, expected, taken, observer, Some(work.left()), report);
+            work.pay(report.counters.work);
+            cut |= report.status == Status::Truncated;
+            if let Some(answer) = report.solution.take() {
+                // As many as the smallest parts can be.
+                let _ = answers.push(answer);
+                if let Some(edge) = report.candidates.iter_mut().find(|c| c.verdict == Verdict::Chosen) {
+                    edge.verdict = Verdict::Passed;
+                    let _ = chosen.push(*edge);
+                }
+                continue;
+            }
+            let ended = matches!(report.status, Status::TooDark | Status::TooBright);
+            if !ended && f64::from(part.area()) >= 2.0 * least {
+                let _ = waiting.extend_from_slice(part.halves().as_ref().map_or(&[][..], |h| h));
+            }
+        }
+        (report.status, report.level, report.counters.work) = (status, level, work.done());
+        if cut || work.was_cut() {
+            report.status = Status::Truncated;
+        }
+        if let Some(mut answer) = together(&mut answers, self.config.recover.combine) {
+            answer.axis_body = self.cam_to_body.as_ref().map(|r| r.apply(&answer.axis));
+            report.status = Status::Ok;
+            report.stage = Stage::Select;
+            if let Some(edge) = chosen.iter().find(|c| c.number == answer.candidate) {
+                report.choose(*edge);
+            }
+            report.solution = Some(answer);
+        }
+    }
+
+    /// Looks at a part with the camera and the region that are its own; `left` is what it may cost.
+    fn look_through<P: Pixels, O: Observer<T>>(
+        &self,
+        lists: Lists<'_, T>,
+        crop: Crop,
+        picture: &P,
+        expected: &Expected<T>,
+        taken: &[FoundLimb<T>],
+        observer: &O,
+        left: Option<u32>,
+        report: &mut Report<T>,
+    ) {
+        let mut config = self.config.clone();
+        config.limits.max_work = left.or(config.limits.max_work);
+        let part = Sensor {
+            config,
+            camera: self.camera.through(&crop),
+            region: self.region.through(&crop),
+            cam_to_body: self.cam_to_body,
+        };
+        part.look(lists, &Cropped::new(picture, crop), expected, taken, &Through { observer, crop }, report);
+    }
+}
+
+/// The answer nearest to the median or mean of all, with that for its axis, and the scatter of all in its covariance.
+fn together<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Option<Solution<T>> {
+    let count = T::from_f64(answers.len() as f64);
+    let axis = match combine {
+        Combine::Mean => answers.iter().fold(V3::new(T::ZERO, T::ZERO, T::ZERO), |sum, a| sum + a.axis.v()),
+        Combine::Median => {
+            let mut middle = [T::ZERO; 3];
+            for (k, m) in middle.iter_mut().enumerate() {
+                let mut values = heapless::Vec::<T, ANSWERS>::new();
+                for answer in answers.iter() {
+                    let _ = values.push(answer.axis.v()[k]);
+                }
+                sort::by(&mut values, |a, b| a < b);
+                let at = |i: usize| values.get(i).copied().unwrap_or(T::ZERO);
+                let n = values.len();
+                *m = (at(n / 2) + at(n.saturating_sub(1) / 2)) * T::from_f64(0.5);
+            }
+            V3::from(middle)
+        }
+    };
+    let axis = unit(&axis)?;
+    let (b1, b2) = basis(&axis);
+    let mut p = [T::ZERO; 3];
+    for a in answers.iter() {
+        let rows = a.covariance.rows();
+        let form = |x: &V3<T>, y: &V3<T>| {
+            let mut sum = T::ZERO;
+            for i in 0..3 {
+                for j in 0..3 {
+                    sum += x[i] * rows[i][j] * y[j];
+                }
+            }
+            sum
+        };
+        let off = a.axis.v() - axis;
+        let (x, y) = (off.dot(&b1), off.dot(&b2));
+        p[0] += form(&b1, &b1) + x * x;
+        p[1] += form(&b1, &b2) + x * y;
+        p[2] += form(&b2, &b2) + y * y;
+    }
+    let nearest = answers.iter().max_by(|a, b| {
+        let along = |s: &Solution<T>| s.axis.v().dot(&axis);
+        along(a).partial_cmp(&along(b)).unwrap_or(core::cmp::Ordering::Equal)
+    })?;
+    Some(Solution {
+        axis: UnitVec3::assume_unit(axis),
+        covariance: Cov3::from_tangent(&b1, &b2, p.map(|x| x / count)),
+        ..*nearest
+    })
+}
+
+/// Tells of a part in the picture's coordinates.
+struct Through<'a, O> {
+    observer: &'a O,
+    crop: Crop,
+}
+
+impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
+    fn enter(&self, stage: Stage) {
+        self.observer.enter(stage);
+    }
+    fn pixel(&self, x: u16, y: u16) {
+        let at = self.crop.pixel(x, y);
+        self.observer.pixel(at.x, at.y);
+    }
+    fn level(&self, level: u16, mean: T, samples: u32) {
+        self.observer.level(level, mean, samples);
+    }
+    fn frame(&self, px: u16) {
+        self.observer.frame(px);
+    }
+    fn look(&self, number: u32, level: u16) {
+        self.observer.look(number, level);
+    }
+    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+        self.observer.edge(candidate, border.map(|p| self.crop.pixel(p.x, p.y)), stride);
+    }
+    fn wants(&self, candidate: u32) -> bool {
+        self.observer.wants(candidate)
+    }
+    fn point(&self, candidate: u32, point: ImagePoint<T>) {
+        self.observer.point(candidate, self.crop.in_picture(point));
+    }
+    fn weight(&self, candidate: u32, point: u32, weight: T) {
+        self.observer.weight(candidate, point, weight);
+    }
+    fn wants_budget(&self) -> bool {
+        self.observer.wants_budget()
+    }
+    fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
+        self.observer.budget(candidate, budget);
+    }
+    fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
+        self.observer.verdict(candidate, outcome, solution);
+    }
+}

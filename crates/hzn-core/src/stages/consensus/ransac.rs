@@ -1,0 +1,42 @@
+//! Classic RANSAC on three points (Fischler & Bolles 1981; Braun & Barf 2022, section 3.6).
+//!
+//! Three rays determine a cone, its half-angle included: the normal of their plane. Every point is compared with it,
+//! and the cone with the most points within the threshold wins. Nothing of what is known beforehand is used, neither
+//! the half-angle nor on which side of the edge the light is, and every draw looks at every point: that is what the
+//! default, `two-point`, is better at.
+
+use super::sampled::{FEWEST, agreeing, conclude, drawn, needed};
+use super::{Config, Consensus, Threshold};
+use crate::base::real::Real;
+use crate::base::rng::Rng;
+use crate::geometry::block::Block;
+use crate::model::work::{DRAW, SCORE, Work};
+
+/// The cone with the most points near it; the others lose their weight. `None` with fewer than three points, or when
+/// no cone has more points than the three it goes through.
+pub(super) fn keep<T: Real>(
+    blocks: &mut [Block<T>],
+    count: u32,
+    threshold: Threshold<T>,
+    config: &Config,
+    work: &mut Work,
+) -> Option<Consensus<T>> {
+    if count < 3 {
+        return None;
+    }
+    let limit2 = threshold.px * threshold.px;
+    let mut rng = Rng::new(config.seed);
+    let (mut best, mut most) = (None, T::from_f64(3.5));
+    let (mut draws, mut enough) = (0, config.max_draws);
+    let a_draw = DRAW + blocks.len() as u32 * SCORE;
+    while draws < enough.max(FEWEST).min(config.max_draws) && work.spend(a_draw) {
+        draws += 1;
+        let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
+        let near = agreeing(blocks, &e, c, limit2);
+        if near > most {
+            (best, most) = (Some((e, c)), near);
+            enough = needed(near / T::from_f64(f64::from(count)));
+        }
+    }
+    conclude(blocks, best, limit2, draws)
+}

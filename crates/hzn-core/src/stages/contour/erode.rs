@@ -1,0 +1,115 @@
+//! Edges by erosion (Barf 2014, 2.2.3): a lit pixel with too few lit ones around it would be eroded, so it is edge.
+//!
+//! Every pixel of the picture is looked at with its whole neighbourhood, and all edges of the picture are one list,
+//! whatever they belong to: there is no border to follow. To give the points an order along the limb they are sorted
+//! about the centre of the circle through all of them, from the widest gap on.
+
+use super::order::about_their_circle;
+use super::thinned::Thinned;
+use super::{Config, Scene};
+use crate::base::real::Real;
+use crate::geometry::pixel::Pixel;
+use crate::image::Pixels;
+use crate::model::observer::Observer;
+use crate::model::work::{self, Work};
+
+/// The edge pixels of the picture, in order about their circle. Beside the end of the region, or a mask, there is no
+/// edge.
+pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    config: &Config,
+    buffer: &'a mut [Pixel],
+    work: &mut Work,
+) -> Thinned<'a> {
+    let mut edge = Thinned::new(buffer);
+    let reach = config.erode_size_px / 2;
+    let least = config.erode_threshold;
+    let around = work::square(config.erode_size_px, scene.mask_cost());
+    for y in 0..scene.region.height() {
+        let Some((x0, x1)) = scene.region.span(y) else { continue };
+        // What was looked at of the mask in the row before, too.
+        if !work.spend(u32::from(x1 - x0) + scene.cost()) {
+            break;
+        }
+        for x in x0..=x1 {
+            let inside = scene.lit(x, y) && scene.region.is_inside_by(x, y, reach);
+            if inside && work.spend(around) && is_edge(scene, x, y, reach, least) {
+                edge.push(Pixel { x, y });
+            }
+        }
+    }
+    if work.spend(edge.pixels().len() as u32 * work::ORDER) {
+        about_their_circle::<T>(edge.pixels_mut());
+    }
+    edge
+}
+
+/// Whether fewer than `least` pixels of the neighbourhood are lit, and none masked.
+fn is_edge<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    x: u16,
+    y: u16,
+    reach: u16,
+    least: u16,
+) -> bool {
+    let mut lit = 0;
+    for v in y - reach..=y + reach {
+        for u in x - reach..=x + reach {
+            if scene.region.masked(u, v) {
+                return false;
+            }
+            lit += u16::from(scene.lit(u, v));
+        }
+    }
+    lit < least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::region::Region;
+    use crate::image::{Grey, Layout};
+    use crate::model::observer::Unobserved;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn eroded(data: &[u8], w: u16, h: u16, size: u16, threshold: u16) -> Vec<(u16, u16)> {
+        let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
+        let region = Region::<f64>::whole(w, h);
+        let scene = Scene::new(&picture, &region, 128, &Unobserved);
+        let mut buffer = vec![Pixel::default(); 4096];
+        let config = Config { erode_size_px: size, erode_threshold: threshold, ..Config::default() };
+        edges(&scene, &config, &mut buffer, &mut Work::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
+    }
+
+    #[test]
+    fn a_straight_edge_is_as_wide_as_the_neighbourhood_reaches() {
+        let data: Vec<u8> = (0..20 * 20).map(|i| if i / 20 >= 8 { 200 } else { 0 }).collect();
+        // 3×3 of a flat edge's first row: six lit. In the second all nine.
+        let first: Vec<_> = (1..19).map(|x| (x, 8)).collect();
+        assert_eq!(eroded(&data, 20, 20, 3, 9), first);
+        assert_eq!(eroded(&data, 20, 20, 3, 6), []);
+        // 5×5: fifteen, then twenty, then all.
+        assert_eq!(eroded(&data, 20, 20, 5, 25).len(), 2 * 16);
+        assert_eq!(eroded(&data, 20, 20, 5, 20).len(), 16);
+    }
+
+    #[test]
+    fn points_of_an_arc_are_in_order_along_it() {
+        let (w, h, cx, cy, r) = (90u16, 60u16, 40.0, 80.0, 60.0);
+        let data: Vec<u8> = (0..u32::from(w) * u32::from(h))
+            .map(|i| {
+                let (x, y) = (f64::from(i % u32::from(w)), f64::from(i / u32::from(w)));
+                if libm::hypot(x - cx, y - cy) < r { 200 } else { 0 }
+            })
+            .collect();
+        let edge = eroded(&data, w, h, 3, 9);
+        assert!(edge.len() > 60);
+        let along: Vec<f64> = edge.iter().map(|p| libm::atan2(f64::from(p.1) - cy, f64::from(p.0) - cx)).collect();
+        // From the left to the right, the gap below the picture left out; neighbours are a pixel or two apart.
+        assert!(along.is_sorted_by(|a, b| *a <= *b + 0.01), "{along:?}");
+        for pair in edge.windows(2) {
+            assert!(pair[0].0.abs_diff(pair[1].0) <= 4 && pair[0].1.abs_diff(pair[1].1) <= 4, "{pair:?}");
+        }
+    }
+}

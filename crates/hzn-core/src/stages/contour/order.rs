@@ -1,0 +1,33 @@
+//! An order along the limb for edge pixels that were found one by one, of the whole picture.
+
+use crate::base::real::Real;
+use crate::base::sort;
+use crate::geometry::circle::Circle;
+use crate::geometry::pixel::Pixel;
+
+/// Sorts by the angle about the circle through all pixels, the widest gap between the last and the first. Pixels on a
+/// line stay in their order.
+pub(super) fn about_their_circle<T: Real>(pixels: &mut [Pixel]) {
+    let place = |p: &Pixel| [T::from_i32(i32::from(p.x)), T::from_i32(i32::from(p.y))];
+    let Some(circle) = Circle::through(pixels.iter().map(place)) else { return };
+    // Grows with the angle from −x over −y: 0 to 4.
+    let angle = |p: &Pixel| -> T {
+        let [x, y] = place(p);
+        let (x, y) = (x - circle.centre[0], y - circle.centre[1]);
+        let along = x / (x.abs() + y.abs()).max(T::from_f64(1e-20));
+        if y < T::ZERO { T::one() + along } else { T::from_f64(3.0) - along }
+    };
+    sort::by(pixels, |a, b| angle(a) < angle(b));
+    let Some((first, last)) = pixels.first().zip(pixels.last()) else { return };
+    let (mut widest, mut start) = (angle(first) + T::from_f64(4.0) - angle(last), 0);
+    for (i, pair) in pixels.windows(2).enumerate() {
+        if let [a, b] = pair
+            && angle(b) - angle(a) > widest
+        {
+            (widest, start) = (angle(b) - angle(a), i + 1);
+        }
+    }
+    if start < pixels.len() {
+        pixels.rotate_left(start);
+    }
+}

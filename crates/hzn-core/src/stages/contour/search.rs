@@ -1,0 +1,262 @@
+//! Where edges begin: at the border of the region, and on search lines.
+
+use super::follow::{Scene, WEST};
+use super::marks::Marks;
+use crate::base::real::Real;
+use crate::geometry::pixel::Pixel;
+use crate::image::Pixels;
+use crate::image::region::Run;
+use crate::model::observer::Observer;
+
+/// Most starts that are ranked.
+pub(crate) const RANKED: usize = 4;
+
+/// An edge begins here: a lit pixel of the ring, the direction of the dark one before it, and how long the dark
+/// stretch before it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Start {
+    pub(crate) pixel: Pixel,
+    pub(crate) dark: u8,
+    pub(crate) stretch: u32,
+}
+
+/// The starts beside the longest dark stretches of the ring, longest first. The sky is the longest of all in most
+/// pictures, so the limb comes first, however many edges the clouds have.
+pub(crate) type Ranked = heapless::Vec<Start, RANKED>;
+
+impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
+    /// Calls `found` with every start along the ring, clockwise, until it says to stop. Each open edge has exactly
+    /// one start. The ring is read at every `stride`-th pixel, and at all of them where it changes in between; where
+    /// it becomes lit also at those before, as noise frays the place where a wide edge begins.
+    ///
+    /// The first start's stretch does not count what lies beyond the place where the walk begins; the return value
+    /// does: the stretch that ends the walk.
+    pub(crate) fn each_start(&self, stride: u16, found: &mut dyn FnMut(Start) -> bool) -> u32 {
+        let stride = stride.max(1);
+        let mut stretch = 0u32;
+        let mut before: Option<(Pixel, bool)> = None;
+        let mut first: Option<(Pixel, bool)> = None;
+        let mut go_on = true;
+        // One pixel after another.
+        let mut step = |before: &mut Option<(Pixel, bool)>, stretch: &mut u32, pixel: Pixel, lit: bool| -> bool {
+            let go_on = match *before {
+                Some((dark, false)) if lit => found(Start { pixel, dark: direction(pixel, dark), stretch: *stretch }),
+                _ => true,
+            };
+            if lit {
+                *stretch = 0;
+            } else if !self.region.masked(pixel.x, pixel.y) {
+                *stretch += 1;
+            }
+            *before = Some((pixel, lit));
+            go_on
+        };
+        self.region.each_run(|run| {
+            let mut k = 0;
+            // The dark pixels that were passed over last: how many, how many of them counted, and what was before.
+            let mut passed = (0, 0, None);
+            while k < run.len {
+                let next = (k + stride).min(run.len) - 1;
+                let Pixel { x, y } = run.at(next);
+                let lit = self.lit(x, y);
+                match before {
+                    Some((_, same)) if same == lit => {
+                        let counted = if lit || self.region.masked(x, y) { 0 } else { u32::from(next + 1 - k) };
+                        stretch += counted;
+                        passed = (if lit { 0 } else { next + 1 - k }, counted, before);
+                        before = Some((Pixel { x, y }, lit));
+                        let leaps = if self.region.has_mask() { 0 } else { self.leaps(&run, next, stride, lit) };
+                        if leaps > 0 {
+                            let at = |leaps: u16| Some((run.at(next + leaps * stride), lit));
+                            if !lit {
+                                stretch += u32::from(leaps) * u32::from(stride);
+                                passed = (stride, stride.into(), at(leaps - 1));
+                            }
+                            before = at(leaps);
+                            k = next + leaps * stride + 1;
+                            continue;
+                        }
+                    }
+                    _ => {
+                        let (again, counted, prior) = core::mem::take(&mut passed);
+                        if lit && again > 0 {
+                            (k, stretch, before) = (k - again, stretch - counted, prior);
+                        }
+                        for i in k..=next {
+                            let pixel = run.at(i);
+                            let lit = if i == next { lit } else { self.lit(pixel.x, pixel.y) };
+                            if first.is_none() {
+                                first = Some((pixel, lit));
+                            }
+                            if !step(&mut before, &mut stretch, pixel, lit) {
+                                go_on = false;
+                                return false;
+                            }
+                        }
+                    }
+                }
+                k = next + 1;
+            }
+            true
+        });
+        // Close the ring: the last pixel and the first may make a start.
+        if let (true, Some((pixel, true))) = (go_on, first) {
+            step(&mut before, &mut stretch, pixel, true);
+            return 0;
+        }
+        stretch
+    }
+
+    /// How many times `stride` pixels can be passed over from number `k` of a run and what is there is lit, or dark, as it.
+    #[inline(always)]
+    fn leaps(&self, run: &Run, k: u16, stride: u16, lit: bool) -> u16 {
+        let Pixel { x, y } = run.at(k);
+        let (dx, dy) = run.step();
+        let leap = (dx as isize * self.picture.across() as isize + dy as isize * self.picture.down() as isize)
+            * stride as isize;
+        let mut index = self.picture.index(x, y);
+        let most = (run.len - 1 - k).checked_div(stride).unwrap_or(0);
+        for leaps in 0..most {
+            index = index.wrapping_add_signed(leap);
+            let there = run.at(k + (leaps + 1) * stride);
+            self.observer.pixel(there.x, there.y);
+            if (self.picture.read(index) >= self.level) != lit {
+                return leaps;
+            }
+        }
+        most
+    }
+
+    /// Calls `found` with the starts that [`Self::each_start`] can have passed over, until it says to stop: those with
+    /// fewer than `stride` dark pixels before them, or lit ones after them. Every pixel of the ring is read.
+    pub(crate) fn each_narrow_start(&self, stride: u16, found: &mut dyn FnMut(Start) -> bool) {
+        let mut before: Option<(Pixel, bool)> = None;
+        let (mut dark_px, mut lit_px) = (0u32, 0u32);
+        let mut waiting: Option<Start> = None;
+        let mut go_on = true;
+        // The last start's lit pixels may go on where the ring closes.
+        for round in 0..2 {
+            let mut starts = true;
+            self.region.each_run(|run| {
+                for k in 0..run.len {
+                    let pixel = run.at(k);
+                    let lit = self.lit(pixel.x, pixel.y);
+                    if lit {
+                        if let Some((dark, false)) = before
+                            && starts
+                        {
+                            (waiting, lit_px) =
+                                (Some(Start { pixel, dark: direction(pixel, dark), stretch: dark_px }), 0);
+                        }
+                        (dark_px, lit_px) = (0, lit_px + 1);
+                    } else {
+                        dark_px += 1;
+                    }
+                    before = Some((pixel, lit));
+                    starts &= round == 0;
+                    let stride = u32::from(stride);
+                    let ended = !lit || lit_px >= stride;
+                    if let Some(start) = waiting.take_if(|_| ended) {
+                        go_on = start.stretch >= stride && lit_px >= stride || found(start);
+                    }
+                    go_on &= round == 0 || waiting.is_some();
+                    if !go_on {
+                        return false;
+                    }
+                }
+                true
+            });
+            if !go_on {
+                return;
+            }
+        }
+    }
+
+    /// The ranked starts.
+    pub(crate) fn ranked_starts(&self, stride: u16) -> Ranked {
+        let mut ranked = Ranked::new();
+        let mut first: Option<Start> = None;
+        let tail = self.each_start(stride, &mut |start| {
+            if first.is_none() {
+                first = Some(start);
+            } else {
+                insert(&mut ranked, start);
+            }
+            true
+        });
+        if let Some(start) = first {
+            insert(&mut ranked, Start { stretch: start.stretch + tail, ..start });
+        }
+        ranked
+    }
+
+    /// Calls `found` with every unmarked lit pixel of a search line, from column `x0` to `x1` of row `y`, whose western
+    /// neighbour is dark, until it says to stop. `found` gets the marks back, for the follower. Gives how often the line
+    /// was lit after dark.
+    pub(crate) fn each_crossing<'m>(
+        &self,
+        y: u16,
+        (x0, x1): (u16, u16),
+        marks: &mut Marks<'m>,
+        mut found: impl FnMut(Pixel, u8, &mut Marks<'m>) -> bool,
+    ) -> u32 {
+        let (mut x, mut lit, mut crossings) = (x0, self.lit(x0, y), 0);
+        while x < x1 {
+            if !self.region.has_mask() {
+                x += self.alike_beyond(x, y, x1 - x);
+            }
+            x += 1;
+            let now = x <= x1 && self.lit(x, y);
+            if now && !lit {
+                crossings += 1;
+                if !marks.get(x, y) && !found(Pixel { x, y }, WEST, marks) {
+                    break;
+                }
+            }
+            lit = now;
+        }
+        crossings
+    }
+
+    /// Of the `count` pixels east of column `x` of row `y`, how many are lit as that one, or dark as it, before the first
+    /// that is not.
+    #[inline(never)]
+    fn alike_beyond(&self, x: u16, y: u16, count: u16) -> u16 {
+        let index = self.picture.index(x, y);
+        let lit = self.picture.read(index) >= self.level;
+        let alike = self.picture.alike(index + self.picture.across(), count.into(), self.level, lit) as u16;
+        for dx in 0..(alike + 1).min(count) {
+            self.observer.pixel(x + 1 + dx, y);
+        }
+        alike
+    }
+}
+
+fn insert(ranked: &mut Ranked, start: Start) {
+    if ranked.is_full() && ranked.last().is_some_and(|last| last.stretch < start.stretch) {
+        ranked.pop();
+    }
+    // Full of longer ones: it is none of them.
+    let Ok(()) = ranked.push(start) else { return };
+    let mut upwards = ranked.as_mut_slice();
+    while let [.., longer, new] = &mut *upwards
+        && longer.stretch < new.stretch
+    {
+        core::mem::swap(longer, new);
+        upwards = upwards.split_last_mut().map_or(&mut [], |(_, rest)| rest);
+    }
+}
+
+/// The direction from `a` to its neighbour `b`, counter-clockwise from east.
+fn direction(a: Pixel, b: Pixel) -> u8 {
+    match (i32::from(b.x) - i32::from(a.x), i32::from(b.y) - i32::from(a.y)) {
+        (1, 0) => 0,
+        (1, -1) => 1,
+        (0, -1) => 2,
+        (-1, -1) => 3,
+        (-1, 0) => 4,
+        (-1, 1) => 5,
+        (0, 1) => 6,
+        _ => 7,
+    }
+}

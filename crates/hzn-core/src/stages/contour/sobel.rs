@@ -1,0 +1,144 @@
+//! Edges of the whole picture by Sobel's gradient (Wang et al. 2022, 2.1).
+//!
+//! Every pixel's gradient is looked at, and every edge of the picture is in one list, whatever it belongs to: rejection is
+//! left to the sampler. An edge pixel has a gradient of more than twice the root mean square of all, as the automatic
+//! threshold of common tools, and no larger one beside it along the axis on which it is larger. A limb is found even
+//! where one level does not part ground from sky. To give the points an order along the limb they are sorted about the
+//! centre of the circle through all of them, from the widest gap on.
+
+use super::Scene;
+use super::order::about_their_circle;
+use super::thinned::Thinned;
+use crate::base::real::Real;
+use crate::geometry::pixel::Pixel;
+use crate::image::Pixels;
+use crate::model::observer::Observer;
+use crate::model::work::{self, Work};
+
+/// Least gradient of an edge over the root mean square of all: its square.
+const LEAST: u64 = 4;
+
+/// The edge pixels of the picture, in order about their circle. Beside the end of the region, or a mask, there is no
+/// edge.
+pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    buffer: &'a mut [Pixel],
+    work: &mut Work,
+) -> Thinned<'a> {
+    let mut edge = Thinned::new(buffer);
+    let (mut sum, mut count) = (0u64, 0u64);
+    let look = work::gradient(scene.mask_cost());
+    each_pixel(scene, look, work, |x, y, _| {
+        if let Some((gx, gy)) = gradient(scene, x, y) {
+            sum = sum.saturating_add(square(gx, gy));
+            count += 1;
+        }
+    });
+    // A picture without any gradient has none above the mean.
+    let least = LEAST * (sum / count.max(1));
+    each_pixel(scene, look, work, |x, y, work| {
+        if let Some((gx, gy)) = gradient(scene, x, y)
+            && square(gx, gy) > least
+            && work.spend(2 * look)
+            && is_largest(scene, x, y, gx, gy)
+        {
+            edge.push(Pixel { x, y });
+        }
+    });
+    if work.spend(edge.pixels().len() as u32 * work::ORDER) {
+        about_their_circle::<T>(edge.pixels_mut());
+    }
+    edge
+}
+
+fn square(gx: i32, gy: i32) -> u64 {
+    let (gx, gy) = (u64::from(gx.unsigned_abs()), u64::from(gy.unsigned_abs()));
+    gx * gx + gy * gy
+}
+
+fn each_pixel<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    cost: u32,
+    work: &mut Work,
+    mut visit: impl FnMut(u16, u16, &mut Work),
+) {
+    for y in 0..scene.region.height() {
+        let Some((x0, x1)) = scene.region.span(y) else { continue };
+        if !work.spend((u32::from(x1 - x0) + 1).saturating_mul(cost)) {
+            break;
+        }
+        for x in x0..=x1 {
+            visit(x, y, work);
+        }
+    }
+}
+
+/// Eight times the brightness change a pixel, to the right and down; `None` beside the end of the region or a mask.
+fn gradient<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: u16, y: u16) -> Option<(i32, i32)> {
+    if !scene.region.is_inside_by(x, y, 1) {
+        return None;
+    }
+    let mut near = [[0i32; 3]; 3];
+    for (row, v) in near.iter_mut().zip(y - 1..) {
+        for (value, u) in row.iter_mut().zip(x - 1..) {
+            if scene.region.masked(u, v) {
+                return None;
+            }
+            scene.observer.pixel(u, v);
+            *value = i32::from(scene.picture.at(u, v));
+        }
+    }
+    let [[nw, n, ne], [w, _, e], [sw, s, se]] = near;
+    Some(((ne + 2 * e + se) - (nw + 2 * w + sw), (sw + 2 * s + se) - (nw + 2 * n + ne)))
+}
+
+/// Whether the gradient is no smaller than those beside it along the axis on which it is larger; of two alike the first.
+fn is_largest<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    x: u16,
+    y: u16,
+    gx: i32,
+    gy: i32,
+) -> bool {
+    let across = gx.abs() >= gy.abs();
+    let along = |(gx, gy): (i32, i32)| if across { gx.abs() } else { gy.abs() };
+    let here = along((gx, gy));
+    let (before, after) = if across { ((x - 1, y), (x + 1, y)) } else { ((x, y - 1), (x, y + 1)) };
+    let beside = |(x, y): (u16, u16)| gradient(scene, x, y).map(along);
+    beside(before).is_none_or(|g| g < here) && beside(after).is_none_or(|g| g <= here)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::region::Region;
+    use crate::image::{Grey, Layout};
+    use crate::model::observer::Unobserved;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn found(data: &[u8], w: u16, h: u16) -> Vec<(u16, u16)> {
+        let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
+        let region = Region::<f64>::whole(w, h);
+        // No level: every pixel is lit.
+        let scene = Scene::new(&picture, &region, 1, &Unobserved);
+        let mut buffer = vec![Pixel::default(); 4096];
+        edges(&scene, &mut buffer, &mut Work::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
+    }
+
+    #[test]
+    fn an_edge_is_one_pixel_wide_and_needs_no_level() {
+        // A blurred step between 60 and 180, row 12 in its middle.
+        let row = |y: i32| [60, 75, 100, 140, 165, 180][(y - 10).clamp(0, 5) as usize];
+        let data: Vec<u8> = (0..30 * 30).map(|i| row(i / 30)).collect();
+        let edge = found(&data, 30, 30);
+        assert_eq!(edge.len(), 28, "{edge:?}");
+        assert!(edge.iter().all(|p| p.1 == 12 || p.1 == 13) && edge.windows(2).all(|p| p[0].1 == p[1].1), "{edge:?}");
+    }
+
+    #[test]
+    fn flat_pictures_have_no_edge() {
+        assert!(found(&[90; 400], 20, 20).is_empty());
+        assert!(found(&[90; 4], 2, 2).is_empty() && found(&[90], 1, 1).is_empty());
+    }
+}

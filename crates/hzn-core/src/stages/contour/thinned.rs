@@ -1,0 +1,127 @@
+//! A list of border pixels that never overflows: when it is full, every second one is dropped and the stride
+//! doubles, so that the whole edge stays covered.
+
+use crate::geometry::pixel::Pixel;
+
+/// Border pixels of one edge, every `stride`-th of them.
+#[derive(Debug)]
+pub(crate) struct Thinned<'a> {
+    buffer: &'a mut [Pixel],
+    len: usize,
+    stride: u32,
+    /// Pixels to come before the next one is stored.
+    wait: u32,
+    total: u32,
+}
+
+impl<'a> Thinned<'a> {
+    pub(crate) fn new(buffer: &'a mut [Pixel]) -> Self {
+        Self { buffer, len: 0, stride: 1, wait: 0, total: 0 }
+    }
+
+    pub(crate) fn push(&mut self, p: Pixel) {
+        self.total += 1;
+        if self.wait > 0 {
+            self.wait -= 1;
+            return;
+        }
+        if self.len == self.buffer.len() {
+            self.halve();
+            if self.wait > 0 {
+                self.wait -= 1;
+                return;
+            }
+        }
+        if let Some(slot) = self.buffer.get_mut(self.len) {
+            *slot = p;
+            self.len += 1;
+        }
+        self.wait = self.stride - 1;
+    }
+
+    /// Pushes several.
+    #[inline]
+    pub(crate) fn extend(&mut self, passed: &[Pixel]) {
+        if self.stride == 1
+            && let Some(room) = self.buffer.get_mut(self.len..self.len + passed.len())
+        {
+            room.copy_from_slice(passed);
+            self.len += passed.len();
+            self.total += passed.len() as u32;
+        } else {
+            for &p in passed {
+                self.push(p);
+            }
+        }
+    }
+
+    #[cold]
+    fn halve(&mut self) {
+        let kept = self.len.div_ceil(2);
+        for i in 0..kept {
+            if let Some(&p) = self.buffer.get(2 * i)
+                && let Some(slot) = self.buffer.get_mut(i)
+            {
+                *slot = p;
+            }
+        }
+        // The next stored pixel is 2·stride after the last kept one; an odd one out has been dropped if len is even.
+        self.wait = if self.len.is_multiple_of(2) { 0 } else { self.stride };
+        self.len = kept;
+        self.stride *= 2;
+    }
+
+    /// Forgets everything.
+    #[cfg(feature = "horace")]
+    pub(crate) fn clear(&mut self) {
+        (self.len, self.stride, self.wait, self.total) = (0, 1, 0, 0);
+    }
+
+    /// The stored pixels, to be brought into another order.
+    #[cfg(any(feature = "horace", feature = "zju"))]
+    pub(crate) fn pixels_mut(&mut self) -> &mut [Pixel] {
+        self.buffer.get_mut(..self.len).unwrap_or_default()
+    }
+
+    /// The stored pixels in order.
+    pub(crate) fn pixels(&self) -> &[Pixel] {
+        self.buffer.get(..self.len).unwrap_or_default()
+    }
+    /// Every how many pixels one is stored.
+    pub(crate) fn stride(&self) -> u32 {
+        self.stride
+    }
+    /// Pixels pushed.
+    pub(crate) fn total(&self) -> u32 {
+        self.total
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn keeps_every_nth_over_the_whole_length() {
+        for n in 0..200u16 {
+            let mut buffer = [Pixel::default(); 8];
+            let mut t = Thinned::new(&mut buffer);
+            for x in 0..n {
+                t.push(Pixel { x, y: 0 });
+            }
+            let stride = t.stride() as u16;
+            let want: Vec<u16> = (0..n).step_by(usize::from(stride)).collect();
+            let got: Vec<u16> = t.pixels().iter().map(|p| p.x).collect();
+            assert_eq!(got, want, "n {n}");
+            assert_eq!(t.total(), u32::from(n));
+
+            let mut buffer = [Pixel::default(); 8];
+            let mut t = Thinned::new(&mut buffer);
+            let all: Vec<Pixel> = (0..n).map(|x| Pixel { x, y: 0 }).collect();
+            all.chunks(3).for_each(|three| t.extend(three));
+            let got: Vec<u16> = t.pixels().iter().map(|p| p.x).collect();
+            assert_eq!((got, t.total()), (want, u32::from(n)), "by threes, n {n}");
+        }
+    }
+}

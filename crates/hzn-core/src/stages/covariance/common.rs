@@ -1,0 +1,141 @@
+//! Errors that all points of an edge share, so that no residual shows them.
+//!
+//! Each is a signal x along the edge, in radians: the fit turns a signal of unit size into the error v = R Σ w h x of
+//! (δ₁₂, δc), R the response of the fit, and the covariance grows by σ² v vᵀ.
+//!
+//! | term | signal |
+//! |---|---|
+//! | common shift | g: every point one pixel across the limb |
+//! | common tilt | g τ, τ from −1 to 1 along the edge |
+//! | unknown azimuth | cos kφ and sin kφ of the azimuth φ about the axis, k = 1, 2 |
+//! | lens | g·∂u/∂p, the pixel's move for an intrinsic parameter p |
+//!
+//! Of the azimuth: the limb of an ellipsoid differs from its mean cone by a second harmonic, one whose height varies with
+//! latitude also by a first. Unless an attitude tells where north is, the phase is anything: with the amplitude a the
+//! residuals hold a cos(kφ + ψ), ψ evenly distributed, so that each of the two signals counts with a²/2. Around the whole
+//! limb the second harmonic leaves nothing behind, on a short arc nearly all of it is taken for a tilt or another
+//! half-angle: which, the visible arc tells.
+//!
+//! The signals vary slowly along the limb: a part of the points is fitted in their place, with its own normal equations, so
+//! that a signal which the cone can follow comes out whole.
+
+use super::noise::Levels;
+use super::{Term, response};
+use crate::base::linalg::{M3, V3, basis};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::{Camera, INTRINSICS};
+use crate::model::body::Expected;
+use crate::stages::fit::Fit;
+
+/// Points that the signals are summed over, at most, evenly along the edge.
+const PART: usize = 64;
+
+/// The standard deviation of a place along the edge, for places from −1 to 1: 1/√3.
+const SPREAD: f64 = 0.577_350_269_189_625_8;
+
+/// Hands each term with its covariance of (δ₁₂, δc) to `add`.
+pub(super) fn each<T: Real>(
+    blocks: &[Block<T>],
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+    noise: &Levels<T>,
+    camera: &Camera<T>,
+    mut add: impl FnMut(Term, &M3<T>),
+) -> Option<()> {
+    let sums = Sums::new(blocks, fit, camera);
+    let response = response(&fit.sums.of_part(sums.normal), fit.mean, fit.free)?;
+    let error = |sum: &V3<T>| response * sum;
+    let outer = |v: &V3<T>, variance: T| v * v.transpose() * variance;
+    add(Term::CommonShift, &outer(&error(&sums.shift), noise.shift_px * noise.shift_px));
+    add(Term::CommonTilt, &outer(&error(&sums.tilt()), noise.tilt_px * noise.tilt_px));
+    let mut uneven = M3::zeros();
+    for (amplitude, pair) in expected.uneven_cos.iter().zip(&sums.harmonics) {
+        for sum in pair {
+            uneven += outer(&error(sum), *amplitude * *amplitude * T::from_f64(0.5));
+        }
+    }
+    add(Term::UnknownAzimuth, &uneven);
+    if let Some(modes) = camera.uncertain() {
+        let mut lens = M3::zeros();
+        for mode in modes {
+            let sum = mode.iter().zip(&sums.lens).fold(V3::zeros(), |sum, (m, by)| sum + by * *m);
+            lens += outer(&error(&sum), T::one());
+        }
+        add(Term::Lens, &lens);
+    }
+    Some(())
+}
+
+/// Σ w h x over a part of the points, for each signal x.
+struct Sums<T> {
+    /// Upper triangle of Σ w h hᵀ.
+    normal: [T; 6],
+    shift: V3<T>,
+    /// Σ w h g i, with i the number of the point, and what makes τ of i: Σ, Σ i and Σ i² of the robust weights.
+    by_number: V3<T>,
+    numbers: [T; 3],
+    /// By harmonic, cosine and sine.
+    harmonics: [[V3<T>; 2]; 2],
+    /// By intrinsic parameter.
+    lens: [V3<T>; INTRINSICS],
+}
+
+impl<T: Real> Sums<T> {
+    fn new(blocks: &[Block<T>], fit: &Fit<T>, camera: &Camera<T>) -> Self {
+        let (b1, b2) = basis(&fit.e);
+        let [m1, m2] = fit.mean;
+        let zero = V3::zeros();
+        let mut sums = Self {
+            normal: [T::ZERO; 6],
+            shift: zero,
+            by_number: zero,
+            numbers: [T::ZERO; 3],
+            harmonics: [[zero; 2]; 2],
+            lens: [zero; INTRINSICS],
+        };
+        let is_uncertain = camera.uncertain().is_some();
+        let points = blocks.iter().flat_map(|block| (0..LANES).map(move |l| (block, l))).enumerate();
+        let carrying = points.filter(|(_, (block, l))| block.weight[l & 7] > T::ZERO);
+        // From the middle of each stretch.
+        let every = (fit.inliers as usize).div_ceil(PART).max(1);
+        for (place, (block, l)) in carrying.skip(every / 2).step_by(every) {
+            let s = block.ray(l);
+            let [gu, gv] = block.gradient_at(l, &fit.e);
+            let g2 = (gu * gu + gv * gv).max(T::from_f64(1e-20));
+            let w = block.weight[l & 7] / g2;
+            let (x, y) = (s.dot(&b1), s.dot(&b2));
+            let (h1, h2) = (x - m1, y - m2);
+            let h = V3::new(h1, h2, -T::one()) * w;
+            let terms = [h.x * h1, h.x * h2, -h.x, h.y * h2, -h.y, w];
+            sums.normal.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            let shift = h * g2.sqrt();
+            sums.shift += shift;
+            let i = T::from_i32(place as i32);
+            sums.by_number += shift * i;
+            sums.numbers[0] += block.weight[l & 7];
+            sums.numbers[1] += block.weight[l & 7] * i;
+            sums.numbers[2] += block.weight[l & 7] * i * i;
+            let per = T::one() / (x * x + y * y).max(T::from_f64(1e-20)).sqrt();
+            let (c, s_) = (x * per, y * per);
+            sums.harmonics[0][0] += h * c;
+            sums.harmonics[0][1] += h * s_;
+            sums.harmonics[1][0] += h * (c * c - s_ * s_);
+            sums.harmonics[1][1] += h * ((c + c) * s_);
+            if is_uncertain {
+                for (sum, [du, dv]) in sums.lens.iter_mut().zip(camera.moves(&s)) {
+                    *sum += h * (gu * du + gv * dv);
+                }
+            }
+        }
+        sums
+    }
+
+    /// Of the tilt: τ = (i − ī)/(√3 σ_i), which goes from −1 to 1 over points that are evenly spread.
+    fn tilt(&self) -> V3<T> {
+        let [n, sum, squares] = self.numbers;
+        let mean = sum / n.max(T::one());
+        let spread = (squares / n.max(T::one()) - mean * mean).max(T::one()).sqrt();
+        (self.by_number - self.shift * mean) * (T::from_f64(SPREAD) / spread)
+    }
+}

@@ -1,0 +1,183 @@
+//! The best accuracy there is: a blurred step fitted to 7×7 pixels.
+//!
+//! The picture of a straight edge through optics of a round blur is dim + (bright − dim) Φ((x·n − ρ)/σ), Φ the normal
+//! distribution. Gauss-Newton fits its offset ρ and the angle of its normal n to the 49 pixels and reaches the
+//! Cramér-Rao bound of the patch; the levels are means over the plateaus on both sides, and the width σ is fitted
+//! along: its derivative is odd about the edge and that of the offset even, so that it costs no accuracy.
+
+use super::patch::{HALF, Patch, brightness};
+use crate::base::linalg::{V3, invert_spd3};
+use crate::base::real::Real;
+use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::image::Pixels;
+use crate::model::observer::Observer;
+use crate::stages::contour::Scene;
+
+/// Gauss-Newton steps in one patch.
+const STEPS: usize = 6;
+/// Fits, each in a patch about the edge of the one before.
+const WINDOWS: usize = 6;
+/// Where a plateau begins, from the edge: in widths of it, and in pixels at least and at most.
+const BEGINS: (f64, f64, f64) = (2.7, 2.0, 9.0);
+/// Extent of a plateau across the edge and to each side along it, in pixels.
+const DEEP: i32 = 5;
+const ALONG: i32 = 4;
+
+/// A blurred step in a patch.
+#[derive(Clone, Copy)]
+pub(super) struct Edge<T> {
+    /// From the patch's centre along the normal, pixels.
+    pub(super) offset: T,
+    /// Unit normal towards the light.
+    pub(super) n: [T; 2],
+    /// Width: the blur's standard deviation in pixels.
+    pub(super) sigma: T,
+}
+
+impl<T: Real> Edge<T> {
+    /// The point of the edge nearest to the centre (x, y) of the patch.
+    pub(super) fn point(&self, x: i32, y: i32) -> ImagePoint<T> {
+        ImagePoint { u: T::from_i32(x) + self.offset * self.n[0], v: T::from_i32(y) + self.offset * self.n[1] }
+    }
+}
+
+/// Brightness of the dark side and of the lit one.
+pub(super) struct Levels<T> {
+    pub(super) dim: T,
+    pub(super) bright: T,
+}
+
+/// The edge next to a border pixel and the direction (du, dv) of its gradient; `None` without a clear edge within
+/// reach.
+pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+) -> Option<(ImagePoint<T>, [T; 2])> {
+    let (mut x, mut y) = (i32::from(p.x), i32::from(p.y));
+    let mut edge = start(scene, x, y)?;
+    for last in (0..WINDOWS).rev() {
+        let patch = Patch::read(scene, x, y)?;
+        let levels = levels(scene, x, y, &edge)?;
+        let before = edge;
+        edge = fit(&patch, edge, &levels)?;
+        let (dx, dy) = towards(edge.offset, edge.n);
+        // The levels are those about this edge and the patch holds all of it; or noise moves it to and fro.
+        let moved = (edge.offset - before.offset).abs() + (edge.sigma - before.sigma).abs() * T::from_f64(0.2);
+        let settled = dx == 0 && dy == 0 && moved < T::from_f64(0.05);
+        if settled || (last == 0 && edge.offset.abs() < T::from_f64(1.5)) {
+            return Some((edge.point(x, y), edge.n));
+        }
+        (x, y) = (x + dx, y + dy);
+        edge.offset -= T::from_i32(dx) * edge.n[0] + T::from_i32(dy) * edge.n[1];
+    }
+    None
+}
+
+/// An edge of a pixel's width through (x, y), normal to the gradient.
+pub(super) fn start<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> Option<Edge<T>> {
+    Some(Edge { offset: T::ZERO, n: direction(&Patch::read(scene, x, y)?)?, sigma: T::one() })
+}
+
+/// Direction towards the light: the first moments over the disc of the patch.
+fn direction<T: Real>(patch: &Patch<T>) -> Option<[T; 2]> {
+    let (mut gx, mut gy) = (T::ZERO, T::ZERO);
+    each(patch, |x, y, value| {
+        if x * x + y * y < T::from_f64(10.5) {
+            gx += x * value;
+            gy += y * value;
+        }
+    });
+    let norm = (gx * gx + gy * gy).sqrt();
+    (norm > T::ZERO).then(|| [gx / norm, gy / norm])
+}
+
+/// Means over the plateaus on both sides of an edge.
+fn levels<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    x: i32,
+    y: i32,
+    edge: &Edge<T>,
+) -> Option<Levels<T>> {
+    let (widths, least, most) = BEGINS;
+    let begins = (edge.sigma * T::from_f64(widths)).max(T::from_f64(least)).min(T::from_f64(most));
+    let half = T::from_f64(0.5);
+    let mean = |sign: T| -> Option<T> {
+        let (mut sum, mut count) = (0, 0);
+        for k in 0..DEEP {
+            let across = edge.offset + sign * (begins + T::from_i32(k));
+            for j in -ALONG..=ALONG {
+                let along = T::from_i32(j);
+                let dx = (across * edge.n[0] - along * edge.n[1] + half).floor().to_i32();
+                let dy = (across * edge.n[1] + along * edge.n[0] + half).floor().to_i32();
+                if let Some(value) = brightness(scene, x + dx, y + dy) {
+                    sum += value;
+                    count += 1;
+                }
+            }
+        }
+        (count > ALONG).then(|| T::from_i32(sum) / T::from_i32(count))
+    };
+    let (bright, dim) = (mean(T::one())?, mean(-T::one())?);
+    let least = (i32::from(scene.picture.full_scale()) / 64).max(2);
+    (bright - dim >= T::from_i32(least)).then_some(Levels { dim, bright })
+}
+
+/// The best edge from `start` on; `None` when it leaves the patch.
+pub(super) fn fit<T: Real>(patch: &Patch<T>, start: Edge<T>, levels: &Levels<T>) -> Option<Edge<T>> {
+    let contrast = levels.bright - levels.dim;
+    let Edge { mut offset, mut n, mut sigma } = start;
+    for _ in 0..STEPS {
+        // Unknowns: offset, angle, ln σ.
+        let (mut m, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
+        each(patch, |x, y, value| {
+            let (d, along) = (x * n[0] + y * n[1], y * n[0] - x * n[1]);
+            let z = (d - offset) / sigma;
+            let density = (z * z * T::from_f64(-0.5)).exp() * T::from_f64(0.398_942_280_401_432_7);
+            let share = (T::one() + (z * T::from_f64(core::f64::consts::FRAC_1_SQRT_2)).erf()) * T::from_f64(0.5);
+            let r = (value - levels.dim) / contrast - share;
+            let row = [-density / sigma, density / sigma * along, -density * z];
+            let mut at = 0;
+            for i in 0..3 {
+                for j in i..3 {
+                    m[at] += row[i] * row[j];
+                    at += 1;
+                }
+                g[i] += row[i] * r;
+            }
+        });
+        // Some friction for the width, which noise can blow up where the patch shows little of the edge.
+        m[5] += T::from_f64(0.02);
+        let step = invert_spd3(&m)? * V3::new(g[0], g[1], g[2]);
+        let turn = step.y.max(T::from_f64(-0.5)).min(T::from_f64(0.5));
+        let (s, c) = turn.sin_cos();
+        n = [c * n[0] - s * n[1], c * n[1] + s * n[0]];
+        offset += step.x;
+        sigma = (sigma * step.z.max(T::from_f64(-0.5)).min(T::from_f64(0.5)).exp())
+            .max(T::from_f64(0.3))
+            .min(T::from_f64(4.0));
+        if !(offset.abs() < T::from_f64(4.0)) {
+            return None;
+        }
+        if step.x.abs() + turn.abs() < T::from_f64(1e-4) {
+            break;
+        }
+    }
+    Some(Edge { offset, n, sigma })
+}
+
+/// Whole pixels from the centre of a patch to the edge at `offset` along the unit normal, along the axis of the larger
+/// component: so the edge comes closer than half a pixel.
+fn towards<T: Real>(offset: T, [x, y]: [T; 2]) -> (i32, i32) {
+    let whole = |v: T| (v + T::from_f64(0.5)).floor().to_i32();
+    if x.abs() >= y.abs() { (whole(offset / x), 0) } else { (0, whole(offset / y)) }
+}
+
+/// Calls `visit` with each pixel's place from the centre and its brightness.
+#[inline(always)]
+fn each<T: Real>(patch: &Patch<T>, mut visit: impl FnMut(T, T, T)) {
+    for (row, dy) in patch.rows.iter().zip(-HALF..) {
+        for (value, dx) in row.iter().zip(-HALF..) {
+            visit(T::from_i32(dx), T::from_i32(dy), *value);
+        }
+    }
+}

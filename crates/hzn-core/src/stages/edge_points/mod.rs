@@ -1,0 +1,732 @@
+//! Sub-pixel points of a candidate edge.
+//!
+//! A border pixel is lit and has a dark neighbour; the edge itself runs somewhere between. The local limb is where
+//! the brightness is half-way between the plateaus on both sides: a level of the whole picture would move it with
+//! the illumination, which is an error of the limb height. Across the edge (along the axis of the larger gradient)
+//! three rows are smoothed with 1-2-1 and read outwards on both sides only until they level off, at most ten steps. A
+//! step is a pixel for a sharp edge, and more for one that is spread over many, such as air seen from a rocket or haze
+//! through a long lens: read in pixels, its plateaus would end within it, and the limb move with the illumination.
+
+#[cfg(feature = "erf")]
+mod erf;
+#[cfg(test)]
+mod golden;
+#[cfg(any(feature = "erf", feature = "zju"))]
+mod patch;
+#[cfg(feature = "zju")]
+mod zernike;
+
+use crate::base::error::{ConfigError, Limit, require};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES, Lit};
+use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::image::{Passed, Pixels};
+use crate::model::observer::Observer;
+use crate::stages::contour::Scene;
+
+/// How a border pixel becomes an edge point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum SubPixel {
+    /// Crossing of the mid-level between the plateaus on both sides, in three rows smoothed along the edge; of the Sun, which
+    /// blooms into a glare that is no plateau, crossing of the picture's level.
+    #[default]
+    Linear,
+    /// The border pixel's centre, moved half a pixel to the dark side.
+    None,
+    /// A blurred step fitted to 7×7 pixels, between the means of the plateaus: the best accuracy, at some hundred times
+    /// the cost.
+    #[cfg(feature = "erf")]
+    Erf,
+    /// Zernike moments of 7×7 pixels (Wang et al. 2022): a step across a disc.
+    #[cfg(feature = "zju")]
+    Zernike,
+}
+
+/// `[candidates]` of sensor.toml.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Config {
+    /// Edges with fewer border pixels are left out, 8 or more; half of what a small body has around it is enough of it, and
+    /// half of the shorter side of a picture of fewer than 80 rows.
+    pub min_points: u16,
+    /// Points kept of each candidate, evenly along the edge, 16 or more; 0 keeps all that fit.
+    pub keep_points: u16,
+    /// How a border pixel becomes an edge point.
+    pub sub_pixel: SubPixel,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { min_points: 40, keep_points: 600, sub_pixel: SubPixel::Linear }
+    }
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let (min, keep) = (f64::from(self.min_points), f64::from(self.keep_points));
+        require(self.min_points >= 8, "candidates.min_points", min, Limit::AtLeast(8.0))?;
+        require(
+            self.keep_points == 0 || self.keep_points >= 16,
+            "candidates.keep_points",
+            keep,
+            Limit::Rule("must be 16 or more, or 0 to keep all"),
+        )
+    }
+}
+
+/// How far a plateau is looked for, in steps.
+const REACH: i32 = 10;
+/// Widest step of a profile in pixels.
+const WIDEST: i32 = 6;
+/// Steps from a border pixel within which everything is read.
+const MARGIN: i32 = REACH + 3;
+/// Where an edge that is no wider than four pixels has faded to half of the level, pixels.
+const FADED: i32 = 3;
+/// A plateau is clipped when it is within this part of full scale below it, which is room for what JPEG makes of one. A bright one
+/// with noise seldom comes so near.
+const CLIPPED_PART: i32 = 128;
+/// Farther than an edge point can stand from its border pixel, pixels.
+const FARTHEST: i32 = 1024;
+/// Stands for a brightness that cannot be read.
+const UNSEEN: i32 = i32::MIN;
+
+/// What came of a candidate's border.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Points {
+    /// Points made.
+    pub(crate) count: u32,
+    /// Of them, points at the global level, because the local one was not found.
+    pub(crate) fallback: u32,
+    /// Of them, points whose lit side is clipped at full scale.
+    pub(crate) clipped: u32,
+    /// Border pixels that took longer: beside a mask or the picture's border, or on a wide edge.
+    pub(crate) slow: u32,
+    /// Of a picture that came row by row: points whose plateaus were not within the rows held.
+    pub(crate) cut: u32,
+}
+
+/// Fills `blocks` with the points of a border, evenly thinned to `keep_points`. Lanes that stay empty have weight 0.
+/// Ends after `most_slow` points that are slow.
+pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    config: &Config,
+    border: &[Pixel],
+    candidate: u32,
+    blocks: &mut [Block<T>],
+    most_slow: u32,
+) -> Points {
+    let room = blocks.len() * LANES;
+    let keep = match usize::from(config.keep_points) {
+        0 => room,
+        n => n.min(room),
+    };
+    let every = border.len().div_ceil(keep.max(1)).max(1);
+    let mut made = Points::default();
+    let mut place = 0;
+    for &pixel in border.iter().skip(every / 2).step_by(every) {
+        if made.slow >= most_slow {
+            break;
+        }
+        let found = if P::PASSED {
+            let found = scene.picture.passed(pixel.x, pixel.y);
+            made.cut += u32::from(found.is_some_and(|f| f.cut));
+            found.map(|f| {
+                let point = point_off(pixel, f.lit.towards_dark(), T::from_f64(f.towards_dark_px.into()));
+                Found { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped }
+            })
+        } else {
+            locate(scene, config, pixel, &mut made.slow)
+        };
+        let Some(found) = found else { continue };
+        let Some(block) = blocks.get_mut(place / LANES) else { break };
+        if place % LANES == 0 {
+            *block = Block::default();
+        }
+        block.set_point(place % LANES, found.point, found.lit);
+        scene.observer.point(candidate, found.point);
+        place += 1;
+        made.count += 1;
+        made.fallback += u32::from(found.fallback);
+        made.clipped += u32::from(found.clipped);
+    }
+    made
+}
+
+/// An edge point.
+struct Found<T> {
+    point: ImagePoint<T>,
+    /// The side of the light.
+    lit: Lit,
+    /// It stands at the global level, because the local one was not found.
+    fallback: bool,
+    /// The lit side is clipped at full scale, so that its half is not half of the light.
+    clipped: bool,
+}
+
+impl<T> Found<T> {
+    /// Of a method that has no level of its own.
+    fn plain(point: ImagePoint<T>, lit: Lit) -> Self {
+        Self { point, lit, fallback: false, clipped: false }
+    }
+}
+
+/// The edge point at a border pixel.
+#[inline(always)]
+fn locate<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    config: &Config,
+    p: Pixel,
+    slow: &mut u32,
+) -> Option<Found<T>> {
+    match config.sub_pixel {
+        SubPixel::Linear => {
+            if is_clear(scene, p, MARGIN as u16) {
+                linear::<T, P, O, true>(scene, p, slow)
+            } else {
+                linear::<T, P, O, false>(scene, p, slow)
+            }
+        }
+        SubPixel::None => half_pixel(scene, p),
+        #[cfg(feature = "erf")]
+        SubPixel::Erf => erf::locate(scene, p).and_then(towards_light),
+        #[cfg(feature = "zju")]
+        SubPixel::Zernike => zernike::locate(scene, p).and_then(towards_light),
+    }
+}
+
+/// The edge point at a border pixel, to be kept when the picture is not: of the methods that locate it along an axis.
+#[inline(never)]
+pub(crate) fn pass<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    config: &Config,
+    p: Pixel,
+) -> Option<Passed> {
+    let Found { point, lit, fallback, clipped } = locate(scene, config, p, &mut 0)?;
+    // The difference is exact, and so is the sum that makes the point again.
+    let (dx, dy) = lit.towards_dark();
+    let off =
+        (point.u - T::from_i32(p.x.into())) * T::from_i32(dx) + (point.v - T::from_i32(p.y.into())) * T::from_i32(dy);
+    Some(Passed { towards_dark_px: off.to_f64() as f32, lit, fallback, clipped, cut: false })
+}
+
+/// Reads around one border pixel; `None` beyond the region and under the mask. `FREE`: no read within reach needs a
+/// check.
+struct Around<'a, 'b, T, P, O, const FREE: bool> {
+    scene: &'a Scene<'b, T, P, O>,
+    x: i32,
+    y: i32,
+    index: usize,
+    across: isize,
+    down: isize,
+}
+
+impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b, T, P, O, FREE> {
+    fn new(scene: &'a Scene<'b, T, P, O>, p: Pixel) -> Self {
+        Self {
+            scene,
+            x: i32::from(p.x),
+            y: i32::from(p.y),
+            index: scene.picture.index(p.x, p.y),
+            across: scene.picture.across() as isize,
+            down: scene.picture.down() as isize,
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, dx: i32, dy: i32) -> Option<i32> {
+        self.read(dx, dy, dx as isize * self.across + dy as isize * self.down)
+    }
+
+    /// The pixel (dx, dy) further, which stands `offset` further in memory.
+    #[inline(always)]
+    fn read(&self, dx: i32, dy: i32, offset: isize) -> Option<i32> {
+        read::<T, P, O, FREE>(self.scene, (self.x + dx, self.y + dy), self.index.wrapping_add_signed(offset))
+    }
+
+    /// Three pixels side by side, `dy` rows down.
+    #[inline(always)]
+    fn row(&self, dy: i32) -> Option<[i32; 3]> {
+        if !FREE {
+            return Some([self.at(-1, dy)?, self.at(0, dy)?, self.at(1, dy)?]);
+        }
+        let (x, y) = (self.x as u16, (self.y + dy) as u16);
+        for dx in [u16::MAX, 0, 1] {
+            self.scene.observer.pixel(x.wrapping_add(dx), y);
+        }
+        let first = self.index.wrapping_add_signed(dy as isize * self.down - self.across);
+        Some(self.scene.picture.three(first).map(i32::from))
+    }
+
+    /// The 3×3 neighbourhood.
+    #[inline(always)]
+    fn near(&self) -> Option<Near> {
+        let [nw, n, ne] = self.row(-1)?;
+        let [w, c, e] = self.row(0)?;
+        let [sw, s, se] = self.row(1)?;
+        let columns = [nw + 2 * w + sw, n + 2 * c + s, ne + 2 * e + se];
+        let rows = [nw + 2 * n + ne, w + 2 * c + e, sw + 2 * s + se];
+        Some(Near { columns, rows })
+    }
+}
+
+/// The line across the edge through a border pixel.
+struct Line<'a, 'b, 'c, T, P, O, const FREE: bool> {
+    around: &'a Around<'b, 'c, T, P, O, FREE>,
+    /// A step towards the dark in pixels, and in memory; a pixel to the side of it in memory.
+    step: (i32, i32),
+    ahead: isize,
+    aside: isize,
+}
+
+impl<'a, 'b, 'c, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'a, 'b, 'c, T, P, O, FREE> {
+    #[inline(always)]
+    fn new(around: &'a Around<'b, 'c, T, P, O, FREE>, (dx, dy): (i32, i32), step: i32) -> Self {
+        let (x, y) = (dx as isize, dy as isize);
+        Self {
+            around,
+            step: (dx * step, dy * step),
+            ahead: (x * around.across + y * around.down) * step as isize,
+            aside: y * around.across + x * around.down,
+        }
+    }
+    #[inline(always)]
+    fn at(&self, k: i32, side: i32) -> Option<i32> {
+        let (dx, dy) = self.step;
+        // To the side is across the step, one pixel.
+        let (sx, sy) = (dy.signum() * side, dx.signum() * side);
+        self.around.read(k * dx + sx, k * dy + sy, k as isize * self.ahead + side as isize * self.aside)
+    }
+    /// Four times the brightness `k` steps towards the dark, smoothed with 1-2-1 along the edge.
+    #[inline(always)]
+    fn three(&self, k: i32) -> Option<i32> {
+        Some(self.at(k, -1)? + 2 * self.at(k, 0)? + self.at(k, 1)?)
+    }
+}
+
+/// Reads in a straight line.
+struct Walk<'a, 'b, T, P, O, const FREE: bool> {
+    scene: &'a Scene<'b, T, P, O>,
+    /// Column and row of the next pixel, and the step to the one after it.
+    at: (i32, i32),
+    step: (i32, i32),
+    index: usize,
+    ahead: isize,
+}
+
+impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O, FREE> {
+    /// Four times the brightness of the next pixel; [`UNSEEN`] where nothing can be read.
+    #[inline(always)]
+    fn next(&mut self) -> i32 {
+        let seen = read::<T, P, O, FREE>(self.scene, self.at, self.index);
+        self.at = (self.at.0 + self.step.0, self.at.1 + self.step.1);
+        self.index = self.index.wrapping_add_signed(self.ahead);
+        seen.map_or(UNSEEN, |v| 4 * v)
+    }
+}
+
+/// The pixel at column `x`, row `y`, which stands at `index`; `None` beyond the region and under the mask. `FREE`: it is
+/// known to be within and unmasked.
+#[inline(always)]
+fn read<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+    scene: &Scene<'_, T, P, O>,
+    (x, y): (i32, i32),
+    index: usize,
+) -> Option<i32> {
+    if !FREE && !scene.region.counts(x, y) {
+        return None;
+    }
+    scene.observer.pixel(x as u16, y as u16);
+    Some(i32::from(scene.picture.read(index)))
+}
+
+/// Sums over columns (left to right) and rows (downwards) of a 3×3 neighbourhood, smoothed with 1-2-1.
+struct Near {
+    columns: [i32; 3],
+    rows: [i32; 3],
+}
+
+impl Near {
+    /// Eight times the brightness change a pixel, to the right and down.
+    #[inline(always)]
+    fn gradient(&self) -> (i32, i32) {
+        (self.columns[2] - self.columns[0], self.rows[2] - self.rows[0])
+    }
+    /// One step to the lit side, here, and one step to the dark side.
+    #[inline(always)]
+    fn across(&self, lit: Lit) -> [i32; 3] {
+        let ([w, x, e], [n, y, s]) = (self.columns, self.rows);
+        match lit {
+            Lit::Right => [e, x, w],
+            Lit::Left => [w, x, e],
+            Lit::Below => [s, y, n],
+            Lit::Above => [n, y, s],
+        }
+    }
+}
+
+/// The side of the light by the larger component, and the step (dx, dy) towards the dark.
+fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
+    if gx == 0 && gy == 0 {
+        return None;
+    }
+    let lit = if gx.abs() >= gy.abs() {
+        if gx > 0 { Lit::Right } else { Lit::Left }
+    } else if gy > 0 {
+        Lit::Below
+    } else {
+        Lit::Above
+    };
+    let (dx, dy) = lit.towards_dark();
+    Some((lit, dx, dy))
+}
+
+/// A point of the methods that know the gradient's direction.
+#[cfg(any(feature = "erf", feature = "zju"))]
+fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<Found<T>> {
+    // Whole numbers are what `orientation` compares; the direction is a unit vector.
+    let scale = T::from_f64(1024.0);
+    let (lit, _, _) = orientation(((x * scale).to_i32(), (y * scale).to_i32()))?;
+    Some(Found::plain(point, lit))
+}
+
+fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<Found<T>> {
+    let around = Around::<T, P, O, false>::new(scene, p);
+    let (lit, dx, dy) = orientation(around.near()?.gradient())?;
+    Some(Found::plain(point_off(p, (dx, dy), T::from_f64(0.5)), lit))
+}
+
+fn point_off<T: Real>(p: Pixel, (dx, dy): (i32, i32), towards_dark: T) -> ImagePoint<T> {
+    ImagePoint {
+        u: T::from_i32(i32::from(p.x)) + T::from_i32(dx) * towards_dark,
+        v: T::from_i32(i32::from(p.y)) + T::from_i32(dy) * towards_dark,
+    }
+}
+
+/// The crossing of the mid-level; also whether the global level had to stand in for it.
+#[inline(always)]
+fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+    slow: &mut u32,
+) -> Option<Found<T>> {
+    let around = Around::<T, P, O, FREE>::new(scene, p);
+    let near = around.near()?;
+    let gradient = near.gradient();
+    let (lit, dx, dy) = orientation(gradient)?;
+    let level = i32::from(scene.level);
+    if scene.blooms {
+        let [_, inner, outer] = near.across(lit);
+        let level4 = (4 * level).max(outer + 1).min(inner);
+        let part = T::from_i32(inner - level4) / T::from_i32((inner - outer).max(1));
+        return (inner > outer).then(|| Found::plain(point_off(p, (dx, dy), part), lit));
+    }
+    // The edge fades over level / gradient pixels; at the top of a narrow one the gradient says less than how soon it is dark.
+    // A step is half of that, so that air seen from a rocket is read to where it ends; but of haze through a long lens, below
+    // which the clouds begin, only a fifth.
+    let steep = gradient.0.abs().max(gradient.1.abs());
+    let line = Line::new(&around, (dx, dy), 1);
+    if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
+        let Crossing { part, fallback, clipped, .. } = line.crossing(near.across(lit))?;
+        return Some(Found { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
+    }
+    *slow += 1;
+    let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
+    let step = half.min(fifth.max(4)).clamp(1, WIDEST);
+    let found = if FREE && is_clear(scene, p, (MARGIN * step) as u16) {
+        in_steps::<T, P, O, true>(scene, p, (dx, dy), step)?
+    } else {
+        in_steps::<T, P, O, false>(scene, p, (dx, dy), step)?
+    };
+    let Wide { off, fallback, clipped, .. } =
+        if found.rising { climb(scene, p, (dx, dy), step, found, slow) } else { found };
+    Some(Found { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
+}
+
+/// Most times that a profile is read again from where it crosses.
+const CLIMBS: u32 = 4;
+
+/// A profile that still grows brighter where it was read to has no plateau there, and its middle moves with the level that
+/// led to its border: it is read again about its crossing, until that is its middle.
+#[inline(never)]
+fn climb<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+    (dx, dy): (i32, i32),
+    step: i32,
+    mut found: Wide<T>,
+    slow: &mut u32,
+) -> Wide<T> {
+    let mut whole = 0;
+    for _ in 0..CLIMBS {
+        let moved = (found.off + T::from_i32(FARTHEST)).to_i32() - FARTHEST - whole;
+        if !found.rising || moved.abs() < step {
+            break;
+        }
+        let (x, y) = (i32::from(p.x) + dx * (whole + moved), i32::from(p.y) + dy * (whole + moved));
+        if !scene.region.counts(x, y) {
+            break;
+        }
+        *slow += 1;
+        let Some(next) = in_steps::<T, P, O, false>(scene, Pixel { x: x as u16, y: y as u16 }, (dx, dy), step) else {
+            break;
+        };
+        whole += moved;
+        found = Wide { off: next.off + T::from_i32(whole), ..next };
+    }
+    found
+}
+
+/// Whether neither the region's border nor a mask is within `margin` pixels.
+#[inline(always)]
+fn is_clear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel, margin: u16) -> bool {
+    let region = scene.region;
+    region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || region.clearance(p.x, p.y, margin) == margin)
+}
+
+/// Where a wide edge crosses the mid-level, pixels from a border pixel towards the dark.
+struct Wide<T> {
+    off: T,
+    fallback: bool,
+    clipped: bool,
+    /// The lit side did not level off within reach.
+    rising: bool,
+}
+
+/// As [`linear`], `step` pixels a step.
+#[inline(never)]
+fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+    (dx, dy): (i32, i32),
+    step: i32,
+) -> Option<Wide<T>> {
+    let around = Around::<T, P, O, FREE>::new(scene, p);
+    let line = Line::new(&around, (dx, dy), step);
+    let Crossing { part, mid2, fallback, clipped, rising } =
+        line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
+    let coarse = part * T::from_i32(step);
+    // The profile bends over a step: once more over half of one, in the middle of which the crossing should be.
+    let half = step / 2;
+    if half == 0 {
+        return Some(Wide { off: coarse, fallback, clipped, rising });
+    }
+    let pixels = Line::new(&around, (dx, dy), 1);
+    let whole = (coarse + T::from_i32(REACH * WIDEST)).to_i32() - REACH * WIDEST;
+    let k = whole - half / 2;
+    let (a, b) = (pixels.three(k)?, pixels.three(k + half)?);
+    let fine = T::from_i32(k) + T::from_i32(half * (2 * a - mid2)) / T::from_i32((2 * (a - b)).max(1));
+    let off = if (fine - coarse).abs() <= T::from_i32(half) { fine } else { coarse };
+    Some(Wide { off, fallback, clipped, rising })
+}
+
+/// Where an edge crosses the mid-level.
+struct Crossing<T> {
+    /// Steps from the border pixel towards the dark.
+    part: T,
+    /// Twice the level, in units of [`Line::three`].
+    mid2: i32,
+    /// Whether the global level had to stand in for the local one.
+    fallback: bool,
+    /// The lit side is clipped at full scale.
+    clipped: bool,
+    /// The lit side did not level off within reach.
+    rising: bool,
+}
+
+impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P, O, FREE> {
+    /// One pixel after another from `k` steps towards the dark, in the direction `out`.
+    #[inline(always)]
+    fn outwards(&self, k: i32, out: i32) -> Walk<'_, '_, T, P, O, FREE> {
+        let Around { scene, x, y, index, .. } = *self.around;
+        let (dx, dy) = self.step;
+        Walk {
+            scene,
+            at: (x + k * dx, y + k * dy),
+            step: (out * dx, out * dy),
+            index: index.wrapping_add_signed(k as isize * self.ahead),
+            ahead: out as isize * self.ahead,
+        }
+    }
+
+    /// Reads on from the border pixel or its dark neighbour, whose brightness is `v`, until the side has levelled off:
+    /// two more pixels change it by less than a twelfth of the contrast to `other` each. Gives the plateau's level and
+    /// the offset where it begins.
+    #[inline(always)]
+    fn plateau<const LIT: bool>(&self, mut v: i32, other: i32) -> (i32, i32) {
+        let (from, out) = if LIT { (0, -1) } else { (1, 1) };
+        // How far `v` lies beyond `w`, away from the other side.
+        let beyond = |v: i32, w: i32| if LIT { v - w } else { w - v };
+        // Where nothing can be read the side ends.
+        let or_here = |seen: i32, v: i32| if FREE || seen != UNSEEN { seen } else { v };
+        let mut k = from;
+        let mut outwards = self.outwards(from + out, out);
+        let (mut near, mut far) = (outwards.next(), outwards.next());
+        loop {
+            let (n, f) = (or_here(near, v), or_here(far, v));
+            let contrast = beyond(v, other).max(24);
+            if 12 * beyond(n, v) > contrast {
+                (k, v, near) = (k + out, n, far);
+            } else if 6 * beyond(f, v) > contrast {
+                (k, v, near) = (k + 2 * out, f, outwards.next());
+            } else {
+                // What lies beyond on the same level counts towards it.
+                let level = match (6 * beyond(v, n) < contrast, 6 * beyond(v, f) < contrast) {
+                    (true, true) => (v + n + f) / 3,
+                    (true, false) => (v + n) / 2,
+                    (false, true) => (v + f) / 2,
+                    (false, false) => v,
+                };
+                return (level, k);
+            }
+            if (k - from) * out >= REACH {
+                return (v, k);
+            }
+            far = outwards.next();
+        }
+    }
+
+    /// Steps from the border pixel to the crossing of the mid-level; also whether the global level had to stand in for it.
+    /// From the smoothed brightness one step to the lit side, here, and one step to the dark side.
+    #[inline(always)]
+    fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3]) -> Option<Crossing<T>> {
+        let scene = self.around.scene;
+        // In one row for the plateaus, of which the mean of several is taken, over three rows for the crossing.
+        let (bright, inner) = self.plateau::<true>(first_lit, first_dark);
+        let (dim, outer) = self.plateau::<false>(first_dark, bright);
+        let contrast = bright - dim;
+        let level4 = i32::from(scene.level) * 4;
+        let (mid2, fallback) = if contrast >= 4 * scene.least_contrast {
+            (bright + dim, false)
+        } else if first_lit > first_dark {
+            (2 * level4.max(first_dark + 1).min(first_lit), true)
+        } else {
+            return None;
+        };
+        // The crossing next to the border pixel: outwards from it while lit, else inwards. `a` at k is lit, `b` at k + 1 not.
+        let (mut k, mut a, mut b) =
+            if 2 * first_lit >= mid2 { (0, first_lit, first_dark) } else { (-1, inside, first_lit) };
+        while 2 * b >= mid2 {
+            (k, a) = (k + 1, b);
+            if k >= outer.max(1) {
+                return None;
+            }
+            b = self.three(k + 1)?;
+        }
+        while 2 * a < mid2 {
+            if k <= inner.min(-1) {
+                return None;
+            }
+            (k, b) = (k - 1, a);
+            a = self.three(k)?;
+        }
+        if a <= b {
+            return None;
+        }
+        let part = T::from_i32(k) + T::from_i32(2 * a - mid2) / T::from_i32(2 * (a - b));
+        let full = i32::from(scene.picture.full_scale());
+        let clipped = bright >= 4 * (full - full / CLIPPED_PART);
+        Some(Crossing { part, mid2, fallback, clipped, rising: inner <= -REACH })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::region::Region;
+    use crate::image::{Grey, Layout};
+    use crate::model::observer::Unobserved;
+    use std::vec::Vec;
+
+    /// A straight edge blurred over `width_px`, lit where (x, y)·n > offset, between two plateaus.
+    fn picture(n: [f64; 2], offset: f64, width_px: f64, dim: f64, bright: f64) -> Vec<u8> {
+        (0..100 * 100)
+            .map(|i| {
+                let d = f64::from(i % 100) * n[0] + f64::from(i / 100) * n[1] - offset;
+                let part = 0.5 + 0.5 * (d / width_px).clamp(-1.0, 1.0);
+                (dim + (bright - dim) * part + 0.5) as u8
+            })
+            .collect()
+    }
+
+    fn points(data: &[u8], config: &Config, level: u16) -> Vec<(f64, f64)> {
+        let grey = Grey::try_new(data, Layout::packed(100, 100, 1, 8)).unwrap();
+        let region = Region::<f64>::whole(100, 100);
+        let scene = Scene::new(&grey, &region, level, &Unobserved);
+        let border: Vec<Pixel> = (0..100u16)
+            .flat_map(|y| (0..100u16).map(move |x| Pixel { x, y }))
+            .filter(|p| (20..80).contains(&p.x) && (20..80).contains(&p.y))
+            .filter(|p| scene.lit(p.x, p.y))
+            .filter(|p| {
+                [(1, 0), (-1, 0), (0, 1), (0, -1)]
+                    .iter()
+                    .any(|(dx, dy)| !scene.lit((i32::from(p.x) + dx) as u16, (i32::from(p.y) + dy) as u16))
+            })
+            .collect();
+        let mut blocks = [Block::default(); 64];
+        let made = pick(&scene, config, &border, 0, &mut blocks, u32::MAX);
+        assert!(made.count > 30, "{made:?}");
+        blocks
+            .iter()
+            .flat_map(|b| (0..LANES).filter(|&l| b.weight[l] > 0.0).map(|l| (b.point(l).u, b.point(l).v)))
+            .collect()
+    }
+
+    #[test]
+    fn linear_finds_the_local_mid_level_whatever_the_level() {
+        // Edges in four directions and at angles, narrow and wide.
+        for (nx, ny) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.8, 0.6), (-0.6, 0.8)] {
+            for width in [1.0, 2.5, 5.0] {
+                let offset = 50.3 * nx + 49.8 * ny;
+                let data = picture([nx, ny], offset, width, 20.0, 220.0);
+                for level in [70, 120, 170] {
+                    for (u, v) in points(&data, &Config::default(), level) {
+                        let off = u * nx + v * ny - offset;
+                        assert!(off.abs() < 0.13, "normal {nx} {ny} width {width} level {level}: {off}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_sub_pixel_points_stand_half_a_pixel_out() {
+        let data = picture([0.0, 1.0], 49.8, 0.1, 20.0, 220.0);
+        let config = Config { sub_pixel: SubPixel::None, ..Config::default() };
+        for (_, v) in points(&data, &config, 120) {
+            // Row 50 is the first lit one.
+            assert_eq!(v, 49.5);
+        }
+    }
+
+    /// Half of full scale is not half of the light where the light goes on beyond it.
+    #[test]
+    fn points_before_a_clipped_side_are_counted() {
+        let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
+        for width in [1.0, 4.0] {
+            for (bright, all) in [(255.0, true), (254.0, true), (240.0, false), (120.0, false)] {
+                let data = picture([0.0, 1.0], 49.8, width, 20.0, bright);
+                let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
+                let region = Region::<f64>::whole(100, 100);
+                let scene = Scene::new(&grey, &region, 70, &Unobserved);
+                let mut blocks = [Block::default(); 8];
+                let made = pick(&scene, &Config::default(), &border, 0, &mut blocks, u32::MAX);
+                assert_eq!((made.count, made.clipped), (60, if all { 60 } else { 0 }), "{width} {bright}");
+            }
+        }
+    }
+
+    #[test]
+    fn thinning_keeps_the_whole_edge() {
+        let data = picture([0.0, 1.0], 49.8, 1.0, 20.0, 220.0);
+        let config = Config { keep_points: 16, ..Config::default() };
+        let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
+        let region = Region::<f32>::whole(100, 100);
+        let scene = Scene::new(&grey, &region, 120, &Unobserved);
+        let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
+        let mut blocks = [Block::default(); 2];
+        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks, u32::MAX), Points { count: 15, ..Points::default() });
+        let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
+        assert_eq!((first, last), (22.0, 78.0));
+    }
+}

@@ -1,0 +1,130 @@
+//! Zernike moments of 7×7 pixels: the edge as a step across a disc (Ghosal & Mehrotra 1993; Wang et al. 2022, 2.1).
+//!
+//! For a step of height k at distance l from the centre of the unit disc, the moments turned to the edge's direction
+//! are A₁₁ = (2k/3)(1 − l²)^(3/2) and A₂₀ = l A₁₁, so the edge lies at l = A₂₀/A₁₁ along the direction of A₁₁. The limb
+//! is no step but a ramp, which pulls the point towards the centre of the patch. As with Wang et al. the patch stands
+//! on the pixel with the largest of Sobel's gradients, so that the edge and with it the bias are small; beyond a blur of
+//! about 1.5 px `linear` is better.
+
+use super::patch::{Patch, SIDE, brightness};
+use crate::base::real::Real;
+use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::image::Pixels;
+use crate::model::observer::Observer;
+use crate::stages::contour::Scene;
+
+/// Radius of the disc in pixels.
+const RADIUS_PX: f64 = 3.5;
+
+/// ∬ x over each pixel's part of the disc, in radii: right half, rows from the middle down.
+const X: [[f64; 4]; 4] = [
+    [0.0, 0.023_323_615, 0.046_647_230, 0.068_999_037],
+    [0.0, 0.023_323_615, 0.046_647_230, 0.057_337_221],
+    [0.0, 0.023_323_615, 0.046_573_851, 0.022_425_177],
+    [0.0, 0.019_019_963, 0.015_045_882, 0.0],
+];
+/// ∬ 2(x² + y²) − 1, likewise.
+const BOWL: [[f64; 4]; 4] = [
+    [-0.079_411_356, -0.066_083_576, -0.026_100_236, 0.039_551_926],
+    [-0.066_083_576, -0.052_755_796, -0.012_772_456, 0.039_373_472],
+    [-0.026_100_236, -0.012_772_456, 0.027_106_056, 0.022_466_219],
+    [0.039_551_926, 0.039_373_472, 0.022_466_219, 0.0],
+];
+
+/// The edge next to a border pixel and the direction (du, dv) of its gradient; `None` without an edge within reach.
+pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
+    scene: &Scene<'_, T, P, O>,
+    p: Pixel,
+) -> Option<(ImagePoint<T>, [T; 2])> {
+    let (x, y) = steepest(scene, i32::from(p.x), i32::from(p.y))?;
+    let (offset, direction) = edge(&Patch::read(scene, x, y)?)?;
+    let (u, v) = (T::from_i32(x) + offset * direction[0], T::from_i32(y) + offset * direction[1]);
+    Some((ImagePoint { u, v }, direction))
+}
+
+/// Where Sobel's gradient is largest, up to a pixel from the border pixel along the axis on which it is larger: the
+/// edge pixel of a gradient picture thinned to its maxima.
+fn steepest<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> Option<(i32, i32)> {
+    let at = |x: i32, y: i32| brightness(scene, x, y);
+    // Eight times the change a pixel along (dx, dy).
+    let slope = |x: i32, y: i32, dx: i32, dy: i32| -> Option<i32> {
+        let line = |k: i32| -> Option<i32> {
+            let (x, y) = (x + k * dx, y + k * dy);
+            Some(at(x - dy, y - dx)? + 2 * at(x, y)? + at(x + dy, y + dx)?)
+        };
+        Some((line(1)? - line(-1)?).abs())
+    };
+    let (across, down) = (slope(x, y, 1, 0)?, slope(x, y, 0, 1)?);
+    let (dx, dy) = if across >= down { (1, 0) } else { (0, 1) };
+    let mut best = (across.max(down), x, y);
+    for k in [-1, 1] {
+        let (x, y) = (x + k * dx, y + k * dy);
+        if let Some(g) = slope(x, y, dx, dy)
+            && g > best.0
+        {
+            best = (g, x, y);
+        }
+    }
+    Some((best.1, best.2))
+}
+
+/// Distance of the edge from the centre in pixels, and the unit direction towards the light.
+fn edge<T: Real>(patch: &Patch<T>) -> Option<(T, [T; 2])> {
+    let (mut re, mut im, mut a20, mut largest) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
+    // Without the middle's brightness the moments are of the contrast alone, and exact in single precision.
+    let middle = patch.rows[SIDE / 2][SIDE / 2];
+    for j in 0..SIDE {
+        for i in 0..SIDE {
+            let value = patch.rows[j][i] - middle;
+            let (a, b) = (i.abs_diff(3), j.abs_diff(3));
+            let x = T::from_f64(X[b & 3][a & 3]);
+            let y = T::from_f64(X[a & 3][b & 3]);
+            re += value * if i < 3 { -x } else { x };
+            im += value * if j < 3 { -y } else { y };
+            a20 += value * T::from_f64(BOWL[b & 3][a & 3]);
+            largest = largest.max(value.abs());
+        }
+    }
+    let a11 = (re * re + im * im).sqrt();
+    // A step through the centre has A₁₁ = 2/3 of its height.
+    if !(a11 > largest * T::from_f64(0.05)) {
+        return None;
+    }
+    let l = a20 / a11;
+    (l.abs() < T::from_f64(0.9)).then(|| (l * T::from_f64(RADIUS_PX), [re / a11, im / a11]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_the_integrals_over_pixel_and_disc() {
+        const N: i32 = 400;
+        for b in 0..4 {
+            for a in 0..4 {
+                let (mut x_sum, mut bowl) = (0.0, 0.0);
+                for i in 0..N * N {
+                    let at = |k: i32, n: usize| (n as f64 - 0.5 + (f64::from(k) + 0.5) / f64::from(N)) / RADIUS_PX;
+                    let (x, y) = (at(i % N, a), at(i / N, b));
+                    let r2 = x * x + y * y;
+                    if r2 <= 1.0 {
+                        x_sum += x;
+                        bowl += 2.0 * r2 - 1.0;
+                    }
+                }
+                let area = (f64::from(N) * RADIUS_PX).powi(-2);
+                // The middle column and row lie on both sides of 0.
+                let x_sum = if a == 0 { 0.0 } else { x_sum * area };
+                assert!((X[b][a] - x_sum).abs() < 2e-5, "X {b} {a}: {x_sum}");
+                assert!((BOWL[b][a] - bowl * area).abs() < 2e-5, "BOWL {b} {a}: {}", bowl * area);
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_window_has_no_edge() {
+        let flat = Patch { rows: [[77.0f32; SIDE]; SIDE] };
+        assert!(edge(&flat).is_none());
+    }
+}

@@ -1,0 +1,175 @@
+//! A conic through the edge points, and the axis from its coefficients (Braun & Barf 2022, (17) and (18), corrected).
+//!
+//! On the plane z = 1 the limb of a sphere is A x² + B xy + C y² + D x + E y + F = 0. The coefficients are found by
+//! least squares under the constraint that the curve *is* an ellipse, 4AC − B² = 1, or a hyperbola, 4AC − B² = −1
+//! (Fitzgibbon et al. 1999; O'Leary & Zsombor-Murray 2004): both come from one eigenvalue problem, and the one that
+//! lies closer to the points is taken. A parabola lies between the two and comes out as either.
+//!
+//! As a quadratic form of rays the conic is the cone e eᵀ − cos²α I times any factor: its eigenvector for the
+//! eigenvalue whose sign no other has is the axis, and the eigenvalues are as sin²α to −cos²α. (18) as printed takes
+//! square roots of the coefficients: the signs of the axis's components are lost, and with them the direction; and it
+//! takes the factor for 1, although a conic's coefficients have none. The nappe gives the sign of the whole.
+
+use super::direct::LEAST_Z;
+use crate::base::linalg::{M3, Triangle, V3, symmetric_eigen, unit};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+
+/// The axis and cos α of the conic closest to the points that may count; `None` when they do not determine a cone:
+/// fewer than five, all on a line, or on a conic that is no picture of a cone about its axis.
+pub(crate) fn fit<T: Real>(blocks: &[Block<T>]) -> Option<(V3<T>, T)> {
+    let plane = Plane::new(blocks)?;
+    let mut best: Option<(T, V3<T>, T)> = None;
+    for conic in plane.conics(blocks)? {
+        let Some((e, c)) = cone(&plane.rays(&conic), &plane.towards) else { continue };
+        let off = distance2(blocks, &e, c);
+        if off.is_finite() && best.is_none_or(|(b, _, _)| off < b) {
+            best = Some((off, e, c));
+        }
+    }
+    best.map(|(_, e, c)| (e, c))
+}
+
+/// Mean squared distance of the points from a cone in pixels.
+fn distance2<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T) -> T {
+    let (mut total, mut count) = (T::ZERO, T::ZERO);
+    for b in blocks {
+        let g = b.gradient(e);
+        for l in 0..LANES {
+            let r = c - b.ray(l).dot(e);
+            total += b.weight[l] * r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20));
+            count += b.weight[l];
+        }
+    }
+    total / count
+}
+
+/// Coefficients A to F of a conic about the points' centre and scale.
+type Conic<T> = [T; 6];
+
+/// The points on the plane z = 1, moved to their centre and scaled to unit spread: powers of four of the
+/// coordinates are summed.
+struct Plane<T> {
+    centre: [T; 2],
+    scale: T,
+    /// Mean direction of the points: on the nappe that is seen.
+    towards: V3<T>,
+}
+
+impl<T: Real> Plane<T> {
+    fn new(blocks: &[Block<T>]) -> Option<Self> {
+        let (mut n, mut x, mut y) = (T::ZERO, T::ZERO, T::ZERO);
+        let mut towards = V3::new(T::ZERO, T::ZERO, T::ZERO);
+        each(blocks, |p, s| {
+            n += T::one();
+            x += p[0];
+            y += p[1];
+            towards += s;
+        });
+        if n < T::from_f64(5.0) {
+            return None;
+        }
+        let centre = [x / n, y / n];
+        let mut spread = T::ZERO;
+        each(blocks, |p, _| {
+            let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
+            spread += dx * dx + dy * dy;
+        });
+        let scale = (spread / n).sqrt();
+        (scale > T::EPSILON).then_some(())?;
+        Some(Self { centre, scale: T::one() / scale, towards: unit(&towards)? })
+    }
+
+    /// The best ellipse and the best hyperbola.
+    ///
+    /// A triangle of rows (1, x, y, x², xy, y²) frees the quadratic terms of the linear ones: its last three rows and
+    /// columns, R, have aᵀ RᵀR a as the least sum of squares for a = (A, B, C). It shall be least for given
+    /// aᵀ C a = 4AC − B². With the singular values σ and vectors V of R and a = V σ⁻¹ y this is an ordinary symmetric
+    /// problem: the greatest eigenvalue of σ⁻¹ Vᵀ C V σ⁻¹ is the ellipse's and the least the hyperbola's.
+    fn conics(&self, blocks: &[Block<T>]) -> Option<[Conic<T>; 2]> {
+        let mut triangle = Triangle::<T, 6>::new();
+        each(blocks, |p, _| {
+            let (x, y) = self.place(p);
+            triangle.push([T::one(), x, y, x * x, x * y, y * y]);
+        });
+        let [[r11, r12, r13, r14, r15, r16], [_, r22, r23, r24, r25, r26], [_, _, r33, r34, r35, r36], rest @ ..] =
+            *triangle.rows();
+        let mut quadratic = Triangle::<T, 3>::new();
+        for [_, _, _, a, b, c] in rest {
+            quadratic.push([a, b, c]);
+        }
+        let (values, vectors) = quadratic.singular();
+        // Points on a conic make the least one zero but for rounding; when the next is zero too, more than one conic
+        // goes through them: they lie on a line, or in fewer than five places.
+        let floor = values[2] * T::EPSILON * T::from_f64(4.0);
+        if !(values[1] > floor * T::from_f64(16.0) && r33.abs() > T::EPSILON * T::from_f64(64.0) * r11.abs()) {
+            return None;
+        }
+        let half: [[T; 3]; 3] =
+            core::array::from_fn(|i| core::array::from_fn(|j| vectors[i][j] / values[i].max(floor)));
+        let discriminant = |a: &[T; 3], b: &[T; 3]| (a[0] * b[2] + a[2] * b[0]) * T::from_f64(2.0) - a[1] * b[1];
+        let problem = core::array::from_fn(|i| core::array::from_fn(|j| discriminant(&half[i], &half[j])));
+        let (_, solutions) = symmetric_eigen::<T, 3>(problem);
+        let conic = |y: &[T; 3]| -> Conic<T> {
+            let [a, b, c]: [T; 3] = core::array::from_fn(|k| half[0][k] * y[0] + half[1][k] * y[1] + half[2][k] * y[2]);
+            // The linear terms: the first three rows, from below.
+            let e = -(r34 * a + r35 * b + r36 * c) / r33;
+            let d = -(r24 * a + r25 * b + r26 * c + r23 * e) / r22;
+            let f = -(r14 * a + r15 * b + r16 * c + r12 * d + r13 * e) / r11;
+            [a, b, c, d, e, f]
+        };
+        Some([conic(&solutions[2]), conic(&solutions[0])])
+    }
+
+    fn place(&self, [x, y]: [T; 2]) -> (T, T) {
+        ((x - self.centre[0]) * self.scale, (y - self.centre[1]) * self.scale)
+    }
+
+    /// The conic as a quadratic form of rays (x, y, 1), normalised to a unit largest entry.
+    fn rays(&self, &[a, b, c, d, e, f]: &Conic<T>) -> [[T; 3]; 3] {
+        let half = T::from_f64(0.5);
+        let local = M3::new(a, b * half, d * half, b * half, c, e * half, d * half, e * half, f);
+        let (k, zero) = (self.scale, T::ZERO);
+        let [x, y] = self.centre;
+        let t = M3::new(k, zero, -k * x, zero, k, -k * y, zero, zero, T::one());
+        let m = t.transpose() * local * t;
+        let mut largest = T::ZERO;
+        for value in m.iter() {
+            largest = largest.max(value.abs());
+        }
+        let by = T::one() / largest.max(T::from_f64(1e-30));
+        core::array::from_fn(|i| core::array::from_fn(|j| m[(i, j)] * by))
+    }
+}
+
+/// The axis and cos α of the cone rᵀ m r = 0, on the nappe of `towards`: (18), corrected. `None` when the eigenvalues
+/// have one sign: no cone is seen.
+pub(crate) fn cone<T: Real>(m: &[[T; 3]; 3], towards: &V3<T>) -> Option<(V3<T>, T)> {
+    let (values, vectors) = symmetric_eigen(*m);
+    let [low, mid, high] = values;
+    // One positive and two negative, or the other way round, whatever the factor.
+    let (own, others, axis) = if mid < T::ZERO && high > T::ZERO {
+        (high, low + mid, &vectors[2])
+    } else if mid > T::ZERO && low < T::ZERO {
+        (low, mid + high, &vectors[0])
+    } else {
+        return None;
+    };
+    // cot²α of an elliptic cone: the mean of both transverse ones.
+    let cot2 = -others * T::from_f64(0.5) / own;
+    let c = (cot2 / (T::one() + cot2)).sqrt();
+    let e = unit(&V3::from(*axis))?;
+    let e = if e.dot(towards) < T::ZERO { -e } else { e };
+    (c > T::ZERO && c < T::one()).then_some((e, c))
+}
+
+fn each<T: Real>(blocks: &[Block<T>], mut visit: impl FnMut([T; 2], V3<T>)) {
+    for b in blocks {
+        for l in 0..LANES {
+            let z = b.s[2][l];
+            if b.weight[l] > T::ZERO && z > T::from_f64(LEAST_Z) {
+                visit([b.s[0][l] / z, b.s[1][l] / z], b.ray(l));
+            }
+        }
+    }
+}

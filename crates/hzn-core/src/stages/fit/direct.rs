@@ -1,0 +1,138 @@
+//! The nadir directly from the edge points, without a conic in between (Braun & Barf 2022, (24)).
+//!
+//! On the plane z = 1 a limb point p = s/s_z fulfils p·e = cos α ‖p‖, which is linear in e: least squares over all
+//! points gives e = (HᵀH)⁻¹ Hᵀ (cos α ‖p‖) with the p as rows of H. In unit rays these are the equations s·e = cos α
+//! with the weights 1/s_z²: far from the axis a point counts for more, and beyond 90° there is no plane.
+//!
+//! The paper says that α must be known. It need not: another cos α scales e and leaves its direction as it is, so the
+//! length that comes out, cos α assumed over cos α measured, *measures* α. That also is the method's weakness: the
+//! half-angle is left free, which on a short arc costs a factor of three to six (docs/math.md).
+
+use crate::base::linalg::{M3, V3, basis, invert_spd3};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+
+/// Points nearer to the horizon of the camera than this (cosine of the angle off axis) are not on the plane.
+pub(crate) const LEAST_Z: f64 = 0.03;
+
+/// Rounds of residuals: each takes what rounding left in the one before by the condition of the equations.
+const ROUNDS: usize = 4;
+
+/// The least-squares nadir of the points that may count: the unit axis and cos α. `None` when they do not determine a
+/// cone: fewer than three, or all in a plane through the camera.
+pub(crate) fn fit<T: Real>(blocks: &[Block<T>]) -> Option<(V3<T>, T)> {
+    let one = T::one();
+    // Start: the mean direction. The equations are solved for what is missing, in a basis along it, so that single
+    // precision suffices: p·δ = ‖p‖ − p·e for cos α assumed to be 1.
+    let mut e = mean(blocks)?;
+    let (b1, b2) = basis(&e);
+    let normal = Normal::new(blocks, &b1, &b2, &e.clone())?;
+    for _ in 0..ROUNDS {
+        let step = normal.solve(blocks, &e);
+        e += step;
+        if !(step.dot(&step) > T::EPSILON * T::EPSILON * e.dot(&e)) {
+            break;
+        }
+    }
+    let norm = e.dot(&e).sqrt();
+    // cos α = 1 was assumed.
+    let c = one / norm;
+    (norm.is_finite() && c > T::ZERO && c < one).then(|| (e * c, c))
+}
+
+/// Mean direction of the points.
+fn mean<T: Real>(blocks: &[Block<T>]) -> Option<V3<T>> {
+    let mut total = V3::new(T::ZERO, T::ZERO, T::ZERO);
+    for b in blocks {
+        for l in 0..LANES {
+            if weight(b, l) > T::ZERO {
+                total += b.ray(l);
+            }
+        }
+    }
+    crate::base::linalg::unit(&total)
+}
+
+/// 1/s_z² for a point that may count, else 0.
+fn weight<T: Real>(b: &Block<T>, l: usize) -> T {
+    let z = b.s[2][l & 7];
+    if b.weight[l & 7] > T::ZERO && z > T::from_f64(LEAST_Z) { T::one() / (z * z) } else { T::ZERO }
+}
+
+/// HᵀH in the basis (b1, b2, e), the first two columns freed of the third, inverted.
+pub(crate) struct Normal<T> {
+    axes: [V3<T>; 3],
+    /// What of the third column is in the first two.
+    shear: [T; 2],
+    inverse: M3<T>,
+}
+
+impl<T: Real> Normal<T> {
+    pub(crate) fn new(blocks: &[Block<T>], b1: &V3<T>, b2: &V3<T>, e: &V3<T>) -> Option<Self> {
+        let (mut s13, mut s23, mut s33) = (T::ZERO, T::ZERO, T::ZERO);
+        each(blocks, |w, s| {
+            let z = s.dot(e);
+            s13 += w * s.dot(b1) * z;
+            s23 += w * s.dot(b2) * z;
+            s33 += w * z * z;
+        });
+        if !(s33 > T::ZERO) {
+            return None;
+        }
+        let shear = [s13 / s33, s23 / s33];
+        let mut n = [T::ZERO; 6];
+        each(blocks, |w, s| {
+            let [x, y, z] = row(&s, [b1, b2, e], shear);
+            n[0] += w * x * x;
+            n[1] += w * x * y;
+            n[2] += w * x * z;
+            n[3] += w * y * y;
+            n[4] += w * y * z;
+            n[5] += w * z * z;
+        });
+        Some(Self { axes: [*b1, *b2, *e], shear, inverse: invert_spd3(&n)? })
+    }
+
+    /// The row of a ray, before its weight.
+    pub(crate) fn row(&self, s: &V3<T>) -> V3<T> {
+        let [a, b, c] = &self.axes;
+        V3::from(row(s, [a, b, c], self.shear))
+    }
+
+    /// (HᵀH)⁻¹ in the sheared basis.
+    pub(crate) fn inverse(&self) -> &M3<T> {
+        &self.inverse
+    }
+
+    /// A solution in the sheared basis as a vector of the camera frame: with rows x' = x − m z the unknowns are
+    /// (x, y, z + m·(x, y)), so z is what remains.
+    pub(crate) fn vector(&self, d: &V3<T>) -> V3<T> {
+        let z = d.z - self.shear[0] * d.x - self.shear[1] * d.y;
+        self.axes[0] * d.x + self.axes[1] * d.y + self.axes[2] * z
+    }
+
+    /// Least squares of p·δ = ‖p‖ − p·e.
+    fn solve(&self, blocks: &[Block<T>], e: &V3<T>) -> V3<T> {
+        let mut right = V3::new(T::ZERO, T::ZERO, T::ZERO);
+        each(blocks, |w, s| {
+            right += self.row(&s) * (w * (T::one() - s.dot(e)));
+        });
+        self.vector(&(self.inverse * right))
+    }
+}
+
+fn row<T: Real>(s: &V3<T>, [a, b, c]: [&V3<T>; 3], shear: [T; 2]) -> [T; 3] {
+    let z = s.dot(c);
+    [s.dot(a) - shear[0] * z, s.dot(b) - shear[1] * z, z]
+}
+
+fn each<T: Real>(blocks: &[Block<T>], mut visit: impl FnMut(T, V3<T>)) {
+    for b in blocks {
+        for l in 0..LANES {
+            let w = weight(b, l);
+            if w > T::ZERO {
+                visit(w, b.ray(l));
+            }
+        }
+    }
+}

@@ -1,0 +1,641 @@
+//! Gauss-Newton on the sphere: the cone s·e = cos α through the edge points.
+//!
+//! State: the unit axis e and k = 1 − cos α, which keeps its digits for a small disc where cos α does not; for the same
+//! reason 1 − s·e is formed as |s − e|²/2. In what follows c = cos α. For each point r = c − s·e is the residual, g = ∂(s·e)/∂(u, v), and |r|/|g|
+//! the distance from the limb in pixels, so w = 1/|g|² weighs by pixels. With h = [Bᵀs − m, −1], B the tangent basis
+//! at e and m the mean of Bᵀs, a step solves (Σ w h hᵀ) δ = Σ w r h. Subtracting the means keeps the sums
+//! well-conditioned in single precision; the third unknown then is δc' = δc − m·δ₁₂.
+//!
+//! The expected half-angle enters the robust iterations as one more row, weighed against the edge's *correlated*
+//! errors. With the weights so found the half-angle is then fitted freely, for the covariance, for the altitude
+//! estimate, and for the test of the candidate; `covariance` fuses the two.
+
+#[cfg(feature = "horace")]
+mod circle;
+#[cfg(feature = "dlr")]
+pub(crate) mod conic;
+#[cfg(feature = "dlr")]
+pub(crate) mod direct;
+#[cfg(feature = "zju")]
+mod quadric;
+
+use crate::base::error::ConfigError;
+use crate::base::linalg::{M3, V3, basis, invert_spd2, invert_spd3, unit};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, HALF, LANES, sum};
+use crate::geometry::camera::Camera;
+use crate::geometry::cone::Azimuth;
+use crate::model::body::Expected;
+use crate::model::edge_noise;
+use crate::stages::consensus::Consensus;
+#[cfg(feature = "zju")]
+pub(crate) use quadric::Quadric;
+
+/// What the fit takes for the half-angle of the cone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum HalfAngle {
+    /// Fitted freely, then fused with the expected one by their covariances. Never worse than the better of the two.
+    #[default]
+    Fused,
+    /// The expected one, exactly.
+    Known,
+    /// Fitted; the expected one is only a start.
+    Free,
+}
+
+/// How the cone is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Method {
+    /// Gauss-Newton on the sphere with Tukey's weights and the expected half-angle.
+    #[default]
+    Sphere,
+    /// Linear least squares on the plane z = 1, half-angle free (Braun & Barf 2022, (24)).
+    #[cfg(feature = "dlr")]
+    Direct,
+    /// The axis of the ellipse or hyperbola through the points (Braun & Barf 2022, (17), (18) corrected).
+    #[cfg(feature = "dlr")]
+    Conic,
+    /// An elliptic cone by total least squares (Wang et al. 2022, (10) to (17)).
+    #[cfg(feature = "zju")]
+    Tls,
+    /// The same, every point weighed by what a pixel is to it (Wang et al. 2022, (18) to (21)).
+    #[cfg(feature = "zju")]
+    Wtls,
+    /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
+    #[cfg(feature = "horace")]
+    Circle,
+}
+
+/// `[estimate]` of sensor.toml.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Config {
+    /// How the cone is fitted.
+    pub method: Method,
+    /// What the fit takes for the half-angle.
+    pub half_angle: HalfAngle,
+    /// For `wtls`: weights are used when the axis lies further off the optical axis than this, in degrees, 0 to 180; 0
+    /// uses them always. Nearer, the result is that of `tls`.
+    #[cfg(feature = "zju")]
+    pub weigh_above_deg: f64,
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        #[cfg(feature = "zju")]
+        crate::base::error::between("estimate.weigh_above_deg", self.weigh_above_deg, 0.0, 180.0)?;
+        Ok(())
+    }
+}
+
+/// A fitted cone.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fit<T> {
+    /// Axis.
+    pub(crate) e: V3<T>,
+    /// cos of the (mean) half-angle.
+    pub(crate) c: T,
+    /// 1 − cos of it, to its own digits.
+    pub(crate) k: T,
+    /// The half-angle was fitted too; otherwise it is the expected one.
+    pub(crate) free: bool,
+    /// Weighted RMS distance of the points from the limb in pixels.
+    pub(crate) rms_px: T,
+    /// Points with a weight.
+    pub(crate) inliers: u32,
+    /// Length of edge between neighbouring points with a weight, in pixels.
+    pub(crate) arc_px: T,
+    /// Points that the weights' cut-off leaves out although they lie within three times it.
+    pub(crate) nearby: u32,
+    /// The normal equations at the cone, about `mean`.
+    pub(crate) sums: Sums<T>,
+    /// Means of Bᵀs.
+    pub(crate) mean: [T; 2],
+    /// The elliptic cone, of the methods that fit one: its covariance is not that of the normal equations.
+    #[cfg(feature = "zju")]
+    pub(crate) quadric: Option<Quadric<T>>,
+}
+
+/// Tukey's constant: 95 % efficiency on Gaussian errors.
+const TUKEY: f64 = 4.685;
+/// Most robust iterations, and most with the weights kept.
+const ROBUST: usize = 10;
+/// Blocks that the first robust iterations look at.
+const PART: usize = 24;
+const SETTLE: usize = 5;
+
+/// The correction by azimuth of an ellipsoid seen with a known attitude.
+pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
+    let cone = expected.ellipsoid.as_ref()?;
+    let to_cam = expected.cam_to_ecef?.inverse();
+    let (east, axis) = (to_cam.apply(&cone.east), to_cam.apply(&cone.axis));
+    Some(Azimuth {
+        north: east.v().cross(axis.v()),
+        harmonics_cos: expected.harmonics_cos,
+        east: *east.v(),
+        cot2_east: cone.cot2_east,
+        cot2_meridian: cone.cot2_meridian,
+        mean_cos: expected.cos,
+    })
+}
+
+/// Fits the cone; leaves in each point the weight that it had. `None` when the points do not determine one.
+pub(crate) fn fit<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    expected: &Expected<T>,
+    camera: &Camera<T>,
+    threshold_px: T,
+    config: &Config,
+    noise: &edge_noise::Config,
+) -> Option<Fit<T>> {
+    #[cfg(not(feature = "horace"))]
+    let _ = camera;
+    let cone = match config.method {
+        Method::Sphere => sphere(blocks, start, expected, threshold_px, config, noise)?,
+        #[cfg(feature = "dlr")]
+        Method::Direct => held(blocks, start, threshold_px, direct::fit)?,
+        #[cfg(feature = "dlr")]
+        Method::Conic => held(blocks, start, threshold_px, conic::fit)?,
+        #[cfg(feature = "zju")]
+        Method::Tls => elliptic(blocks, start, threshold_px, HALF_TURN_RAD)?,
+        #[cfg(feature = "zju")]
+        Method::Wtls => elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?,
+        #[cfg(feature = "horace")]
+        Method::Circle => held(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
+    };
+    Some(counted(blocks, cone))
+}
+
+/// The fit that a cone is, with what there is to count of its points.
+fn counted<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T> {
+    let (mut inliers, mut arc) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+    let mut before = T::ZERO;
+    for block in blocks.iter() {
+        let on = block.weight.map(|w| if w > T::ZERO { T::one() } else { T::ZERO });
+        for l in 0..LANES {
+            inliers[l] += on[l];
+            arc[l] += on[l] * before * block.step_px[l];
+            before = on[l];
+        }
+    }
+    let (inliers, arc) = (sum(&inliers).to_i32() as u32, sum(&arc));
+    let Cone { at, mean, sums, free, .. } = cone;
+    Fit {
+        e: at.e,
+        c: at.c(),
+        k: at.k,
+        free,
+        rms_px: (sums.cost / sums.weight).sqrt(),
+        inliers,
+        arc_px: arc,
+        nearby: at.nearby,
+        sums,
+        mean,
+        #[cfg(feature = "zju")]
+        quadric: cone.quadric,
+    }
+}
+
+/// What every method ends with.
+struct Cone<T> {
+    at: State<T>,
+    /// The means that `sums` are about.
+    mean: [T; 2],
+    sums: Sums<T>,
+    free: bool,
+    #[cfg(feature = "zju")]
+    quadric: Option<Quadric<T>>,
+}
+
+/// Robust iterations under the expected half-angle, then the half-angle freely with the weights so found.
+fn sphere<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    expected: &Expected<T>,
+    threshold_px: T,
+    config: &Config,
+    noise: &edge_noise::Config,
+) -> Option<Cone<T>> {
+    let azimuth = azimuth(expected);
+    let azimuth = azimuth.as_ref();
+    let known = config.half_angle == HalfAngle::Known && !expected.free;
+    let (robust, sums) = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
+    let freely = if known { None } else { settle(blocks, robust, Some(sums), true, azimuth) };
+    let ((at, mean, sums), free) = match freely {
+        Some(settled) => (settled, true),
+        // Sun and Moon have no other half-angle to fall back on.
+        None if expected.free => return None,
+        None => (settle(blocks, State { k: T::one() - expected.cos, ..robust }, None, false, azimuth)?, false),
+    };
+    Some(Cone {
+        at,
+        mean,
+        sums,
+        free,
+        #[cfg(feature = "zju")]
+        quadric: None,
+    })
+}
+
+/// The cone that another method finds through the points within `threshold_px` of the consensus (all of them, when
+/// none was to be left out), with the normal equations there, so that it is weighed, judged and given a covariance
+/// as every other. `find` gets the blocks with weights 0 and 1 and gives axis and cos of the half-angle.
+#[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
+#[allow(dead_code, reason = "for the estimators behind features")]
+fn held<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    threshold_px: T,
+    find: impl FnOnce(&[Block<T>]) -> Option<(V3<T>, T)>,
+) -> Option<Cone<T>> {
+    if !start.all {
+        let limit2 = threshold_px * threshold_px;
+        for b in blocks.iter_mut() {
+            let g = b.gradient(&start.e);
+            for l in 0..LANES {
+                let r = start.c - b.ray(l).dot(&start.e);
+                if !(r * r <= limit2 * (g[0][l] * g[0][l] + g[1][l] * g[1][l])) {
+                    b.weight[l] = T::ZERO;
+                }
+            }
+        }
+    }
+    let (e, c) = find(blocks)?;
+    at(blocks, e, c)
+}
+
+/// The fit that a given cone is, by the weights that the points have.
+#[cfg(any(test, feature = "_edges"))]
+#[allow(dead_code, reason = "behind a feature")]
+pub(crate) fn given<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Fit<T>> {
+    let cone = at(blocks, e, c)?;
+    Some(counted(blocks, cone))
+}
+
+/// A cone with the normal equations there.
+#[cfg(any(test, feature = "dlr", feature = "zju", feature = "horace", feature = "_edges"))]
+fn at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
+    let e = unit(&e)?;
+    if !(c.abs() < T::one()) {
+        return None;
+    }
+    let (b1, b2) = basis(&e);
+    let mean = means(blocks, &b1, &b2);
+    let sums = pass(blocks, &e, &b1, &b2, T::one() - c, mean, &Weights::Kept, None);
+    // NaN is refused with the rest.
+    (sums.weight > T::from_f64(2.5) && sums.cost >= T::ZERO).then_some(Cone {
+        at: State { e, k: T::one() - c, mean, nearby: 0 },
+        mean,
+        sums,
+        free: true,
+        #[cfg(feature = "zju")]
+        quadric: None,
+    })
+}
+
+/// No axis lies further off.
+#[cfg(feature = "zju")]
+const HALF_TURN_RAD: f64 = core::f64::consts::PI;
+
+/// The elliptic cone through the points; its distances are those of `rms_px`, and its covariance is its own.
+#[cfg(feature = "zju")]
+fn elliptic<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    threshold_px: T,
+    weigh_above_rad: f64,
+) -> Option<Cone<T>> {
+    let mut quadric = None;
+    let cone = held(blocks, start, threshold_px, |blocks| {
+        let found = Quadric::fit(blocks, T::from_f64(weigh_above_rad))?;
+        quadric = Some(found);
+        Some((found.e, found.c))
+    })?;
+    let found = quadric?;
+    let sums = Sums { weight: found.weight, cost: found.cost, ..cone.sums };
+    Some(Cone { sums, quadric, ..cone })
+}
+
+/// Where the iterations stand.
+#[derive(Clone, Copy)]
+struct State<T> {
+    e: V3<T>,
+    /// 1 − cos of the half-angle.
+    k: T,
+    /// Means of Bᵀs.
+    mean: [T; 2],
+    nearby: u32,
+}
+
+impl<T: Real> State<T> {
+    /// cos of the half-angle.
+    fn c(&self) -> T {
+        T::one() - self.k
+    }
+    /// Its sine.
+    fn sin(&self) -> T {
+        (self.k * (T::one() + self.c())).max(T::ZERO).sqrt()
+    }
+    /// Takes the step and gives its size in radians; `None` when it leads nowhere.
+    fn step(&mut self, b1: &V3<T>, b2: &V3<T>, ([d1, d2], dc): ([T; 2], T), sums: &Sums<T>) -> Option<T> {
+        self.e = unit(&(self.e + b1 * d1 + b2 * d2))?;
+        self.k -= dc;
+        self.mean = sums.means(self.mean);
+        Some(d1.abs() + d2.abs() + dc.abs())
+    }
+}
+
+/// Iterations with Tukey's weights, whose cut-off shrinks from three thresholds to what the residuals ask for; writes
+/// the last weights into the points, and gives the sums there.
+fn robust<T: Real>(
+    blocks: &mut [Block<T>],
+    start: &Consensus<T>,
+    expected: &Expected<T>,
+    threshold_px: T,
+    known: bool,
+    config: &Config,
+    noise: &edge_noise::Config,
+    azimuth: Option<&Azimuth<T>>,
+) -> Option<(State<T>, Sums<T>)> {
+    let (widest, narrowest) = (threshold_px * T::from_f64(2.0), threshold_px * T::from_f64(0.5));
+    let mut cutoff = threshold_px * T::from_f64(3.0);
+    let prior = Prior::new(blocks, expected, config, noise);
+    let e = unit(&start.e)?;
+    let (b1, b2) = basis(&e);
+    let k = T::one() - if known { expected.cos } else { start.c };
+    let mut at = State { e, k, mean: means(blocks, &b1, &b2), nearby: 0 };
+    // A part of the points brings the cone near; all of them make the end.
+    let mut every = blocks.len().div_ceil(PART).max(1);
+    for _ in 0..ROBUST {
+        let (b1, b2) = basis(&at.e);
+        let weights = Weights::Tukey { cutoff2: cutoff * cutoff, every };
+        let sums = pass(blocks, &at.e, &b1, &b2, at.k, at.mean, &weights, azimuth);
+        let free = if known { None } else { sums.step(at.mean, prior.as_ref(), at.c()) };
+        let step = match free {
+            Some(step) => step,
+            None => sums.step_known(at.mean)?,
+        };
+        let size = at.step(&b1, &b2, step, &sums)?;
+        at.k = clamp(at.k);
+        let spread = (sums.cost / sums.weight.max(T::from_f64(1e-20))).sqrt() * T::from_f64(1.2);
+        let next = (spread * T::from_f64(TUKEY)).max(narrowest).min(widest);
+        // Over all points a step leaves a small part of itself to the next; over some of them it is as good as they are.
+        let small = T::from_f64(if every == 1 { 5e-4 } else { 1e-4 });
+        let settled = (next - cutoff).abs() < cutoff * T::from_f64(0.05) && size < small * at.sin();
+        cutoff = next;
+        // All points and the last digits come with the weights kept.
+        if settled {
+            break;
+        }
+        if size < T::from_f64(1e-3) * at.sin() {
+            every = 1;
+        }
+    }
+    let (b1, b2) = basis(&at.e);
+    let weights = Weights::Last { cutoff2: cutoff * cutoff };
+    let last = pass(blocks, &at.e, &b1, &b2, at.k, at.mean, &weights, azimuth);
+    at.nearby = last.nearby.to_i32() as u32;
+    (last.weight > T::from_f64(3.0)).then_some((at, last))
+}
+
+/// Iterations with the weights kept, to the end, and the normal equations there with the means they are about. `None`
+/// when the points do not determine the cone: for a free half-angle, when the arc is too short. `first`: the sums at the
+/// start, where they are known.
+fn settle<T: Real>(
+    blocks: &mut [Block<T>],
+    start: State<T>,
+    mut first: Option<Sums<T>>,
+    free: bool,
+    azimuth: Option<&Azimuth<T>>,
+) -> Option<(State<T>, [T; 2], Sums<T>)> {
+    let mut at = start;
+    let mut end = None;
+    for _ in 0..SETTLE {
+        let (b1, b2) = basis(&at.e);
+        let mean = at.mean;
+        let known = first.take();
+        let mut sums = known.unwrap_or_else(|| pass(blocks, &at.e, &b1, &b2, at.k, mean, &Weights::Kept, azimuth));
+        let step = if free { sums.step(mean, None, at.c())? } else { sums.step_known(mean)? };
+        sums.cost = (sums.cost - sums.gain(mean, step)).max(T::ZERO);
+        let size = at.step(&b1, &b2, step, &sums)?;
+        // 20° from the robust solution is another cone.
+        if !(at.k > T::ZERO && at.k < T::from_f64(2.0)) || at.e.dot(&start.e) < T::from_f64(0.94) {
+            return None;
+        }
+        end = Some((at, mean, sums));
+        // Convergence is quadratic: after a step this small nothing is left, and the sums are those of the end.
+        if size * size < T::EPSILON * T::from_f64(2.0) * at.sin() {
+            break;
+        }
+    }
+    end
+}
+
+/// 1 − cos within its ends.
+fn clamp<T: Real>(k: T) -> T {
+    k.max(T::from_f64(1e-9)).min(T::from_f64(2.0 - 1e-6))
+}
+
+/// The expected half-angle as a row of the normal equations.
+struct Prior<T> {
+    cos: T,
+    weight: T,
+}
+
+impl<T: Real> Prior<T> {
+    /// Weighed so that an edge counts for as many points as it has independent errors: one in two correlation lengths.
+    fn new(blocks: &[Block<T>], expected: &Expected<T>, config: &Config, noise: &edge_noise::Config) -> Option<Self> {
+        if expected.free || config.half_angle == HalfAngle::Free {
+            return None;
+        }
+        let (mut points, mut arc) = (T::ZERO, T::ZERO);
+        for block in blocks {
+            points += sum(&block.weight);
+            arc += sum(&block.step_px);
+        }
+        let correlation = T::from_f64(2.0 * noise.correlation_px);
+        let each =
+            if correlation > T::ZERO { (points * correlation / arc.max(correlation)).max(T::one()) } else { T::one() };
+        let sigma = T::from_f64(noise.sigma_px);
+        let floor = expected.sin * T::from_f64(1e-6);
+        let sigma_c = expected.sigma_cos.max(floor);
+        Some(Self { cos: expected.cos, weight: sigma * sigma * each / (sigma_c * sigma_c) })
+    }
+}
+
+/// Sums of one pass over the points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sums<T> {
+    /// Upper triangle of Σ w h hᵀ.
+    pub(crate) n: [T; 6],
+    g: [T; 3],
+    /// Σ of the robust weights, and of the squared distances times them, px².
+    pub(crate) weight: T,
+    pub(crate) cost: T,
+    /// Points that Tukey's cut-off leaves out although they lie within three times it; counted by the last pass only.
+    nearby: T,
+}
+
+impl<T: Real> Sums<T> {
+    /// By how much a step lowers the cost, to the second order.
+    fn gain(&self, mean: [T; 2], ([d1, d2], dc): ([T; 2], T)) -> T {
+        let [g1, g2, g3] = self.g;
+        g1 * d1 + g2 * d2 + g3 * (dc - mean[0] * d1 - mean[1] * d2)
+    }
+
+    /// The step (δ₁₂, δc) with the half-angle free or under its prior.
+    fn step(&self, mean: [T; 2], prior: Option<&Prior<T>>, c: T) -> Option<([T; 2], T)> {
+        let [mut n11, mut n12, mut n13, mut n22, mut n23, mut n33] = self.n;
+        let [mut g1, mut g2, mut g3] = self.g;
+        if let Some(p) = prior {
+            // Row [m, 1] on (δ₁₂, δc') with the value c₀ − c.
+            let (w, [m1, m2], v) = (p.weight, mean, p.cos - c);
+            n11 += w * m1 * m1;
+            n12 += w * m1 * m2;
+            n13 += w * m1;
+            n22 += w * m2 * m2;
+            n23 += w * m2;
+            n33 += w;
+            g1 += w * m1 * v;
+            g2 += w * m2 * v;
+            g3 += w * v;
+        }
+        let p = invert_spd3(&[n11, n12, n13, n22, n23, n33])?;
+        let d = p * V3::new(g1, g2, g3);
+        Some(([d.x, d.y], d.z + mean[0] * d.x + mean[1] * d.y))
+    }
+
+    /// The step with the half-angle held: δc = 0, that is δc' = −m·δ₁₂.
+    fn step_known(&self, mean: [T; 2]) -> Option<([T; 2], T)> {
+        let [a, b, d] = invert_spd2(self.known(mean))?;
+        let [g1, g2, g3] = self.g;
+        let (g1, g2) = (g1 - mean[0] * g3, g2 - mean[1] * g3);
+        Some(([a * g1 + b * g2, b * g1 + d * g2], T::ZERO))
+    }
+
+    /// Σ w (Bᵀs)(Bᵀs)ᵀ, upper triangle.
+    pub(crate) fn known(&self, [m1, m2]: [T; 2]) -> [T; 3] {
+        let [n11, n12, n13, n22, n23, n33] = self.n;
+        // h₁₂ + m times (h₃ = −1): Bᵀs = h₁₂ − m h₃.
+        [
+            n11 - m1 * n13 - m1 * n13 + m1 * m1 * n33,
+            n12 - m1 * n23 - m2 * n13 + m1 * m2 * n33,
+            n22 - m2 * n23 - m2 * n23 + m2 * m2 * n33,
+        ]
+    }
+
+    /// Weighted RMS of |g|: by how much cos α changes when every point moves by one pixel across the limb, 1/px.
+    pub(crate) fn cos_per_px(&self) -> T {
+        (self.weight / self.n[5].max(T::from_f64(1e-20))).sqrt()
+    }
+
+    /// With the normal equations of a part of the points.
+    pub(crate) fn of_part(&self, n: [T; 6]) -> Self {
+        Self { n, ..*self }
+    }
+
+    /// The means of Bᵀs, from the sums about the old ones.
+    pub(crate) fn means(&self, [m1, m2]: [T; 2]) -> [T; 2] {
+        let w = self.n[5].max(T::from_f64(1e-20));
+        [m1 - self.n[2] / w, m2 - self.n[4] / w]
+    }
+}
+
+/// Means of Bᵀs over every point that may count.
+pub(crate) fn means<T: Real>(blocks: &[Block<T>], b1: &V3<T>, b2: &V3<T>) -> [T; 2] {
+    let (mut n, mut x, mut y) = ([T::ZERO; LANES], [T::ZERO; LANES], [T::ZERO; LANES]);
+    for b in blocks {
+        for l in 0..LANES {
+            let w = b.weight[l];
+            n[l] += w;
+            x[l] += w * (b.s[0][l] * b1.x + b.s[1][l] * b1.y + b.s[2][l] * b1.z);
+            y[l] += w * (b.s[0][l] * b2.x + b.s[1][l] * b2.y + b.s[2][l] * b2.z);
+        }
+    }
+    let n = sum(&n).max(T::one());
+    [sum(&x) / n, sum(&y) / n]
+}
+
+/// What a pass weighs the points by, besides their distance in pixels.
+pub(crate) enum Weights<T> {
+    /// The weights that they have.
+    Kept,
+    /// Tukey's, on every so many blocks, which stand for all.
+    Tukey { cutoff2: T, every: usize },
+    /// Tukey's, which the points then keep.
+    Last { cutoff2: T },
+}
+
+/// One pass: sums at (e, k), about `mean`.
+pub(crate) fn pass<T: Real>(
+    blocks: &mut [Block<T>],
+    e: &V3<T>,
+    b1: &V3<T>,
+    b2: &V3<T>,
+    k: T,
+    mean: [T; 2],
+    weights: &Weights<T>,
+    azimuth: Option<&Azimuth<T>>,
+) -> Sums<T> {
+    let (inverse, every, last) = match *weights {
+        Weights::Kept => (T::ZERO, 1, false),
+        Weights::Tukey { cutoff2, every } => (T::one() / cutoff2, every, false),
+        Weights::Last { cutoff2 } => (T::one() / cutoff2, 1, true),
+    };
+    let mut totals = [[T::ZERO; HALF]; 11];
+    let mut nearby = [T::ZERO; LANES];
+    let half = T::from_f64(0.5);
+    let east_along = azimuth.map_or(T::ZERO, |a| a.east.dot(e));
+    for b in blocks.iter_mut().step_by(every.max(1)) {
+        let grad = b.gradient(e);
+        let mut target = [-k; LANES];
+        if let Some(a) = azimuth {
+            for l in 0..LANES {
+                let s = [b.s[0][l], b.s[1][l], b.s[2][l]];
+                let d = s[0] * e.x + s[1] * e.y + s[2] * e.z;
+                target[l] += a.offset(s, d, east_along);
+            }
+        }
+        let [mut robust, mut parts] = [[T::ZERO; LANES]; 2];
+        for l in 0..HALF {
+            let mut terms = |l: usize| {
+                let (x, y, z) = (b.s[0][l] - e.x, b.s[1][l] - e.y, b.s[2][l] - e.z);
+                let r = target[l] + (x * x + y * y + z * z) * half;
+                let g2 = (grad[0][l] * grad[0][l] + grad[1][l] * grad[1][l]).max(T::from_f64(1e-20));
+                let per = T::one() / g2;
+                let d2 = r * r * per;
+                parts[l] = d2 * inverse;
+                let u = (T::one() - parts[l]).max(T::ZERO);
+                robust[l] = b.weight[l] * u * u;
+                let w = robust[l] * per;
+                let h1 = x * b1.x + y * b1.y + z * b1.z - mean[0];
+                let h2 = x * b2.x + y * b2.y + z * b2.z - mean[1];
+                let (w1, w2) = (w * h1, w * h2);
+                [w1 * h1, w1 * h2, w1, w2 * h2, w2, w, w1 * r, w2 * r, w * r, robust[l], robust[l] * d2]
+            };
+            let (one, other) = (terms(l), terms(l + HALF));
+            for (total, (a, b)) in totals.iter_mut().zip(one.iter().zip(&other)) {
+                total[l] += *a + *b;
+            }
+        }
+        if last {
+            for l in 0..LANES {
+                let beside = parts[l] > T::one() && parts[l] <= T::from_f64(9.0);
+                nearby[l] += if beside { b.weight[l] } else { T::ZERO };
+            }
+            b.weight = robust;
+        }
+    }
+    let times = T::from_i32(every as i32);
+    let [n11, n12, n13, n22, n23, n33, g1, g2, g3, weight, cost] =
+        totals.map(|[a, b, c, d]| ((a + b) + (c + d)) * times);
+    Sums { n: [n11, n12, -n13, n22, -n23, n33], g: [g1, g2, -g3], weight, cost, nearby: sum(&nearby) * times }
+}
+
+/// Inverse of the free normal equations about `mean`.
+pub(crate) fn inverse<T: Real>(sums: &Sums<T>) -> Option<M3<T>> {
+    invert_spd3(&sums.n)
+}

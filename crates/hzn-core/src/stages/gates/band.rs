@@ -1,0 +1,116 @@
+//! A band has sky on both sides: a ring, a streak and a window's frame. What lies inside a limb is the body.
+
+use super::sky;
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::geometry::block::Block;
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::UnitVec3;
+use crate::image::Pixels;
+use crate::model::observer::Observer;
+use crate::stages::contour::Scene;
+
+/// Places that are looked at from the limb inwards to the border of the region, evenly.
+const PLACES: i32 = 16;
+/// A look that ends nearer than this says nothing, pixels.
+const SHORTEST_PX: i32 = 32;
+/// The looks end before the far side of the body's disc, at this part of its diameter.
+const ACROSS: f64 = 0.8;
+/// The limb's own step is read so far to each side, and the far edge of a band likewise, pixels.
+const ASIDE_PX: i32 = 6;
+/// Of what lies behind a band so much must be sky; of a body nearly nothing is.
+const FOR_GOOD: [usize; 2] = [2, 3];
+/// Of the limb's step so much stands above the sky at the most where there is sky again: blur and stray light.
+const SKY_PART: f64 = 0.1;
+
+/// The part of the looks inwards that come back to the sky across a second edge, at least `step` times as high as the limb,
+/// 0 to 1. A terminator fades and is no edge. `disc_px` is the diameter of the body's disc.
+pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
+    e: &V3<T>,
+    blocks: &[Block<T>],
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+    sky: &sky::Sky<T>,
+    disc_px: T,
+    step: T,
+) -> T {
+    let (mut looks, mut bands) = (0, 0);
+    for (block, lane) in super::inliers(blocks, super::LOOKS) {
+        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
+        let [gu, gv] = block.gradient_at(lane, e);
+        let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+        let (du, dv) = (gu / norm, gv / norm);
+        let at = |px: i32| {
+            let (x, y) = ((from.u + du * T::from_i32(px)).to_i32(), (from.v + dv * T::from_i32(px)).to_i32());
+            let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
+            scene.region.contains(x, y).then_some((x, y))
+        };
+        let seen = |px: i32| {
+            at(px).filter(|&(x, y)| !scene.region.masked(x, y)).map(|(x, y)| T::from_i32(scene.brightness(x, y).into()))
+        };
+        let most = i32::from(scene.region.width()) + i32::from(scene.region.height());
+        let end = inside(&at, most.min((disc_px * T::from_f64(ACROSS)).to_i32()));
+        if end < SHORTEST_PX {
+            continue;
+        }
+        // The brightest: a band may end before that.
+        let lit = (1..=ASIDE_PX).filter_map(seen).fold(T::ZERO, |a, b| a.max(b));
+        let limb = (lit - sky.median).max(T::one());
+        let dark = (sky.spread * T::from_f64(3.0)).max(limb * T::from_f64(SKY_PART)) + sky.median;
+        looks += 1;
+        let place = |k: i32| ASIDE_PX + (end - ASIDE_PX) * k / PLACES;
+        let mut is_sky = [None; PLACES as usize];
+        for (k, cell) in (1..=PLACES).zip(is_sky.iter_mut()) {
+            *cell = seen(place(k)).map(|b| b < dark);
+        }
+        let Some(back) = back_for_good(&is_sky) else { continue };
+        // The far edge is where half of the band's brightness is left: behind the last place that has more.
+        let above = |px: i32| seen(px).map_or(T::ZERO, |b| b - sky.median);
+        let passed = |k: i32| above(if k == 0 { ASIDE_PX } else { place(k) });
+        let level = (0..=back as i32).fold(limb, |most, k| most.max(passed(k))) * T::from_f64(0.5);
+        let last = (0..=back as i32).rev().find(|&k| passed(k) >= level).unwrap_or(0);
+        let (mut near, mut far) = (place(last), place(last + 1));
+        while far - near > 1 {
+            let middle = (near + far) / 2;
+            if seen(middle).is_some_and(|b| b - sky.median < level) { far = middle } else { near = middle }
+        }
+        // Of three pixels, for the noise.
+        let edge = |px: i32| {
+            let (mut sum, mut count) = (T::ZERO, 0);
+            for b in [px - 1, px, px + 1].into_iter().filter_map(seen) {
+                sum += b;
+                count += 1;
+            }
+            if count > 0 { sum / T::from_i32(count) } else { sky.median }
+        };
+        // A narrow band is brightest less than so far from its far edge.
+        let bright = ((near - ASIDE_PX).max(1)..=near).map(edge).fold(T::ZERO, |a, b| a.max(b));
+        bands += i32::from(bright - edge(far + ASIDE_PX) >= limb * step);
+    }
+    T::from_i32(bands) / T::from_i32(looks.max(1))
+}
+
+/// How far the region reaches from the limb inwards, pixels, by halving; at most `most`.
+fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
+    let (mut within, mut beyond) = (0, most);
+    while beyond - within > 4 {
+        let middle = (within + beyond) / 2;
+        if at(middle).is_some() { within = middle } else { beyond = middle }
+    }
+    within
+}
+
+/// The first place that is sky and from which on most of what is seen is, of three places or more.
+fn back_for_good(is_sky: &[Option<bool>]) -> Option<usize> {
+    let (mut first, mut sky, mut all) = (None, 0, 0);
+    // From the far end, so that each place adds itself to what lies behind it.
+    for (k, seen) in is_sky.iter().enumerate().rev() {
+        let Some(is_sky) = *seen else { continue };
+        all += 1;
+        sky += usize::from(is_sky);
+        if is_sky && all >= 3 && sky * FOR_GOOD[1] >= all * FOR_GOOD[0] {
+            first = Some(k);
+        }
+    }
+    first
+}

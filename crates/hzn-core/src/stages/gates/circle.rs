@@ -1,0 +1,138 @@
+//! The rival circle: a flare is a circle in the image, a limb is one only on the sphere.
+
+use super::shape::{Place, Shape};
+use crate::base::linalg::{V3, invert_spd3};
+use crate::base::real::Real;
+
+/// Gauss-Newton steps; from a circle through three of the points two are enough.
+const STEPS: usize = 2;
+
+/// A circle through `at` with the unit normal `n` towards its centre and the curvature `kappa`; 0 is a straight line.
+struct Circle<T> {
+    at: [T; 2],
+    n: [T; 2],
+    kappa: T,
+}
+
+impl<T: Real> Circle<T> {
+    /// Through three points, about the first.
+    fn through(p: [T; 2], a: [T; 2], b: [T; 2]) -> Option<Self> {
+        let (a, b) = ([a[0] - p[0], a[1] - p[1]], [b[0] - p[0], b[1] - p[1]]);
+        let (aa, bb) = (a[0] * a[0] + a[1] * a[1], b[0] * b[0] + b[1] * b[1]);
+        // 2 n·q = κ |q|² for both, so n is across |b|² a − |a|² b.
+        let along = [bb * a[0] - aa * b[0], bb * a[1] - aa * b[1]];
+        let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
+        if !(length > T::from_f64(1e-20)) {
+            return None;
+        }
+        let n = [-along[1] / length, along[0] / length];
+        let kappa = (n[0] * (a[0] + b[0]) + n[1] * (a[1] + b[1])) * T::from_f64(2.0) / (aa + bb);
+        Some(Self { at: p, n, kappa })
+    }
+
+    /// The point as seen from `at` and its signed distance: (2 n·q − κ|q|²)/(1 + √(1 − 2κ n·q + κ²|q|²)), which holds for
+    /// a straight line, too.
+    fn distance(&self, p: [T; 2]) -> (T, T, T, T) {
+        let q = [p[0] - self.at[0], p[1] - self.at[1]];
+        let (along, q2) = (self.n[0] * q[0] + self.n[1] * q[1], q[0] * q[0] + q[1] * q[1]);
+        let one = T::one();
+        let root = (one - (along + along) * self.kappa + self.kappa * self.kappa * q2).max(T::ZERO).sqrt();
+        let d = (along + along - self.kappa * q2) / (one + root);
+        (d, along, self.n[0] * q[1] - self.n[1] * q[0], q2)
+    }
+
+    /// One Gauss-Newton step.
+    fn step(&mut self, points: impl Iterator<Item = ([T; 2], T)>) -> Option<()> {
+        let (mut n, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
+        for (p, w) in points {
+            let (d, along, across, q2) = self.distance(p);
+            // ∂d by a shift along n, a turn, and the curvature.
+            let h = [self.kappa * along - T::one(), across, q2 * T::from_f64(-0.5)];
+            let mut k = 0;
+            for i in 0..3 {
+                g[i] += w * h[i] * d;
+                for j in i..3 {
+                    n[k] += w * h[i] * h[j];
+                    k += 1;
+                }
+            }
+        }
+        let step = invert_spd3(&n)? * V3::new(-g[0], -g[1], -g[2]);
+        let [nx, ny] = self.n;
+        self.at = [self.at[0] + nx * step.x, self.at[1] + ny * step.x];
+        let turned = [nx - ny * step.y, ny + nx * step.y];
+        let length = (turned[0] * turned[0] + turned[1] * turned[1]).sqrt();
+        self.n = [turned[0] / length, turned[1] / length];
+        self.kappa += step.z;
+        Some(())
+    }
+}
+
+/// Weighted RMS distance of the points from the circle that fits them best, in pixels; `None` where none is found.
+pub(super) fn rms<T: Real>(shape: &Shape<T>) -> Option<T> {
+    let count = shape.len();
+    let at = |i: usize| shape.get(i).map(|p: &Place<T>| p.at);
+    let (first, middle, last) = (at(count / 6)?, at(count / 2)?, at(count - 1 - count / 6)?);
+    // Lengths in units of the distance between the ends, about the middle: single precision keeps its digits.
+    let (dx, dy) = (last[0] - first[0], last[1] - first[1]);
+    let (ex, ey) = (first[0] - middle[0], first[1] - middle[1]);
+    let unit = (dx * dx + dy * dy + ex * ex + ey * ey).sqrt();
+    if !(unit > T::one()) {
+        return None;
+    }
+    let scaled = |p: [T; 2]| [(p[0] - middle[0]) / unit, (p[1] - middle[1]) / unit];
+    let mut circle = Circle::through([T::ZERO; 2], scaled(first), scaled(last))?;
+    for _ in 0..STEPS {
+        circle.step(shape.iter().map(|p| (scaled(p.at), p.w)))?;
+    }
+    let (mut cost, mut weight) = (T::ZERO, T::ZERO);
+    for p in shape {
+        let (d, ..) = circle.distance(scaled(p.at));
+        cost += p.w * d * d;
+        weight += p.w;
+    }
+    let rms = (cost / weight.max(T::from_f64(1e-20))).sqrt() * unit;
+    rms.is_finite().then_some(rms)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn shape<T: Real>(points: impl Iterator<Item = [f64; 2]>) -> Shape<T> {
+        let place = |p: [f64; 2]| Place { at: p.map(T::from_f64), r: T::ZERO, w: T::one() };
+        points.map(place).collect()
+    }
+
+    proptest! {
+        /// Points of a circle of any size and place are on it, in both precisions; a straight line is a circle.
+        #[test]
+        fn circles_fit_circles(x in -500.0..2500.0f64, y in -500.0..2500.0f64, radius in 20.0..30_000.0f64,
+                               from in 0.0..6.2f64, extent in 60.0..900.0f64) {
+            let turn = (extent / radius).min(6.2) / 127.0;
+            let at = |i: usize| {
+                let (s, c) = libm::sincos(from + turn * i as f64);
+                // The arc stays about (x, y), however large the circle.
+                let (s0, c0) = libm::sincos(from);
+                [x + radius * (c - c0), y + radius * (s - s0)]
+            };
+            prop_assert!(rms::<f64>(&shape((0..MOST).map(at))).unwrap() < 1e-6);
+            prop_assert!(rms::<f32>(&shape((0..MOST).map(at))).unwrap() < 0.01);
+        }
+    }
+
+    const MOST: usize = super::super::shape::MOST;
+
+    /// What is no circle is not: an ellipse of ten to nine, by about the size of the difference.
+    #[test]
+    fn an_ellipse_is_no_circle() {
+        let at = |i: usize| {
+            let (s, c) = libm::sincos(i as f64 / 20.0);
+            [500.0 + 100.0 * c, 400.0 + 90.0 * s]
+        };
+        let found = rms::<f32>(&shape((0..MOST).map(at))).unwrap();
+        assert!((2.0..5.0).contains(&found), "{found}");
+        assert!(rms::<f32>(&shape((0..2).map(at))).is_none());
+    }
+}

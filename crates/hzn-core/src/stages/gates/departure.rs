@@ -1,0 +1,218 @@
+//! An edge that goes on smoothly next to the fitted cone counts against it: a limb does not bend away from itself.
+
+use super::Config;
+use super::shape::Curve;
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::UnitVec3;
+use crate::image::Pixels;
+use crate::model::observer::Observer;
+use crate::stages::contour::Scene;
+
+/// Length of edge whose points are taken together, pixels: a direction is then known to a few degrees.
+const BOX_PX: f64 = 16.0;
+/// Most boxes that are looked at beyond each end of the inliers.
+const BOXES: usize = 24;
+/// Boxes beyond an end that tell whether the edge keeps its contrast there.
+const NEAR: usize = 2;
+/// Gaps up to this length do not end a run of inliers, pixels.
+const GAP_PX: f64 = 12.0;
+/// The edge's contrast is read so far to each side, pixels.
+const ASIDE_PX: i32 = 3;
+
+/// The longest run of inliers: its first and last point and its length in pixels.
+struct Run<T> {
+    first: usize,
+    last: usize,
+    length: T,
+}
+
+fn longest<T: Real>(blocks: &[Block<T>]) -> Option<Run<T>> {
+    let mut best: Option<Run<T>> = None;
+    let mut now: Option<Run<T>> = None;
+    let mut gap = T::ZERO;
+    for (number, block) in blocks.iter().enumerate() {
+        for lane in 0..LANES {
+            let place = number * LANES + lane;
+            let step = block.step_px[lane];
+            gap += step;
+            if !(block.weight[lane] > T::ZERO) {
+                continue;
+            }
+            now = match now.take() {
+                Some(run) if !(gap > T::from_f64(GAP_PX).max(step)) => {
+                    Some(Run { last: place, length: run.length + gap, ..run })
+                }
+                ended => {
+                    best = longer(best, ended);
+                    Some(Run { first: place, last: place, length: T::ZERO })
+                }
+            };
+            gap = T::ZERO;
+        }
+    }
+    longer(best, now)
+}
+
+fn longer<T: Real>(a: Option<Run<T>>, b: Option<Run<T>>) -> Option<Run<T>> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b.length > a.length { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// A stretch of edge: where its middle is, and how far off the cone.
+#[derive(Clone, Copy)]
+struct Stretch<T> {
+    at: [T; 2],
+    off: T,
+    length: T,
+    points: i32,
+}
+
+/// What there is to look at.
+struct Edge<'a, 'b, T, P, O> {
+    blocks: &'a [Block<T>],
+    points: usize,
+    curve: &'a Curve<T>,
+    camera: &'a Camera<T>,
+    scene: &'a Scene<'b, T, P, O>,
+}
+
+impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
+    fn block(&self, place: usize) -> Option<(&Block<T>, usize)> {
+        (place < self.points).then_some(())?;
+        Some((self.blocks.get(place / LANES)?, place % LANES))
+    }
+
+    /// The points from `place` on, in the direction `ahead`, over a box; and the place after them.
+    fn stretch(&self, place: &mut Option<usize>, ahead: bool) -> Option<Stretch<T>> {
+        let mut sum = Stretch { at: [T::ZERO; 2], off: T::ZERO, length: T::ZERO, points: 0 };
+        while sum.length < T::from_f64(BOX_PX) || sum.points == 0 {
+            let here = (*place)?;
+            let Some((block, lane)) = self.block(here) else { break };
+            let Some(at) = self.camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { break };
+            // The step to the point before in the order of the walk.
+            let step = if ahead { Some((block, lane)) } else { self.block(here + 1) };
+            sum.length += step.map_or(T::ZERO, |(b, l)| b.step_px[l]);
+            sum.at = [sum.at[0] + at.u, sum.at[1] + at.v];
+            sum.off += self.curve.distance(block, lane);
+            sum.points += 1;
+            *place = if ahead { Some(here + 1) } else { here.checked_sub(1) };
+        }
+        if sum.points == 0 {
+            return None;
+        }
+        let n = T::from_i32(sum.points);
+        Some(Stretch { at: sum.at.map(|x| x / n), off: sum.off / n, ..sum })
+    }
+
+    /// Difference in brightness across the edge at `at`, whose direction is (dx, dy), counts.
+    fn contrast(&self, at: [T; 2], [dx, dy]: [T; 2]) -> Option<i32> {
+        let norm = (dx * dx + dy * dy).sqrt().max(T::from_f64(1e-6));
+        let side = |px: i32| {
+            let half = T::from_f64(0.5);
+            let x = (at[0] - dy / norm * T::from_i32(px) + half).to_i32();
+            let y = (at[1] + dx / norm * T::from_i32(px) + half).to_i32();
+            let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
+            let counts = self.scene.region.contains(x, y) && !self.scene.region.masked(x, y);
+            counts.then(|| i32::from(self.scene.brightness(x, y)))
+        };
+        Some((side(ASIDE_PX)? - side(-ASIDE_PX)?).abs())
+    }
+}
+
+/// Whether the edge goes on beside the cone, where it keeps its contrast: smoothly over more than `select.max_departure` of
+/// the longest run of inliers, or at all, where less than `select.min_support_abrupt` of the limb in view is edge.
+/// `noise_px` is the noise from point to point, `support` the part of the limb in view that is edge.
+///
+/// Smooth is a turn from box to box of less than `select.departure_turn_deg` and what the noise of the boxes' places makes.
+pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
+    blocks: &[Block<T>],
+    points: u32,
+    curve: &Curve<T>,
+    noise_px: T,
+    support: T,
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+    config: &Config,
+) -> bool {
+    let edge = Edge { blocks, points: points as usize, curve, camera, scene };
+    let Some(run) = longest(blocks) else { return false };
+    let off_cone = noise_px.max(T::from_f64(config.rival_floor_px)) * T::from_f64(3.0);
+    let (mut away, mut smooth, mut near) = (T::ZERO, Mean::default(), Mean::default());
+    let turn = T::from_f64(config.departure_turn_deg.to_radians());
+    for ahead in [false, true] {
+        let end = if ahead { run.last } else { run.first };
+        // Two boxes within the run give the direction in which it ends.
+        let mut place = Some(end);
+        let (Some(mut before), Some(further)) = (edge.stretch(&mut place, !ahead), edge.stretch(&mut place, !ahead))
+        else {
+            continue;
+        };
+        let mut heading = [before.at[0] - further.at[0], before.at[1] - further.at[1]];
+        let mut place = if ahead { Some(end + 1) } else { end.checked_sub(1) };
+        let mut is_smooth = true;
+        for number in 0..BOXES {
+            let Some(now) = edge.stretch(&mut place, ahead) else { break };
+            let step = [now.at[0] - before.at[0], now.at[1] - before.at[1]];
+            let cross = heading[0] * step[1] - heading[1] * step[0];
+            let dot = heading[0] * step[0] + heading[1] * step[1];
+            // Means of n points, two differences of them: 4 √6 σ/√n over the box.
+            let n = T::from_i32(now.points.max(1)).sqrt();
+            let length = (step[0] * step[0] + step[1] * step[1]).sqrt().max(T::one());
+            let blur = noise_px * T::from_f64(4.0 * 2.449_489_743) / (n * length);
+            is_smooth = is_smooth && cross.abs().atan2(dot) <= turn + blur;
+            if now.off.abs() > off_cone {
+                let contrast = edge.contrast(now.at, step);
+                if number < NEAR {
+                    near.add(contrast);
+                }
+                if is_smooth {
+                    away += now.length;
+                    smooth.add(contrast);
+                }
+            }
+            if !is_smooth && number >= NEAR {
+                break;
+            }
+            (before, heading) = (now, step);
+        }
+    }
+    let is_long =
+        away >= T::from_f64(2.0 * BOX_PX) && away > run.length.max(T::one()) * T::from_f64(config.max_departure);
+    let is_abrupt = near.count > 0 && support < T::from_f64(config.min_support_abrupt);
+    if !(is_long || is_abrupt) {
+        return false;
+    }
+    let mut on_cone = Mean::default();
+    for (block, lane) in super::inliers(blocks, super::LOOKS) {
+        let [gu, gv] = block.gradient_at(lane, curve.axis());
+        if let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) {
+            on_cone.add(edge.contrast([at.u, at.v], [-gv, gu]));
+        }
+    }
+    // A terminator fades, and the rim of something else does not.
+    let kept = |beside: &Mean| {
+        beside.count > 0 && beside.mean::<T>() >= on_cone.mean::<T>() * T::from_f64(config.departure_contrast)
+    };
+    (is_long && kept(&smooth)) || (is_abrupt && kept(&near))
+}
+
+/// Contrasts in counts.
+#[derive(Default)]
+struct Mean {
+    sum: i32,
+    count: i32,
+}
+
+impl Mean {
+    fn add(&mut self, seen: Option<i32>) {
+        self.sum += seen.unwrap_or(0);
+        self.count += i32::from(seen.is_some());
+    }
+    fn mean<T: Real>(&self) -> T {
+        T::from_i32(self.sum) / T::from_i32(self.count.max(1))
+    }
+}

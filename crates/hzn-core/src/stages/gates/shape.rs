@@ -1,0 +1,135 @@
+//! The inliers as points of the picture with their residuals: what the rival shapes are fitted to.
+
+use crate::base::linalg::V3;
+use crate::base::median;
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::Camera;
+use crate::geometry::cone::Azimuth;
+use crate::geometry::frames::UnitVec3;
+use crate::stages::fit::Fit;
+
+/// Most inliers that are looked at, evenly along the edge: the ratio of two residuals is then known to some 10 %.
+pub(super) const MOST: usize = 128;
+
+/// An inlier.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<T> {
+    /// Image point, pixels.
+    pub(super) at: [T; 2],
+    /// Signed distance from the fitted cone in pixels.
+    pub(super) r: T,
+    /// The weight that it has in the fit.
+    pub(super) w: T,
+}
+
+/// Inliers in the order of the edge.
+pub(super) type Shape<T> = heapless::Vec<Place<T>, MOST>;
+
+/// The cone that residuals are measured from.
+pub(super) struct Curve<T> {
+    e: V3<T>,
+    k: T,
+    azimuth: Option<Azimuth<T>>,
+    east_along: T,
+}
+
+impl<T: Real> Curve<T> {
+    pub(super) fn new(fit: &Fit<T>, azimuth: Option<Azimuth<T>>) -> Self {
+        let east_along = azimuth.as_ref().map_or(T::ZERO, |a| a.east.dot(&fit.e));
+        Self { e: fit.e, k: fit.k, azimuth, east_along }
+    }
+    /// The axis of the cone.
+    pub(super) fn axis(&self) -> &V3<T> {
+        &self.e
+    }
+    /// Signed distance of a point in pixels, positive outside of the cone.
+    pub(super) fn distance(&self, block: &Block<T>, lane: usize) -> T {
+        let s = block.ray(lane);
+        let off = s - self.e;
+        // 1 − s·e, as in `estimate`: it keeps its digits for a small disc.
+        let mut r = off.dot(&off) * T::from_f64(0.5) - self.k;
+        if let Some(a) = &self.azimuth {
+            r += a.offset([s.x, s.y, s.z], s.dot(&self.e), self.east_along);
+        }
+        let [gu, gv] = block.gradient_at(lane, &self.e);
+        r / (gu * gu + gv * gv).max(T::from_f64(1e-20)).sqrt()
+    }
+}
+
+/// The inliers, thinned to [`MOST`].
+pub(super) fn inliers<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, curve: &Curve<T>, camera: &Camera<T>) -> Shape<T> {
+    let every = fit.inliers.div_ceil(MOST as u32).max(1);
+    let (mut shape, mut passed) = (Shape::new(), every / 2);
+    for block in blocks {
+        for lane in 0..LANES {
+            let w = block.weight[lane];
+            if !(w > T::ZERO) {
+                continue;
+            }
+            passed += 1;
+            if passed < every {
+                continue;
+            }
+            passed = 0;
+            let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
+            if shape.push(Place { at: [at.u, at.v], r: curve.distance(block, lane), w }).is_err() {
+                return shape;
+            }
+        }
+    }
+    shape
+}
+
+/// Weighted RMS of the residuals in pixels.
+pub(super) fn rms<T: Real>(shape: &Shape<T>) -> T {
+    let (mut cost, mut weight) = (T::ZERO, T::ZERO);
+    for p in shape {
+        cost += p.w * p.r * p.r;
+        weight += p.w;
+    }
+    (cost / weight.max(T::from_f64(1e-20))).sqrt()
+}
+
+/// Noise from point to point in pixels, which does not see a misfit: the median of |r_i − (r_{i−1} + r_{i+1})/2|, which
+/// is 0.6745 √1.5 times the sigma of independent errors.
+pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
+    let half = T::from_f64(0.5);
+    let mut all = heapless::Vec::<T, MOST>::new();
+    let mut most = T::ZERO;
+    for w in shape.windows(3) {
+        if let [a, b, c] = w {
+            let second = (b.r - (a.r + c.r) * half).abs();
+            most = most.max(second);
+            let _ = all.push(second);
+        }
+    }
+    median::of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
+}
+
+/// Arc over which the residuals stay alike, in points of the shape: 1 + 2 Σ ρ_k up to the first below 0.05.
+pub(super) fn correlated_points<T: Real>(shape: &Shape<T>) -> T {
+    let products = |lag: usize| {
+        let (mut sum, mut count) = (T::ZERO, 0);
+        for (a, b) in shape.iter().zip(shape.iter().skip(lag)) {
+            sum += a.r * b.r;
+            count += 1;
+        }
+        sum / T::from_i32(count.max(1))
+    };
+    let variance = products(0).max(T::from_f64(1e-20));
+    let mut sum = T::from_f64(0.5);
+    for lag in 1..shape.len() / 2 {
+        let rho = products(lag) / variance;
+        if !(rho > T::from_f64(0.05)) {
+            break;
+        }
+        sum += rho;
+    }
+    sum + sum
+}
+
+/// Residuals that count as independent, 3 at least.
+pub(super) fn independent<T: Real>(shape: &Shape<T>) -> T {
+    (T::from_i32(shape.len() as i32) / correlated_points(shape).max(T::one())).max(T::from_f64(3.0))
+}

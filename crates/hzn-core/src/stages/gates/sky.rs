@@ -1,0 +1,71 @@
+//! What lies beyond the fitted limb: the sky, but for what stands before it.
+
+use crate::base::linalg::V3;
+use crate::base::median;
+use crate::base::real::Real;
+use crate::geometry::block::Block;
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::UnitVec3;
+use crate::image::Pixels;
+use crate::model::observer::Observer;
+use crate::stages::contour::Scene;
+
+/// Distance of the nearest look in pixels; each next is twice as far.
+const NEAREST_PX: f64 = 16.0;
+/// Looks outwards of each inlier.
+const OUTWARDS: usize = 11;
+
+/// The sky beyond a limb.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sky<T> {
+    /// The part of it that is lit, 0 to 1. Air that fades outwards from the limb is sky, however bright it begins.
+    pub(super) lit: T,
+    /// Median of its brightness, and median distance from it, counts.
+    pub(super) median: T,
+    pub(super) spread: T,
+}
+
+/// Looks from the limb outwards to the border of the region.
+pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
+    e: &V3<T>,
+    blocks: &[Block<T>],
+    scene: &Scene<'_, T, P, O>,
+    camera: &Camera<T>,
+) -> Sky<T> {
+    let (mut looks, mut lit) = (0, 0);
+    let mut seen = heapless::Vec::<u16, { super::LOOKS * OUTWARDS }>::new();
+    for (block, lane) in super::inliers(blocks, super::LOOKS) {
+        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
+        let [gu, gv] = block.gradient_at(lane, e);
+        let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+        let mut distance = T::ZERO;
+        let mut fading = Some(u16::MAX);
+        for _ in 0..OUTWARDS {
+            let (x, y) = ((from.u - gu / norm * distance).to_i32(), (from.v - gv / norm * distance).to_i32());
+            let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { break };
+            if !scene.region.contains(x, y) {
+                break;
+            }
+            if !scene.region.masked(x, y) {
+                let brightness = scene.brightness(x, y);
+                fading = fading.filter(|&before| brightness < before).map(|_| brightness);
+                if distance > T::ZERO {
+                    looks += 1;
+                    lit += i32::from(fading.is_none() && brightness >= scene.level);
+                    let _ = seen.push(brightness);
+                }
+            }
+            distance = (distance + distance).max(T::from_f64(NEAREST_PX));
+        }
+    }
+    let middle = median::of_counts(&seen);
+    for b in &mut seen {
+        *b = b.abs_diff(middle);
+    }
+    let spread = median::of_counts(&seen);
+    Sky {
+        lit: T::from_i32(lit) / T::from_i32(looks.max(1)),
+        median: T::from_i32(middle.into()),
+        spread: T::from_i32(spread.max(1).into()),
+    }
+}

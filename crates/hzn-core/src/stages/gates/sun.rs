@@ -1,0 +1,26 @@
+//! The Sun's direction: what it does not light is not seen in its light.
+
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::model::body::Expected;
+
+/// The part of the inliers over which the Sun stands lower than `elevation_deg`, 0 to 1; 0 where its direction is unknown or
+/// the body shines by itself. The normal where the ray s touches the limb is (s cos α − e)/sin α.
+pub(super) fn unlit<T: Real>(e: &V3<T>, c: T, blocks: &[Block<T>], expected: &Expected<T>, elevation_deg: f64) -> T {
+    let Some(sun) = &expected.sun_seen else { return T::ZERO };
+    let sin = (T::one() - c * c).max(T::from_f64(1e-12)).sqrt();
+    let (lowest, _) = T::from_f64(elevation_deg.to_radians()).sin_cos();
+    let along = e.dot(sun);
+    let (mut dark, mut all) = (0, 0);
+    for block in blocks {
+        for lane in 0..LANES {
+            if block.weight[lane] > T::ZERO {
+                all += 1;
+                let high = (block.ray(lane).dot(sun) * c - along) / sin;
+                dark += i32::from(high < lowest);
+            }
+        }
+    }
+    T::from_i32(dark) / T::from_i32(all.max(1))
+}

@@ -1,0 +1,135 @@
+//! How much of a fitted limb lies in the picture.
+
+use crate::base::linalg::{V3, basis};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::UnitVec3;
+use crate::geometry::pixel::ImagePoint;
+use crate::image::region::Region;
+
+/// Length in pixels that the inliers cover along the limb about `e`: a step from one to the next counts as far as it leads
+/// along it, forth and back. The way along a noisy edge is many times as long.
+pub(super) fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
+    let mut length = T::ZERO;
+    let mut before: Option<V3<T>> = None;
+    for block in blocks {
+        for lane in 0..LANES {
+            let here = (block.weight[lane] > T::ZERO).then(|| block.ray(lane));
+            if let (Some(a), Some(b)) = (before, here) {
+                let (step, along) = (b - a, e.cross(&b));
+                let whole = (step.dot(&step) * along.dot(&along)).sqrt();
+                if whole > T::ZERO {
+                    length += block.step_px[lane] * step.dot(&along) / whole;
+                }
+            }
+            before = here;
+        }
+    }
+    length.abs()
+}
+
+/// Most steps along the limb to each side.
+const STEPS: usize = 48;
+
+/// Length in pixels of the limb of the cone (e, c) in the picture, walked to both sides from the inlier `seen` until
+/// it leaves the region or comes around. What a mask covers is not counted.
+pub(super) fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Camera<T>, region: &Region<T>) -> T {
+    let sin = (T::one() - c * c).max(T::ZERO).sqrt();
+    let (b1, b2) = basis(e);
+    let (fx, fy) = camera.focal_px();
+    // A step of about a sixteenth of the picture, and at least eight around.
+    let wide = T::from_i32(i32::from(region.width().max(region.height())));
+    let step = (wide / (T::from_f64(16.0) * (fx + fy) * T::from_f64(0.5) * sin.max(T::from_f64(1e-6))))
+        .min(T::from_f64(0.785))
+        .max(T::from_f64(0.02));
+    let (ss, cs) = step.sin_cos();
+    let radial = (seen.dot(&b1), seen.dot(&b2));
+    let norm = (radial.0 * radial.0 + radial.1 * radial.1).sqrt().max(T::from_f64(1e-12));
+    let start = (radial.0 / norm, radial.1 / norm);
+    let at = |(x, y): (T, T)| -> Option<ImagePoint<T>> {
+        let p = camera.project(&UnitVec3::assume_unit(e * c + (b1 * x + b2 * y) * sin))?;
+        let (half, zero) = (T::from_f64(0.5), T::ZERO);
+        (p.u >= zero && p.v >= zero).then_some(())?;
+        let (x, y) = ((p.u + half).to_i32(), (p.v + half).to_i32());
+        let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
+        region.contains(x, y).then_some(p)
+    };
+    let masked = |p: &ImagePoint<T>| region.masked(p.u.to_i32() as u16, p.v.to_i32() as u16);
+    let half_turn = T::from_f64(core::f64::consts::PI);
+    let mut length = T::ZERO;
+    for turn in [ss, -ss] {
+        let (mut direction, mut before) = (start, at(start));
+        let mut angle = T::ZERO;
+        for _ in 0..STEPS {
+            angle += step;
+            if angle > half_turn {
+                break;
+            }
+            let (x, y) = direction;
+            direction = (x * cs - y * turn, x * turn + y * cs);
+            let now = at(direction);
+            let (Some(a), Some(b)) = (before, now) else {
+                // The last piece, cut by the border, counts half a step.
+                if let (Some(a), None) = (before, now)
+                    && !masked(&a)
+                {
+                    length += step * sin * (fx + fy) * T::from_f64(0.25);
+                }
+                break;
+            };
+            if !(masked(&a) || masked(&b)) {
+                let (du, dv) = (b.u - a.u, b.v - a.v);
+                length += (du * du + dv * dv).sqrt();
+            }
+            before = now;
+        }
+    }
+    length
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points about a circle of 30° at every half degree, every other `off` radians aside; 600 pixels are a radian.
+    fn edge(off: f64) -> [Block<f64>; 4] {
+        let mut blocks = [Block::EMPTY; 4];
+        let mut before: Option<V3<f64>> = None;
+        for i in 0..4 * LANES {
+            let alpha = 0.5 + if i % 2 == 1 { off } else { 0.0 };
+            let (sin, cos) = libm::sincos(alpha);
+            let (y, x) = libm::sincos(i as f64 * 0.5f64.to_radians());
+            let ray = V3::new(x * sin, y * sin, cos);
+            let (block, lane) = (&mut blocks[i / LANES], i % LANES);
+            for (k, v) in [ray.x, ray.y, ray.z].into_iter().enumerate() {
+                block.s[k][lane] = v;
+            }
+            block.weight[lane] = 1.0;
+            block.step_px[lane] = before.map_or(0.0, |b| 600.0 * (ray - b).dot(&(ray - b)).sqrt());
+            before = Some(ray);
+        }
+        blocks
+    }
+
+    #[test]
+    fn noise_makes_no_limb_longer() {
+        let axis = V3::new(0.0, 0.0, 1.0);
+        let arc = 600.0 * libm::sin(0.5) * 15.5f64.to_radians();
+        for off in [0.0, 0.002, 0.01] {
+            let blocks = edge(off);
+            assert!((covered(&axis, &blocks) / arc - 1.0).abs() < 0.02, "{off}: {} of {arc}", covered(&axis, &blocks));
+        }
+        let way: f64 = edge(0.01).iter().flat_map(|b| b.step_px).sum();
+        assert!(way > 2.0 * arc, "{way}");
+    }
+
+    #[test]
+    fn rejected_points_cover_nothing() {
+        let mut blocks = edge(0.0);
+        let whole = covered(&V3::new(0.0, 0.0, 1.0), &blocks);
+        blocks[1].weight = [0.0; LANES];
+        let rest = covered(&V3::new(0.0, 0.0, 1.0), &blocks);
+        assert!((whole - rest - 9.0 * whole / 31.0).abs() < 1e-6 * whole, "{rest} of {whole}");
+    }
+}
