@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hzn_core::{Config, Frame, camera};
+use hzn_core::{Config, Prior, camera};
 use hzn_sim::flight::rocket;
 use hzn_sim::{Disc, Flight, FlightFrame, Samples, Sky};
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ pub(crate) struct Case {
 /// One frame with what is known and what is true about it.
 pub(crate) struct Picture {
     pub(crate) bytes: Vec<u8>,
-    pub(crate) known: Frame<f64>,
+    pub(crate) known: Prior<f64>,
     /// Limb axis in the camera frame.
     pub(crate) truth: [f64; 3],
 }

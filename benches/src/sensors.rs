@@ -6,7 +6,7 @@ use std::time::Instant;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
-use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon};
+use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior};
 
 use crate::cases::{Case, Picture};
 use crate::observers::{Clock, Touched};
@@ -63,11 +63,11 @@ fn picture<'a>(case: &Case, frame: &'a Picture) -> Result<Grey<'a, u8>, String> 
     Grey::try_new(&frame.bytes, Layout::packed(c.width.into(), c.height.into(), 1, 8)).map_err(|e| e.to_string())
 }
 
-fn known<T: Real>(frame: &Picture) -> Frame<T> {
-    Frame {
+fn known<T: Real>(frame: &Picture) -> Prior<T> {
+    Prior {
         altitude_m: frame.known.altitude_m.map(T::from_f64),
         position_m: frame.known.position_m.map(|p| p.map(T::from_f64)),
-        ..Frame::default()
+        ..Prior::default()
     }
 }
 

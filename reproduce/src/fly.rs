@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Context;
 use hzn_core::body::Kind;
 use hzn_core::{Config, HostHorizon, Report};
-use hzn_sim::evaluate::{Answer, Case, Evaluation, Found, pair};
+use hzn_sim::evaluate::{Answer, Case, Evaluation, MeasuredDirection, pair};
 use hzn_sim::{Flight, FlightFrame, Picture, Truth};
 use rayon::prelude::*;
 
@@ -42,12 +42,12 @@ impl Sensor {
         Self { without_rates: true, ..self }
     }
     /// What it is told about a picture.
-    pub(crate) fn known(&self, frame: &FlightFrame) -> hzn_core::Frame<f64> {
+    pub(crate) fn known(&self, frame: &FlightFrame) -> hzn_core::Prior<f64> {
         let known = match self.attitude_sigma_deg {
             Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
             None => frame.known(),
         };
-        hzn_core::Frame {
+        hzn_core::Prior {
             position_m: known.position_m.filter(|_| !self.altitude_only),
             rate_rad_s: known.rate_rad_s.filter(|_| !self.without_rates),
             ..known
@@ -142,7 +142,7 @@ fn look(
         file: frame.file.clone(),
         body: truth.body.clone(),
         status: report.status,
-        found: report.solution.as_ref().map(|s| Found {
+        found: report.solution.as_ref().map(|s| MeasuredDirection {
             axis: s.axis.xyz(),
             covariance_rad2: s.covariance.upper_rad2,
             half_angle_deg: Some(s.half_angle_rad.to_degrees()),
@@ -153,7 +153,7 @@ fn look(
 
 /// The one evaluation of cases of one body.
 pub(crate) fn evaluate(cases: &[Case]) -> Evaluation {
-    Evaluation::of(&cases.iter().collect::<Vec<_>>())
+    Evaluation::new(&cases.iter().collect::<Vec<_>>())
 }
 
 /// Cells of an evaluation: answered, false answers, RMS, 95 %, worst, NEES with its interval.

@@ -7,7 +7,7 @@ use std::process::{Command, ExitCode};
 use hzn_core::Preset;
 use hzn_core::status::Stage;
 use hzn_core::threshold::Method;
-use hzn_core::{Config, Frame, camera};
+use hzn_core::{Config, Prior, camera};
 use hzn_sim::flight::rocket;
 use hzn_sim::{Disc, FlightFrame, Sky};
 use hzn_tests::emulated::{Board, Case, Measured, bits, chain, measure, measure_rows};
@@ -108,7 +108,7 @@ fn adversary(seed: u32, sensors: &Sensors) -> Case {
         .collect();
     let kind = format!("{pattern:?}").to_lowercase();
     let name = format!("{kind} of {period} px{}{known_by} (seed {seed})", if soft { ", soft" } else { "" });
-    Case { name, sensor: sensor.clone(), known: Frame::default(), bytes }
+    Case { name, sensor: sensor.clone(), known: Prior::default(), bytes }
 }
 
 const W: usize = 1920;
@@ -196,7 +196,7 @@ fn adversaries(seeds: std::ops::Range<u32>, sensors: &Sensors) -> Vec<Case> {
 fn moon_at_the_bottom() -> Case {
     let disc = |x: f64, y: f64| ((6.0 - (x - 1500.0).hypot(y - 1000.0)).clamp(0.0, 1.0) * 200.0) as u8 + 20;
     let bytes = (0..W * H).map(|i| disc((i % W) as f64, (i / W) as f64)).collect();
-    Case { name: "1920×1080 Moon at the bottom".into(), sensor: moon().mostly.0, known: Frame::default(), bytes }
+    Case { name: "1920×1080 Moon at the bottom".into(), sensor: moon().mostly.0, known: Prior::default(), bytes }
 }
 
 /// A line of the table: instructions in thousands.

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use hzn_core::image::{Grey, Layout};
-use hzn_core::{Config, FlightHorizon, Frame};
-use hzn_flight::answer::Answer;
+use hzn_core::{Config, FlightHorizon, Prior};
+use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::{Parameters, table};
 
@@ -71,7 +71,7 @@ pub struct Case {
     /// What the sensor is told.
     pub sensor: Config,
     /// What is known about the picture.
-    pub known: Frame<f32>,
+    pub known: Prior<f32>,
     /// The picture, a byte a pixel, of the size that the sensor expects.
     pub bytes: Vec<u8>,
 }
@@ -80,7 +80,7 @@ pub struct Case {
 #[derive(Debug, Clone)]
 pub struct Measured {
     /// The answer.
-    pub answer: Answer,
+    pub answer: PictureAnswer,
     /// Instructions of `FlightHorizon::new`, of `expect`, of `process`.
     pub calls: [u64; 3],
     /// Instructions by stage; together a few more than `process`, for the looks at the timer.
@@ -98,10 +98,10 @@ impl Case {
         let picture = frame.render().expect("the scene can be rendered");
         let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: 8 bits are expected") };
         let known = frame.known();
-        let known = Frame {
+        let known = Prior {
             altitude_m: known.altitude_m.map(|h| h as f32),
             position_m: known.position_m.map(|p| p.map(|x| x as f32)),
-            ..Frame::default()
+            ..Prior::default()
         };
         Self { name, sensor: sensor.clone(), known, bytes: bytes.clone() }
     }
@@ -110,13 +110,13 @@ impl Case {
     ///
     /// # Panics
     /// The configuration or what is known is refused.
-    pub fn here(&self) -> Answer {
+    pub fn here(&self) -> PictureAnswer {
         let mut horizon = Box::new(FlightHorizon::new(&self.sensor).expect("the configuration is valid"));
         let camera = &self.sensor.camera;
         let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
         let picture = Grey::try_new(&self.bytes, layout).expect("the picture is whole");
         let expected = horizon.expect(&self.known).expect("what is known is possible");
-        Answer::of(&horizon.process(&picture, &expected))
+        PictureAnswer::from_report(&horizon.process(&picture, &expected))
     }
 
     fn write(&self, out: &mut Vec<u8>) {
@@ -137,7 +137,7 @@ impl Case {
 }
 
 /// The bytes of an answer: equal when every bit is.
-pub fn bits(answer: &Answer) -> Vec<u8> {
+pub fn bits(answer: &PictureAnswer) -> Vec<u8> {
     let mut bytes = vec![0; 640];
     let mut out = Writer::new(&mut bytes);
     answer.write(&mut out);
@@ -211,5 +211,5 @@ fn read(from: &mut Reader<'_>) -> Option<Measured> {
     let sum: u64 = stages.iter().sum();
     calls[2] += (sum.saturating_sub(calls[2]) + WRAP / 2) / WRAP * WRAP;
     let (stack_bytes, _) = (from.u32()?, from.u32()?);
-    Some(Measured { answer: Answer::read(from)?, calls, stages, stack_bytes })
+    Some(Measured { answer: PictureAnswer::read(from)?, calls, stages, stack_bytes })
 }

@@ -5,7 +5,7 @@ use hzn_core::image::Pixels;
 use hzn_core::observer::{Observer, Unobserved};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
-use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Report};
+use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior, Report};
 use hzn_sim::{Globe, Scene};
 use nalgebra::{Matrix3, Vector3};
 
@@ -62,13 +62,13 @@ impl Sensors {
 }
 
 /// What a navigation system would tell about a scene: the position for `earth`, else the altitude; no attitude.
-pub fn known<T: Real>(scene: &Scene) -> Frame<T> {
+pub fn known<T: Real>(scene: &Scene) -> Prior<T> {
     let position_m = scene.pose.position_m;
-    let altitude_m = Globe::of(&scene.body).altitude_m(position_m);
-    Frame {
+    let altitude_m = Globe::new(&scene.body).altitude_m(position_m);
+    Prior {
         altitude_m: Some(T::from_f64(altitude_m)),
         position_m: (scene.body.kind == Kind::Earth).then(|| position_m.map(T::from_f64)),
-        ..Frame::default()
+        ..Prior::default()
     }
 }
 
@@ -79,7 +79,7 @@ pub fn known<T: Real>(scene: &Scene) -> Frame<T> {
 pub fn look<T: Real, const P: usize, const B: usize, const W: usize>(
     horizon: &mut Horizon<T, P, B, W>,
     picture: &impl Pixels,
-    known: &Frame<T>,
+    known: &Prior<T>,
 ) -> Result<Answer, Status> {
     look_observed(horizon, picture, known, &Unobserved)
 }
@@ -94,7 +94,7 @@ pub fn look<T: Real, const P: usize, const B: usize, const W: usize>(
 pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
     horizon: &mut Horizon<T, P, B, W>,
     picture: &impl Pixels,
-    known: &Frame<T>,
+    known: &Prior<T>,
     observer: &impl Observer<T>,
 ) -> Result<Answer, Status> {
     let expected = horizon.expect(known).expect("what is known of the picture is possible");
@@ -105,12 +105,12 @@ pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
         let verdicts = report.candidates.iter().map(|c| format!("{} points {:?}", c.points, c.verdict));
         println!("{:?}: {}", report.status, verdicts.collect::<Vec<_>>().join(", "));
     }
-    Answer::of(&report).ok_or(report.status)
+    Answer::from_report(&report).ok_or(report.status)
 }
 
 impl Answer {
     /// The answer in a report, if there is one.
-    pub fn of<T: Real>(report: &Report<T>) -> Option<Self> {
+    pub fn from_report<T: Real>(report: &Report<T>) -> Option<Self> {
         let s = report.solution.as_ref()?;
         Some(Self {
             axis: s.axis.xyz().map(Real::to_f64),

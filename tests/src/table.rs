@@ -4,7 +4,7 @@ use core::fmt::Write;
 
 use hzn_core::camera::{self, Model};
 use hzn_core::region::Polygon;
-use hzn_core::{Config, Frame, body, covariance};
+use hzn_core::{Config, Prior, body, covariance};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Band, Clouds, Detector, Disc, Foreground, Look, Pose, Profile, Scene, flight};
 
@@ -106,8 +106,8 @@ pub fn measure((sensor, scenes): &(Config, Vec<Scene>)) -> [Tally; 2] {
         let truth = scene.truth("", 0.0).expect("the scene is valid");
         let picture = scene.render().expect("the scene is valid");
         let error_rad = [0, 3, 5].map(|k| ATTITUDE_SIGMA_DEG.to_radians() * SIGMAS[(i + k) % FRAMES]);
-        let position: Frame<f64> = crate::known(scene);
-        let attitude = Frame { cam_to_ecef: scene.pose.disturbed(error_rad).cam_to_ecef(), ..position };
+        let position: Prior<f64> = crate::known(scene);
+        let attitude = Prior { cam_to_ecef: scene.pose.disturbed(error_rad).cam_to_ecef(), ..position };
         for (tally, known) in tallies.iter_mut().zip([attitude, position]) {
             let answer = look(&mut sensors.host, &picture.view(), &known);
             tally.add(answer.ok().as_ref(), [truth.axis_x, truth.axis_y, truth.axis_z]);

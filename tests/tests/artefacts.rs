@@ -3,7 +3,7 @@
 
 use hzn_core::observer::Unobserved;
 use hzn_core::{Config, HostHorizon, camera};
-use hzn_sim::artefact::{Kind, Outcome, Told, Trial, look};
+use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, look};
 
 /// Pictures of each kind, and the first seed: others than those of the campaign.
 const OF_EACH: u64 = 15;
@@ -14,7 +14,12 @@ fn horizon() -> Box<HostHorizon> {
 }
 
 /// The picture of a trial at each threshold, `None` for the default.
-fn outcomes(horizon: &mut HostHorizon, trial: &Trial, thresholds_px: &[Option<f64>], told: Told) -> Vec<Outcome> {
+fn outcomes(
+    horizon: &mut HostHorizon,
+    trial: &Trial,
+    thresholds_px: &[Option<f64>],
+    told: PriorKnowledge,
+) -> Vec<Outcome> {
     let picture = trial.render().unwrap();
     let mut at = |threshold_px: &Option<f64>| {
         let mut config = Config::new(trial.scene.camera.clone());
@@ -31,7 +36,7 @@ fn no_artefact_is_taken_for_a_limb() {
     let mut wrong = Vec::new();
     for (kind, seed) in Kind::ALL.iter().flat_map(|&k| (FIRST_SEED..FIRST_SEED + OF_EACH).map(move |s| (k, s))) {
         let trial = Trial::without_limb(kind, seed).unwrap();
-        for o in outcomes(&mut horizon, &trial, &[None, Some(1.0), Some(1.5)], Told::default()) {
+        for o in outcomes(&mut horizon, &trial, &[None, Some(1.0), Some(1.5)], PriorKnowledge::default()) {
             if o.is_false() && !o.matching_disc {
                 wrong.push(format!("{} {seed}: {:?}", kind.name(), o.found.map(|f| f.miss.angle_deg)));
             }
@@ -47,7 +52,7 @@ fn limbs_next_to_artefacts_are_found() {
     let (mut pictures, mut answered) = (0, 0);
     for (kind, seed) in Kind::ALL.iter().flat_map(|&k| (FIRST_SEED..FIRST_SEED + OF_EACH).map(move |s| (k, s))) {
         let Some(trial) = Trial::beside_limb(kind, seed).unwrap() else { continue };
-        for o in outcomes(&mut horizon, &trial, &[None], Told { attitude_sigma_deg: Some(5.0) }) {
+        for o in outcomes(&mut horizon, &trial, &[None], PriorKnowledge { attitude_sigma_deg: Some(5.0) }) {
             pictures += 1;
             answered += u32::from(o.found.is_some());
             assert!(!o.is_false(), "{} {seed}: {:?}", kind.name(), o.found);

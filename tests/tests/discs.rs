@@ -7,7 +7,7 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
 use hzn_core::status::Status;
-use hzn_core::{Config, Frame, HostHorizon, Preset};
+use hzn_core::{Config, HostHorizon, Preset, Prior};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Detector, Light, Look, Pose, Scene, Visible, World};
 use hzn_tests::disc::{Disc, apart_px, direction};
@@ -18,8 +18,8 @@ fn config(preset: Preset, focal_px: f64) -> Config {
     Config::preset(preset, camera::Config::ideal(Model::Pinhole, 640, 480, focal_px))
 }
 
-fn frame<T: Real>(sun: Option<[f64; 3]>) -> Frame<T> {
-    Frame { sun: sun.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))), ..Frame::default() }
+fn frame<T: Real>(sun: Option<[f64; 3]>) -> Prior<T> {
+    Prior { sun: sun.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))), ..Prior::default() }
 }
 
 /// What both precisions say.
@@ -170,7 +170,7 @@ fn the_level_follows_the_limb_of_the_picture_before() {
         let disc = Disc { brightness, halo: 0.0, noise: 1.0, ..sun(axis, 0.2666f64.to_radians() * 10.0) };
         let data = disc.paint(&config, 3);
         let picture = Grey::try_new(&data, Layout::packed(640, 480, 1, 8)).unwrap();
-        let expected = sensors.host.expect(&Frame::default()).unwrap();
+        let expected = sensors.host.expect(&Prior::default()).unwrap();
         let report = sensors.host.process(&picture, &expected);
         assert_eq!(report.status, Status::Ok, "{brightness}");
         // Halfway between the sky at 8 counts and the disc.
@@ -183,7 +183,7 @@ fn the_level_follows_the_limb_of_the_picture_before() {
     // Forgotten with another configuration, and with a picture without an answer.
     sensors.host.reconfigure(&config).unwrap();
     let dark = vec![8u8; 640 * 480];
-    let expected = sensors.host.expect(&Frame::default()).unwrap();
+    let expected = sensors.host.expect(&Prior::default()).unwrap();
     let report = sensors.host.process(&Grey::try_new(&dark, Layout::packed(640, 480, 1, 8)).unwrap(), &expected);
     assert_eq!((report.status, report.next_level), (Status::NoLimb, None));
 }
@@ -223,7 +223,7 @@ fn earth_and_moon_in_one_picture() {
         scene.detector = Detector { psf_sigma_px: 0.9, read_noise: 0.01, ..Detector::default() };
         scene.seed = n as u64;
         let picture = scene.render().unwrap();
-        let known = Frame { position_m: Some(pose.position_m), ..frame(Some(sun)) };
+        let known = Prior { position_m: Some(pose.position_m), ..frame(Some(sun)) };
         let expected = [0, 1].map(|which| horizon.expect_body(which, &known).unwrap());
         let reports = horizon.process_each(&picture.view(), &expected);
         for (report, (kind, limit_deg)) in reports.iter().zip([(Kind::Earth, 0.1), (Kind::Moon, 0.016)]) {

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::status::Status;
 use hzn_core::threshold;
-use hzn_core::{Config, FlightHorizon, Frame, camera};
+use hzn_core::{Config, FlightHorizon, Prior, camera};
 use hzn_flight::flight::{Buffers, Lists};
 use hzn_flight::{Parameters, table};
 use hzn_sim::flight::{leo_infrared, rocket};
@@ -41,10 +41,10 @@ fn cases() -> Vec<Case> {
             view.at(x as u16, y as u16) as u8
         };
         let bytes = (0..usize::from(view.width()) * usize::from(view.height())).map(pixel).collect();
-        cases.push(Case { name: file.into(), sensor: photograph.sensor.clone(), known: Frame::default(), bytes });
+        cases.push(Case { name: file.into(), sensor: photograph.sensor.clone(), known: Prior::default(), bytes });
     }
     let sensor = rocket(640, 480, 1, 1).sensor;
-    let told = Frame { altitude_m: Some(2e5f32), ..Frame::default() };
+    let told = Prior { altitude_m: Some(2e5f32), ..Prior::default() };
     let paint = |name: &str, f: &dyn Fn(usize, usize) -> u8| Case {
         name: name.into(),
         sensor: sensor.clone(),
@@ -92,7 +92,7 @@ fn rows_have_the_bits_of_the_picture() {
         .frames
         .iter()
         .map(|frame| Case {
-            known: Frame { altitude_m: Some(frame.known().altitude_m.unwrap_or(2e5) as f32), ..Frame::default() },
+            known: Prior { altitude_m: Some(frame.known().altitude_m.unwrap_or(2e5) as f32), ..Prior::default() },
             ..Case::rendered(frame.file.clone(), &flight.sensor, frame)
         })
         .collect();
@@ -348,7 +348,7 @@ fn the_sensor_alone_answers_with_the_same_bits() {
     }
     let mut ok = 0;
     for frame in &flight.frames {
-        let case = Case { known: Frame::default(), ..Case::rendered(frame.file.clone(), &sensor, frame) };
+        let case = Case { known: Prior::default(), ..Case::rendered(frame.file.clone(), &sensor, frame) };
         let mut horizon = Box::new(FlightHorizon::new(&sensor).unwrap());
         let picture = Grey::try_new(&case.bytes, Layout::packed(1920, 1080, 1, 8)).unwrap();
         let expected = horizon.expect(&case.known).unwrap();

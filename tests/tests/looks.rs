@@ -7,7 +7,7 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 use hzn_core::threshold::{self, Method};
-use hzn_core::{Config, Frame, HostHorizon, Report};
+use hzn_core::{Config, HostHorizon, Prior, Report};
 use hzn_sim::painted::UnderCircle;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Clouds, Light, Look, Pose, Scene, Visible};
@@ -32,7 +32,7 @@ fn told(lens: &camera::Config, altitude_km: f64, level: f64) -> Config {
 
 fn seen(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report<f64> {
     let picture = Grey::try_new(data, Layout::packed(lens.width.into(), lens.height.into(), 1, 8)).unwrap();
-    let expected = horizon.expect(&Frame::default()).unwrap();
+    let expected = horizon.expect(&Prior::default()).unwrap();
     horizon.process(&picture, &expected)
 }
 
@@ -69,12 +69,12 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let answer = |sensor: &Config| {
         let sensors = &mut Sensors::new(sensor);
         let [host, flight] = [
-            look(&mut sensors.host, &p.view(), &Frame::default()),
-            look(&mut sensors.flight, &p.view(), &Frame::default()),
+            look(&mut sensors.host, &p.view(), &Prior::default()),
+            look(&mut sensors.flight, &p.view(), &Prior::default()),
         ];
         let why = || {
             let mut horizon = HostHorizon::boxed(sensor).unwrap();
-            let expected = horizon.expect(&Frame::default()).unwrap();
+            let expected = horizon.expect(&Prior::default()).unwrap();
             format!("{:?}", horizon.process(&p.view(), &expected).candidates)
         };
         let (host, flight) = (
@@ -100,7 +100,7 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     // With the frame, the picture's own outline belongs to the edge: fewer points, or none.
     p.sensor.recover.frame_px = 0;
     p.sensor.binarize = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
-    let with = look(&mut Sensors::new(&p.sensor).host, &p.view(), &Frame::default());
+    let with = look(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default());
     assert!(
         with.is_err() || with.is_ok_and(|a| 2 * a.inliers < a.points && a.error_deg(axes[0]) < a.sigma_deg()),
         "{with:?}"

@@ -1,7 +1,7 @@
 //! Photographs. None has a surveyed calibration or attitude: judged is how well the fitted limb lies on the visible
 //! one, and how little it moves when it should not. Each test writes `target/overlays/*.png` to look at.
 
-use hzn_core::Frame;
+use hzn_core::Prior;
 use hzn_core::status::Status;
 use hzn_tests::real::{Photograph, Points, Watch, steepest};
 use hzn_tests::sensors::{look, look_observed};
@@ -23,8 +23,8 @@ fn lies_on_the_limb(photograph: &Photograph, answer: &Answer, eighths: std::ops:
 fn through(photograph: &Photograph) -> Looked {
     let mut sensors = Sensors::new(&photograph.sensor);
     let watch = Watch::default();
-    let host = look_observed(&mut sensors.host, &photograph.view(), &Frame::default(), &watch);
-    let flight = look(&mut sensors.flight, &photograph.view(), &Frame::default());
+    let host = look_observed(&mut sensors.host, &photograph.view(), &Prior::default(), &watch);
+    let flight = look(&mut sensors.flight, &photograph.view(), &Prior::default());
     let points = watch.points();
     photograph.overlay(host.as_ref().ok(), &points);
     for (kind, answer) in [("host", &host), ("flight", &flight)] {
@@ -55,7 +55,7 @@ fn change_with_level_deg(photograph: &Photograph, axis: [f64; 3]) -> f64 {
     let moved = [0.8, 1.2].map(|scale| {
         let mut sensor = photograph.sensor.clone();
         sensor.binarize.scale = scale;
-        let answer = look(&mut Sensors::new(&sensor).host, &photograph.view(), &Frame::default());
+        let answer = look(&mut Sensors::new(&sensor).host, &photograph.view(), &Prior::default());
         answer.map_or(f64::INFINITY, |a| a.error_deg(axis))
     });
     println!("{}: {moved:.4?}° with the level at 80 % and 120 %", photograph.name);
@@ -95,7 +95,7 @@ fn iss_limb_over_broken_cloud_reduced() {
 fn iss_limb_is_the_same_at_both_sizes() {
     let answers = ["full/iss-limb-2020-11-20.jpg", "iss-limb-2020-11-20.jpg"].map(|file| {
         let p = Photograph::load(file);
-        look(&mut Sensors::new(&p.sensor).host, &p.view(), &Frame::default()).expect("the limb is found")
+        look(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default()).expect("the limb is found")
     });
     // The same limb, within the claimed sigmas: haze of one width is read to another depth where it spans more pixels.
     let apart_deg = answers[0].error_deg(answers[1].axis);

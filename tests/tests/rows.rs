@@ -7,17 +7,17 @@ use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::threshold::Method;
-use hzn_core::{Config, Frame, Report, Sensor};
+use hzn_core::{Config, Prior, Report, Sensor};
 use hzn_core::{
     observer::Observer,
-    pipeline::{HELD, Rows, Workspace},
+    pipeline::{ROWS_HELD, RowBuffers, Workspace},
 };
 use hzn_sim::flight::{leo_infrared, rocket};
 use hzn_tests::real::Photograph;
 
 /// Lists for any of these pictures.
 const WIDEST: usize = 5568;
-type Large = Rows<u8, { HELD as usize * WIDEST }, 3712, 65535, 65535>;
+type Large = RowBuffers<u8, { ROWS_HELD as usize * WIDEST }, 3712, 65535, 65535>;
 /// As the flight computer's, for one candidate of 600 points.
 type Lists = Workspace<f32, 16384, 256, 512>;
 
@@ -33,7 +33,7 @@ impl Observer<f32> for Seen {
 struct Case {
     name: String,
     sensor: Config,
-    known: Frame<f32>,
+    known: Prior<f32>,
     bytes: Vec<u8>,
 }
 
@@ -56,7 +56,7 @@ fn cases() -> Vec<Case> {
         let bytes = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| view.at(x, y) as u8).collect();
         let mut sensor = photograph.sensor.clone();
         sensor.candidates.keep_points = 600;
-        cases.push(Case { name: file.into(), sensor, known: Frame::default(), bytes });
+        cases.push(Case { name: file.into(), sensor, known: Prior::default(), bytes });
     }
     cases
 }
@@ -128,8 +128,8 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
 /// What the lists of docs/porting.md take, with their share of a 640×480 picture and of a large one.
 #[test]
 fn memory_without_a_frame() {
-    type Vga = Rows<u8, { HELD as usize * 640 }, 480, 8192, 2560>;
-    type Hd = Rows<u8, { HELD as usize * 1920 }, 1080, 16384, 5120>;
+    type Vga = RowBuffers<u8, { ROWS_HELD as usize * 640 }, 480, 8192, 2560>;
+    type Hd = RowBuffers<u8, { ROWS_HELD as usize * 1920 }, 1080, 16384, 5120>;
     type Short = Workspace<f32, 2048, 76, 512>;
     let (vga, hd, lists) = (size_of::<Vga>(), size_of::<Hd>(), size_of::<Short>());
     println!("rows of 640×480: {vga} bytes; of 1920×1080: {hd} bytes; workspace for 600 points: {lists} bytes");

@@ -12,7 +12,7 @@ use hzn_core::consensus::{self, Method};
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pipeline::edges::Edges;
 use hzn_core::pixel::ImagePoint;
-use hzn_core::{Config, Frame, HostHorizon};
+use hzn_core::{Config, HostHorizon, Prior};
 
 const HELP: &str = "usage: cargo xtask bench ransac [--runs N]
   --runs N     sets of points a cell, 10 or more (default 200; a tenth of them for the Hough transform)";
@@ -109,7 +109,7 @@ fn compare(runs: u32) -> Result<(), String> {
     config.body =
         body::Config { kind: Kind::EarthSphere, altitude_km: Some(600.0), limb_height_sigma_km: 1.0, ..config.body };
     let horizon = HostHorizon::boxed(&config).map_err(|e| e.to_string())?;
-    let expected = horizon.expect(&Frame::default()).map_err(|e| e.to_string())?;
+    let expected = horizon.expect(&Prior::default()).map_err(|e| e.to_string())?;
     let half_angle_rad = expected.half_angle_rad();
 
     let contenders = contenders();

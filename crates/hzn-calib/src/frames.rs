@@ -17,11 +17,11 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use hzn_core::body::{FrameError, Kind};
+use hzn_core::body::{Kind, PriorError};
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use hzn_core::frames::{Rotation, UnitVec3};
 use hzn_core::real::Real;
-use hzn_core::{Config, Frame};
+use hzn_core::{Config, Prior};
 
 use crate::nearest::nearest;
 use crate::{Problem, plausible, time};
@@ -75,8 +75,8 @@ pub struct FrameData {
 
 impl FrameData {
     /// The same for the pipeline, in metres. `altitude_km` of the row beats `default_altitude_km`.
-    pub fn to_frame<T: Real>(&self, default_altitude_km: Option<f64>) -> Frame<T> {
-        Frame {
+    pub fn to_frame<T: Real>(&self, default_altitude_km: Option<f64>) -> Prior<T> {
+        Prior {
             altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::from_f64(km * 1e3)),
             position_m: self.position_km.map(|p| p.map(|km| T::from_f64(km * 1e3))),
             cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::from_f64))),
@@ -187,13 +187,13 @@ impl Frames {
     }
 
     /// A row that hzn-core refused, with the value that was given.
-    pub fn refused(&self, row: &FrameData, error: FrameError) -> Problem {
+    pub fn refused(&self, row: &FrameData, error: PriorError) -> Problem {
         let given = match error {
-            FrameError::Altitude => row.altitude_km.map(|h| format!("{h}")),
-            FrameError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
-            FrameError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
-            FrameError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
-            FrameError::NoAltitude | FrameError::BelowLimb { .. } | FrameError::NoBody => None,
+            PriorError::Altitude => row.altitude_km.map(|h| format!("{h}")),
+            PriorError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
+            PriorError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
+            PriorError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
+            PriorError::NoAltitude | PriorError::BelowLimb { .. } | PriorError::NoBody => None,
         };
         let given = given.map(|given| format!(", not {given}")).unwrap_or_default();
         self.problem(row, format!("{error}{given}"))

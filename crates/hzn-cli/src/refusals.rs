@@ -18,7 +18,7 @@ enum Why {
 
 impl Why {
     /// `None` of an answer.
-    fn of(report: &Report<f64>) -> Option<Self> {
+    fn from_report(report: &Report<f64>) -> Option<Self> {
         if report.status == Status::Ok {
             return None;
         }
@@ -50,7 +50,7 @@ impl Refusals {
         let whole = frame.found.iter().all(|f| f.report.is_ok()).then_some(frame.index);
         let again = |report: &Report<f64>| report.status == Status::Ok && report.counters.looks > 1;
         self.further += frame.found.iter().filter(|f| f.report.as_ref().is_ok_and(again)).count() as u64;
-        for why in frame.found.iter().filter_map(|f| Why::of(f.report.as_ref().ok()?)) {
+        for why in frame.found.iter().filter_map(|f| Why::from_report(f.report.as_ref().ok()?)) {
             self.total += 1;
             match self.each.iter_mut().find(|(known, ..)| *known == why) {
                 Some((_, n, first)) => (*n, *first) = (*n + 1, first.or(whole)),

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use hzn_calib::{FrameData, Frames, Sensor, plausible};
 use hzn_core::Config;
-use hzn_core::body::{self, FrameError};
+use hzn_core::body::{self, PriorError};
 use hzn_core::config::Orient;
 use hzn_sim::Truth;
 
@@ -203,7 +203,7 @@ pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option
 fn above_the_limb(config: &Config) -> Result<(), Stop> {
     let Ok(sensor) = AnySensor::new(config, false) else { return Ok(()) };
     let half_angles = sensor.expected_half_angles_rad(None);
-    let below = |e: &Result<f64, FrameError>| e.err().filter(|e| matches!(e, FrameError::BelowLimb { .. }));
+    let below = |e: &Result<f64, PriorError>| e.err().filter(|e| matches!(e, PriorError::BelowLimb { .. }));
     match half_angles.iter().map(below).collect::<Option<Vec<_>>>().and_then(|each| each.first().copied()) {
         Some(why) => {
             Err(usage(format!("body.altitude_km: {why}, so that no limb can be seen; give the altitude of the camera")))

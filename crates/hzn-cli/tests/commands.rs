@@ -269,7 +269,7 @@ fn a_telecommand_has_values_that_can_be() {
     let place = Place::new();
     let set = |pair: &str| place.command(&["telecommand", &format!("set {pair}")]).output().unwrap();
     let refused = |pair: &str| {
-        let ran = common::Ran::of(&set(pair), &place.path("")).expect(2);
+        let ran = common::Ran::from_output(&set(pair), &place.path("")).expect(2);
         assert!(ran.out.is_empty());
         ran.err.trim_end().split_once("\": ").unwrap().1.to_owned()
     };

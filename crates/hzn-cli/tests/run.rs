@@ -233,7 +233,7 @@ fn a_full_disk_is_said_and_finished_frames_stay() {
     place.run(&["explain", "in/0000.png", "--overlay", "o.png", "--force"]).expect(1).says("the disk is full");
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output = place.command(&["run", "in"]).stdout(full).output().unwrap();
-    common::Ran::of(&output, &place.path("")).expect(1).says("cannot be written to stdout");
+    common::Ran::from_output(&output, &place.path("")).expect(1).says("cannot be written to stdout");
 }
 
 /// A limit on the size of files stands for a disk that fills up in the middle of a run.
@@ -249,7 +249,7 @@ fn a_disk_that_fills_up_keeps_what_is_finished() {
         let hzn = place.command(&[]);
         let mut shell = std::process::Command::new("bash");
         shell.args(["-c", &limited]).arg(hzn.get_program()).current_dir(place.path(""));
-        common::Ran::of(&shell.output().unwrap(), &place.path(""))
+        common::Ran::from_output(&shell.output().unwrap(), &place.path(""))
             .expect(1)
             .says("ulimit -f")
             .says("resume the run to go on");
@@ -374,7 +374,7 @@ fn nobody_listening_is_no_crash() {
     let closed = || std::io::pipe().unwrap().1;
     for args in [&["run", "in"][..], &["info", "in/0000.png"], &["explain", "in/0000.png"], &["completions", "bash"]] {
         let output = place.command(args).stdout(closed()).output().unwrap();
-        let ran = common::Ran::of(&output, &place.path("")).expect(1);
+        let ran = common::Ran::from_output(&output, &place.path("")).expect(1);
         assert!(!ran.err.contains("panicked") && !ran.err.contains("error"), "{}", ran.err);
     }
     for (args, code) in [
@@ -418,7 +418,7 @@ fn the_commonest_refusal_is_named_and_the_command_runs_as_printed() {
         let command = suggested(ran);
         let mut shell = std::process::Command::new("/bin/sh");
         shell.args(["-c", &command]).current_dir(place.path("")).env("PATH", path);
-        let done = common::Ran::of(&shell.output().unwrap(), &place.path(""));
+        let done = common::Ran::from_output(&shell.output().unwrap(), &place.path(""));
         done.expect(0).out
     };
     let base = ["-s", "its sensor.toml", "--altitude-km", "400"];

@@ -139,7 +139,7 @@ impl Scripts {
     }
     fn with_path(&self, path: &str) -> Ran {
         let output = self.place.command(&["run", "in/film.mp4"]).env("PATH", self.place.path(path)).output().unwrap();
-        Ran::of(&output, &self.place.path(""))
+        Ran::from_output(&output, &self.place.path(""))
     }
 }
 
@@ -255,7 +255,7 @@ fn a_video_interrupted_with_all_its_helpers_can_be_continued() {
         command.args(args).env("PATH", scripts.place.path("bin"));
         command
     };
-    let ran = |args: &[&str]| Ran::of(&hzn(args).output().unwrap(), &scripts.place.path("")).expect(0);
+    let ran = |args: &[&str]| Ran::from_output(&hzn(args).output().unwrap(), &scripts.place.path("")).expect(0);
     ran(&["whole.csv"]).says("60 frames: 60 ok");
     let mut cut = hzn(&["a.csv", "-j", "1"]).process_group(0).stderr(Stdio::null()).spawn().unwrap();
     let begin = Instant::now();

@@ -29,7 +29,7 @@
 //! ```
 //! use hzn_core::camera::{self, Model};
 //! use hzn_core::image::{Grey, Layout};
-//! use hzn_core::{Config, FlightHorizon, Frame};
+//! use hzn_core::{Config, FlightHorizon, Prior};
 //!
 //! let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
 //! config.body.altitude_km = Some(230.0);
@@ -37,7 +37,7 @@
 //! // Sky above, ground below, of a body as wide as the Earth.
 //! let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
 //! let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
-//! let expected = horizon.expect(&Frame::default())?;
+//! let expected = horizon.expect(&Prior::default())?;
 //! let report = horizon.process(&picture, &expected);
 //! println!("{} at stage {}", report.status, report.stage.name());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -81,7 +81,7 @@ pub use image::region;
 pub use model::{body, edge_noise, error_budget, observer, report, status, verdict, work};
 pub use stages::{consensus, contour, covariance, edge_points, fit, gates, threshold};
 
-pub use body::{Expected, Frame};
+pub use body::{Expected, Prior};
 pub use config::Config;
 pub use observer::{Observer, Unobserved};
 pub use papers::Preset;

@@ -6,7 +6,7 @@ mod common;
 use std::cell::{Cell, RefCell};
 
 use common::{KINDS, garbage};
-use hzn_core::body::{Frame, Kind};
+use hzn_core::body::{Kind, Prior};
 use hzn_core::camera::{self, Model};
 use hzn_core::edge_points::SubPixel;
 use hzn_core::image::{Grey, Layout};
@@ -48,7 +48,7 @@ fn disc(config: &Config, u: f64, v: f64, radius_px: f64) -> Vec<u8> {
 fn answer(config: &Config, data: &[u8], observer: &impl Observer<f64>) -> Report<f64> {
     let layout = Layout::packed(config.camera.width.into(), config.camera.height.into(), 1, 8);
     let mut host = HostHorizon::boxed(config).unwrap();
-    let expected = host.expect(&Frame::default()).unwrap();
+    let expected = host.expect(&Prior::default()).unwrap();
     host.process_observed(&Grey::try_new(data, layout).unwrap(), &expected, observer)
 }
 
@@ -244,7 +244,7 @@ fn a_picture_with_more_pixels_than_bits_is_truncated() {
     config.recover.method = retry::Method::None;
     let data = disc(&config, 191.5, 127.5, 87.0);
     let mut flight = FlightHorizon::boxed(&config).unwrap();
-    let expected = flight.expect(&Frame::default()).unwrap();
+    let expected = flight.expect(&Prior::default()).unwrap();
     let picture = Grey::try_new(&data, Layout::packed(384, 256, 1, 8)).unwrap();
     assert_eq!(flight.process(&picture, &expected).status, Status::Truncated);
     // A copy that fits is answered.
@@ -329,7 +329,7 @@ proptest! {
         let again = answer(&config, &data, &Watch::default());
         prop_assert_eq!(report.solution.map(|s| s.axis.xyz()), again.solution.map(|s| s.axis.xyz()));
         let mut flight = FlightHorizon::boxed(&config).unwrap();
-        let expected = flight.expect(&Frame::default()).unwrap();
+        let expected = flight.expect(&Prior::default()).unwrap();
         let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
         if let Some(s) = flight.process(&picture, &expected).solution {
             prop_assert!(s.axis.xyz().iter().all(|v| v.is_finite()));

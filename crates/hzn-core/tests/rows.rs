@@ -7,16 +7,16 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::threshold::Method;
-use hzn_core::{Config, FlightWorkspace, Frame, Report, Sensor};
+use hzn_core::{Config, FlightWorkspace, Prior, Report, Sensor};
 use hzn_core::{
     observer::{Observer, Unobserved},
-    pipeline::{HELD, Rows, RowsError},
+    pipeline::{ROWS_HELD, RowBuffers, RowStreamError},
 };
 use proptest::prelude::*;
 
 const W: usize = 96;
 const H: usize = 64;
-type Small = Rows<u8, { HELD as usize * W }, H, 8192, 8192>;
+type Small = RowBuffers<u8, { ROWS_HELD as usize * W }, H, 8192, 8192>;
 
 /// The edge points of each candidate, with every bit.
 #[derive(Default)]
@@ -47,12 +47,12 @@ fn config(mask: bool, circle: bool) -> Config {
 
 fn stream<const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize>(
     sensor: &Sensor<f32>,
-    rows: &mut Rows<u8, WINDOW, HEIGHT, TURNS, POINTS>,
+    rows: &mut RowBuffers<u8, WINDOW, HEIGHT, TURNS, POINTS>,
     data: &[u8],
     level: Option<u16>,
     observer: &impl Observer<f32>,
 ) -> Report<f32> {
-    let expected = sensor.expect(&Frame { level, ..Frame::default() }).unwrap();
+    let expected = sensor.expect(&Prior { level, ..Prior::default() }).unwrap();
     let mut stream = sensor.rows(rows, 8, &expected).unwrap();
     for row in data.chunks(W) {
         stream.push_row(row).unwrap();
@@ -62,7 +62,7 @@ fn stream<const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const PO
 
 fn whole(sensor: &Sensor<f32>, data: &[u8], observer: &impl Observer<f32>) -> Report<f32> {
     let picture = Grey::try_new(data, Layout::packed(W as u32, H as u32, 1, 8)).unwrap();
-    let expected = sensor.expect(&Frame::default()).unwrap();
+    let expected = sensor.expect(&Prior::default()).unwrap();
     sensor.process(&mut Box::new(FlightWorkspace::new()), &picture, &expected, observer)
 }
 
@@ -120,10 +120,10 @@ proptest! {
     fn short_lists_are_borne(kind in 0u8..8, seed in any::<u64>(), level in any::<u8>(), mask: bool, circle: bool) {
         let data = garbage(kind, seed, level);
         let sensor = Sensor::<f32>::new(&config(mask, circle)).unwrap();
-        let mut few_points = Box::new(Rows::<u8, { HELD as usize * W }, H, 8192, 60>::new());
+        let mut few_points = Box::new(RowBuffers::<u8, { ROWS_HELD as usize * W }, H, 8192, 60>::new());
         let report = stream(&sensor, &mut few_points, &data, None, &Unobserved);
         prop_assert_eq!(report.status == Status::Ok, report.solution.is_some());
-        let mut few_turns = Box::new(Rows::<u8, { HELD as usize * W }, H, 150, 8192>::new());
+        let mut few_turns = Box::new(RowBuffers::<u8, { ROWS_HELD as usize * W }, H, 150, 8192>::new());
         let report = stream(&sensor, &mut few_turns, &data, None, &Unobserved);
         prop_assert_eq!(report.status == Status::Ok, report.solution.is_some());
     }
@@ -139,7 +139,7 @@ fn the_picture_ends_where_the_lists_do() {
     };
     let data: Vec<u8> = (0..W * H).map(|i| shade(i % W, i / W)).collect();
     let sensor = Sensor::<f32>::new(&config(false, false)).unwrap();
-    let mut rows = Box::new(Rows::<u8, { HELD as usize * W }, H, 100, 8192>::new());
+    let mut rows = Box::new(RowBuffers::<u8, { ROWS_HELD as usize * W }, H, 100, 8192>::new());
     let report = stream(&sensor, &mut rows, &data, None, &Unobserved);
     assert!(report.counters.dropped > 1000, "{:?}", report.counters);
     assert!(report.candidates.len() == 1 && report.candidates[0].length_px == W as u32, "{:?}", report.candidates);
@@ -165,15 +165,15 @@ fn the_level_comes_from_the_picture_before() {
 #[test]
 fn misuse_is_refused_by_name() {
     let sensor = Sensor::<f32>::new(&config(false, false)).unwrap();
-    let expected = sensor.expect(&Frame::default()).unwrap();
-    let mut low = Box::new(Rows::<u8, { HELD as usize * W }, 10, 100, 100>::new());
+    let expected = sensor.expect(&Prior::default()).unwrap();
+    let mut low = Box::new(RowBuffers::<u8, { ROWS_HELD as usize * W }, 10, 100, 100>::new());
     let refused = sensor.rows(&mut low, 8, &expected).unwrap_err();
-    assert_eq!(refused, RowsError::Room { window: 3072, height: 64 });
+    assert_eq!(refused, RowStreamError::Room { window: 3072, height: 64 });
     assert_eq!(refused.to_string(), "the picture needs room for 3072 samples in the window and for 64 rows");
     let mut rows = Box::new(Small::new());
-    assert_eq!(sensor.rows(&mut rows, 12, &expected).unwrap_err(), RowsError::Bits);
+    assert_eq!(sensor.rows(&mut rows, 12, &expected).unwrap_err(), RowStreamError::Bits);
     let mut stream = sensor.rows(&mut rows, 8, &expected).unwrap();
-    assert_eq!(stream.push_row(&[0; 95]), Err(RowsError::Length));
+    assert_eq!(stream.push_row(&[0; 95]), Err(RowStreamError::Length));
     for _ in 0..H - 1 {
         stream.push_row(&[0; W]).unwrap();
     }
@@ -184,6 +184,6 @@ fn misuse_is_refused_by_name() {
     for _ in 0..H {
         stream.push_row(&[0; W]).unwrap();
     }
-    assert_eq!(stream.push_row(&[0; W]), Err(RowsError::Finished));
+    assert_eq!(stream.push_row(&[0; W]), Err(RowStreamError::Finished));
     assert_eq!(stream.finish(&mut workspace, &Unobserved).status, Status::NoLimb);
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{KINDS, garbage};
-use hzn_core::body::{Frame, Kind};
+use hzn_core::body::{Kind, Prior};
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
@@ -64,12 +64,12 @@ fn the_chosen_edge_is_listed_however_late_it_comes() {
     let data: Vec<u8> = (0..640 * 480).map(|i| lit(i % 640, i / 640) as u8).collect();
     let picture = Grey::try_new(&data, Layout::packed(640, 480, 1, 8)).unwrap();
     let mut host = HostHorizon::boxed(&config).unwrap();
-    let report = host.process(&picture, &host.expect(&Frame::default()).unwrap());
+    let report = host.process(&picture, &host.expect(&Prior::default()).unwrap());
     assert!(report.solution.as_ref().is_some_and(|s| s.candidate as usize >= MAX_LISTED), "{report:?}");
     assert_eq!((report.candidates.len(), report.candidates[15].verdict), (MAX_LISTED, Verdict::Chosen));
     listed(&report);
     let mut flight = FlightHorizon::boxed(&config).unwrap();
-    let report = flight.process(&picture, &flight.expect(&Frame::default()).unwrap());
+    let report = flight.process(&picture, &flight.expect(&Prior::default()).unwrap());
     assert_eq!(report.candidates[15].verdict, Verdict::Chosen);
     listed(&report);
 }
@@ -87,7 +87,7 @@ proptest! {
         let data = garbage(kind, seed, level);
         let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
         let mut host = HostHorizon::boxed(&config).unwrap();
-        let expected = host.expect(&Frame::default()).unwrap();
+        let expected = host.expect(&Prior::default()).unwrap();
         let first = host.process(&picture, &expected);
         sound(&first);
         // The same picture gives the same answer, whatever came between.
@@ -96,7 +96,7 @@ proptest! {
         prop_assert_eq!(first.counters, again.counters);
         prop_assert_eq!(first.solution.map(|s| s.axis.xyz()), again.solution.map(|s| s.axis.xyz()));
         let mut flight = FlightHorizon::boxed(&config).unwrap();
-        let expected: Expected<f32> = flight.expect(&Frame::default()).unwrap();
+        let expected: Expected<f32> = flight.expect(&Prior::default()).unwrap();
         let report = flight.process(&picture, &expected);
         listed(&report);
         if let Some(s) = report.solution {
@@ -122,7 +122,7 @@ proptest! {
         let data = garbage(kind, seed, level);
         let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
         let mut host = HostHorizon::boxed(&config).unwrap();
-        let frame = Frame { sun: sun.and_then(UnitVec3::try_new), ..Frame::default() };
+        let frame = Prior { sun: sun.and_then(UnitVec3::try_new), ..Prior::default() };
         let expected = host.expect(&frame).unwrap();
         sound(&host.process(&picture, &expected));
         // The same body thrice: what is taken is not given again.
@@ -150,7 +150,7 @@ proptest! {
         let data = garbage(kind, seed, level);
         let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
         let mut host = HostHorizon::boxed(&config(most)).unwrap();
-        let expected = host.expect(&Frame::default()).unwrap();
+        let expected = host.expect(&Prior::default()).unwrap();
         let bounded = host.process(&picture, &expected);
         sound(&bounded);
         prop_assert!(bounded.counters.work <= most);
@@ -173,7 +173,7 @@ fn a_picture_that_would_cost_too_much_is_truncated() {
     config.limits.max_work = Some(10_000);
     let data = garbage(0, 1, 128);
     let mut host = HostHorizon::boxed(&config).unwrap();
-    let expected = host.expect(&Frame::default()).unwrap();
+    let expected = host.expect(&Prior::default()).unwrap();
     let report = host.process(&Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap(), &expected);
     assert_eq!(report.status, Status::Truncated);
     config.limits.max_work = Some(9_999);
@@ -184,7 +184,7 @@ fn a_picture_that_would_cost_too_much_is_truncated() {
 #[test]
 fn a_picture_of_another_size_is_rejected() {
     let mut host = HostHorizon::boxed(&config(Model::Pinhole, false, false, Kind::Earth)).unwrap();
-    let expected = host.expect(&Frame::default()).unwrap();
+    let expected = host.expect(&Prior::default()).unwrap();
     let data = vec![0u8; 50 * 50];
     let report = host.process(&Grey::try_new(&data, Layout::packed(50, 50, 1, 8)).unwrap(), &expected);
     assert_eq!(report.status, Status::Rejected);
@@ -196,7 +196,7 @@ fn grey_colour_and_sixteen_bits_agree() {
     let colour: Vec<u8> = data.iter().flat_map(|&v| [v, v, v]).collect();
     let words: Vec<u16> = data.iter().map(|&v| u16::from(v) * 256).collect();
     let mut host = HostHorizon::boxed(&config(Model::Pinhole, false, false, Kind::EarthSphere)).unwrap();
-    let expected = host.expect(&Frame::default()).unwrap();
+    let expected = host.expect(&Prior::default()).unwrap();
     let views = [
         ImageView::from_bytes(&data, Layout::packed(96, 64, 1, 8), Channel::Mean).unwrap(),
         ImageView::from_bytes(&colour, Layout::packed(96, 64, 3, 8), Channel::Mean).unwrap(),
@@ -211,18 +211,18 @@ fn grey_colour_and_sixteen_bits_agree() {
 
 #[test]
 fn impossible_frames_are_refused_by_name() {
-    use hzn_core::body::FrameError;
+    use hzn_core::body::PriorError;
     let mut c = config(Model::Pinhole, false, false, Kind::Earth);
     c.body.altitude_km = None;
     let host = HostHorizon::boxed(&c).unwrap();
-    let refused = |frame: Frame<f64>| host.expect(&frame).unwrap_err();
-    assert_eq!(refused(Frame::default()), FrameError::NoAltitude);
-    assert_eq!(refused(Frame { altitude_m: Some(f64::NAN), ..Frame::default() }), FrameError::Altitude);
-    assert_eq!(refused(Frame { altitude_m: Some(-5e3), ..Frame::default() }), FrameError::Altitude);
-    assert_eq!(refused(Frame { position_m: Some([6.3e6, 0.0, 0.0]), ..Frame::default() }), FrameError::Position);
+    let refused = |frame: Prior<f64>| host.expect(&frame).unwrap_err();
+    assert_eq!(refused(Prior::default()), PriorError::NoAltitude);
+    assert_eq!(refused(Prior { altitude_m: Some(f64::NAN), ..Prior::default() }), PriorError::Altitude);
+    assert_eq!(refused(Prior { altitude_m: Some(-5e3), ..Prior::default() }), PriorError::Altitude);
+    assert_eq!(refused(Prior { position_m: Some([6.3e6, 0.0, 0.0]), ..Prior::default() }), PriorError::Position);
     assert_eq!(
-        refused(Frame { position_m: Some([f64::INFINITY, 0.0, 0.0]), ..Frame::default() }),
-        FrameError::Position
+        refused(Prior { position_m: Some([f64::INFINITY, 0.0, 0.0]), ..Prior::default() }),
+        PriorError::Position
     );
-    assert!(host.expect(&Frame { position_m: Some([6.7e6, 0.0, 0.0]), ..Frame::default() }).is_ok());
+    assert!(host.expect(&Prior { position_m: Some([6.7e6, 0.0, 0.0]), ..Prior::default() }).is_ok());
 }

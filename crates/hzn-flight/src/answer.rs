@@ -58,7 +58,7 @@ pub struct Direction {
 
 /// The answer to one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answer {
+pub struct PictureAnswer {
     /// [`hzn_core::status::Status`] as a number.
     pub status: u8,
     /// [`hzn_core::status::Stage`] as a number: the last that was entered.
@@ -90,9 +90,9 @@ pub struct Answer {
 /// So many looks fit into a packet.
 const MOST_LOOKS: u32 = 16;
 
-impl Answer {
+impl PictureAnswer {
     /// What a report says.
-    pub fn of(report: &Report<f32>) -> Self {
+    pub fn from_report(report: &Report<f32>) -> Self {
         let c = &report.counters;
         let mut edges = [None; MAX_LISTED];
         for (edge, c) in edges.iter_mut().zip(&report.candidates) {
@@ -306,7 +306,7 @@ mod tests {
         };
         let mut edges = [None; MAX_LISTED];
         (edges[0], edges[1]) = (Some(Edge { verdict: 5, ..edge }), Some(edge));
-        let whole = Answer {
+        let whole = PictureAnswer {
             status: 0,
             stage: 7,
             looks: 3,
@@ -321,14 +321,14 @@ mod tests {
             direction: Some(direction),
             edges,
         };
-        for answer in [whole, Answer { status: 1, direction: None, edges: [None; MAX_LISTED], ..whole }] {
+        for answer in [whole, PictureAnswer { status: 1, direction: None, edges: [None; MAX_LISTED], ..whole }] {
             let mut bytes = [0; 512];
             let mut out = Writer::new(&mut bytes);
             answer.write(&mut out);
             let n = out.finish().unwrap();
-            assert_eq!(Answer::read(&mut Reader::new(&bytes[..n])), Some(answer));
+            assert_eq!(PictureAnswer::read(&mut Reader::new(&bytes[..n])), Some(answer));
             for cut in 0..n {
-                assert_eq!(Answer::read(&mut Reader::new(&bytes[..cut])), None);
+                assert_eq!(PictureAnswer::read(&mut Reader::new(&bytes[..cut])), None);
             }
         }
     }

@@ -7,9 +7,9 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Observer;
 use hzn_core::pixel::Pixel;
 use hzn_core::status::Status;
-use hzn_core::{Frame, Sensor, Workspace};
+use hzn_core::{Prior, Sensor, Workspace};
 
-use crate::answer::Answer;
+use crate::answer::PictureAnswer;
 use crate::board::{Board, Shot};
 use crate::bytes::{Reader, Writer};
 use crate::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode};
@@ -85,7 +85,7 @@ pub struct Flight<'a, B> {
     workspace: &'a mut Lists,
     sensor: Sensor<f32>,
     housekeeping_every: u16,
-    known: Frame<f32>,
+    known: Prior<f32>,
     /// The last answer, and when its picture was exposed.
     last: Option<(Last<f32>, u64)>,
     mode: Mode,
@@ -120,7 +120,7 @@ impl<'a, B: Board> Flight<'a, B> {
             workspace,
             sensor,
             housekeeping_every: loaded.parameters.housekeeping_every,
-            known: Frame::default(),
+            known: Prior::default(),
             last: None,
             mode: Mode::Standby,
             state,
@@ -310,7 +310,7 @@ impl<'a, B: Board> Flight<'a, B> {
                 }
                 let position_m = all([Some(x), Some(y), Some(z)]);
                 let rate_rad_s = rate.and_then(all);
-                let known = Frame { altitude_m: given(h), position_m, rate_rad_s, ..Frame::default() };
+                let known = Prior { altitude_m: given(h), position_m, rate_rad_s, ..Prior::default() };
                 if self.sensor.expect(&known).is_err() {
                     return Code::Refused;
                 }
@@ -411,7 +411,7 @@ impl<'a, B: Board> Flight<'a, B> {
         }
         let age_s = |exposure_us: u64| shot.exposure_us.saturating_sub(exposure_us) as f32 * 1e-6;
         let last = self.last.map(|(last, exposure_us)| Last { age_s: age_s(exposure_us), ..last });
-        let expected = match self.sensor.expect(&Frame { last, ..self.known }) {
+        let expected = match self.sensor.expect(&Prior { last, ..self.known }) {
             Ok(expected) => expected,
             Err(_) => {
                 self.state.refused = self.state.refused.saturating_add(1);
@@ -449,7 +449,7 @@ impl<'a, B: Board> Flight<'a, B> {
             body: Parameters::body_number(config),
             altitude_m: told.unwrap_or(f32::NAN),
         };
-        let answer = Answer::of(&report);
+        let answer = PictureAnswer::from_report(&report);
         self.send(Apid::Science, |out| {
             exposure.write(out);
             answer.write(out);

@@ -9,7 +9,7 @@ use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode};
 use hzn_flight::packet::{self, Apid, Scan};
-use hzn_flight::{Parameters, answer::Answer, table};
+use hzn_flight::{Parameters, answer::PictureAnswer, table};
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
@@ -126,7 +126,7 @@ fn command(sequence: u16, function: Function, arguments: impl FnOnce(&mut Writer
 #[derive(Debug, Default)]
 struct Heard {
     housekeeping: Vec<Housekeeping>,
-    science: Vec<(Exposure, Answer)>,
+    science: Vec<(Exposure, PictureAnswer)>,
     events: Vec<(Event, u32, u32)>,
     answers: Vec<(u8, u16, Code)>,
     parameters: Vec<(u16, f64)>,
@@ -146,7 +146,7 @@ fn heard(flight: &mut Flight<'_, Bench>) -> Heard {
         let mut r = Reader::new(packet.user);
         match Apid::numbered(packet.apid).unwrap() {
             Apid::Housekeeping => out.housekeeping.push(Housekeeping::read(&mut r).unwrap()),
-            Apid::Science => out.science.push((Exposure::read(&mut r).unwrap(), Answer::read(&mut r).unwrap())),
+            Apid::Science => out.science.push((Exposure::read(&mut r).unwrap(), PictureAnswer::read(&mut r).unwrap())),
             Apid::Event => {
                 let e = EventRecord::read(&mut r).unwrap();
                 out.events.push((Event::numbered(e.number).unwrap(), e.a, e.b));

@@ -42,7 +42,7 @@ impl Place {
 
 /// What an index tells, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Found {
+pub enum IndexEntry {
     /// A picture, which has not been read.
     Picture(Place),
     /// The result of one picture and body.
@@ -134,13 +134,13 @@ impl Index {
     ///
     /// # Errors
     /// The file cannot be read, or a report cannot be decoded.
-    pub fn next_part(&mut self) -> Result<Option<Vec<Found>>, Error> {
+    pub fn next_part(&mut self) -> Result<Option<Vec<IndexEntry>>, Error> {
         let mut found = Vec::new();
         let more = self.step(&mut found).map_err(|source| Error::Read { path: self.path.clone(), source })??;
         Ok(more.then_some(found))
     }
 
-    fn step(&mut self, found: &mut Vec<Found>) -> io::Result<Result<bool, Error>> {
+    fn step(&mut self, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
         let Some((op, length)) = self.head()? else { return Ok(Ok(false)) };
         match op {
             Op::DATA_END => {
@@ -162,7 +162,7 @@ impl Index {
         }
     }
 
-    fn chunk(&mut self, length: u64, found: &mut Vec<Found>) -> io::Result<Result<bool, Error>> {
+    fn chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
         let start = self.position;
         // Times, sizes and CRC, the name of the compression and the length of the records.
         let mut head = [0; 40];
@@ -240,17 +240,23 @@ impl Index {
         Ok(Ok(whole))
     }
 
-    fn message(&mut self, m: &Message<'_>, chunk: Option<u64>, at: u64, found: &mut Vec<Found>) -> Result<(), Error> {
+    fn message(
+        &mut self,
+        m: &Message<'_>,
+        chunk: Option<u64>,
+        at: u64,
+        found: &mut Vec<IndexEntry>,
+    ) -> Result<(), Error> {
         if self.reports == Some(m.channel) {
             let broken = |e: serde_json::Error| Error::Decode {
                 path: self.path.clone(),
                 detail: format!("report of frame {}: {e}", m.sequence),
             };
             let (row, candidates, given) = messages::parse_report(m.data).map_err(broken)?;
-            found.push(Found::Report(Box::new(row), candidates, given));
+            found.push(IndexEntry::Report(Box::new(row), candidates, given));
         } else if self.pictures.contains_key(&m.channel) {
             let (channel, log_time_ns, sequence) = (m.channel, m.log_time_ns, m.sequence);
-            found.push(Found::Picture(Place { chunk, message: at, channel, log_time_ns, sequence }));
+            found.push(IndexEntry::Picture(Place { chunk, message: at, channel, log_time_ns, sequence }));
         }
         Ok(())
     }

@@ -54,7 +54,7 @@ pub use frame::{
     Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine,
 };
 pub use images::{ImageReader, InputImage};
-pub use index::{Found, Index, Pictures, Place};
+pub use index::{Index, IndexEntry, Pictures, Place};
 pub use part::{create_part, open_part, part_path};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use hzn_core::camera;
 use hzn_core::status::Status;
 use hzn_mcap::{
-    Annotations, Attitude, CandidateEdge, Contents, EncodedImage, Error, Found, FrameRecord, Given, ImageFormat,
-    ImageReader, Index, LogLevel, LogLine, Options, Place, Reader, Row, RowMeta, Writer, part_path, recover, resume,
+    Annotations, Attitude, CandidateEdge, Contents, EncodedImage, Error, FrameRecord, Given, ImageFormat, ImageReader,
+    Index, IndexEntry, LogLevel, LogLine, Options, Place, Reader, Row, RowMeta, Writer, part_path, recover, resume,
 };
 
 const SENSOR: &str = "preset = \"hzn\"\n";
@@ -335,8 +335,8 @@ fn index(path: &Path) -> (Vec<Place>, Vec<(Row, Given)>, Index) {
     while let Some(part) = index.next_part().unwrap() {
         for found in part {
             match found {
-                Found::Picture(place) => pictures.push(place),
-                Found::Report(row, candidates, given) => {
+                IndexEntry::Picture(place) => pictures.push(place),
+                IndexEntry::Report(row, candidates, given) => {
                     assert_eq!(candidates, frame(row.index).candidates);
                     rows.push((*row, given));
                 }

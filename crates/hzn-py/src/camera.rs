@@ -22,7 +22,7 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    pub(crate) fn of(config: Config) -> PyResult<Self> {
+    pub(crate) fn from_config(config: Config) -> PyResult<Self> {
         let lens = camera::Camera::try_new(&config).map_err(errors::config)?;
         Ok(Self { config, lens })
     }
@@ -47,20 +47,20 @@ impl Camera {
     fn new(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let sections = PyDict::new(py);
         sections.set_item("camera", keys.map_or_else(|| PyDict::new(py), Clone::clone))?;
-        Self::of(parameters::config(&sections)?.camera)
+        Self::from_config(parameters::config(&sections)?.camera)
     }
 
     #[doc = doc!("Camera.from_toml")]
     #[staticmethod]
     fn from_toml(path: PathBuf) -> PyResult<Self> {
-        Self::of(sensor::load(&path).map_err(errors::config)?.config.camera)
+        Self::from_config(sensor::load(&path).map_err(errors::config)?.config.camera)
     }
 
     #[doc = doc!("Camera.from_kalibr")]
     #[staticmethod]
     #[pyo3(signature = (path, *, camera = None))]
     fn from_kalibr(path: PathBuf, camera: Option<&str>) -> PyResult<Self> {
-        Self::of(camera_file::load(&path, camera).map_err(errors::config)?)
+        Self::from_config(camera_file::load(&path, camera).map_err(errors::config)?)
     }
 
     #[doc = doc!("Camera.from_opencv")]
@@ -73,7 +73,7 @@ impl Camera {
         fisheye: bool,
     ) -> PyResult<Self> {
         if let Ok(path) = source.extract::<PathBuf>() {
-            return Self::of(camera_file::load(&path, None).map_err(errors::config)?);
+            return Self::from_config(camera_file::load(&path, None).map_err(errors::config)?);
         }
         let matrix = rows(source, 3, "camera matrix")?;
         let m = matrix.as_array();
@@ -97,7 +97,7 @@ impl Camera {
         };
         let ideal = Config::ideal(model, width, height, m[(0, 0)]);
         let k = k.into_iter().collect();
-        Self::of(Config { fx_px: m[(0, 0)], fy_px: m[(1, 1)], cx_px: m[(0, 2)], cy_px: m[(1, 2)], k, ..ideal })
+        Self::from_config(Config { fx_px: m[(0, 0)], fy_px: m[(1, 1)], cx_px: m[(0, 2)], cy_px: m[(1, 2)], k, ..ideal })
     }
 
     #[doc = doc!("Camera.parameters")]

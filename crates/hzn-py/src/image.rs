@@ -19,7 +19,7 @@ pub(crate) enum Array<'py> {
 
 impl<'py> Array<'py> {
     /// Takes an array of uint8 or uint16, height x width or height x width x 1 to 4.
-    pub(crate) fn of(object: &Bound<'py, PyAny>) -> PyResult<Self> {
+    pub(crate) fn from_object(object: &Bound<'py, PyAny>) -> PyResult<Self> {
         let Ok(untyped) = object.cast::<PyUntypedArray>() else {
             let name = object.get_type().name().map(|n| n.to_string()).unwrap_or_default();
             return Err(errors::image(format!("a numpy array is expected, not {name}: numpy.asarray(...) makes one")));

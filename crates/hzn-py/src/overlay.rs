@@ -26,7 +26,7 @@ pub(crate) fn overlay<'py>(
 
 /// A picture in colour with what the report stands on drawn over it.
 pub(crate) fn draw(py: Python<'_>, image: &Bound<'_, PyAny>, report: &Report, bits: Option<u8>) -> PyResult<RgbImage> {
-    let array = Array::of(image)?;
+    let array = Array::from_object(image)?;
     let picture = Picture::new(array.to_samples(), array.layout(bits)?);
     let (drawing, title) = (report.drawing_of_all(), report.title());
     errors::detached(py, || hzn_run::overlay::draw_annotations(picture.to_rgb(), &drawing, &title))

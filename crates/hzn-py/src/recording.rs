@@ -53,7 +53,7 @@ pub(crate) fn open_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
     Ok(Recording {
         sensor_toml: text,
         metadata: reader.metadata().clone(),
-        camera: config.and_then(|c| Camera::of(c.config.camera).ok()).map(Arc::new),
+        camera: config.and_then(|c| Camera::from_config(c.config.camera).ok()).map(Arc::new),
         path,
         open: Mutex::new(Some(Open { reader, ahead: None, told: false })),
     })
@@ -117,7 +117,7 @@ impl Recording {
     fn sensor(&self) -> PyResult<Sensor> {
         let text = self.sensor_toml.as_deref().ok_or_else(|| errors::other("the recording holds no sensor.toml"))?;
         let parsed = hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(errors::config)?;
-        Sensor::of(parsed.config, false)
+        Sensor::from_config(parsed.config, false)
     }
     #[doc = doc!("Recording.close")]
     fn close(&self) {

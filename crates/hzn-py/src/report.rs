@@ -386,7 +386,7 @@ impl Report {
         let pickled: Pickled = serde_json::from_slice(pickled).map_err(errors::other)?;
         Ok(Self {
             candidates: pickled.candidates,
-            camera: pickled.camera.map(Camera::of).transpose()?.map(Arc::new),
+            camera: pickled.camera.map(Camera::from_config).transpose()?.map(Arc::new),
             half_angle_rad: pickled.half_angle_rad,
             detail: pickled.detail,
             stage: pickled.stage,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use hzn_calib::{FrameData, plausible, sensor};
-use hzn_core::body::FrameError;
+use hzn_core::body::PriorError;
 use hzn_core::status::Status;
 use hzn_core::{Config, Sensor as CoreSensor};
 use hzn_mcap::{Row, RowMeta};
@@ -39,9 +39,9 @@ pub(crate) struct State {
 }
 
 impl State {
-    fn of(config: Config, flight: bool) -> PyResult<Arc<Self>> {
+    fn new(config: Config, flight: bool) -> PyResult<Arc<Self>> {
         let core = CoreSensor::new(&config).map_err(errors::config)?;
-        let camera = Arc::new(Camera::of(config.camera.clone())?);
+        let camera = Arc::new(Camera::from_config(config.camera.clone())?);
         Ok(Arc::new(Self { config, flight, camera, core, idle: Mutex::default() }))
     }
 
@@ -59,8 +59,8 @@ impl State {
 }
 
 impl Sensor {
-    pub(crate) fn of(config: Config, flight: bool) -> PyResult<Self> {
-        Ok(Self { state: RwLock::new(State::of(config, flight)?) })
+    pub(crate) fn from_config(config: Config, flight: bool) -> PyResult<Self> {
+        Ok(Self { state: RwLock::new(State::new(config, flight)?) })
     }
 
     /// As it is now: a change of the parameters leaves calls under way alone.
@@ -78,7 +78,7 @@ impl Sensor {
         let config = parameters::config(sections.unwrap_or(&none))?;
         let doubts = plausible::doubts(&config);
         doubts.iter().try_for_each(|doubt| errors::warn(py, format_args!("{}: {}", doubt.key, doubt.what)))?;
-        Self::of(config, flight)
+        Self::from_config(config, flight)
     }
 
     #[doc = doc!("Sensor.from_toml")]
@@ -87,7 +87,7 @@ impl Sensor {
     fn from_toml(py: Python<'_>, path: PathBuf, flight: bool) -> PyResult<Self> {
         let loaded = sensor::load(&path).map_err(errors::config)?;
         loaded.warnings.iter().try_for_each(|warning| errors::warn(py, warning))?;
-        Self::of(loaded.config, flight)
+        Self::from_config(loaded.config, flight)
     }
 
     #[doc = doc!("Sensor.parameters")]
@@ -97,7 +97,7 @@ impl Sensor {
     }
     #[setter]
     fn set_parameters(&self, sections: &Bound<'_, PyDict>) -> PyResult<()> {
-        let state = State::of(parameters::config(sections)?, self.flight())?;
+        let state = State::new(parameters::config(sections)?, self.flight())?;
         *self.state.write().unwrap_or_else(PoisonError::into_inner) = state;
         Ok(())
     }
@@ -126,7 +126,7 @@ impl Sensor {
         time_s: Option<f64>,
     ) -> PyResult<Expected> {
         let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
-        Expected::of(&self.state(), data, body)
+        Expected::new(&self.state(), data, body)
     }
 
     #[doc = doc!("Sensor.process")]
@@ -147,7 +147,7 @@ impl Sensor {
     ) -> PyResult<Report> {
         let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
         let state = self.state();
-        let array = Array::of(image)?;
+        let array = Array::from_object(image)?;
         state.check_size(&array)?;
         let bits = array.bits(bits, &state.config.input);
         let view = array.view(bits, state.config.input.channel)?;
@@ -171,7 +171,7 @@ impl Sensor {
             let found = match processed.report {
                 Ok(found) => found,
                 // Every rocket begins there: a flight goes on after it.
-                Err(why @ FrameError::BelowLimb { .. }) => {
+                Err(why @ PriorError::BelowLimb { .. }) => {
                     return Ok(Report::of_row(Row::unprocessed(&meta, Status::NoAltitude, why.to_string())));
                 }
                 Err(why) => return Err(errors::config(why)),
@@ -221,7 +221,7 @@ impl Sensor {
     }
     #[staticmethod]
     fn _of(sections: &Bound<'_, PyDict>, flight: bool) -> PyResult<Self> {
-        Self::of(parameters::config(sections)?, flight)
+        Self::from_config(parameters::config(sections)?, flight)
     }
 }
 

@@ -148,7 +148,7 @@ fn processed(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: sourc
     let finished = errors::detached(py, || state.lend(|sensor| engine::one(plan, sensor, index, item)))??;
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
     let rows = hzn_run::sink::rows(&finished, &plan.config);
-    let report = |(row, found): (hzn_mcap::Row, &engine::Found)| match &found.report {
+    let report = |(row, found): (hzn_mcap::Row, &engine::BodyOutcome)| match &found.report {
         Ok(found) => Report::new(row, found, None, &state.camera),
         Err(_) => Report::of_row(row),
     };

@@ -60,7 +60,7 @@ impl Simulation {
             let fit = errors::detached(py, || Fit::measure(&self.scenario, MEASURED, &|_, _| ()))?;
             let mut config = self.flight.sensor.clone();
             fit.map_err(errors::config)?.iter().for_each(|fit| fit.apply(&mut config));
-            Py::new(py, Sensor::of(config, false)?)
+            Py::new(py, Sensor::from_config(config, false)?)
         });
         made.map(|sensor| sensor.clone_ref(py))
     }

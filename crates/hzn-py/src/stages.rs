@@ -26,7 +26,7 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    pub(crate) fn of(state: &State, data: FrameData, body: usize) -> PyResult<Self> {
+    pub(crate) fn new(state: &State, data: FrameData, body: usize) -> PyResult<Self> {
         let bodies = state.config.each_body().len();
         if body >= bodies {
             return Err(errors::config(format!("body: {body} is refused: the sensor's are 0 to {}", bodies - 1)));
@@ -105,7 +105,7 @@ impl Fit {
 pub(crate) struct Rays(Mutex<Edges<f64>>);
 
 impl Rays {
-    fn of(edges: Edges<f64>) -> Self {
+    fn new(edges: Edges<f64>) -> Self {
         Self(Mutex::new(edges))
     }
     fn edges(&self) -> MutexGuard<'_, Edges<f64>> {
@@ -158,7 +158,7 @@ impl Rays {
 /// Reads the array as a picture of this sensor and hands it on, packed or not.
 macro_rules! with_picture {
     ($image:expr, $state:expr, $bits:expr, |$picture:ident| $work:expr) => {{
-        let array = Array::of($image)?;
+        let array = Array::from_object($image)?;
         $state.check_size(&array)?;
         let input = &$state.config.input;
         match array.view(array.bits($bits, input), input.channel)? {
@@ -217,7 +217,7 @@ pub(crate) fn pick(
     };
     let border: Option<Vec<Pixel>> = border.as_array().outer_iter().map(pixel).collect();
     let border = border.ok_or_else(|| errors::image("border: a pixel lies outside of the picture"))?;
-    Ok(Rays::of(with_picture!(image, state, bits, |picture| Edges::pick(core, &picture, level, &border))))
+    Ok(Rays::new(with_picture!(image, state, bits, |picture| Edges::pick(core, &picture, level, &border))))
 }
 
 #[pyfunction]
@@ -234,7 +234,7 @@ pub(crate) fn rays(sensor: &Sensor, points: &Bound<'_, PyAny>, lit: &Bound<'_, P
         .zip(lit.as_array().outer_iter())
         .map(|(p, l)| (ImagePoint { u: p[0], v: p[1] }, [l[0], l[1]]))
         .collect();
-    Ok(Rays::of(Edges::towards(state.core()?.camera(), &both)))
+    Ok(Rays::new(Edges::towards(state.core()?.camera(), &both)))
 }
 
 #[pyfunction]

@@ -22,7 +22,7 @@ use hzn_core::{
     observer::Observer,
     report::{Candidate, Solution},
 };
-use hzn_sim::artefact::{Kind, Outcome, Told, Trial, look};
+use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, look};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 
@@ -166,7 +166,7 @@ fn one(
             config.reject.threshold_px = px;
         }
         let watch = Watch::default();
-        let told = Told { attitude_sigma_deg: args.attitude };
+        let told = PriorKnowledge { attitude_sigma_deg: args.attitude };
         let outcome = look(horizon, &config, &trial, &picture, told, &watch)?;
         let bad = outcome.is_false() || args.limb && !outcome.is_right();
         let listed = args.all || bad && (args.list || args.png.is_some());

@@ -87,7 +87,7 @@ impl FlightFrame {
     /// What frames.csv says about the picture: time and position, no attitude.
     pub fn row(&self) -> FrameRow {
         let [x_km, y_km, z_km] = self.scene.pose.position_m.map(|m| m * 1e-3);
-        let altitude_km = Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m) * 1e-3;
+        let altitude_km = Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m) * 1e-3;
         let rate = self.rate_rad_s();
         FrameRow {
             file: self.file.clone(),
@@ -126,19 +126,19 @@ impl FlightFrame {
         self.scene.truth(&self.file, self.time_s)
     }
     /// What a navigation system would tell the sensor: the position, no attitude.
-    pub fn known(&self) -> hzn_core::Frame<f64> {
-        hzn_core::Frame {
-            altitude_m: Some(Globe::of(&self.scene.body).altitude_m(self.scene.pose.position_m)),
+    pub fn known(&self) -> hzn_core::Prior<f64> {
+        hzn_core::Prior {
+            altitude_m: Some(Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m)),
             position_m: Some(self.scene.pose.position_m),
             rate_rad_s: self.rate_rad_s(),
-            ..hzn_core::Frame::default()
+            ..hzn_core::Prior::default()
         }
     }
     /// As [`FlightFrame::known`], with an attitude that is wrong by `sigma_rad` (1-sigma, about each axis).
-    pub fn known_with_attitude(&self, sigma_rad: f64) -> hzn_core::Frame<f64> {
+    pub fn known_with_attitude(&self, sigma_rad: f64) -> hzn_core::Prior<f64> {
         let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
         let error_rad = [0, 1, 2].map(|i| sigma_rad * draws.normal(i));
-        hzn_core::Frame {
+        hzn_core::Prior {
             cam_to_ecef: self.scene.pose.disturbed(error_rad).cam_to_ecef(),
             attitude_sigma_rad: Some(sigma_rad),
             ..self.known()

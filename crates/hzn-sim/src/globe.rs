@@ -18,7 +18,7 @@ pub struct Globe {
 
 impl Globe {
     /// The body of a sensor's configuration: WGS-84 for `earth`, else its sphere.
-    pub fn of(body: &body::Config) -> Self {
+    pub fn new(body: &body::Config) -> Self {
         match body.kind {
             Kind::Earth => Self { a_m: WGS84_A_M, b_m: WGS84_B_M },
             Kind::EarthSphere | Kind::Sun | Kind::Moon | Kind::Sphere => {
@@ -52,7 +52,7 @@ pub(crate) struct View {
 
 /// What one ray meets.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sight {
+pub(crate) struct RayHit {
     /// The ray in scaled ECEF; not of unit length.
     sigma: Vector3<f64>,
     /// −y·σ: positive when the ray goes towards the body.
@@ -83,16 +83,16 @@ impl View {
 
     /// What the ray with direction `s` (camera frame, unit length) meets.
     #[inline(always)]
-    pub(crate) fn look(&self, s: [f64; 3]) -> Sight {
+    pub(crate) fn look(&self, s: [f64; 3]) -> RayHit {
         let sigma = self.cam_to_scaled * Vector3::from(s);
         let m = -self.y.dot(&sigma);
         let s2 = sigma.norm_squared();
         // A ray that leads away is nearest to the body where it starts.
         let along = if m > 0.0 { m * m / s2 } else { 0.0 };
-        Sight { sigma, m, s2, miss: self.outside - along }
+        RayHit { sigma, m, s2, miss: self.outside - along }
     }
 
-    /// How fast [`Sight::miss`] grows with the angle off the limb, 1/rad.
+    /// How fast [`RayHit::miss`] grows with the angle off the limb, 1/rad.
     pub(crate) fn miss_per_rad(&self) -> f64 {
         // Closest approach = |y| sin γ for the angle γ to the centre; at the limb it is one.
         2.0 * self.outside.sqrt()
@@ -100,7 +100,7 @@ impl View {
 
     /// The point the ray meets, on the unit sphere: where it enters, or the foot of its closest approach.
     #[inline(always)]
-    pub(crate) fn point(&self, sight: &Sight) -> Vector3<f64> {
+    pub(crate) fn point(&self, sight: &RayHit) -> Vector3<f64> {
         let under = -sight.miss * sight.s2;
         if under > 0.0 {
             self.y + sight.sigma * ((sight.m - under.sqrt()) / sight.s2)
@@ -109,20 +109,20 @@ impl View {
         }
     }
 
-    fn closest(&self, sight: &Sight) -> Vector3<f64> {
+    fn closest(&self, sight: &RayHit) -> Vector3<f64> {
         self.y + sight.sigma * (sight.m.max(0.0) / sight.s2)
     }
 
     /// Height of the ray's closest approach above the globe in metres, negative for a hit, to first order in the
     /// flattening times the height, and zero exactly at the limb.
     #[inline(always)]
-    pub(crate) fn tangent_height_m(&self, sight: &Sight) -> f64 {
+    pub(crate) fn tangent_height_m(&self, sight: &RayHit) -> f64 {
         let k = (1.0 + sight.miss).max(0.0).sqrt();
         sight.miss / (1.0 + k) * self.metres_a_unit(sight)
     }
 
     /// Metres along the normal for a change of the closest approach by one, close to the limb.
-    fn metres_a_unit(&self, sight: &Sight) -> f64 {
+    fn metres_a_unit(&self, sight: &RayHit) -> f64 {
         let q = self.closest(sight);
         let n2 = q.norm_squared();
         if n2 < 1e-12 {
@@ -132,7 +132,7 @@ impl View {
     }
 
     /// Derivative of the tangent height by (u, v) in metres a pixel; `jacobian` is the ray's, rows x, y, z.
-    pub(crate) fn tangent_height_gradient(&self, sight: &Sight, jacobian: &[[f64; 2]; 3]) -> [f64; 2] {
+    pub(crate) fn tangent_height_gradient(&self, sight: &RayHit, jacobian: &[[f64; 2]; 3]) -> [f64; 2] {
         // miss = outside − m²/s2 with dm = −y·dσ and ds2 = 2 σ·dσ.
         let r = sight.m / sight.s2;
         let by_sigma = self.y * (2.0 * r) + sight.sigma * (2.0 * r * r);
@@ -143,7 +143,7 @@ impl View {
     }
 
     /// Direction of the ray in ECEF, unit.
-    pub(crate) fn direction(&self, sight: &Sight) -> Vector3<f64> {
+    pub(crate) fn direction(&self, sight: &RayHit) -> Vector3<f64> {
         sight.sigma.component_div(&self.inverse_axes)
     }
 
@@ -162,7 +162,7 @@ impl View {
     /// Distance to a point of the unit sphere in metres, and the cosine of the angle under which the ray meets the
     /// surface there.
     #[inline(always)]
-    pub(crate) fn range_m_and_incidence(&self, sight: &Sight, point: &Vector3<f64>) -> (f64, f64) {
+    pub(crate) fn range_m_and_incidence(&self, sight: &RayHit, point: &Vector3<f64>) -> (f64, f64) {
         let scaled = (point - self.y).norm();
         (scaled / sight.s2.sqrt(), -sight.sigma.dot(point) / sight.s2.sqrt())
     }

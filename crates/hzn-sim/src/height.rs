@@ -12,7 +12,7 @@ pub(crate) struct LimbHeight {
 }
 
 impl LimbHeight {
-    pub(crate) fn of(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let mut table: Vec<(f64, f64)> =
             scene.limb_height_by_latitude_km.iter().map(|[lat_deg, km]| (lat_deg.to_radians(), km * 1e3)).collect();
         table.sort_by(|a, b| a.0.total_cmp(&b.0));

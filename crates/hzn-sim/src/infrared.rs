@@ -8,7 +8,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::globe::{Globe, Sight, View};
+use crate::globe::{Globe, RayHit, View};
 use crate::pose::Pose;
 use crate::radiance::{Grid, Radiance, mean_over_globe};
 use crate::texture::{CloudField, Clouds, Drawn};
@@ -235,7 +235,7 @@ impl Warmth {
     }
 
     /// What stands where a ray meets or passes the globe.
-    fn under(&self, sight: &Sight, drawn: &mut Drawn) -> Under<'_> {
+    fn under(&self, sight: &RayHit, drawn: &mut Drawn) -> Under<'_> {
         let point = self.view.point(sight);
         let latitude_deg = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
         let mut cloud = None;

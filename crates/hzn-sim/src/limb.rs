@@ -35,7 +35,7 @@ impl Scene {
     /// Tangent heights above the ellipsoid, kilometres, of rays in the camera frame, as the camera stands at the middle of the
     /// exposure; empty for a camera inside the body.
     pub fn tangent_heights_km(&self, rays: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
-        let Some(view) = View::try_new(Globe::of(&self.body), &self.pose) else { return Vec::new() };
+        let Some(view) = View::try_new(Globe::new(&self.body), &self.pose) else { return Vec::new() };
         rays.into_iter().map(|ray| view.tangent_height_m(&view.look(ray)) * 1e-3).collect()
     }
 }
@@ -71,12 +71,12 @@ impl LimbCircle {
     ///
     /// # Errors
     /// The position is not outside.
-    pub fn of(scene: &Scene) -> Result<Self, SceneError> {
+    pub fn new(scene: &Scene) -> Result<Self, SceneError> {
         Self::at_height(scene, scene.body.limb_height_km * 1e3)
     }
 
     fn at_height(scene: &Scene, height_m: f64) -> Result<Self, SceneError> {
-        let globe = Globe::of(&scene.body).raised(height_m);
+        let globe = Globe::new(&scene.body).raised(height_m);
         let cone = LimbCone::try_new(scene.pose.position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)?;
         let (axis, east) = (Vector3::from(cone.axis.xyz()), Vector3::from(cone.east.xyz()));
         let (cot2_east, cot2_meridian) = (cone.cot2_east, cone.cot2_meridian);
@@ -128,7 +128,7 @@ pub(crate) struct Walk<'a> {
 impl<'a> Walk<'a> {
     pub(crate) fn try_new(scene: &'a Scene) -> Result<Self, SceneError> {
         let camera = Camera::try_new(&scene.camera)?;
-        Ok(Self { scene, camera, circle: LimbCircle::of(scene)?, painter: Painter::try_new(scene)? })
+        Ok(Self { scene, camera, circle: LimbCircle::new(scene)?, painter: Painter::try_new(scene)? })
     }
 
     /// The ray (ECEF, unit) of the limb at this azimuth.

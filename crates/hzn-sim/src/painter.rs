@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use crate::counter::{Counter, Stream};
 use crate::error::SceneError;
-use crate::globe::{Globe, Sight, View};
+use crate::globe::{Globe, RayHit, View};
 use crate::height::LimbHeight;
 use crate::pose::Pose;
 use crate::render::beyond_circle;
@@ -47,7 +47,7 @@ pub(crate) struct Painter {
     /// Larger of the two angles a pixel in the middle covers, radians.
     pixel_rad: f64,
     height: LimbHeight,
-    /// [`Sight::miss`] of pixels that may have the limb within [`NEAR_PX`].
+    /// [`RayHit::miss`] of pixels that may have the limb within [`NEAR_PX`].
     near: f64,
     radius_km: f32,
 }
@@ -55,8 +55,8 @@ pub(crate) struct Painter {
 impl Painter {
     pub(crate) fn try_new(scene: &Scene) -> Result<Self, SceneError> {
         let camera = beyond_circle(&scene.camera)?;
-        let height = LimbHeight::of(scene);
-        let globe = Globe::of(&scene.body).raised(height.reference_m);
+        let height = LimbHeight::new(scene);
+        let globe = Globe::new(&scene.body).raised(height.reference_m);
         let view = View::try_new(globe, &scene.pose).ok_or(SceneError::Pose)?;
         let (fx, fy) = camera.focal_px();
         let pixel_rad = 1.0 / fx.min(fy);
@@ -166,7 +166,7 @@ impl Painter {
 
     /// Tangent height of a ray above the limb height at its latitude, metres.
     #[inline(always)]
-    fn above_limb_m(&self, sight: &Sight) -> f64 {
+    fn above_limb_m(&self, sight: &RayHit) -> f64 {
         let above_reference = self.view.tangent_height_m(sight);
         if !self.height.varies() {
             return above_reference;
@@ -175,13 +175,13 @@ impl Painter {
     }
 
     /// Geodetic latitude of the point that a ray meets or passes, radians.
-    fn latitude_rad(&self, sight: &Sight) -> f64 {
+    fn latitude_rad(&self, sight: &RayHit) -> f64 {
         libm::asin(self.view.normal(&self.view.point(sight)).z.clamp(-1.0, 1.0))
     }
 
     /// Sky and body, the body with weight `cover`.
     #[inline(always)]
-    fn blend(&self, cover: f32, sight: &Sight, drawn: &mut Drawn) -> f32 {
+    fn blend(&self, cover: f32, sight: &RayHit, drawn: &mut Drawn) -> f32 {
         if cover <= 1e-4 {
             return self.sky;
         }
@@ -189,7 +189,7 @@ impl Painter {
     }
 
     /// Brightness of the body where the ray meets or passes it.
-    fn body(&self, sight: &Sight, drawn: &mut Drawn) -> f32 {
+    fn body(&self, sight: &RayHit, drawn: &mut Drawn) -> f32 {
         let point = self.view.point(sight);
         let lit = self.lamp.at(&self.view, sight, &point);
         if lit <= 0.0 {

@@ -66,7 +66,7 @@ impl Scene {
                 vec![Plane { width: w, data }]
             }
             World::Infrared(world) => {
-                let globe = Globe::of(&self.body);
+                let globe = Globe::new(&self.body);
                 let warmth = Warmth::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
                 let mut data = vec![0.0f32; w * h];
                 data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match &motion {
@@ -112,7 +112,7 @@ impl Scene {
             Light::Full | Light::Sector { .. } => up,
         };
         let sun = sun.try_normalize(1e-12).ok_or(SceneError::Sun)?;
-        Shader::try_new(world, camera, Globe::of(&self.body), &self.pose, sun).ok_or(SceneError::Pose)
+        Shader::try_new(world, camera, Globe::new(&self.body), &self.pose, sun).ok_or(SceneError::Pose)
     }
 
     /// Earth, sky, and what stands in it.

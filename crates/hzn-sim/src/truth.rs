@@ -219,7 +219,7 @@ impl Scene {
     /// # Errors
     /// A camera, position or light that cannot be.
     pub fn truth(&self, file: &str, time_s: f64) -> Result<Truth, SceneError> {
-        let globe = Globe::of(&self.body);
+        let globe = Globe::new(&self.body);
         let raised = globe.raised(self.body.limb_height_km * 1e3);
         let cone = LimbCone::try_new(self.pose.position_m, raised.a_m, raised.b_m).ok_or(SceneError::Pose)?;
         let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
@@ -290,7 +290,7 @@ impl Scene {
         let Some(disc) = self.disc_of(kind)? else { return self.visible_limb_px() };
         let camera = Camera::<f64>::try_new(&self.camera)?;
         let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
-        let view = View::try_new(Globe::of(&self.body), &self.pose).ok_or(SceneError::Pose)?;
+        let view = View::try_new(Globe::new(&self.body), &self.pose).ok_or(SceneError::Pose)?;
         let centre = Vector3::from(disc.direction);
         let helper = if centre.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
         let a = centre.cross(&helper).normalize();

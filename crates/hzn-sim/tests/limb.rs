@@ -36,7 +36,7 @@ fn circle_and_truth_equal_spice() {
         let mean = 0.5 * (cot2("cone_half_angle_east_deg") + cot2("cone_half_angle_meridian_deg"));
         assert!((truth.half_angle_deg - mean.sqrt().recip().atan().to_degrees()).abs() < 1e-9);
 
-        let circle = LimbCircle::of(&scene).unwrap();
+        let circle = LimbCircle::new(&scene).unwrap();
         for ray in case["rays_ecef"].as_array().unwrap() {
             let ray = UnitVec3::<hzn_core::frames::Ecef, f64>::try_new(three(ray)).unwrap();
             let azimuth = circle.azimuth_rad(ray.xyz());

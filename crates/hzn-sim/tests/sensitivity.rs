@@ -2,7 +2,7 @@
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
-use hzn_core::{Config, Frame, HostHorizon, covariance};
+use hzn_core::{Config, HostHorizon, Prior, covariance};
 use hzn_sim::pose::position_m;
 use hzn_sim::sensitivity::{Design, Sigmas, reference};
 use hzn_sim::{Look, Pose, Scene};
@@ -152,7 +152,7 @@ fn the_sensor_reports_what_the_design_says() {
         scene.body = config.body.clone();
         let picture = scene.render().unwrap();
         let mut horizon = HostHorizon::boxed(&config).unwrap();
-        let expected = horizon.expect(&Frame::default()).unwrap();
+        let expected = horizon.expect(&Prior::default()).unwrap();
         let report = horizon.process(&picture.view(), &expected);
         let reported = report.solution.unwrap().covariance.sigma_max_rad().to_degrees();
         let largest = promised.fused.pitch_deg.max(promised.fused.roll_deg);

@@ -2,7 +2,7 @@
 
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::UnitVec3;
-use hzn_core::{Config, Frame, HostHorizon};
+use hzn_core::{Config, HostHorizon, Prior};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Look, Motion, Pose, Scene};
 
@@ -15,10 +15,10 @@ fn error(scene: &Scene, told: bool) -> Option<[f64; 2]> {
     let mut config = Config::new(scene.camera.clone());
     config.body = scene.body.clone();
     config.body.limb_height_sigma_km = 0.5;
-    let frame = Frame {
+    let frame = Prior {
         position_m: Some(scene.pose.position_m),
         rate_rad_s: scene.motion.filter(|_| told).map(|m| m.rate_radps),
-        ..Frame::default()
+        ..Prior::default()
     };
     let mut horizon = HostHorizon::boxed(&config).unwrap();
     let expected = horizon.expect(&frame).unwrap();

@@ -65,7 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     outcome.unwrap_or(Ok(()))
 }
 
-type Taken = Arc<Mutex<Option<anyhow::Result<()>>>>;
+type RunResult = Arc<Mutex<Option<anyhow::Result<()>>>>;
 
 struct Window {
     viewer: Viewer,
@@ -76,7 +76,7 @@ struct Window {
     /// Passes since the frame is there.
     passes: u32,
     told: bool,
-    taken: Taken,
+    taken: RunResult,
 }
 
 impl eframe::App for Window {

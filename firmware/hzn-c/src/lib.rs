@@ -10,9 +10,9 @@ use core::ptr::{self, NonNull};
 
 use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Unobserved;
-use hzn_core::{FlightWorkspace, Frame, Sensor};
+use hzn_core::{FlightWorkspace, Prior, Sensor};
 use hzn_flight::Parameters;
-use hzn_flight::answer::Answer;
+use hzn_flight::answer::PictureAnswer;
 use hzn_flight::parameters::Refused;
 
 #[cfg(feature = "standalone")]
@@ -223,24 +223,24 @@ pub unsafe extern "C" fn hzn_process(
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
     let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
     // SAFETY: the caller's promise.
-    let frame = unsafe { known.as_ref() }.map_or_else(Frame::default, frame);
+    let frame = unsafe { known.as_ref() }.map_or_else(Prior::default, frame);
     let Ok(expected) = sensor.sensor.expect(&frame) else { return HZN_KNOWN };
     let report = sensor.sensor.process(&mut sensor.workspace, &grey, &expected, &Unobserved);
-    *out = answer(&Answer::of(&report));
+    *out = answer(&PictureAnswer::from_report(&report));
     i32::from(out.status)
 }
 
-fn frame(known: &HznKnown) -> Frame<f32> {
+fn frame(known: &HznKnown) -> Prior<f32> {
     let told = |v: [f32; 3]| (!v.iter().any(|x| x.is_nan())).then_some(v);
-    Frame {
+    Prior {
         altitude_m: (!known.altitude_m.is_nan()).then_some(known.altitude_m),
         position_m: told(known.position_m),
         rate_rad_s: told(known.rate_rad_s),
-        ..Frame::default()
+        ..Prior::default()
     }
 }
 
-fn answer(a: &Answer) -> HznAnswer {
+fn answer(a: &PictureAnswer) -> HznAnswer {
     let nan = f32::NAN;
     let d = a.direction.as_ref();
     HznAnswer {

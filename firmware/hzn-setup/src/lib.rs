@@ -5,9 +5,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-use hzn_core::body::{Expected, FrameError};
+use hzn_core::body::{Expected, PriorError};
 use hzn_core::error::ConfigError;
-use hzn_core::{Config, Frame, Sensor};
+use hzn_core::{Config, Prior, Sensor};
 
 /// As [`Sensor::new`].
 ///
@@ -23,6 +23,6 @@ pub fn sensor(config: &Config) -> Result<Sensor<f32>, ConfigError> {
 /// # Errors
 /// An altitude or a position that cannot be.
 #[inline(never)]
-pub fn expect(sensor: &Sensor<f32>, frame: &Frame<f32>) -> Result<Expected<f32>, FrameError> {
+pub fn expect(sensor: &Sensor<f32>, frame: &Prior<f32>) -> Result<Expected<f32>, PriorError> {
     sensor.expect(frame)
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hzn_core::{Config, HostHorizon};
 use hzn_core::{observer::Unobserved, verdict::Verdict};
-use hzn_sim::artefact::{FALSE_SIGMAS, GROSS_DEG, Kind, Outcome, Told, Trial, look};
+use hzn_sim::artefact::{FALSE_SIGMAS, GROSS_DEG, Kind, Outcome, PriorKnowledge, Trial, look};
 use rayon::prelude::*;
 
 use super::Effort;
@@ -58,7 +58,7 @@ impl Setting {
 fn seen(horizon: &mut HostHorizon, trial: &Trial, settings: &[Setting]) -> anyhow::Result<Vec<Outcome>> {
     let picture = trial.render()?;
     let one = |s: &Setting| {
-        let told = Told { attitude_sigma_deg: s.attitude.then_some(ATTITUDE_DEG) };
+        let told = PriorKnowledge { attitude_sigma_deg: s.attitude.then_some(ATTITUDE_DEG) };
         Ok(look(horizon, &sensor(trial, s.threshold_px), trial, &picture, told, &Unobserved)?)
     };
     settings.iter().map(one).collect()
@@ -88,7 +88,7 @@ pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
     s.text(format!(
         "{} pictures without a limb, {count} of each kind, of 480×360 to 1280×960 pixels through pinholes (27° to 110° wide), \
          equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 bits, with noise of \
-         0.2 to 2.5 % of full scale; the ranges of each kind stand in `hzn_sim::artefact`. Told: the camera and the position, \
+         0.2 to 2.5 % of full scale; the ranges of each kind stand in `hzn_sim::artefact`. PriorKnowledge: the camera and the position, \
          for the lower half of the table also an attitude that is wrong by {ATTITUDE_DEG}° (1σ about each axis). Every \
          setting but `reject.threshold_px` has its default. Counted: pictures that are answered. Discs whose half-angle \
          lies within three told sigmas of the expected one cannot be told from a limb by their shape and have a row of \

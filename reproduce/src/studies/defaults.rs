@@ -40,11 +40,11 @@ impl Rendered {
         let mut scenario = Scenario::builtin(scene).ok_or_else(|| anyhow!("no scene {scene}"))?;
         scenario.seed = seed;
         scenario.capture.frames = u32::try_from(count)?;
-        Self::of(&scenario, scene == SKEWED).with_context(|| format!("{scene}, seed {seed}"))
+        Self::from_scenario(&scenario, scene == SKEWED).with_context(|| format!("{scene}, seed {seed}"))
     }
 
     /// Every picture of a scenario, measured, with the rates of rotation told or not.
-    pub(super) fn of(scenario: &Scenario, rates: bool) -> anyhow::Result<Self> {
+    pub(super) fn from_scenario(scenario: &Scenario, rates: bool) -> anyhow::Result<Self> {
         let flight = scenario.flight()?;
         let pictures: Vec<Picture> = flight.frames.par_iter().map(FlightFrame::render).collect::<Result<_, _>>()?;
         let seen: Vec<_> = flight.frames.iter().zip(&pictures).collect();
@@ -63,7 +63,7 @@ impl Rendered {
             |horizon, (frame, picture)| {
                 let horizon = horizon.as_mut().ok()?;
                 let known = frame.known();
-                let known = hzn_core::Frame { rate_rad_s: known.rate_rad_s.filter(|_| rates), ..known };
+                let known = hzn_core::Prior { rate_rad_s: known.rate_rad_s.filter(|_| rates), ..known };
                 let expected = horizon.expect(&known).ok()?;
                 let points = Points::default();
                 let solution = horizon.process_observed(&picture.view(), &expected, &points).solution?;
@@ -72,7 +72,7 @@ impl Rendered {
             },
         );
         let sightings: Vec<Sighting> = each.flatten().collect();
-        Ok(Calibration::of(&wide.body, &sightings)?)
+        Ok(Calibration::new(&wide.body, &sightings)?)
     }
 
     /// A sensor that is told the rates of rotation where the flight has them told.

@@ -125,7 +125,7 @@ pub(super) fn visibility(_: &Effort) -> anyhow::Result<Section> {
          a full field of view γ > 4α − π on, a hyperbola from γ > π − 4α on ([BB] section 2.7 has the two exchanged), the \
          whole disc from 2α on. By hand: `hzn sensitivity visibility --limb-height 0`.",
     );
-    let of = |km: f64| Visibility::of((6371.0f64 / (6371.0 + km)).asin());
+    let of = |km: f64| Visibility::new((6371.0f64 / (6371.0 + km)).asin());
     let rows = [80.0, 238.0, 800.0, 2600.0, 6000.0].map(|km| {
         let v = of(km);
         let published = if km == 238.0 { "118.3°" } else { "" };

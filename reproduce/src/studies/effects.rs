@@ -113,7 +113,7 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
             scenario.seed = SEED;
             scenario.capture.frames = u32::try_from(count)?;
             change(&mut scenario);
-            rows.push(cells(name, &Rendered::of(&scenario, false).with_context(|| format!("{scene}: {name}"))?)?);
+            rows.push(cells(name, &Rendered::try_new(&scenario, false).with_context(|| format!("{scene}: {name}"))?)?);
         }
         s.table([&format!("`{scene}`"), "found", "points", "curvature", "χ²", "edge RMS", "RMS", "NEES"], rows);
     }
@@ -170,7 +170,7 @@ fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
             let horizon = horizon.as_mut().ok()?;
             let known = frame.known();
             let turning = camera.turning(known.rate_rad_s);
-            let known = hzn_core::Frame { rate_rad_s: None, ..known };
+            let known = hzn_core::Prior { rate_rad_s: None, ..known };
             let expected = horizon.expect(&known).ok()?;
             let watch = noise::Points::default();
             let solution = horizon.process_observed(&picture.view(), &expected, &watch).solution?;

@@ -124,7 +124,7 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
 fn beside_gross(cases: &[Case]) -> (String, f64) {
     let gross = |c: &Case| c.miss.is_some_and(|m| m.angle_deg > GROSS_DEG);
     let (bad, good): (Vec<&Case>, Vec<&Case>) = cases.iter().partition(|c| gross(c));
-    let e = Evaluation::of(&good);
+    let e = Evaluation::new(&good);
     let rms_deg = e.errors.as_ref().map_or(f64::NAN, |x| x.rms_deg);
     let mut cell = deg(rms_deg);
     for (status, n) in &e.unanswered {

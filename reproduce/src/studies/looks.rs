@@ -8,7 +8,7 @@ use hzn_core::body::{self, Kind};
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
 use hzn_core::threshold::{self, Method};
-use hzn_core::{Config, Frame, HostHorizon};
+use hzn_core::{Config, HostHorizon, Prior};
 use hzn_sim::Scenario;
 use hzn_sim::painted::UnderCircle;
 use rayon::prelude::*;
@@ -73,7 +73,7 @@ fn under_a_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
             config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
             let mut horizon = HostHorizon::boxed(&config)?;
             let layout = Layout::packed(under.lens.width.into(), under.lens.height.into(), 1, 8);
-            let expected = horizon.expect(&Frame::default())?;
+            let expected = horizon.expect(&Prior::default())?;
             let report = horizon.process(&Grey::try_new(&data, layout)?, &expected);
             let right = report.solution.is_some_and(|found| found.axis.angle_rad(&axis).to_degrees() < 0.2);
             out.push((whole, right));
@@ -235,7 +235,7 @@ impl Photograph {
         let mut horizon = HostHorizon::boxed(&config)?;
         let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);
         let view = ImageView::from_bytes(self.rgb.as_raw(), layout, Channel::Mean)?;
-        let expected = horizon.expect(&Frame::default())?;
+        let expected = horizon.expect(&Prior::default())?;
         Ok(horizon.process(&view, &expected).solution.map(|s| Found {
             axis: s.axis.xyz(),
             sigma_deg: s.covariance.sigma_max_rad().to_degrees(),

@@ -133,7 +133,7 @@ impl Calibration {
     ///
     /// # Errors
     /// What they do not tell.
-    pub fn of(body: &body::Config, sightings: &[Sighting]) -> Result<Self, Refusal> {
+    pub fn new(body: &body::Config, sightings: &[Sighting]) -> Result<Self, Refusal> {
         let few = |answered: usize| Refusal::TooFew { answered, least: LEAST_PICTURES };
         if sightings.len() < LEAST_PICTURES {
             return Err(few(sightings.len()));

@@ -5,7 +5,7 @@
 //! B at e and the weighted mean m of Bᵀs the rows are h = [Bᵀs − m, −1]/g, and (Σ w h hᵀ) δ = Σ w r h; the change of c is
 //! a·δ with a = (m, 1).
 
-use hzn_core::Frame;
+use hzn_core::Prior;
 use hzn_core::camera::Camera;
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::UnitVec3;
@@ -227,7 +227,7 @@ pub(super) struct Azimuth {
 
 impl Azimuth {
     /// Of the limb cone seen by a camera with this attitude; `None` without one.
-    pub(super) fn new(cone: &LimbCone<f64>, frame: &Frame<f64>) -> Option<Self> {
+    pub(super) fn new(cone: &LimbCone<f64>, frame: &Prior<f64>) -> Option<Self> {
         let east: UnitVec3<_, f64> = frame.cam_to_ecef?.inverse().apply(&cone.east);
         Some(Self {
             east: Vector3::from(east.xyz()),

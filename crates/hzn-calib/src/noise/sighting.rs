@@ -7,7 +7,7 @@
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::Camera;
 use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, from_geodetic, geodetic};
-use hzn_core::{Frame, Solution};
+use hzn_core::{Prior, Solution};
 use nalgebra::Vector3;
 
 use super::bend::{self, SHAPES};
@@ -80,7 +80,7 @@ impl Sighting {
         name: &str,
         camera: &Camera<f64>,
         body: &body::Config,
-        frame: &Frame<f64>,
+        frame: &Prior<f64>,
         points: &[([f64; 2], f64)],
         solution: &Solution<f64>,
     ) -> Option<Self> {
@@ -91,7 +91,7 @@ impl Sighting {
         let camera = &camera.turning(frame.rate_rad_s);
         let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
         let known =
-            Frame { cam_to_ecef: frame.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*frame };
+            Prior { cam_to_ecef: frame.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*frame };
         let azimuth = place.cone.as_ref().and_then(|cone| Azimuth::new(cone, &known));
         let cone = Cone::fit(camera, points, solution.axis.xyz(), solution.half_angle_rad.cos(), azimuth.as_ref())?;
         let sin = (1.0 - cone.cos * cone.cos).sqrt();
@@ -141,7 +141,7 @@ pub fn shares(
 }
 
 impl Place {
-    fn new(body: &body::Config, frame: &Frame<f64>) -> Option<Self> {
+    fn new(body: &body::Config, frame: &Prior<f64>) -> Option<Self> {
         let limb_m = body.limb_height_km * 1e3;
         let given = frame.altitude_m.or(body.altitude_km.map(|km| km * 1e3));
         let radius_m = body.mean_radius_km() * 1e3;
@@ -199,7 +199,7 @@ fn uneven_cos(cone: &LimbCone<f64>) -> f64 {
 }
 
 /// Latitudes of the limb with their shares: of the points themselves where an attitude tells, else of the whole ring.
-fn latitudes(place: &Place, cone: &Cone, frame: &Frame<f64>, attitude_sigma_rad: f64) -> Vec<(f64, f64)> {
+fn latitudes(place: &Place, cone: &Cone, frame: &Prior<f64>, attitude_sigma_rad: f64) -> Vec<(f64, f64)> {
     let (Some(position), Some(limb)) = (place.position_m, &place.cone) else { return Vec::new() };
     let camera = Vector3::from(position);
     // The point of a ray that is nearest to the centre: its latitude is that of the limb to the flattening.

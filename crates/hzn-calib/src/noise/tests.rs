@@ -4,7 +4,7 @@ use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera, Model};
 use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, from_geodetic};
 use hzn_core::frames::{Cov3, UnitVec3};
-use hzn_core::{Config, Frame, Solution};
+use hzn_core::{Config, Prior, Solution};
 use nalgebra::Vector3;
 
 use super::{Calibration, Refusal, Sighting, Weighted, cone, edge, into_sensor_toml};
@@ -103,7 +103,7 @@ fn flight(count: usize, fov_deg: f64, limb_km: f64, scatter_km: f64, noise: Nois
         let below = alpha + (0.1 * k as f64).sin() * 0.1;
         let axis = Vector3::new(0.3 * below.sin(), 0.954 * below.sin(), below.cos()).normalize();
         let points = limb(&camera, axis, &|_| alpha.cos(), noise, &mut draws);
-        let frame = Frame { altitude_m: Some(altitude_km * 1e3), ..Frame::default() };
+        let frame = Prior { altitude_m: Some(altitude_km * 1e3), ..Prior::default() };
         // From a start that is not the end.
         Sighting::measure("p", &camera, &earth(), &frame, &points, &solution(axis, alpha + 1e-3))
     });
@@ -121,7 +121,7 @@ fn a_flight_without_noise_gives_the_height_exactly() {
 
 #[test]
 fn height_scatter_and_noise_are_found_within_their_errors() {
-    let c = Calibration::of(&earth(), &flight(30, 90.0, 18.7, 8.0, Noise(0.3, 40.0, 0.5), 2)).unwrap();
+    let c = Calibration::new(&earth(), &flight(30, 90.0, 18.7, 8.0, Noise(0.3, 40.0, 0.5), 2)).unwrap();
     let h = &c.height;
     assert!((h.km - 18.7).abs() < 2.0 * h.statistical_km && h.statistical_km < 2.5, "{h:?}");
     assert!((4.0..11.0).contains(&h.scatter_km), "{h:?}");
@@ -135,7 +135,7 @@ fn height_scatter_and_noise_are_found_within_their_errors() {
 #[test]
 fn heights_are_as_far_off_as_their_sigmas_say() {
     let sightings = flight(60, 90.0, 18.7, 0.0, Noise(0.2, 20.0, 0.7), 3);
-    let c = Calibration::of(&earth(), &sightings).unwrap();
+    let c = Calibration::new(&earth(), &sightings).unwrap();
     // Averaged over lengths up to the arc, sigma is on the careful side.
     assert!((0.02..1.3).contains(&c.chi2), "{}", c.chi2);
     assert!(c.alarm().is_none());
@@ -143,23 +143,23 @@ fn heights_are_as_far_off_as_their_sigmas_say() {
 
 #[test]
 fn pictures_that_contradict_each_other_raise_the_alarm() {
-    let c = Calibration::of(&earth(), &flight(24, 90.0, 18.7, 15.0, Noise(0.2, 20.0, 0.7), 4)).unwrap();
+    let c = Calibration::new(&earth(), &flight(24, 90.0, 18.7, 15.0, Noise(0.2, 20.0, 0.7), 4)).unwrap();
     assert!(matches!(c.alarm(), Some(Refusal::Alarm { chi2, .. }) if chi2 > 2.0), "{}", c.chi2);
 }
 
 #[test]
 fn what_pictures_do_not_tell_is_refused_with_the_number() {
     let noise = Noise(0.3, 40.0, 0.5);
-    let few = Calibration::of(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();
+    let few = Calibration::new(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();
     assert_eq!(few, Refusal::TooFew { answered: 11, least: 12 });
     assert!(few.to_string().starts_with("11 pictures were answered, but at least 12 are needed"), "{few}");
     // Sigma grows with the inverse square of the field.
-    let narrow = Calibration::of(&earth(), &flight(24, 15.0, 18.7, 0.0, noise, 6)).unwrap_err();
+    let narrow = Calibration::new(&earth(), &flight(24, 15.0, 18.7, 0.0, noise, 6)).unwrap_err();
     assert!(matches!(narrow, Refusal::TooVague { sigma_km, .. } if sigma_km > 3.5), "{narrow:?}");
     // Half of them on other edges.
     let mut mixed = flight(16, 90.0, 18.7, 0.0, noise, 7);
     mixed.iter_mut().skip(11).for_each(|s| s.limb_height_km += 90.0);
-    assert_eq!(Calibration::of(&earth(), &mixed).unwrap_err(), Refusal::Apart { apart: 5, pictures: 16 });
+    assert_eq!(Calibration::new(&earth(), &mixed).unwrap_err(), Refusal::Apart { apart: 5, pictures: 16 });
 }
 
 /// A limb by latitude, seen all round by a camera that looks straight down from a polar orbit.
@@ -174,7 +174,7 @@ fn a_flight_over_all_latitudes_gives_rows() {
         .filter_map(|k| {
             let latitude = (-80.0 + 160.0 * k as f64 / 23.0f64).to_radians();
             let position = from_geodetic(latitude, 0.3, 600e3, WGS84_A_M, WGS84_B_M);
-            let frame = Frame { position_m: Some(position), ..Frame::default() };
+            let frame = Prior { position_m: Some(position), ..Prior::default() };
             // The mean height of the ring, as the whole limb is seen.
             let limb_m = height_km(latitude.to_degrees()) * 1e3 * 0.91 + 25e3 * 0.09;
             let cone = LimbCone::try_new(position, WGS84_A_M + limb_m, WGS84_B_M + limb_m)?;
@@ -184,7 +184,7 @@ fn a_flight_over_all_latitudes_gives_rows() {
             Sighting::measure("p", &camera, &body, &frame, &points, &solution(axis, alpha))
         })
         .collect();
-    let c = Calibration::of(&body, &sightings).unwrap();
+    let c = Calibration::new(&body, &sightings).unwrap();
     assert!(c.height.by_latitude.len() >= 2, "{:?}", c.height);
     for [deg, km, sigma] in &c.height.by_latitude {
         assert!((km - height_km(*deg)).abs() < 1.0, "{deg}: {km} ± {sigma}");
@@ -205,7 +205,7 @@ fn a_flight_at_one_latitude_gives_no_rows() {
     let sightings: Vec<Sighting> = (0..24)
         .filter_map(|k| {
             let position = from_geodetic((67.9 + 0.05 * f64::from(k)).to_radians(), 0.3, 200e3, WGS84_A_M, WGS84_B_M);
-            let frame = Frame { position_m: Some(position), ..Frame::default() };
+            let frame = Prior { position_m: Some(position), ..Prior::default() };
             let limb_m = 15e3 + 500.0 * f64::from(k);
             let cone = LimbCone::try_new(position, WGS84_A_M + limb_m, WGS84_B_M + limb_m)?;
             let alpha = cone.mean_half_angle_rad();
@@ -215,7 +215,7 @@ fn a_flight_at_one_latitude_gives_no_rows() {
         })
         .collect();
     assert_eq!(sightings.len(), 24);
-    let c = Calibration::of(&body, &sightings).unwrap();
+    let c = Calibration::new(&body, &sightings).unwrap();
     assert!(c.height.by_latitude.is_empty(), "{:?}", c.height);
 }
 
@@ -262,7 +262,7 @@ fn a_longer_focal_length_makes_the_limb_as_much_higher_as_is_said() {
     let alpha = ((radius + 20.0) / (radius + 200.0)).asin();
     let axis = Vector3::new(0.1, alpha.sin(), alpha.cos()).normalize();
     let points = limb(&camera, axis, &|_| alpha.cos(), Noise(1e-4, 10.0, 0.5), &mut Draws(10));
-    let frame = Frame { altitude_m: Some(200e3), ..Frame::default() };
+    let frame = Prior { altitude_m: Some(200e3), ..Prior::default() };
     let at = |camera: &Camera<f64>| {
         Sighting::measure("p", camera, &earth(), &frame, &points, &solution(axis, alpha)).unwrap()
     };
@@ -277,7 +277,7 @@ const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight 
 
 #[test]
 fn the_keys_are_written_and_all_other_text_stays() {
-    let c = Calibration::of(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
+    let c = Calibration::new(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
     let written = into_sensor_toml(SENSOR, &c, "flight").unwrap();
     let text = &written.text;
     for kept in ["# mine\n", "# the old guess\n", "# from a book", "threshold_px = 2.5", "cx_px = 479.5"] {
@@ -299,7 +299,7 @@ fn of_several_bodies_the_earth_gets_its_own_noise() {
         "[body]\nkind = \"earth-sphere\"",
         "[[bodies]]\nkind = \"sun\"\n\n[[bodies]]\nkind = \"earth-sphere\"",
     );
-    let c = Calibration::of(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
+    let c = Calibration::new(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
     let written = into_sensor_toml(&bodies, &c, "flight").unwrap();
     let read = crate::sensor::parse(&written.text, std::path::Path::new("sensor.toml")).unwrap().config;
     let mut applied = crate::sensor::parse(&bodies, std::path::Path::new("sensor.toml")).unwrap().config;

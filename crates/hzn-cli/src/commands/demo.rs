@@ -59,7 +59,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (flight_mcap, flight_csv) = (folder.join("flight.mcap"), folder.join("flight.csv"));
     process(&flight_dir, &flight_mcap)?;
     let rows = rows(&flight_mcap)?;
-    let mut table = sink::Rows::create(&flight_csv, sink::Existing::Replace)?;
+    let mut table = sink::RowFile::create(&flight_csv, sink::Existing::Replace)?;
     for row in &rows {
         table.write(row)?;
     }

@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Outcome {
                 continue;
             }
         };
-        let told = Told {
+        let told = Explained {
             name: &item.name,
             config,
             body,
@@ -130,7 +130,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Everything that is known about the frame.
-struct Told<'a> {
+struct Explained<'a> {
     name: &'a str,
     config: &'a Config,
     body: &'a body::Config,
@@ -142,7 +142,7 @@ struct Told<'a> {
     half_angle: f64,
 }
 
-impl Told<'_> {
+impl Explained<'_> {
     fn text(&self, decoding: Duration, elapsed: Duration) -> String {
         let mut out = String::new();
         let mut line = |name: &str, value: String| {

@@ -9,7 +9,7 @@ use hzn_run::results;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
 use hzn_run::overlay;
-use hzn_run::sink::{self, Existing, Rows};
+use hzn_run::sink::{self, Existing, RowFile};
 use hzn_run::source::{self, ending};
 
 /// Turn a recording into a table, pictures, or pictures with overlay
@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         std::fs::create_dir_all(folder).map_err(|e| sink::cannot(folder, &e))?;
     }
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
-    let mut table = args.output.as_deref().map(|path| Rows::create(path, existing)).transpose()?;
+    let mut table = args.output.as_deref().map(|path| RowFile::create(path, existing)).transpose()?;
     let (mut rows, mut images) = (0u64, 0u64);
     let mut lost = None;
     if kind == "mcap" {

@@ -246,12 +246,12 @@ struct Summary {
     last: Option<u64>,
     time: Option<(f64, f64)>,
     /// By name, in the order in which they come.
-    bodies: Vec<(String, Found)>,
+    bodies: Vec<(String, BodySummary)>,
 }
 
 /// How one body was found.
 #[derive(Debug, Default)]
-struct Found {
+struct BodySummary {
     statuses: BTreeMap<u8, u64>,
     sigma_deg: Vec<f64>,
     rms_px: Vec<f64>,
@@ -268,7 +268,7 @@ impl Summary {
             self.time = Some(self.time.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
         }
         let place = self.bodies.iter().position(|(name, _)| *name == row.body).unwrap_or_else(|| {
-            self.bodies.push((row.body.clone(), Found::default()));
+            self.bodies.push((row.body.clone(), BodySummary::default()));
             self.bodies.len() - 1
         });
         let found = &mut self.bodies[place].1;

@@ -13,7 +13,7 @@ use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
 use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, settle_input, stop_flag};
 use crate::tell;
-use hzn_run::engine::{self, AnySensor, End, Finished, Found, Plan};
+use hzn_run::engine::{self, AnySensor, BodyOutcome, End, Finished, Plan};
 use hzn_run::sink::{self, Existing, Held, Output};
 use hzn_run::source::{self, Source, ending};
 
@@ -334,9 +334,9 @@ impl Gaps {
         self.frames += 1;
         self.no_row += u64::from(frame.data.is_none());
         self.no_time += u64::from(frame.time_s.is_none());
-        let unprocessed = |f: &Found| f.status() == Status::NoAltitude;
+        let unprocessed = |f: &BodyOutcome| f.status() == Status::NoAltitude;
         if frame.found.iter().any(unprocessed) {
-            let below = frame.found.iter().any(Found::is_below_limb);
+            let below = frame.found.iter().any(BodyOutcome::is_below_limb);
             *(if below { &mut self.below_limb } else { &mut self.no_altitude }) += 1;
         }
     }

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use hzn_core::body::Kind;
-use hzn_flight::answer::Answer;
+use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::Reader;
 use hzn_flight::messages::{
     Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode, Severity,
@@ -16,7 +16,7 @@ use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, 
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
-use hzn_run::sink::{self, Existing, Rows, Target};
+use hzn_run::sink::{self, Existing, RowFile, Target};
 
 /// Decode a flight computer's telemetry
 ///
@@ -100,14 +100,14 @@ fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {
 
 /// Where answers go.
 enum Sink {
-    Rows(Rows),
+    Rows(RowFile),
     Mcap(Box<hzn_mcap::Writer>),
 }
 
 impl Sink {
     fn create(path: &Path, existing: Existing) -> Result<Self, Stop> {
         if sink::target(path)? != Target::Mcap {
-            return Ok(Self::Rows(Rows::create(path, existing)?));
+            return Ok(Self::Rows(RowFile::create(path, existing)?));
         }
         let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
         let options = hzn_mcap::Options { metadata, force: existing == Existing::Replace, ..Default::default() };
@@ -163,7 +163,7 @@ impl Heard {
             format!("a packet of APID {:#x}{name} with {} bytes is not understood", packet.apid, packet.user.len())
         };
         match apid {
-            Some(Apid::Science) => match (Exposure::read(from), Answer::read(from)) {
+            Some(Apid::Science) => match (Exposure::read(from), PictureAnswer::read(from)) {
                 (Some(exposure), Some(answer)) => self.answer(&exposure, &answer, sink)?,
                 _ => self.note(time_s, LogLevel::Warning, &strange()),
             },
@@ -219,7 +219,7 @@ impl Heard {
         Ok(())
     }
 
-    fn answer(&mut self, exposure: &Exposure, answer: &Answer, sink: &mut Option<Sink>) -> Result<(), Stop> {
+    fn answer(&mut self, exposure: &Exposure, answer: &PictureAnswer, sink: &mut Option<Sink>) -> Result<(), Stop> {
         let time_s = exposure.exposure_us as f64 * 1e-6;
         let Some(report) = answer.report() else {
             self.note(time_s, LogLevel::Warning, &format!("picture {}: numbers that mean nothing", exposure.picture));

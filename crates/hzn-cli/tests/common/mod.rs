@@ -79,7 +79,7 @@ impl Place {
         command
     }
     pub fn run(&self, args: &[&str]) -> Ran {
-        Ran::of(&self.command(args).output().unwrap(), self.dir.path())
+        Ran::from_output(&self.command(args).output().unwrap(), self.dir.path())
     }
     /// The row of a picture in a CSV, as columns by name.
     pub fn rows(&self, name: &str) -> Vec<Vec<(String, String)>> {
@@ -109,7 +109,7 @@ pub fn without_time(text: &str) -> Vec<Vec<(String, String)>> {
 }
 
 impl Ran {
-    pub fn of(output: &Output, folder: &Path) -> Self {
+    pub fn from_output(output: &Output, folder: &Path) -> Self {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).replace(&format!("{}/", folder.display()), "");
         Self { code: output.status.code().unwrap_or(-1), out: text(&output.stdout), err: text(&output.stderr) }
     }

@@ -18,7 +18,7 @@ pub(crate) use cropped::Cropped;
 /// What the pipeline reads: one brightness per pixel.
 pub trait Pixels {
     /// The picture is gone, and of its edges only [`Self::passed`] is left.
-    const PASSED: bool = false;
+    const STREAMED: bool = false;
     /// Columns, 1 to 65535.
     fn width(&self) -> u16;
     /// Rows, 1 to 65535.
@@ -46,7 +46,7 @@ pub trait Pixels {
     }
     /// The edge point of a border pixel, of a picture that came row by row: it was measured when the rows around it were
     /// there.
-    fn passed(&self, _x: u16, _y: u16) -> Option<Passed> {
+    fn streamed_point(&self, _x: u16, _y: u16) -> Option<StreamedPoint> {
         None
     }
     /// Brightness at column `x`, row `y`. The caller stays within the picture: beyond, it is some pixel or 0.
@@ -56,9 +56,9 @@ pub trait Pixels {
     }
 }
 
-/// An edge point as it is kept beside its border pixel, see [`Pixels::passed`].
+/// An edge point as it is kept beside its border pixel, see [`Pixels::streamed_point`].
 #[derive(Debug, Clone, Copy)]
-pub struct Passed {
+pub struct StreamedPoint {
     /// From the pixel's centre, away from the light.
     pub(crate) towards_dark_px: f32,
     pub(crate) lit: Lit,
@@ -71,9 +71,9 @@ pub struct Passed {
 }
 
 impl<P: Pixels> Pixels for &P {
-    const PASSED: bool = P::PASSED;
-    fn passed(&self, x: u16, y: u16) -> Option<Passed> {
-        (**self).passed(x, y)
+    const STREAMED: bool = P::STREAMED;
+    fn streamed_point(&self, x: u16, y: u16) -> Option<StreamedPoint> {
+        (**self).streamed_point(x, y)
     }
     fn width(&self) -> u16 {
         (**self).width()

@@ -18,7 +18,7 @@ pub struct Config {
     pub max_work: Option<u32>,
 }
 
-/// Work for each border pixel that the lists hold, where the configuration does not say.
+/// WorkBudget for each border pixel that the lists hold, where the configuration does not say.
 const A_PIXEL: u32 = 120;
 
 impl Config {
@@ -82,13 +82,13 @@ pub(crate) const GATES: u32 = 1000;
 
 /// What is left.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Work {
+pub(crate) struct WorkBudget {
     all: u32,
     left: u32,
     cut: bool,
 }
 
-impl Work {
+impl WorkBudget {
     /// For lists that hold so many border pixels, of which a sub-pixel point costs this.
     pub(crate) fn new(config: &Config, pixels: usize, point: u32) -> Self {
         let a_pixel = A_PIXEL - POINT + point;
@@ -104,7 +104,7 @@ impl Work {
 
     /// Pays `cost`, if that much is left; otherwise nothing is left from here on.
     #[inline]
-    pub(crate) fn spend(&mut self, cost: u32) -> bool {
+    pub(crate) fn try_spend(&mut self, cost: u32) -> bool {
         let rest = self.left.checked_sub(cost);
         self.cut |= rest.is_none();
         self.left = rest.unwrap_or(0);
@@ -122,32 +122,32 @@ impl Work {
     }
 
     /// Pays for what was done already, as far as it goes.
-    pub(crate) fn pay(&mut self, cost: u32) {
+    pub(crate) fn charge(&mut self, cost: u32) {
         self.left = self.left.saturating_sub(cost);
     }
     /// Whether nothing can be done any more.
-    pub(crate) fn is_spent(&self) -> bool {
+    pub(crate) fn is_exhausted(&self) -> bool {
         self.left == 0
     }
     /// Nothing more is done.
-    pub(crate) fn cut(&mut self) {
+    pub(crate) fn exhaust(&mut self) {
         (self.left, self.cut) = (0, true);
     }
     /// Something was not done for lack of room; what is left may serve others.
     #[cfg(feature = "horace")]
-    pub(crate) fn lack(&mut self) {
+    pub(crate) fn mark_truncated(&mut self) {
         self.cut = true;
     }
     /// Whether something was not done for lack of it.
-    pub(crate) fn was_cut(&self) -> bool {
+    pub(crate) fn was_truncated(&self) -> bool {
         self.cut
     }
     /// What is left.
-    pub(crate) fn left(&self) -> u32 {
+    pub(crate) fn remaining(&self) -> u32 {
         self.left
     }
     /// What was done.
-    pub(crate) fn done(&self) -> u32 {
+    pub(crate) fn spent(&self) -> u32 {
         self.all - self.left
     }
 }

@@ -20,9 +20,9 @@ use crate::model::body::Expected;
 use crate::model::observer::{Observer, Unobserved};
 use crate::model::report::Report;
 use crate::model::status::Status;
-use crate::model::work::Work;
+use crate::model::work::WorkBudget;
 use crate::stages::consensus;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 use crate::stages::covariance;
 use crate::stages::edge_points;
 use crate::stages::fit;
@@ -107,8 +107,8 @@ impl<T: Real> Sensor<T> {
         let (mut border, mut marks) = (vec![Pixel { x: 0, y: 0 }; HOST_POINTS], vec![0; HOST_WORDS]);
         let lists = Lists { border: &mut border, blocks: &mut [], marks: &mut marks };
         let borders = Borders::default();
-        let scene = Scene::new(picture, &self.region, level, &borders).blooming(expected.blooms());
-        self.search(lists, &scene, Work::unlimited(), expected, &[], &mut Report::of_nothing());
+        let binary = BinaryPicture::new(picture, &self.region, level, &borders).blooming(expected.blooms());
+        self.search(lists, &binary, WorkBudget::unlimited(), expected, &[], &mut Report::of_nothing());
         borders.0.into_inner()
     }
 }
@@ -137,25 +137,26 @@ impl<T: Real> Edges<T> {
                 Lit::towards(g)
             })
         };
-        Self::of(camera, points.iter().map(|p| (*p, side(p))).collect())
+        Self::from_points(camera, points.iter().map(|p| (*p, side(p))).collect())
     }
 
     /// As [`Self::new`], with the direction of the light in the picture, (u, v), for each point.
     pub fn towards(camera: &Camera<T>, points: &[(ImagePoint<T>, [T; 2])]) -> Self {
-        Self::of(camera, points.iter().map(|(p, lit)| (*p, Lit::towards(*lit))).collect())
+        Self::from_points(camera, points.iter().map(|(p, lit)| (*p, Lit::towards(*lit))).collect())
     }
 
     /// The points that the candidates stage makes of a border.
     pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
-        let scene = Scene::new(picture, sensor.region(), level, &Unobserved).blooming(sensor.config().body.blooms());
+        let binary =
+            BinaryPicture::new(picture, sensor.region(), level, &Unobserved).blooming(sensor.config().body.blooms());
         let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
-        let made = edge_points::pick(&scene, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
+        let made = edge_points::pick(&binary, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
         let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
         let clipped = T::from_i32(made.clipped as i32) / T::from_i32(made.count.max(1) as i32);
-        Self { clipped, ..Self::of(sensor.camera(), (0..made.count as usize).map(point).collect()) }
+        Self { clipped, ..Self::from_points(sensor.camera(), (0..made.count as usize).map(point).collect()) }
     }
 
-    fn of(camera: &Camera<T>, points: Vec<(ImagePoint<T>, Lit)>) -> Self {
+    fn from_points(camera: &Camera<T>, points: Vec<(ImagePoint<T>, Lit)>) -> Self {
         let mut blocks = vec![Block::<T>::default(); points.len().div_ceil(LANES)];
         for (i, &(point, lit)) in points.iter().enumerate() {
             blocks[i / LANES].set_point(i % LANES, point, lit);
@@ -200,12 +201,12 @@ impl<T: Real> Edges<T> {
     /// The distance from the limb up to which a point can be an inlier: by the noise from point to point, whatever the
     /// weights are.
     fn threshold(&self, expected: &Expected<T>, config: &consensus::Config) -> consensus::Threshold<T> {
-        consensus::Threshold::of(&self.blocks, self.points.len() as u32, expected, self.focal_px, config)
+        consensus::Threshold::new(&self.blocks, self.points.len() as u32, expected, self.focal_px, config)
     }
 
     /// Rejects outliers.
     pub fn reject(&mut self, expected: &Expected<T>, config: &consensus::Config) -> Option<Agreed<T>> {
-        let (count, mut work) = (self.points.len() as u32, Work::unlimited());
+        let (count, mut work) = (self.points.len() as u32, WorkBudget::unlimited());
         let expected = &expected.clipped(self.clipped);
         let threshold = self.threshold(expected, config);
         let found = consensus::keep(&mut self.blocks, count, expected, self.focal_px, threshold, config, &mut work)?;

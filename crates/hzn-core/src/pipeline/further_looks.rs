@@ -16,7 +16,7 @@ use crate::model::observer::Observer;
 use crate::model::report::Report;
 use crate::model::status::Status;
 use crate::model::work;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold::{self, Level};
 
 /// A look without an answer, after which another may have one.
@@ -48,7 +48,7 @@ impl<T: Real> Sensor<T> {
         report.level = first.level;
         loop {
             let look = |region| {
-                Scene::new(picture, region, report.level, observer)
+                BinaryPicture::new(picture, region, report.level, observer)
                     .blooming(expected.blooms())
                     .contrasting(first.contrast)
             };
@@ -59,15 +59,15 @@ impl<T: Real> Sensor<T> {
                     within = Some(self.region.within(frame));
                 }
             }
-            let scene = look(within.as_ref().unwrap_or(&self.region));
-            work = self.search(lists.again(), &scene, work, expected, taken, report);
+            let binary = look(within.as_ref().unwrap_or(&self.region));
+            work = self.search(lists.again(), &binary, work, expected, taken, report);
             if !goes_on(report.status) {
                 break;
             }
             if status != Some(Status::Rejected) {
                 status = Some(report.status);
             }
-            if others.len() == 0 || !work.spend(work::LOOK) {
+            if others.len() == 0 || !work.try_spend(work::LOOK) {
                 break;
             }
             let lowest = *lowest.get_or_insert_with(|| {

@@ -16,8 +16,8 @@ use crate::geometry::camera::{Camera, Config as CameraConfig, Model};
 use crate::geometry::ellipsoid::LimbCone;
 use crate::geometry::frames::{Cam, Cov3, Ecef, Rotation, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
-use crate::model::body::{self, Expected, Frame};
-use crate::model::work::Work;
+use crate::model::body::{self, Expected, Prior};
+use crate::model::work::WorkBudget;
 use crate::pipeline::edges::Edges;
 use crate::stages::consensus;
 use crate::stages::covariance;
@@ -162,10 +162,10 @@ fn azimuth_correction_removes_the_ellipsoid_bias() {
         .unwrap();
         let r = rows(&case["R_ec"]);
         let q = quaternion(&r);
-        let frame = Frame {
+        let frame = Prior {
             position_m: Some(triple(&case["r_ecef_m"])),
             cam_to_ecef: Rotation::assume_from_quaternion(q),
-            ..Frame::default()
+            ..Prior::default()
         };
         let body = body::Config { limb_height_km: num(&case["atmosphere_d_m"]) / 1e3, ..body::Config::default() };
         let axis = direction::<f64>(triple(&case["limb_axis_c"]));
@@ -228,7 +228,7 @@ fn solve<T: Real>(
         fx,
         consensus::Threshold::told(&config),
         &config,
-        &mut Work::unlimited(),
+        &mut WorkBudget::unlimited(),
     )?;
     let estimate = fit::Config { half_angle, ..Default::default() };
     let noise = covariance::Config::told(sigma_px, correlation_px);
@@ -243,7 +243,7 @@ fn solve<T: Real>(
     })
 }
 
-fn sphere(altitude_m: f64, radius_m: f64, limb_sigma_km: f64) -> (body::Config, Frame<f64>) {
+fn sphere(altitude_m: f64, radius_m: f64, limb_sigma_km: f64) -> (body::Config, Prior<f64>) {
     let body = body::Config {
         kind: body::Kind::Sphere,
         radius_km: Some(radius_m / 1e3),
@@ -252,11 +252,11 @@ fn sphere(altitude_m: f64, radius_m: f64, limb_sigma_km: f64) -> (body::Config, 
         limb_height_sigma_km: limb_sigma_km,
         ..body::Config::default()
     };
-    (body, Frame { altitude_m: Some(altitude_m), ..Frame::default() })
+    (body, Prior { altitude_m: Some(altitude_m), ..Prior::default() })
 }
 
-fn single<T: Real>(frame: &Frame<f64>) -> Frame<T> {
-    Frame { altitude_m: frame.altitude_m.map(T::from_f64), ..Frame::default() }
+fn single<T: Real>(frame: &Prior<f64>) -> Prior<T> {
+    Prior { altitude_m: frame.altitude_m.map(T::from_f64), ..Prior::default() }
 }
 
 /// `nadir_cases.json`: scipy maximum-likelihood fits.
@@ -682,11 +682,11 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         );
         let columns = [x, y, z].map(|axis| turned * nalgebra::Vector3::new(axis.x, axis.y, axis.z));
         let attitude: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]));
-        let frame = Frame::<T> {
+        let frame = Prior::<T> {
             position_m: Some(position.map(T::from_f64)),
             cam_to_ecef: Rotation::assume_from_quaternion(quaternion(&attitude).map(T::from_f64)),
             attitude_sigma_rad: Some(T::from_f64(YAW_SIGMA_RAD)),
-            ..Frame::default()
+            ..Prior::default()
         };
         let expected = Expected::new(&body, &frame).unwrap();
         let truth = to_camera(*truth.v());

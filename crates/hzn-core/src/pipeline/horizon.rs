@@ -8,7 +8,7 @@ use crate::config::Config;
 use crate::geometry::camera::Camera;
 use crate::image::Pixels;
 use crate::image::region::Region;
-use crate::model::body::{Expected, Frame, FrameError};
+use crate::model::body::{Expected, Prior, PriorError};
 use crate::model::observer::{Observer, Unobserved};
 use crate::model::report::MAX_BODIES;
 use crate::model::report::{Report, Reports};
@@ -80,14 +80,14 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     ///
     /// # Errors
     /// An altitude or a position that cannot be.
-    pub fn expect(&self, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+    pub fn expect(&self, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         self.sensor.expect(frame)
     }
     /// As [`Sensor::expect_body`].
     ///
     /// # Errors
     /// An altitude or a position that cannot be; a number beyond the last.
-    pub fn expect_body(&self, which: usize, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+    pub fn expect_body(&self, which: usize, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         self.sensor.expect_body(which, frame)
     }
     /// Finds the limb. Total: any picture gives a report. One of another size than the camera's is `rejected` at the

@@ -23,6 +23,6 @@ mod workspace;
 mod golden;
 
 pub use horizon::{FlightHorizon, Horizon, HostHorizon};
-pub use row_stream::{HELD, Rows, RowsError, Stream};
+pub use row_stream::{ROWS_HELD, RowBuffers, RowStream, RowStreamError};
 pub use sensor::Sensor;
 pub use workspace::{FlightWorkspace, HostWorkspace, Workspace};

@@ -16,12 +16,12 @@ use crate::model::observer::Observer;
 use crate::model::report::{Candidate, Free, Report, Solution};
 use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
-use crate::model::work::{self, Work};
+use crate::model::work::{self, WorkBudget};
 use crate::papers;
 use crate::stages::consensus;
 #[cfg(feature = "horace")]
 use crate::stages::contour;
-use crate::stages::contour::{End, Marks, Scene, Thinned};
+use crate::stages::contour::{BinaryPicture, End, Marks, Thinned};
 use crate::stages::covariance;
 use crate::stages::edge_points;
 use crate::stages::fit;
@@ -63,7 +63,7 @@ pub(super) struct Search<'a, T, O> {
     observer: &'a O,
     blocks: &'a mut [Block<T>],
     /// What may still be done.
-    work: Work,
+    work: WorkBudget,
     best: Option<Best<T>>,
     /// The best score of an answer that points elsewhere.
     rival: Option<T>,
@@ -105,7 +105,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         taken: &'a [FoundLimb<T>],
         observer: &'a O,
         blocks: &'a mut [Block<T>],
-        work: Work,
+        work: WorkBudget,
         report: &'a mut Report<T>,
     ) -> Self {
         let config = &sensor.config;
@@ -134,14 +134,14 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
 
     /// Nothing more to look for: the limb is found, or the picture may cost no more.
     fn done(&self) -> bool {
-        self.work.is_spent() || self.best.as_ref().is_some_and(|b| b.certain)
+        self.work.is_exhausted() || self.best.as_ref().is_some_and(|b| b.certain)
     }
 
     /// Edges from the border of the picture, the likeliest first, then those that search lines meet.
     #[inline(always)]
     pub(super) fn border_following<P: Pixels>(
         &mut self,
-        scene: &Scene<'_, T, P, O>,
+        binary: &BinaryPicture<'_, T, P, O>,
         border: &mut [Pixel],
         bits: &mut [u32],
     ) {
@@ -149,24 +149,24 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let (spacing, widest) =
             self.sensor.config.contour.line_spacing_px.map_or((narrow, widest), |given| (given, given));
         let bits = bits.get_mut(..LINE_WORDS.min(bits.len())).unwrap_or_default();
-        let (width, height) = (scene.region.width(), scene.region.height());
+        let (width, height) = (binary.region.width(), binary.region.height());
         let mut marks = Marks::new(bits, width, height, spacing, widest);
         // What is narrower on the border than a search line is apart from the next is no limb.
         let stride = spacing.min(width.min(height) / BORDER_LOOKS).max(1);
-        let ranked = scene.ranked_starts(stride);
-        self.work.pay(scene.cost());
+        let ranked = binary.ranked_starts(stride);
+        self.work.charge(binary.cost());
         for start in &ranked {
             if self.done() {
                 break;
             }
-            self.edge(scene, start.pixel, start.dark, border, &mut marks);
+            self.edge(binary, start.pixel, start.dark, border, &mut marks);
         }
         if !self.done() {
-            scene.each_start(stride, &mut |start| {
+            binary.each_start(stride, &mut |start| {
                 if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
-                    self.edge(scene, start.pixel, start.dark, border, &mut marks);
+                    self.edge(binary, start.pixel, start.dark, border, &mut marks);
                 }
-                self.work.pay(scene.cost());
+                self.work.charge(binary.cost());
                 !self.done()
             });
         }
@@ -175,23 +175,23 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
         let mut missed = Missed::Unknown;
         for y in marks.rows(height) {
-            let Some((x0, x1)) = scene.region.span(y) else { continue };
-            if self.done() || !self.work.spend(work::line(x0, x1)) {
+            let Some((x0, x1)) = binary.region.span(y) else { continue };
+            if self.done() || !self.work.try_spend(work::line(x0, x1)) {
                 break;
             }
-            let crossings = scene.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
-                self.edge_on_line(scene, pixel, dark, border, marks, &mut missed);
+            let crossings = binary.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
+                self.edge_on_line(binary, pixel, dark, border, marks, &mut missed);
                 !self.done()
             });
-            self.work.pay(crossings * work::CROSSING + scene.cost());
+            self.work.charge(crossings * work::CROSSING + binary.cost());
             if missed == Missed::Some {
                 missed = Missed::Found;
-                if !self.work.spend(work::ring(width, height)) {
+                if !self.work.try_spend(work::ring(width, height)) {
                     break;
                 }
-                scene.each_narrow_start(stride, &mut |start| {
-                    self.edge(scene, start.pixel, start.dark, border, &mut marks);
-                    self.work.pay(scene.cost());
+                binary.each_narrow_start(stride, &mut |start| {
+                    self.edge(binary, start.pixel, start.dark, border, &mut marks);
+                    self.work.charge(binary.cost());
                     !self.done()
                 });
             }
@@ -202,7 +202,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     /// over it: half of an edge is not judged, but asked for whole.
     fn edge_on_line<P: Pixels>(
         &mut self,
-        scene: &Scene<'_, T, P, O>,
+        binary: &BinaryPicture<'_, T, P, O>,
         pixel: Pixel,
         dark: u8,
         border: &mut [Pixel],
@@ -210,26 +210,31 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         missed: &mut Missed,
     ) {
         let mut edge = Thinned::new(border);
-        match self.follow(scene, pixel, dark, &mut edge, marks) {
+        match self.follow(binary, pixel, dark, &mut edge, marks) {
             Some(End::Open) if *missed != Missed::Found => *missed = Missed::Some,
-            Some(_) => self.piece(scene, &edge),
+            Some(_) => self.piece(binary, &edge),
             None => {}
         }
     }
 
     /// Every outer border of the picture.
     #[cfg(feature = "horace")]
-    pub(super) fn raster<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, border: &mut [Pixel], bits: &mut [u32]) {
-        let most = self.work.left();
+    pub(super) fn raster<P: Pixels>(
+        &mut self,
+        binary: &BinaryPicture<'_, T, P, O>,
+        border: &mut [Pixel],
+        bits: &mut [u32],
+    ) {
+        let most = self.work.remaining();
         let mut steps = most;
-        let ended = contour::raster::each_border(scene, bits, border, &mut steps, |edge| {
-            self.piece(scene, edge);
-            !self.work.is_spent()
+        let ended = contour::raster::each_border(binary, bits, border, &mut steps, |edge| {
+            self.piece(binary, edge);
+            !self.work.is_exhausted()
         });
         self.report.counters.followed += most - steps;
-        self.work.pay(most - steps);
+        self.work.charge(most - steps);
         if ended == contour::raster::Scanned::Truncated {
-            self.work.lack();
+            self.work.mark_truncated();
         }
     }
 
@@ -237,41 +242,41 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     #[cfg(any(feature = "horace", feature = "zju"))]
     pub(super) fn whole<'b, P: Pixels>(
         &mut self,
-        scene: &Scene<'_, T, P, O>,
-        edges: impl FnOnce(&mut Work) -> Thinned<'b>,
+        binary: &BinaryPicture<'_, T, P, O>,
+        edges: impl FnOnce(&mut WorkBudget) -> Thinned<'b>,
     ) {
         let edge = edges(&mut self.work);
-        self.piece(scene, &edge);
+        self.piece(binary, &edge);
     }
 
     /// Follows one edge and takes it through every stage.
     fn edge<P: Pixels>(
         &mut self,
-        scene: &Scene<'_, T, P, O>,
+        binary: &BinaryPicture<'_, T, P, O>,
         pixel: Pixel,
         dark: u8,
         border: &mut [Pixel],
         marks: &mut Marks<'_>,
     ) {
         let mut edge = Thinned::new(border);
-        if self.follow(scene, pixel, dark, &mut edge, marks).is_some() {
-            self.piece(scene, &edge);
+        if self.follow(binary, pixel, dark, &mut edge, marks).is_some() {
+            self.piece(binary, &edge);
         }
     }
 
     /// Follows one edge, and says how it ended; `None` when it is none, or cannot be paid for.
     fn follow<P: Pixels>(
         &mut self,
-        scene: &Scene<'_, T, P, O>,
+        binary: &BinaryPicture<'_, T, P, O>,
         pixel: Pixel,
         dark: u8,
         edge: &mut Thinned<'_>,
         marks: &mut Marks<'_>,
     ) -> Option<End> {
-        if !self.work.spend(work::EDGE) {
+        if !self.work.try_spend(work::EDGE) {
             return None;
         }
-        let end = self.work.on_edge(|steps| scene.follow(pixel, dark, edge, marks, steps));
+        let end = self.work.on_edge(|steps| binary.follow(pixel, dark, edge, marks, steps));
         self.report.counters.followed += edge.total();
         // A hole: sky or ground seen through something.
         let hole = matches!(end, End::Closed { twice_area } if twice_area > 0);
@@ -279,7 +284,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     }
 
     /// Takes an edge through every stage.
-    pub(super) fn piece<P: Pixels>(&mut self, scene: &Scene<'_, T, P, O>, edge: &Thinned<'_>) {
+    pub(super) fn piece<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
         let counters = &mut self.report.counters;
         let length = edge.total();
         if length < u32::from(self.min_points) {
@@ -288,8 +293,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
         let keep = u32::from(self.sensor.config.candidates.keep_points);
         let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
-        let point = account::point(self.sensor.config.candidates.sub_pixel, scene.mask_cost());
-        if !self.work.spend(points.saturating_mul(point)) {
+        let point = account::point(self.sensor.config.candidates.sub_pixel, binary.mask_cost());
+        if !self.work.try_spend(points.saturating_mul(point)) {
             return;
         }
         let number = counters.candidates;
@@ -299,7 +304,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         if !self.observer.wants(number) {
             return;
         }
-        let (outcome, solution) = self.candidate(scene, number, length, edge.pixels());
+        let (outcome, solution) = self.candidate(binary, number, length, edge.pixels());
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
         if let Some(new) = solution {
             self.weigh(new);
@@ -313,7 +318,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
 
     fn candidate<P: Pixels>(
         &mut self,
-        scene: &Scene<'_, T, P, O>,
+        binary: &BinaryPicture<'_, T, P, O>,
         number: u32,
         length: u32,
         border: &[Pixel],
@@ -330,14 +335,14 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         };
 
         self.enter(Stage::Candidates);
-        let slow = work::slow_point(scene.mask_cost());
-        let most_slow = self.work.left() / slow;
-        let points = edge_points::pick(scene, &config.candidates, border, number, self.blocks, most_slow);
+        let slow = work::slow_point(binary.mask_cost());
+        let most_slow = self.work.remaining() / slow;
+        let points = edge_points::pick(binary, &config.candidates, border, number, self.blocks, most_slow);
         if points.slow == most_slow {
-            self.work.cut();
+            self.work.exhaust();
             return (outcome, None);
         }
-        self.work.pay(points.slow * slow);
+        self.work.charge(points.slow * slow);
         outcome.points = points.count;
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;
@@ -359,7 +364,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
         let (fx, fy) = camera.focal_px();
         let focal = (fx + fy) * T::from_f64(0.5);
-        let threshold = consensus::Threshold::of(blocks, points.count, expected, focal, &config.reject);
+        let threshold = consensus::Threshold::new(blocks, points.count, expected, focal, &config.reject);
         let consensus =
             consensus::keep(blocks, points.count, expected, focal, threshold, &config.reject, &mut self.work);
         let Some(consensus) = consensus else {
@@ -369,7 +374,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
 
         enter(self.report, self.observer, Stage::Estimate);
         outcome.verdict = Verdict::NoFit;
-        if !self.work.spend(used as u32 * work::FIT + work::GATES) {
+        if !self.work.try_spend(used as u32 * work::FIT + work::GATES) {
             return (outcome, None);
         }
         let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.estimate, self.noise);
@@ -395,9 +400,9 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
         let (made, raised) = (points.count, threshold.raised);
-        let judged = gates::judge(&fit, &fused, sigma, expected, blocks, made, raised, scene, camera, &config.select);
+        let judged = gates::judge(&fit, &fused, sigma, expected, blocks, made, raised, binary, camera, &config.select);
         outcome.verdict = match judged.verdict {
-            Verdict::Passed => papers::verdict(&fit, expected, blocks, camera, scene.region, &config.select),
+            Verdict::Passed => papers::verdict(&fit, expected, blocks, camera, binary.region, &config.select),
             failed => failed,
         };
         let most = T::from_i32(points.count as i32) * T::from_f64(config.recover.min_part);
@@ -442,7 +447,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
         let certain = judged.support > T::from_f64(config.select.certain_support)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
-        let tracks = (self.tracks && !P::PASSED).then(|| gates::middle_level(&fused.e, blocks, scene, camera));
+        let tracks = (self.tracks && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
         (outcome, Some(Best { solution, outcome, score: judged.score, certain, level: tracks.flatten() }))
     }
 
@@ -466,9 +471,9 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     }
 
     /// Writes the answer into the report. Gives back what is left of the account.
-    pub(super) fn conclude(self) -> Work {
+    pub(super) fn conclude(self) -> WorkBudget {
         let (report, work) = (self.report, self.work);
-        report.counters.work = work.done();
+        report.counters.work = work.spent();
         report.counters.looks += 1;
         if let Some(best) = self.best {
             let factor = T::from_f64(self.sensor.config.select.ambiguous_score);
@@ -482,7 +487,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             report.solution = Some(best.solution);
             return work;
         }
-        report.status = if work.was_cut() {
+        report.status = if work.was_truncated() {
             Status::Truncated
         } else if self.fitted {
             Status::Rejected

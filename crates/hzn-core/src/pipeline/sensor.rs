@@ -10,13 +10,13 @@ use crate::geometry::camera::Camera;
 use crate::geometry::frames::{Body, Cam, Rotation};
 use crate::image::Pixels;
 use crate::image::region::Region;
-use crate::model::body::{Expected, Frame, FrameError};
+use crate::model::body::{Expected, Prior, PriorError};
 use crate::model::observer::Observer;
 use crate::model::report::MAX_BODIES;
 use crate::model::report::{Report, Reports};
 use crate::model::status::Stage;
-use crate::model::work::Work;
-use crate::stages::contour::{self, Scene};
+use crate::model::work::WorkBudget;
+use crate::stages::contour::{self, BinaryPicture};
 use crate::stages::threshold;
 
 /// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
@@ -63,15 +63,15 @@ impl<T: Real> Sensor<T> {
     ///
     /// # Errors
     /// An altitude or a position that cannot be.
-    pub fn expect(&self, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
+    pub fn expect(&self, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         self.expect_body(0, frame)
     }
     /// As [`Self::expect`], of the body number `which` of [`Config::each_body`], from 0.
     ///
     /// # Errors
     /// An altitude or a position that cannot be; a number beyond the last.
-    pub fn expect_body(&self, which: usize, frame: &Frame<T>) -> Result<Expected<T>, FrameError> {
-        let body = self.config.each_body().get(which).ok_or(FrameError::NoBody)?;
+    pub fn expect_body(&self, which: usize, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
+        let body = self.config.each_body().get(which).ok_or(PriorError::NoBody)?;
         Ok(Expected { which: which as u8, ..Expected::new(body, frame)? })
     }
     /// Finds the limb, watched. Total: any picture gives a report. One of another size than the camera's is `rejected`
@@ -169,28 +169,28 @@ impl<T: Real> Sensor<T> {
     pub(super) fn search<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
-        scene: &Scene<'_, T, P, O>,
-        work: Work,
+        binary: &BinaryPicture<'_, T, P, O>,
+        work: WorkBudget,
         expected: &Expected<T>,
         taken: &[FoundLimb<T>],
         report: &mut Report<T>,
-    ) -> Work {
+    ) -> WorkBudget {
         let config = &self.config;
         report.stage = report.stage.max(Stage::Contour);
-        scene.observer.enter(Stage::Contour);
+        binary.observer.enter(Stage::Contour);
         let turning = self.turning(expected);
         let camera = turning.as_ref().unwrap_or(&self.camera);
-        let mut search = Search::new(self, camera, expected, taken, scene.observer, lists.blocks, work, report);
+        let mut search = Search::new(self, camera, expected, taken, binary.observer, lists.blocks, work, report);
         match config.contour.method {
-            contour::Method::BorderFollowing => search.border_following(scene, lists.border, lists.marks),
+            contour::Method::BorderFollowing => search.border_following(binary, lists.border, lists.marks),
             #[cfg(feature = "horace")]
-            contour::Method::Raster => search.raster(scene, lists.border, lists.marks),
+            contour::Method::Raster => search.raster(binary, lists.border, lists.marks),
             #[cfg(feature = "horace")]
             contour::Method::Erode => {
-                search.whole(scene, |work| contour::erode::edges(scene, &config.contour, lists.border, work));
+                search.whole(binary, |work| contour::erode::edges(binary, &config.contour, lists.border, work));
             }
             #[cfg(feature = "zju")]
-            contour::Method::Sobel => search.whole(scene, |work| contour::sobel::edges(scene, lists.border, work)),
+            contour::Method::Sobel => search.whole(binary, |work| contour::sobel::edges(binary, lists.border, work)),
         }
         search.conclude()
     }

@@ -68,7 +68,7 @@ impl<T: Real> Sensor<T> {
         let (status, level) = (report.status, report.level);
         // What the whole picture left.
         let mut work = account::open(&self.config, lists.border.len());
-        work.pay(report.counters.work);
+        work.charge(report.counters.work);
         let mut cut = false;
         let least = f64::from(whole.area()) * self.config.recover.least_part;
         let mut answers = Answers::<T>::new();
@@ -77,12 +77,12 @@ impl<T: Real> Sensor<T> {
         // A half at a time: as many wait as there have been halvings.
         let _ = waiting.extend_from_slice(whole.halves().as_ref().map_or(&[][..], |h| h));
         while let Some(part) = waiting.pop() {
-            if !work.spend(work::PART) {
+            if !work.try_spend(work::PART) {
                 break;
             }
             report.counters.work = 0;
-            self.look_through(lists.again(), part, picture, expected, taken, observer, Some(work.left()), report);
-            work.pay(report.counters.work);
+            self.look_through(lists.again(), part, picture, expected, taken, observer, Some(work.remaining()), report);
+            work.charge(report.counters.work);
             cut |= report.status == Status::Truncated;
             if let Some(answer) = report.solution.take() {
                 // As many as the smallest parts can be.
@@ -98,8 +98,8 @@ impl<T: Real> Sensor<T> {
                 let _ = waiting.extend_from_slice(part.halves().as_ref().map_or(&[][..], |h| h));
             }
         }
-        (report.status, report.level, report.counters.work) = (status, level, work.done());
-        if cut || work.was_cut() {
+        (report.status, report.level, report.counters.work) = (status, level, work.spent());
+        if cut || work.was_truncated() {
             report.status = Status::Truncated;
         }
         if let Some(mut answer) = together(&mut answers, self.config.recover.combine) {

@@ -123,9 +123,9 @@ pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
 
 /// Both samples of a picture whose rows pass.
 #[derive(Debug)]
-pub(crate) struct Passing([Sample; SIDES_LOG2.len()]);
+pub(crate) struct RowSampler([Sample; SIDES_LOG2.len()]);
 
-impl Passing {
+impl RowSampler {
     pub(crate) fn new<T: Real>(seed: u32, full_scale: u16, region: &Region<T>) -> Self {
         Self(SIDES_LOG2.map(|side_log2| Sample::new(seed, side_log2, full_scale, region)))
     }

@@ -61,7 +61,7 @@ impl ChunkBuilder {
     pub(crate) fn take(&mut self, compress: bool) -> std::io::Result<Chunk> {
         let plain = std::mem::take(&mut self.bytes);
         let crc = crc32fast::hash(&plain);
-        let index = Index::of(&plain).unwrap_or_default();
+        let index = Index::read(&plain).unwrap_or_default();
         let size = plain.len() as u64;
         let (compression, records) =
             if compress { ("zstd", zstd::bulk::compress(&plain, ZSTD_LEVEL)?) } else { ("", plain) };
@@ -82,7 +82,7 @@ pub(crate) struct Index {
 
 impl Index {
     /// Reads through the records of an uncompressed chunk; `None` when they do not hold together.
-    fn of(plain: &[u8]) -> Option<Self> {
+    fn read(plain: &[u8]) -> Option<Self> {
         let mut index = Self::default();
         let mut rest = Fields(plain);
         while !rest.0.is_empty() {
@@ -142,7 +142,7 @@ impl Chunk {
         if plain.len() as u64 != size || (crc != 0 && crc32fast::hash(&plain) != crc) {
             return None;
         }
-        let index = Index::of(&plain)?;
+        let index = Index::read(&plain)?;
         Some((Self { compression, size, crc, records, index }, plain))
     }
 

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use hzn_calib::{FrameData, Frames};
-use hzn_core::body::FrameError;
+use hzn_core::body::PriorError;
 use hzn_core::camera::Camera;
 use hzn_core::status::Status;
 use hzn_core::{Config, Report};
@@ -65,7 +65,7 @@ pub struct Finished {
     /// What frames.csv, or a recording of ours, says about this frame.
     pub data: Option<FrameData>,
     /// What came of every body, in order.
-    pub found: Vec<Found>,
+    pub found: Vec<BodyOutcome>,
     /// What is drawn over the picture, when it was asked for.
     pub drawing: hzn_mcap::Annotations,
     /// The picture as PNG or JPEG, when it was asked for.
@@ -80,14 +80,14 @@ pub struct Finished {
 
 /// What came of one body in one frame.
 #[derive(Debug)]
-pub struct Found {
+pub struct BodyOutcome {
     /// The answer, or why there is none.
     pub report: Result<Report<f64>, Unprocessed>,
     /// Time of processing, decoding not included.
     pub elapsed: Duration,
 }
 
-impl Found {
+impl BodyOutcome {
     /// Outcome.
     pub fn status(&self) -> Status {
         self.report.as_ref().map_or_else(|e| e.status, |r| r.status)
@@ -99,7 +99,7 @@ impl Found {
     }
 }
 
-impl From<Processed> for Found {
+impl From<Processed> for BodyOutcome {
     fn from(p: Processed) -> Self {
         Self { report: p.report.map_err(Into::into), elapsed: p.elapsed }
     }
@@ -116,13 +116,13 @@ pub struct Unprocessed {
     pub below_limb: bool,
 }
 
-impl From<FrameError> for Unprocessed {
-    fn from(error: FrameError) -> Self {
+impl From<PriorError> for Unprocessed {
+    fn from(error: PriorError) -> Self {
         let status = match error {
-            FrameError::NoAltitude | FrameError::BelowLimb { .. } => Status::NoAltitude,
+            PriorError::NoAltitude | PriorError::BelowLimb { .. } => Status::NoAltitude,
             _ => Status::Unreadable,
         };
-        Self { status, why: error.to_string(), below_limb: matches!(error, FrameError::BelowLimb { .. }) }
+        Self { status, why: error.to_string(), below_limb: matches!(error, PriorError::BelowLimb { .. }) }
     }
 }
 
@@ -135,7 +135,7 @@ impl Finished {
     /// A picture that could not be read: so it is with every body.
     fn not_read(self, plan: &Plan, why: &str) -> Self {
         let why = Unprocessed { status: Status::Unreadable, why: why.to_owned(), below_limb: false };
-        let none = || Found { report: Err(why.clone()), elapsed: Duration::ZERO };
+        let none = || BodyOutcome { report: Err(why.clone()), elapsed: Duration::ZERO };
         Self { found: plan.config.each_body().iter().map(|_| none()).collect(), ..self }
     }
 }
@@ -326,7 +326,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     };
     let data = finished.data.as_ref();
     sensor.set_time(finished.time_s);
-    finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(Found::from).collect();
+    finished.found = sensor.process(&view, data, traces.as_ref()).into_iter().map(BodyOutcome::from).collect();
     if finished.found.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
         finished.tip = picture.unused_bits();
     }
@@ -353,7 +353,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
 }
 
 /// What is drawn over the picture for all of its bodies.
-fn draw(found: &[Found], traces: &Traces, camera: &Camera<f64>) -> hzn_mcap::Annotations {
+fn draw(found: &[BodyOutcome], traces: &Traces, camera: &Camera<f64>) -> hzn_mcap::Annotations {
     let mut drawing = hzn_mcap::Annotations::default();
     for (found, trace) in found.iter().zip(&traces.each) {
         let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref());
@@ -363,7 +363,7 @@ fn draw(found: &[Found], traces: &Traces, camera: &Camera<f64>) -> hzn_mcap::Ann
 }
 
 /// What became of the bodies, in words.
-fn statuses(found: &[Found], plan: &Plan) -> String {
+fn statuses(found: &[BodyOutcome], plan: &Plan) -> String {
     match found {
         [one] => one.status().name().to_owned(),
         several => {

@@ -3,14 +3,14 @@
 use std::time::Duration;
 
 use hzn_calib::{FrameData, Frames, Problem};
-use hzn_core::body::{self, FrameError};
+use hzn_core::body::{self, PriorError};
 use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
 use hzn_core::frames::{Cov3, Ecef, UnitVec3};
 use hzn_core::image::{ImageView, Pixels};
 use hzn_core::real::Real;
 use hzn_core::report::{Candidate, Free};
-use hzn_core::{Config, FlightHorizon, Frame, Horizon, HostHorizon, Observer, Report, Solution};
+use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report, Solution};
 use hzn_nav::ephemeris;
 
 use super::trace::{Clock, Traces, Watch};
@@ -108,7 +108,7 @@ impl AnySensor {
 
     /// Half-angle in radians that is expected of each body in a frame; or why nothing can be expected: an altitude or
     /// position that cannot be.
-    pub fn expected_half_angles_rad(&self, data: Option<&FrameData>) -> Vec<Result<f64, FrameError>> {
+    pub fn expected_half_angles_rad(&self, data: Option<&FrameData>) -> Vec<Result<f64, PriorError>> {
         match &self.kind {
             Kind::Host(h) => half_angles(h, data),
             Kind::Flight(h) => half_angles(h, data),
@@ -194,7 +194,7 @@ fn in_the_sky(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>>
 #[derive(Debug)]
 pub struct Processed {
     /// The report; or an altitude or position that cannot be.
-    pub report: Result<Report<f64>, FrameError>,
+    pub report: Result<Report<f64>, PriorError>,
     /// Time of processing.
     pub elapsed: Duration,
 }
@@ -202,12 +202,12 @@ pub struct Processed {
 fn half_angles<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
     data: Option<&FrameData>,
-) -> Vec<Result<f64, FrameError>> {
+) -> Vec<Result<f64, PriorError>> {
     let expect = |which| Ok(horizon.expect_body(which, &frame(data))?.half_angle_rad().into());
     (0..horizon.config().each_body().len()).map(expect).collect()
 }
 
-fn frame<T: Real>(data: Option<&FrameData>) -> Frame<T> {
+fn frame<T: Real>(data: Option<&FrameData>) -> Prior<T> {
     data.map(|d| d.to_frame(None)).unwrap_or_default()
 }
 
@@ -228,7 +228,7 @@ fn run<
 ) -> Vec<Processed> {
     let expect = |(which, last): (usize, &Option<Answered>)| {
         let last = last.zip(now_s).and_then(|(last, now_s)| last.to_last(now_s));
-        horizon.expect_body(which, &Frame { last, ..frame(data) })
+        horizon.expect_body(which, &Prior { last, ..frame(data) })
     };
     let expected: Vec<_> = last.iter().enumerate().map(expect).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
@@ -236,7 +236,7 @@ fn run<
     let times = watch.times();
     let mut done = reports.iter().zip(times);
     // As many reports as bodies of which something could be expected.
-    let result = |expected: Result<_, FrameError>| match expected {
+    let result = |expected: Result<_, PriorError>| match expected {
         Err(why) => Some(Processed { report: Err(why), elapsed: Duration::ZERO }),
         Ok(_) => done.next().map(|(report, elapsed)| Processed { report: Ok(widen(report)), elapsed }),
     };
@@ -308,7 +308,7 @@ pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result
     for row in &frames.rows {
         for half_angle in sensor.expected_half_angles_rad(Some(row)) {
             match half_angle {
-                Ok(_) | Err(FrameError::NoAltitude | FrameError::BelowLimb { .. }) => {}
+                Ok(_) | Err(PriorError::NoAltitude | PriorError::BelowLimb { .. }) => {}
                 Err(why) => return Err(frames.refused(row, why)),
             }
         }

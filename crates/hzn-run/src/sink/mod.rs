@@ -324,12 +324,12 @@ impl Sink for Output {
 }
 
 /// A table of rows that are at hand already.
-pub struct Rows {
+pub struct RowFile {
     text: Text,
     path: PathBuf,
 }
 
-impl Rows {
+impl RowFile {
     /// Begins a CSV or JSON Lines file.
     ///
     /// # Errors

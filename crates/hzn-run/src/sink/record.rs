@@ -12,7 +12,7 @@ use hzn_mcap::{
 };
 use hzn_sim::evaluate;
 
-use crate::engine::{Finished, Found, Trace};
+use crate::engine::{BodyOutcome, Finished, Trace};
 use crate::overlay::limb;
 
 /// The altitude above a body, kilometres: that of the position, else as given; of Sun and Moon there is none.
@@ -29,7 +29,7 @@ pub fn altitude_km(data: Option<&FrameData>, body: &body::Config) -> Option<f64>
 
 /// The rows of a frame, one for each body.
 pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
-    let row = |(body, found): (&body::Config, &Found)| {
+    let row = |(body, found): (&body::Config, &BodyOutcome)| {
         let meta = RowMeta {
             index: frame.index,
             file: frame.name.clone(),
@@ -76,7 +76,7 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
 pub fn answer(row: &Row) -> evaluate::Answer {
     let covariance =
         || -> Option<[f64; 6]> { Some([row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?]) };
-    let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| evaluate::Found {
+    let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| evaluate::MeasuredDirection {
         axis,
         // Without a covariance the error still counts, its honesty does not.
         covariance_rad2: covariance().unwrap_or_default(),

@@ -47,7 +47,7 @@ enum Kind {
 
 impl Kind {
     /// What cannot be looked at is a picture that cannot be read, such as a link into an archive that is not mounted.
-    fn of(path: &Path) -> Self {
+    fn from_path(path: &Path) -> Self {
         match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => Self::Folder,
             Ok(meta) if !meta.is_file() => Self::Special,
@@ -59,7 +59,7 @@ impl Kind {
 /// Leaves out what is no file.
 fn only_files(paths: &mut Vec<PathBuf>, left_out: &mut LeftOut) {
     paths.retain(|p| {
-        let kind = Kind::of(p);
+        let kind = Kind::from_path(p);
         if kind != Kind::File {
             *left_out.entry((kind, ending(p))).or_default() += 1;
         }
@@ -99,7 +99,7 @@ impl Files {
             } else if text.contains(['*', '?', '[']) {
                 let matches = glob::glob(&text).map_err(|e| unusable(format!("{text}: not a valid pattern: {e}")))?;
                 let mut found: Vec<PathBuf> = matches.flatten().collect();
-                found.retain(|p| match Kind::of(p) {
+                found.retain(|p| match Kind::from_path(p) {
                     Kind::File => raw.is_some() || !COMPANIONS.contains(&ending(p).as_str()),
                     _ => PICTURES.contains(&ending(p).as_str()),
                 });
@@ -160,7 +160,7 @@ fn in_folder(folder: &Path, raw: bool, left_out: &mut LeftOut) -> Result<Vec<Pat
         let hidden = p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
         let (picture, companion) = (PICTURES.contains(&e.as_str()), COMPANIONS.contains(&e.as_str()) || hidden);
         let take = if raw { !picture && !companion } else { picture };
-        if !take && !companion && Kind::of(p) == Kind::File {
+        if !take && !companion && Kind::from_path(p) == Kind::File {
             *left_out.entry((Kind::File, e)).or_default() += 1;
         }
         take

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hzn_calib::FrameData;
-use hzn_mcap::{Contents, Found, FrameRecord, Index, Reader};
+use hzn_mcap::{Contents, FrameRecord, Index, IndexEntry, Reader};
 
 use super::recording::{SAMPLE_EVERY, payload, size_of};
 use super::{Item, Payload, SIZES, Source, TimeSource};
@@ -56,7 +56,7 @@ fn holds(path: &Path) -> Result<Holds, hzn_mcap::Error> {
     let mut index = Index::open(path)?;
     let mut any = false;
     while let Some(part) = index.next_part()? {
-        if part.iter().any(|found| matches!(found, Found::Picture(_))) {
+        if part.iter().any(|found| matches!(found, IndexEntry::Picture(_))) {
             return Ok(Holds::Pictures);
         }
         any |= !part.is_empty();

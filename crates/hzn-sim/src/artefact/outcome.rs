@@ -18,14 +18,14 @@ pub const FALSE_SIGMAS: f64 = 5.0;
 
 /// What is told about a picture besides the position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Told {
+pub struct PriorKnowledge {
     /// Error of the attitude, 1σ about each axis in degrees; `None`: no attitude is told.
     pub attitude_sigma_deg: Option<f64>,
 }
 
 /// An answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct Detection {
     /// How far off it is.
     pub miss: Miss,
     /// Direction in the camera.
@@ -46,7 +46,7 @@ pub struct Outcome {
     /// The status.
     pub status: Status,
     /// The answer, with status `ok`.
-    pub found: Option<Found>,
+    pub found: Option<Detection>,
     /// What became of each edge that was looked at.
     pub candidates: Vec<Candidate<f64>>,
     /// Whether one of the picture's discs has the expected half-angle within three of its sigmas.
@@ -80,7 +80,7 @@ pub fn look(
     config: &Config,
     trial: &Trial,
     picture: &Picture,
-    told: Told,
+    told: PriorKnowledge,
     observer: &impl Observer<f64>,
 ) -> Result<Outcome, SceneError> {
     horizon.reconfigure(config)?;
@@ -89,13 +89,13 @@ pub fn look(
     let report = horizon.process_observed(&picture.view(), &expected, observer);
     let truth = &trial.truth;
     let found = report.solution.as_ref().and_then(|s| {
-        let found = evaluate::Found {
+        let found = evaluate::MeasuredDirection {
             axis: s.axis.xyz(),
             covariance_rad2: s.covariance.upper_rad2,
             half_angle_deg: Some(s.half_angle_rad.to_degrees()),
         };
-        Some(Found {
-            miss: Miss::of(&found, [truth.axis_x, truth.axis_y, truth.axis_z], truth.half_angle_deg)?,
+        Some(Detection {
+            miss: Miss::new(&found, [truth.axis_x, truth.axis_y, truth.axis_z], truth.half_angle_deg)?,
             axis: s.axis.xyz(),
             half_angle_rad: s.fused_half_angle_rad,
             rms_px: s.rms_px,
@@ -115,7 +115,7 @@ pub fn look(
 /// The told sigma of the half-angle: sin α = (R + d)/(R + H), so cos α dα = (dd − sin α dH)/(R + H).
 fn half_angle_sigma_rad(trial: &Trial, config: &Config, expected: &Expected<f64>) -> f64 {
     let (sin, cos) = libm::sincos(expected.half_angle_rad());
-    let globe = Globe::of(&config.body);
+    let globe = Globe::new(&config.body);
     let distance_km = (globe.a_m + globe.altitude_m(trial.scene.pose.position_m)) * 1e-3;
     let (limb, altitude) = (config.body.limb_height_sigma_km, sin * config.body.altitude_sigma_km);
     libm::hypot(limb, altitude) / (distance_km * cos)

@@ -2,7 +2,7 @@
 
 use core::f64::consts::PI;
 
-use hzn_core::Frame;
+use hzn_core::Prior;
 use hzn_core::camera::{self, Camera};
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::UnitVec3;
@@ -229,16 +229,16 @@ impl Trial {
 
     /// What a navigation system would tell: the position; with `attitude_sigma_deg` an attitude too, which is wrong by as
     /// much about each axis (1σ).
-    pub fn known(&self, attitude_sigma_deg: Option<f64>) -> Frame<f64> {
+    pub fn known(&self, attitude_sigma_deg: Option<f64>) -> Prior<f64> {
         let pose = &self.scene.pose;
         let dice = &mut Part::Attitude.dice(self.kind, self.seed);
         let sigma_rad = attitude_sigma_deg.map(f64::to_radians);
-        Frame {
-            altitude_m: Some(Globe::of(&self.scene.body).altitude_m(pose.position_m)),
+        Prior {
+            altitude_m: Some(Globe::new(&self.scene.body).altitude_m(pose.position_m)),
             position_m: Some(pose.position_m),
             cam_to_ecef: sigma_rad.and_then(|s| pose.disturbed([0; 3].map(|_| s * dice.normal())).cam_to_ecef()),
             attitude_sigma_rad: sigma_rad,
-            ..Frame::default()
+            ..Prior::default()
         }
     }
 }
@@ -251,7 +251,7 @@ fn place(dice: &mut Dice) -> [f64; 3] {
 
 /// The limb's cone for a limb height in kilometres.
 fn cone(position_m: [f64; 3], limb_height_km: f64) -> Result<LimbCone<f64>, SceneError> {
-    let globe = Globe::of(&hzn_core::body::Config::default()).raised(limb_height_km * 1e3);
+    let globe = Globe::new(&hzn_core::body::Config::default()).raised(limb_height_km * 1e3);
     LimbCone::try_new(position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)
 }
 

@@ -21,12 +21,12 @@ pub struct Answer {
     /// Outcome.
     pub status: Status,
     /// The direction, beside `ok`.
-    pub found: Option<Found>,
+    pub found: Option<MeasuredDirection>,
 }
 
 /// A direction with its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct MeasuredDirection {
     /// Unit vector to the body in the camera frame.
     pub axis: [f64; 3],
     /// Its covariance: xx, xy, xz, yy, yz, zz in rad².
@@ -91,7 +91,7 @@ pub struct Miss {
 
 impl Miss {
     /// Of one direction against the truth; `None` when either is no direction.
-    pub fn of(found: &Found, truth_axis: [f64; 3], truth_half_angle_deg: f64) -> Option<Self> {
+    pub fn new(found: &MeasuredDirection, truth_axis: [f64; 3], truth_half_angle_deg: f64) -> Option<Self> {
         let unit = |v: [f64; 3]| Vector3::from(v).try_normalize(1e-12);
         let (e, truth) = (unit(found.axis)?, unit(truth_axis)?);
         let cross = e.cross(&truth);
@@ -218,7 +218,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
             miss: answer.found.and_then(|f| {
                 // The Sun blooms: its size is no measure.
                 let half_angle_deg = f.half_angle_deg.filter(|_| t.body != name(Kind::Sun));
-                Miss::of(&Found { half_angle_deg, ..f }, axis, t.half_angle_deg)
+                Miss::new(&MeasuredDirection { half_angle_deg, ..f }, axis, t.half_angle_deg)
             }),
         });
     }

@@ -31,7 +31,7 @@ pub struct Within {
 
 impl Honesty {
     /// Of squared errors over covariances; `None` without any.
-    pub fn of(nees: &[f64]) -> Option<Self> {
+    pub fn from_nees(nees: &[f64]) -> Option<Self> {
         let n = nees.len();
         if n == 0 {
             return None;

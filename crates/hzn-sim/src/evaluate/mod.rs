@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   answers ─┐
-//!            ├─ pair ─► Case (one a frame and body) ─► Evaluation::of ─► shares, errors, honesty, groups
+//!            ├─ pair ─► Case (one a frame and body) ─► Evaluation::new ─► shares, errors, honesty, groups
 //!   truth  ──┘
 //! ```
 //!
@@ -13,7 +13,7 @@ mod case;
 mod honesty;
 mod summary;
 
-pub use case::{Answer, Case, Found, Mismatch, Miss, limb_in_view_px, pair};
+pub use case::{Answer, Case, MeasuredDirection, Mismatch, Miss, limb_in_view_px, pair};
 pub use honesty::{Honesty, Within};
 pub use summary::{Errors, Evaluation, Group, GroupRow, Horace};
 

@@ -105,11 +105,11 @@ impl Evaluation {
             }
         }
         let of = |body: &&str| cases.iter().filter(|c| c.body == **body).collect::<Vec<_>>();
-        bodies.iter().map(|body| Self::of(&of(body))).collect()
+        bodies.iter().map(|body| Self::new(&of(body))).collect()
     }
 
     /// Of the cases of one body.
-    pub fn of(cases: &[&Case]) -> Self {
+    pub fn new(cases: &[&Case]) -> Self {
         let with_limb: Vec<&Case> = cases.iter().copied().filter(|c| c.limb).collect();
         let without = cases.len() - with_limb.len();
         let false_answers = cases.iter().filter(|c| !c.limb && c.miss.is_some()).count();
@@ -127,7 +127,7 @@ impl Evaluation {
             answered: with_limb.iter().filter(|c| c.miss.is_some()).count(),
             unanswered,
             false_answers,
-            errors: Errors::of(&with_limb),
+            errors: Errors::new(&with_limb),
             honesty: honesty(&with_limb),
             horace: Horace {
                 success,
@@ -135,9 +135,9 @@ impl Evaluation {
                 false_positives: (without > 0).then(|| false_answers as f64 / without as f64),
             },
             groups: [
-                Group::of("altitude", "km", &with_limb, |c| c.altitude_km),
-                Group::of(off_axis, "deg", &with_limb, |c| Some(c.off_axis_deg)),
-                Group::of("limb in view", "px", &with_limb, |c| c.limb_in_view_px),
+                Group::new("altitude", "km", &with_limb, |c| c.altitude_km),
+                Group::new(off_axis, "deg", &with_limb, |c| Some(c.off_axis_deg)),
+                Group::new("limb in view", "px", &with_limb, |c| c.limb_in_view_px),
             ]
             .into_iter()
             .flatten()
@@ -160,12 +160,12 @@ fn horace_counts(case: &Case) -> bool {
 
 fn honesty(cases: &[&Case]) -> Option<Honesty> {
     let nees: Vec<f64> = cases.iter().filter_map(|c| c.miss?.nees).collect();
-    Honesty::of(&nees)
+    Honesty::from_nees(&nees)
 }
 
 impl Errors {
     /// Of the answers among some cases; `None` without any.
-    fn of(cases: &[&Case]) -> Option<Self> {
+    fn new(cases: &[&Case]) -> Option<Self> {
         let misses: Vec<_> = cases.iter().filter_map(|c| c.miss).collect();
         let mut sorted: Vec<f64> = misses.iter().map(|m| m.angle_deg).collect();
         sorted.sort_by(f64::total_cmp);
@@ -196,7 +196,7 @@ pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
 
 impl Group {
     /// In ranges of about a sixth of where the values are; `None` when they are all alike, or not known.
-    fn of(
+    fn new(
         name: &'static str,
         unit: &'static str,
         cases: &[&Case],
@@ -219,7 +219,7 @@ impl Group {
                 range,
                 with_limb: members.len(),
                 answered: members.iter().filter(|c| c.miss.is_some()).count(),
-                errors: Errors::of(&members),
+                errors: Errors::new(&members),
                 honesty: honesty(&members),
             })
         };

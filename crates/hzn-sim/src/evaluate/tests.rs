@@ -27,7 +27,7 @@ fn answer(file: &str, x_deg: f64, z_deg: f64) -> Answer {
     let (a, b) = (0.1f64.to_radians(), 0.2f64.to_radians());
     // A turn about z moves the x component, one about x the z component.
     let covariance_rad2 = [b * b, 0.0, 0.0, 0.0, 0.0, a * a];
-    let found = Found { axis, covariance_rad2, half_angle_deg: Some(60.0) };
+    let found = MeasuredDirection { axis, covariance_rad2, half_angle_deg: Some(60.0) };
     Answer { file: file.into(), body: "earth".into(), status: Status::Ok, found: Some(found) }
 }
 
@@ -49,13 +49,17 @@ fn errors_by_axis_and_their_sigmas() {
 #[test]
 fn a_singular_covariance_has_no_nees_and_a_large_error_is_an_arc() {
     let mut opposite = answer("a", 0.0, 0.0);
-    opposite.found = Some(Found { axis: [0.0, 0.0, 1.0], covariance_rad2: [0.0; 6], half_angle_deg: None });
+    opposite.found = Some(MeasuredDirection { axis: [0.0, 0.0, 1.0], covariance_rad2: [0.0; 6], half_angle_deg: None });
     let m = pair(&[opposite], &[truth("a", 1)], None).unwrap()[0].miss.unwrap();
     assert!((m.angle_deg - 90.0).abs() < 1e-9 && m.nees.is_none());
-    let found = Found { axis: [0.0, 0.0, 1.0], covariance_rad2: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0], half_angle_deg: None };
-    let m = Miss::of(&found, [0.0, 1.0, 0.0], 60.0).unwrap();
+    let found = MeasuredDirection {
+        axis: [0.0, 0.0, 1.0],
+        covariance_rad2: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        half_angle_deg: None,
+    };
+    let m = Miss::new(&found, [0.0, 1.0, 0.0], 60.0).unwrap();
     assert!((m.nees.unwrap() - core::f64::consts::FRAC_PI_2.powi(2)).abs() < 1e-9);
-    assert!(Miss::of(&found, [0.0; 3], 60.0).is_none());
+    assert!(Miss::new(&found, [0.0; 3], 60.0).is_none());
 }
 
 #[test]
@@ -145,11 +149,11 @@ fn intervals_are_those_of_chi_square() {
     // Tables: χ² of 20 degrees of freedom has 9.591 and 34.170 at 2.5 % and 97.5 %; n = 10.
     let [low, high] = interval(10);
     assert!((low - 0.9591).abs() < 1e-4 && (high - 3.4170).abs() < 1e-4, "{low} {high}");
-    let h = Honesty::of(&[2.0; 10]).unwrap();
+    let h = Honesty::from_nees(&[2.0; 10]).unwrap();
     assert!(h.is_within_interval() && (h.sigma_scale - 1.0).abs() < 1e-12);
     assert_eq!(h.within.map(|w| w.share), [0.0, 1.0, 1.0]);
     assert!((h.within[1].expected - 0.8647).abs() < 1e-4);
-    assert!(!Honesty::of(&[8.0; 10]).unwrap().is_within_interval() && Honesty::of(&[]).is_none());
+    assert!(!Honesty::from_nees(&[8.0; 10]).unwrap().is_within_interval() && Honesty::from_nees(&[]).is_none());
 }
 
 #[test]

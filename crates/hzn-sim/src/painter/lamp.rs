@@ -4,7 +4,7 @@ use hzn_core::ellipsoid::LimbCone;
 use nalgebra::Vector3;
 
 use crate::error::SceneError;
-use crate::globe::{Globe, Sight, View};
+use crate::globe::{Globe, RayHit, View};
 use crate::scene::{Light, Scene};
 use crate::texture::smoothstep;
 
@@ -44,7 +44,7 @@ impl Lamp {
 
     /// How much of the light falls where the ray meets the body, 0 to 1.
     #[inline(always)]
-    pub(super) fn at(&self, view: &View, sight: &Sight, point: &Vector3<f64>) -> f32 {
+    pub(super) fn at(&self, view: &View, sight: &RayHit, point: &Vector3<f64>) -> f32 {
         let x = match self {
             Self::Full => return 1.0,
             Self::Sun { direction, twilight_rad } => {

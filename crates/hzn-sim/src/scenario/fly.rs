@@ -132,7 +132,7 @@ impl Scenario {
         let mut scene = Scene::new(self.camera.clone(), pose);
         // The camera flies around the Earth, whatever it looks for.
         scene.body = self.body_of(Kind::Earth);
-        let altitude_km = crate::Globe::of(&scene.body).altitude_m(pose.position_m) * 1e-3;
+        let altitude_km = crate::Globe::new(&scene.body).altitude_m(pose.position_m) * 1e-3;
         if !(altitude_km > scene.body.limb_height_km) {
             let what = format!(
                 "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the Earth or its limb of {:.1} km",

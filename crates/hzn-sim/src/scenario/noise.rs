@@ -91,11 +91,11 @@ impl Fit {
     pub fn of_pictures(scenario: &Scenario, seen: &[(&FlightFrame, &Picture)]) -> Vec<Self> {
         let sensor = scenario.sensor();
         let alone = |body: &body::Config| Config { body: body.clone(), bodies: Default::default(), ..sensor.clone() };
-        sensor.each_body().iter().filter_map(|body| Self::of(scenario, &alone(body), seen)).collect()
+        sensor.each_body().iter().filter_map(|body| Self::new(scenario, &alone(body), seen)).collect()
     }
 
     /// Of the one body that the sensor looks for.
-    fn of(scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, &Picture)]) -> Option<Self> {
+    fn new(scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, &Picture)]) -> Option<Self> {
         let kind = alone.body.kind;
         // At first nothing is known of the limb's height, and points scatter by a pixel.
         let mut sensor = alone.clone();
@@ -108,7 +108,7 @@ impl Fit {
             return None;
         }
         let mut pictures: Vec<Edge> =
-            answered.iter().filter_map(|l| Edge::of(kind, l, sensor.body.limb_height_km)).collect();
+            answered.iter().filter_map(|l| Edge::new(kind, l, sensor.body.limb_height_km)).collect();
         // A picture far from all others is an answer on another edge: its direction is right by chance.
         let middle = median(pictures.iter().map(|p| p.mean_km));
         let usual = median(pictures.iter().map(|p| (p.mean_km - middle).abs()));
@@ -275,13 +275,13 @@ struct Edge {
 }
 
 impl Edge {
-    fn of(kind: Kind, looked: &Looked<'_>, limb_height_km: f64) -> Option<Self> {
+    fn new(kind: Kind, looked: &Looked<'_>, limb_height_km: f64) -> Option<Self> {
         let scene = &looked.frame.scene;
         let readout_s = scene.motion.map_or(0.0, |motion| motion.readout_s);
         let camera = Camera::<f64>::try_new(&camera::Config { readout_s, ..scene.camera.clone() }).ok()?;
         // Rays as at the time of the middle row, for which the truth holds.
         let camera = camera.turning(looked.frame.known().rate_rad_s);
-        let view = View::try_new(Globe::of(&scene.body).raised(limb_height_km * 1e3), &scene.pose)?;
+        let view = View::try_new(Globe::new(&scene.body).raised(limb_height_km * 1e3), &scene.pose)?;
         let truth = scene.truth_of(kind, "", 0.0).ok()?;
         let axis: UnitVec3<_, f64> = truth.axis()?;
         let disc = matches!(kind, Kind::Sun | Kind::Moon);

@@ -20,7 +20,7 @@ pub struct Visibility {
 
 impl Visibility {
     /// Of a half-angle in radians.
-    pub fn of(half_angle_rad: f64) -> Self {
+    pub fn new(half_angle_rad: f64) -> Self {
         let alpha = half_angle_rad.to_degrees();
         Self {
             half_angle_deg: alpha,
@@ -76,11 +76,11 @@ mod tests {
 
     #[test]
     fn an_ellipse_at_238_km_needs_118_degrees() {
-        let v = Visibility::of((6371.0f64 / 6609.0).asin());
+        let v = Visibility::new((6371.0f64 / 6609.0).asin());
         assert!((v.ellipse_deg - 118.3).abs() < 0.05 && v.hyperbola_deg == 0.0, "{v:?}");
         assert!((v.disc_deg - 2.0 * v.half_angle_deg).abs() < 1e-12);
         // From far away only ellipses are seen in small pictures.
-        let far = Visibility::of((6371.0f64 / 42_157.0).asin());
+        let far = Visibility::new((6371.0f64 / 42_157.0).asin());
         assert!(far.ellipse_deg == 0.0 && far.hyperbola_deg > 140.0);
     }
 

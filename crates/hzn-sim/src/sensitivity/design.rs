@@ -101,7 +101,7 @@ impl Design {
         let half_angle_rad = self.half_angle_rad()?;
         let camera = Camera::try_new(&self.camera)?;
         let stations = self.stations(&camera, half_angle_rad);
-        Ok(Sigmas::of(self, &camera, half_angle_rad, &stations))
+        Ok(Sigmas::new(self, &camera, half_angle_rad, &stations))
     }
 
     /// The limb in view as points a pixel apart.

@@ -63,7 +63,12 @@ fn correlated<const N: usize>(rows: &[Row<N>]) -> SMatrix<f64, N, N> {
 
 impl Sigmas {
     /// `None` when the points do not determine a direction with a free half-angle.
-    pub(super) fn of(design: &Design, camera: &Camera<f64>, half_angle_rad: f64, stations: &[Station]) -> Option<Self> {
+    pub(super) fn new(
+        design: &Design,
+        camera: &Camera<f64>,
+        half_angle_rad: f64,
+        stations: &[Station],
+    ) -> Option<Self> {
         let e = Vector3::from(design.axis());
         // Towards the optical axis, and across; looking straight down any plane will do.
         let z = Vector3::z();

@@ -81,7 +81,7 @@ pub(crate) fn from_ecef(sidereal_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
 enum Way {
     Rocket(rocket::Ascent),
     Orbit(orbit::Ellipse),
-    Table(table::Rows),
+    Table(table::TableRows),
 }
 
 /// A flight: way and attitude, prepared.

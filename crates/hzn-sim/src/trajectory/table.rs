@@ -43,7 +43,7 @@ impl Table {
         Ok(())
     }
 
-    pub(crate) fn rows(&self, [from_s, to_s]: [f64; 2]) -> Result<Rows, (String, String)> {
+    pub(crate) fn rows(&self, [from_s, to_s]: [f64; 2]) -> Result<TableRows, (String, String)> {
         let file = self.file.display();
         let wrong = |what: String| ("[trajectory] table.file".to_owned(), format!("{file}: {what}"));
         let text = self.text.as_deref().ok_or_else(|| wrong("was not read".into()))?;
@@ -85,18 +85,18 @@ impl Table {
             let what = format!("the pictures from {from_s} s to {to_s} s reach beyond {file}: {first} s to {last} s");
             return Err(("[capture]".into(), what));
         }
-        Ok(Rows { points, turns })
+        Ok(TableRows { points, turns })
     }
 }
 
 /// [`Table`], prepared.
 #[derive(Debug, Clone)]
-pub(crate) struct Rows {
+pub(crate) struct TableRows {
     points: Vec<(f64, Vector3<f64>)>,
     turns: Vec<UnitQuaternion<f64>>,
 }
 
-impl Rows {
+impl TableRows {
     pub(crate) fn has_attitudes(&self) -> bool {
         !self.turns.is_empty()
     }
@@ -151,7 +151,7 @@ impl Rows {
 mod tests {
     use super::*;
 
-    fn rows(text: &str) -> Result<Rows, (String, String)> {
+    fn rows(text: &str) -> Result<TableRows, (String, String)> {
         Table { file: "way.csv".into(), text: Some(text.into()) }.rows([0.0, 2.0])
     }
 

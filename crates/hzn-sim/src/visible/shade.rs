@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use super::Visible;
 use super::air::Prepared;
 use super::ground::Soil;
-use crate::globe::{Globe, Sight, View};
+use crate::globe::{Globe, RayHit, View};
 use crate::pose::Pose;
 use crate::texture::{CloudField, Drawn};
 
@@ -44,7 +44,7 @@ pub(crate) struct Shader {
     sun_cam: Vector3<f64>,
     pixel_rad: f64,
     radius_km: f32,
-    /// Rays a side of a pixel close to the limb, and [`Sight::miss`] up to where that is.
+    /// Rays a side of a pixel close to the limb, and [`RayHit::miss`] up to where that is.
     samples: u32,
     near: f64,
 }
@@ -134,7 +134,7 @@ impl Shader {
 
     /// Light along one ray.
     #[inline]
-    fn colour(&self, s: &Vector3<f64>, sight: &Sight, before: &mut Before) -> [f32; 3] {
+    fn colour(&self, s: &Vector3<f64>, sight: &RayHit, before: &mut Before) -> [f32; 3] {
         let air = &self.air;
         let cos = s.dot(&self.sun_cam) as f32;
         let phase = 0.75 * (1.0 + cos * cos);

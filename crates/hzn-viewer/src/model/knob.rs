@@ -16,7 +16,7 @@ pub struct Knob {
 impl Knob {
     /// For a value with these limits that usually is about `usual`; `None` for what is no number. A slider does not reach
     /// limits that are far from what is usual; they can be typed.
-    pub fn of(limits: &Limits, usual: f64) -> Option<Self> {
+    pub fn from_limits(limits: &Limits, usual: f64) -> Option<Self> {
         let Limits::Number { low, above, high } = *limits else { return None };
         let usual = if usual.abs() > 0.0 { usual.abs() } else { 1.0 };
         let far = low + usual * 30.0;
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn near_limits_are_reached_and_far_ones_are_not() {
-        let knob = |l: Limits, usual: f64| Knob::of(&l, usual).unwrap();
+        let knob = |l: Limits, usual: f64| Knob::from_limits(&l, usual).unwrap();
         assert_eq!(knob(number(0.0, false, 1.0), 0.15), Knob { low: 0.0, high: 1.0, logarithmic: false });
         let threshold = knob(number(0.0, true, 1000.0), 3.0);
         assert_eq!((threshold.low, threshold.high, threshold.logarithmic), (0.1, 90.0, true));
@@ -59,14 +59,14 @@ mod tests {
         assert!(knob(number(0.0, true, 100.0), 10.0).low > 0.0);
         let scale = knob(number(0.1, false, 10.0), 1.0);
         assert_eq!((scale.logarithmic, scale.middle()), (true, 1.0));
-        assert!(Knob::of(&Limits::Words("words".into()), 1.0).is_none());
+        assert!(Knob::from_limits(&Limits::Words("words".into()), 1.0).is_none());
     }
 
     #[test]
     fn every_slider_begins_within_its_limits() {
         for key in hzn_calib::keys::all() {
             for usual in [0.0, 0.01, 1.0, 300.0] {
-                let Some(knob) = Knob::of(&key.limits, usual) else { continue };
+                let Some(knob) = Knob::from_limits(&key.limits, usual) else { continue };
                 let Limits::Number { low, high, .. } = key.limits else { unreachable!() };
                 assert!(knob.low < knob.high && knob.low >= low && knob.high <= high, "{} {knob:?}", key.path());
                 assert!((knob.low..=knob.high).contains(&knob.middle()), "{}", key.path());

@@ -16,7 +16,7 @@ pub use knob::Knob;
 pub use mask::MaskEdit;
 pub use plane::Plane;
 pub use playback::Playback;
-pub use rows::Rows;
+pub use rows::ResultHistory;
 pub use sequence::{Entry, Place, Sequence};
 pub use session::Session;
 pub use settings::{Look, Settings};

@@ -30,7 +30,7 @@ pub struct Pinhole {
 
 impl Pinhole {
     /// The pinhole whose picture, of the same size, shows as much of the camera's as it can.
-    pub fn of(camera: &Camera<f64>) -> Self {
+    pub fn new(camera: &Camera<f64>) -> Self {
         let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
         let ImagePoint { u, v } = camera.principal_point();
         let far = [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(x, y): (f64, f64)| (x - u).hypot(y - v));
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn there_and_back() {
         let camera = camera(Model::Equidistant, 280.0);
-        let plane = Plane::Pinhole(Pinhole::of(&camera));
+        let plane = Plane::Pinhole(Pinhole::new(&camera));
         for p in [[319.5, 239.5], [100.0, 200.0], [600.0, 450.0]] {
             let back = plane.of(&camera, plane.show(&camera, p).unwrap()).unwrap();
             assert!((back[0] - p[0]).abs() < 1e-6 && (back[1] - p[1]).abs() < 1e-6, "{p:?} {back:?}");
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn straight_lines_become_straight() {
         let camera = camera(Model::Equidistant, 280.0);
-        let plane = Plane::Pinhole(Pinhole::of(&camera));
+        let plane = Plane::Pinhole(Pinhole::new(&camera));
         // Rays in one plane through the camera: a straight line to a pinhole, a curve to this lens.
         let shown: Vec<Point> = [-0.6, 0.0, 0.6]
             .iter()
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn a_pinhole_stays_what_it_is() {
         let camera = camera(Model::Pinhole, 500.0);
-        let pinhole = Pinhole::of(&camera);
+        let pinhole = Pinhole::new(&camera);
         assert!((pinhole.focal_px - 500.0).abs() < 1.0, "{pinhole:?}");
     }
 }

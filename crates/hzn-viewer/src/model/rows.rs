@@ -8,12 +8,12 @@ use hzn_sim::truth::Truth;
 
 /// Results by frame and body: those of the file, and those of the parameters as they are now.
 #[derive(Debug, Clone, Default)]
-pub struct Rows {
+pub struct ResultHistory {
     recorded: Vec<Vec<Row>>,
     fresh: HashMap<usize, Vec<Row>>,
 }
 
-impl Rows {
+impl ResultHistory {
     /// Appends what the file says about a body of frame `index`; frames may lack results.
     pub fn record(&mut self, index: usize, row: Row) {
         if self.recorded.len() <= index {
@@ -151,8 +151,8 @@ mod tests {
         row
     }
 
-    fn rows() -> Rows {
-        let mut rows = Rows::default();
+    fn rows() -> ResultHistory {
+        let mut rows = ResultHistory::default();
         for (i, sigma) in [Some(0.1), None, Some(0.3), Some(0.2), None].into_iter().enumerate() {
             rows.record(i, row(i as u64, sigma));
         }
@@ -165,7 +165,7 @@ mod tests {
         assert_eq!(rows.next_refused(1, false, 0), Some(4));
         assert_eq!(rows.next_refused(4, false, 0), Some(1));
         assert_eq!(rows.next_refused(0, true, 0), Some(4));
-        assert_eq!(Rows::default().next_refused(0, false, 0), None);
+        assert_eq!(ResultHistory::default().next_refused(0, false, 0), None);
         assert_eq!(rows.next_refused(0, false, 1), None, "there is no second body");
     }
 

@@ -4,7 +4,7 @@ use egui::{RichText, Ui, vec2};
 
 use super::viewer::Viewer;
 use crate::model::rows;
-use crate::work::sight::Answer;
+use crate::work::frame_view::BodyResult;
 
 /// A line of the table: what it shows of a column.
 type Line = fn(&Column) -> &str;
@@ -19,7 +19,8 @@ struct Column {
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let Some((name, other)) = &viewer.other else { return };
-    let answers = |sight: &crate::work::Sight| [0, 1].map(|i| sight.answers.get(i)?.bodies.get(viewer.body).cloned());
+    let answers =
+        |sight: &crate::work::FrameView| [0, 1].map(|i| sight.answers.get(i)?.bodies.get(viewer.body).cloned());
     let columns = match viewer.sight.as_ref().map(answers) {
         Some([Some(a), Some(b)]) => columns(&a, &b),
         _ => Vec::new(),
@@ -68,7 +69,7 @@ fn difference(x: f64, digits: usize) -> String {
     if x.abs() < 0.5 * 0.1f64.powi(digits as i32) { "0".into() } else { format!("{x:+.digits$}") }
 }
 
-fn columns(a: &Answer, b: &Answer) -> Vec<Column> {
+fn columns(a: &BodyResult, b: &BodyResult) -> Vec<Column> {
     let apart = match (a.row.axis(), b.row.axis()) {
         (Some(x), Some(y)) => format!("{:.4}° apart", rows::angle_deg(x, y)),
         _ => String::new(),

@@ -3,7 +3,7 @@
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, body};
 
-use crate::work::sight::{Answer, Outcome, Sight};
+use crate::work::frame_view::{BodyResult, FrameView, Outcome};
 
 /// A card of the stages' column: its title, the stage that it shows, the sections of sensor.toml that belong to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ pub(super) const CARDS: &[Card] = &[
 ];
 
 /// What went in, what came out, what was dropped.
-pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answer) -> Vec<String> {
+pub(super) fn lines(card: &Card, sight: &FrameView, outcome: &Outcome, answer: &BodyResult) -> Vec<String> {
     let Ok(report) = &answer.report else { return Vec::new() };
     let (c, config) = (report.counters, &outcome.config);
     let reached = |stage| report.stage >= stage;
@@ -113,7 +113,7 @@ pub(super) fn lines(card: &Card, sight: &Sight, outcome: &Outcome, answer: &Answ
     }
 }
 
-fn picture(sight: &Sight, config: &Config) -> Vec<String> {
+fn picture(sight: &FrameView, config: &Config) -> Vec<String> {
     let Ok(picture) = &sight.picture else { return Vec::new() };
     let l = picture.layout;
     let form = match l.channels {
@@ -130,7 +130,7 @@ fn picture(sight: &Sight, config: &Config) -> Vec<String> {
     out
 }
 
-fn expected(answer: &Answer) -> Vec<String> {
+fn expected(answer: &BodyResult) -> Vec<String> {
     let mut out = vec![hzn_mcap::body_name(answer.kind).to_owned()];
     if let (Some(rad), false) = (answer.expected_rad, matches!(answer.kind, body::Kind::Sun | body::Kind::Moon)) {
         out.push(format!("half-angle {:.4}° expected", rad.to_degrees()));
@@ -139,7 +139,7 @@ fn expected(answer: &Answer) -> Vec<String> {
     out
 }
 
-fn level(answer: &Answer, config: &Config) -> Vec<String> {
+fn level(answer: &BodyResult, config: &Config) -> Vec<String> {
     let Ok(report) = &answer.report else { return Vec::new() };
     match (report.status, answer.sample) {
         (Status::TooDark | Status::TooBright, _) => vec![format!(

@@ -8,7 +8,7 @@ use egui_plot::{GridInput, GridMark, HLine, HoverPosition, Line, Plot, PlotPoint
 use super::viewer::Viewer;
 use super::{picture, theme};
 use crate::model::rows::{Of, QUANTITIES, Quantity};
-use crate::work::sight::Residual;
+use crate::work::frame_view::Residual;
 
 /// Name of the residuals among what can be plotted.
 pub(super) const RESIDUALS: &str = "Residuals";

@@ -7,7 +7,7 @@ use super::viewer::Viewer;
 use super::{Command, facts, theme};
 use crate::model::rows;
 use crate::model::settings::{Layer, Look};
-use crate::work::sight::{Answer, Sight};
+use crate::work::frame_view::{BodyResult, FrameView};
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let width = viewer.settings.side_width;
@@ -78,7 +78,7 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
 }
 
 /// How far the answer is from that of the file.
-fn change(recorded: &hzn_mcap::Row, answer: &Answer) -> Option<String> {
+fn change(recorded: &hzn_mcap::Row, answer: &BodyResult) -> Option<String> {
     match (recorded.axis(), answer.row.axis()) {
         (Some(a), Some(b)) => {
             let angle = rows::angle_deg(a, b);
@@ -91,7 +91,7 @@ fn change(recorded: &hzn_mcap::Row, answer: &Answer) -> Option<String> {
 }
 
 /// Why there is no answer, and what to try first.
-fn detail(sight: &Sight, answer: Option<&Answer>) -> Vec<String> {
+fn detail(sight: &FrameView, answer: Option<&BodyResult>) -> Vec<String> {
     match (&sight.picture, answer) {
         (Err(why), _) => vec![why.clone()],
         (_, Some(answer)) => {

@@ -9,7 +9,7 @@ use super::facts::{self, CARDS, Card};
 use super::viewer::Viewer;
 use super::{Command, theme};
 use crate::model::{Knob, Session};
-use crate::work::sight::{Answer, Outcome};
+use crate::work::frame_view::{BodyResult, Outcome};
 
 /// Width of the parameters' names.
 const NAME_WIDTH: f32 = 136.0;
@@ -192,7 +192,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>)
 }
 
 /// The colour of a card's dot: whether the frame came as far as this.
-fn reached(card: &Card, answer: Option<&Answer>) -> Color32 {
+fn reached(card: &Card, answer: Option<&BodyResult>) -> Color32 {
     let grey = Color32::from_rgb(110, 115, 124);
     let Some(Ok(report)) = answer.map(|a| a.report.as_ref()) else { return grey };
     match card.stage {
@@ -204,7 +204,7 @@ fn reached(card: &Card, answer: Option<&Answer>) -> Color32 {
 }
 
 /// The candidate edges: pointing at one shows it in the picture.
-fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &Answer) {
+fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
     let Ok(report) = &answer.report else { return };
     viewer.pointed = None;
     if report.candidates.is_empty() {
@@ -309,7 +309,7 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
             (Limits::Number { .. }, None) => {
                 // Left out: a click gives it a value to begin with.
                 if ui.button("automatic").on_hover_text(format!("{hint}\nClick to set it.")).clicked()
-                    && let Some(knob) = Knob::of(&key.limits, session.usual(&key.section, &key.name, body))
+                    && let Some(knob) = Knob::from_limits(&key.limits, session.usual(&key.section, &key.name, body))
                 {
                     session.set_number(key, body, knob.middle());
                     session.settle();
@@ -333,7 +333,7 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
     let whole = matches!(session.value(&key.section, &key.name, body), Some(toml::Value::Integer(_)));
     let unit = if key.unit().is_empty() { String::new() } else { format!(" {}", key.unit()) };
     let usual = session.usual(&key.section, &key.name, body);
-    let response = match Knob::of(limits, usual).filter(|_| key.section != "camera") {
+    let response = match Knob::from_limits(limits, usual).filter(|_| key.section != "camera") {
         Some(knob) => {
             ui.spacing_mut().slider_width = (ui.available_width() - 96.0).max(60.0);
             let mut slider = Slider::new(&mut x, knob.low..=knob.high)

@@ -1,4 +1,4 @@
-//! The thread that looks: it takes the newest wish, forgets older ones, and answers with a [`Sight`]. While nothing is
+//! The thread that looks: it takes the newest wish, forgets older ones, and answers with a [`FrameView`]. While nothing is
 //! wished for it decodes the frames that will come next.
 
 use std::collections::VecDeque;
@@ -14,8 +14,8 @@ use hzn_run::source::Picture;
 use hzn_run::source::picture::Samples;
 
 use super::Wake;
+use super::frame_view::{self, FrameInput, FrameView, Outcome, Shown};
 use super::paint::{self, Recipe, Warp};
-use super::sight::{self, Outcome, Shown, Sight, Subject};
 use super::store::Store;
 use crate::model::{Entry, Look, Plane, plane::Pinhole};
 
@@ -60,7 +60,7 @@ enum Message {
 /// The thread, from outside. It ends when this is dropped.
 pub struct Engine {
     send: Sender<Message>,
-    receive: Receiver<Sight>,
+    receive: Receiver<FrameView>,
 }
 
 impl Engine {
@@ -84,11 +84,11 @@ impl Engine {
         let _ = self.send.send(Message::Look(Box::new(ask)));
     }
     /// The newest answer that has come since the last call, with those before it.
-    pub fn answers(&self) -> impl Iterator<Item = Sight> {
+    pub fn answers(&self) -> impl Iterator<Item = FrameView> {
         self.receive.try_iter()
     }
     /// Waits for an answer; `None` when the time is up.
-    pub fn wait(&self, limit: std::time::Duration) -> Option<Sight> {
+    pub fn wait(&self, limit: std::time::Duration) -> Option<FrameView> {
         self.receive.recv_timeout(limit).ok()
     }
 }
@@ -114,7 +114,7 @@ fn told(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
 }
 
 impl Looker {
-    fn run(&mut self, messages: &Receiver<Message>, sights: &Sender<Sight>, wake: &Wake) {
+    fn run(&mut self, messages: &Receiver<Message>, sights: &Sender<FrameView>, wake: &Wake) {
         loop {
             let mut newest = None;
             // Wait only when there is nothing to decode beforehand.
@@ -153,7 +153,7 @@ impl Looker {
         }
     }
 
-    fn look(&mut self, ask: &Ask) -> Sight {
+    fn look(&mut self, ask: &Ask) -> FrameView {
         let begin = Instant::now();
         let at_hand = self.store.has(ask.index);
         let picture = self.store.get(ask.index, &ask.entry.place).and_then(|p| match ask.setups.first() {
@@ -161,7 +161,7 @@ impl Looker {
             None => Ok(p),
         });
         let decoding = (!at_hand).then(|| begin.elapsed());
-        let mut sight = Sight {
+        let mut sight = FrameView {
             index: ask.index,
             name: ask.entry.name.clone(),
             time_s: ask.entry.time_s,
@@ -175,7 +175,7 @@ impl Looker {
             latency: ask.since.elapsed(),
         };
         let Ok(picture) = picture else { return sight };
-        let subject = Subject {
+        let subject = FrameInput {
             index: ask.index,
             name: &ask.entry.name,
             time_s: ask.entry.time_s,
@@ -189,7 +189,7 @@ impl Looker {
                     if which == 0 {
                         sight.camera = Some(camera);
                     }
-                    sight::look(subject, &setup.config, sensor, ask.touched && which == 0)
+                    frame_view::look(subject, &setup.config, sensor, ask.touched && which == 0)
                 }
                 Err(why) => Outcome {
                     config: Arc::clone(&setup.config),
@@ -233,11 +233,11 @@ impl Looker {
     }
 
     /// The picture for the screen, painted only when it is another one.
-    fn show(&mut self, ask: &Ask, picture: &hzn_run::source::Picture, sight: &Sight) -> Arc<Shown> {
+    fn show(&mut self, ask: &Ask, picture: &hzn_run::source::Picture, sight: &FrameView) -> Arc<Shown> {
         let config = ask.setups.first().map(|s| &s.config);
         let camera = sight.camera.as_deref();
         let plane = match camera {
-            Some(camera) if ask.undistorted => Plane::Pinhole(Pinhole::of(camera)),
+            Some(camera) if ask.undistorted => Plane::Pinhole(Pinhole::new(camera)),
             _ => Plane::Camera,
         };
         let reached = || sight.answers.first()?.bodies.first()?.row.level;

@@ -9,11 +9,11 @@ use hzn_core::Config;
 use hzn_mcap::{Annotations, Row};
 use hzn_run::engine::AnySensor;
 use hzn_run::overlay;
-use hzn_run::sink::{Existing, Rows as Table};
+use hzn_run::sink::{Existing, RowFile as Table};
 use hzn_run::source::{Picture, Source};
 
+use super::frame_view::{self, FrameInput, FrameView, Outcome};
 use super::job::{Done, Halt, Progress};
-use super::sight::{self, Outcome, Sight, Subject};
 use super::walk::Walk;
 use crate::model::settings::Layer;
 use crate::model::{Sequence, whole};
@@ -62,7 +62,7 @@ fn draw(picture: &Picture, outcome: Option<&Outcome>, layers: &[Layer]) -> image
 ///
 /// # Errors
 /// There is no picture, the name is not that of a PNG, or the disk says no.
-pub fn picture(sight: &Sight, layers: &[Layer], path: &Path) -> Result<Done, Halt> {
+pub fn picture(sight: &FrameView, layers: &[Layer], path: &Path) -> Result<Done, Halt> {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         return Err(Halt::Failed(format!("{}: the picture's ending must be .png", path.display())));
     }
@@ -168,8 +168,8 @@ impl Film {
             let image = match item.payload.decode(Some(&self.config)) {
                 Ok((picture, _)) => {
                     let (name, time_s) = (&*item.name, item.data.as_ref().and_then(|d| d.time_s));
-                    let subject = Subject { index, name, time_s, data: data.as_ref(), picture: &picture };
-                    let outcome = sight::look(subject, &self.config, sensor, false);
+                    let subject = FrameInput { index, name, time_s, data: data.as_ref(), picture: &picture };
+                    let outcome = frame_view::look(subject, &self.config, sensor, false);
                     draw(&picture, Some(&outcome), &self.layers)
                 }
                 Err(_) => image::RgbImage::new(size.0, size.1),

@@ -2,18 +2,18 @@
 
 pub mod engine;
 pub mod export;
+pub mod frame_view;
 pub mod job;
 pub mod open;
 pub mod paint;
 mod reader;
-pub mod sight;
 pub mod store;
 pub mod sweep;
 mod walk;
 
 pub use engine::{Ask, Engine, Setup};
+pub use frame_view::{BodyResult, FrameView};
 pub use job::Job;
-pub use sight::{Answer, Sight};
 
 use std::sync::Arc;
 

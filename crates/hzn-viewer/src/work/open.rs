@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_calib::Frames;
-use hzn_mcap::{Found, Index, Row};
+use hzn_mcap::{Index, IndexEntry, Row};
 use hzn_run::source::{self, Item, Payload, Raw, Source, TimeSource};
 use hzn_sim::truth::{self, Truth};
 
@@ -253,14 +253,14 @@ struct Gather {
 }
 
 impl Gather {
-    fn take(&mut self, part: Vec<Found>, has_reports: bool) -> Vec<(Entry, Vec<Row>)> {
+    fn take(&mut self, part: Vec<IndexEntry>, has_reports: bool) -> Vec<(Entry, Vec<Row>)> {
         let mut out = Vec::new();
         for found in part {
             match found {
-                Found::Picture(place) if has_reports => {
+                IndexEntry::Picture(place) if has_reports => {
                     self.pending.insert(place.sequence(), place);
                 }
-                Found::Picture(place) => {
+                IndexEntry::Picture(place) => {
                     let name = format!("{}#{:06}", self.name, self.pictures_only);
                     self.pictures_only += 1;
                     let data = self.frames.as_ref().and_then(|f| f.get(&name)).cloned();
@@ -270,7 +270,7 @@ impl Gather {
                     };
                     out.push((Entry { name, time_s, data, place: Place::Recorded(place) }, Vec::new()));
                 }
-                Found::Report(row, _, given) => {
+                IndexEntry::Report(row, _, given) => {
                     if let Some((entry, rows)) = &mut self.last
                         && rows.first().is_some_and(|r| r.index == row.index)
                         && entry.name == row.file

@@ -12,7 +12,7 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_viewer::model::Settings;
 use hzn_viewer::ui::Viewer;
-use hzn_viewer::work::Sight;
+use hzn_viewer::work::FrameView;
 use tempfile::TempDir;
 
 pub(crate) const WIDTH: u16 = 320;
@@ -185,7 +185,7 @@ pub(crate) fn files(folder: &Path) -> Vec<String> {
     names
 }
 
-pub(crate) fn sight(window: &Window) -> &Sight {
+pub(crate) fn sight(window: &Window) -> &FrameView {
     window.state().sight().unwrap()
 }
 

@@ -12,7 +12,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
-use hzn_core::{Config, Frame};
+use hzn_core::{Config, Prior};
 use hzn_core::{observer::Unobserved, pipeline::Workspace};
 use hzn_mps2::board::Board;
 use hzn_mps2::host::{File, exit};
@@ -53,7 +53,7 @@ fn run() -> Option<()> {
     let workspace = WORKSPACE.try_take()?;
     // Seen through, the methods that this configuration does not choose would be left out.
     let sensor = hzn_setup::sensor(black_box(&config())).ok()?;
-    let expected = hzn_setup::expect(&sensor, &Frame::default()).ok()?;
+    let expected = hzn_setup::expect(&sensor, &Prior::default()).ok()?;
     let picture = Grey::try_new(&*picture, Layout::packed(WIDTH.into(), HEIGHT.into(), 1, 8)).ok()?;
     let report = sensor.process(workspace, &picture, &expected, &Unobserved);
 

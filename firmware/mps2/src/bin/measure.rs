@@ -15,8 +15,8 @@ use cortex_m_rt::entry;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::{Observer, Unobserved};
 use hzn_core::status::Stage;
-use hzn_core::{FlightWorkspace, Frame};
-use hzn_flight::answer::Answer;
+use hzn_core::{FlightWorkspace, Prior};
+use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::Writer;
 use hzn_flight::table;
 use hzn_mps2::board::{Board, Timer};
@@ -96,7 +96,7 @@ fn run() -> Option<()> {
             (Some(x), Some(y), Some(z)) => Some([x, y, z]),
             _ => None,
         };
-        let frame = Frame { altitude_m: given(altitude), position_m, ..Frame::default() };
+        let frame = Prior { altitude_m: given(altitude), position_m, ..Prior::default() };
 
         let t0 = timer.ticks();
         let sensor = hzn_setup::sensor(&parameters.sensor).ok()?;
@@ -112,8 +112,8 @@ fn run() -> Option<()> {
             ticks: core::array::from_fn(|_| Cell::new(0)),
         };
         let again = sensor.process(workspace, &picture, &expected, &clock);
-        let answer = Answer::of(&report);
-        if Answer::of(&again).status != answer.status {
+        let answer = PictureAnswer::from_report(&report);
+        if PictureAnswer::from_report(&again).status != answer.status {
             return None;
         }
 

@@ -6,9 +6,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use hzn_core::{Frame, Sensor};
-use hzn_core::{observer::Unobserved, pipeline::{HELD, Rows, Workspace}};
-use hzn_flight::answer::Answer;
+use hzn_core::{Prior, Sensor};
+use hzn_core::{observer::Unobserved, pipeline::{ROWS_HELD, RowBuffers, Workspace}};
+use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::Writer;
 use hzn_flight::table;
 use hzn_mps2::board::Board;
@@ -18,7 +18,7 @@ use static_cell::ConstStaticCell;
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
-type Picture = Rows<u8, { HELD as usize * WIDTH }, HEIGHT, 8192, 2560>;
+type Picture = RowBuffers<u8, { ROWS_HELD as usize * WIDTH }, HEIGHT, 8192, 2560>;
 /// For 600 points of an edge.
 type Lists = Workspace<f32, 2048, 76, 512>;
 
@@ -56,7 +56,7 @@ fn run() -> Option<()> {
             return None;
         }
         let (parameters, _) = table::read(table_bytes).ok()?;
-        let known = Frame { altitude_m: Some(f32::from_bits(altitude)).filter(|v| !v.is_nan()), ..Frame::default() };
+        let known = Prior { altitude_m: Some(f32::from_bits(altitude)).filter(|v| !v.is_nan()), ..Prior::default() };
 
         let t0 = timer.ticks();
         let sensor = Sensor::new(&parameters.sensor).ok()?;
@@ -78,7 +78,7 @@ fn run() -> Option<()> {
 
         let mut bytes = [0u8; 640];
         let mut out = Writer::new(&mut bytes);
-        Answer::of(&report).write(&mut out);
+        PictureAnswer::from_report(&report).write(&mut out);
         let len = out.finish()?;
         let mut head = [0u8; 88];
         let mut out = Writer::new(&mut head);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use hzn_calib::Sensor;
 use hzn_calib::noise::{self, Calibration, Sighting};
-use hzn_core::Frame;
+use hzn_core::Prior;
 use hzn_core::body;
 use hzn_core::camera::Camera;
 
@@ -102,7 +102,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut progress = Progress::new(source.total(), 0, args.quiet);
     let mut sightings = Vec::new();
     let mut seen = |frame: &Finished| {
-        progress.count(frame.found.iter().map(engine::Found::status));
+        progress.count(frame.found.iter().map(engine::BodyOutcome::status));
         sightings.extend(sighting(frame, &camera, &body));
     };
     let stop = stop_flag();
@@ -114,7 +114,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let shown = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let pictures = progress.frames();
-    let calibration = Calibration::of(&body, &sightings)
+    let calibration = Calibration::new(&body, &sightings)
         .map_err(|why| failed(format!("{shown}: of {} {why}", explain::counted(pictures, "picture"))))?;
     let written = noise::into_sensor_toml(&sensor.text, &calibration, &shown).map_err(failed)?;
     tell::result(text::of(&calibration, pictures))?;
@@ -143,6 +143,6 @@ fn sighting(frame: &Finished, camera: &Camera<f64>, body: &body::Config) -> Opti
     let edges = frame.traces.as_ref()?.each.first()?.edges();
     let edge = edges.iter().find(|e| e.candidate == solution.candidate)?;
     let points: noise::Weighted = edge.points.iter().copied().zip(edge.weights.iter().copied()).collect();
-    let known = frame.data.as_ref().map_or_else(Frame::default, |d| d.to_frame(None));
+    let known = frame.data.as_ref().map_or_else(Prior::default, |d| d.to_frame(None));
     Sighting::measure(&frame.name, camera, body, &known, &points, solution)
 }

@@ -15,7 +15,7 @@ impl Body {
     pub(super) const EARTH: Self = Self { radius_km: EARTH_MEAN_RADIUS_M / 1e3, limb_height_km: 10.0 };
 
     /// The body of a sensor.toml, as a sphere.
-    pub(super) fn of(body: &body::Config) -> Self {
+    pub(super) fn from_config(body: &body::Config) -> Self {
         Self { radius_km: body.mean_radius_km(), limb_height_km: body.limb_height_km }
     }
 }

@@ -28,7 +28,7 @@ pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
             return Err(usage(format!("--altitude: {km} km is not above the limb at {limb_height_km} km")));
         }
         let sin = (body.radius_km + limb_height_km) / (body.radius_km + km);
-        rows.push((km, Visibility::of(sin.asin())));
+        rows.push((km, Visibility::new(sin.asin())));
     }
     let mut table = Table::default();
     table.column("altitude_km", "altitude_km", rows.iter().map(|(km, _)| Some(*km)));

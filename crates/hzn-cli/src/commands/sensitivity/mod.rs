@@ -191,7 +191,7 @@ impl<'a> Grid<'a> {
         let body = sensor.as_ref().map(|s| &s.body);
         let bodies = match (args.body.is_empty(), body) {
             (false, _) => args.body.clone(),
-            (true, Some(body)) => vec![Body::of(body)],
+            (true, Some(body)) => vec![Body::from_config(body)],
             (true, None) => vec![Body::EARTH],
         };
         let altitude = match (&args.altitude, body.and_then(|b| b.altitude_km)) {

@@ -6,8 +6,8 @@ use crate::geometry::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
 use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 
 use super::{
-    AU_KM, AltitudeReference, Config, Frame, FrameError, Kind, LOWEST_ALTITUDE_M, Last, MOON_DISTANCE_KM,
-    MOON_RADIUS_KM, SUN_RADIUS_KM, shape,
+    AU_KM, AltitudeReference, Config, Kind, LOWEST_ALTITUDE_M, Last, MOON_DISTANCE_KM, MOON_RADIUS_KM, Prior,
+    PriorError, SUN_RADIUS_KM, shape,
 };
 
 /// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
@@ -80,29 +80,29 @@ impl<T: Real> Expected<T> {
     }
 
     /// sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
-    pub(crate) fn new(body: &Config, frame: &Frame<T>) -> Result<Self, FrameError> {
+    pub(crate) fn new(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let mut limb = T::from_f64(body.limb_height_km) * km;
         let mut harmonics = [T::zero(); 2];
         let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
         let mut altitude_sigma = T::from_f64(body.altitude_sigma_km) * km;
         let lowest = T::from_f64(LOWEST_ALTITUDE_M);
-        let below = |h: T, limb: T| FrameError::BelowLimb { altitude_m: rounded_m(h), limb_m: rounded_m(limb) };
+        let below = |h: T, limb: T| PriorError::BelowLimb { altitude_m: rounded_m(h), limb_m: rounded_m(limb) };
         let given = match frame.altitude_m {
-            Some(h) if !(h > lowest && h.is_finite()) => return Err(FrameError::Altitude),
+            Some(h) if !(h > lowest && h.is_finite()) => return Err(PriorError::Altitude),
             Some(h) => Some(h),
             None => body.altitude_km.map(|h| T::from_f64(h) * km),
         };
         let position = match frame.position_m {
-            Some(p) if !p.iter().all(|x| x.is_finite()) => return Err(FrameError::Position),
+            Some(p) if !p.iter().all(|x| x.is_finite()) => return Err(PriorError::Position),
             other => other,
         };
         let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(T::from_f64(ATTITUDE_SIGMA_RAD));
         if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
-            return Err(FrameError::AttitudeSigma);
+            return Err(PriorError::AttitudeSigma);
         }
         if frame.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::from_f64(MAX_RATE_RAD_S))) {
-            return Err(FrameError::Rate);
+            return Err(PriorError::Rate);
         }
         let mut ellipsoid = None;
         let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
@@ -110,11 +110,11 @@ impl<T: Real> Expected<T> {
             (Kind::Earth, Some(p)) => {
                 let raised = |limb: T| {
                     let (a, b) = (T::from_f64(WGS84_A_M) + limb, T::from_f64(WGS84_B_M) + limb);
-                    LimbCone::try_new(p, a, b).ok_or(FrameError::Position)
+                    LimbCone::try_new(p, a, b).ok_or(PriorError::Position)
                 };
                 let (h, latitude) = geodetic(p, T::from_f64(WGS84_A_M), T::from_f64(WGS84_B_M));
                 if !(h > lowest && h.is_finite()) {
-                    return Err(FrameError::Position);
+                    return Err(PriorError::Position);
                 }
                 let mut cone = raised(limb);
                 if !body.limb_height_by_latitude_km.is_empty() {
@@ -139,14 +139,14 @@ impl<T: Real> Expected<T> {
                     (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
                         let h = (x * x + y * y + z * z).sqrt() - r;
                         if !(h > lowest && h.is_finite()) {
-                            return Err(FrameError::Position);
+                            return Err(PriorError::Position);
                         }
                         h
                     }
                     (_, _, Kind::Sun) => T::from_f64((AU_KM - SUN_RADIUS_KM) * 1e3),
                     (_, _, Kind::Moon) => T::from_f64((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
                     (_, Some(h), _) => h,
-                    (_, None, _) => return Err(FrameError::NoAltitude),
+                    (_, None, _) => return Err(PriorError::NoAltitude),
                 };
                 let sin = (r + limb) / (r + altitude);
                 if body.kind == Kind::Earth {
@@ -305,7 +305,7 @@ mod tests {
 
     #[test]
     fn a_cone_of_a_raised_limb_asks_for_its_height() {
-        let frame = Frame { altitude_m: Some(400e3), ..Frame::default() };
+        let frame = Prior { altitude_m: Some(400e3), ..Prior::default() };
         let at = |km: f64| {
             Expected::<f64>::new(&Config { limb_height_km: km, kind: Kind::EarthSphere, ..Config::default() }, &frame)
                 .unwrap()
@@ -317,7 +317,7 @@ mod tests {
         assert!(((higher - height) / -1e-6 / slope - 1.0).abs() < 1e-4);
         let single = Expected::<f32>::new(
             &Config { kind: Kind::EarthSphere, ..Config::default() },
-            &Frame { altitude_m: Some(400e3), ..Frame::default() },
+            &Prior { altitude_m: Some(400e3), ..Prior::default() },
         );
         assert!((single.unwrap().limb_height_m(raised.cos as f32).unwrap().0 - 25e3).abs() < 10.0);
     }
@@ -326,7 +326,7 @@ mod tests {
     fn a_clipped_limb_is_expected_higher_and_less_surely() {
         let at = |km: f64, sigma_km: f64, kind| {
             let body = Config { limb_height_km: km, limb_height_sigma_km: sigma_km, kind, ..Config::default() };
-            Expected::<f64>::new(&body, &Frame { altitude_m: Some(400e3), ..Frame::default() }).unwrap()
+            Expected::<f64>::new(&body, &Prior { altitude_m: Some(400e3), ..Prior::default() }).unwrap()
         };
         let told = at(17.0, 7.0, Kind::EarthSphere);
         for part in [0.0, 0.3, 1.0] {
@@ -345,16 +345,16 @@ mod tests {
     #[test]
     fn a_better_attitude_leaves_less_of_the_shape_open() {
         let body = Config::default();
-        let frame = Frame {
+        let frame = Prior {
             position_m: Some([4.9e6, 0.0, 4.9e6]),
             cam_to_ecef: Rotation::assume_from_quaternion([1.0, 0.0, 0.0, 0.0]),
-            ..Frame::default()
+            ..Prior::default()
         };
         let sigma = |deg: f64| {
-            let frame = Frame { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
+            let frame = Prior { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
             Expected::<f64>::new(&body, &frame).unwrap().uneven_cos[1]
         };
-        let [_, none] = Expected::new(&body, &Frame { cam_to_ecef: None, ..frame }).unwrap().uneven_cos;
+        let [_, none] = Expected::new(&body, &Prior { cam_to_ecef: None, ..frame }).unwrap().uneven_cos;
         assert!(none > 1e-5);
         assert_eq!(sigma(0.0), 0.0);
         assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);
@@ -362,8 +362,8 @@ mod tests {
         assert_eq!(sigma(40.0), none);
         assert_eq!(Expected::new(&body, &frame).unwrap().uneven_cos[1], sigma(5.0));
         for deg in [f64::NAN, -1.0, f64::INFINITY] {
-            let frame = Frame { attitude_sigma_rad: Some(deg), ..frame };
-            assert_eq!(Expected::new(&body, &frame).unwrap_err(), FrameError::AttitudeSigma);
+            let frame = Prior { attitude_sigma_rad: Some(deg), ..frame };
+            assert_eq!(Expected::new(&body, &frame).unwrap_err(), PriorError::AttitudeSigma);
         }
     }
 
@@ -371,27 +371,27 @@ mod tests {
     fn a_camera_below_the_limb_height_is_told_apart_from_impossible_ones() {
         let with = |kind| Config { kind, limb_height_km: 17.0, radius_km: None, ..Config::default() };
         let body = with(Kind::Earth);
-        let at = |body: &Config, frame: Frame<f64>| Expected::<f64>::new(body, &frame).unwrap_err();
-        let altitude = |h: f64| Frame { altitude_m: Some(h), ..Frame::default() };
-        let told = FrameError::BelowLimb { altitude_m: 3200, limb_m: 17_000 };
+        let at = |body: &Config, frame: Prior<f64>| Expected::<f64>::new(body, &frame).unwrap_err();
+        let altitude = |h: f64| Prior { altitude_m: Some(h), ..Prior::default() };
+        let told = PriorError::BelowLimb { altitude_m: 3200, limb_m: 17_000 };
         assert_eq!(at(&body, altitude(3200.0)), told);
         assert_eq!(told.to_string(), "altitude 3.2 km is below the limb height 17 km");
         let pad = crate::geometry::ellipsoid::from_geodetic(1.18, 0.37, 3200.0, WGS84_A_M, WGS84_B_M);
-        assert_eq!(at(&body, Frame { position_m: Some(pad), ..Frame::default() }), told);
+        assert_eq!(at(&body, Prior { position_m: Some(pad), ..Prior::default() }), told);
         let rows = [[-90.0, 16.0], [0.0, 18.0], [90.0, 16.0]].into_iter().collect();
         let by_latitude = Config { limb_height_by_latitude_km: rows, ..body.clone() };
-        let FrameError::BelowLimb { altitude_m: 3200, limb_m: 16_000..17_000 } =
-            at(&by_latitude, Frame { position_m: Some(pad), ..Frame::default() })
+        let PriorError::BelowLimb { altitude_m: 3200, limb_m: 16_000..17_000 } =
+            at(&by_latitude, Prior { position_m: Some(pad), ..Prior::default() })
         else {
             panic!()
         };
         let sphere = with(Kind::EarthSphere);
-        let near = Frame { position_m: Some([0.0, 6371.0088e3 + 3200.0, 0.0]), ..Frame::default() };
+        let near = Prior { position_m: Some([0.0, 6371.0088e3 + 3200.0, 0.0]), ..Prior::default() };
         assert_eq!(at(&sphere, near), told);
         // The pad may stand below the ellipsoid. At the limb height itself nothing is seen either.
-        assert!(matches!(at(&body, altitude(-20.0)), FrameError::BelowLimb { altitude_m: -20, .. }));
+        assert!(matches!(at(&body, altitude(-20.0)), PriorError::BelowLimb { altitude_m: -20, .. }));
         assert!(at(&body, altitude(17_000.0)).to_string().contains("is not above the limb height"));
-        assert_eq!(at(&body, altitude(-1000.0)), FrameError::Altitude);
+        assert_eq!(at(&body, altitude(-1000.0)), PriorError::Altitude);
         assert!(Expected::<f64>::new(&body, &altitude(17_500.0)).is_ok());
     }
 }

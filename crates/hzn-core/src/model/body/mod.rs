@@ -236,7 +236,7 @@ impl Config {
 
 /// What is known about one picture besides the picture itself. Everything may be missing.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Frame<T> {
+pub struct Prior<T> {
     /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. Above the limb height.
     pub altitude_m: Option<T>,
     /// Position of the camera in ECEF, metres. It beats the altitude.
@@ -272,7 +272,7 @@ pub struct Last<T> {
 
 /// Why a frame's own data were refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameError {
+pub enum PriorError {
     /// The altitude is not a finite number, or no camera is that low.
     Altitude,
     /// The position is not finite, or inside the body.
@@ -294,7 +294,7 @@ pub enum FrameError {
     NoBody,
 }
 
-impl core::fmt::Display for FrameError {
+impl core::fmt::Display for PriorError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Altitude => "altitude_km must be a finite number above -1 (kilometres)",
@@ -313,7 +313,7 @@ impl core::fmt::Display for FrameError {
         })
     }
 }
-impl core::error::Error for FrameError {}
+impl core::error::Error for PriorError {}
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::base::linalg::{M3, symmetric_eigen};
-use crate::model::work::Work;
+use crate::model::work::WorkBudget;
 use crate::stages::covariance::braun_barf;
 use crate::stages::fit::{conic, direct};
 
@@ -365,7 +365,7 @@ fn ransac_leaves_outliers_out() {
         .collect();
     let mut blocks = blocks(&camera, &points, &e);
     let body = crate::model::body::Config { altitude_km: Some(120.0), ..Default::default() };
-    let expected = crate::model::body::Expected::new(&body, &crate::model::body::Frame::default()).unwrap();
+    let expected = crate::model::body::Expected::new(&body, &crate::model::body::Prior::default()).unwrap();
     let config = consensus::Config { method: consensus::Method::Ransac, threshold_px: 1.0, ..Default::default() };
     let found = consensus::keep(
         &mut blocks,
@@ -374,7 +374,7 @@ fn ransac_leaves_outliers_out() {
         888.97,
         consensus::Threshold::told(&config),
         &config,
-        &mut Work::unlimited(),
+        &mut WorkBudget::unlimited(),
     )
     .unwrap();
     assert!(found.draws < config.max_draws);
@@ -393,7 +393,7 @@ fn ransac_leaves_outliers_out() {
         888.97,
         consensus::Threshold::told(&config),
         &config,
-        &mut Work::unlimited(),
+        &mut WorkBudget::unlimited(),
     );
     assert!(few.is_none());
 }

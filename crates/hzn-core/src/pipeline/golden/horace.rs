@@ -14,7 +14,7 @@ fn expected<T: Real>(altitude_km: f64) -> Expected<T> {
         limb_height_km: 0.0,
         ..body::Config::default()
     };
-    Expected::new(&body, &Frame::default()).unwrap()
+    Expected::new(&body, &Prior::default()).unwrap()
 }
 
 fn fitted<T: Real>(
@@ -33,7 +33,7 @@ fn fitted<T: Real>(
 type Seen = (Camera<f64>, UnitVec3<Cam, f64>, Vec<(f64, f64)>);
 
 /// The limb of a sphere seen `off_nadir_deg` beside the optical axis of a pinhole.
-fn scene(altitude_km: f64, off_nadir_deg: f64) -> Seen {
+fn binary(altitude_km: f64, off_nadir_deg: f64) -> Seen {
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 2400, 1800, 100.0)).unwrap();
     let (s, c) = libm::sincos(off_nadir_deg.to_radians());
     let e = direction([0.0, s, c]);
@@ -44,7 +44,7 @@ fn scene(altitude_km: f64, off_nadir_deg: f64) -> Seen {
 
 /// (2.31) to (2.36) there and back at 80 km; with (2.27) as printed the radius belongs to another altitude.
 fn eighty_kilometres<T: Real>(tolerance_m: f64) {
-    let (camera, e, points) = scene(80.0, 0.0);
+    let (camera, e, points) = binary(80.0, 0.0);
     let _ = camera;
     let camera = Camera::<T>::try_new(&CameraConfig::ideal(Model::Pinhole, 2400, 1800, 100.0)).unwrap();
     let known = expected::<T>(80.0);
@@ -69,7 +69,7 @@ fn altitude_from_the_radius() {
 /// (2.37) counts the centre from the picture's corner: half a pixel off in both directions.
 #[test]
 fn the_centre_of_a_picture_is_that_of_its_pixels() {
-    let (camera, e, points) = scene(80.0, 0.0);
+    let (camera, e, points) = binary(80.0, 0.0);
     let (axis, _) = fitted(&mut blocks(&camera, &points, &e), &camera, &expected(80.0)).unwrap();
     let found = camera.project(&axis).unwrap();
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
@@ -102,7 +102,7 @@ fn a_circle_is_right_straight_down_only() {
 
 #[test]
 fn degenerate_points_give_no_circle() {
-    let (camera, e, _) = scene(600.0, 0.0);
+    let (camera, e, _) = binary(600.0, 0.0);
     let cases: [Vec<(f64, f64)>; 5] = [
         Vec::new(),
         Vec::from([(10.0, 20.0)]),

@@ -54,7 +54,7 @@ fn fitted(
         fx,
         consensus::Threshold::told(&config),
         &config,
-        &mut Work::unlimited(),
+        &mut WorkBudget::unlimited(),
     )
     .unwrap();
     let estimate = fit::Config { half_angle: HalfAngle::Free, ..Default::default() };
@@ -166,7 +166,7 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
         let altitude = 6_371_008.8 / libm::sin(half_angle_deg.to_radians()) - 6_371_008.8;
         let expected = Expected::new(
             &body::Config::default(),
-            &Frame { altitude_m: Some(altitude.max(30e3)), ..Frame::default() },
+            &Prior { altitude_m: Some(altitude.max(30e3)), ..Prior::default() },
         )
         .unwrap();
         let mut gauss = Gauss(crate::base::rng::Rng::new(3));
@@ -180,7 +180,7 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
         let mut told = None;
         for noise in [Noise::Told, Noise::Rms] {
             let mut blocks = blocks(&camera, &points, &e);
-            let mut work = Work::unlimited();
+            let mut work = WorkBudget::unlimited();
             let start = consensus::keep(
                 &mut blocks,
                 points.len() as u32,

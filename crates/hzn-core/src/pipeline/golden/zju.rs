@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::base::linalg::{M3, Triangle};
-use crate::model::work::Work;
+use crate::model::work::WorkBudget;
 use crate::stages::consensus::Consensus;
 use crate::stages::fit::{Fit, Method, Quadric};
 
@@ -19,7 +19,7 @@ fn pairs(v: &Value) -> Vec<(f64, f64)> {
 /// A sphere of the Earth's size seen from 600 km.
 fn expected<T: Real>() -> Expected<T> {
     let body = body::Config { kind: body::Kind::EarthSphere, ..body::Config::default() };
-    Expected::new(&body, &Frame { altitude_m: Some(T::from_f64(600e3)), ..Frame::default() }).unwrap()
+    Expected::new(&body, &Prior { altitude_m: Some(T::from_f64(600e3)), ..Prior::default() }).unwrap()
 }
 
 /// The fit alone, through all the points.
@@ -275,7 +275,7 @@ fn solved(config: &consensus::Config, outliers: f64, runs: u32) -> u32 {
             92.0,
             consensus::Threshold::told(&config),
             &config,
-            &mut Work::unlimited(),
+            &mut WorkBudget::unlimited(),
         );
         found.is_some_and(|f| f.e.dot(e.v()) > 2f64.to_radians().cos())
     };
@@ -331,7 +331,7 @@ proptest::proptest! {
         for method in [consensus::Method::RansacPreverify, consensus::Method::Mlesac] {
             let mut blocks = blocks(&camera, &points, &direction([0.0, 0.0, 1.0]));
             let config = consensus::Config { method, max_draws: 300, ..consensus::Config::default() };
-            if let Some(found) = consensus::keep(&mut blocks, points.len() as u32, &expected(), 92.0, consensus::Threshold::told(&config), &config, &mut Work::unlimited()) {
+            if let Some(found) = consensus::keep(&mut blocks, points.len() as u32, &expected(), 92.0, consensus::Threshold::told(&config), &config, &mut WorkBudget::unlimited()) {
                 proptest::prop_assert!((found.e.dot(&found.e) - 1.0).abs() < 1e-4 && found.c.is_finite());
             }
         }

@@ -24,30 +24,30 @@ use super::workspace::Workspace;
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
 use crate::image::region::Region;
-use crate::image::{Passed, Pixels, Sample};
+use crate::image::{Pixels, Sample, StreamedPoint};
 use crate::model::body::Expected;
 use crate::model::observer::{Observer, Unobserved};
 use crate::model::report::Report;
 use crate::model::status::{Stage, Status};
-use crate::stages::contour::{self, Scene};
+use crate::stages::contour::{self, BinaryPicture};
 use crate::stages::edge_points::{self, SubPixel};
 use crate::stages::threshold;
-use crate::stages::threshold::Passing;
+use crate::stages::threshold::RowSampler;
 use points::{Point, Points};
 use recent_rows::RecentRows;
 use runs::Runs;
 
-/// Rows of the picture that are held.
-pub const HELD: u16 = 32;
-/// Rows that must have come after a border pixel's before it is measured; not fewer are held before it.
+/// RowBuffers of the picture that are held.
+pub const ROWS_HELD: u16 = 32;
+/// RowBuffers that must have come after a border pixel's before it is measured; not fewer are held before it.
 const AHEAD: u16 = 15;
 
-/// What a picture of passing rows needs besides a [`Workspace`]: `WINDOW` samples, [`HELD`] times the width; `HEIGHT` rows;
+/// What a picture of passing rows needs besides a [`Workspace`]: `WINDOW` samples, [`ROWS_HELD`] times the width; `HEIGHT` rows;
 /// `TURNS` changes between dark and lit in a row, of all rows together; `POINTS` edge points of all edges together.
 ///
 /// A new one is all zeros: in a `static` it takes no room in flash.
 #[derive(Debug)]
-pub struct Rows<S, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize> {
+pub struct RowBuffers<S, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize> {
     window: [S; WINDOW],
     run_ends: [u16; HEIGHT],
     turns: [u16; TURNS],
@@ -56,7 +56,7 @@ pub struct Rows<S, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize,
 }
 
 impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize> Default
-    for Rows<S, WINDOW, HEIGHT, TURNS, POINTS>
+    for RowBuffers<S, WINDOW, HEIGHT, TURNS, POINTS>
 {
     fn default() -> Self {
         Self::new()
@@ -64,7 +64,7 @@ impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, co
 }
 
 impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize>
-    Rows<S, WINDOW, HEIGHT, TURNS, POINTS>
+    RowBuffers<S, WINDOW, HEIGHT, TURNS, POINTS>
 {
     /// Empty.
     pub const fn new() -> Self {
@@ -80,8 +80,8 @@ impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, co
 
 /// Why a picture cannot be taken by rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RowsError {
-    /// [`Rows`] has no room for it: so many samples and rows are needed.
+pub enum RowStreamError {
+    /// [`RowBuffers`] has no room for it: so many samples and rows are needed.
     Room {
         /// `WINDOW`.
         window: usize,
@@ -98,7 +98,7 @@ pub enum RowsError {
     Finished,
 }
 
-impl fmt::Display for RowsError {
+impl fmt::Display for RowStreamError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Room { window, height } => {
@@ -111,20 +111,20 @@ impl fmt::Display for RowsError {
         }
     }
 }
-impl core::error::Error for RowsError {}
+impl core::error::Error for RowStreamError {}
 
 /// A picture of which rows are taken.
 #[derive(Debug)]
-pub struct Stream<'a, T, S> {
+pub struct RowStream<'a, T, S> {
     sensor: &'a Sensor<T>,
     expected: &'a Expected<T>,
     /// `None`: the picture is for the next one's level only.
     level: Option<u16>,
-    samples: Passing,
+    samples: RowSampler,
     window: RecentRows<'a, S>,
     runs: Runs<'a>,
     points: Points<'a>,
-    /// Rows that came.
+    /// RowBuffers that came.
     rows: u16,
     /// A row did not fit: what comes is not looked at.
     full: bool,
@@ -141,41 +141,41 @@ impl<T: Real> Sensor<T> {
     /// No room, or a method that needs the whole picture.
     pub fn rows<'a, S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize>(
         &'a self,
-        rows: &'a mut Rows<S, WINDOW, HEIGHT, TURNS, POINTS>,
+        rows: &'a mut RowBuffers<S, WINDOW, HEIGHT, TURNS, POINTS>,
         bits: u8,
         expected: &'a Expected<T>,
-    ) -> Result<Stream<'a, T, S>, RowsError> {
+    ) -> Result<RowStream<'a, T, S>, RowStreamError> {
         let config = &self.config;
         let (width, height) = (self.camera.width(), self.camera.height());
-        let window = usize::from(HELD) * usize::from(width);
+        let window = usize::from(ROWS_HELD) * usize::from(width);
         if WINDOW < window || HEIGHT < usize::from(height) {
-            return Err(RowsError::Room { window, height: height.into() });
+            return Err(RowStreamError::Room { window, height: height.into() });
         }
         if !matches!(config.candidates.sub_pixel, SubPixel::Linear | SubPixel::None) {
-            return Err(RowsError::Method("candidates.sub_pixel"));
+            return Err(RowStreamError::Method("candidates.sub_pixel"));
         }
         if config.contour.method != contour::Method::BorderFollowing {
-            return Err(RowsError::Method("contour.method"));
+            return Err(RowStreamError::Method("contour.method"));
         }
         #[cfg(feature = "horace")]
         {
             if config.recover.method != crate::config::retry::Method::None {
-                return Err(RowsError::Method("recover.method"));
+                return Err(RowStreamError::Method("recover.method"));
             }
             if config.input.scale_to_height.is_some() {
-                return Err(RowsError::Method("input.scale_to_height"));
+                return Err(RowStreamError::Method("input.scale_to_height"));
             }
         }
         if bits < 8 || bits > S::BITS {
-            return Err(RowsError::Bits);
+            return Err(RowStreamError::Bits);
         }
         let full_scale = ((1u32 << bits) - 1) as u16;
         let levels = config.levels_of(expected.which);
-        Ok(Stream {
+        Ok(RowStream {
             sensor: self,
             expected,
             level: threshold::fixed_level::<T>(levels, full_scale).or(expected.level),
-            samples: Passing::new(config.reject.seed, full_scale, &self.region),
+            samples: RowSampler::new(config.reject.seed, full_scale, &self.region),
             window: RecentRows::new(&mut rows.window, width, height, full_scale),
             runs: Runs::new(&mut rows.run_ends, &mut rows.turns, width),
             points: Points::new(&mut rows.point_ends, &mut rows.points),
@@ -185,18 +185,18 @@ impl<T: Real> Sensor<T> {
     }
 }
 
-impl<T: Real, S: Sample> Stream<'_, T, S> {
+impl<T: Real, S: Sample> RowStream<'_, T, S> {
     /// Takes the next row, from the top.
     ///
     /// # Errors
     /// A row of another length, or one too many: nothing has changed.
-    pub fn push_row(&mut self, row: &[S]) -> Result<(), RowsError> {
+    pub fn push_row(&mut self, row: &[S]) -> Result<(), RowStreamError> {
         let camera = &self.sensor.camera;
         if row.len() != usize::from(camera.width()) {
-            return Err(RowsError::Length);
+            return Err(RowStreamError::Length);
         }
         if self.rows == camera.height() {
-            return Err(RowsError::Finished);
+            return Err(RowStreamError::Finished);
         }
         self.samples.row(&self.sensor.region, self.rows, row, &Unobserved);
         self.rows += 1;
@@ -257,12 +257,12 @@ impl<T: Real, S: Sample> Stream<'_, T, S> {
         let picture = Memory { runs: &self.runs, points: &self.points, width: region.width(), height: region.height() };
         let lists = workspace.lists();
         if picture.height > 1 {
-            let scene = Scene::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
+            let binary = BinaryPicture::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
             let work = account::open(&self.sensor.config, lists.border.len());
             let turning = self.sensor.turning(self.expected);
             let camera = turning.as_ref().unwrap_or(&self.sensor.camera);
             let mut judge = Search::new(self.sensor, camera, self.expected, &[], observer, lists.blocks, work, report);
-            judge.border_following(&scene, lists.border, lists.marks);
+            judge.border_following(&binary, lists.border, lists.marks);
             judge.conclude();
         }
         report.next_level = Some(next);
@@ -278,13 +278,13 @@ impl<T: Real, S: Sample> Stream<'_, T, S> {
     /// Measures the edge points of a row, the rows around which have come.
     fn measure(&mut self, y: u16, level: u16, region: &Region<T>) {
         let config = &self.sensor.config.candidates;
-        let scene = Scene::new(&self.window, region, level, &Unobserved).blooming(self.expected.blooms());
+        let binary = BinaryPicture::new(&self.window, region, level, &Unobserved).blooming(self.expected.blooms());
         self.runs.each_border(y, |x| {
             if region.contains(x, y)
                 && self.points.wants(x, y)
-                && let Some(found) = edge_points::pass(&scene, config, Pixel { x, y })
+                && let Some(found) = edge_points::pass(&binary, config, Pixel { x, y })
             {
-                self.points.push(x, Passed { cut: self.window.went_beyond(), ..found });
+                self.points.push(x, StreamedPoint { cut: self.window.went_beyond(), ..found });
             }
         });
         self.points.end_row();
@@ -300,7 +300,7 @@ struct Memory<'a> {
 }
 
 impl Pixels for Memory<'_> {
-    const PASSED: bool = true;
+    const STREAMED: bool = true;
     fn width(&self) -> u16 {
         self.width
     }
@@ -323,7 +323,7 @@ impl Pixels for Memory<'_> {
     fn read(&self, index: usize) -> u16 {
         u16::from(self.runs.lit((index & 0xFFFF) as u16, (index >> 16) as u16))
     }
-    fn passed(&self, x: u16, y: u16) -> Option<Passed> {
+    fn streamed_point(&self, x: u16, y: u16) -> Option<StreamedPoint> {
         self.points.get(x, y)
     }
 }

@@ -1,7 +1,7 @@
 //! Edge points by the border pixel that they were measured at, in the order of the rows.
 
 use crate::geometry::block::Lit;
-use crate::image::Passed;
+use crate::image::StreamedPoint;
 
 /// An edge point: the column of its border pixel, and where it lies from there.
 #[derive(Debug, Clone, Copy)]
@@ -100,7 +100,7 @@ impl<'a> Points<'a> {
     }
 
     /// Adds a point of the row that is not finished; columns rise.
-    pub(super) fn push(&mut self, x: u16, found: Passed) {
+    pub(super) fn push(&mut self, x: u16, found: StreamedPoint) {
         if let Some(place) = self.points.get_mut(self.used) {
             let marks =
                 u8::from(found.fallback) * FALLBACK + u8::from(found.cut) * CUT + u8::from(found.clipped) * CLIPPED;
@@ -118,13 +118,13 @@ impl<'a> Points<'a> {
     }
 
     /// The point of a border pixel of a finished row.
-    pub(super) fn get(&self, x: u16, y: u16) -> Option<Passed> {
+    pub(super) fn get(&self, x: u16, y: u16) -> Option<StreamedPoint> {
         let at = |y: u16| self.ends.get(usize::from(y)).map_or(0, |&e| usize::from(e));
         let start = if y == 0 { 0 } else { at(y - 1) };
         let row = self.points.get(start..at(y))?;
         let found = row.get(row.partition_point(|p| p.x < x)).filter(|p| p.x == x)?;
         let Point { towards_dark_px, lit, marks, .. } = *found;
         let has = |mark: u8| marks & mark > 0;
-        Some(Passed { towards_dark_px, lit, fallback: has(FALLBACK), clipped: has(CLIPPED), cut: has(CUT) })
+        Some(StreamedPoint { towards_dark_px, lit, fallback: has(FALLBACK), clipped: has(CLIPPED), cut: has(CUT) })
     }
 }

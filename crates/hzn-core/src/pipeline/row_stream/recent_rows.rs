@@ -2,17 +2,17 @@
 
 use core::cell::Cell;
 
-use super::HELD;
+use super::ROWS_HELD;
 use crate::image::{Pixels, Sample};
 
-/// The last [`HELD`] rows. Where others are asked for, the first or the last of them stands for them, which is counted.
+/// The last [`ROWS_HELD`] rows. Where others are asked for, the first or the last of them stands for them, which is counted.
 #[derive(Debug)]
 pub(super) struct RecentRows<'a, S> {
     samples: &'a mut [S],
     width: u16,
     height: u16,
     full_scale: u16,
-    /// Rows so far.
+    /// RowBuffers so far.
     rows: u16,
     beyond: Cell<u32>,
 }
@@ -22,7 +22,7 @@ impl<'a, S: Sample> RecentRows<'a, S> {
         Self { samples, width, height, full_scale, rows: 0, beyond: Cell::new(0) }
     }
     fn start(&self, y: u16) -> usize {
-        usize::from(y % HELD) * usize::from(self.width)
+        usize::from(y % ROWS_HELD) * usize::from(self.width)
     }
     /// Takes the next row in the place of the oldest.
     pub(super) fn push(&mut self, row: &[S]) {
@@ -65,7 +65,7 @@ impl<S: Sample> Pixels for RecentRows<'_, S> {
     #[inline]
     fn read(&self, index: usize) -> u16 {
         let (x, y) = (index & 0xFFFF, (index >> 16) as u16);
-        let held = y.max(self.rows.saturating_sub(HELD)).min(self.rows.saturating_sub(1));
+        let held = y.max(self.rows.saturating_sub(ROWS_HELD)).min(self.rows.saturating_sub(1));
         if held != y {
             self.beyond.set(self.beyond.get() + 1);
         }

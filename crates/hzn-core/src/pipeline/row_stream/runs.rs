@@ -1,6 +1,6 @@
 //! A picture of two shades as runs: of each row the columns where dark turns to lit and lit to dark.
 
-/// Rows so far; views of memory that belongs to someone else.
+/// RowBuffers so far; views of memory that belongs to someone else.
 #[derive(Debug)]
 pub(super) struct Runs<'a> {
     /// Where each row ends in `turns`.
@@ -38,7 +38,7 @@ impl<'a> Runs<'a> {
         true
     }
 
-    /// Rows taken.
+    /// RowBuffers taken.
     pub(super) fn rows(&self) -> u16 {
         self.rows
     }

@@ -11,7 +11,7 @@ use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;
 use crate::geometry::block::{Block, LANES, sum};
-use crate::model::work::{DRAW, LIKELIHOOD, Work};
+use crate::model::work::{DRAW, LIKELIHOOD, WorkBudget};
 
 /// Steps for the share of inliers.
 const STEPS: usize = 3;
@@ -26,7 +26,7 @@ pub(super) fn keep<T: Real>(
     focal_px: T,
     threshold: Threshold<T>,
     config: &Config,
-    work: &mut Work,
+    work: &mut WorkBudget,
 ) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
@@ -37,7 +37,7 @@ pub(super) fn keep<T: Real>(
     let mut best: Option<(V3<T>, T, T)> = None;
     let (mut draws, mut enough) = (0, config.max_draws);
     let a_draw = DRAW + blocks.len() as u32 * LIKELIHOOD;
-    while draws < enough.max(FEWEST).min(config.max_draws) && work.spend(a_draw) {
+    while draws < enough.max(FEWEST).min(config.max_draws) && work.try_spend(a_draw) {
         draws += 1;
         let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
         let (cost, share) = mixture.cost(blocks, &e, c);

@@ -22,7 +22,7 @@ use crate::base::rng::Rng;
 use crate::geometry::block::{Block, LANES, sum};
 use crate::geometry::cone::{through_three, through_two};
 use crate::model::body::Expected;
-use crate::model::work::{DRAW, SCORE, Work};
+use crate::model::work::{DRAW, SCORE, WorkBudget};
 
 /// How outliers are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -99,7 +99,7 @@ impl<T: Real> Threshold<T> {
     ///
     /// Noise raises it to no more than the sigma of the limb's own height. The air spreads a limb no farther, so an edge
     /// that scatters more belongs to something else.
-    pub(crate) fn of(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
+    pub(crate) fn new(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
         let told = T::from_f64(config.threshold_px);
         let most = if expected.free { told } else { told.max(expected.limb_sigma_rad() * focal_px) };
         let factor = T::from_f64(config.noise_sigma);
@@ -140,7 +140,7 @@ pub(crate) fn keep<T: Real>(
     focal_px: T,
     threshold: Threshold<T>,
     config: &Config,
-    work: &mut Work,
+    work: &mut WorkBudget,
 ) -> Option<Consensus<T>> {
     let best = match config.method {
         Method::TwoPoint => search(blocks, count, expected, focal_px, threshold, config, work)?,
@@ -191,7 +191,7 @@ fn search<T: Real>(
     focal_px: T,
     threshold: Threshold<T>,
     config: &Config,
-    work: &mut Work,
+    work: &mut WorkBudget,
 ) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
@@ -213,7 +213,7 @@ fn search<T: Real>(
     let mut needed = config.max_draws;
     let mut draws = 0;
     let score_cost = looked_at as u32 * SCORE;
-    'draws: while draws < needed.max(FEWEST).min(config.max_draws) && work.spend(DRAW) {
+    'draws: while draws < needed.max(FEWEST).min(config.max_draws) && work.try_spend(DRAW) {
         draws += 1;
         let i = rng.below(count);
         // Far apart for precision, close together for a limb that is a small part of the edge: there, neighbours of a
@@ -240,7 +240,7 @@ fn search<T: Real>(
             if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {
                 continue;
             }
-            if !work.spend(score_cost) {
+            if !work.try_spend(score_cost) {
                 break 'draws;
             }
             let cost = score(blocks, scored, &e, c, limit2);

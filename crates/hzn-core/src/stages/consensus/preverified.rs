@@ -15,7 +15,7 @@ use crate::base::real::Real;
 use crate::base::rng::Rng;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::cone::through_three;
-use crate::model::work::{DRAW, SCORE, Work};
+use crate::model::work::{DRAW, SCORE, WorkBudget};
 
 /// k_max.
 const HYPOTHESES: u32 = 287;
@@ -29,7 +29,7 @@ pub(super) fn keep<T: Real>(
     count: u32,
     threshold: Threshold<T>,
     config: &Config,
-    work: &mut Work,
+    work: &mut WorkBudget,
 ) -> Option<Consensus<T>> {
     if count < SAMPLE as u32 {
         return None;
@@ -38,12 +38,12 @@ pub(super) fn keep<T: Real>(
     let mut rng = Rng::new(config.seed);
     let (mut best, mut most) = (None, T::ZERO);
     let (mut draws, mut hypotheses) = (0, 0);
-    while draws < config.max_draws && hypotheses < HYPOTHESES && work.spend(DRAW) {
+    while draws < config.max_draws && hypotheses < HYPOTHESES && work.try_spend(DRAW) {
         draws += 1;
         let sample = [(); SAMPLE].map(|()| rng.below(count));
         let Some((e, c)) = verified(blocks, sample, limit2) else { continue };
         hypotheses += 1;
-        if !work.spend(blocks.len() as u32 * SCORE) {
+        if !work.try_spend(blocks.len() as u32 * SCORE) {
             break;
         }
         let near = agreeing(blocks, &e, c, limit2);

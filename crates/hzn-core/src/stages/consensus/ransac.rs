@@ -10,7 +10,7 @@ use super::{Config, Consensus, Threshold};
 use crate::base::real::Real;
 use crate::base::rng::Rng;
 use crate::geometry::block::Block;
-use crate::model::work::{DRAW, SCORE, Work};
+use crate::model::work::{DRAW, SCORE, WorkBudget};
 
 /// The cone with the most points near it; the others lose their weight. `None` with fewer than three points, or when
 /// no cone has more points than the three it goes through.
@@ -19,7 +19,7 @@ pub(super) fn keep<T: Real>(
     count: u32,
     threshold: Threshold<T>,
     config: &Config,
-    work: &mut Work,
+    work: &mut WorkBudget,
 ) -> Option<Consensus<T>> {
     if count < 3 {
         return None;
@@ -29,7 +29,7 @@ pub(super) fn keep<T: Real>(
     let (mut best, mut most) = (None, T::from_f64(3.5));
     let (mut draws, mut enough) = (0, config.max_draws);
     let a_draw = DRAW + blocks.len() as u32 * SCORE;
-    while draws < enough.max(FEWEST).min(config.max_draws) && work.spend(a_draw) {
+    while draws < enough.max(FEWEST).min(config.max_draws) && work.try_spend(a_draw) {
         draws += 1;
         let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
         let near = agreeing(blocks, &e, c, limit2);

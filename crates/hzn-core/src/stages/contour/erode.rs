@@ -6,39 +6,39 @@
 
 use super::order::about_their_circle;
 use super::thinned::Thinned;
-use super::{Config, Scene};
+use super::{BinaryPicture, Config};
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::model::work::{self, Work};
+use crate::model::work::{self, WorkBudget};
 
 /// The edge pixels of the picture, in order about their circle. Beside the end of the region, or a mask, there is no
 /// edge.
 pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     buffer: &'a mut [Pixel],
-    work: &mut Work,
+    work: &mut WorkBudget,
 ) -> Thinned<'a> {
     let mut edge = Thinned::new(buffer);
     let reach = config.erode_size_px / 2;
     let least = config.erode_threshold;
-    let around = work::square(config.erode_size_px, scene.mask_cost());
-    for y in 0..scene.region.height() {
-        let Some((x0, x1)) = scene.region.span(y) else { continue };
+    let around = work::square(config.erode_size_px, binary.mask_cost());
+    for y in 0..binary.region.height() {
+        let Some((x0, x1)) = binary.region.span(y) else { continue };
         // What was looked at of the mask in the row before, too.
-        if !work.spend(u32::from(x1 - x0) + scene.cost()) {
+        if !work.try_spend(u32::from(x1 - x0) + binary.cost()) {
             break;
         }
         for x in x0..=x1 {
-            let inside = scene.lit(x, y) && scene.region.is_inside_by(x, y, reach);
-            if inside && work.spend(around) && is_edge(scene, x, y, reach, least) {
+            let inside = binary.lit(x, y) && binary.region.is_inside_by(x, y, reach);
+            if inside && work.try_spend(around) && is_edge(binary, x, y, reach, least) {
                 edge.push(Pixel { x, y });
             }
         }
     }
-    if work.spend(edge.pixels().len() as u32 * work::ORDER) {
+    if work.try_spend(edge.pixels().len() as u32 * work::ORDER) {
         about_their_circle::<T>(edge.pixels_mut());
     }
     edge
@@ -46,7 +46,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
 
 /// Whether fewer than `least` pixels of the neighbourhood are lit, and none masked.
 fn is_edge<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     x: u16,
     y: u16,
     reach: u16,
@@ -55,10 +55,10 @@ fn is_edge<T: Real, P: Pixels, O: Observer<T>>(
     let mut lit = 0;
     for v in y - reach..=y + reach {
         for u in x - reach..=x + reach {
-            if scene.region.masked(u, v) {
+            if binary.region.masked(u, v) {
                 return false;
             }
-            lit += u16::from(scene.lit(u, v));
+            lit += u16::from(binary.lit(u, v));
         }
     }
     lit < least
@@ -76,10 +76,10 @@ mod tests {
     fn eroded(data: &[u8], w: u16, h: u16, size: u16, threshold: u16) -> Vec<(u16, u16)> {
         let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
         let region = Region::<f64>::whole(w, h);
-        let scene = Scene::new(&picture, &region, 128, &Unobserved);
+        let binary = BinaryPicture::new(&picture, &region, 128, &Unobserved);
         let mut buffer = vec![Pixel::default(); 4096];
         let config = Config { erode_size_px: size, erode_threshold: threshold, ..Config::default() };
-        edges(&scene, &config, &mut buffer, &mut Work::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
+        edges(&binary, &config, &mut buffer, &mut WorkBudget::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
     }
 
     #[test]

@@ -31,7 +31,7 @@ const CONTRAST_PART: i32 = 16;
 const LEAST_CONTRAST: i32 = 2;
 
 /// What is followed: a picture, its level and its region.
-pub(crate) struct Scene<'a, T, P, O> {
+pub(crate) struct BinaryPicture<'a, T, P, O> {
     pub(crate) picture: &'a P,
     pub(crate) region: &'a Region<T>,
     pub(crate) level: u16,
@@ -102,7 +102,7 @@ struct Walk {
 /// Most steps of a run.
 const RUN: usize = 32;
 
-impl<'a, T: Real, P: Pixels, O: Observer<T>> Scene<'a, T, P, O> {
+impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     pub(crate) fn new(picture: &'a P, region: &'a Region<T>, level: u16, observer: &'a O) -> Self {
         let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
         let (mask, masked) = (region.mask_cost(), Cell::new(0));

@@ -2,11 +2,11 @@
 //!
 //! Over a lit body it makes the picture's own outline an edge, to which the limb is joined at both ends.
 
-use super::follow::Scene;
+use super::follow::BinaryPicture;
 use crate::base::real::Real;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::model::work::{self, Work};
+use crate::model::work::{self, WorkBudget};
 
 /// Of a frame's pixels fewer than one in so many is lit, and of those next to it more than one in so many, of all around
 /// the picture: where an image circle leaves few of them, they tell nothing.
@@ -15,10 +15,10 @@ const LIT: u32 = 8;
 /// Pixels between those that are looked at first: they tell of nearly every picture that it has none.
 const COARSE: u16 = 64;
 
-impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
+impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     /// Width of the frame in pixels, `most` at most; 0 where there is none: light must come at once from its inner side
     /// on, and not grow from the picture's border inwards as that of a disc or a glare does.
-    pub(crate) fn dark_frame_px(&self, most: u16, work: &mut Work) -> u16 {
+    pub(crate) fn dark_frame_px(&self, most: u16, work: &mut WorkBudget) -> u16 {
         let (w, h) = (self.region.width(), self.region.height());
         let most = most.min(w.min(h).saturating_sub(1) / 4);
         let around = 2 * (u32::from(w) + u32::from(h));
@@ -28,7 +28,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
             return 0;
         }
         for px in 0..=most {
-            if !work.spend(work::ring(w, h)) {
+            if !work.try_spend(work::ring(w, h)) {
                 return 0;
             }
             let lit = self.count_ring(px, 1);

@@ -17,7 +17,7 @@ mod search;
 pub(crate) mod sobel;
 mod thinned;
 
-pub(crate) use follow::{End, Scene};
+pub(crate) use follow::{BinaryPicture, End};
 pub(crate) use marks::Marks;
 pub(crate) use thinned::Thinned;
 

@@ -9,7 +9,7 @@
 //! A border that runs along the side of the picture, or along a mask, is no edge there: it is split into the pieces
 //! between.
 
-use super::Scene;
+use super::BinaryPicture;
 use super::follow::STEPS;
 use super::thinned::Thinned;
 use crate::base::real::Real;
@@ -54,13 +54,13 @@ impl Bits<'_> {
 /// Calls `found` with every piece of every outer border, stored in `buffer`, until it says to stop. `steps` is counted
 /// down by the border pixels followed.
 pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     words: &mut [u32],
     buffer: &mut [Pixel],
     steps: &mut u32,
     mut found: impl FnMut(&Thinned<'_>) -> bool,
 ) -> Scanned {
-    let (width, height) = (scene.region.width(), scene.region.height());
+    let (width, height) = (binary.region.width(), binary.region.height());
     let need = (usize::from(width) * usize::from(height)).div_ceil(32);
     let Some(words) = words.get_mut(..need) else { return Scanned::Truncated };
     words.fill(0);
@@ -68,17 +68,17 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
     for y in 0..height {
         let (mut outside, mut before) = (true, false);
         for x in 0..width {
-            let lit = seen(scene, i32::from(x), i32::from(y));
+            let lit = seen(binary, i32::from(x), i32::from(y));
             if lit && !before && outside && !bits.get(x, y) {
                 let start = At { pixel: Pixel { x, y }, back: WEST };
-                let Some(border) = follow(scene, start, u32::MAX, &mut bits, steps, |_, _| true) else {
+                let Some(border) = follow(binary, start, u32::MAX, &mut bits, steps, |_, _| true) else {
                     return Scanned::Truncated;
                 };
                 // From a place where it is cut, if there is one, so that no piece is cut at the start.
                 let (from, length) = (border.cut.unwrap_or(start), border.length);
                 let mut piece = Thinned::new(buffer);
                 let mut go_on = true;
-                let again = follow(scene, from, length, &mut bits, steps, |pixel, cut| {
+                let again = follow(binary, from, length, &mut bits, steps, |pixel, cut| {
                     if !cut {
                         piece.push(pixel);
                     } else if piece.total() > 0 {
@@ -107,9 +107,9 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// Whether a pixel is in the region, lit, and not masked.
-fn seen<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> bool {
+fn seen<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> bool {
     let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
-    scene.region.contains(x, y) && scene.lit(x, y)
+    binary.region.contains(x, y) && binary.lit(x, y)
 }
 
 /// A pixel of a border, and the direction back to where the follower came from.
@@ -130,7 +130,7 @@ struct Border {
 /// says so; it gets every pixel, and whether it is no edge point because what the border faces there is the end of the
 /// region, or a mask. `None` when the steps are used up.
 fn follow<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     start: At,
     most: u32,
     bits: &mut Bits<'_>,
@@ -147,15 +147,15 @@ fn follow<T: Real, P: Pixels, O: Observer<T>>(
             let d = (at.back + turn) & 7;
             let (dx, dy) = STEPS[usize::from(d & 7)];
             let (x, y) = (i32::from(here.x) + dx, i32::from(here.y) + dy);
-            if seen(scene, x, y) {
+            if seen(binary, x, y) {
                 next = Some(At { pixel: Pixel { x: x as u16, y: y as u16 }, back: (d + 4) & 7 });
                 break;
             }
             // Only what shares a side with the pixel is faced; an outer corner is merely dark.
-            cut |= d.is_multiple_of(2) && hidden(scene, x, y);
+            cut |= d.is_multiple_of(2) && hidden(binary, x, y);
             if d == WEST {
                 bits.set(here.x, here.y);
-            } else if d == EAST && x < i32::from(scene.region.width()) {
+            } else if d == EAST && x < i32::from(binary.region.width()) {
                 bits.set(x as u16, here.y);
             }
             // Around, and at the dark pixel where it began.
@@ -184,9 +184,9 @@ fn follow<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// Beyond the region, or lit under a mask.
-fn hidden<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> bool {
+fn hidden<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> bool {
     let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return true };
-    !scene.region.contains(x, y) || (scene.region.masked(x, y) && scene.picture.at(x, y) >= scene.level)
+    !binary.region.contains(x, y) || (binary.region.masked(x, y) && binary.picture.at(x, y) >= binary.level)
 }
 
 #[cfg(test)]
@@ -204,10 +204,10 @@ mod tests {
     fn borders(data: &[u8], w: u16, h: u16) -> Vec<Points> {
         let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
         let region = Region::<f64>::whole(w, h);
-        let scene = Scene::new(&picture, &region, 128, &Unobserved);
+        let binary = BinaryPicture::new(&picture, &region, 128, &Unobserved);
         let (mut words, mut buffer, mut steps) = (vec![0u32; 4096], vec![Pixel::default(); 4096], 1_000_000);
         let mut found = Vec::new();
-        let ended = each_border(&scene, &mut words, &mut buffer, &mut steps, |piece| {
+        let ended = each_border(&binary, &mut words, &mut buffer, &mut steps, |piece| {
             found.push(piece.pixels().iter().map(|p| (p.x, p.y)).collect());
             true
         });
@@ -266,10 +266,10 @@ mod tests {
         let data: Vec<u8> = (0..64 * 64).map(|i| if (i / 7) % 3 == 0 { 200 } else { 0 }).collect();
         let picture = Grey::try_new(&data, Layout::packed(64, 64, 1, 8)).unwrap();
         let region = Region::<f32>::whole(64, 64);
-        let scene = Scene::new(&picture, &region, 128, &Unobserved);
+        let binary = BinaryPicture::new(&picture, &region, 128, &Unobserved);
         let mut buffer = vec![Pixel::default(); 64];
         let mut run = |words: usize, mut steps: u32| {
-            each_border(&scene, &mut vec![u32::MAX; words], &mut buffer, &mut steps, |_| true)
+            each_border(&binary, &mut vec![u32::MAX; words], &mut buffer, &mut steps, |_| true)
         };
         assert_eq!(run(127, 1_000_000), Scanned::Truncated);
         assert_eq!(run(128, 100), Scanned::Truncated);

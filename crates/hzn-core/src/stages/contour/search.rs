@@ -1,6 +1,6 @@
 //! Where edges begin: at the border of the region, and on search lines.
 
-use super::follow::{Scene, WEST};
+use super::follow::{BinaryPicture, WEST};
 use super::marks::Marks;
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
@@ -24,7 +24,7 @@ pub(crate) struct Start {
 /// pictures, so the limb comes first, however many edges the clouds have.
 pub(crate) type Ranked = heapless::Vec<Start, RANKED>;
 
-impl<T: Real, P: Pixels, O: Observer<T>> Scene<'_, T, P, O> {
+impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     /// Calls `found` with every start along the ring, clockwise, until it says to stop. Each open edge has exactly
     /// one start. The ring is read at every `stride`-th pixel, and at all of them where it changes in between; where
     /// it becomes lit also at those before, as noise frays the place where a wide edge begins.

@@ -6,14 +6,14 @@
 //! where one level does not part ground from sky. To give the points an order along the limb they are sorted about the
 //! centre of the circle through all of them, from the widest gap on.
 
-use super::Scene;
+use super::BinaryPicture;
 use super::order::about_their_circle;
 use super::thinned::Thinned;
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::model::work::{self, Work};
+use crate::model::work::{self, WorkBudget};
 
 /// Least gradient of an edge over the root mean square of all: its square.
 const LEAST: u64 = 4;
@@ -21,31 +21,31 @@ const LEAST: u64 = 4;
 /// The edge pixels of the picture, in order about their circle. Beside the end of the region, or a mask, there is no
 /// edge.
 pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     buffer: &'a mut [Pixel],
-    work: &mut Work,
+    work: &mut WorkBudget,
 ) -> Thinned<'a> {
     let mut edge = Thinned::new(buffer);
     let (mut sum, mut count) = (0u64, 0u64);
-    let look = work::gradient(scene.mask_cost());
-    each_pixel(scene, look, work, |x, y, _| {
-        if let Some((gx, gy)) = gradient(scene, x, y) {
+    let look = work::gradient(binary.mask_cost());
+    each_pixel(binary, look, work, |x, y, _| {
+        if let Some((gx, gy)) = gradient(binary, x, y) {
             sum = sum.saturating_add(square(gx, gy));
             count += 1;
         }
     });
     // A picture without any gradient has none above the mean.
     let least = LEAST * (sum / count.max(1));
-    each_pixel(scene, look, work, |x, y, work| {
-        if let Some((gx, gy)) = gradient(scene, x, y)
+    each_pixel(binary, look, work, |x, y, work| {
+        if let Some((gx, gy)) = gradient(binary, x, y)
             && square(gx, gy) > least
-            && work.spend(2 * look)
-            && is_largest(scene, x, y, gx, gy)
+            && work.try_spend(2 * look)
+            && is_largest(binary, x, y, gx, gy)
         {
             edge.push(Pixel { x, y });
         }
     });
-    if work.spend(edge.pixels().len() as u32 * work::ORDER) {
+    if work.try_spend(edge.pixels().len() as u32 * work::ORDER) {
         about_their_circle::<T>(edge.pixels_mut());
     }
     edge
@@ -57,14 +57,14 @@ fn square(gx: i32, gy: i32) -> u64 {
 }
 
 fn each_pixel<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     cost: u32,
-    work: &mut Work,
-    mut visit: impl FnMut(u16, u16, &mut Work),
+    work: &mut WorkBudget,
+    mut visit: impl FnMut(u16, u16, &mut WorkBudget),
 ) {
-    for y in 0..scene.region.height() {
-        let Some((x0, x1)) = scene.region.span(y) else { continue };
-        if !work.spend((u32::from(x1 - x0) + 1).saturating_mul(cost)) {
+    for y in 0..binary.region.height() {
+        let Some((x0, x1)) = binary.region.span(y) else { continue };
+        if !work.try_spend((u32::from(x1 - x0) + 1).saturating_mul(cost)) {
             break;
         }
         for x in x0..=x1 {
@@ -74,18 +74,22 @@ fn each_pixel<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// Eight times the brightness change a pixel, to the right and down; `None` beside the end of the region or a mask.
-fn gradient<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: u16, y: u16) -> Option<(i32, i32)> {
-    if !scene.region.is_inside_by(x, y, 1) {
+fn gradient<T: Real, P: Pixels, O: Observer<T>>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    x: u16,
+    y: u16,
+) -> Option<(i32, i32)> {
+    if !binary.region.is_inside_by(x, y, 1) {
         return None;
     }
     let mut near = [[0i32; 3]; 3];
     for (row, v) in near.iter_mut().zip(y - 1..) {
         for (value, u) in row.iter_mut().zip(x - 1..) {
-            if scene.region.masked(u, v) {
+            if binary.region.masked(u, v) {
                 return None;
             }
-            scene.observer.pixel(u, v);
-            *value = i32::from(scene.picture.at(u, v));
+            binary.observer.pixel(u, v);
+            *value = i32::from(binary.picture.at(u, v));
         }
     }
     let [[nw, n, ne], [w, _, e], [sw, s, se]] = near;
@@ -94,7 +98,7 @@ fn gradient<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: u
 
 /// Whether the gradient is no smaller than those beside it along the axis on which it is larger; of two alike the first.
 fn is_largest<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     x: u16,
     y: u16,
     gx: i32,
@@ -104,7 +108,7 @@ fn is_largest<T: Real, P: Pixels, O: Observer<T>>(
     let along = |(gx, gy): (i32, i32)| if across { gx.abs() } else { gy.abs() };
     let here = along((gx, gy));
     let (before, after) = if across { ((x - 1, y), (x + 1, y)) } else { ((x, y - 1), (x, y + 1)) };
-    let beside = |(x, y): (u16, u16)| gradient(scene, x, y).map(along);
+    let beside = |(x, y): (u16, u16)| gradient(binary, x, y).map(along);
     beside(before).is_none_or(|g| g < here) && beside(after).is_none_or(|g| g <= here)
 }
 
@@ -121,9 +125,9 @@ mod tests {
         let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
         let region = Region::<f64>::whole(w, h);
         // No level: every pixel is lit.
-        let scene = Scene::new(&picture, &region, 1, &Unobserved);
+        let binary = BinaryPicture::new(&picture, &region, 1, &Unobserved);
         let mut buffer = vec![Pixel::default(); 4096];
-        edges(&scene, &mut buffer, &mut Work::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
+        edges(&binary, &mut buffer, &mut WorkBudget::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
     }
 
     #[test]

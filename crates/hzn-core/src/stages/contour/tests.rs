@@ -37,15 +37,15 @@ impl Bitmap {
     fn closed(&self, spacing: u16) -> Vec<(Points, i64)> {
         let region = Region::<f64>::whole(self.w, self.h);
         let grey = self.grey();
-        let scene = Scene::new(&grey, &region, 128, &Unobserved);
+        let binary = BinaryPicture::new(&grey, &region, 128, &Unobserved);
         let mut bits = vec![0u32; 4096];
         let mut marks = Marks::new(&mut bits, self.w, self.h, spacing, spacing);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
         for y in marks.rows(self.h) {
-            scene.each_crossing(y, (0, self.w - 1), &mut marks, |start, dark, marks| {
+            binary.each_crossing(y, (0, self.w - 1), &mut marks, |start, dark, marks| {
                 let mut edge = Thinned::new(&mut buffer);
-                match scene.follow(start, dark, &mut edge, marks, &mut steps) {
+                match binary.follow(start, dark, &mut edge, marks, &mut steps) {
                     End::Closed { twice_area } => {
                         edges.push((edge.pixels().iter().map(|p| (p.x, p.y)).collect(), twice_area));
                     }
@@ -60,14 +60,14 @@ impl Bitmap {
     fn open(&self) -> Vec<Points> {
         let region = Region::<f64>::whole(self.w, self.h);
         let grey = self.grey();
-        let scene = Scene::new(&grey, &region, 128, &Unobserved);
+        let binary = BinaryPicture::new(&grey, &region, 128, &Unobserved);
         let mut bits = vec![0u32; 4096];
         let mut marks = Marks::new(&mut bits, self.w, self.h, 1, 1);
         let (mut buffer, mut steps) = (vec![Pixel::default(); 4096], 1_000_000);
         let mut edges = Vec::new();
-        scene.each_start(1, &mut |start| {
+        binary.each_start(1, &mut |start| {
             let mut edge = Thinned::new(&mut buffer);
-            let end = scene.follow(start.pixel, start.dark, &mut edge, &mut marks, &mut steps);
+            let end = binary.follow(start.pixel, start.dark, &mut edge, &mut marks, &mut steps);
             assert_eq!(end, End::Open);
             edges.push(edge.pixels().iter().map(|p| (p.x, p.y)).collect());
             true
@@ -150,12 +150,12 @@ proptest! {
         let data = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| at(x, y)).collect();
         let map = Bitmap { w, h, data };
         let (grey, region) = (map.grey(), Region::<f64>::whole(w, h));
-        let scene = Scene::new(&grey, &region, 128, &Unobserved);
+        let binary = BinaryPicture::new(&grey, &region, 128, &Unobserved);
         let key = |pixel: Pixel, dark: u8| (pixel.x, pixel.y, dark);
         let (mut all, mut found) = (BTreeSet::new(), BTreeSet::new());
-        scene.each_start(1, &mut |s| { all.insert(key(s.pixel, s.dark)); true });
-        scene.each_start(stride, &mut |s| { found.insert(key(s.pixel, s.dark)); true });
-        scene.each_narrow_start(stride, &mut |s| { found.insert(key(s.pixel, s.dark)); true });
+        binary.each_start(1, &mut |s| { all.insert(key(s.pixel, s.dark)); true });
+        binary.each_start(stride, &mut |s| { found.insert(key(s.pixel, s.dark)); true });
+        binary.each_narrow_start(stride, &mut |s| { found.insert(key(s.pixel, s.dark)); true });
         prop_assert_eq!(&all, &found);
     }
 
@@ -230,7 +230,8 @@ fn a_dark_frame_is_measured_and_nothing_else_is_one() {
     let frame = |map: &Bitmap, most: u16| {
         let region = Region::<f64>::whole(map.w, map.h);
         let grey = map.grey();
-        Scene::new(&grey, &region, 100, &Unobserved).dark_frame_px(most, &mut crate::model::work::Work::unlimited())
+        BinaryPicture::new(&grey, &region, 100, &Unobserved)
+            .dark_frame_px(most, &mut crate::model::work::WorkBudget::unlimited())
     };
     for px in 0..=9 {
         assert_eq!(frame(&under_a_frame(px), 8), if px <= 8 { px } else { 0 }, "{px}");

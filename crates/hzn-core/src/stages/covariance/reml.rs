@@ -117,7 +117,7 @@ pub struct Posterior {
 impl Posterior {
     /// Of the rows of an edge of the length `arc_px`, whose residuals have the given RMS. Variances lie between `floor_px` and
     /// twice the RMS, squared. `None` as of [`likelihood`].
-    pub fn of<R: IntoIterator<Item = Row>>(
+    pub fn new<R: IntoIterator<Item = Row>>(
         rows: impl Fn() -> R,
         arc_px: f64,
         rms_px: f64,
@@ -161,7 +161,7 @@ pub(super) fn averaged<T: Real>(
     let (b1, b2) = basis(&fit.e);
     let azimuth = fit::azimuth(expected);
     let rows = || rows(blocks, fit, azimuth.as_ref());
-    let posterior = Posterior::of(rows, fit.arc_px.to_f64(), fit.rms_px.to_f64(), floor_px)?;
+    let posterior = Posterior::new(rows, fit.arc_px.to_f64(), fit.rms_px.to_f64(), floor_px)?;
     let of_length = |length_px: f64| correlated(blocks, &fit.e, &b1, &b2, fit.mean, T::from_f64(length_px));
     let mut x = [T::ZERO; 6];
     let mut add = |part: [T; 6], variance: f64| {
@@ -273,7 +273,7 @@ mod tests {
                 .map(|seed| {
                     let rows = drawn(seed + 1, 0.1, 100.0, white);
                     let rms = libm::sqrt(rows.iter().map(|r| r.residual_px * r.residual_px).sum::<f64>() / 500.0);
-                    let posterior = Posterior::of(|| rows.iter().copied(), 1000.0, rms, 0.0).unwrap();
+                    let posterior = Posterior::new(|| rows.iter().copied(), 1000.0, rms, 0.0).unwrap();
                     let weights: f64 = posterior.models.iter().flatten().map(|m| m.weight).sum();
                     assert!((weights - 1.0).abs() < 1e-12);
                     libm::sqrt(posterior.mean(|m| m.variance_px2)) / 0.1

@@ -11,7 +11,7 @@ use crate::base::real::Real;
 use crate::geometry::pixel::{ImagePoint, Pixel};
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 
 /// Gauss-Newton steps in one patch.
 const STEPS: usize = 6;
@@ -50,14 +50,14 @@ pub(super) struct Levels<T> {
 /// The edge next to a border pixel and the direction (du, dv) of its gradient; `None` without a clear edge within
 /// reach.
 pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
 ) -> Option<(ImagePoint<T>, [T; 2])> {
     let (mut x, mut y) = (i32::from(p.x), i32::from(p.y));
-    let mut edge = start(scene, x, y)?;
+    let mut edge = start(binary, x, y)?;
     for last in (0..WINDOWS).rev() {
-        let patch = Patch::read(scene, x, y)?;
-        let levels = levels(scene, x, y, &edge)?;
+        let patch = Patch::read(binary, x, y)?;
+        let levels = levels(binary, x, y, &edge)?;
         let before = edge;
         edge = fit(&patch, edge, &levels)?;
         let (dx, dy) = towards(edge.offset, edge.n);
@@ -74,8 +74,12 @@ pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// An edge of a pixel's width through (x, y), normal to the gradient.
-pub(super) fn start<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> Option<Edge<T>> {
-    Some(Edge { offset: T::ZERO, n: direction(&Patch::read(scene, x, y)?)?, sigma: T::one() })
+pub(super) fn start<T: Real, P: Pixels, O: Observer<T>>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    x: i32,
+    y: i32,
+) -> Option<Edge<T>> {
+    Some(Edge { offset: T::ZERO, n: direction(&Patch::read(binary, x, y)?)?, sigma: T::one() })
 }
 
 /// Direction towards the light: the first moments over the disc of the patch.
@@ -93,7 +97,7 @@ fn direction<T: Real>(patch: &Patch<T>) -> Option<[T; 2]> {
 
 /// Means over the plateaus on both sides of an edge.
 fn levels<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     x: i32,
     y: i32,
     edge: &Edge<T>,
@@ -109,7 +113,7 @@ fn levels<T: Real, P: Pixels, O: Observer<T>>(
                 let along = T::from_i32(j);
                 let dx = (across * edge.n[0] - along * edge.n[1] + half).floor().to_i32();
                 let dy = (across * edge.n[1] + along * edge.n[0] + half).floor().to_i32();
-                if let Some(value) = brightness(scene, x + dx, y + dy) {
+                if let Some(value) = brightness(binary, x + dx, y + dy) {
                     sum += value;
                     count += 1;
                 }
@@ -118,7 +122,7 @@ fn levels<T: Real, P: Pixels, O: Observer<T>>(
         (count > ALONG).then(|| T::from_i32(sum) / T::from_i32(count))
     };
     let (bright, dim) = (mean(T::one())?, mean(-T::one())?);
-    let least = (i32::from(scene.picture.full_scale()) / 64).max(2);
+    let least = (i32::from(binary.picture.full_scale()) / 64).max(2);
     (bright - dim >= T::from_i32(least)).then_some(Levels { dim, bright })
 }
 

@@ -63,7 +63,7 @@ fn draw(noise: &mut Noise, sigma_px: f64, snr: f64) -> Drawn {
 fn rmse(
     sigma_px: f64,
     snr: f64,
-    find: impl Fn(&Scene<'_, f64, Grey<'_, u16>, Unobserved>, Pixel) -> Option<ImagePoint<f64>>,
+    find: impl Fn(&BinaryPicture<'_, f64, Grey<'_, u16>, Unobserved>, Pixel) -> Option<ImagePoint<f64>>,
 ) -> f64 {
     let mut noise = Noise(7);
     let (mut sum, mut found) = (0.0, 0);
@@ -72,8 +72,8 @@ fn rmse(
         let grey = Grey::try_new(&data, Layout::packed(SIZE as u32, SIZE as u32, 1, 16)).unwrap();
         let region = Region::whole(SIZE as u16, SIZE as u16);
         let level = (DIM + CONTRAST / 2.0) as u16;
-        let scene = Scene::new(&grey, &region, level, &Unobserved);
-        let dark = |x: i32, y: i32| !scene.lit(x as u16, y as u16);
+        let binary = BinaryPicture::new(&grey, &region, level, &Unobserved);
+        let dark = |x: i32, y: i32| !binary.lit(x as u16, y as u16);
         let beside = |x: i32, y: i32| f64::from(x) * n[0] + f64::from(y) * n[1] - offset;
         // The border pixel nearest to the middle; noise far from the edge makes others.
         let (x, y) = (0..SIZE * SIZE)
@@ -83,7 +83,7 @@ fn rmse(
             .filter(|&(x, y)| beside(x, y).abs() < 1.5)
             .min_by_key(|&(x, y)| (x - SIZE / 2).pow(2) + (y - SIZE / 2).pow(2))
             .unwrap();
-        if let Some(p) = find(&scene, Pixel { x: x as u16, y: y as u16 }) {
+        if let Some(p) = find(&binary, Pixel { x: x as u16, y: y as u16 }) {
             sum += (p.u * n[0] + p.v * n[1] - offset).powi(2);
             found += 1;
         }
@@ -92,11 +92,13 @@ fn rmse(
     (sum / f64::from(found)).sqrt()
 }
 
-fn by(method: SubPixel) -> impl Fn(&Scene<'_, f64, Grey<'_, u16>, Unobserved>, Pixel) -> Option<ImagePoint<f64>> {
-    move |scene, pixel| {
+fn by(
+    method: SubPixel,
+) -> impl Fn(&BinaryPicture<'_, f64, Grey<'_, u16>, Unobserved>, Pixel) -> Option<ImagePoint<f64>> {
+    move |binary, pixel| {
         let mut blocks = [Block::default(); 1];
         let config = Config { sub_pixel: method, keep_points: 0, ..Config::default() };
-        (pick(scene, &config, &[pixel], 0, &mut blocks, u32::MAX).count == 1).then(|| blocks[0].point(0))
+        (pick(binary, &config, &[pixel], 0, &mut blocks, u32::MAX).count == 1).then(|| blocks[0].point(0))
     }
 }
 
@@ -125,11 +127,11 @@ fn all(method: SubPixel, expected: impl Fn(&(f64, f64, f64, f64, f64)) -> Option
 #[test]
 fn erf_reaches_the_bound() {
     for &(sigma_px, snr, bound, ..) in &TABLE {
-        let error = rmse(sigma_px, snr, |scene, pixel| {
+        let error = rmse(sigma_px, snr, |binary, pixel| {
             let (x, y) = (i32::from(pixel.x), i32::from(pixel.y));
-            let start = erf::start(scene, x, y)?;
+            let start = erf::start(binary, x, y)?;
             let found =
-                erf::fit(&patch::Patch::read(scene, x, y)?, start, &erf::Levels { dim: DIM, bright: DIM + CONTRAST })?;
+                erf::fit(&patch::Patch::read(binary, x, y)?, start, &erf::Levels { dim: DIM, bright: DIM + CONTRAST })?;
             Some(found.point(x, y))
         });
         assert!(error < 1.15 * bound, "blur {sigma_px} px, SNR {snr}: {error:.3} px, bound {bound}");

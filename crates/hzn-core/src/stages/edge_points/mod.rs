@@ -20,9 +20,9 @@ use crate::base::error::{ConfigError, Limit, require};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES, Lit};
 use crate::geometry::pixel::{ImagePoint, Pixel};
-use crate::image::{Passed, Pixels};
+use crate::image::{Pixels, StreamedPoint};
 use crate::model::observer::Observer;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 
 /// How a border pixel becomes an edge point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -109,7 +109,7 @@ pub(crate) struct Points {
 /// Fills `blocks` with the points of a border, evenly thinned to `keep_points`. Lanes that stay empty have weight 0.
 /// Ends after `most_slow` points that are slow.
 pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     border: &[Pixel],
     candidate: u32,
@@ -128,15 +128,15 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
         if made.slow >= most_slow {
             break;
         }
-        let found = if P::PASSED {
-            let found = scene.picture.passed(pixel.x, pixel.y);
+        let found = if P::STREAMED {
+            let found = binary.picture.streamed_point(pixel.x, pixel.y);
             made.cut += u32::from(found.is_some_and(|f| f.cut));
             found.map(|f| {
                 let point = point_off(pixel, f.lit.towards_dark(), T::from_f64(f.towards_dark_px.into()));
-                Found { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped }
+                EdgePoint { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped }
             })
         } else {
-            locate(scene, config, pixel, &mut made.slow)
+            locate(binary, config, pixel, &mut made.slow)
         };
         let Some(found) = found else { continue };
         let Some(block) = blocks.get_mut(place / LANES) else { break };
@@ -144,7 +144,7 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
             *block = Block::default();
         }
         block.set_point(place % LANES, found.point, found.lit);
-        scene.observer.point(candidate, found.point);
+        binary.observer.point(candidate, found.point);
         place += 1;
         made.count += 1;
         made.fallback += u32::from(found.fallback);
@@ -154,7 +154,7 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// An edge point.
-struct Found<T> {
+struct EdgePoint<T> {
     point: ImagePoint<T>,
     /// The side of the light.
     lit: Lit,
@@ -164,7 +164,7 @@ struct Found<T> {
     clipped: bool,
 }
 
-impl<T> Found<T> {
+impl<T> EdgePoint<T> {
     /// Of a method that has no level of its own.
     fn plain(point: ImagePoint<T>, lit: Lit) -> Self {
         Self { point, lit, fallback: false, clipped: false }
@@ -174,46 +174,46 @@ impl<T> Found<T> {
 /// The edge point at a border pixel.
 #[inline(always)]
 fn locate<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     p: Pixel,
     slow: &mut u32,
-) -> Option<Found<T>> {
+) -> Option<EdgePoint<T>> {
     match config.sub_pixel {
         SubPixel::Linear => {
-            if is_clear(scene, p, MARGIN as u16) {
-                linear::<T, P, O, true>(scene, p, slow)
+            if is_clear(binary, p, MARGIN as u16) {
+                linear::<T, P, O, true>(binary, p, slow)
             } else {
-                linear::<T, P, O, false>(scene, p, slow)
+                linear::<T, P, O, false>(binary, p, slow)
             }
         }
-        SubPixel::None => half_pixel(scene, p),
+        SubPixel::None => half_pixel(binary, p),
         #[cfg(feature = "erf")]
-        SubPixel::Erf => erf::locate(scene, p).and_then(towards_light),
+        SubPixel::Erf => erf::locate(binary, p).and_then(towards_light),
         #[cfg(feature = "zju")]
-        SubPixel::Zernike => zernike::locate(scene, p).and_then(towards_light),
+        SubPixel::Zernike => zernike::locate(binary, p).and_then(towards_light),
     }
 }
 
 /// The edge point at a border pixel, to be kept when the picture is not: of the methods that locate it along an axis.
 #[inline(never)]
 pub(crate) fn pass<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     p: Pixel,
-) -> Option<Passed> {
-    let Found { point, lit, fallback, clipped } = locate(scene, config, p, &mut 0)?;
+) -> Option<StreamedPoint> {
+    let EdgePoint { point, lit, fallback, clipped } = locate(binary, config, p, &mut 0)?;
     // The difference is exact, and so is the sum that makes the point again.
     let (dx, dy) = lit.towards_dark();
     let off =
         (point.u - T::from_i32(p.x.into())) * T::from_i32(dx) + (point.v - T::from_i32(p.y.into())) * T::from_i32(dy);
-    Some(Passed { towards_dark_px: off.to_f64() as f32, lit, fallback, clipped, cut: false })
+    Some(StreamedPoint { towards_dark_px: off.to_f64() as f32, lit, fallback, clipped, cut: false })
 }
 
 /// Reads around one border pixel; `None` beyond the region and under the mask. `FREE`: no read within reach needs a
 /// check.
 struct Around<'a, 'b, T, P, O, const FREE: bool> {
-    scene: &'a Scene<'b, T, P, O>,
+    binary: &'a BinaryPicture<'b, T, P, O>,
     x: i32,
     y: i32,
     index: usize,
@@ -222,14 +222,14 @@ struct Around<'a, 'b, T, P, O, const FREE: bool> {
 }
 
 impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b, T, P, O, FREE> {
-    fn new(scene: &'a Scene<'b, T, P, O>, p: Pixel) -> Self {
+    fn new(binary: &'a BinaryPicture<'b, T, P, O>, p: Pixel) -> Self {
         Self {
-            scene,
+            binary,
             x: i32::from(p.x),
             y: i32::from(p.y),
-            index: scene.picture.index(p.x, p.y),
-            across: scene.picture.across() as isize,
-            down: scene.picture.down() as isize,
+            index: binary.picture.index(p.x, p.y),
+            across: binary.picture.across() as isize,
+            down: binary.picture.down() as isize,
         }
     }
 
@@ -241,7 +241,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
     /// The pixel (dx, dy) further, which stands `offset` further in memory.
     #[inline(always)]
     fn read(&self, dx: i32, dy: i32, offset: isize) -> Option<i32> {
-        read::<T, P, O, FREE>(self.scene, (self.x + dx, self.y + dy), self.index.wrapping_add_signed(offset))
+        read::<T, P, O, FREE>(self.binary, (self.x + dx, self.y + dy), self.index.wrapping_add_signed(offset))
     }
 
     /// Three pixels side by side, `dy` rows down.
@@ -252,10 +252,10 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
         }
         let (x, y) = (self.x as u16, (self.y + dy) as u16);
         for dx in [u16::MAX, 0, 1] {
-            self.scene.observer.pixel(x.wrapping_add(dx), y);
+            self.binary.observer.pixel(x.wrapping_add(dx), y);
         }
         let first = self.index.wrapping_add_signed(dy as isize * self.down - self.across);
-        Some(self.scene.picture.three(first).map(i32::from))
+        Some(self.binary.picture.three(first).map(i32::from))
     }
 
     /// The 3×3 neighbourhood.
@@ -306,7 +306,7 @@ impl<'a, 'b, 'c, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'a, 
 
 /// Reads in a straight line.
 struct Walk<'a, 'b, T, P, O, const FREE: bool> {
-    scene: &'a Scene<'b, T, P, O>,
+    binary: &'a BinaryPicture<'b, T, P, O>,
     /// Column and row of the next pixel, and the step to the one after it.
     at: (i32, i32),
     step: (i32, i32),
@@ -318,7 +318,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O,
     /// Four times the brightness of the next pixel; [`UNSEEN`] where nothing can be read.
     #[inline(always)]
     fn next(&mut self) -> i32 {
-        let seen = read::<T, P, O, FREE>(self.scene, self.at, self.index);
+        let seen = read::<T, P, O, FREE>(self.binary, self.at, self.index);
         self.at = (self.at.0 + self.step.0, self.at.1 + self.step.1);
         self.index = self.index.wrapping_add_signed(self.ahead);
         seen.map_or(UNSEEN, |v| 4 * v)
@@ -329,15 +329,15 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O,
 /// known to be within and unmasked.
 #[inline(always)]
 fn read<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     (x, y): (i32, i32),
     index: usize,
 ) -> Option<i32> {
-    if !FREE && !scene.region.counts(x, y) {
+    if !FREE && !binary.region.counts(x, y) {
         return None;
     }
-    scene.observer.pixel(x as u16, y as u16);
-    Some(i32::from(scene.picture.read(index)))
+    binary.observer.pixel(x as u16, y as u16);
+    Some(i32::from(binary.picture.read(index)))
 }
 
 /// Sums over columns (left to right) and rows (downwards) of a 3×3 neighbourhood, smoothed with 1-2-1.
@@ -383,17 +383,20 @@ fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
 
 /// A point of the methods that know the gradient's direction.
 #[cfg(any(feature = "erf", feature = "zju"))]
-fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<Found<T>> {
+fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<EdgePoint<T>> {
     // Whole numbers are what `orientation` compares; the direction is a unit vector.
     let scale = T::from_f64(1024.0);
     let (lit, _, _) = orientation(((x * scale).to_i32(), (y * scale).to_i32()))?;
-    Some(Found::plain(point, lit))
+    Some(EdgePoint::plain(point, lit))
 }
 
-fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel) -> Option<Found<T>> {
-    let around = Around::<T, P, O, false>::new(scene, p);
+fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    p: Pixel,
+) -> Option<EdgePoint<T>> {
+    let around = Around::<T, P, O, false>::new(binary, p);
     let (lit, dx, dy) = orientation(around.near()?.gradient())?;
-    Some(Found::plain(point_off(p, (dx, dy), T::from_f64(0.5)), lit))
+    Some(EdgePoint::plain(point_off(p, (dx, dy), T::from_f64(0.5)), lit))
 }
 
 fn point_off<T: Real>(p: Pixel, (dx, dy): (i32, i32), towards_dark: T) -> ImagePoint<T> {
@@ -406,20 +409,20 @@ fn point_off<T: Real>(p: Pixel, (dx, dy): (i32, i32), towards_dark: T) -> ImageP
 /// The crossing of the mid-level; also whether the global level had to stand in for it.
 #[inline(always)]
 fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     slow: &mut u32,
-) -> Option<Found<T>> {
-    let around = Around::<T, P, O, FREE>::new(scene, p);
+) -> Option<EdgePoint<T>> {
+    let around = Around::<T, P, O, FREE>::new(binary, p);
     let near = around.near()?;
     let gradient = near.gradient();
     let (lit, dx, dy) = orientation(gradient)?;
-    let level = i32::from(scene.level);
-    if scene.blooms {
+    let level = i32::from(binary.level);
+    if binary.blooms {
         let [_, inner, outer] = near.across(lit);
         let level4 = (4 * level).max(outer + 1).min(inner);
         let part = T::from_i32(inner - level4) / T::from_i32((inner - outer).max(1));
-        return (inner > outer).then(|| Found::plain(point_off(p, (dx, dy), part), lit));
+        return (inner > outer).then(|| EdgePoint::plain(point_off(p, (dx, dy), part), lit));
     }
     // The edge fades over level / gradient pixels; at the top of a narrow one the gradient says less than how soon it is dark.
     // A step is half of that, so that air seen from a rocket is read to where it ends; but of haze through a long lens, below
@@ -428,19 +431,19 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let line = Line::new(&around, (dx, dy), 1);
     if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
         let Crossing { part, fallback, clipped, .. } = line.crossing(near.across(lit))?;
-        return Some(Found { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
+        return Some(EdgePoint { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
     }
     *slow += 1;
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
-    let found = if FREE && is_clear(scene, p, (MARGIN * step) as u16) {
-        in_steps::<T, P, O, true>(scene, p, (dx, dy), step)?
+    let found = if FREE && is_clear(binary, p, (MARGIN * step) as u16) {
+        in_steps::<T, P, O, true>(binary, p, (dx, dy), step)?
     } else {
-        in_steps::<T, P, O, false>(scene, p, (dx, dy), step)?
+        in_steps::<T, P, O, false>(binary, p, (dx, dy), step)?
     };
     let Wide { off, fallback, clipped, .. } =
-        if found.rising { climb(scene, p, (dx, dy), step, found, slow) } else { found };
-    Some(Found { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
+        if found.rising { climb(binary, p, (dx, dy), step, found, slow) } else { found };
+    Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
 }
 
 /// Most times that a profile is read again from where it crosses.
@@ -450,7 +453,7 @@ const CLIMBS: u32 = 4;
 /// led to its border: it is read again about its crossing, until that is its middle.
 #[inline(never)]
 fn climb<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     (dx, dy): (i32, i32),
     step: i32,
@@ -464,11 +467,11 @@ fn climb<T: Real, P: Pixels, O: Observer<T>>(
             break;
         }
         let (x, y) = (i32::from(p.x) + dx * (whole + moved), i32::from(p.y) + dy * (whole + moved));
-        if !scene.region.counts(x, y) {
+        if !binary.region.counts(x, y) {
             break;
         }
         *slow += 1;
-        let Some(next) = in_steps::<T, P, O, false>(scene, Pixel { x: x as u16, y: y as u16 }, (dx, dy), step) else {
+        let Some(next) = in_steps::<T, P, O, false>(binary, Pixel { x: x as u16, y: y as u16 }, (dx, dy), step) else {
             break;
         };
         whole += moved;
@@ -479,8 +482,8 @@ fn climb<T: Real, P: Pixels, O: Observer<T>>(
 
 /// Whether neither the region's border nor a mask is within `margin` pixels.
 #[inline(always)]
-fn is_clear<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, p: Pixel, margin: u16) -> bool {
-    let region = scene.region;
+fn is_clear<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, p: Pixel, margin: u16) -> bool {
+    let region = binary.region;
     region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || region.clearance(p.x, p.y, margin) == margin)
 }
 
@@ -496,12 +499,12 @@ struct Wide<T> {
 /// As [`linear`], `step` pixels a step.
 #[inline(never)]
 fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     (dx, dy): (i32, i32),
     step: i32,
 ) -> Option<Wide<T>> {
-    let around = Around::<T, P, O, FREE>::new(scene, p);
+    let around = Around::<T, P, O, FREE>::new(binary, p);
     let line = Line::new(&around, (dx, dy), step);
     let Crossing { part, mid2, fallback, clipped, rising } =
         line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
@@ -538,10 +541,10 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
     /// One pixel after another from `k` steps towards the dark, in the direction `out`.
     #[inline(always)]
     fn outwards(&self, k: i32, out: i32) -> Walk<'_, '_, T, P, O, FREE> {
-        let Around { scene, x, y, index, .. } = *self.around;
+        let Around { binary, x, y, index, .. } = *self.around;
         let (dx, dy) = self.step;
         Walk {
-            scene,
+            binary,
             at: (x + k * dx, y + k * dy),
             step: (out * dx, out * dy),
             index: index.wrapping_add_signed(k as isize * self.ahead),
@@ -590,13 +593,13 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
     /// From the smoothed brightness one step to the lit side, here, and one step to the dark side.
     #[inline(always)]
     fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3]) -> Option<Crossing<T>> {
-        let scene = self.around.scene;
+        let binary = self.around.binary;
         // In one row for the plateaus, of which the mean of several is taken, over three rows for the crossing.
         let (bright, inner) = self.plateau::<true>(first_lit, first_dark);
         let (dim, outer) = self.plateau::<false>(first_dark, bright);
         let contrast = bright - dim;
-        let level4 = i32::from(scene.level) * 4;
-        let (mid2, fallback) = if contrast >= 4 * scene.least_contrast {
+        let level4 = i32::from(binary.level) * 4;
+        let (mid2, fallback) = if contrast >= 4 * binary.least_contrast {
             (bright + dim, false)
         } else if first_lit > first_dark {
             (2 * level4.max(first_dark + 1).min(first_lit), true)
@@ -624,7 +627,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
             return None;
         }
         let part = T::from_i32(k) + T::from_i32(2 * a - mid2) / T::from_i32(2 * (a - b));
-        let full = i32::from(scene.picture.full_scale());
+        let full = i32::from(binary.picture.full_scale());
         let clipped = bright >= 4 * (full - full / CLIPPED_PART);
         Some(Crossing { part, mid2, fallback, clipped, rising: inner <= -REACH })
     }
@@ -652,19 +655,19 @@ mod tests {
     fn points(data: &[u8], config: &Config, level: u16) -> Vec<(f64, f64)> {
         let grey = Grey::try_new(data, Layout::packed(100, 100, 1, 8)).unwrap();
         let region = Region::<f64>::whole(100, 100);
-        let scene = Scene::new(&grey, &region, level, &Unobserved);
+        let binary = BinaryPicture::new(&grey, &region, level, &Unobserved);
         let border: Vec<Pixel> = (0..100u16)
             .flat_map(|y| (0..100u16).map(move |x| Pixel { x, y }))
             .filter(|p| (20..80).contains(&p.x) && (20..80).contains(&p.y))
-            .filter(|p| scene.lit(p.x, p.y))
+            .filter(|p| binary.lit(p.x, p.y))
             .filter(|p| {
                 [(1, 0), (-1, 0), (0, 1), (0, -1)]
                     .iter()
-                    .any(|(dx, dy)| !scene.lit((i32::from(p.x) + dx) as u16, (i32::from(p.y) + dy) as u16))
+                    .any(|(dx, dy)| !binary.lit((i32::from(p.x) + dx) as u16, (i32::from(p.y) + dy) as u16))
             })
             .collect();
         let mut blocks = [Block::default(); 64];
-        let made = pick(&scene, config, &border, 0, &mut blocks, u32::MAX);
+        let made = pick(&binary, config, &border, 0, &mut blocks, u32::MAX);
         assert!(made.count > 30, "{made:?}");
         blocks
             .iter()
@@ -708,9 +711,9 @@ mod tests {
                 let data = picture([0.0, 1.0], 49.8, width, 20.0, bright);
                 let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
                 let region = Region::<f64>::whole(100, 100);
-                let scene = Scene::new(&grey, &region, 70, &Unobserved);
+                let binary = BinaryPicture::new(&grey, &region, 70, &Unobserved);
                 let mut blocks = [Block::default(); 8];
-                let made = pick(&scene, &Config::default(), &border, 0, &mut blocks, u32::MAX);
+                let made = pick(&binary, &Config::default(), &border, 0, &mut blocks, u32::MAX);
                 assert_eq!((made.count, made.clipped), (60, if all { 60 } else { 0 }), "{width} {bright}");
             }
         }
@@ -722,10 +725,13 @@ mod tests {
         let config = Config { keep_points: 16, ..Config::default() };
         let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
         let region = Region::<f32>::whole(100, 100);
-        let scene = Scene::new(&grey, &region, 120, &Unobserved);
+        let binary = BinaryPicture::new(&grey, &region, 120, &Unobserved);
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
         let mut blocks = [Block::default(); 2];
-        assert_eq!(pick(&scene, &config, &border, 0, &mut blocks, u32::MAX), Points { count: 15, ..Points::default() });
+        assert_eq!(
+            pick(&binary, &config, &border, 0, &mut blocks, u32::MAX),
+            Points { count: 15, ..Points::default() }
+        );
         let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
         assert_eq!((first, last), (22.0, 78.0));
     }

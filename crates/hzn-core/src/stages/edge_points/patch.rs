@@ -3,7 +3,7 @@
 use crate::base::real::Real;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 
 /// Pixels from the centre to each side.
 pub(super) const HALF: i32 = 3;
@@ -18,11 +18,11 @@ pub(super) struct Patch<T> {
 
 impl<T: Real> Patch<T> {
     /// Reads the picture; `None` where the patch leaves the region or touches a mask.
-    pub(super) fn read<P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> Option<Self> {
+    pub(super) fn read<P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> Option<Self> {
         let mut rows = [[T::ZERO; SIDE]; SIDE];
         for (row, dy) in rows.iter_mut().zip(-HALF..) {
             for (value, dx) in row.iter_mut().zip(-HALF..) {
-                *value = T::from_i32(brightness(scene, x + dx, y + dy)?);
+                *value = T::from_i32(brightness(binary, x + dx, y + dy)?);
             }
         }
         Some(Self { rows })
@@ -31,14 +31,14 @@ impl<T: Real> Patch<T> {
 
 /// Brightness of a pixel; `None` beyond the region and under the mask.
 pub(super) fn brightness<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     x: i32,
     y: i32,
 ) -> Option<i32> {
     let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return None };
-    if !scene.region.contains(x, y) || scene.region.masked(x, y) {
+    if !binary.region.contains(x, y) || binary.region.masked(x, y) {
         return None;
     }
-    scene.observer.pixel(x, y);
-    Some(i32::from(scene.picture.at(x, y)))
+    binary.observer.pixel(x, y);
+    Some(i32::from(binary.picture.at(x, y)))
 }

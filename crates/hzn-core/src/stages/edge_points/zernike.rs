@@ -11,7 +11,7 @@ use crate::base::real::Real;
 use crate::geometry::pixel::{ImagePoint, Pixel};
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 
 /// Radius of the disc in pixels.
 const RADIUS_PX: f64 = 3.5;
@@ -33,19 +33,23 @@ const BOWL: [[f64; 4]; 4] = [
 
 /// The edge next to a border pixel and the direction (du, dv) of its gradient; `None` without an edge within reach.
 pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
 ) -> Option<(ImagePoint<T>, [T; 2])> {
-    let (x, y) = steepest(scene, i32::from(p.x), i32::from(p.y))?;
-    let (offset, direction) = edge(&Patch::read(scene, x, y)?)?;
+    let (x, y) = steepest(binary, i32::from(p.x), i32::from(p.y))?;
+    let (offset, direction) = edge(&Patch::read(binary, x, y)?)?;
     let (u, v) = (T::from_i32(x) + offset * direction[0], T::from_i32(y) + offset * direction[1]);
     Some((ImagePoint { u, v }, direction))
 }
 
 /// Where Sobel's gradient is largest, up to a pixel from the border pixel along the axis on which it is larger: the
 /// edge pixel of a gradient picture thinned to its maxima.
-fn steepest<T: Real, P: Pixels, O: Observer<T>>(scene: &Scene<'_, T, P, O>, x: i32, y: i32) -> Option<(i32, i32)> {
-    let at = |x: i32, y: i32| brightness(scene, x, y);
+fn steepest<T: Real, P: Pixels, O: Observer<T>>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    x: i32,
+    y: i32,
+) -> Option<(i32, i32)> {
+    let at = |x: i32, y: i32| brightness(binary, x, y);
     // Eight times the change a pixel along (dx, dy).
     let slope = |x: i32, y: i32, dx: i32, dy: i32| -> Option<i32> {
         let line = |k: i32| -> Option<i32> {

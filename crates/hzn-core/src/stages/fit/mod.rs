@@ -362,7 +362,7 @@ fn robust<T: Real>(
 ) -> Option<(State<T>, Sums<T>)> {
     let (widest, narrowest) = (threshold_px * T::from_f64(2.0), threshold_px * T::from_f64(0.5));
     let mut cutoff = threshold_px * T::from_f64(3.0);
-    let prior = Prior::new(blocks, expected, config, noise);
+    let prior = HalfAngleRow::new(blocks, expected, config, noise);
     let e = unit(&start.e)?;
     let (b1, b2) = basis(&e);
     let k = T::one() - if known { expected.cos } else { start.c };
@@ -440,12 +440,12 @@ fn clamp<T: Real>(k: T) -> T {
 }
 
 /// The expected half-angle as a row of the normal equations.
-struct Prior<T> {
+struct HalfAngleRow<T> {
     cos: T,
     weight: T,
 }
 
-impl<T: Real> Prior<T> {
+impl<T: Real> HalfAngleRow<T> {
     /// Weighed so that an edge counts for as many points as it has independent errors: one in two correlation lengths.
     fn new(blocks: &[Block<T>], expected: &Expected<T>, config: &Config, noise: &edge_noise::Config) -> Option<Self> {
         if expected.free || config.half_angle == HalfAngle::Free {
@@ -487,7 +487,7 @@ impl<T: Real> Sums<T> {
     }
 
     /// The step (δ₁₂, δc) with the half-angle free or under its prior.
-    fn step(&self, mean: [T; 2], prior: Option<&Prior<T>>, c: T) -> Option<([T; 2], T)> {
+    fn step(&self, mean: [T; 2], prior: Option<&HalfAngleRow<T>>, c: T) -> Option<([T; 2], T)> {
         let [mut n11, mut n12, mut n13, mut n22, mut n23, mut n33] = self.n;
         let [mut g1, mut g2, mut g3] = self.g;
         if let Some(p) = prior {

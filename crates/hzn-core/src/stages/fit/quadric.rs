@@ -45,12 +45,12 @@ impl<T: Real> Quadric<T> {
     /// `weigh_above_rad` off the optical axis. `None` when the points do not determine a cone about one axis.
     pub(crate) fn fit(blocks: &[Block<T>], weigh_above_rad: T) -> Option<Self> {
         let v = tls(blocks)?;
-        let shape = Shape::of(blocks, &v)?;
+        let shape = Shape::new(blocks, &v)?;
         let (_, cos_limit) = weigh_above_rad.sin_cos();
         let weighted = weigh_above_rad <= T::ZERO || shape.e.z < cos_limit;
         let (v, shape) = if weighted {
             let v = wtls(blocks, v)?;
-            (v, Shape::of(blocks, &v)?)
+            (v, Shape::new(blocks, &v)?)
         } else {
             (v, shape)
         };
@@ -206,7 +206,7 @@ struct Shape<T> {
 
 impl<T: Real> Shape<T> {
     /// The eigenvector of the eigenvalue with the distinct sign, towards the points; `None` when there is no such one.
-    fn of(blocks: &[Block<T>], v: &[T; N]) -> Option<Self> {
+    fn new(blocks: &[Block<T>], v: &[T; N]) -> Option<Self> {
         let half = T::from_f64(0.5);
         let m = [
             [v[0] + v[5], v[1] * half, v[3] * half],

@@ -8,7 +8,7 @@ use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 
 /// Places that are looked at from the limb inwards to the border of the region, evenly.
 const PLACES: i32 = 16;
@@ -28,7 +28,7 @@ const SKY_PART: f64 = 0.1;
 pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     sky: &sky::Sky<T>,
     disc_px: T,
@@ -43,12 +43,14 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
         let at = |px: i32| {
             let (x, y) = ((from.u + du * T::from_i32(px)).to_i32(), (from.v + dv * T::from_i32(px)).to_i32());
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            scene.region.contains(x, y).then_some((x, y))
+            binary.region.contains(x, y).then_some((x, y))
         };
         let seen = |px: i32| {
-            at(px).filter(|&(x, y)| !scene.region.masked(x, y)).map(|(x, y)| T::from_i32(scene.brightness(x, y).into()))
+            at(px)
+                .filter(|&(x, y)| !binary.region.masked(x, y))
+                .map(|(x, y)| T::from_i32(binary.brightness(x, y).into()))
         };
-        let most = i32::from(scene.region.width()) + i32::from(scene.region.height());
+        let most = i32::from(binary.region.width()) + i32::from(binary.region.height());
         let end = inside(&at, most.min((disc_px * T::from_f64(ACROSS)).to_i32()));
         if end < SHORTEST_PX {
             continue;

@@ -8,7 +8,7 @@ use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 
 /// Length of edge whose points are taken together, pixels: a direction is then known to a few degrees.
 const BOX_PX: f64 = 16.0;
@@ -77,7 +77,7 @@ struct Edge<'a, 'b, T, P, O> {
     points: usize,
     curve: &'a Curve<T>,
     camera: &'a Camera<T>,
-    scene: &'a Scene<'b, T, P, O>,
+    binary: &'a BinaryPicture<'b, T, P, O>,
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
@@ -116,8 +116,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
             let x = (at[0] - dy / norm * T::from_i32(px) + half).to_i32();
             let y = (at[1] + dx / norm * T::from_i32(px) + half).to_i32();
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            let counts = self.scene.region.contains(x, y) && !self.scene.region.masked(x, y);
-            counts.then(|| i32::from(self.scene.brightness(x, y)))
+            let counts = self.binary.region.contains(x, y) && !self.binary.region.masked(x, y);
+            counts.then(|| i32::from(self.binary.brightness(x, y)))
         };
         Some((side(ASIDE_PX)? - side(-ASIDE_PX)?).abs())
     }
@@ -134,11 +134,11 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     curve: &Curve<T>,
     noise_px: T,
     support: T,
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
 ) -> bool {
-    let edge = Edge { blocks, points: points as usize, curve, camera, scene };
+    let edge = Edge { blocks, points: points as usize, curve, camera, binary };
     let Some(run) = longest(blocks) else { return false };
     let off_cone = noise_px.max(T::from_f64(config.rival_floor_px)) * T::from_f64(3.0);
     let (mut away, mut smooth, mut near) = (T::ZERO, Mean::default(), Mean::default());

@@ -21,7 +21,7 @@ use crate::image::Pixels;
 use crate::model::body::Expected;
 use crate::model::observer::Observer;
 use crate::model::verdict::Verdict;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 use crate::stages::covariance::Fused;
 use crate::stages::fit::{self, Fit};
 
@@ -290,13 +290,13 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     blocks: &[Block<T>],
     points: u32,
     raised: T,
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
 ) -> Judged<T> {
     let limb_px = inliers(blocks, 1)
         .next()
-        .map_or(T::ZERO, |(b, l)| view::limb_in_view(&fused.e, fused.c, &b.ray(l), camera, scene.region));
+        .map_or(T::ZERO, |(b, l)| view::limb_in_view(&fused.e, fused.c, &b.ray(l), camera, binary.region));
     let covered_px = view::covered(&fused.e, blocks);
     let support = (covered_px / limb_px.max(T::one())).min(T::one());
     let sigma_limit = T::from_f64(config.max_sigma_deg.to_radians());
@@ -322,14 +322,14 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     {
         Verdict::Indistinct
     } else {
-        surroundings(fused, expected, blocks, scene, camera, config)
+        surroundings(fused, expected, blocks, binary, camera, config)
     };
     let verdict = match verdict {
         Verdict::Passed => attitude::verdict(&fused.e, sigma_max_rad, expected, config),
         failed => failed,
     };
     let verdict = match verdict {
-        Verdict::Passed => rivals(fit, fused, expected, blocks, points, support, scene, camera, config),
+        Verdict::Passed => rivals(fit, fused, expected, blocks, points, support, binary, camera, config),
         failed => failed,
     };
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support }
@@ -346,11 +346,11 @@ fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
     fused: &Fused<T>,
     expected: &Expected<T>,
     blocks: &[Block<T>],
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
 ) -> Verdict {
-    let sky = sky::beyond(&fused.e, blocks, scene, camera);
+    let sky = sky::beyond(&fused.e, blocks, binary, camera);
     if sky.lit > T::from_f64(config.max_lit_sky) {
         return Verdict::NoSky;
     }
@@ -361,9 +361,9 @@ fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
     // A disc that lies whole in the picture may be a crescent, which is a band.
     let disc_px = disc_px(expected, camera);
     let wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
-    let looks = !P::PASSED && config.max_band < 1.0 && wide;
+    let looks = !P::STREAMED && config.max_band < 1.0 && wide;
     let step = T::from_f64(config.band_step);
-    if looks && band::banded(&fused.e, blocks, scene, camera, &sky, disc_px, step) >= T::from_f64(config.max_band) {
+    if looks && band::banded(&fused.e, blocks, binary, camera, &sky, disc_px, step) >= T::from_f64(config.max_band) {
         return Verdict::Band;
     }
     Verdict::Passed
@@ -384,7 +384,7 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     blocks: &[Block<T>],
     points: u32,
     support: T,
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
 ) -> Verdict {
@@ -422,9 +422,9 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     if half_angle::disagrees(fit, fused, expected, blocks, config) {
         return Verdict::HalfAngle;
     }
-    if !P::PASSED
+    if !P::STREAMED
         && fit.inliers < points
-        && departure::departs(blocks, points, &curve, noise, support, scene, camera, config)
+        && departure::departs(blocks, points, &curve, noise, support, binary, camera, config)
     {
         return Verdict::Departure;
     }
@@ -498,7 +498,7 @@ const PLATEAU_PX: i32 = 6;
 pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
 ) -> Option<u16> {
     let (mut dark, mut lit, mut looks) = (0u32, 0u32, 0u32);
@@ -510,7 +510,7 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
             let px = T::from_i32(px);
             let (x, y) = ((from.u + gu / norm * px).to_i32(), (from.v + gv / norm * px).to_i32());
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            (scene.region.contains(x, y) && !scene.region.masked(x, y)).then(|| u32::from(scene.brightness(x, y)))
+            (binary.region.contains(x, y) && !binary.region.masked(x, y)).then(|| u32::from(binary.brightness(x, y)))
         };
         if let (Some(d), Some(l)) = (at(-PLATEAU_PX), at(PLATEAU_PX)) {
             (dark, lit, looks) = (dark + d, lit + l, looks + 1);

@@ -8,7 +8,7 @@ use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
-use crate::stages::contour::Scene;
+use crate::stages::contour::BinaryPicture;
 
 /// Distance of the nearest look in pixels; each next is twice as far.
 const NEAREST_PX: f64 = 16.0;
@@ -29,7 +29,7 @@ pub(super) struct Sky<T> {
 pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
-    scene: &Scene<'_, T, P, O>,
+    binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
 ) -> Sky<T> {
     let (mut looks, mut lit) = (0, 0);
@@ -43,15 +43,15 @@ pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
         for _ in 0..OUTWARDS {
             let (x, y) = ((from.u - gu / norm * distance).to_i32(), (from.v - gv / norm * distance).to_i32());
             let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { break };
-            if !scene.region.contains(x, y) {
+            if !binary.region.contains(x, y) {
                 break;
             }
-            if !scene.region.masked(x, y) {
-                let brightness = scene.brightness(x, y);
+            if !binary.region.masked(x, y) {
+                let brightness = binary.brightness(x, y);
                 fading = fading.filter(|&before| brightness < before).map(|_| brightness);
                 if distance > T::ZERO {
                     looks += 1;
-                    lit += i32::from(fading.is_none() && brightness >= scene.level);
+                    lit += i32::from(fading.is_none() && brightness >= binary.level);
                     let _ = seen.push(brightness);
                 }
             }

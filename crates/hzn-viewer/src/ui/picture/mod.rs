@@ -14,7 +14,7 @@ use crate::model::Plane;
 use crate::model::View;
 use crate::model::settings::Layer;
 use crate::model::view::Point;
-use crate::work::Sight;
+use crate::work::FrameView;
 pub(super) use mask::toggle as toggle_mask;
 use read_out::{label, notice};
 use stage::{Stage, area};
@@ -23,7 +23,7 @@ pub(super) use textures::Textures;
 /// How near the pointer must be to a corner, screen points.
 const REACH: f64 = 9.0;
 
-fn size_of(sight: &Sight) -> Option<Point> {
+fn size_of(sight: &FrameView) -> Option<Point> {
     let layout = sight.picture.as_ref().ok()?.layout;
     Some([layout.width.into(), layout.height.into()])
 }
@@ -70,7 +70,7 @@ fn welcome(viewer: &mut Viewer, ui: &mut Ui) {
     });
 }
 
-fn one(viewer: &mut Viewer, ui: &mut Ui, sight: &Sight, rect: Rect, pane: usize) {
+fn one(viewer: &mut Viewer, ui: &mut Ui, sight: &FrameView, rect: Rect, pane: usize) {
     let response = ui.interact(rect, ui.scope_id().with(("picture", pane)), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Picture {}", sight.name)));
     let painter = ui.painter_at(rect);

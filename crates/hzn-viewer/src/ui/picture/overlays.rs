@@ -8,11 +8,11 @@ use crate::model::settings::Layer;
 use crate::model::view::Point;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
-use crate::work::Sight;
-use crate::work::sight::{Answer, Outcome};
+use crate::work::FrameView;
+use crate::work::frame_view::{BodyResult, Outcome};
 
 /// Everything that is switched on.
-pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &Sight, outcome: &Outcome, stage: &Stage<'_>) {
+pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &FrameView, outcome: &Outcome, stage: &Stage<'_>) {
     let on = |layer| viewer.settings.shows(layer);
     if on(Layer::Mask) {
         for polygon in &outcome.config.mask.polygons_px {
@@ -57,7 +57,7 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &Sight, outcome: &
 }
 
 /// Where Sun and Moon should be: from the time, the position and the attitude, or from frames.csv or the truth.
-fn sky(viewer: &Viewer, sight: &Sight, stage: &Stage<'_>) -> Vec<(&'static str, Pos2)> {
+fn sky(viewer: &Viewer, sight: &FrameView, stage: &Stage<'_>) -> Vec<(&'static str, Pos2)> {
     let Some(camera) = stage.camera else { return Vec::new() };
     let mut out = Vec::new();
     let mut add = |name, direction: Option<[f64; 3]>| {
@@ -82,7 +82,7 @@ fn from_ephemeris(data: &hzn_calib::FrameData, place: impl Fn(f64) -> hzn_nav::e
     Some(turn.apply(&UnitVec3::try_new(seen.direction)?).xyz())
 }
 
-fn body(viewer: &Viewer, painter: &Painter, answer: &Answer, stage: &Stage<'_>) {
+fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, stage: &Stage<'_>) {
     let on = |layer| viewer.settings.shows(layer);
     let dot = (stage.scale() as f32 * 0.5).clamp(0.9, 5.0);
     if on(Layer::Edges) {
@@ -126,7 +126,7 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &Answer, stage: &Stage<'_>) 
 }
 
 /// An axis that is not in the picture: an arrow at its border, towards it.
-fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &Answer) {
+fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &BodyResult) {
     let (Some(s), Some(camera)) = (answer.solution(), stage.camera) else { return };
     let [x, y, _] = s.axis.xyz();
     let length = x.hypot(y);

@@ -5,8 +5,8 @@ use hzn_core::pixel::ImagePoint;
 
 use super::stage::Stage;
 use crate::model::{Plane, rows};
+use crate::work::frame_view::{BodyResult, FrameView, Outcome, Residual};
 use crate::work::paint;
-use crate::work::sight::{Answer, Outcome, Residual, Sight};
 
 /// Screen points a picture pixel from which single pixels show their values.
 const VALUES_FROM: f64 = 34.0;
@@ -15,7 +15,7 @@ const VALUES_FROM: f64 = 34.0;
 const REJECTED_REACH: f64 = 6.0;
 
 /// Values of single pixels, when they are large enough.
-pub(super) fn values(painter: &Painter, sight: &Sight, stage: &Stage<'_>, rect: Rect) {
+pub(super) fn values(painter: &Painter, sight: &FrameView, stage: &Stage<'_>, rect: Rect) {
     let (Ok(picture), Plane::Camera) = (&sight.picture, &stage.plane) else { return };
     if stage.scale() < VALUES_FROM {
         return;
@@ -35,7 +35,7 @@ pub(super) fn values(painter: &Painter, sight: &Sight, stage: &Stage<'_>, rect: 
 
 /// What is under the pointer.
 pub(super) fn under_pointer(
-    sight: &Sight,
+    sight: &FrameView,
     outcome: Option<&Outcome>,
     body: usize,
     stage: &Stage<'_>,
@@ -59,7 +59,7 @@ pub(super) fn under_pointer(
         return Some(text + if stage.camera.is_some() { "   outside of the image circle" } else { "" });
     };
     text += &format!("   ray ({rx:.4}, {ry:.4}, {rz:.4})   {:.3}° off axis", rz.clamp(-1.0, 1.0).acos().to_degrees());
-    if let Some(s) = outcome.and_then(|o| o.bodies.get(body)).and_then(Answer::solution) {
+    if let Some(s) = outcome.and_then(|o| o.bodies.get(body)).and_then(BodyResult::solution) {
         let angle = rows::angle_deg([rx, ry, rz], s.axis.xyz());
         let beyond = angle - s.fused_half_angle_rad.to_degrees();
         let side = if beyond > 0.0 { "outside of" } else { "inside" };

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use egui::{ColorImage, TextureFilter, TextureHandle, TextureOptions};
 
-use crate::work::Sight;
-use crate::work::sight::Shown;
+use crate::work::FrameView;
+use crate::work::frame_view::Shown;
 
 /// Pictures on the graphics card.
 #[derive(Default)]
@@ -16,7 +16,7 @@ pub(in crate::ui) struct Textures {
 
 impl Textures {
     /// Takes what is new in the sight.
-    pub(in crate::ui) fn take(&mut self, sight: Option<&Sight>, ctx: &egui::Context) {
+    pub(in crate::ui) fn take(&mut self, sight: Option<&FrameView>, ctx: &egui::Context) {
         // Single pixels stay squares, a large picture is smoothed.
         let smooth = TextureOptions {
             magnification: TextureFilter::Nearest,

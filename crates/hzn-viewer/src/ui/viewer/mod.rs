@@ -14,11 +14,11 @@ use hzn_sim::truth::Truth;
 
 use super::dialogs::Asking;
 use super::{command, compare, dialogs, help, picture, plots, side, stages, theme, timeline, top};
-use crate::model::{MaskEdit, Playback, Rows, Sequence, Session, Settings, View};
+use crate::model::{MaskEdit, Playback, ResultHistory, Sequence, Session, Settings, View};
+use crate::work::frame_view::BodyResult;
 use crate::work::open::{self, Request};
-use crate::work::sight::Answer;
 use crate::work::sweep::Sweep;
-use crate::work::{Engine, Job, Sight, Wake};
+use crate::work::{Engine, FrameView, Job, Wake};
 use threads::Asked;
 
 /// Frames that are decoded beforehand.
@@ -45,7 +45,7 @@ pub struct Viewer {
     /// Where they are kept; `None` leaves them.
     store: Option<PathBuf>,
     pub(super) sequence: Sequence,
-    pub(super) rows: Rows,
+    pub(super) rows: ResultHistory,
     pub(super) truth: HashMap<String, Vec<Truth>>,
     pub(super) session: Option<Session>,
     /// What the session is compared with, and its name.
@@ -56,7 +56,7 @@ pub struct Viewer {
     pub(super) body: usize,
     /// The candidate that is pointed at.
     pub(super) pointed: Option<u32>,
-    pub(super) sight: Option<Sight>,
+    pub(super) sight: Option<FrameView>,
     pub(super) messages: Vec<Message>,
     pub(super) asking: Option<Asking>,
     pub(super) mask: Option<MaskEdit>,
@@ -89,7 +89,7 @@ impl Viewer {
             settings,
             store,
             sequence: Sequence::default(),
-            rows: Rows::default(),
+            rows: ResultHistory::default(),
             truth: HashMap::new(),
             session: None,
             other: None,
@@ -152,7 +152,7 @@ impl Viewer {
     }
 
     /// The frame that is shown, once it is.
-    pub fn sight(&self) -> Option<&Sight> {
+    pub fn sight(&self) -> Option<&FrameView> {
         self.sight.as_ref()
     }
     /// The frames.
@@ -218,7 +218,7 @@ impl Viewer {
     }
 
     /// What was made of the body that is looked at.
-    pub(super) fn answer(&self) -> Option<&Answer> {
+    pub(super) fn answer(&self) -> Option<&BodyResult> {
         let outcome = self.sight.as_ref()?.answers.first()?;
         outcome.bodies.get(self.body).or(outcome.bodies.first())
     }

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use super::{AHEAD, AT_ONCE, Message, Viewer};
 use crate::model::settings::Layer;
-use crate::model::{Look, Place, Rows, Sequence, Session, View};
+use crate::model::{Look, Place, ResultHistory, Sequence, Session, View};
 use crate::ui::dialogs;
 use crate::work::open;
 use crate::work::sweep::{self, Sweep};
-use crate::work::{Ask, Setup, Sight};
+use crate::work::{Ask, FrameView, Setup};
 
 /// What was asked for last: nothing is asked for twice.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ impl Viewer {
         for event in opening {
             self.opened(event);
         }
-        let sights: Vec<Sight> = self.engine.answers().collect();
+        let sights: Vec<FrameView> = self.engine.answers().collect();
         for sight in sights {
             self.see(sight);
         }
@@ -60,7 +60,7 @@ impl Viewer {
     }
 
     /// A frame was looked at.
-    fn see(&mut self, sight: Sight) {
+    fn see(&mut self, sight: FrameView) {
         if let Some(outcome) = sight.answers.first()
             && self.session.as_ref().is_some_and(|s| s.changes() == sight.changes)
             && !outcome.bodies.is_empty()
@@ -80,7 +80,7 @@ impl Viewer {
                     folder: opened.folder,
                     ..Sequence::default()
                 };
-                (self.rows, self.truth) = (Rows::default(), opened.truth);
+                (self.rows, self.truth) = (ResultHistory::default(), opened.truth);
                 (self.sight, self.asked, self.sweep, self.mask) = (None, None, None, None);
                 (self.worst, self.body) = (0, 0);
                 self.view = View::FIT;

@@ -17,7 +17,7 @@ use hzn_core::status::Stage;
 use hzn_core::{Config, Observer, Report, Solution, body};
 use hzn_mcap::Row;
 use hzn_run::engine::trace::Edge;
-use hzn_run::engine::{AnySensor, Finished, Found, Traces, Watch};
+use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Traces, Watch};
 use hzn_run::source::Picture;
 use hzn_run::{explain, sink};
 
@@ -26,7 +26,7 @@ use crate::model::view::Point;
 
 /// One frame as the parameters make it.
 #[derive(Debug, Clone)]
-pub struct Sight {
+pub struct FrameView {
     /// Its place in the sequence.
     pub index: usize,
     /// Name of its picture.
@@ -66,7 +66,7 @@ pub struct Outcome {
     /// The configuration.
     pub config: Arc<Config>,
     /// Each body, in order.
-    pub bodies: Vec<Answer>,
+    pub bodies: Vec<BodyResult>,
     /// Why nothing was made of it: the picture has another size, or the like.
     pub refused: Option<String>,
     /// Pixels that were read, white in a transparent picture; only when it was asked for.
@@ -77,7 +77,7 @@ pub struct Outcome {
 
 /// What was made of one body.
 #[derive(Debug, Clone)]
-pub struct Answer {
+pub struct BodyResult {
     /// Which body.
     pub kind: body::Kind,
     /// The result as files hold it.
@@ -126,7 +126,7 @@ impl Residual {
     }
 }
 
-impl Answer {
+impl BodyResult {
     /// The solution, when there is one.
     pub fn solution(&self) -> Option<&Solution<f64>> {
         self.report.as_ref().ok()?.solution.as_ref()
@@ -139,18 +139,18 @@ impl Answer {
 }
 
 /// Pixels that were read, beside everything else that is watched.
-struct Touching {
+struct PixelTraces {
     traces: Traces,
     pixels: Option<RefCell<HashSet<(u16, u16)>>>,
 }
 
-impl Watch for Touching {
+impl Watch for PixelTraces {
     fn times(&self) -> Vec<Duration> {
         self.traces.times()
     }
 }
 
-impl<T: Real + Into<f64>> Observer<T> for Touching {
+impl<T: Real + Into<f64>> Observer<T> for PixelTraces {
     fn body(&self, which: u8) {
         Observer::<T>::body(&self.traces, which);
     }
@@ -184,7 +184,7 @@ impl<T: Real + Into<f64>> Observer<T> for Touching {
 
 /// A frame before a sensor looks at it.
 #[derive(Debug, Clone, Copy)]
-pub struct Subject<'a> {
+pub struct FrameInput<'a> {
     /// Place in the sequence.
     pub index: usize,
     /// Name of the picture.
@@ -198,8 +198,8 @@ pub struct Subject<'a> {
 }
 
 /// Processes a frame and gathers what there is to see. With `touched`, the pixels that were read too.
-pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, touched: bool) -> Outcome {
-    let Subject { index, name, time_s, data, picture } = subject;
+pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySensor, touched: bool) -> Outcome {
+    let FrameInput { index, name, time_s, data, picture } = subject;
     let mut outcome =
         Outcome { config: Arc::clone(config), bodies: Vec::new(), refused: None, touched: None, touched_pixels: None };
     let (w, h) = (picture.layout.width, picture.layout.height);
@@ -218,7 +218,7 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
         }
     };
     let bodies = config.each_body();
-    let watch = Touching { traces: Traces::new(bodies.len()), pixels: touched.then(RefCell::default) };
+    let watch = PixelTraces { traces: Traces::new(bodies.len()), pixels: touched.then(RefCell::default) };
     let watched = sensor.process_watched(&view, data, &watch);
     // Again for the time alone; but not where the level would come from the first look.
     let plain = if config.tracks() { watched } else { sensor.process(&view, data, None) };
@@ -227,7 +227,7 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
         name: name.to_owned(),
         time_s,
         data: data.cloned(),
-        found: plain.into_iter().map(Found::from).collect(),
+        found: plain.into_iter().map(BodyOutcome::from).collect(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
         traces: None,
@@ -243,7 +243,7 @@ pub fn look(subject: Subject<'_>, config: &Arc<Config>, sensor: &mut AnySensor, 
         let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref()).copied();
         let edges = trace.edges().clone();
         let chosen = solution.and_then(|s| edges.iter().find(|e| e.candidate == s.candidate));
-        outcome.bodies.push(Answer {
+        outcome.bodies.push(BodyResult {
             kind: body.kind,
             row,
             sample: trace.level().map(|(_, mean, n)| (mean, n)),
