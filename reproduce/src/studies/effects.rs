@@ -113,7 +113,10 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
             scenario.seed = SEED;
             scenario.capture.frames = u32::try_from(count)?;
             change(&mut scenario);
-            rows.push(cells(name, &Rendered::try_new(&scenario, false).with_context(|| format!("{scene}: {name}"))?)?);
+            rows.push(cells(
+                name,
+                &Rendered::from_scenario(&scenario, false).with_context(|| format!("{scene}: {name}"))?,
+            )?);
         }
         s.table([&format!("`{scene}`"), "found", "points", "curvature", "χ²", "edge RMS", "RMS", "NEES"], rows);
     }
