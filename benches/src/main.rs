@@ -23,7 +23,7 @@ use table::Results;
 const HELP: &str = "usage: cargo xtask bench [OPTION]...
   --frames N   distinct frames a case, 8 or more (default 8)
   --rounds N   times that every frame is measured (default 7)
-  --only WORD  cases whose name contains WORD (clean, cloudy, 640x480, ...); docs/benchmarks.md is left alone
+  --only WORD  cases whose name contains WORD (clean, cloudy, 640x480, ...); book/results/benchmarks.md is left alone
   --render     render the frames again even if they are there";
 
 /// What the command line says.
@@ -84,7 +84,7 @@ fn run(options: &Options) -> Result<(), String> {
     std::fs::write(folder.join("results.json"), json).map_err(text)?;
     if options.only.is_none() {
         std::fs::create_dir_all("docs").map_err(text)?;
-        std::fs::write("docs/benchmarks.md", results.markdown()).map_err(text)?;
+        std::fs::write("book/results/benchmarks.md", results.markdown()).map_err(text)?;
     }
     Ok(())
 }

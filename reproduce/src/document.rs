@@ -24,9 +24,9 @@ these words are calculations.
 /// A file that holds sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Document {
-    /// docs/reproduction.md, which is nothing but sections.
+    /// book/results/reproduction.md, which is nothing but sections.
     Reproduction,
-    /// docs/methods.md, which has places for some.
+    /// book/theory/methods.md, which has places for some.
     Methods,
 }
 
@@ -133,7 +133,7 @@ fn find<'a>(document: &'a str, name: &str) -> Option<&'a str> {
     Some(&rest[..to])
 }
 
-/// docs/reproduction.md with this section in its place; the others stay, in the order of the studies.
+/// book/results/reproduction.md with this section in its place; the others stay, in the order of the studies.
 fn put(document: &str, name: &str, section: &str) -> String {
     let mut out = HEAD.to_owned();
     for study in ALL.iter().filter(|s| s.document == Document::Reproduction) {

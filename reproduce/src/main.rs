@@ -1,7 +1,7 @@
 //! Our numbers beside the published ones, and accuracy and honesty on rendered flights: `cargo xtask reproduce`.
 //!
 //! A [`studies::Study`] is a name, a title and a function that measures and gives a [`document::Section`]; the list of
-//! them is `docs/reproduction.md`. To add one: a function in `studies`, a line in [`studies::ALL`].
+//! them is `book/results/reproduction.md`. To add one: a function in `studies`, a line in [`studies::ALL`].
 #![forbid(unsafe_code)]
 
 mod document;
@@ -15,7 +15,7 @@ use clap::Parser;
 
 use studies::{ALL, Effort};
 
-/// Measures again what docs/reproduction.md and parts of docs/methods.md say, and writes it.
+/// Measures again what book/results/reproduction.md and parts of book/theory/methods.md say, and writes it.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask reproduce")]
 struct Args {

@@ -1,4 +1,4 @@
-//! What the firmware costs in QEMU: instructions by stage, memory. Prints docs/firmware-cost.md; `--check FILE` compares with
+//! What the firmware costs in QEMU: instructions by stage, memory. Prints book/results/firmware-cost.md; `--check FILE` compares with
 //! an earlier one and fails when instructions, flash, static RAM or stack grew by more than 5 %. `--search FROM TO`: the most expensive of the pictures made
 //! with these seeds.
 

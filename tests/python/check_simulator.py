@@ -1,4 +1,4 @@
-"""Renders one simulated picture again with NumPy and OpenCV, from the model in docs/simulator.md, and compares.
+"""Renders one simulated picture again with NumPy and OpenCV, from the model in book/theory/simulator.md, and compares.
 
 usage: check_simulator.py HZN FOLDER
 

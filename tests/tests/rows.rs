@@ -125,7 +125,7 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
     assert!(ok >= 18 && wide * 2 < cases.len() as u32, "{ok} {wide}");
 }
 
-/// What the lists of docs/porting.md take, with their share of a 640×480 picture and of a large one.
+/// What the lists of book/guide/porting.md take, with their share of a 640×480 picture and of a large one.
 #[test]
 fn memory_without_a_frame() {
     type Vga = RowBuffers<u8, { ROWS_HELD as usize * 640 }, 480, 8192, 2560>;

@@ -17,7 +17,7 @@ const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
 /// The images of a board.
 const IMAGES: [&str; 4] = ["chain", "flight", "measure", "rows"];
 /// Where the costs are written down.
-const COSTS: &str = "docs/firmware-cost.md";
+const COSTS: &str = "book/results/firmware-cost.md";
 
 /// Builds every image and puts it where the tests find it: `target/firmware/BOARD/images`.
 pub(crate) fn build() -> Outcome {
@@ -87,7 +87,7 @@ fn linked_with(features: &[&str]) -> Result<PathBuf, Trouble> {
     Ok(built.join("flight"))
 }
 
-/// What the methods of published systems take of flash, as the table of docs/methods.md.
+/// What the methods of published systems take of flash, as the table of book/theory/methods.md.
 fn by_feature() -> Outcome {
     let mut table = "| features of hzn-core | flash, bytes |\n|---|---:|\n".to_owned();
     let each = METHODS.iter().map(core::slice::from_ref);

@@ -3,7 +3,7 @@
 //! ```text
 //! cargo xtask test     everything that must hold: format, lints, tests, documents, flight build, files, demo
 //! cargo xtask bench    hzn-core beside the OpenCV recipe, in one run
-//! cargo xtask reproduce  our numbers beside the published ones, into docs/reproduction.md
+//! cargo xtask reproduce  our numbers beside the published ones, into book/results/reproduction.md
 //! cargo xtask firmware the images for the flight computer, and what they cost in instructions
 //! cargo xtask viewer   the picture of the viewer's window in the documents
 //! ```
@@ -29,13 +29,13 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|viewer> [
                      CI=true turns a step that cannot run into a failure
   bench [ARG]...     hzn-core beside the OpenCV recipe; arguments go to hzn-benches (see --help there)
   bench run [ARG]... `hzn run` on PNGs beside decoding them alone
-  bench python       what the Python package costs beside the sensor, into crates/hzn-py/docs/measured.md
+  bench python       what the Python package costs beside the sensor, into book/results/python-measured.md
   bench ransac [--runs N] samplers of outliers beside each other, on simulated edge points
-  reproduce [STUDY]... measures again what docs/reproduction.md says, and writes it (see --help there)
+  reproduce [STUDY]... measures again what book/results/reproduction.md says, and writes it (see --help there)
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
-                     --write puts the table into docs/firmware-cost.md;
+                     --write puts the table into book/results/firmware-cost.md;
                      --by-feature says instead what the methods of published systems take of flash
-  viewer             makes docs/viewer.png anew, after `cargo xtask test demo`";
+  viewer             makes book/images/viewer.png anew, after `cargo xtask test demo`";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

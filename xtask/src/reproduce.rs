@@ -1,4 +1,4 @@
-//! Campaigns: our numbers beside the published ones, into docs/reproduction.md.
+//! Campaigns: our numbers beside the published ones, into book/results/reproduction.md.
 
 use crate::machine::root;
 use crate::steps::{self, Trouble, cargo};

@@ -119,7 +119,7 @@ pub(crate) fn run() -> Result<(), String> {
         Trouble::Failed(why) | Trouble::Missing(why) => why,
     };
     let picture = shot().map_err(told)?;
-    let kept = Path::new("docs/viewer.png");
+    let kept = Path::new("book/images/viewer.png");
     fs::copy(picture, kept).map_err(|e| e.to_string())?;
     println!("written: {}", kept.display());
     Ok(())

@@ -27,7 +27,7 @@ pub(crate) fn run_step(hzn: &Path) -> Outcome {
     steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
     steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider"]).arg(tests))?;
     // The site, with the reference out of the docstrings; its notebooks are executed on the way.
-    let config = fs::canonicalize(folder.join("mkdocs.yml"))?;
+    let config = fs::canonicalize("mkdocs.yml")?;
     let mut site = module(&["mkdocs", "build", "--strict", "--quiet", "--config-file"]);
     site.env("NO_MKDOCS_2_WARNING", "1");
     steps::run(site.arg(config).arg("--site-dir").arg(scratch.join("python-site")))
@@ -38,7 +38,7 @@ pub(crate) fn measure(args: &[String]) -> Outcome {
     let folder = fs::canonicalize(CRATE)?;
     let python = installed("release")?;
     let mut measure = Command::new(python);
-    measure.arg(folder.join("benches/measure.py")).arg(folder.join("docs/measured.md"));
+    measure.arg(folder.join("benches/measure.py")).arg(fs::canonicalize("book/results")?.join("python-measured.md"));
     steps::run(measure.args(args).current_dir(scratch()?))
 }
 

@@ -1,4 +1,4 @@
-//! The keys of sensor.toml as data: name, unit, meaning, limits. The table of docs/sensor-toml.md is the one place where
+//! The keys of sensor.toml as data: name, unit, meaning, limits. The table of book/reference/sensor-toml.md is the one place where
 //! they are described; it is read here, so that programs which show them cannot tell another story.
 
 use std::sync::OnceLock;
@@ -50,7 +50,7 @@ impl Key {
 /// All keys, in the order of the table.
 pub fn all() -> &'static [Key] {
     static KEYS: OnceLock<Vec<Key>> = OnceLock::new();
-    KEYS.get_or_init(|| table(include_str!("../../../docs/sensor-toml.md")))
+    KEYS.get_or_init(|| table(include_str!("../../../book/reference/sensor-toml.md")))
 }
 
 /// The keys of one section, in order.
@@ -172,7 +172,7 @@ mod tests {
         let config = crate::sensor::parse(CAMERA, Path::new("sensor.toml")).unwrap().config;
         for (section, values) in toml::Table::try_from(config).unwrap() {
             for (name, _) in values.as_table().into_iter().flatten() {
-                assert!(of(&section).any(|k| k.name == *name), "{section}.{name} is not in docs/sensor-toml.md");
+                assert!(of(&section).any(|k| k.name == *name), "{section}.{name} is not in book/reference/sensor-toml.md");
             }
         }
     }

@@ -69,12 +69,12 @@ fn a_sensor_file_brings_camera_body_and_noise() {
     place.run(&[&several[..], &["--body", "moon"]].concat()).expect(0);
 }
 
-/// The commands that docs/evaluation.md shows, with a sensor as `hzn simulate` writes it: its altitude is in frames.csv.
+/// The commands that book/guide/evaluation.md shows, with a sensor as `hzn simulate` writes it: its altitude is in frames.csv.
 #[test]
 fn the_examples_of_the_docs_run() {
     let place = Place::new();
     place.write("sensor.toml", common::SENSOR.replace("altitude_km = 400.0\n", "").as_bytes());
-    let docs = include_str!("../../../docs/evaluation.md");
+    let docs = include_str!("../../../book/guide/evaluation.md");
     let examples: Vec<&str> = docs.lines().filter(|l| l.starts_with("hzn sensitivity")).collect();
     assert!(examples.len() >= 5, "{examples:?}");
     for example in examples {

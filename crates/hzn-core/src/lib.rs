@@ -20,7 +20,7 @@
 //! | [`covariance`] | [`covariance::Config`] | the fit and the noise model | covariance, and the expected half-angle fused |
 //! | [`select`] | [`gates::Config`] | the answer | a verdict; the best of all candidates |
 //!
-//! Each module begins with its equations and their source; the project's docs/math.md has them in one place. They are tested
+//! Each module begins with its equations and their source; the project's book/theory/math.md has them in one place. They are tested
 //! beside the code, and against data of other programs (`golden`).
 //!
 //! [`pipeline`] knows them all. Frames and units: [`frames`] (camera x right, y down, z forward), [`pixel`] (pixel

@@ -354,7 +354,7 @@ impl Parameters {
         if same.sensor == self.sensor {
             Ok(())
         } else {
-            Err("this sensor has settings that do not fly (docs/telemetry.md)")
+            Err("this sensor has settings that do not fly (book/reference/telemetry.md)")
         }
     }
 

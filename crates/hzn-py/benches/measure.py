@@ -1,4 +1,4 @@
-"""What Python costs beside the sensor, in one run: `cargo xtask bench python` writes it into docs/measured.md.
+"""What Python costs beside the sensor, in one run: `cargo xtask bench python` writes it into book/results/python-measured.md.
 
     measure.py OUTPUT [--frames N]
 """

@@ -1,4 +1,4 @@
-//! How fast the real window is, and how much memory it takes: `hzn-viewer --measure`, for docs/viewer.md.
+//! How fast the real window is, and how much memory it takes: `hzn-viewer --measure`, for book/guide/viewer.md.
 
 use std::time::{Duration, Instant};
 

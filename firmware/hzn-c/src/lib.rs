@@ -1,7 +1,7 @@
 //! hzn for C: one sensor in memory that the caller owns. No heap, no callbacks, nothing global.
 //!
 //! Functions return 0 to 7, the status of a picture as everywhere in hzn (0 is success), or a negative number for a
-//! mistake of the caller's, after which nothing has changed. Parameters have the numbers of docs/telemetry.md.
+//! mistake of the caller's, after which nothing has changed. Parameters have the numbers of book/reference/telemetry.md.
 
 #![no_std]
 

@@ -47,7 +47,7 @@ pub(super) fn sensitivity(_: &Effort) -> anyhow::Result<Section> {
     s.text(
         "Level pinhole camera 1920×1080 at 200 km, edge errors of 1 px over 300 px, points a pixel apart; 3 sigma, ours / \
          reference. [BB] print curves; the reference is an independent evaluation of their equations with the errata put \
-         right (docs/math.md), reached within 2 %. Roll is about the optical axis, pitch about the picture's horizontal. \
+         right (book/theory/math.md), reached within 2 %. Roll is about the optical axis, pitch about the picture's horizontal. \
          The same by hand: `hzn sensitivity --altitude 200 --limb-height 0 --fov 66:146:16 -o table.csv`.",
     );
     let head = ["", "roll [BB 33]", "pitch [BB 33]", "pitch, α known", "overbound [BB 37]"];
@@ -156,7 +156,7 @@ pub(super) fn spherical_earth(_: &Effort) -> anyhow::Result<Section> {
     s.text(
         "What a sensor measures is the axis of the limb's cone. Taking it for the direction to the Earth's centre, as a \
          sphere has it, is wrong by up to 0.19°; hzn gives the limb axis itself in both frames, so nothing of this is \
-         left. At 45° latitude, without a limb height; the reference is the independent table of docs/math.md's source. By \
+         left. At 45° latitude, without a limb height; the reference is the independent table of book/theory/math.md's source. By \
          hand: `hzn sensitivity spherical-earth`.",
     );
     let rows = [

@@ -87,7 +87,7 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
     s.text(
         "[B14] and [H15] count on their own set of test pictures and their flight video, which are not public: pictures of a \
          limb that is curved enough for a circle, seen by a camera that looks at the Earth. `horace-2015` rebuilds their \
-         method; the centre of its circle is not the direction to the Earth in a tilted picture (docs/methods.md), which is \
+         method; the centre of its circle is not the direction to the Earth in a tilted picture (book/theory/methods.md), which is \
          what its errors here are.",
     );
     own_camera(&mut s, effort)?;

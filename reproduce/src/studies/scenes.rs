@@ -77,7 +77,7 @@ pub(super) fn others(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(200);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures a scene, as docs/simulator.md describes them. `tumble` is coarse (4 km of limb \
+        "{count} pictures a scene, as book/theory/simulator.md describes them. `tumble` is coarse (4 km of limb \
          height a pixel) and has limb, Sun and nothing in view by turns: an answer without a limb is false. {BY_HAND}"
     ));
     let hzn = |flight: &Flight| vec![Sensor::new("hzn", flight.sensor.clone())];

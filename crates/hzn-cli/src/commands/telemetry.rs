@@ -21,7 +21,7 @@ use hzn_run::sink::{self, Existing, RowFile, Target};
 /// Decode a flight computer's telemetry
 ///
 /// Answers become rows as `hzn run` writes them; events, acknowledged commands and parameters are printed. What is no
-/// whole packet is skipped and counted. The format: docs/telemetry.md.
+/// whole packet is skipped and counted. The format: book/reference/telemetry.md.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The stream as it was received; - for standard input
@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     heard.summary();
     if heard.packets == 0 && !bytes.is_empty() {
-        let what = "no packet in it; is this what the flight computer sent? (docs/telemetry.md)";
+        let what = "no packet in it; is this what the flight computer sent? (book/reference/telemetry.md)";
         return Err(failed(format!("{}: {what}", args.file.display())));
     }
     Ok(Exit::Done)

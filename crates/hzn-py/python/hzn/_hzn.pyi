@@ -537,7 +537,7 @@ def read_mcap(path: _Path) -> dict[str, NDArray[Any]]:
     Returns
     -------
     dict
-        One array a column, of equal length; NaN in empty cells. Columns and units: docs/files.md.
+        One array a column, of equal length; NaN in empty cells. Columns and units: book/reference/files.md.
 
     Raises
     ------
@@ -649,7 +649,7 @@ class SimulatedFrame:
 
     @property
     def truth(self) -> list[dict[str, Any]]:
-        """The truth for each body: columns of truth.csv (docs/files.md)."""
+        """The truth for each body: columns of truth.csv (book/reference/files.md)."""
 
 @final
 class Expected:

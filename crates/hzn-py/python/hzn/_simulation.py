@@ -69,7 +69,7 @@ def evaluate(
     Returns
     -------
     dict
-        ``evaluations``: a dictionary a body, as ``hzn evaluate -o report.json`` writes it (docs/evaluation.md; angles in
+        ``evaluations``: a dictionary a body, as ``hzn evaluate -o report.json`` writes it (book/guide/evaluation.md; angles in
         degrees). ``frames``: a dictionary a frame, ready for ``pandas.json_normalize``.
 
     Raises

@@ -1,4 +1,4 @@
-"""An archive of pictures on a Dask cluster: `pip install hzn[dask]`.
+"""An archive of pictures on a Dask cluster: `pip install "hzn-sensor[dask]"`.
 
 One task a shard; the engine does the work, on one core a task. A shard is written under another name and then renamed, so
 whatever has its name is whole; a second run passes over shards that are there.
@@ -22,7 +22,7 @@ try:
     import pyarrow.parquet  # type: ignore[import-untyped]
     from distributed import as_completed, get_client
 except ImportError as _missing:
-    raise ImportError(f"hzn.dask needs the package {_missing.name}: pip install hzn[dask]") from None
+    raise ImportError(f"hzn.dask needs the package {_missing.name}: pip install \"hzn-sensor[dask]\"") from None
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -73,7 +73,7 @@ def process_archive(
     out
         URL or path of a folder for the shards.
     format
-        Of the shards: Parquet with the columns of docs/files.md, or MCAP without pictures.
+        Of the shards: Parquet with the columns of book/reference/files.md, or MCAP without pictures.
     shard_frames
         Pictures a shard; another number makes other shards.
     retries

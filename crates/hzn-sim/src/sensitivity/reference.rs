@@ -1,5 +1,5 @@
 //! What equations 33 and 37 of Braun & Barf 2022 give, worked out apart from this program with the paper's errata put right
-//! (docs/math.md): the tests and `cargo xtask reproduce` compare with these numbers.
+//! (book/theory/math.md): the tests and `cargo xtask reproduce` compare with these numbers.
 //!
 //! Three standard deviations in degrees; a level pinhole camera of 1920×1080 px 200 km above a sphere of 6371 km with its limb
 //! at 0 km, edge errors of 1 px over 300 px. Roll is about the optical axis, pitch about the picture's horizontal.

@@ -150,10 +150,10 @@ mod tests {
         assert!((air.sun_path(1e-6) / air.sun_path(-1e-6) - 1.0).abs() < 1e-4);
     }
 
-    /// docs/methods.md tells users how high the limb stands in their band.
+    /// book/theory/methods.md tells users how high the limb stands in their band.
     #[test]
     fn half_levels_by_wavelength_are_those_of_the_documents() {
-        let text = include_str!("../../../../docs/methods.md");
+        let text = include_str!("../../../../book/theory/methods.md");
         let (_, table) = text.split_once("| wavelength | τ₀ |").unwrap();
         let rows: Vec<&str> = table.lines().skip(2).take_while(|l| l.starts_with('|')).collect();
         assert!(rows.len() >= 6, "{rows:?}");

@@ -1,7 +1,7 @@
 //! The Earth in sunlight as a camera in the visible sees it: ground, clouds, air, Sun, Moon and stars.
 //!
 //! Light is counted in units of what a white, matt surface sends back under the Sun at the zenith, before the exposure;
-//! three channels (red 650 nm, green 550 nm, blue 450 nm). The equations are in docs/simulator.md.
+//! three channels (red 650 nm, green 550 nm, blue 450 nm). The equations are in book/theory/simulator.md.
 
 pub(crate) mod air;
 pub(crate) mod discs;

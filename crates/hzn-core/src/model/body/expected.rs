@@ -10,7 +10,7 @@ use super::{
     PriorError, SUN_RADIUS_KM, shape,
 };
 
-/// An attitude that is known no better than this is worth no more than none: 30 degrees (docs/math.md, ellipsoid).
+/// An attitude that is known no better than this is worth no more than none: 30 degrees (book/theory/math.md, ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude that comes without one: 5 degrees.
 const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;

@@ -6,7 +6,7 @@
 //!
 //! The paper says that α must be known. It need not: another cos α scales e and leaves its direction as it is, so the
 //! length that comes out, cos α assumed over cos α measured, *measures* α. That also is the method's weakness: the
-//! half-angle is left free, which on a short arc costs a factor of three to six (docs/math.md).
+//! half-angle is left free, which on a short arc costs a factor of three to six (book/theory/math.md).
 
 use crate::base::linalg::{M3, V3, basis, invert_spd3};
 use crate::base::real::Real;
