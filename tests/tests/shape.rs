@@ -59,9 +59,9 @@ fn functions(text: &str) -> Vec<(usize, usize, String)> {
         let words = line.trim_start();
         let indent = line.len() - words.len();
         let Some(at) = words.find("fn ").filter(|at| *at == 0 || words[..*at].ends_with(' ')) else { continue };
-        let is_head = words[..at].split_whitespace().all(|w| {
-            w.starts_with("pub") || ["const", "unsafe", "extern", "\"C\"", "async"].contains(&w)
-        });
+        let is_head = words[..at]
+            .split_whitespace()
+            .all(|w| w.starts_with("pub") || ["const", "unsafe", "extern", "\"C\"", "async"].contains(&w));
         if !is_head || line.trim_end().ends_with(';') {
             continue;
         }

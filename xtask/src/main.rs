@@ -5,6 +5,7 @@
 //! cargo xtask bench    hzn-core beside the OpenCV recipe, in one run
 //! cargo xtask reproduce  our numbers beside the published ones, into book/results/reproduction.md
 //! cargo xtask firmware the images for the flight computer, and what they cost in instructions
+//! cargo xtask keys     what is written from the keys of sensor.toml: table, template, JSON schema
 //! cargo xtask viewer   the picture of the viewer's window in the documents
 //! ```
 #![forbid(unsafe_code)]
@@ -23,7 +24,7 @@ mod wheel;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|viewer> [OPTION]...
+const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|keys|viewer> [OPTION]...
 
   test [STEP]...     all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
@@ -35,6 +36,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|viewer> [
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
                      --by-feature says instead what the methods of published systems take of flash
+  keys               writes the table of book/reference/sensor-toml.md, the template and the JSON schema from the
+                     keys in hzn-core
   viewer             makes book/images/viewer.png anew, after `cargo xtask test demo`";
 
 fn main() -> ExitCode {
@@ -48,6 +51,7 @@ fn main() -> ExitCode {
         "bench" => bench::run(rest),
         "reproduce" => reproduce::run(rest),
         "firmware" => firmware::run(rest),
+        "keys" => keys(),
         "viewer" => viewer::run(),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");
@@ -65,4 +69,12 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Writes the documents that are derived from the keys of sensor.toml.
+fn keys() -> Result<(), String> {
+    let mut cargo = steps::cargo(&["run", "--quiet", "-p", "hzn-calib", "--example", "keys", "--", "."]);
+    steps::run(&mut cargo).map_err(|trouble| match trouble {
+        steps::Trouble::Failed(why) | steps::Trouble::Missing(why) => why,
+    })
 }

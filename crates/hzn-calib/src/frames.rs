@@ -94,8 +94,8 @@ impl FrameData {
 pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Option<f64> {
     match kind {
         Kind::Earth => Some(geodetic(position_km.map(|km| km * 1e3), WGS84_A_M, WGS84_B_M).0 / 1e3),
-        Kind::EarthSphere | Kind::Sphere => Some(position_km.iter().map(|x| x * x).sum::<f64>().sqrt() - radius_km),
         Kind::Sun | Kind::Moon => None,
+        _ => Some(position_km.iter().map(|x| x * x).sum::<f64>().sqrt() - radius_km),
     }
 }
 

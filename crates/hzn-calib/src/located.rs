@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::path::Path;
 
 use hzn_core::body::MAX_LATITUDES;
-use hzn_core::config::lacking;
 use hzn_core::error::{ConfigError, Limit};
 use hzn_core::region::{MAX_CORNERS, MAX_POLYGONS};
 use toml::de::{DeTable, DeValue};
@@ -153,9 +152,7 @@ pub(crate) fn meaning(
         let what = if own.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
         Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(own)
     } else if message.starts_with("unknown variant") {
-        let key = place.map(|p| p.path.join(".")).unwrap_or_default();
-        let what = unbuilt(&key, first)
-            .unwrap_or_else(|| format!("{first:?} is not a valid value{}", suggestion(first, &valid)));
+        let what = format!("{first:?} is not a valid value{}", suggestion(first, &valid));
         Problem::new(path, what).in_field(own)
     } else if message.starts_with("missing field") {
         let mut p: Vec<String> = place.map(|p| p.path.clone()).unwrap_or_default();
@@ -190,10 +187,10 @@ fn whole_number(message: &str, place: Option<&Place>) -> Option<String> {
         "u32" => f64::from(u32::MAX),
         _ => return None,
     };
-    let key = place.and_then(|p| keys::at(&p.path));
+    let key = place.and_then(|p| keys::find_parts(&p.path));
     let rule = match key.map(|key| &key.limits) {
         Some(Limits::Number { low, high, .. }) => format!("between {low} and {}", high.min(most)),
-        Some(Limits::Words(words)) if words.contains(" to ") => words.clone(),
+        Some(Limits::Rule(words)) if words.contains(" to ") => (*words).to_owned(),
         _ => format!("between 0 and {most}"),
     };
     Some(match given.strip_prefix("invalid value: integer `").and_then(|n| n.strip_suffix('`')) {
@@ -206,7 +203,7 @@ fn whole_number(message: &str, place: Option<&Place>) -> Option<String> {
 pub(crate) fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Place]) -> Problem {
     let what = match error.limit {
         // A value that is missing.
-        rule @ Limit::Rule(_) if error.value.is_nan() => rule.to_string(),
+        rule @ (Limit::Rule(_) | Limit::Feature { .. }) if error.value.is_nan() => rule.to_string(),
         rule if error.value.is_nan() => format!("nan is refused: {rule}"),
         rule => format!("{} is refused: {rule}", error.value),
     };
@@ -228,10 +225,4 @@ pub(crate) fn at_key(key: &str, body: Option<u8>, what: String, text: &str, path
         Some(place) => problem.at_offset(text, place.key.start),
         None => problem,
     }
-}
-
-/// That a value exists, but not in this build.
-pub(crate) fn unbuilt(key: &str, value: &str) -> Option<String> {
-    let feature = lacking(key, value)?;
-    Some(format!("{value:?} is not in this build: it needs hzn-core with the feature {feature:?}"))
 }

@@ -186,10 +186,7 @@ fn half_width_deg(c: &camera::Config) -> Option<f64> {
 /// As [`half_width_deg`], of a lens without coefficients.
 fn linear_half_width_deg(c: &camera::Config) -> f64 {
     let half = f64::from(c.width) / 2.0 / c.fx_px;
-    match c.model {
-        Model::Pinhole | Model::BrownConrady => half.atan().to_degrees(),
-        Model::KannalaBrandt | Model::Equidistant => half.to_degrees(),
-    }
+    if c.model.is_planar() { half.atan().to_degrees() } else { half.to_degrees() }
 }
 
 fn coefficients(c: &camera::Config) -> Option<Doubt> {

@@ -14,7 +14,7 @@ use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
-use crate::located::{at_key, meaning, places, refused, syntax, too_long, unbuilt};
+use crate::located::{at_key, meaning, places, refused, syntax, too_long};
 use crate::nearest::suggestion;
 use crate::{Problem, camera_file, plausible};
 
@@ -101,10 +101,12 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
 
 /// The preset of that name, or what is wrong with it.
 fn preset_named(name: &str) -> Result<Preset, String> {
-    Preset::named(name).ok_or_else(|| {
+    let preset = Preset::named(name).ok_or_else(|| {
         let names: Vec<&str> = Preset::ALL.iter().map(|p| p.name()).collect();
-        unbuilt("preset", name).unwrap_or_else(|| format!("no preset {name:?}{}", suggestion(name, &names)))
-    })
+        format!("no preset {name:?}{}", suggestion(name, &names))
+    })?;
+    preset.check().map_err(|e| e.limit.to_string())?;
+    Ok(preset)
 }
 
 /// A preset as the text of a sensor.toml without camera.
@@ -236,15 +238,22 @@ mod tests {
 
     #[test]
     fn methods_behind_features_are_taken_or_the_feature_is_named() {
-        for o in hzn_core::config::OPTIONAL {
-            let line = match o.key.split_once('.') {
-                Some((section, key)) => format!("{CAMERA}[{section}]\n{key} = {:?}\n", o.value),
-                None => format!("{} = {:?}\n{CAMERA}", o.key, o.value),
-            };
-            match parse(&line, Path::new("s.toml")) {
-                Ok(_) => assert!(o.built, "{o:?}"),
-                Err(e) => {
-                    assert!(!o.built && e.to_string().contains(&format!("feature {:?}", o.feature)), "{o:?}: {e}")
+        for key in crate::keys::all() {
+            for choice in key.choices {
+                let line = match key.section() {
+                    "" => format!("{} = {:?}\n{CAMERA}", key.name(), choice.name),
+                    "camera" | "body" => continue,
+                    section => format!("{CAMERA}[{section}]\n{} = {:?}\n", key.name(), choice.name),
+                };
+                match parse(&line, Path::new("s.toml")) {
+                    Ok(_) => assert!(choice.built, "{choice:?}"),
+                    Err(e) => {
+                        let feature = choice.feature.unwrap_or_default();
+                        assert!(
+                            !choice.built && e.to_string().contains(&format!("feature {feature:?}")),
+                            "{choice:?}: {e}"
+                        )
+                    }
                 }
             }
         }
@@ -365,7 +374,7 @@ mod tests {
             let want = format!("s.toml:2: [camera] width: {value} is refused: must be between 2 and 65535");
             assert_eq!(width(value), want);
         }
-        assert_eq!(width("1"), "s.toml:2: [camera] width: 1 is refused: must be at least 2");
+        assert_eq!(width("1"), "s.toml:2: [camera] width: 1 is refused: must be between 2 and 65535");
         assert_eq!(
             width("640.5"),
             "s.toml:2: [camera] width: invalid type: number `640.5`: must be a whole number, between 2 and 65535"

@@ -94,7 +94,7 @@ pub fn focal_px(lens: Model, width: f64, fov_deg: f64) -> Option<f64> {
     let radius = match lens {
         Model::Pinhole => (fov_deg < 180.0).then(|| half.tan())?,
         Model::Equidistant => half,
-        Model::KannalaBrandt | Model::BrownConrady => return None,
+        _ => return None,
     };
     (radius > 0.0 && fov_deg <= 300.0).then(|| 0.5 * width / radius)
 }

@@ -72,11 +72,9 @@ mod papers;
 pub mod pipeline;
 mod stages;
 
-pub use base::{error, real};
+pub use base::{error, keys, real};
 pub use config::retry;
-#[cfg(feature = "dlr")]
-pub use geometry::section;
-pub use geometry::{camera, ellipsoid, frames, pixel};
+pub use geometry::{camera, ellipsoid, frames, pixel, section};
 pub use image::region;
 pub use model::{body, edge_noise, error_budget, observer, report, status, verdict, work};
 pub use stages::{consensus, contour, covariance, edge_points, fit, gates, threshold};

@@ -58,7 +58,7 @@ pub use index::{Index, IndexEntry, Pictures, Place};
 pub use part::{create_part, open_part, part_path};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
-pub use row::{Row, RowMeta, body_name, roll_pitch_deg};
+pub use row::{Row, RowMeta, roll_pitch_deg};
 pub use topics::{IMAGE_TOPIC, REPORT_SCHEMA};
 pub use writer::{FLUSH_INTERVAL, Options, Writer};
 

@@ -236,10 +236,7 @@ pub(crate) fn parse_log(data: &[u8]) -> Result<LogLine, prost::DecodeError> {
 
 /// The calibration. Its principal point keeps hzn's pixel centres at integers, as ROS has them.
 pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
-    let (model, coefficients) = match c.model {
-        camera::Model::KannalaBrandt | camera::Model::Equidistant => ("kannala_brandt", 4),
-        camera::Model::Pinhole | camera::Model::BrownConrady => ("plumb_bob", 5),
-    };
+    let (model, coefficients) = if c.model.is_planar() { ("plumb_bob", 5) } else { ("kannala_brandt", 4) };
     let (fx, fy, cx, cy) = (c.fx_px, c.fy_px, c.cx_px, c.cy_px);
     CameraCalibration {
         timestamp: stamp(ns),

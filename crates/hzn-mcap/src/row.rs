@@ -1,6 +1,5 @@
 //! The flat result: one row a picture and body, the same in CSV, JSON Lines and MCAP.
 
-use hzn_core::body::Kind;
 use hzn_core::frames::{Body, UnitVec3};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
@@ -16,7 +15,7 @@ pub struct RowMeta {
     pub file: String,
     /// Time of the picture in seconds, of the sequence's own epoch; `None` where it is not known.
     pub time_s: Option<f64>,
-    /// Name of the body; see [`body_name`].
+    /// Name of the body; see [`Kind::name`](hzn_core::body::Kind::name).
     pub body: String,
     /// Altitude of the position, or else the one given with the picture or by sensor.toml, kilometres.
     pub altitude_km: Option<f64>,
@@ -229,17 +228,6 @@ impl Row {
 pub fn roll_pitch_deg<T: Real>(to_body: &UnitVec3<Body, T>) -> [f64; 2] {
     let [x, y, z] = to_body.xyz().map(Real::to_f64);
     [y.atan2(z).to_degrees(), (-x).atan2(y.hypot(z)).to_degrees()]
-}
-
-/// The name of a body in files.
-pub const fn body_name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Earth => "earth",
-        Kind::EarthSphere => "earth-sphere",
-        Kind::Sun => "sun",
-        Kind::Moon => "moon",
-        Kind::Sphere => "sphere",
-    }
 }
 
 /// A number that a table can hold.

@@ -147,9 +147,9 @@ impl<'a> Strided<'a> {
         };
         let channels = match channel {
             Channel::Mean if layout.channels >= 3 => 0..3,
-            Channel::Mean | Channel::Red => 0..1,
             Channel::Green => 1..2,
             Channel::Blue => 2..3,
+            _ => 0..1,
         };
         Ok(Self { samples, layout, channels })
     }

@@ -164,7 +164,7 @@ impl Sensor {
         let report = |(which, (processed, body)): (usize, (hzn_run::engine::Processed, &hzn_core::body::Config))| {
             let meta = RowMeta {
                 time_s: Some(data.time_s.unwrap_or(0.0)),
-                body: hzn_mcap::body_name(body.kind).to_owned(),
+                body: body.kind.name().to_owned(),
                 altitude_km: hzn_run::sink::altitude_km(Some(&data), body),
                 ..RowMeta::default()
             };
@@ -207,7 +207,7 @@ impl Sensor {
     fn __repr__(&self) -> String {
         let state = self.state();
         let c = &state.config.camera;
-        let bodies: Vec<&str> = state.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
+        let bodies: Vec<&str> = state.config.each_body().iter().map(|b| b.kind.name()).collect();
         format!("Sensor({} x {} px, {}, {})", c.width, c.height, c.model.name(), bodies.join(", "))
     }
     fn __eq__(&self, other: &Self) -> bool {

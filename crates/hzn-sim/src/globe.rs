@@ -21,7 +21,7 @@ impl Globe {
     pub fn new(body: &body::Config) -> Self {
         match body.kind {
             Kind::Earth => Self { a_m: WGS84_A_M, b_m: WGS84_B_M },
-            Kind::EarthSphere | Kind::Sun | Kind::Moon | Kind::Sphere => {
+            _ => {
                 let r = body.mean_radius_km() * 1e3;
                 Self { a_m: r, b_m: r }
             }

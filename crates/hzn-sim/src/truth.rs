@@ -202,17 +202,6 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
     Ok(rows)
 }
 
-/// The kind's name in sensor.toml.
-pub fn name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Earth => "earth",
-        Kind::EarthSphere => "earth-sphere",
-        Kind::Sun => "sun",
-        Kind::Moon => "moon",
-        Kind::Sphere => "sphere",
-    }
-}
-
 impl Scene {
     /// The truth of the scene, for a picture's name and time.
     ///
@@ -239,7 +228,7 @@ impl Scene {
         Ok(Truth {
             file: file.to_owned(),
             time_s,
-            body: name(self.body.kind).to_owned(),
+            body: self.body.kind.name().to_owned(),
             limb: u8::from(self.visible_limb_px()? >= LIMB_IN_VIEW_PX),
             axis_x,
             axis_y,
@@ -271,7 +260,7 @@ impl Scene {
         let direction = UnitVec3::<Ecef, f64>::try_new(disc.direction).ok_or(SceneError::Sun)?;
         let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&direction).xyz();
         Ok(Truth {
-            body: name(kind).to_owned(),
+            body: kind.name().to_owned(),
             limb: u8::from(self.visible_px(kind)? >= LIMB_IN_VIEW_PX),
             axis_x,
             axis_y,
@@ -343,7 +332,7 @@ impl Scene {
                 let moon = Vector3::from(self.moon_ecef_m.ok_or(SceneError::Moon)?);
                 Ok(Some(SkyDisc::new(moon - Vector3::from(self.pose.position_m), MOON_RADIUS_KM)))
             }
-            Kind::Earth | Kind::EarthSphere | Kind::Sphere => Ok(None),
+            _ => Ok(None),
         }
     }
 }

@@ -15,7 +15,7 @@ use hzn_core::Preset;
 use hzn_core::body::Kind;
 use hzn_core::{Config, body, covariance};
 use hzn_sim::scenario::{Fit, MEASURED};
-use hzn_sim::{Flight, Scenario, truth};
+use hzn_sim::{Flight, Scenario};
 
 use crate::document::{Document, Section};
 
@@ -115,7 +115,7 @@ fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
     };
     let of = |body: &Kind| match scenario.bodies.len() {
         1 => format!("`{name}` {}", told(*body)),
-        _ => format!("`{name}`, {}: {}", truth::name(*body), told(*body)),
+        _ => format!("`{name}`, {}: {}", body.name(), told(*body)),
     };
     let told: Vec<String> = scenario.bodies.iter().map(of).collect();
     Ok((flight, told.join("; ")))

@@ -19,7 +19,7 @@ fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight)
         let sensors = sensors(&flight);
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
             for body in bodies {
-                let kind = hzn_sim::truth::name(body.kind);
+                let kind = body.kind.name();
                 let own: Vec<Case> = cases.iter().filter(|c| c.body == kind).cloned().collect();
                 let shown = if bodies.len() > 1 { format!("`{name}`, {kind}") } else { format!("`{name}`") };
                 rows.push([shown, sensor.name.clone()].into_iter().chain(cells(&evaluate(&own))).collect());

@@ -236,12 +236,7 @@ impl File<'_> {
         let [Some(width), Some(height)] = size.map(whole) else {
             return Err(self.problem("resolution", "width and height must be whole numbers from 2 to 65535"));
         };
-        let most = match model {
-            Model::KannalaBrandt => 4,
-            Model::BrownConrady => 5,
-            Model::Equidistant | Model::Pinhole => 0,
-        };
-        let k = given.values.iter().flatten().copied().take(most).collect();
+        let k = given.values.iter().flatten().copied().take(model.coefficients().len()).collect();
         let ideal = Config::ideal(model, width, height, fx);
         Ok(Config { fx_px: fx, fy_px: fy, cx_px: cx, cy_px: cy, k, ..ideal })
     }

@@ -56,9 +56,9 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
             let mut out = String::from("cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n");
             let k = four(camera, format)?;
             let model = match camera.model {
-                Model::KannalaBrandt | Model::Equidistant => "equidistant",
-                Model::BrownConrady => "radtan",
                 Model::Pinhole => "none",
+                planar if planar.is_planar() => "radtan",
+                _ => "equidistant",
             };
             let _ = write!(
                 out,
@@ -72,10 +72,7 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
         }
         Format::Euroc => {
             let k = four(camera, format)?;
-            let model = match camera.model {
-                Model::KannalaBrandt | Model::Equidistant => "equidistant",
-                Model::BrownConrady | Model::Pinhole => "radial-tangential",
-            };
+            let model = if camera.model.is_planar() { "radial-tangential" } else { "equidistant" };
             Ok(format!(
                 "sensor_type: camera\nresolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: {}\n\
                  distortion_model: {model}\ndistortion_coefficients: {}\n",

@@ -59,13 +59,7 @@ fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn 
 
 /// The one of several bodies that was calibrated.
 fn body_of(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike, String> {
-    let name = match kind {
-        Kind::Earth => "earth",
-        Kind::EarthSphere => "earth-sphere",
-        Kind::Sun => "sun",
-        Kind::Moon => "moon",
-        Kind::Sphere => "sphere",
-    };
+    let name = kind.name();
     let is_it = |table: &Table| table.get("kind").map_or("earth", |k| k.as_str().unwrap_or_default()) == name;
     let bodies = document.get_mut("bodies").and_then(Item::as_array_of_tables_mut);
     let bodies = bodies.ok_or("[[bodies]] is no list of sections")?;

@@ -94,7 +94,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     for (which, ((processed, time), half_angle)) in processed.zip(half_angles).enumerate() {
         let (Some(body), Some(trace)) = (config.each_body().get(which), traces.each.get(which)) else { continue };
         let between = if which > 0 { "\n" } else { "" };
-        let name = hzn_mcap::body_name(body.kind);
+        let name = body.kind.name();
         let (report, half_angle) = match (processed.report, half_angle) {
             (Ok(report), Ok(half_angle)) => (report, half_angle),
             (Err(why), _) | (_, Err(why)) => {
@@ -258,8 +258,7 @@ impl Explained<'_> {
 
     fn expected(&self) -> String {
         let body = self.body;
-        let cone =
-            format!("{}, cone of {:.4} deg half-angle", hzn_mcap::body_name(body.kind), self.half_angle.to_degrees());
+        let cone = format!("{}, cone of {:.4} deg half-angle", body.kind.name(), self.half_angle.to_degrees());
         let Some(km) = sink::altitude_km(self.data, body) else {
             return format!("{cone}, as seen from about the Earth");
         };

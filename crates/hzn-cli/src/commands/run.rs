@@ -171,7 +171,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         progress.count(frame.found.iter().map(|f| f.status()));
     };
     let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut seen);
-    let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
+    let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| b.kind.name()).collect();
     let summary = progress.summary(&bodies);
     let end = end?;
     output.finish()?;

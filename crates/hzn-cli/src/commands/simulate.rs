@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
 use hzn_sim::scenario::{BUILTIN, Fit, MEASURED};
-use hzn_sim::{Flight, FlightFrame, Scenario, truth};
+use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
@@ -143,7 +143,7 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
     let mut sensor = flight.sensor.clone();
     let mut how = String::new();
     for &body in &scenario.bodies {
-        let name = truth::name(body);
+        let name = body.name();
         let Some(fit) = fits.iter().find(|fit| fit.body == body) else {
             let why = "too few pictures were answered to measure limb height and noise";
             how += &format!("# The {name}: {why}: these are the defaults.\n");

@@ -177,16 +177,16 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
     let cannot = |what: String| Err(format!("{name} cannot be {word}: it is {what}"));
     let number = word.parse::<f64>();
     let taken = |x: f64| Parameters::idle().set(id, x).is_ok();
-    let choices = choices(id, name);
+    let choices = choices(name);
     if !choices.is_empty() {
-        let named = choices.iter().find(|(choice, _)| choice == word).map(|(_, number)| *number);
+        let named = choices.iter().find(|(choice, _)| *choice == word).map(|(_, number)| *number);
         if let Some(number) = named.or(number.ok().filter(|x| taken(*x))) {
             return Ok(number);
         }
         let each: Vec<String> = choices.iter().map(|(choice, number)| format!("{number} {choice}")).collect();
         return cannot(format!("one of {}", each.join(", ")));
     }
-    let limits = match hzn_calib::keys::all().iter().find(|key| key.path() == name).map(|key| &key.limits) {
+    let limits = match hzn_calib::keys::find(name).map(|key| &key.limits) {
         Some(Limits::Number { low, above, high }) => Some((*low, *above, *high)),
         _ if name == "telemetry.housekeeping_every" => Some((1.0, false, 65535.0)),
         _ => None,
@@ -211,24 +211,22 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
     cannot(format!("{kind}{range}{}", if optional { ", or NaN where it is left out" } else { "" }))
 }
 
-/// The choices of a parameter that has some: names as in sensor.toml, with their numbers.
-fn choices(id: u16, name: &str) -> Vec<(String, f64)> {
-    let of = |number: u8| {
-        let mut parameters = Parameters::idle();
-        parameters.set(id, number.into()).ok()?;
-        let table = toml::Table::try_from(parameters.sensor).ok()?;
-        let (section, key) = name.split_once('.')?;
-        Some((table.get(section)?.get(key)?.as_str()?.to_owned(), number.into()))
-    };
-    // None has as many.
-    (0..16).filter_map(of).collect()
+/// The choices of a parameter that flies: the words of sensor.toml, with their numbers.
+fn choices(name: &str) -> Vec<(&'static str, f64)> {
+    let choices = hzn_calib::keys::find(name).map_or(&[][..], |key| key.choices);
+    choices.iter().filter_map(|choice| Some((choice.name, f64::from(choice.flight?)))).collect()
 }
 
 /// Every parameter of a sensor: one command, so that they are taken all or none.
 fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     let sensor = hzn_calib::sensor::load(path)?;
     let parameters = Parameters::new(sensor.config);
-    parameters.flyable().map_err(|e| usage(format!("{}: {e}", path.display())))?;
+    parameters.flyable().map_err(|key| {
+        usage(format!(
+            "{}: {key} has a value that does not fly; leave it at its default (book/reference/telemetry.md)",
+            path.display()
+        ))
+    })?;
     let pairs: Vec<_> = parameters.numbers().filter_map(|id| Some((id, parameters.get(id)?))).collect();
     let mut bytes = vec![0; packet::MAX_BYTES];
     let mut out = Writer::new(&mut bytes);

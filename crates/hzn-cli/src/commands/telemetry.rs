@@ -233,7 +233,7 @@ impl Heard {
             index: u64::from(exposure.picture).saturating_sub(1),
             file: format!("picture-{:06}", exposure.picture),
             time_s: Some(time_s),
-            body: body.map_or("?", hzn_mcap::body_name).to_owned(),
+            body: body.map_or("?", hzn_core::body::Kind::name).to_owned(),
             altitude_km: altitude_km.filter(|_| !matches!(body, Some(Kind::Sun | Kind::Moon))),
         };
         let row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)));

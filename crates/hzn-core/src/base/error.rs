@@ -15,8 +15,16 @@ pub struct ConfigError {
     pub body: Option<u8>,
 }
 
+impl ConfigError {
+    /// A value that needs a feature which this build does not have: a `word`, or any value but the default.
+    pub(crate) const fn lacks(field: &'static str, word: Option<&'static str>, feature: &'static str) -> Self {
+        Self { field, value: f64::NAN, limit: Limit::Feature { word, feature }, body: None }
+    }
+}
+
 /// The rule that a value broke.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Limit {
     /// A finite number.
     Finite,
@@ -32,6 +40,13 @@ pub enum Limit {
     Monotone(f64),
     /// A rule in words.
     Rule(&'static str),
+    /// The value needs a feature of this crate that is not built in.
+    Feature {
+        /// The word that was given; `None` for a value that is no word.
+        word: Option<&'static str>,
+        /// The feature.
+        feature: &'static str,
+    },
 }
 
 impl fmt::Display for Limit {
@@ -49,6 +64,12 @@ impl fmt::Display for Limit {
                 deg - 2.0
             ),
             Self::Rule(text) => f.write_str(text),
+            Self::Feature { word: Some(word), feature } => {
+                write!(f, "{word:?} is not in this build: it needs hzn-core with the feature {feature:?}")
+            }
+            Self::Feature { word: None, feature } => {
+                write!(f, "this build reads no such key: it needs hzn-core with the feature {feature:?}")
+            }
         }
     }
 }
@@ -58,7 +79,10 @@ impl fmt::Display for ConfigError {
         if let Some(which) = self.body {
             write!(f, "bodies[{which}]: ")?;
         }
-        write!(f, "{} = {}: {}", self.field, self.value, self.limit)
+        match self.limit {
+            Limit::Feature { .. } => write!(f, "{}: {}", self.field, self.limit),
+            _ => write!(f, "{} = {}: {}", self.field, self.value, self.limit),
+        }
     }
 }
 

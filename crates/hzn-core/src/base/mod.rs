@@ -1,6 +1,8 @@
 //! Numbers: what has nothing to do with pictures.
 
 pub mod error;
+#[macro_use]
+pub mod keys;
 pub(crate) mod linalg;
 pub(crate) mod median;
 pub mod real;

@@ -1,11 +1,12 @@
 //! Everything that describes a sensor, as plain values: sensor.toml without the file.
 
-mod optional;
+mod numbers;
 pub mod retry;
 
-pub use optional::{OPTIONAL, Optional, lacking};
+pub use numbers::SECTIONS;
 
 use crate::base::error::{ConfigError, Limit, between, require};
+use crate::base::keys::{Section, choices, section};
 use crate::geometry::camera;
 use crate::image::Channel;
 use crate::image::region;
@@ -73,55 +74,48 @@ pub struct Config {
     pub limits: work::Config,
 }
 
-/// `[mount]`: camera to vehicle body.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Mount {
-    /// Quaternion, scalar first, that takes camera coordinates to body coordinates. Normalised on loading.
-    pub q_body_from_camera_wxyz: [f64; 4],
+section! {
+    /// `[mount]` of sensor.toml: how the camera sits in the vehicle.
+    "mount" pub struct Mount: Copy without defaults {
+        /// Quaternion that takes camera coordinates to vehicle coordinates, scalar first; it gives roll and pitch in the
+        /// results.
+        @20 q_body_from_camera_wxyz: [f64; 4], serde(), ["unit quaternion"]
+            { unset: "no mounting", example: "[1.0, 0.0, 0.0, 0.0]" };
+    }
 }
 
-/// `[input]`: from samples to brightness.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Input {
-    /// Mean of the colours, or one of them.
-    pub channel: Channel,
-    /// Significant bits of a sample, 8 to 16, where words have room for more: full scale is theirs. For programs that read
-    /// files, which put it into the picture's [`Layout`](crate::image::Layout). Left out: as the file says, and where that is
-    /// 16, as many as the samples of the sequence use.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub bits: Option<u8>,
-    /// How pictures are turned before they are looked at; the camera's width, height and calibration are those of the turned
-    /// picture. For programs that read files.
-    pub orient: Orient,
-    /// Rows of a smaller copy of the picture that is looked at instead of it, 16 up to the picture's own. From there on
-    /// every length is in the copy's pixels. Left out: the picture as it is.
-    #[cfg(feature = "horace")]
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub scale_to_height: Option<u16>,
+section! {
+    /// `[input]` of sensor.toml: how a pixel becomes one brightness.
+    "input" pub struct Input: Copy {
+        /// Which brightness a colour pixel has.
+        @- channel: Channel = Channel::Mean, [choice];
+        /// Significant bits of a sample, where the file's words have room for more.
+        ///
+        /// A camera of 12 bits whose values stand in the lower bits of 16-bit words has 12. Programs that read files put it
+        /// into the picture's [`Layout`](crate::image::Layout).
+        @- bits: Option<u8> = None, [8.0 to 16.0]
+            { unset: "as the file says; for words of 16 bits found from the pictures", example: "12" };
+        /// How a picture is turned before it is processed; the camera's size and calibration are those of the turned picture.
+        @- orient: Orient = Orient::AsStored, [choice];
+        /// Rows of a smaller copy of the picture that is processed instead; from there on, lengths are in pixels of the copy.
+        @- scale_to_height: Option<u16> = None, ["16 to `height`"] { needs: "horace", unset: "none", example: "540" };
+    }
 }
 
-/// How a picture is turned between its file and the sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Orient {
-    /// Not at all: pixels are where the file has them, as the detector gave them.
-    #[default]
-    #[cfg_attr(feature = "serde", serde(rename = "as-stored"))]
-    AsStored,
-    /// As the camera wrote into the file (EXIF) that it is to be shown, as photograph viewers and OpenCV's `imread` do.
-    #[cfg_attr(feature = "serde", serde(rename = "exif"))]
-    Exif,
-    /// By 90 degrees clockwise.
-    #[cfg_attr(feature = "serde", serde(rename = "rotate-90"))]
-    Rotate90,
-    /// By 180 degrees.
-    #[cfg_attr(feature = "serde", serde(rename = "rotate-180"))]
-    Rotate180,
-    /// By 90 degrees counter-clockwise.
-    #[cfg_attr(feature = "serde", serde(rename = "rotate-270"))]
-    Rotate270,
+choices! {
+    /// How a picture is turned between its file and the sensor.
+    pub enum Orient {
+        /// Pixels stay where the file has them, as the detector gave them.
+        @- AsStored = "as-stored";
+        /// The picture is turned as its EXIF orientation says; photograph viewers and OpenCV's `imread` do the same.
+        @- Exif = "exif";
+        /// By 90 degrees clockwise.
+        @- Rotate90 = "rotate-90";
+        /// By 180 degrees.
+        @- Rotate180 = "rotate-180";
+        /// By 90 degrees counter-clockwise.
+        @- Rotate270 = "rotate-270";
+    }
 }
 
 impl Config {
@@ -197,19 +191,16 @@ impl Config {
             body.check().map_err(|e| ConfigError { body: (!self.bodies.is_empty()).then_some(which as u8), ..e })?;
         }
         self.gate.check()?;
-        self.binarize.check()?;
+        self.binarize.check_keys()?;
         self.mask.check(&self.camera)?;
         self.contour.check()?;
         self.candidates.check()?;
-        self.reject.check()?;
-        self.estimate.check()?;
-        self.covariance.check()?;
-        self.recover.check()?;
-        self.limits.check()?;
-        if let Some(bits) = self.input.bits {
-            between("input.bits", f64::from(bits), 8.0, 16.0)?;
-        }
-        #[cfg(feature = "horace")]
+        self.reject.check_keys()?;
+        self.estimate.check_keys()?;
+        self.covariance.check_keys()?;
+        self.recover.check_keys()?;
+        self.limits.check_keys()?;
+        self.input.check_keys()?;
         if let Some(rows) = self.input.scale_to_height {
             between("input.scale_to_height", f64::from(rows), 16.0, f64::from(self.camera.height.max(16)))?;
         }

@@ -10,5 +10,4 @@ pub(crate) mod crop;
 pub mod ellipsoid;
 pub mod frames;
 pub mod pixel;
-#[cfg(feature = "dlr")]
 pub mod section;

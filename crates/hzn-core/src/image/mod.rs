@@ -10,6 +10,7 @@ pub mod region;
 
 use core::fmt;
 
+use crate::base::keys::choices;
 use crate::geometry::block::Lit;
 
 #[cfg(feature = "horace")]
@@ -138,19 +139,18 @@ impl fmt::Display for ImageError {
 }
 impl core::error::Error for ImageError {}
 
-/// Which brightness a colour pixel has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum Channel {
-    /// The mean of the first three channels (of all, when there are fewer), rounded down.
-    #[default]
-    Mean,
-    /// The first channel (red, in RGB order).
-    Red,
-    /// The second channel.
-    Green,
-    /// The third channel.
-    Blue,
+choices! {
+    /// The brightness of a colour pixel.
+    pub enum Channel {
+        /// The mean of the first three channels (of all, where there are fewer), rounded down.
+        @- Mean = "mean";
+        /// The first channel (red, in RGB order).
+        @- Red = "red";
+        /// The second channel.
+        @- Green = "green";
+        /// The third channel.
+        @- Blue = "blue";
+    }
 }
 
 /// Shape of a picture in memory.

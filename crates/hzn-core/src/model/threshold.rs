@@ -1,76 +1,65 @@
-//! How the level between dark and lit is chosen: for all bodies, or for one of them.
+//! How the threshold between dark and lit is chosen: for all bodies, or for one of them.
 
-use crate::base::error::{ConfigError, Limit, above, between, require};
+use crate::base::error::{ConfigError, Limit, require};
+use crate::base::keys::{Form, Section, Value, choices, section};
 
-/// How the level is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum Method {
-    /// The level that separates the sample's histogram best (Otsu 1979).
-    #[default]
-    Otsu,
-    /// `level`, always.
-    Fixed,
-    /// `factor` times the sample's mean.
-    Dynamic,
-    /// Halfway between the brightness on both sides of the limb in the picture before; `otsu` when that had no answer.
-    Track,
+choices! {
+    /// How the threshold is found.
+    pub enum Method {
+        /// The threshold separates the histogram of a sparse sample best (Otsu 1979).
+        @0 Otsu = "otsu";
+        /// The threshold is `level`.
+        @1 Fixed = "fixed";
+        /// The threshold is `factor` times the mean of the sample.
+        @2 Dynamic = "dynamic";
+        /// The threshold is halfway between the brightness on both sides of the limb in the previous picture; `otsu`
+        /// stands in where that picture had no answer.
+        @- Track = "track";
+    }
 }
 
-/// `[binarize]` of sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
-    /// How the level is found.
-    pub method: Method,
-    /// For `fixed`: a pixel is lit at this value or above. In the picture's own counts, 1 to 65535; below 1 it is a
-    /// fraction of full scale, whatever the bits.
-    pub level: f64,
-    /// For `dynamic`: level = factor × mean, above 0 to 100.
-    pub factor: f64,
-    /// For `otsu`: the found level is multiplied by this, 0.1 to 10. To see how much an answer depends on the level.
-    pub scale: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { method: Method::Otsu, level: 64.0, factor: 1.0, scale: 1.0 }
+section! {
+    /// `[binarize]` of sensor.toml: the threshold between dark and lit.
+    "binarize" pub struct Config: Copy {
+        /// How the threshold is found.
+        @50 method: Method = Method::Otsu, [choice];
+        /// For `fixed`: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a fraction of
+        /// full scale.
+        @51 level: f64 = 64.0, [above 0.0 to 65535.0];
+        /// For `dynamic`: the threshold is this factor times the mean of the sample.
+        @52 factor: f64 = 1.0, [above 0.0 to 100.0];
+        /// For `otsu`: the threshold that was found is multiplied by this.
+        ///
+        /// It shows how much an answer depends on the threshold.
+        @53 scale: f64 = 1.0, [0.1 to 10.0];
     }
 }
 
 /// How the Sun is split from everything else.
 pub(crate) static SUN: Config = Config { method: Method::Fixed, level: 0.9, factor: 1.0, scale: 1.0 };
 
-/// `[gate]` of sensor.toml: a picture too dark or too bright is not looked at.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Gate {
-    /// Smallest mean brightness as a fraction of full scale, 0 to 1.
-    pub min_mean: f64,
-    /// Largest mean brightness as a fraction of full scale, 0 to 1.
-    pub max_mean: f64,
-}
-
-impl Default for Gate {
-    fn default() -> Self {
-        Self { min_mean: 0.0, max_mean: 0.98 }
+section! {
+    /// `[gate]` of sensor.toml: the brightness that a picture must have to be processed.
+    "gate" pub struct Gate: Copy {
+        /// Smallest mean brightness of the picture, as a fraction of full scale.
+        @40 min_mean: f64 = 0.0, [0.0 to 1.0];
+        /// Largest mean brightness of the picture, as a fraction of full scale; not below `min_mean`.
+        @41 max_mean: f64 = 0.98, [0.0 to 1.0];
     }
 }
 
 impl Gate {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        between("gate.min_mean", self.min_mean, 0.0, 1.0)?;
-        between("gate.max_mean", self.max_mean, self.min_mean, 1.0)
+        self.check_keys()?;
+        let limit = Limit::Between(self.min_mean, 1.0);
+        require(self.max_mean >= self.min_mean, "gate.max_mean", self.max_mean, limit)
     }
 }
 
-impl Config {
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        require(self.level.is_finite(), "binarize.level", self.level, Limit::Finite)?;
-        above("binarize.level", self.level, 0.0)?;
-        between("binarize.level", self.level, 0.0, 65535.0)?;
-        above("binarize.factor", self.factor, 0.0)?;
-        between("binarize.factor", self.factor, 0.0, 100.0)?;
-        between("binarize.scale", self.scale, 0.1, 10.0)
+/// A body has a table of its own with these keys.
+impl Value for Config {
+    const FORM: Form = Form::Table;
+    fn check(&self, _path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {
+        self.check_keys()
     }
 }

@@ -4,28 +4,23 @@
 //! cost at most, by what they are about to look at, so that the sum does not depend on the machine. The sample for the
 //! level is free, and so is the border, but for looks at the mask.
 
-use crate::base::error::{ConfigError, between};
+use crate::base::keys::section;
 
-/// `[limits]` of sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
-    /// What one picture may cost in steps of the border follower, 10 thousand to a billion: the bound on the worst
-    /// picture's time. An ordinary picture takes some 30 thousand. Used up, the best answer so far is taken; without
-    /// one the status is `truncated`. Left out: 120 for each border pixel that the lists hold, which is 246 thousand on
-    /// a flight computer and two million on a workstation; 2120 with `erf`.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub max_work: Option<u32>,
-}
-
-/// WorkBudget for each border pixel that the lists hold, where the configuration does not say.
-const A_PIXEL: u32 = 120;
-
-impl Config {
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        self.max_work.map_or(Ok(()), |n| between("limits.max_work", f64::from(n), 1e4, 1e9))
+section! {
+    /// `[limits]` of sensor.toml: the bound on the time of the worst picture.
+    "limits" pub struct Config: Copy {
+        /// Largest cost of one picture and body, in steps of the border follower; when it is used up, the best answer so far
+        /// counts.
+        ///
+        /// An ordinary picture costs about 30 thousand. Without an answer the status is `truncated`. The default is 120 for
+        /// each border pixel that the lists hold, and 2120 with `erf`.
+        @120 max_work: Option<u32> = None, [10000.0 to 1e9]
+            { unset: "245 760 in flight lists, 1 966 080 in the host's", example: "1000000" };
     }
 }
+
+/// Work for each border pixel that the lists hold, where the configuration does not say.
+const A_PIXEL: u32 = 120;
 
 /// Beginning to follow an edge.
 pub(crate) const EDGE: u32 = 20;

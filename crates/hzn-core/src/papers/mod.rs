@@ -1,12 +1,11 @@
 //! Named starting values, and what published systems have of their own: a preset, and gates.
 
-#[cfg(feature = "dlr")]
 mod braun_barf_2022;
-#[cfg(feature = "horace")]
 mod horace_2015;
-#[cfg(feature = "zju")]
 mod wang_2022;
 
+use crate::base::error::ConfigError;
+use crate::base::keys::{Value, choices};
 use crate::base::real::Real;
 use crate::config::Config;
 use crate::geometry::block::Block;
@@ -21,59 +20,36 @@ use crate::stages::fit::Fit;
 use crate::stages::gates;
 use crate::stages::threshold;
 
-/// Starting values of a whole sensor: what is written besides beats them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Preset {
-    /// The best chain that is known: every value at its default.
-    #[default]
-    Hzn,
-    /// The Sun: a disc whose apparent size is no measure, because it blooms.
-    Sun,
-    /// The Moon, lit from any side.
-    Moon,
-    /// The optical horizon sensor of Braun & Barf 2022.
-    #[cfg(feature = "dlr")]
-    Dlr2022,
-    /// The infrared Earth sensor of Wang et al. 2022.
-    #[cfg(feature = "zju")]
-    Zju2022,
-    /// HORACE on REXUS-16 (Barf 2014, Barf et al. 2015).
-    #[cfg(feature = "horace")]
-    Horace2015,
+choices! {
+    /// Starting values of a whole sensor; keys that are written in sensor.toml count instead of them.
+    pub enum Preset {
+        /// The best chain that is known: every value is the default.
+        @- Hzn = "hzn";
+        /// The Sun: a disc whose apparent size is no measure, because it blooms.
+        @- Sun = "sun";
+        /// The Moon, lit from any side.
+        @- Moon = "moon";
+        /// The optical horizon sensor of Braun & Barf 2022.
+        @- Dlr2022 = "dlr-2022" needs "dlr";
+        /// The infrared Earth sensor of Wang et al. 2022.
+        @- Zju2022 = "zju-2022" needs "zju";
+        /// HORACE on REXUS-16 (Barf 2014, Barf et al. 2015).
+        @- Horace2015 = "horace-2015" needs "horace";
+    }
 }
 
 impl Preset {
-    /// Every preset of this build.
-    pub const ALL: &[Self] = &[
-        Self::Hzn,
-        Self::Sun,
-        Self::Moon,
-        #[cfg(feature = "dlr")]
-        Self::Dlr2022,
-        #[cfg(feature = "zju")]
-        Self::Zju2022,
-        #[cfg(feature = "horace")]
-        Self::Horace2015,
-    ];
-
-    /// The name used in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Hzn => "hzn",
-            Self::Sun => "sun",
-            Self::Moon => "moon",
-            #[cfg(feature = "dlr")]
-            Self::Dlr2022 => "dlr-2022",
-            #[cfg(feature = "zju")]
-            Self::Zju2022 => "zju-2022",
-            #[cfg(feature = "horace")]
-            Self::Horace2015 => "horace-2015",
-        }
-    }
-
     /// The preset of that name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|p| p.name() == name)
+    }
+
+    /// Checks that this build has the methods of the preset.
+    ///
+    /// # Errors
+    /// The feature that is missing.
+    pub fn check(self) -> Result<(), ConfigError> {
+        Value::check(&self, "preset", 0.0, false, 0.0)
     }
 }
 
@@ -90,11 +66,8 @@ impl Config {
                 // Half of its limb is lit at most, and less of it bright.
                 config.select.min_support = 0.25;
             }
-            #[cfg(feature = "dlr")]
             Preset::Dlr2022 => braun_barf_2022::preset(&mut config),
-            #[cfg(feature = "zju")]
             Preset::Zju2022 => wang_2022::preset(&mut config),
-            #[cfg(feature = "horace")]
             Preset::Horace2015 => horace_2015::preset(&mut config),
         }
         config
@@ -110,7 +83,6 @@ fn disc(config: &mut Config, kind: Kind, level: f64) {
 }
 
 /// The noise model and limb height that the published systems' presets have always had: told values, for comparison.
-#[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
 fn told(config: &mut Config) {
     config.body.limb_height_km = 10.0;
     config.body.limb_height_sigma_km = 2.0;
@@ -120,7 +92,6 @@ fn told(config: &mut Config) {
 }
 
 /// Only what every fit must have, and what these methods cost, of which some look at every pixel and every point.
-#[cfg(any(feature = "dlr", feature = "horace", feature = "zju"))]
 fn trust_every_fit(config: &mut Config) {
     config.limits.max_work = Some(200_000_000);
     // They looked once.
@@ -144,20 +115,14 @@ pub(crate) fn verdict<T: Real>(
     region: &Region<T>,
     config: &gates::Config,
 ) -> Verdict {
-    // A build without a feature leaves some of them unread.
-    let _ = (fit, expected, blocks, camera, region, config);
-    let verdict = Verdict::Passed;
-    #[cfg(feature = "dlr")]
-    let verdict = match verdict {
-        Verdict::Passed => braun_barf_2022::verdict(fit, expected, blocks, camera, region, config),
-        failed => failed,
+    let verdict = match cfg!(feature = "dlr") {
+        true => braun_barf_2022::verdict(fit, expected, blocks, camera, region, config),
+        false => Verdict::Passed,
     };
-    #[cfg(feature = "horace")]
-    let verdict = match verdict {
-        Verdict::Passed => horace_2015::verdict(fit, expected, camera, config),
-        failed => failed,
-    };
-    verdict
+    match verdict {
+        Verdict::Passed if cfg!(feature = "horace") => horace_2015::verdict(fit, expected, camera, config),
+        verdict => verdict,
+    }
 }
 
 #[cfg(test)]

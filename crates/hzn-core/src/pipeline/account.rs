@@ -14,9 +14,7 @@ pub(super) fn point(method: SubPixel, mask: u32) -> u32 {
     // Beyond that of the default, and looks at the mask.
     let (more, looks) = match method {
         SubPixel::Linear | SubPixel::None => (0, 0),
-        #[cfg(feature = "zju")]
         SubPixel::Zernike => (40, 70),
-        #[cfg(feature = "erf")]
         SubPixel::Erf => (2000, 400),
     };
     POINT + more + looks * mask

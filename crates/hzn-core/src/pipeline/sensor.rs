@@ -16,7 +16,9 @@ use crate::model::report::MAX_BODIES;
 use crate::model::report::{Report, Reports};
 use crate::model::status::Stage;
 use crate::model::work::WorkBudget;
-use crate::stages::contour::{self, BinaryPicture};
+#[cfg(any(feature = "horace", feature = "zju"))]
+use crate::stages::contour;
+use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold;
 
 /// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
@@ -182,7 +184,6 @@ impl<T: Real> Sensor<T> {
         let camera = turning.as_ref().unwrap_or(&self.camera);
         let mut search = Search::new(self, camera, expected, taken, binary.observer, lists.blocks, work, report);
         match config.contour.method {
-            contour::Method::BorderFollowing => search.border_following(binary, lists.border, lists.marks),
             #[cfg(feature = "horace")]
             contour::Method::Raster => search.raster(binary, lists.border, lists.marks),
             #[cfg(feature = "horace")]
@@ -191,6 +192,8 @@ impl<T: Real> Sensor<T> {
             }
             #[cfg(feature = "zju")]
             contour::Method::Sobel => search.whole(binary, |work| contour::sobel::edges(binary, lists.border, work)),
+            // `Config::check` refuses a method that is not built in.
+            _ => search.border_following(binary, lists.border, lists.marks),
         }
         search.conclude()
     }

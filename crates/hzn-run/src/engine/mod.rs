@@ -367,7 +367,7 @@ fn statuses(found: &[BodyOutcome], plan: &Plan) -> String {
     match found {
         [one] => one.status().name().to_owned(),
         several => {
-            let bodies = plan.config.each_body().iter().map(|b| hzn_mcap::body_name(b.kind));
+            let bodies = plan.config.each_body().iter().map(|b| b.kind.name());
             let each: Vec<String> = bodies.zip(several).map(|(body, f)| format!("{body} {}", f.status())).collect();
             each.join(", ")
         }

@@ -34,7 +34,7 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
             index: frame.index,
             file: frame.name.clone(),
             time_s: frame.time_s,
-            body: hzn_mcap::body_name(body.kind).to_owned(),
+            body: body.kind.name().to_owned(),
             altitude_km: altitude_km(frame.data.as_ref(), body),
         };
         match &found.report {

@@ -169,7 +169,7 @@ impl Payload {
         let stored = match sensor.input.orient {
             Orient::Exif => None,
             Orient::Rotate90 | Orient::Rotate270 => Some((own.1, own.0)),
-            Orient::AsStored | Orient::Rotate180 => Some(own),
+            _ => Some(own),
         };
         let (picture, original) = self.decode_as_it_is(stored)?;
         let turned = picture.is_turned(&sensor.input);

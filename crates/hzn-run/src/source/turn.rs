@@ -9,11 +9,11 @@ use super::picture::{Picture, Samples};
 /// How a picture with this EXIF orientation is turned.
 pub(super) fn needed(orient: Orient, exif: Orientation) -> Orientation {
     match orient {
-        Orient::AsStored => Orientation::NoTransforms,
         Orient::Exif => exif,
         Orient::Rotate90 => Orientation::Rotate90,
         Orient::Rotate180 => Orientation::Rotate180,
         Orient::Rotate270 => Orientation::Rotate270,
+        _ => Orientation::NoTransforms,
     }
 }
 

@@ -9,7 +9,7 @@ use hzn_core::status::Status;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use crate::truth::{Truth, name};
+use crate::truth::Truth;
 
 /// What the sensor says about one picture and body.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +37,7 @@ pub struct MeasuredDirection {
 
 /// Sun and Moon, which have no nadir.
 fn in_the_sky(body: &str) -> bool {
-    body == name(Kind::Sun) || body == name(Kind::Moon)
+    body == Kind::Sun.name() || body == Kind::Moon.name()
 }
 
 /// One picture and body: what was there, and what was made of it.
@@ -217,7 +217,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
             limb_in_view_px: camera.map(|c| limb_in_view_px(c, axis, t.half_angle_deg.to_radians())),
             miss: answer.found.and_then(|f| {
                 // The Sun blooms: its size is no measure.
-                let half_angle_deg = f.half_angle_deg.filter(|_| t.body != name(Kind::Sun));
+                let half_angle_deg = f.half_angle_deg.filter(|_| t.body != Kind::Sun.name());
                 Miss::new(&MeasuredDirection { half_angle_deg, ..f }, axis, t.half_angle_deg)
             }),
         });

@@ -37,7 +37,7 @@ impl Scenario {
         let preset = |kind: Kind| match kind {
             Kind::Sun => Preset::Sun,
             Kind::Moon => Preset::Moon,
-            Kind::Earth | Kind::EarthSphere | Kind::Sphere => Preset::Hzn,
+            _ => Preset::Hzn,
         };
         // Of several bodies the last is the faintest: its gates let the others through too.
         let gates = self.bodies.last().copied().map_or(Preset::Hzn, preset);
@@ -184,7 +184,7 @@ impl Scenario {
                 return Ok(());
             }
         }
-        let name = crate::truth::name(kind);
+        let name = kind.name();
         let what = format!(
             "the limb of the {name} is lit and in view in none of the pictures: check off-nadir angle, field of view, \
              and the time of day (utc)"

@@ -215,7 +215,7 @@ impl Turn {
                 let to: Vector3<f64> = match kind {
                     Kind::Sun => ephemeris::sun(path.unix_s(time_s)).seen_from(here.into()).direction.into(),
                     Kind::Moon => ephemeris::moon(path.unix_s(time_s)).seen_from(here.into()).direction.into(),
-                    Kind::Earth | Kind::EarthSphere | Kind::Sphere => -here.normalize(),
+                    _ => -here.normalize(),
                 };
                 let helper = if to.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
                 let right = to.cross(&helper).normalize();

@@ -59,7 +59,7 @@ mod tests {
         assert!(knob(number(0.0, true, 100.0), 10.0).low > 0.0);
         let scale = knob(number(0.1, false, 10.0), 1.0);
         assert_eq!((scale.logarithmic, scale.middle()), (true, 1.0));
-        assert!(Knob::from_limits(&Limits::Words("words".into()), 1.0).is_none());
+        assert!(Knob::from_limits(&Limits::Rule("words"), 1.0).is_none());
     }
 
     #[test]
@@ -68,8 +68,8 @@ mod tests {
             for usual in [0.0, 0.01, 1.0, 300.0] {
                 let Some(knob) = Knob::from_limits(&key.limits, usual) else { continue };
                 let Limits::Number { low, high, .. } = key.limits else { unreachable!() };
-                assert!(knob.low < knob.high && knob.low >= low && knob.high <= high, "{} {knob:?}", key.path());
-                assert!((knob.low..=knob.high).contains(&knob.middle()), "{}", key.path());
+                assert!(knob.low < knob.high && knob.low >= low && knob.high <= high, "{} {knob:?}", key.path);
+                assert!((knob.low..=knob.high).contains(&knob.middle()), "{}", key.path);
             }
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use hzn_calib::Problem;
-use hzn_calib::keys::{self, Key, Limits};
+use hzn_calib::keys::{self, Form, Key};
 use hzn_core::{Config, Preset};
 use toml_edit::Value;
 
@@ -166,10 +166,10 @@ impl Session {
 
     /// Sets a number as the key holds it: whole where the value that counts is whole.
     pub fn set_number(&mut self, key: &Key, body: usize, x: f64) {
-        let whole = matches!(self.value(&key.section, &key.name, body), Some(toml::Value::Integer(_)))
-            || (self.value(&key.section, &key.name, body).is_none() && is_whole(key));
+        let whole = matches!(self.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)))
+            || (self.value(key.section(), key.name(), body).is_none() && key.form == Form::Whole);
         let value = if whole { Value::from(x.round() as i64) } else { Value::from(tidy(x)) };
-        self.set(&key.section, &key.name, body, Some(value));
+        self.set(key.section(), key.name(), body, Some(value));
     }
 
     /// Does the text say something else about a key than the saved one?
@@ -273,8 +273,8 @@ impl Session {
         if self.is_changed() {
             let bodies = table.as_ref().and_then(|t| t.get("bodies")?.as_array()).map_or(1, |b| b.len().max(1));
             let of_bodies = |k: &'static Key| (0..bodies).map(move |body| (k, body));
-            let key = |(k, body): (&'static Key, usize)| sheet::Key { section: &k.section, name: &k.name, body };
-            let keys = keys::all().iter().flat_map(of_bodies).map(key);
+            let key = |(k, body): (&'static Key, usize)| sheet::Key { section: k.section(), name: k.name(), body };
+            let keys = keys::all().flat_map(of_bodies).map(key);
             self.differing.extend(self.sheet.differing(&self.saved, keys).iter().map(|k| (k.section, k.name, k.body)));
         }
         match hzn_calib::sensor::parse(self.sheet.text(), &self.home) {
@@ -300,13 +300,6 @@ fn number(value: &toml::Value) -> Option<f64> {
         toml::Value::Integer(n) => Some(*n as f64),
         _ => None,
     }
-}
-
-/// Is a key without a value a whole number? Its limits tell, where the unit does not.
-fn is_whole(key: &Key) -> bool {
-    key.name == "line_spacing_px"
-        || key.name == "scale_to_height"
-        || (matches!(key.limits, Limits::Number { .. }) && key.unit().is_empty() && key.name.starts_with("erode"))
 }
 
 /// A number as one would write it: five significant digits.
@@ -424,7 +417,7 @@ mod tests {
     #[test]
     fn whole_numbers_stay_whole() {
         let mut s = session();
-        let key = |path: &str| keys::all().iter().find(|k| k.path() == path).unwrap();
+        let key = |path: &str| keys::find(path).unwrap();
         s.set_number(key("candidates.keep_points"), 0, 299.7);
         s.set_number(key("contour.line_spacing_px"), 0, 4.2);
         s.set_number(key("reject.threshold_px"), 0, 3.0000001);

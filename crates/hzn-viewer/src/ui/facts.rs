@@ -131,7 +131,7 @@ fn picture(sight: &FrameView, config: &Config) -> Vec<String> {
 }
 
 fn expected(answer: &BodyResult) -> Vec<String> {
-    let mut out = vec![hzn_mcap::body_name(answer.kind).to_owned()];
+    let mut out = vec![answer.kind.name().to_owned()];
     if let (Some(rad), false) = (answer.expected_rad, matches!(answer.kind, body::Kind::Sun | body::Kind::Moon)) {
         out.push(format!("half-angle {:.4}° expected", rad.to_degrees()));
     }
@@ -181,8 +181,8 @@ mod tests {
     fn every_section_has_a_card_and_every_stage() {
         for key in hzn_calib::keys::all() {
             let elsewhere = ["", "mount", "bodies"];
-            let shown = CARDS.iter().any(|c| c.sections.contains(&key.section.as_str()));
-            assert!(shown || elsewhere.contains(&key.section.as_str()), "{}", key.path());
+            let shown = CARDS.iter().any(|c| c.sections.contains(&key.section()));
+            assert!(shown || elsewhere.contains(&key.section()), "{}", key.path);
         }
         for stage in Stage::ALL {
             assert!(CARDS.iter().any(|c| c.stage == Some(stage)), "{}", stage.name());

@@ -64,18 +64,16 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
     let mut command = None;
     ui.horizontal(|ui| {
         let label = ui.label("preset");
-        let key = keys::all().iter().find(|k| k.path() == "preset");
+        let key = keys::find("preset");
         let current = session.preset().to_owned();
         ComboBox::from_id_salt("preset")
             .selected_text(&current)
             .width(104.0)
             .show_ui(ui, |ui| {
-                if let Some(Key { limits: Limits::Choice(names), .. }) = key {
-                    for name in names {
-                        if ui.selectable_label(*name == current, name).clicked() {
-                            session.set("", "preset", 0, Some(name.as_str().into()));
-                            session.settle();
-                        }
+                for choice in key.map_or(&[][..], |key| key.choices) {
+                    if ui.selectable_label(choice.name == current, choice.name).clicked() {
+                        session.set("", "preset", 0, Some(choice.name.into()));
+                        session.settle();
                     }
                 }
             })
@@ -116,7 +114,7 @@ fn bodies(viewer: &mut Viewer, ui: &mut Ui) {
         .iter()
         .flat_map(|s| s.answers.first())
         .flat_map(|o| &o.bodies)
-        .map(|b| (hzn_mcap::body_name(b.kind), b.row.status))
+        .map(|b| (b.kind.name(), b.row.status))
         .collect();
     ui.horizontal(|ui| {
         for (i, (name, status)) in names.into_iter().enumerate() {
@@ -182,7 +180,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>)
         state.show_body_unindented(ui, |ui| {
             ui.add_space(2.0);
             for section in card.sections {
-                for key in keys::of(section) {
+                for key in keys::in_section(section) {
                     parameter(viewer, ui, key);
                 }
             }
@@ -260,13 +258,13 @@ fn mask(viewer: &mut Viewer, ui: &mut Ui) {
 fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
     let body = viewer.body;
     let Some(session) = &mut viewer.session else { return };
-    if key.path() == "mask.polygons_px" || key.section == "camera" && key.name == "file" {
+    if matches!(key.path, "mask.polygons_px" | "camera.file" | "camera.camera") {
         return;
     }
-    let value = session.value(&key.section, &key.name, body).cloned();
-    let method = session.value(&key.section, "method", body).and_then(|m| m.as_str().map(str::to_owned));
+    let value = session.value(key.section(), key.name(), body).cloned();
+    let method = session.value(key.section(), "method", body).and_then(|m| m.as_str().map(str::to_owned));
     // A key of another method changes nothing: it is not in the way.
-    if key.method.is_some() && method.is_some() && key.method != method {
+    if key.method().is_some() && method.is_some() && key.method() != method.as_deref() {
         return;
     }
     let hint = hint(key);
@@ -275,19 +273,19 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
         let name = ui
             .allocate_ui_with_layout(vec2(NAME_WIDTH, 18.0), place, |ui| {
                 ui.set_min_width(NAME_WIDTH);
-                ui.add(egui::Label::new(RichText::new(&key.name).size(12.5)).truncate())
+                ui.add(egui::Label::new(RichText::new(key.name()).size(12.5)).truncate())
             })
             .inner
             .on_hover_text(&hint);
         match (&key.limits, &value) {
-            (Limits::Choice(words), Some(toml::Value::String(current))) => {
-                ComboBox::from_id_salt(key.path())
+            (Limits::Choice, Some(toml::Value::String(current))) => {
+                ComboBox::from_id_salt(key.path)
                     .selected_text(current)
                     .width(130.0)
                     .show_ui(ui, |ui| {
-                        for word in words {
-                            if ui.selectable_label(word == current, word).clicked() {
-                                session.set(&key.section, &key.name, body, Some(word.as_str().into()));
+                        for choice in key.choices {
+                            if ui.selectable_label(choice.name == current, choice.name).clicked() {
+                                session.set(key.section(), key.name(), body, Some(choice.name.into()));
                                 session.settle();
                             }
                         }
@@ -299,7 +297,7 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
             (_, Some(toml::Value::Boolean(on))) => {
                 let mut on = *on;
                 if ui.checkbox(&mut on, "").labelled_by(name.id).on_hover_text(&hint).changed() {
-                    session.set(&key.section, &key.name, body, Some(Value::from(on)));
+                    session.set(key.section(), key.name(), body, Some(Value::from(on)));
                     session.settle();
                 }
             }
@@ -309,7 +307,7 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
             (Limits::Number { .. }, None) => {
                 // Left out: a click gives it a value to begin with.
                 if ui.button("automatic").on_hover_text(format!("{hint}\nClick to set it.")).clicked()
-                    && let Some(knob) = Knob::from_limits(&key.limits, session.usual(&key.section, &key.name, body))
+                    && let Some(knob) = Knob::from_limits(&key.limits, session.usual(key.section(), key.name(), body))
                 {
                     session.set_number(key, body, knob.middle());
                     session.settle();
@@ -328,12 +326,12 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
 }
 
 fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &Limits, name: egui::Id, hint: &str) {
-    let Some(mut x) = session.number(&key.section, &key.name, body) else { return };
+    let Some(mut x) = session.number(key.section(), key.name(), body) else { return };
     let before = x;
-    let whole = matches!(session.value(&key.section, &key.name, body), Some(toml::Value::Integer(_)));
+    let whole = matches!(session.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)));
     let unit = if key.unit().is_empty() { String::new() } else { format!(" {}", key.unit()) };
-    let usual = session.usual(&key.section, &key.name, body);
-    let response = match Knob::from_limits(limits, usual).filter(|_| key.section != "camera") {
+    let usual = session.usual(key.section(), key.name(), body);
+    let response = match Knob::from_limits(limits, usual).filter(|_| key.section() != "camera") {
         Some(knob) => {
             ui.spacing_mut().slider_width = (ui.available_width() - 96.0).max(60.0);
             let mut slider = Slider::new(&mut x, knob.low..=knob.high)
@@ -364,24 +362,18 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
 
 /// A value that the text holds can be taken out, so that the preset's counts.
 fn restore(session: &mut Session, ui: &mut Ui, key: &Key, body: usize) {
-    let differs = session.differs(&key.section, &key.name, body);
+    let differs = session.differs(key.section(), key.name(), body);
     if differs && ui.small_button("file").on_hover_text("Back to the file's value").clicked() {
-        session.restore(&key.section, &key.name, body);
+        session.restore(key.section(), key.name(), body);
         session.settle();
     }
 }
 
 fn hint(key: &Key) -> String {
-    let limits = match &key.limits {
-        Limits::Choice(_) => String::new(),
-        Limits::Number { low, above: true, high } if high.is_infinite() => format!("\nAbove {low}."),
-        Limits::Number { low, high, .. } if high.is_infinite() => format!("\n{low} or more."),
-        Limits::Number { low, above, high } => {
-            format!("\n{}{low} to {high}.", if *above { "Above " } else { "" })
-        }
-        Limits::Words(words) if words.is_empty() => String::new(),
-        Limits::Words(words) => format!("\n{words}."),
+    let limits = match key.limits {
+        Limits::Choice => String::new(),
+        _ => format!("\n{}.", keys::limits_in_words(key).replace('`', "")),
     };
     let unit = if key.unit().is_empty() { String::new() } else { format!(" [{}]", key.unit()) };
-    format!("{}{unit}: {}{limits}", key.path(), key.meaning)
+    format!("{}{unit}: {}{limits}", key.path, key.sentence().replace('`', ""))
 }

@@ -90,7 +90,7 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
     );
     let half_angles = AnySensor::new(config, false).map(|s| s.expected_half_angles_rad(None)).unwrap_or_default();
     for (body, half_angle) in config.each_body().iter().zip(half_angles) {
-        let name = hzn_mcap::body_name(body.kind);
+        let name = body.kind.name();
         match half_angle {
             Ok(rad) => {
                 line("expected body", format!("{name}, half-angle {:.3} deg", rad.to_degrees()));
@@ -170,7 +170,6 @@ fn limb_size(half_angle: f64, camera: &Camera<f64>, c: &camera::Config) -> Strin
 fn monotone_limit_deg(c: &camera::Config) -> Option<f64> {
     let k = |i: usize| c.coefficient(i);
     let slope: Box<dyn Fn(f64) -> f64> = match c.model {
-        Model::Pinhole | Model::Equidistant => return None,
         Model::KannalaBrandt => {
             let k = [k(0), k(1), k(2), k(3)];
             Box::new(move |t| {
@@ -185,6 +184,7 @@ fn monotone_limit_deg(c: &camera::Config) -> Option<f64> {
                 1.0 + r2 * (3.0 * k[0] + r2 * (5.0 * k[1] + r2 * 7.0 * k[2]))
             })
         }
+        _ => return None,
     };
     let end = if c.model == Model::BrownConrady { 89.9 } else { 180.0 };
     let steps = 18_000;

@@ -181,7 +181,7 @@ impl<'a> Grid<'a> {
                 [one] => config.body = one.clone(),
                 _ if !args.body.is_empty() => {}
                 several => {
-                    let names: Vec<&str> = several.iter().map(|b| hzn_mcap::body_name(b.kind)).collect();
+                    let names: Vec<&str> = several.iter().map(|b| b.kind.name()).collect();
                     let what = format!("looks for several bodies ({}); name one with --body", names.join(", "));
                     return Err(usage(format!("{}: {what}", path.display())));
                 }

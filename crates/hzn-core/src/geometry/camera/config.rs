@@ -1,32 +1,36 @@
 //! `[camera]` of sensor.toml.
 
 use super::uncertain::INTRINSICS;
-use crate::base::error::{ConfigError, Limit, above, between, require};
+use crate::base::error::{ConfigError, Limit, between, require};
+use crate::base::keys::{Form, Section, Value, choices, section};
 
-/// The projection of the lens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum Model {
-    /// r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸); OpenCV `fisheye`, Kalibr `equidistant`.
-    #[default]
-    KannalaBrandt,
-    /// r = θ, without coefficients.
-    Equidistant,
-    /// r = tan θ, without coefficients.
-    Pinhole,
-    /// Pinhole with radial and tangential distortion: k = [k1, k2, p1, p2, k3] as OpenCV writes them.
-    BrownConrady,
+choices! {
+    /// The projection of the lens.
+    pub enum Model {
+        /// r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸); OpenCV calls it `fisheye`, Kalibr `equidistant`.
+        @0 KannalaBrandt = "kannala-brandt";
+        /// r = θ, without coefficients.
+        @1 Equidistant = "equidistant";
+        /// r = tan θ, without coefficients.
+        @2 Pinhole = "pinhole";
+        /// Pinhole with radial and tangential distortion: k = [k1, k2, p1, p2, k3], in OpenCV's order.
+        @3 BrownConrady = "brown-conrady";
+    }
 }
 
 impl Model {
-    /// Its name in files.
-    pub const fn name(self) -> &'static str {
+    /// The names of its coefficients, in the order of `camera.k`.
+    pub const fn coefficients(self) -> &'static [&'static str] {
         match self {
-            Self::KannalaBrandt => "kannala-brandt",
-            Self::Equidistant => "equidistant",
-            Self::Pinhole => "pinhole",
-            Self::BrownConrady => "brown-conrady",
+            Self::KannalaBrandt => &["k1", "k2", "k3", "k4"],
+            Self::BrownConrady => &["k1", "k2", "p1", "p2", "k3"],
+            Self::Equidistant | Self::Pinhole => &[],
         }
+    }
+
+    /// Whether the image radius grows with tan θ, so that the lens ends before 90° off axis; else it grows with θ.
+    pub const fn is_planar(self) -> bool {
+        matches!(self, Self::Pinhole | Self::BrownConrady)
     }
 }
 
@@ -58,46 +62,59 @@ pub struct Covariance {
     pub rows: heapless::Vec<heapless::Vec<f64, INTRINSICS>, INTRINSICS>,
 }
 
-/// A camera calibration. Pixel centres at integers, x right, y down, z forward (as OpenCV).
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Config {
-    /// Columns of the picture, 2 to 65535.
-    pub width: u16,
-    /// Rows of the picture, 2 to 65535.
-    pub height: u16,
-    /// The projection.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub model: Model,
-    /// Focal length along x in pixels, above 0.
-    pub fx_px: f64,
-    /// Focal length along y in pixels, above 0.
-    pub fy_px: f64,
-    /// Principal point, column in pixels.
-    pub cx_px: f64,
-    /// Principal point, row in pixels.
-    pub cy_px: f64,
-    /// Coefficients: up to 4 for `kannala-brandt`, up to 5 for `brown-conrady`, none for the others. Missing ones are 0.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub k: heapless::Vec<f64, 5>,
-    /// Radius of the image circle in degrees off axis; pixels beyond count as masked. The lens must be monotone up
-    /// to the smaller of this and the farthest corner, with 2° to spare.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    pub theta_max_deg: Option<f64>,
-    /// 1-sigma of the focal length, of both axes alike, in percent of it, 0 to 100. It widens the covariance.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
-    pub focal_sigma_percent: f64,
-    /// 1-sigma of the principal point in pixels, of each coordinate, 0 or more. It widens the covariance.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
-    pub centre_sigma_px: f64,
-    /// Covariance of the intrinsic parameters; it counts instead of the two sigmas.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    pub covariance: Option<Covariance>,
-    /// Time from the exposure of the first row to that of the last one in seconds, 0 to 10; 0 for a global shutter, and
-    /// negative where the last row comes first. It counts where a frame brings the camera's rate of rotation: the rays of each
-    /// row are turned to the time of the middle row.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
-    pub readout_s: f64,
+section! {
+    /// `[camera]` of sensor.toml: the calibration. Pixel centres are at integers, x points right, y down, z forward, as in
+    /// OpenCV.
+    "camera" pub struct Config without defaults {
+        /// Columns of the picture, px.
+        @1 width: u16, serde(), [2.0 to 65535.0] { example: "1920" };
+        /// Rows of the picture, px.
+        @2 height: u16, serde(), [2.0 to 65535.0] { example: "1080" };
+        /// Projection of the lens.
+        @3 model: Model, serde(default), [choice]
+            { unset: "`kannala-brandt`", example: "\"pinhole\"" };
+        /// Focal length along x, px.
+        @4 fx_px: f64, serde(), [above 0.0] { example: "1200.0" };
+        /// Focal length along y, px.
+        @5 fy_px: f64, serde(), [above 0.0] { example: "1200.0" };
+        /// Column of the principal point, px.
+        @6 cx_px: f64, serde(), ["−1 to 2 times the width"] { example: "959.5" };
+        /// Row of the principal point, px.
+        @7 cy_px: f64, serde(), ["−1 to 2 times the height"] { example: "539.5" };
+        /// Coefficients: k1 to k4 of `kannala-brandt`, or k1, k2, p1, p2, k3 of `brown-conrady`.
+        ///
+        /// Coefficients that are left out are 0. The other models have none. The factor 1 of the first power of the angle
+        /// is not among them.
+        @8 k: heapless::Vec<f64, 5>, serde(default), ["4 or 5 numbers; the lens is monotone"]
+            { unset: "none", example: "[-0.055, 0.011, -0.0035, 0.0002]" };
+        /// Radius of the image circle, degrees off the optical axis; pixels beyond it count as masked.
+        ///
+        /// The lens must be monotone up to the smaller of this and the farthest corner, with 2° to spare.
+        @13 theta_max_deg: Option<f64>, serde(default, skip_serializing_if = "Option::is_none"), [0.1 to 175.0]
+            { unset: "none", example: "54.0" };
+        /// 1σ of the focal length, the same for both axes, in percent; it widens the covariance.
+        @14 focal_sigma_percent: f64, serde(default, skip_serializing_if = "is_zero"), [0.0 to 100.0]
+            { unset: "0", example: "0.1" };
+        /// 1σ of each coordinate of the principal point, px; it widens the covariance.
+        @15 centre_sigma_px: f64, serde(default, skip_serializing_if = "is_zero"), [0.0 to 1e6]
+            { unset: "0", example: "0.5" };
+        /// Covariance of the intrinsic parameters, which counts instead of the two sigmas; `order` names rows and columns
+        /// (`fx_px`, `fy_px`, `cx_px`, `cy_px`, `k1` ...), `rows` is the matrix.
+        @- covariance: Option<Covariance>, serde(default, skip_serializing_if = "Option::is_none"),
+            ["symmetric, positive semidefinite"]
+            { unset: "none", example: "{ order = [\"fx_px\", \"fy_px\"], rows = [[1.0, 0.9], [0.9, 1.0]] }" };
+        /// Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,
+        /// negative where the last row comes first.
+        ///
+        /// It counts where the prior of a picture holds the camera's rate of rotation: the rays of each row are turned to
+        /// the time of the middle row.
+        @16 readout_s: f64, serde(default, skip_serializing_if = "is_zero"), [-10.0 to 10.0]
+            { unset: "0", example: "0.03" };
+    }
+}
+
+impl Value for Covariance {
+    const FORM: Form = Form::Table;
 }
 
 /// What a lens that is known exactly leaves out.
@@ -132,19 +149,12 @@ impl Config {
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        require(self.width >= 2, "camera.width", f64::from(self.width), Limit::AtLeast(2.0))?;
-        require(self.height >= 2, "camera.height", f64::from(self.height), Limit::AtLeast(2.0))?;
-        above("camera.fx_px", self.fx_px, 0.0)?;
-        above("camera.fy_px", self.fy_px, 0.0)?;
+        self.check_keys()?;
         // A principal point far outside the picture is a mistake of units or order, not a lens.
         let (w, h) = (f64::from(self.width), f64::from(self.height));
         between("camera.cx_px", self.cx_px, -w, 2.0 * w)?;
         between("camera.cy_px", self.cy_px, -h, 2.0 * h)?;
-        let most = match self.model {
-            Model::KannalaBrandt => 4,
-            Model::BrownConrady => 5,
-            Model::Equidistant | Model::Pinhole => 0,
-        };
+        let most = self.model.coefficients().len();
         for (i, &k) in self.k.iter().enumerate() {
             require(k.is_finite(), "camera.k", k, Limit::Finite)?;
             require(
@@ -158,11 +168,6 @@ impl Config {
                 }),
             )?;
         }
-        if let Some(deg) = self.theta_max_deg {
-            between("camera.theta_max_deg", deg, 0.1, 175.0)?;
-        }
-        between("camera.focal_sigma_percent", self.focal_sigma_percent, 0.0, 100.0)?;
-        between("camera.centre_sigma_px", self.centre_sigma_px, 0.0, 1e6)?;
-        between("camera.readout_s", self.readout_s, -10.0, 10.0)
+        Ok(())
     }
 }

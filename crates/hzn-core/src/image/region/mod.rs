@@ -5,6 +5,7 @@ mod ring;
 pub(crate) use ring::Run;
 
 use crate::base::error::{ConfigError, Limit, between, require};
+use crate::base::keys::section;
 use crate::base::real::Real;
 use crate::geometry::camera::{self, Camera};
 #[cfg(feature = "horace")]
@@ -23,12 +24,14 @@ const RIM_PX: f64 = 3.0;
 /// Corners (x, y) of a polygon in pixels; the last is joined to the first.
 pub type Polygon = heapless::Vec<[f64; 2], MAX_CORNERS>;
 
-/// `[mask]` of sensor.toml.
-#[derive(Debug, Clone, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
-    /// Up to 8 polygons of 3 to 16 corners each; what lies inside is never lit, and its outline never an edge.
-    pub polygons_px: heapless::Vec<Polygon, MAX_POLYGONS>,
+section! {
+    /// `[mask]` of sensor.toml: parts of the vehicle in view.
+    "mask" pub struct Config {
+        /// Areas that never count, as polygons of corners [x, y], px; nothing in them is lit, and their outline is no edge.
+        @- polygons_px: heapless::Vec<Polygon, MAX_POLYGONS> = heapless::Vec::new(),
+            ["up to 8 polygons of 3 to 16 corners"]
+            { unset: "none", example: "[[[1500, 0], [1919, 0], [1919, 1079], [1450, 1079]]]" };
+    }
 }
 
 impl Config {

@@ -4,6 +4,7 @@ mod expected;
 mod shape;
 
 use crate::base::error::{ConfigError, Limit, above, between, require};
+use crate::base::keys::{Section, choices, section};
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::EARTH_MEAN_RADIUS_M;
 use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
@@ -29,100 +30,81 @@ pub const MAX_LATITUDES: usize = 16;
 /// Places on one half of the limb at which a height by latitude is looked up.
 const PLACES: usize = 8;
 
-/// Which body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum Kind {
-    /// WGS-84. Without a position a sphere of the mean radius, and the covariance holds the unknown latitude.
-    #[default]
-    Earth,
-    /// A sphere of 6371.0088 km.
-    EarthSphere,
-    /// A disc of 0.2666° half-angle at 1 au; it blooms, so its half-angle is free.
-    Sun,
-    /// A disc of about 0.26° half-angle; its half-angle is free.
-    Moon,
-    /// A sphere of `radius_km`.
-    Sphere,
-}
-
-/// What an altitude without a position is measured from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum AltitudeReference {
-    /// The ellipsoid, as satellite navigation gives it. A local radius that differs from the mean one moves the camera with
-    /// the surface, and shows in the half-angle by (H − d)/(R + H) of itself only.
-    #[default]
-    Ellipsoid,
-    /// A sphere, such as orbit radius minus 6371 km. The local radius is unknown in full.
-    Sphere,
-}
-
-/// `[body]` of sensor.toml, or one of several `[[bodies]]`.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
+choices! {
     /// Which body.
-    pub kind: Kind,
-    /// Radius in kilometres, above 0; for `sphere`, and only there.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub radius_km: Option<f64>,
-    /// Altitude of the camera in kilometres when a frame brings none: above WGS-84 for `earth`, else above the
-    /// radius. Above 0.
-    pub altitude_km: Option<f64>,
-    /// 1-sigma of the altitude in kilometres, 0 or more.
-    pub altitude_sigma_km: f64,
-    /// What an altitude without a position is measured from, for `earth`: the WGS-84 ellipsoid, or a sphere of 6371 km,
-    /// which leaves the local radius open by some 17 km (1σ).
-    pub altitude_reference: AltitudeReference,
-    /// Effective height of the visible limb above the surface in kilometres, −50 to 500: where the edge at half
-    /// brightness stands. Too high a value makes the cone too wide. The default, 17 km, is where a cloudless limb in sunlight
-    /// has half of its brightness at 550 nm.
-    pub limb_height_km: f64,
-    /// 1-sigma of the limb height in kilometres, 0 or more. The larger, the less the prior half-angle counts. The default,
-    /// 7 km, spans the visible wavelengths (24 km at 440 nm, 12 km at 650 nm) and levels between a quarter and three quarters.
-    pub limb_height_sigma_km: f64,
-    /// What clipping adds to the limb's height in kilometres, 0 to 500: where the limb is overexposed, half of full scale lies
-    /// h ln B above half of the light, h being the height over which the air thins out to 1/e (7.5 km) and B how far the light
-    /// exceeds full scale. The default, 7.8 km, is the mean over B from 1 to 8, evenly distributed in its logarithm. Only the
-    /// part of the limb counts whose lit side is clipped.
-    pub clipped_height_km: f64,
-    /// 1-sigma of that in kilometres, 0 or more; 4.5 km over the same B. It varies along the limb.
-    pub clipped_sigma_km: f64,
-    /// Limb height by latitude instead of `limb_height_km`: up to 16 rows of (geodetic latitude in degrees, height in
-    /// kilometres), latitudes rising, linear between them and constant beyond. For `earth` with a position; an attitude
-    /// is needed to make use of how the height varies along the limb, without one it widens the covariance.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "heapless::Vec::is_empty"))]
-    pub limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES>,
-    /// Whether the body is seen by sunlight, so that, where the direction to the Sun is known, only the limb that it
-    /// lights is limb. Left out: yes for `moon` and `sphere`.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub sunlit: Option<bool>,
-    /// Its own level between dark and lit, where it differs from the sensor's: the Sun's is far above the Earth's.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub binarize: Option<threshold::Config>,
-    /// Its own edge errors, where they differ from the sensor's.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub covariance: Option<edge_noise::Config>,
+    pub enum Kind {
+        /// WGS-84. Without a position it is a sphere of the mean radius, and the covariance holds the unknown latitude.
+        @0 Earth = "earth";
+        /// A sphere of 6371.0088 km.
+        @1 EarthSphere = "earth-sphere";
+        /// A disc of 0.2666° half-angle at 1 au; it blooms, so its half-angle is free.
+        @2 Sun = "sun";
+        /// A disc of about 0.26° half-angle; its half-angle is free.
+        @3 Moon = "moon";
+        /// A sphere of `radius_km`.
+        @4 Sphere = "sphere";
+    }
 }
 
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            kind: Kind::Earth,
-            radius_km: None,
-            altitude_km: None,
-            altitude_sigma_km: 0.5,
-            altitude_reference: AltitudeReference::Ellipsoid,
-            limb_height_km: 17.0,
-            limb_height_sigma_km: 7.0,
-            clipped_height_km: 7.8,
-            clipped_sigma_km: 4.5,
-            limb_height_by_latitude_km: heapless::Vec::new(),
-            sunlit: None,
-            binarize: None,
-            covariance: None,
-        }
+choices! {
+    /// The surface that an altitude without a position is measured from.
+    pub enum AltitudeReference {
+        /// The WGS-84 ellipsoid, as satellite navigation gives it.
+        ///
+        /// A local radius that differs from the mean one moves the camera with the surface, and shows in the half-angle by
+        /// only (H − d)/(R + H) of itself.
+        @0 Ellipsoid = "ellipsoid";
+        /// A sphere of 6371 km, such as orbit radius minus 6371 km; the local radius stays unknown by about 17 km (1σ).
+        @1 Sphere = "sphere";
+    }
+}
+
+section! {
+    /// `[body]` of sensor.toml: the body that is looked for; each of several `[[bodies]]` has the same keys.
+    "body" pub struct Config {
+        /// Which body is looked for.
+        @30 kind: Kind = Kind::Earth, [choice];
+        /// Radius of a `sphere`, km; other bodies take none.
+        @31 radius_km: Option<f64> = None, ["above 0, for `sphere` only"] { unset: "none", example: "1188.3" };
+        /// Altitude of the camera where a picture's prior gives none, km; above WGS-84 for `earth`, else above the radius.
+        ///
+        /// `sun` and `moon` do not use it. For a camera in orbit about the Moon the body is a `sphere` of 1737.4 km.
+        @32 altitude_km: Option<f64> = None, [above 0.0] { unset: "none", example: "400.0" };
+        /// 1σ of the altitude, km.
+        @33 altitude_sigma_km: f64 = 0.5, [0.0 to 1e6];
+        /// For `earth`: the surface that an altitude without a position is measured from.
+        @36 altitude_reference: AltitudeReference = AltitudeReference::Ellipsoid, [choice];
+        /// Height of the visible limb above the surface, km; 17 km is a cloudless limb in sunlight at 550 nm.
+        ///
+        /// It is the height at which the limb has half of its brightness. A value that is too high makes the expected cone
+        /// too wide.
+        @34 limb_height_km: f64 = 17.0, [-50.0 to 500.0];
+        /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds.
+        ///
+        /// Wavelengths: 24 km at 440 nm, 12 km at 650 nm. Thresholds: a quarter to three quarters of the limb's
+        /// brightness. The larger the sigma, the less the expected half-angle counts.
+        @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
+        /// Height that overexposure adds to the limb, km; it counts by the part of the limb that is clipped at full scale.
+        ///
+        /// Half of full scale lies h ln B above half of the light, where h = 7.5 km is the scale height of the air and the
+        /// light exceeds full scale by the factor B. The default is the mean for B from 1 to 8, even in ln B.
+        @37 clipped_height_km: f64 = 7.8, [0.0 to 500.0];
+        /// 1σ of `clipped_height_km`, km; the height varies along the limb.
+        @38 clipped_sigma_km: f64 = 4.5, [0.0 to 1e4];
+        /// Limb height by latitude instead of `limb_height_km`: rows of [geodetic latitude in degrees, height in km], with
+        /// rising latitudes.
+        ///
+        /// It is for `earth` with a position. Heights are linear between rows and constant beyond them. Without an attitude
+        /// the variation along the limb widens the covariance.
+        @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
+            ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
+        /// Whether only the sunlit part of the limb is a limb, where the direction to the Sun is known.
+        @- sunlit: Option<bool> = None, ["true or false"] { unset: "true for `moon` and `sphere`", example: "true" };
+        /// The body's own threshold, as a table with the keys of `[binarize]`.
+        @- binarize: Option<threshold::Config> = None, ["the keys of `[binarize]`"]
+            { unset: "`[binarize]`; for a `sun` among several bodies `fixed` at 0.9" };
+        /// The body's own errors of edge points, as a table with the keys of `[covariance]`.
+        @- covariance: Option<edge_noise::Config> = None, ["the keys of `[covariance]`"] { unset: "`[covariance]`" };
     }
 }
 
@@ -138,14 +120,7 @@ impl Config {
             }
             (_, None) => {}
         }
-        if let Some(h) = self.altitude_km {
-            above("body.altitude_km", h, 0.0)?;
-        }
-        between("body.altitude_sigma_km", self.altitude_sigma_km, 0.0, 1e6)?;
-        between("body.limb_height_km", self.limb_height_km, -50.0, 500.0)?;
-        between("body.limb_height_sigma_km", self.limb_height_sigma_km, 0.0, 1e4)?;
-        between("body.clipped_height_km", self.clipped_height_km, 0.0, 500.0)?;
-        between("body.clipped_sigma_km", self.clipped_sigma_km, 0.0, 1e4)?;
+        self.check_keys()?;
         let rows = &self.limb_height_by_latitude_km;
         let field = "body.limb_height_by_latitude_km";
         for [latitude, height] in rows {
@@ -160,8 +135,8 @@ impl Config {
             rows.len() as f64,
             Limit::Rule("only body.kind = \"earth\" has latitudes"),
         )?;
-        self.binarize.map_or(Ok(()), |b| b.check())?;
-        self.covariance.map_or(Ok(()), |c| c.check())
+        self.binarize.map_or(Ok(()), |b| b.check_keys())?;
+        self.covariance.map_or(Ok(()), |c| c.check_keys())
     }
 
     /// Radius of the sphere that stands for the body where no position is known, kilometres.

@@ -15,7 +15,7 @@ mod ransac;
 #[cfg(any(feature = "dlr", feature = "zju"))]
 mod sampled;
 
-use crate::base::error::{ConfigError, Limit, above, between, require};
+use crate::base::keys::{choices, section};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;
@@ -24,59 +24,40 @@ use crate::geometry::cone::{through_three, through_two};
 use crate::model::body::Expected;
 use crate::model::work::{DRAW, SCORE, WorkBudget};
 
-/// How outliers are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum Method {
-    /// RANSAC on two points with the expected half-angle (three points when it is too uncertain), verified on one
-    /// further point before it is scored.
-    #[default]
-    TwoPoint,
-    /// Every point is taken.
-    None,
-    /// RANSAC on three points, every point counted in every draw (Braun & Barf 2022, 3.6).
-    #[cfg(feature = "dlr")]
-    Ransac,
-    /// RANSAC on five points, of which two verify the cone through the others before it is counted (Wang et al. 2022,
-    /// 2.3). Give it 20000 draws.
-    #[cfg(feature = "zju")]
-    RansacPreverify,
-    /// RANSAC on three points by the likelihood of a mixture (Torr & Zisserman 2000).
-    #[cfg(feature = "zju")]
-    Mlesac,
-}
-
-/// `[reject]` of sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
-    /// How outliers are found.
-    pub method: Method,
-    /// Distance from the limb in pixels up to which a point can be an inlier, above 0 to 1000.
-    pub threshold_px: f64,
-    /// The threshold is at least this many times the noise of the edge from point to point, 0 to 100, but no more than
-    /// the sigma of the limb's height; 0 leaves it at `threshold_px`. A threshold that cuts into the noise keeps the points
-    /// that happen to lie near some limb. Two sigmas hold 95 % of a limb's points.
-    pub noise_sigma: f64,
-    /// Seed of the sampler: the same seed gives the same answer.
-    pub seed: u32,
-    /// Most draws, 1 to 100000. 800 find the limb among 80 % of outliers.
-    pub max_draws: u32,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { method: Method::TwoPoint, threshold_px: 3.0, noise_sigma: 2.0, seed: 1, max_draws: 800 }
+choices! {
+    /// How the inliers are found.
+    pub enum Method {
+        /// RANSAC on two points with the expected half-angle (three points where that is too uncertain); a further point
+        /// verifies a draw before it is scored.
+        @0 TwoPoint = "two-point";
+        /// Every point is an inlier.
+        @1 None = "none";
+        /// RANSAC on three points; every draw is scored with every point (Braun & Barf 2022, 3.6).
+        @- Ransac = "ransac" needs "dlr";
+        /// RANSAC on five points, of which two verify the cone through the other three before it is scored (Wang et al. 2022,
+        /// 2.3); it needs about 20000 draws.
+        @- RansacPreverify = "ransac-preverify" needs "zju";
+        /// RANSAC on three points by the likelihood of a mixture (Torr & Zisserman 2000).
+        @- Mlesac = "mlesac" needs "zju";
     }
 }
 
-impl Config {
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        above("reject.threshold_px", self.threshold_px, 0.0)?;
-        between("reject.threshold_px", self.threshold_px, 0.0, 1000.0)?;
-        between("reject.noise_sigma", self.noise_sigma, 0.0, 100.0)?;
-        let draws = f64::from(self.max_draws);
-        require((1..=100_000).contains(&self.max_draws), "reject.max_draws", draws, Limit::Between(1.0, 1e5))
+section! {
+    /// `[reject]` of sensor.toml: the cone that most edge points agree on, and their outliers.
+    "reject" pub struct Config: Copy {
+        /// How the inliers are found.
+        @80 method: Method = Method::TwoPoint, [choice];
+        /// Largest distance of an inlier from the limb, px.
+        @81 threshold_px: f64 = 3.0, [above 0.0 to 1000.0];
+        /// The largest distance is at least this many times the noise from point to point; 0 leaves it at `threshold_px`.
+        ///
+        /// It is at most the sigma of the limb height. A threshold that cuts into the noise keeps the points that happen to
+        /// lie near some limb. Two sigmas hold 95 % of a limb's points.
+        @84 noise_sigma: f64 = 2.0, [0.0 to 100.0];
+        /// Seed of the random draws; the same seed gives the same answer.
+        @82 seed: u32 = 1, [0.0 to 4294967295.0];
+        /// Largest number of draws; 800 find the limb among 80 % of outliers.
+        @83 max_draws: u32 = 800, [1.0 to 100000.0];
     }
 }
 
@@ -143,7 +124,6 @@ pub(crate) fn keep<T: Real>(
     work: &mut WorkBudget,
 ) -> Option<Consensus<T>> {
     let best = match config.method {
-        Method::TwoPoint => search(blocks, count, expected, focal_px, threshold, config, work)?,
         Method::None => {
             let (a, b) = (ray(blocks, 0)?, ray(blocks, count.saturating_sub(1))?);
             let mid = ray(blocks, count / 2)?;
@@ -156,6 +136,8 @@ pub(crate) fn keep<T: Real>(
         Method::RansacPreverify => return preverified::keep(blocks, count, threshold, config, work),
         #[cfg(feature = "zju")]
         Method::Mlesac => return mlesac::keep(blocks, count, focal_px, threshold, config, work),
+        // `Config::check` refuses a method that is not built in.
+        _ => search(blocks, count, expected, focal_px, threshold, config, work)?,
     };
     for block in blocks {
         let g = block.gradient(&best.e);

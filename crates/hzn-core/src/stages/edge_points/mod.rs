@@ -17,6 +17,7 @@ mod patch;
 mod zernike;
 
 use crate::base::error::{ConfigError, Limit, require};
+use crate::base::keys::{Section, choices, section};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES, Lit};
 use crate::geometry::pixel::{ImagePoint, Pixel};
@@ -24,54 +25,47 @@ use crate::image::{Pixels, StreamedPoint};
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// How a border pixel becomes an edge point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum SubPixel {
-    /// Crossing of the mid-level between the plateaus on both sides, in three rows smoothed along the edge; of the Sun, which
-    /// blooms into a glare that is no plateau, crossing of the picture's level.
-    #[default]
-    Linear,
-    /// The border pixel's centre, moved half a pixel to the dark side.
-    None,
-    /// A blurred step fitted to 7×7 pixels, between the means of the plateaus: the best accuracy, at some hundred times
-    /// the cost.
-    #[cfg(feature = "erf")]
-    Erf,
-    /// Zernike moments of 7×7 pixels (Wang et al. 2022): a step across a disc.
-    #[cfg(feature = "zju")]
-    Zernike,
-}
-
-/// `[candidates]` of sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
-    /// Edges with fewer border pixels are left out, 8 or more; half of what a small body has around it is enough of it, and
-    /// half of the shorter side of a picture of fewer than 80 rows.
-    pub min_points: u16,
-    /// Points kept of each candidate, evenly along the edge, 16 or more; 0 keeps all that fit.
-    pub keep_points: u16,
+choices! {
     /// How a border pixel becomes an edge point.
-    pub sub_pixel: SubPixel,
+    pub enum SubPixel {
+        /// The point is where the brightness crosses the middle between the plateaus on both sides, in three rows smoothed
+        /// along the edge.
+        ///
+        /// The Sun blooms into a glare that is no plateau: its edge point is where the brightness crosses the threshold.
+        @0 Linear = "linear";
+        /// The point is the border pixel's centre, moved half a pixel to the dark side.
+        @1 None = "none";
+        /// A blurred step is fitted to 7×7 pixels between the means of the plateaus: the best accuracy, at about a hundred
+        /// times the cost.
+        @- Erf = "erf" needs "erf";
+        /// Zernike moments of 7×7 pixels locate a step across a disc (Wang et al. 2022).
+        @- Zernike = "zernike" needs "zju";
+    }
 }
 
-impl Default for Config {
-    fn default() -> Self {
-        Self { min_points: 40, keep_points: 600, sub_pixel: SubPixel::Linear }
+section! {
+    /// `[candidates]` of sensor.toml: edges that are candidates for the limb, and their edge points.
+    "candidates" pub struct Config: Copy {
+        /// Shortest edge, border pixels; a small body or picture needs fewer.
+        ///
+        /// For a small disc, half of its circumference in pixels is enough; in a picture of fewer than 80 rows or columns,
+        /// half of its shorter side.
+        @70 min_points: u16 = 40, [8.0 or more];
+        /// Points kept per edge, evenly along it; 0 keeps all that fit into memory.
+        ///
+        /// 200 points take half the time and lose little accuracy.
+        @71 keep_points: u16 = 600, ["0 (all) or 16 to 65535"];
+        /// How a border pixel becomes an edge point.
+        @72 sub_pixel: SubPixel = SubPixel::Linear, [choice];
     }
 }
 
 impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        let (min, keep) = (f64::from(self.min_points), f64::from(self.keep_points));
-        require(self.min_points >= 8, "candidates.min_points", min, Limit::AtLeast(8.0))?;
-        require(
-            self.keep_points == 0 || self.keep_points >= 16,
-            "candidates.keep_points",
-            keep,
-            Limit::Rule("must be 16 or more, or 0 to keep all"),
-        )
+        self.check_keys()?;
+        let keep = f64::from(self.keep_points);
+        let enough = self.keep_points == 0 || self.keep_points >= 16;
+        require(enough, "candidates.keep_points", keep, Limit::Rule("must be 16 or more, or 0 to keep all"))
     }
 }
 
@@ -180,18 +174,14 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
     slow: &mut u32,
 ) -> Option<EdgePoint<T>> {
     match config.sub_pixel {
-        SubPixel::Linear => {
-            if is_clear(binary, p, MARGIN as u16) {
-                linear::<T, P, O, true>(binary, p, slow)
-            } else {
-                linear::<T, P, O, false>(binary, p, slow)
-            }
-        }
         SubPixel::None => half_pixel(binary, p),
         #[cfg(feature = "erf")]
         SubPixel::Erf => erf::locate(binary, p).and_then(towards_light),
         #[cfg(feature = "zju")]
         SubPixel::Zernike => zernike::locate(binary, p).and_then(towards_light),
+        // `Config::check` refuses a method that is not built in.
+        _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, slow),
+        _ => linear::<T, P, O, false>(binary, p, slow),
     }
 }
 

@@ -19,7 +19,7 @@ pub(crate) mod direct;
 #[cfg(feature = "zju")]
 mod quadric;
 
-use crate::base::error::ConfigError;
+use crate::base::keys::{choices, section};
 use crate::base::linalg::{M3, V3, basis, invert_spd2, invert_spd3, unit};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, HALF, LANES, sum};
@@ -31,62 +31,47 @@ use crate::stages::consensus::Consensus;
 #[cfg(feature = "zju")]
 pub(crate) use quadric::Quadric;
 
-/// What the fit takes for the half-angle of the cone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum HalfAngle {
-    /// Fitted freely, then fused with the expected one by their covariances. Never worse than the better of the two.
-    #[default]
-    Fused,
-    /// The expected one, exactly.
-    Known,
-    /// Fitted; the expected one is only a start.
-    Free,
+choices! {
+    /// Which half-angle the fitted cone has.
+    pub enum HalfAngle {
+        /// The half-angle is fitted freely, then fused with the expected one by their covariances; the result is never worse
+        /// than the better of the two.
+        @0 Fused = "fused";
+        /// The half-angle is the expected one, exactly.
+        @1 Known = "known";
+        /// The half-angle is fitted; the expected one is only a start.
+        @2 Free = "free";
+    }
 }
 
-/// How the cone is fitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-pub enum Method {
-    /// Gauss-Newton on the sphere with Tukey's weights and the expected half-angle.
-    #[default]
-    Sphere,
-    /// Linear least squares on the plane z = 1, half-angle free (Braun & Barf 2022, (24)).
-    #[cfg(feature = "dlr")]
-    Direct,
-    /// The axis of the ellipse or hyperbola through the points (Braun & Barf 2022, (17), (18) corrected).
-    #[cfg(feature = "dlr")]
-    Conic,
-    /// An elliptic cone by total least squares (Wang et al. 2022, (10) to (17)).
-    #[cfg(feature = "zju")]
-    Tls,
-    /// The same, every point weighed by what a pixel is to it (Wang et al. 2022, (18) to (21)).
-    #[cfg(feature = "zju")]
-    Wtls,
-    /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
-    #[cfg(feature = "horace")]
-    Circle,
-}
-
-/// `[estimate]` of sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
+choices! {
     /// How the cone is fitted.
-    pub method: Method,
-    /// What the fit takes for the half-angle.
-    pub half_angle: HalfAngle,
-    /// For `wtls`: weights are used when the axis lies further off the optical axis than this, in degrees, 0 to 180; 0
-    /// uses them always. Nearer, the result is that of `tls`.
-    #[cfg(feature = "zju")]
-    pub weigh_above_deg: f64,
+    pub enum Method {
+        /// Gauss-Newton on the sphere, with Tukey's weights and the expected half-angle.
+        @- Sphere = "sphere";
+        /// Linear least squares on the plane z = 1, half-angle free (Braun & Barf 2022, (24)).
+        @- Direct = "direct" needs "dlr";
+        /// The axis of the ellipse or hyperbola through the points (Braun & Barf 2022, (17), (18) corrected).
+        @- Conic = "conic" needs "dlr";
+        /// An elliptic cone by total least squares (Wang et al. 2022, (10) to (17)).
+        @- Tls = "tls" needs "zju";
+        /// The same with every point weighed by the angle of a pixel at its place (Wang et al. 2022, (18) to (21)).
+        @- Wtls = "wtls" needs "zju";
+        /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
+        @- Circle = "circle" needs "horace";
+    }
 }
 
-impl Config {
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        #[cfg(feature = "zju")]
-        crate::base::error::between("estimate.weigh_above_deg", self.weigh_above_deg, 0.0, 180.0)?;
-        Ok(())
+section! {
+    /// `[estimate]` of sensor.toml: the fit of the cone.
+    "estimate" pub struct Config: Copy {
+        /// How the cone is fitted.
+        @- method: Method = Method::Sphere, [choice];
+        /// Which half-angle the fitted cone has.
+        @90 half_angle: HalfAngle = HalfAngle::Fused, [choice];
+        /// For `wtls`: points are weighed where the axis is farther off the optical axis than this, degrees; 0 always weighs
+        /// them.
+        @- weigh_above_deg: f64 = 0.0, [0.0 to 180.0] { needs: "zju" };
     }
 }
 
@@ -154,7 +139,6 @@ pub(crate) fn fit<T: Real>(
     #[cfg(not(feature = "horace"))]
     let _ = camera;
     let cone = match config.method {
-        Method::Sphere => sphere(blocks, start, expected, threshold_px, config, noise)?,
         #[cfg(feature = "dlr")]
         Method::Direct => held(blocks, start, threshold_px, direct::fit)?,
         #[cfg(feature = "dlr")]
@@ -165,6 +149,8 @@ pub(crate) fn fit<T: Real>(
         Method::Wtls => elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?,
         #[cfg(feature = "horace")]
         Method::Circle => held(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
+        // `Config::check` refuses a method that is not built in.
+        _ => sphere(blocks, start, expected, threshold_px, config, noise)?,
     };
     Some(counted(blocks, cone))
 }

@@ -11,7 +11,8 @@ mod sky;
 mod sun;
 mod view;
 
-use crate::base::error::{ConfigError, Limit, above, between, require};
+use crate::base::error::{ConfigError, between};
+use crate::base::keys::{Section, section};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
@@ -25,242 +26,166 @@ use crate::stages::contour::BinaryPicture;
 use crate::stages::covariance::Fused;
 use crate::stages::fit::{self, Fit};
 
-/// `[select]` of sensor.toml: what an answer must fulfil.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct Config {
-    /// Fewest inliers, 8 or more; a third of what a small body has around it is enough of it, and a third of the shorter side
-    /// of a picture of fewer than 80 rows.
-    pub min_inliers: u16,
-    /// Shortest edge that inliers must cover, in pixels, 0 or more. Left out: a tenth of the picture's diagonal, or a
-    /// third of the body's circumference where that is less. Shorter edges fit many curves.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub min_arc_px: Option<f64>,
-    /// Largest weighted RMS distance of the inliers from the limb in pixels, above 0; larger by as much as the noise of
-    /// the edge raises `reject.threshold_px`.
-    pub max_rms_px: f64,
-    /// Largest difference of the fitted half-angle from the expected one in standard deviations, above 0.
-    pub max_half_angle_sigma: f64,
-    /// Largest standard deviation of an answer in degrees, above 0 to 180.
-    pub max_sigma_deg: f64,
-    /// Smallest part of the fitted limb in view that must be edge, 0 to 1. A limb goes on where the edge of a mast or
-    /// a cloud ends. The Sun, which has no phases, needs 0.7 where this is above 0: the Moon is no Sun.
-    pub min_support: f64,
-    /// Largest part of what lies beyond the fitted limb that may be lit, 0 to 1. Beyond a limb is the sky, but for
-    /// what stands before it; beyond the edge of a cloud are other clouds.
-    pub max_lit_sky: f64,
-    /// Smallest part of an edge's points that must be inliers, 0 to 1. With one point in 20, three pixels of threshold and a
-    /// cone free to turn, a curve passes through clutter by chance.
-    pub min_inlier_share: f64,
-    /// Most points that may lie beside the fitted limb, within three times the cut-off, as a part of the inliers; 0 or more. A
-    /// limb stands alone; a curve laid through many edges has others close beside it.
-    pub max_nearby: f64,
-    /// An edge of whose points this part or more are inliers lies on the limb as a whole, 0 to 1. Of others a part may lie on
-    /// it by chance, and is asked for more: see `max_way`. 0 asks no edge.
-    pub whole_edge: f64,
-    /// Longest way along the inliers of an edge that is not whole, as a multiple of what they cover of the limb, 1 or more: a
-    /// cloud's edge winds, and has many parts of which one may lie on a limb.
-    pub max_way: f64,
-    /// As `min_support`, of a body without phases (the Sun) where `min_support` is above 0: it is a whole disc, and a gibbous
-    /// Moon has less. 0 to 1.
-    pub min_support_whole: f64,
-    /// Largest ratio of the cone's residual to that of a rival shape through the same points: a circle of the image, as lens
-    /// flares are, and up to four straight pieces, as an iris or a vehicle has. 1 or more. Where residuals are noise the
-    /// ratio is about 1; where the points are the rival's, the cone's misfit makes it large. 2 stands for a likelihood of
-    /// 4 to the power of half the independent points. A large value turns the gate off.
-    pub max_rival_ratio: f64,
-    /// How much likelier the points must be about the limb than about a straight line, and may be at most about a rival than
-    /// about the limb: twice the logarithm, −1e6 to 1e6. 9 are three standard deviations. Points whose residuals are alike
-    /// count once. A large negative value takes straight edges, too.
-    pub min_evidence: f64,
-    /// Residuals below this are not told apart, pixels, above 0: what sampling and interpolation leave of a perfect edge.
-    pub rival_floor_px: f64,
-    /// Smallest noise that the gate of the half-angle takes an edge to have when the residuals show less than was told,
-    /// pixels, 0 or more. A large value leaves the gate to the told noise.
-    pub residual_floor_px: f64,
-    /// Largest length over which an edge may go on smoothly beside the fitted limb, as a part of its longest run of
-    /// inliers; 0 or more. Only where it keeps its contrast, see `departure_contrast`. A large value turns the gate off.
-    pub max_departure: f64,
-    /// Smallest part of the fitted limb in view that must be edge where the edge leaves the limb with its contrast kept, see
-    /// `departure_contrast`, 0 to 1. The corner of an iris and the crossing of two flares end an edge so. 0 turns the gate off,
-    /// and is the default: 0.7 refuses half-lit discs, too.
-    pub min_support_abrupt: f64,
-    /// The largest turn from one 16 pixels of edge to the next that is smooth, degrees, 0 to 90: 8 degrees is a curve of 115
-    /// pixels radius, sharper ones are corners of clouds. Room for the noise is added.
-    pub departure_turn_deg: f64,
-    /// A departing edge counts only where its contrast is at least this part of the limb's, 0 or more: a terminator fades,
-    /// the rim of a flare does not.
-    pub departure_contrast: f64,
-    /// Largest part of the looks from the limb inwards that may end in the sky across a second edge, 0 to 1; for bodies that
-    /// cannot lie whole in the picture: a crescent is a band. 1 turns the gate off.
-    pub max_band: f64,
-    /// A second edge is one whose step is at least this part of the limb's, above 0 to 1.
-    pub band_step: f64,
-    /// Largest angle between the axis and the one that a given attitude and position lead to, in standard deviations of both,
-    /// above 0.
-    pub max_attitude_sigma: f64,
-    /// Fastest turn of the vehicle in degrees a second, above 0: an axis farther from the last answer is refused. Left out:
-    /// any. Pictures must then come in order.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub max_rate_deg_s: Option<f64>,
-    /// Largest part of the inliers over which the given Sun stands lower than `min_sun_elevation_deg`, 0 to 1. For bodies that
-    /// are seen in its light, see `body.sunlit`. 1 turns the gate off.
-    pub max_unlit: f64,
-    /// Lowest Sun that still lights a limb, degrees above its horizon, −90 to 90. −18 is the end of twilight.
-    pub min_sun_elevation_deg: f64,
-    /// How far the fitted half-angle must lie from that of the body on the other side of the edge, in standard deviations,
-    /// 0 or more: the edge itself tells the side.
-    pub min_side_sigma: f64,
-    /// Answers farther apart than this contradict each other, degrees, 0 to 180.
-    pub ambiguous_deg: f64,
-    /// Of answers that contradict each other the better is taken when its score is better by this factor, 1 or more.
-    pub ambiguous_score: f64,
-    /// An answer ends the search when its edge covers this part of the limb in view, 0 to 1 ...
-    pub certain_support: f64,
-    /// ... and this part of its edge is inliers, or their residual is a quarter of the threshold; 0 to 1.
-    pub certain_share: f64,
-    /// Least and largest half-angle of a Sun, as multiples of its own, above 0: it never shrinks, and blooms.
-    pub sun_size: [f64; 2],
-    /// Least and largest half-angle of a Moon, as multiples of its own, above 0: what saturates of it is smaller, and it is
-    /// nearer at times.
-    pub moon_size: [f64; 2],
-    /// By how much a Moon blooms beyond that, pixels, 0 or more.
-    pub moon_bloom_px: f64,
-    /// Whether some of the limb of the expected half-angle about the fitted axis must lie in the picture.
-    #[cfg(feature = "dlr")]
-    pub limb_in_view: bool,
-    /// Largest mean square distance of the points from the conic section of the expected half-angle about the fitted
-    /// axis, along its principal axis, in focal lengths squared; above 0. Left out: any.
-    #[cfg(feature = "dlr")]
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub max_section_residual: Option<f64>,
-    /// Lowest and highest altitude in kilometres, 0 or more: the fitted circle's radius must be that of the limb from
-    /// between. Left out: any. At 0 the limb is infinitely wide.
-    #[cfg(feature = "horace")]
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub altitude_limits_km: Option<[f64; 2]>,
-    /// By how much the radius may lie beyond its limits, as a part of them, 0 or more.
-    #[cfg(feature = "horace")]
-    pub radius_margin: f64,
-    /// With `altitude_limits_km`: by how much more the radius may lie beyond its limits, in pixels, 0 to 1e6; 0 by default.
-    /// HORACE gives its margin so, 5000 px (Barf 2014, (2.35)). Only a build with the feature `horace` reads it.
-    pub radius_margin_px: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            min_inliers: 24,
-            min_arc_px: None,
-            max_rms_px: 2.0,
-            max_half_angle_sigma: 3.0,
-            max_sigma_deg: 10.0,
-            min_support: 0.4,
-            max_lit_sky: 0.3,
-            min_inlier_share: 0.05,
-            max_nearby: 1.0 / 3.0,
-            whole_edge: 0.8,
-            max_way: 3.0,
-            min_support_whole: 0.7,
-            max_rival_ratio: 2.0,
-            min_evidence: 9.0,
-            rival_floor_px: 0.03,
-            residual_floor_px: 0.1,
-            max_departure: 0.2,
-            min_support_abrupt: 0.0,
-            departure_turn_deg: 8.0,
-            departure_contrast: 0.6,
-            max_band: 0.5,
-            band_step: 0.4,
-            max_attitude_sigma: 4.0,
-            max_rate_deg_s: None,
-            max_unlit: 0.5,
-            min_sun_elevation_deg: -18.0,
-            min_side_sigma: 4.0,
-            ambiguous_deg: 5.0,
-            ambiguous_score: 2.0,
-            certain_support: 0.5,
-            certain_share: 0.8,
-            sun_size: [0.9, 12.0],
-            moon_size: [0.5, 1.1],
-            moon_bloom_px: 10.0,
-            #[cfg(feature = "dlr")]
-            limb_in_view: false,
-            #[cfg(feature = "dlr")]
-            max_section_residual: None,
-            #[cfg(feature = "horace")]
-            altitude_limits_km: None,
-            #[cfg(feature = "horace")]
-            radius_margin: 0.1,
-            radius_margin_px: 0.0,
-        }
+section! {
+    /// `[select]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
+    "select" pub struct Config: Copy {
+        /// Fewest inliers; a small body or picture needs fewer.
+        ///
+        /// For a small disc, one third of its circumference in pixels is enough; in a picture of fewer than 80 rows or
+        /// columns, one third of its shorter side.
+        @110 min_inliers: u16 = 24, [8.0 or more];
+        /// Shortest length of edge that inliers must cover, px.
+        ///
+        /// Shorter edges fit many curves.
+        @111 min_arc_px: Option<f64> = None, [0.0 to 1e6] {
+            unset: "a tenth of the diagonal, or a third of the body's circumference if less",
+            example: "60.0",
+        };
+        /// Largest weighted RMS distance of the inliers from the limb, px; it grows as `reject.noise_sigma` raises the largest
+        /// distance of an inlier.
+        @112 max_rms_px: f64 = 2.0, [above 0.0];
+        /// Largest difference between the fitted and the expected half-angle, in standard deviations.
+        @113 max_half_angle_sigma: f64 = 3.0, [above 0.0];
+        /// Largest standard deviation of an answer, degrees.
+        @114 max_sigma_deg: f64 = 10.0, [above 0.0 to 180.0];
+        /// Smallest part of the fitted limb in view that edge points must cover.
+        ///
+        /// A limb goes on where the edge of a mast or of a cloud ends.
+        @115 min_support: f64 = 0.4, [0.0 to 1.0];
+        /// Largest part of the sky beyond the fitted limb that may be lit.
+        ///
+        /// Beyond the edge of a cloud are other clouds. Ghosts in the sky next to a limb light up to a quarter of it.
+        @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
+        /// Smallest part of an edge's points that must be inliers.
+        ///
+        /// With one point in 20, three pixels of threshold and a cone that is free to turn, a curve passes through clutter by
+        /// chance.
+        @- min_inlier_share: f64 = 0.05, [0.0 to 1.0];
+        /// Largest number of points close to the fitted limb that are no inliers, as a part of the inliers.
+        ///
+        /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has others close to it.
+        @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
+        /// An edge lies on the limb as a whole where at least this part of its points are inliers; 0 checks no edge for
+        /// `max_way`.
+        @- whole_edge: f64 = 0.8, [0.0 to 1.0];
+        /// Longest way along the inliers of an edge that is not whole, as a multiple of the limb that they cover.
+        ///
+        /// A cloud's edge winds, and a part of it may lie on a limb by chance.
+        @- max_way: f64 = 3.0, [1.0 to 1e6];
+        /// For the Sun: smallest part of the fitted limb in view that edge points must cover, where `min_support` is above 0.
+        ///
+        /// The Sun is a whole disc; a gibbous Moon shows less.
+        @- min_support_whole: f64 = 0.7, [0.0 to 1.0];
+        /// Largest residual of the cone over that of a circle of the image or of four straight pieces; 1e6 turns the gate off.
+        ///
+        /// Lens flares are circles of the image; an iris and a vehicle have straight edges. Where residuals are noise the
+        /// ratio is about 1. A ratio of 2 stands for a likelihood of 4 to the power of half the independent points.
+        @- max_rival_ratio: f64 = 2.0, [1.0 to 1e6];
+        /// Evidence for the limb over a straight line, and largest evidence for a rival shape over the limb: twice the
+        /// logarithm of the likelihood ratio; −1e6 turns the gate off.
+        ///
+        /// 9 are three standard deviations. Points whose residuals are alike count once.
+        @- min_evidence: f64 = 9.0, [-1e6 to 1e6];
+        /// Residuals below this count as equal, px.
+        ///
+        /// Sampling and interpolation leave about this residual of a perfect edge.
+        @- rival_floor_px: f64 = 0.03, [above 0.0 to 1e4];
+        /// Smallest noise of an edge in the gate of the half-angle, where its residuals are smaller than the told noise, px; 1e4
+        /// leaves the gate to the told noise.
+        @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
+        /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6 turns
+        /// the gate off.
+        ///
+        /// A continuation counts where it keeps its contrast, see `departure_contrast`.
+        @- max_departure: f64 = 0.2, [0.0 to 1e6];
+        /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb with its contrast
+        /// kept; 0 turns the gate off.
+        ///
+        /// The corner of an iris and the crossing of two flares end an edge like that. The default is 0, because 0.7 also
+        /// refuses half-lit discs and crescents.
+        @- min_support_abrupt: f64 = 0.0, [0.0 to 1.0];
+        /// Largest turn between two lengths of 16 px of edge that counts as smooth, degrees.
+        ///
+        /// 8 degrees are a curve of 115 px radius; corners of clouds are sharper. Room for the noise is added.
+        @- departure_turn_deg: f64 = 8.0, [0.0 to 90.0];
+        /// Smallest contrast of a continuation that counts, as a part of the limb's contrast.
+        ///
+        /// A terminator fades; the rim of a flare does not.
+        @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
+        /// Largest part of the looks inwards from the limb that may end in the sky behind a second edge; 1 turns the gate off.
+        ///
+        /// The gate is for a body that cannot lie whole in the picture: a crescent is a band, too.
+        @- max_band: f64 = 0.5, [0.0 to 1.0];
+        /// Smallest step of a second edge, as a part of the limb's step.
+        @- band_step: f64 = 0.4, [above 0.0 to 1.0];
+        /// Largest angle between the axis and the axis that a given attitude and position predict, in standard deviations.
+        @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
+        /// Fastest turn of the vehicle, degrees per second: an axis farther from the previous answer is refused.
+        ///
+        /// Pictures are then processed in order.
+        @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
+        /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
+        /// `body.sunlit = false`.
+        @- max_unlit: f64 = 0.5, [0.0 to 1.0];
+        /// Lowest elevation of the Sun that lights a limb, degrees; −18 is the end of twilight.
+        @- min_sun_elevation_deg: f64 = -18.0, [-90.0 to 90.0];
+        /// Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard deviations.
+        ///
+        /// The curvature of the edge tells on which side the body is.
+        @- min_side_sigma: f64 = 4.0, [0.0 to 1e6];
+        /// Answers farther apart than this contradict each other, degrees.
+        @- ambiguous_deg: f64 = 5.0, [0.0 to 180.0];
+        /// Of answers that contradict each other, the better one counts where its score is better by this factor.
+        @- ambiguous_score: f64 = 2.0, [1.0 to 1e6];
+        /// An answer ends the search where its edge covers at least this part of the limb in view.
+        @- certain_support: f64 = 0.5, [0.0 to 1.0];
+        /// An answer ends the search where at least this part of its edge's points are inliers.
+        ///
+        /// A residual of a quarter of the threshold does as well.
+        @- certain_share: f64 = 0.8, [0.0 to 1.0];
+        /// [smallest, largest] half-angle of a Sun, as multiples of its true one.
+        ///
+        /// The Sun never looks smaller than it is, and it blooms.
+        @- sun_size: [f64; 2] = [0.9, 12.0], [above 0.0 to 1e6];
+        /// [smallest, largest] half-angle of a Moon, as multiples of its mean one.
+        ///
+        /// The part of it that saturates is smaller, and it is nearer at times.
+        @- moon_size: [f64; 2] = [0.5, 1.1], [above 0.0 to 1e6];
+        /// A Moon may be larger than that by this blooming, px.
+        @- moon_bloom_px: f64 = 10.0, [0.0 to 1e6];
+        /// Some of the limb of the expected half-angle about the fitted axis must lie in the picture.
+        @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };
+        /// Largest mean square distance of the points from the expected conic section, focal lengths squared.
+        ///
+        /// The distance is taken along the section's principal axis.
+        @- max_section_residual: Option<f64> = None, [above 0.0] { needs: "dlr", unset: "any", example: "0.025" };
+        /// [lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them.
+        ///
+        /// At altitude 0 the limb is infinitely wide.
+        @- altitude_limits_km: Option<[f64; 2]> = None, [0.0 to 1e9]
+            { needs: "horace", unset: "any", example: "[0.0, 1000.0]" };
+        /// With `altitude_limits_km`: the radius may lie beyond its limits by this part of them.
+        @- radius_margin: f64 = 0.1, [0.0 to 1000.0] { needs: "horace" };
+        /// With `altitude_limits_km`: the radius may lie beyond its limits by this length, px.
+        ///
+        /// HORACE's margin is 5000 px (Barf 2014, (2.35)).
+        @- radius_margin_px: f64 = 0.0, [0.0 to 1e6] { needs: "horace" };
     }
 }
 
 impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        require(self.min_inliers >= 8, "select.min_inliers", f64::from(self.min_inliers), Limit::AtLeast(8.0))?;
-        if let Some(arc) = self.min_arc_px {
-            between("select.min_arc_px", arc, 0.0, 1e6)?;
+        self.check_keys()?;
+        if let Some([low, high]) = self.altitude_limits_km {
+            between("select.altitude_limits_km", high, low, 1e9)?;
         }
-        #[cfg(feature = "dlr")]
-        if let Some(limit) = self.max_section_residual {
-            above("select.max_section_residual", limit, 0.0)?;
+        for (name, [smallest, largest]) in [("select.sun_size", self.sun_size), ("select.moon_size", self.moon_size)] {
+            between(name, largest, smallest, 1e6)?;
         }
-        #[cfg(feature = "horace")]
-        {
-            if let Some([low, high]) = self.altitude_limits_km {
-                between("select.altitude_limits_km", low, 0.0, 1e9)?;
-                between("select.altitude_limits_km", high, low, 1e9)?;
-            }
-            between("select.radius_margin", self.radius_margin, 0.0, 1e3)?;
-        }
-        between("select.radius_margin_px", self.radius_margin_px, 0.0, 1e6)?;
-        above("select.max_rms_px", self.max_rms_px, 0.0)?;
-        above("select.max_half_angle_sigma", self.max_half_angle_sigma, 0.0)?;
-        above("select.max_sigma_deg", self.max_sigma_deg, 0.0)?;
-        between("select.max_sigma_deg", self.max_sigma_deg, 0.0, 180.0)?;
-        between("select.min_support", self.min_support, 0.0, 1.0)?;
-        between("select.max_lit_sky", self.max_lit_sky, 0.0, 1.0)?;
-        between("select.min_inlier_share", self.min_inlier_share, 0.0, 1.0)?;
-        between("select.max_nearby", self.max_nearby, 0.0, 1e6)?;
-        between("select.whole_edge", self.whole_edge, 0.0, 1.0)?;
-        between("select.max_way", self.max_way, 1.0, 1e6)?;
-        between("select.min_support_whole", self.min_support_whole, 0.0, 1.0)?;
-        between("select.max_rival_ratio", self.max_rival_ratio, 1.0, 1e6)?;
-        between("select.min_evidence", self.min_evidence, -1e6, 1e6)?;
-        above("select.rival_floor_px", self.rival_floor_px, 0.0)?;
-        between("select.rival_floor_px", self.rival_floor_px, 0.0, 1e4)?;
-        between("select.residual_floor_px", self.residual_floor_px, 0.0, 1e4)?;
-        between("select.max_departure", self.max_departure, 0.0, 1e6)?;
-        between("select.min_support_abrupt", self.min_support_abrupt, 0.0, 1.0)?;
-        between("select.departure_turn_deg", self.departure_turn_deg, 0.0, 90.0)?;
-        between("select.departure_contrast", self.departure_contrast, 0.0, 1e6)?;
-        between("select.max_band", self.max_band, 0.0, 1.0)?;
-        above("select.band_step", self.band_step, 0.0)?;
-        between("select.band_step", self.band_step, 0.0, 1.0)?;
-        above("select.max_attitude_sigma", self.max_attitude_sigma, 0.0)?;
-        between("select.max_attitude_sigma", self.max_attitude_sigma, 0.0, 1e6)?;
-        if let Some(rate) = self.max_rate_deg_s {
-            above("select.max_rate_deg_s", rate, 0.0)?;
-            between("select.max_rate_deg_s", rate, 0.0, 1e6)?;
-        }
-        between("select.max_unlit", self.max_unlit, 0.0, 1.0)?;
-        between("select.min_sun_elevation_deg", self.min_sun_elevation_deg, -90.0, 90.0)?;
-        between("select.min_side_sigma", self.min_side_sigma, 0.0, 1e6)?;
-        between("select.ambiguous_deg", self.ambiguous_deg, 0.0, 180.0)?;
-        between("select.ambiguous_score", self.ambiguous_score, 1.0, 1e6)?;
-        between("select.certain_support", self.certain_support, 0.0, 1.0)?;
-        between("select.certain_share", self.certain_share, 0.0, 1.0)?;
-        for (name, [least, most]) in [("select.sun_size", self.sun_size), ("select.moon_size", self.moon_size)] {
-            above(name, least, 0.0)?;
-            between(name, most, least, 1e6)?;
-        }
-        between("select.moon_bloom_px", self.moon_bloom_px, 0.0, 1e6)
+        Ok(())
     }
 
     /// Turns off every gate that compares an edge with what is no limb, for chains that are rebuilt as they were published.
-    #[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
     pub(crate) fn trust_every_shape(&mut self) {
         (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
         (self.min_support_abrupt, self.whole_edge) = (0.0, 0.0);

@@ -1,0 +1,149 @@
+//! The keys of sensor.toml: those of hzn-core, and the few that concern only the file.
+//!
+//! Documents are written from them: the [table](table::markdown) of the documentation, the commented
+//! [template](template::text), and the [JSON schema](schema::json) for editors. `cargo xtask keys` writes all three.
+
+pub mod schema;
+pub mod table;
+pub mod template;
+
+use hzn_core::Preset;
+pub use hzn_core::keys::{Choice, Form, Key, Limits, Table, Value};
+
+/// The starting values, which stand above all sections.
+const PRESET: Key = Key {
+    path: "preset",
+    doc: "Starting values; keys that are written in the file count instead of them.\n",
+    form: Form::Word,
+    limits: Limits::Choice,
+    choices: Preset::CHOICES,
+    feature: None,
+    unset: Some("`hzn`"),
+    example: Some("\"hzn\""),
+    flight: None,
+};
+
+/// Keys of `[camera]` that take the calibration from another tool's file.
+const CAMERA_FILE: [Key; 2] = [
+    Key {
+        path: "camera.file",
+        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file, relative to this one, which brings the calibration; next to it \
+              stand only `theta_max_deg`, `readout_s`, the sigmas and `covariance`.\n",
+        form: Form::Word,
+        limits: Limits::Rule("a path"),
+        choices: &[],
+        feature: None,
+        unset: Some("none"),
+        example: Some("\"camchain.yaml\""),
+        flight: None,
+    },
+    Key {
+        path: "camera.camera",
+        doc: "Which camera of `file` it is, by its name there.\n",
+        form: Form::Word,
+        limits: Limits::Rule("a name in the file"),
+        choices: &[],
+        feature: None,
+        unset: Some("the only one"),
+        example: Some("\"cam0\""),
+        flight: None,
+    },
+];
+
+/// The sections in the order of the documents: `[mount]` comes after `[camera]`.
+pub fn sections() -> impl Iterator<Item = &'static Table> {
+    let is_first = |table: &&Table| table.name == "camera";
+    let is_mount = |table: &&Table| table.name == "mount";
+    let all = hzn_core::config::SECTIONS;
+    let rest = all.iter().filter(move |table| !is_first(table) && !is_mount(table));
+    all.iter().filter(is_first).chain(all.iter().filter(is_mount)).chain(rest)
+}
+
+/// Every key, in the order of the documents.
+pub fn all() -> impl Iterator<Item = &'static Key> {
+    let of = |table: &'static Table| table.keys.iter().chain(extra(table.name));
+    core::iter::once(&PRESET).chain(sections().flat_map(of))
+}
+
+/// The keys of a section that only the file has.
+fn extra(section: &str) -> &'static [Key] {
+    if section == "camera" { &CAMERA_FILE } else { &[] }
+}
+
+/// The keys of one section, in order; `""` is the top of the file.
+pub fn in_section(section: &str) -> impl Iterator<Item = &'static Key> {
+    all().filter(move |key| key.section() == section)
+}
+
+/// The key of a path such as `reject.threshold_px`.
+pub fn find(path: &str) -> Option<&'static Key> {
+    all().find(|key| key.path == path)
+}
+
+/// The key of a path in parts, such as `reject`, `threshold_px`; that of one of several bodies has its number within.
+pub(crate) fn find_parts(path: &[String]) -> Option<&'static Key> {
+    let names: Vec<&str> = path.iter().map(String::as_str).filter(|part| part.parse::<usize>().is_err()).collect();
+    let section = match names[..] {
+        ["body" | "bodies", section, _] => section,
+        ["bodies", _] => "body",
+        [section, _] => section,
+        _ => "",
+    };
+    in_section(section).find(|key| names.last() == Some(&key.name()))
+}
+
+/// The values that a key takes, in words: `above 0 to 1000`, `one of a, b`, or its rule.
+pub fn limits_in_words(key: &Key) -> String {
+    match key.limits {
+        Limits::Number { low, above, high } => {
+            let low = format!("{}{}", if above { "above " } else { "" }, short(low));
+            match (high.is_finite(), above) {
+                (true, _) => format!("{low} to {}", short(high)),
+                (false, true) => low,
+                (false, false) => format!("{low} or more"),
+            }
+        }
+        Limits::Choice => key.choices.iter().map(|choice| format!("`{}`", choice.name)).collect::<Vec<_>>().join(", "),
+        Limits::Rule(rule) => rule.to_owned(),
+        _ => String::new(),
+    }
+}
+
+/// A number without a useless `.0`; large ones as powers of ten.
+fn short(x: f64) -> String {
+    if x.abs() >= 1e6 && x.abs() % 1e6 == 0.0 { format!("{x:e}") } else { x.to_string() }.replace('-', "−")
+}
+
+/// The defaults as TOML, by section.
+fn defaults() -> toml::Table {
+    use hzn_core::camera::{Config, Model};
+    let config = hzn_core::Config::new(Config::ideal(Model::default(), 2, 2, 1.0));
+    let mut table = toml::Table::try_from(config).unwrap_or_default();
+    // A camera has no defaults.
+    table.remove("camera");
+    table
+}
+
+/// A key's default as TOML; `None` where it has none.
+fn default_of(key: &Key, defaults: &toml::Table) -> Option<String> {
+    let value = defaults.get(key.section())?.get(key.name())?;
+    Some(value.to_string())
+}
+
+/// Breaks a text into lines of at most `width` characters.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests;

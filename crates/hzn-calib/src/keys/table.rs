@@ -1,0 +1,54 @@
+//! The table of keys in the documentation.
+
+use super::{Key, Table, default_of, defaults, extra, limits_in_words, sections};
+
+/// The lines between which the table stands.
+const MARKS: [&str; 2] = ["<!-- keys: `cargo xtask keys` writes this table -->\n", "<!-- end of keys -->\n"];
+
+/// A page with the table as it is now between its marks; `None` for a page without marks.
+pub fn inserted(page: &str) -> Option<String> {
+    let [begin, end] = MARKS;
+    let (before, rest) = page.split_once(begin)?;
+    let (_, after) = rest.split_once(end)?;
+    Some(format!("{before}{begin}\n{}\n{end}{after}", markdown()))
+}
+
+/// The table as Markdown.
+pub fn markdown() -> String {
+    let defaults = defaults();
+    let mut out = String::from("| key | meaning | values | default | in flight |\n|---|---|---|---|---|\n");
+    out += &row(&super::PRESET, &defaults);
+    for table in sections() {
+        out += &format!("| **[{}]** | {} | | | |\n", table.name, about(table));
+        for key in table.keys.iter().chain(extra(table.name)) {
+            out += &row(key, &defaults);
+        }
+    }
+    out
+}
+
+/// What a section is for: its text without its own name.
+pub(super) fn about(table: &Table) -> String {
+    let text = table.doc.split("\n\n").next().unwrap_or_default();
+    let text = text.split_once("sensor.toml").map_or(text, |(_, rest)| rest);
+    let text = text.trim_start_matches([':', ',', ' ']).split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+fn row(key: &Key, defaults: &toml::Table) -> String {
+    let meaning = key.sentence().split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|");
+    let default = match (key.unset, default_of(key, defaults)) {
+        (Some(words), _) => words.to_owned(),
+        (None, Some(value)) => format!("`{value}`"),
+        (None, None) => "required".to_owned(),
+    };
+    let flight = match (key.flight, key.path) {
+        (Some(_), "camera.k") => "8 to 12".to_owned(),
+        (Some(_), "mount.q_body_from_camera_wxyz") => "20 to 23".to_owned(),
+        (None, "mask.polygons_px") => "200 to 207, 1000 on".to_owned(),
+        (Some(number), _) => number.to_string(),
+        (None, _) => "–".to_owned(),
+    };
+    format!("| `{}` | {meaning} | {} | {default} | {flight} |\n", key.name(), limits_in_words(key))
+}

@@ -1,0 +1,66 @@
+//! The commented sensor.toml to start from.
+
+use super::table::about;
+use super::{Key, Limits, default_of, defaults, extra, limits_in_words, sections, wrapped};
+
+/// Columns of a comment.
+const WIDTH: usize = 118;
+
+/// The text of the template. It loads as it stands, and every value outside of `[camera]` is the default.
+pub fn text() -> String {
+    let defaults = defaults();
+    let mut out = comment(
+        "A horizon sensor. [camera] must be yours; every other value is the default: a key that you leave out counts as it \
+         stands here. Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png",
+    );
+    out.push('\n');
+    out += &entry(&super::PRESET, &defaults);
+    for table in sections() {
+        out.push('\n');
+        out += &comment(&about(table));
+        // A vehicle without a mounting has no such section.
+        out += &format!("{}[{}]\n", if table.name == "mount" { "# " } else { "" }, table.name);
+        for key in table.keys.iter().chain(extra(table.name)) {
+            out += &entry(key, &defaults);
+        }
+        if table.name == "body" {
+            out += &comment(
+                "Several bodies in one picture: a [[bodies]] for each instead of [body], with the same keys and, where they \
+                 differ, its own [bodies.binarize] and [bodies.covariance].",
+            );
+        }
+    }
+    out
+}
+
+fn comment(text: &str) -> String {
+    wrapped(text, WIDTH).iter().map(|line| format!("# {line}\n")).collect()
+}
+
+/// A key with its meaning and its values above it. A key without a default is commented out.
+fn entry(key: &Key, defaults: &toml::Table) -> String {
+    let (name, sentence) = (key.name(), key.sentence());
+    // A table is written below its own heading; a reader finds its keys there.
+    if key.example.is_none() && default_of(key, defaults).is_none() {
+        return comment(&format!("[{}]: {sentence}", key.path));
+    }
+    let values = limits_in_words(key).replace("`, `", " | ").replace('`', "");
+    let unset = key.unset.filter(|words| *words != "none");
+    let unset = unset.map_or(String::new(), |words| format!("; left out: {}", words.replace('`', "")));
+    let about = match key.limits {
+        Limits::Choice => format!("{sentence} {values}{unset}"),
+        _ => format!("{sentence} [{values}{unset}]"),
+    };
+    let live = match (default_of(key, defaults), key.example) {
+        (Some(value), _) => format!("{name} = {value}\n"),
+        (None, Some(value)) if is_live(key) => format!("{name} = {value}\n"),
+        (None, value) => format!("# {name} = {}\n", value.unwrap_or_default()),
+    };
+    comment(&about) + &live
+}
+
+/// A key that the template gives a value although it has no default: the camera, the altitude, the preset.
+fn is_live(key: &Key) -> bool {
+    let of_camera = key.section() == "camera" && key.unset.is_none();
+    of_camera || matches!(key.path, "camera.model" | "body.altitude_km") || key.path == "preset"
+}

@@ -1,0 +1,88 @@
+//! The keys of all sections together, and the same keys by their numbers in flight.
+
+use super::{Config, Input, Mount, retry};
+use crate::base::keys::{Section, Table};
+use crate::geometry::camera;
+use crate::image::region;
+use crate::model::threshold::Gate;
+use crate::model::{body, edge_noise, threshold, work};
+use crate::stages::{consensus, contour, edge_points, fit, gates};
+
+/// What concerns every section: its field in [`Config`], and its type.
+macro_rules! sections {
+    ($($field:ident: $section:ty),+ $(,)?) => {
+        /// The sections of sensor.toml with their keys.
+        pub const SECTIONS: &[Table] = &[$(<$section>::TABLE),+, Mount::TABLE];
+
+        impl Config {
+            /// The key that a number in flight stands for, such as `reject.threshold_px` for 81.
+            pub fn path(id: u16) -> Option<&'static str> {
+                $(
+                    if let Some(path) = <$section>::path(id) {
+                        return Some(path);
+                    }
+                )+
+                Mount::path(id)
+            }
+
+            /// The numbers in flight of every key that has one, in the order in which they must be set.
+            pub fn numbers() -> impl Iterator<Item = u16> {
+                core::iter::empty()$(.chain(<$section>::numbers()))+.chain(Mount::numbers())
+            }
+
+            /// The value of a number in flight: NaN for a value that is left out, `None` for a number that no key has.
+            pub fn number(&self, id: u16) -> Option<f64> {
+                $(
+                    if let Some(number) = self.$field.number(id) {
+                        return Some(number);
+                    }
+                )+
+                Mount::path(id)?;
+                Some(self.mount.as_ref().and_then(|mount| mount.number(id)).unwrap_or(f64::NAN))
+            }
+
+            /// Sets the value of a number in flight: `None` for a number that no key has, `Some(false)` for a value that its
+            /// key cannot have. Whether the values go together is for [`Config::check`].
+            pub fn set_number(&mut self, id: u16, number: f64) -> Option<bool> {
+                $(
+                    if let Some(taken) = self.$field.set_number(id, number) {
+                        return Some(taken);
+                    }
+                )+
+                Mount::path(id)?;
+                if number.is_nan() {
+                    self.mount = None;
+                    return Some(true);
+                }
+                self.mount.get_or_insert(Mount { q_body_from_camera_wxyz: [0.0; 4] }).set_number(id, number)
+            }
+
+            /// The first key without a number in flight whose value differs from that of `other`.
+            pub fn differing_on_ground(&self, other: &Self) -> Option<&'static str> {
+                $(
+                    if let Some(path) = self.$field.differing_on_ground(&other.$field) {
+                        return Some(path);
+                    }
+                )+
+                (self.bodies != other.bodies).then_some("bodies")
+            }
+        }
+    };
+}
+
+sections! {
+    camera: camera::Config,
+    body: body::Config,
+    input: Input,
+    gate: Gate,
+    binarize: threshold::Config,
+    mask: region::Config,
+    contour: contour::Config,
+    candidates: edge_points::Config,
+    reject: consensus::Config,
+    estimate: fit::Config,
+    covariance: edge_noise::Config,
+    select: gates::Config,
+    recover: retry::Config,
+    limits: work::Config,
+}
