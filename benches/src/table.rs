@@ -170,9 +170,9 @@ impl Results {
         let mut s = String::from("# Benchmarks\n\n");
         let _ = writeln!(
             s,
-            "Written by `cargo xtask bench`. One thread of {}; {}. Each case has {} distinct frames, each measured {} times \
-             with flushed caches, from the level to the covariance, hzn and the recipe taking turns with the same level; of each frame the best time, of \
-             these the median. Load of the machine at the start: {}.\n",
+            "Written by `cargo xtask bench`. One thread of {}; {}. Each case has {} distinct frames, each measured {} \
+             times with flushed caches, from the level to the covariance, hzn and the recipe taking turns with the \
+             same level; of each frame the best time, of these the median. Load of the machine at the start: {}.\n",
             self.machine, self.versions, self.frames, self.rounds, self.load
         );
         let _ = writeln!(
@@ -186,7 +186,8 @@ impl Results {
             let theirs = c.opencv.median();
             let _ = writeln!(
                 s,
-                "| {} | {single:.0} | {fewer:.0} | {double:.0} | {theirs:.0} | {:.1} | {:.1} | {:.1} | {:.0} | {:.2} | {:.0} |",
+                "| {} | {single:.0} | {fewer:.0} | {double:.0} | {theirs:.0} | {:.1} | {:.1} | {:.1} | {:.0} | {:.2} | \
+                 {:.0} |",
                 c.name,
                 theirs / single,
                 theirs / fewer,
@@ -198,9 +199,9 @@ impl Results {
         }
         let _ = write!(
             s,
-            "\nWarm is the same picture once more, in the caches. What lies between that and the first column is memory: the \
-             picture, of which each row that the limb crosses lies elsewhere, and the program, which flushed caches do not \
-             hold either.\n\nOur goals, and what is reached of them:\n\n{}",
+            "\nWarm is the same picture once more, in the caches. What lies between that and the first column is \
+             memory: the picture, of which each row that the limb crosses lies elsewhere, and the program, which \
+             flushed caches do not hold either.\n\nOur goals, and what is reached of them:\n\n{}",
             goals::table(&self.cases)
         );
         s.push_str("\nAngle between answer and truth in degrees, median / worst (frames answered):\n\n");

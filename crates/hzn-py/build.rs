@@ -1,5 +1,5 @@
-//! What Python shows as help is written once, in `python/hzn/_hzn.pyi`: this takes the stubs' docstrings apart, one file
-//! each, for the classes and functions to include.
+//! What Python shows as help is written once, in `python/hzn/_hzn.pyi`: this takes the stubs' docstrings apart, one
+//! file each, for the classes and functions to include.
 
 use std::path::Path;
 use std::{env, fs};

@@ -15,9 +15,12 @@ picture follows from its seed and every answer from its picture, so the numbers 
 Sources: **[BB]** Braun & Barf 2022, **[W]** Wang, Wang & Jin 2022, **[B14]** Barf 2014, **[H15]** Barf et al. 2015.
 NEES is the squared error over the covariance (two degrees of freedom): 2 is ideal, more is too sure.
 
-What a sensor is told beside the pictures decides what a figure is worth, so every section says it. **In-sample**: limb height or
-edge errors were fitted to, or chosen on, the scene that is measured. **Out of sample**: they know nothing of it. Between the two
-stands what was measured on other seeds of the same scene: other clouds and noise, the same air and detector. Sections without
+What a sensor is told beside the pictures decides what a figure is worth, so every section says it. **In-sample**: \
+limb height or
+edge errors were fitted to, or chosen on, the scene that is measured. **Out of sample**: they know nothing of it. \
+Between the two
+stands what was measured on other seeds of the same scene: other clouds and noise, the same air and detector. Sections \
+without
 these words are calculations.
 ";
 

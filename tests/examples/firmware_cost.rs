@@ -1,6 +1,6 @@
-//! What the firmware costs in QEMU: instructions by stage, memory. Prints book/results/firmware-cost.md; `--check FILE` compares with
-//! an earlier one and fails when instructions, flash, static RAM or stack grew by more than 5 %. `--search FROM TO`: the most expensive of the pictures made
-//! with these seeds.
+//! What the firmware costs in QEMU: instructions by stage, memory. Prints book/results/firmware-cost.md; `--check FILE`
+//! compares with an earlier one and fails when instructions, flash, static RAM or stack grew by more than 5 %.
+//! `--search FROM TO`: the most expensive of the pictures made with these seeds.
 
 use std::process::{Command, ExitCode};
 
@@ -14,15 +14,21 @@ use hzn_tests::emulated::{Board, Case, Measured, bits, chain, measure, measure_r
 
 const HEAD: &str = "# What the firmware costs
 
-Written by `cargo xtask firmware --write`; `cargo xtask test` fails when a figure grows by more than 5 %: instructions, flash,
-static RAM, stack. Instructions are exact (QEMU 7.2, `-icount`), not cycles. f32, 600 points kept where a row says nothing else; a
+Written by `cargo xtask firmware --write`; `cargo xtask test` fails when a figure grows by more than 5 %: \
+instructions, flash,
+static RAM, stack. Instructions are exact (QEMU 7.2, `-icount`), not cycles. f32, 600 points kept where a row says \
+nothing else; a
 row is the worst of its pictures. Every answer had the bits of the same sensor on the host.
 
-The goals are those of a Cortex-M7: 96 KiB (98304 bytes) of flash for the sensor alone, 96 KiB of RAM beside the picture,
-0.6 million instructions for a clean picture of 1920×1080, 2 million for a cloudy one, 20 million for the worst. Flash and the
-clean picture miss their goals, the latter also with 200 points kept; what fewer points lose is in [porting.md](porting.md). On the
+The goals are those of a Cortex-M7: 96 KiB (98304 bytes) of flash for the sensor alone, 96 KiB of RAM beside the \
+picture,
+0.6 million instructions for a clean picture of 1920×1080, 2 million for a cloudy one, 20 million for the worst. Flash \
+and the
+clean picture miss their goals, the latter also with 200 points kept; what fewer points lose is in \
+[porting.md](porting.md). On the
 Cortex-M4F, which computes double precision in software, the arithmetic
-for that takes some 9 KB of flash more, and `expect` nearly all of its time: the cone that an altitude or a position leads to
+for that takes some 9 KB of flash more, and `expect` nearly all of its time: the cone that an altitude or a position \
+leads to
 is worked out in double precision, once a picture; nothing else on a picture's way is (`cargo xtask test` looks for it).
 ";
 
@@ -59,8 +65,8 @@ fn lens(width: u16, height: u16) -> camera::Config {
     camera::Config { k, ..camera::Config::ideal(camera::Model::KannalaBrandt, width, height, focal_px) }
 }
 
-/// A picture that is made to be expensive: much edge, and none of it a limb. Edges of many kinds, sharp and soft, thin and
-/// wide, over noise.
+/// A picture that is made to be expensive: much edge, and none of it a limb. Edges of many kinds, sharp and soft, thin
+/// and wide, over noise.
 fn adversary(seed: u32, sensors: &Sensors) -> Case {
     let mut draws = 0;
     let mut draw = |n: u32| {
@@ -317,7 +323,8 @@ fn report() -> Result<String, String> {
         }
         let [flash, ram] = sizes(board, "flight").ok_or("arm-none-eabi-size cannot be run")?;
         out += &format!(
-            "| flight | {flash} | {ram} | as the sensor with 600 points, and the loop: held to 96 KiB in all by a test |\n"
+            "| flight | {flash} | {ram} | as the sensor with 600 points, and the loop: held to 96 KiB in all by a test \
+             |\n"
         );
     }
     Ok(out)

@@ -24,8 +24,8 @@ const SIGMAS: [f64; FRAMES] = [0.49, -1.53, 0.89, -0.16, -0.49, 1.53, 0.16, -0.8
 const HEIGHT_SIGMA_KM: f64 = 1.0;
 const ATTITUDE_SIGMA_DEG: f64 = 5.0;
 
-/// Name, lens, and what an edge point is wrong by with it: sigma and correlation along the edge, both in pixels. Fitted to
-/// the table, as an engineer fits them to a camera's own pictures.
+/// Name, lens, and what an edge point is wrong by with it: sigma and correlation along the edge, both in pixels. Fitted
+/// to the table, as an engineer fits them to a camera's own pictures.
 fn lenses() -> [(&'static str, camera::Config, [f64; 2]); 3] {
     let (w, h) = SIZE;
     // 180° across: clouds shine through more of an edge the larger the pixels are.
@@ -119,7 +119,8 @@ pub fn measure((sensor, scenes): &(Config, Vec<Scene>)) -> [Tally; 2] {
 /// The whole table as Markdown, numbers to two digits. The last three columns are without an attitude.
 pub fn markdown() -> String {
     let mut out = String::from(
-        "| lens | altitude | noise | open | answered | RMS error | median sigma | NEES | answered | RMS error | NEES |\n\
+        "| lens | altitude | noise | open | answered | RMS error | median sigma | NEES | answered | RMS error | NEES \
+         |\n\
          |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
     );
     for (name, camera, errors_px) in lenses() {

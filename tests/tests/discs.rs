@@ -163,8 +163,8 @@ fn the_level_follows_the_limb_of_the_picture_before() {
     config.binarize.method = hzn_core::threshold::Method::Track;
     let mut sensors = Sensors::new(&config);
     let axis = direction(&config, 310.2, 250.4);
-    // Two thirds of the brightness from picture to picture: no fixed level would do, and the disc is too small for otsu's
-    // sample to hold its own.
+    // Two thirds of the brightness from picture to picture: no fixed level would do, and the disc is too small for
+    // otsu's sample to hold its own.
     let mut levels = Vec::new();
     for brightness in [240.0, 160.0, 107.0, 71.0, 47.0] {
         let disc = Disc { brightness, halo: 0.0, noise: 1.0, ..sun(axis, 0.2666f64.to_radians() * 10.0) };

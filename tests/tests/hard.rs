@@ -75,7 +75,8 @@ fn limb_lit_only_in_part() {
 }
 
 /// Clouds over a surface as dark as the sky: the edge is limb where they reach it and cloud where they do not.
-/// The sensor sees a bright band before the sky, as a flare is, or an edge that leaves the limb, and refuses some of them.
+/// The sensor sees a bright band before the sky, as a flare is, or an edge that leaves the limb, and refuses some of
+/// them.
 #[test]
 fn edge_half_cloud_half_limb() {
     let mut answers = 0;
@@ -95,8 +96,8 @@ fn edge_half_cloud_half_limb() {
     assert!(answers >= 12, "{answers} of 16");
 }
 
-/// 16 km at a distance of some 1700 km are 5 px here: the inner edge would be off by half a degree. Over ground as dark as the
-/// sky a band may as well be airglow or a flare, and is refused unless `select.max_band` says that it is none.
+/// 16 km at a distance of some 1700 km are 5 px here: the inner edge would be off by half a degree. Over ground as dark
+/// as the sky a band may as well be airglow or a flare, and is refused unless `select.max_band` says that it is none.
 #[test]
 fn bright_band_has_two_edges() {
     for seed in 0..4 {
@@ -175,8 +176,8 @@ fn moon_and_sun_at_the_edge_of_the_picture() {
             [[0.0; 3], [0.0, 0.0233, 0.0], [0.003, -0.0233, 0.0], [0.017, 0.0, 0.0]].into_iter().enumerate()
         {
             let s = far_away(disc(kind), 12_900.0, distance_m, off_rad);
-            // 0.0044° are a pixel. Single precision knows cos α to 6e-8, which is 0.0008° of so small a half-angle, and a
-            // disc that is cut moves with its radius.
+            // 0.0044° are a pixel. Single precision knows cos α to 6e-8, which is 0.0008° of so small a half-angle, and
+            // a disc that is cut moves with its radius.
             found(&format!("{name} {i}"), &s, &sensor(&s), [0.0004, 0.002]);
         }
     }

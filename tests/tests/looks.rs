@@ -1,5 +1,5 @@
-//! What keeps a picture from being refused for the search's own sake: discs under an image circle, a dark frame, levels that
-//! follow the clouds, arrays of few pixels, words of which few bits are used.
+//! What keeps a picture from being refused for the search's own sake: discs under an image circle, a dark frame, levels
+//! that follow the clouds, arrays of few pixels, words of which few bits are used.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
@@ -36,8 +36,8 @@ fn seen(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report
     horizon.process(&picture, &expected)
 }
 
-/// A disc whose edge touches the image circle over fewer pixels than the border's strides was met by a search line, which
-/// gave a piece of it.
+/// A disc whose edge touches the image circle over fewer pixels than the border's strides was met by a search line,
+/// which gave a piece of it.
 #[test]
 fn no_disc_is_lost_under_an_image_circle() {
     let (mut count, mut lost) = (0, Vec::new());
@@ -61,8 +61,8 @@ fn no_disc_is_lost_under_an_image_circle() {
     assert!(count == 600 && lost.is_empty(), "{} of {count}: {lost:#?}", lost.len());
 }
 
-/// Demosaicing left one black pixel all around; the haze fades over a hundred pixels of the whole picture, 25 of this one,
-/// of which the answers may differ by four. (Through the whole picture they differ by 0.035° at most.)
+/// Demosaicing left one black pixel all around; the haze fades over a hundred pixels of the whole picture, 25 of this
+/// one, of which the answers may differ by four. (Through the whole picture they differ by 0.035° at most.)
 #[test]
 fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let mut p = Photograph::load("opssat-2020-08-16.png");
@@ -160,8 +160,8 @@ fn half_lit_discs_are_looked_at_again() {
     assert!(answered == count && at_once < count, "{at_once}, {answered}");
 }
 
-/// A limb through a lens of 55 degrees on an array of 32×24, 16 bits of which a range of 1200 counts is used above a sky at
-/// 7000: told nothing but the camera and the altitude.
+/// A limb through a lens of 55 degrees on an array of 32×24, 16 bits of which a range of 1200 counts is used above a
+/// sky at 7000: told nothing but the camera and the altitude.
 #[test]
 fn a_thermal_array_answers_by_default() {
     let camera = camera::Config::ideal(Model::Equidistant, 32, 24, 33.0);

@@ -78,12 +78,12 @@ fn rocket_flight_with_payload_in_view() {
     known_limits(&flown);
 }
 
-/// An evenly bright Earth with white noise, the same picture again and again: the scatter of the answers against the bound of
-/// Cramér and Rao for a known half-angle and independent edge points, each as wrong as the points of the picture are. Beyond
-/// the points' own errors noise moves the level and with it all points alike, and what is a border pixel is chosen by noise
-/// too: hundredths of a pixel, which the bound does not know of and `covariance.bias_px` is there for. They show the more
-/// the noisier the picture is. A level that is not halfway between dark and lit moves all pictures alike: a hundredth of a
-/// pixel, too, which no scatter shows.
+/// An evenly bright Earth with white noise, the same picture again and again: the scatter of the answers against the
+/// bound of Cramér and Rao for a known half-angle and independent edge points, each as wrong as the points of the
+/// picture are. Beyond the points' own errors noise moves the level and with it all points alike, and what is a border
+/// pixel is chosen by noise too: hundredths of a pixel, which the bound does not know of and `covariance.bias_px` is
+/// there for. They show the more the noisier the picture is. A level that is not halfway between dark and lit moves all
+/// pictures alike: a hundredth of a pixel, too, which no scatter shows.
 #[test]
 fn white_noise_against_the_bound() {
     let camera = Camera::ideal(Model::Pinhole, 320, 240, 277.0);

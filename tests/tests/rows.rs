@@ -117,8 +117,8 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         }
         let points: usize = there.values().map(Vec::len).sum();
         println!("{}: {}, {points} points, {beyond} cut, {apart_deg:.6} deg apart", case.name, got.status);
-        // Haze through a long lens, over many more rows than are held and with more pixels on its edges than fit, is another
-        // edge; still the same limb.
+        // Haze through a long lens, over many more rows than are held and with more pixels on its edges than fit, is
+        // another edge; still the same limb.
         assert!(apart_deg < 0.1, "{}: {apart_deg}", case.name);
     }
     println!("{} pictures, {ok} answers, {wide} with edges wider than the rows held", cases.len());

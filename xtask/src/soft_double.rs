@@ -92,8 +92,10 @@ mod tests {
 
     #[test]
     fn calls_are_counted_by_function() {
-        let text = "00000400 <hzn_core::consensus::keep>:\n     400:\tbl\t28642 <__aeabi_dmul>\n     404:\tb.w\t100 <__aeabi_f2d>\n\
-                    \n00000500 <other>:\n     500:\tbl\t400 <hzn_core::consensus::keep>\n     504:\tbl\t3 <__aeabi_fadd>\n";
+        let text = "00000400 <hzn_core::consensus::keep>:\n     400:\tbl\t28642 <__aeabi_dmul>\n     404:\tb.w\t100 \
+                    <__aeabi_f2d>\n\
+                    \n00000500 <other>:\n     500:\tbl\t400 <hzn_core::consensus::keep>\n     504:\tbl\t3 \
+                    <__aeabi_fadd>\n";
         let calls = calls_by_function(text);
         assert_eq!(calls, [("hzn_core::consensus::keep".to_owned(), 2), ("other".to_owned(), 0)].into());
     }

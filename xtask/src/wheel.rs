@@ -10,8 +10,8 @@ use crate::steps::{self, Outcome, Trouble};
 
 const CRATE: &str = "crates/hzn-py";
 
-/// Builds the wheel, installs it into an environment of its own, checks stubs, behaviour, notebooks and documents. `hzn` is
-/// the program of the same build.
+/// Builds the wheel, installs it into an environment of its own, checks stubs, behaviour, notebooks and documents.
+/// `hzn` is the program of the same build.
 pub(crate) fn run_step(hzn: &Path) -> Outcome {
     let folder = Path::new(CRATE);
     let python = installed("dev")?;

@@ -201,7 +201,8 @@ fn median(values: &[f64]) -> f64 {
 
 fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
     println!(
-        "{runs} sets of {POINTS} points a cell ({} for the Hough transform), {NOISE_PX} px on the limb, off nadir up to 60°.",
+        "{runs} sets of {POINTS} points a cell ({} for the Hough transform), {NOISE_PX} px on the limb, off nadir up \
+         to 60°.",
         runs.div_ceil(10)
     );
     let head: String = OUTLIERS.iter().map(|r| format!(" {:.0} % |", r * 100.0)).collect();
@@ -229,8 +230,8 @@ fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
     }
 }
 
-/// The cone with the most votes, of axes on a grid and half-angles in bins: 2° and 1°, then 0.5° about the best. What the
-/// samplers are compared with, and nothing for a flight computer.
+/// The cone with the most votes, of axes on a grid and half-angles in bins: 2° and 1°, then 0.5° about the best. What
+/// the samplers are compared with, and nothing for a flight computer.
 fn hough(camera: &Camera<f64>, points: &[ImagePoint<f64>]) -> Option<UnitVec3<Cam, f64>> {
     let rays: Vec<[f64; 3]> = points.iter().filter_map(|p| camera.unproject(*p)).map(|r| r.xyz()).collect();
     // Every 2° from the optical axis to 120° off, and around.

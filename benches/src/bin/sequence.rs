@@ -1,5 +1,5 @@
-//! `hzn run` on a sequence of PNGs beside nothing but decoding them: the same files, the same decoder, all cores, taking
-//! turns in one run.
+//! `hzn run` on a sequence of PNGs beside nothing but decoding them: the same files, the same decoder, all cores,
+//! taking turns in one run.
 //!
 //! `cargo xtask bench run` builds `hzn` and starts this. Each way is a process of its own, so that starting and ending
 //! count too; of its rounds the one with the least wall time is shown, and the least processor time.
@@ -182,9 +182,10 @@ fn table(ways: &[Way], options: &Options, megabytes: f64) -> String {
     let load = load.split_whitespace().next().unwrap_or("unknown").to_owned();
     let (frames, rounds) = (options.frames, options.rounds);
     let mut out = format!(
-        "`cargo xtask bench run`: {frames} distinct PNGs of 1920x1080 ({megabytes:.0} MB), {cores} cores, {rounds} rounds \
-         taking turns, of each way the least time. Load of the machine at the end: {load}.\n\n\
-         | way | wall, s | frames a second | ratio | goal | processor time, s | ratio |\n|---|---|---|---|---|---|---|\n"
+        "`cargo xtask bench run`: {frames} distinct PNGs of 1920x1080 ({megabytes:.0} MB), {cores} cores, {rounds} \
+         rounds taking turns, of each way the least time. Load of the machine at the end: {load}.\n\n\
+         | way | wall, s | frames a second | ratio | goal | processor time, s | ratio \
+         |\n|---|---|---|---|---|---|---|\n"
     );
     let Some(alone) = ways.first() else { return out };
     for way in ways {

@@ -1,7 +1,7 @@
 //! Writes where pixels look and where that is seen: `cargo run -p hzn-calib --example rays -- sensor.toml`.
 //!
-//! Columns: a pixel's centre, its unit ray in the camera's axes, and the ray put back into the picture; one pixel in 16 along
-//! both axes, without those outside the image circle.
+//! Columns: a pixel's centre, its unit ray in the camera's axes, and the ray put back into the picture; one pixel in 16
+//! along both axes, without those outside the image circle.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! A TOML file of another kind, read with the care of a sensor.toml: lines in errors, suggestions for misspelt names, and
-//! a `[camera]` that may come from another tool's `file`.
+//! A TOML file of another kind, read with the care of a sensor.toml: lines in errors, suggestions for misspelt names,
+//! and a `[camera]` that may come from another tool's `file`.
 
 use std::path::Path;
 
@@ -10,8 +10,8 @@ use crate::Problem;
 use crate::located::{meaning, places, syntax, too_long};
 use crate::sensor::{camera_from_file, fill};
 
-/// Reads `text` as a `T`. `path` is named in messages, and a camera `file` is looked for beside it. `check` says what is
-/// wrong with a value that can be read: the key, as `[section] key`, and the rule.
+/// Reads `text` as a `T`. `path` is named in messages, and a camera `file` is looked for beside it. `check` says what
+/// is wrong with a value that can be read: the key, as `[section] key`, and the rule.
 ///
 /// # Errors
 /// The first thing wrong with the text.
@@ -65,7 +65,8 @@ mod tests {
         frames: u32,
     }
 
-    const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px = 319.5\ncy_px = 239.5\n";
+    const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px \
+        = 319.5\ncy_px = 239.5\n";
 
     fn read(text: &str) -> Result<Scene, String> {
         let check = |s: &Scene| match s.capture.frames {
@@ -97,7 +98,8 @@ mod tests {
     fn the_camera_may_come_from_another_file() {
         let dir = tempfile::tempdir().unwrap();
         let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  \
-                     distortion_model: equidistant\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, 480]\n";
+                     distortion_model: equidistant\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, \
+                     480]\n";
         std::fs::write(dir.path().join("camchain.yaml"), chain).unwrap();
         let text = "[camera]\nfile = \"camchain.yaml\"\ntheta_max_deg = 50\n[capture]\nframes = 3\n";
         let scene: Scene = parse(text, &dir.path().join("scene.toml"), |_| Ok(())).unwrap();

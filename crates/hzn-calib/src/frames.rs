@@ -143,8 +143,8 @@ impl Frames {
         warnings
     }
 
-    /// Warnings for values that can be but look wrong: altitude and position of a row that differ by more than 0.1 km, heights
-    /// and positions that must be in metres, altitudes that are not used.
+    /// Warnings for values that can be but look wrong: altitude and position of a row that differ by more than 0.1 km,
+    /// heights and positions that must be in metres, altitudes that are not used.
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
         let odd = |row: &FrameData| {
             let own = altitude_at_km(row.position_km?, kind, radius_km)?;

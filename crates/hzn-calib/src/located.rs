@@ -28,7 +28,8 @@ impl Place {
 }
 
 /// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`; of the second of several tables
-/// `[[bodies]] 2 radius_km`; the third of several lists `[mask] polygons_px 3`, and the second in that `polygons_px 3.2`.
+/// `[[bodies]] 2 radius_km`; the third of several lists `[mask] polygons_px 3`, and the second in that `polygons_px
+/// 3.2`.
 fn field_name(path: &[String]) -> String {
     let nth = |place: &String| place.parse::<usize>().ok().map(|n| n + 1);
     let key = |rest: &[String]| {
@@ -77,8 +78,8 @@ pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     out
 }
 
-/// The first list that holds more than a sensor has room for: serde would tell of some without their number, and take the
-/// first values of others.
+/// The first list that holds more than a sensor has room for: serde would tell of some without their number, and take
+/// the first values of others.
 pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), Problem> {
     const ROWS: &str = "limb_height_by_latitude_km";
     for place in places {

@@ -24,7 +24,8 @@ impl Doubt {
     }
 }
 
-/// The principal point of a camera lies within this part of the picture's side from its middle, unless the picture was cut.
+/// The principal point of a camera lies within this part of the picture's side from its middle, unless the picture was
+/// cut.
 const OFF_CENTRE: f64 = 0.2;
 /// Focal lengths along x and y differ by no more than this part: pixels are square.
 const SQUARE: f64 = 0.2;
@@ -82,8 +83,8 @@ fn of_body(body: &body::Config) -> Option<Doubt> {
 pub fn unused_altitude(body: body::Kind) -> Option<String> {
     match body {
         body::Kind::Moon => Some(format!(
-            "is not used: kind = \"moon\" is the Moon as a disc of half a degree, seen from about the Earth; for a camera in \
-             orbit about the Moon write kind = \"sphere\" and radius_km = {}",
+            "is not used: kind = \"moon\" is the Moon as a disc of half a degree, seen from about the Earth; for a \
+                                         camera in orbit about the Moon write kind = \"sphere\" and radius_km = {}",
             body::MOON_RADIUS_KM
         )),
         body::Kind::Sun => Some("is not used: kind = \"sun\" is the Sun as a disc of half a degree".to_owned()),
@@ -146,8 +147,8 @@ fn focal(c: &camera::Config) -> Option<Doubt> {
     };
     if 2.0 * half > widest && c.theta_max_deg.is_none() {
         let what = format!(
-            "{} px over {} px of width is a field of view of {:.0} degrees: is it in millimetres? (divide those by the width of \
-             a pixel)",
+            "{} px over {} px of width is a field of view of {:.0} degrees: is it in millimetres? (divide those by the \
+             width of a pixel)",
             c.fx_px,
             c.width,
             2.0 * half
@@ -220,7 +221,8 @@ pub(crate) fn five_coefficients(c: &camera::Config) -> Option<String> {
     let plausible = !in_px || (first / c.fx_px - 1.0).abs() < 0.2;
     plausible.then(|| {
         format!(
-            "five coefficients that begin with the angle's first power, as in Braun & Barf 2022; hzn's four follow it: write \
+            "five coefficients that begin with the angle's first power, as in Braun & Barf 2022; hzn's four follow it: \
+             write \
              {focal}k = [{}] (`hzn camera convert --braun-barf` does it)",
             k.join(", ")
         )

@@ -72,7 +72,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     too_long(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
-        // `Config` wants a camera; this one stands in until the file's own is put in below. What stands beside `file` stays.
+        // `Config` wants a camera; this one stands in until the file's own is put in below. What stands beside `file`
+        // stays.
         let stand_in = DeTable::parse("width = 2\nheight = 2\nfx_px = 1.0\nfy_px = 1.0\ncx_px = 0.0\ncy_px = 0.0\n");
         if let (Ok(stand_in), Some(DeValue::Table(own))) =
             (stand_in, table.get_mut().get_mut("camera").map(toml::Spanned::get_mut))
@@ -179,8 +180,8 @@ pub(crate) fn camera_from_file(
     let name = take(camera, "camera");
     let theta_max = take(camera, "theta_max_deg");
     if let Some((key, _)) = camera.iter().find(|(key, _)| !BESIDE_FILE.contains(&&**key.get_ref())) {
-        let what = "cannot stand beside `file`, which brings the whole calibration; only camera, theta_max_deg, readout_s and \
-                    the calibration's sigmas may";
+        let what = "cannot stand beside `file`, which brings the whole calibration; only camera, theta_max_deg, \
+                    readout_s and the calibration's sigmas may";
         let field = format!("[camera] {}", key.get_ref());
         return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
     }
@@ -208,7 +209,8 @@ pub(crate) fn camera_from_file(
 mod tests {
     use super::*;
 
-    const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px = 319.5\ncy_px = 239.5\n";
+    const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px \
+        = 319.5\ncy_px = 239.5\n";
 
     fn error(rest: &str) -> String {
         parse(&format!("{CAMERA}{rest}"), Path::new("sensor.toml")).unwrap_err().to_string()
@@ -261,7 +263,8 @@ mod tests {
 
     #[test]
     fn several_bodies_have_their_own_levels() {
-        let two = "[[bodies]]\nkind = \"earth\"\naltitude_km = 400\n[[bodies]]\nkind = \"sun\"\n[bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n";
+        let two = "[[bodies]]\nkind = \"earth\"\naltitude_km = 400\n[[bodies]]\nkind = \
+                                               \"sun\"\n[bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n";
         let config = parse(&format!("{CAMERA}{two}"), Path::new("s.toml")).unwrap().config;
         assert_eq!((config.each_body().len(), config.each_body()[0].altitude_km), (2, Some(400.0)));
         assert_eq!(config.each_body()[1].binarize.unwrap().level, 0.9);
@@ -451,7 +454,8 @@ mod tests {
     fn the_camera_may_come_from_another_file() {
         let dir = tempfile::tempdir().unwrap();
         let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  \
-                     distortion_model: equidistant\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, 480]\n";
+                     distortion_model: equidistant\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, \
+                     480]\n";
         std::fs::write(dir.path().join("camchain.yaml"), chain).unwrap();
         let path = dir.path().join("sensor.toml");
         std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\ntheta_max_deg = 50\n[reject]\nseed = 7\n").unwrap();

@@ -1,14 +1,14 @@
-//! A sensor.toml for a camera that nobody calibrated: from the size of its pictures and either a stated field of view or
-//! what the camera wrote into EXIF.
+//! A sensor.toml for a camera that nobody calibrated: from the size of its pictures and either a stated field of view
+//! or what the camera wrote into EXIF.
 //!
 //! What is not known is written as a sigma, so that the answers are as uncertain as the lens:
 //!
 //! - **Scale.** Makers state the focal length of a series lens, and so its field of view, to ± 5 %: evenly within that,
-//!   1-sigma is 5 %/√3. EXIF holds the nominal focal length, of a zoom in steps and without the change by focusing: ± 10 %.
-//!   The 35 mm equivalent is rounded to a millimetre, too.
-//! - **Shape.** The ideal lens (pinhole or equidistant) holds at the picture's edges, where the field of view is stated;
-//!   in the middle the real one differs. An equisolid lens, 2 sin (θ/2), lies θ²/24 below the equidistant one; a pinhole
-//!   lens with an eighth of the equidistant lens's barrel distortion, θ²/3, differs by as much.
+//!   1-sigma is 5 %/√3. EXIF holds the nominal focal length, of a zoom in steps and without the change by focusing: ±
+//!   10 %. The 35 mm equivalent is rounded to a millimetre, too.
+//! - **Shape.** The ideal lens (pinhole or equidistant) holds at the picture's edges, where the field of view is
+//!   stated; in the middle the real one differs. An equisolid lens, 2 sin (θ/2), lies θ²/24 below the equidistant one;
+//!   a pinhole lens with an eighth of the equidistant lens's barrel distortion, θ²/3, differs by as much.
 //! - **Centre.** Published calibrations put the principal point this far from the picture's centre, in percent of the
 //!   width (x, y): EuRoC 1.1, 1.2; TUM RGB-D fr1 0.1, 2.5; KITTI odometry 1.0, 0.2. Their root mean square is 1.3 %;
 //!   1.5 % is written. A picture that was cropped on one side is not covered.
@@ -123,7 +123,8 @@ impl Exif {
                 sound(self.columns).map_or(1.0, |columns| width / columns) * sound(self.digital_zoom).unwrap_or(1.0);
             let px = mm * px_per_mm * scale;
             let pitch_um = 1e3 / (px_per_mm * scale);
-            // Some programs write nonsense there: no sensor has pixels of less than half a micrometre or more than 0.1 mm.
+            // Some programs write nonsense there: no sensor has pixels of less than half a micrometre or more than 0.1
+            // mm.
             if (0.5..100.0).contains(&pitch_um) {
                 return Some(Focal {
                     px,
@@ -198,8 +199,8 @@ fn choose(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: f64) -
             let beside = format!("{}: {:.1} px, {other:.1} degrees wide ({off_percent:+.1} %)", exif.from, exif.px);
             let warnings = if off_percent.abs() > 3.0 * stated.percent.hypot(exif.percent) {
                 vec![format!(
-                    "the picture's {beside}, which the field of view contradicts: it counts over the whole width; was it \
-                     stated for the diagonal, another lens, or another mode of the camera?"
+                    "the picture's {beside}, which the field of view contradicts: it counts over the whole width; was \
+                     it stated for the diagonal, another lens, or another mode of the camera?"
                 )]
             } else {
                 Vec::new()
@@ -222,7 +223,8 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
     let mut t = String::new();
     let _ = write!(
         t,
-        "# A start for a camera that nobody calibrated, by `hzn init`. What is not known stands as a sigma: answers are as uncertain as\n\
+        "# A start for a camera that nobody calibrated, by `hzn init`. What is not known stands as a sigma: answers \
+         are as uncertain as\n\
          # the lens. A calibration makes them sharper: `hzn camera convert`, and both sigmas smaller or away.\n\
          # Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png\n\
          # Every other key with its default:  hzn init -o all.toml\n\
@@ -255,7 +257,8 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
         "# 1-sigma of the focal length: {:.1} % for {}, and {shape_percent:.1} % for what a real lens differs\n\
          # from an ideal one over this field.\n\
          focal_sigma_percent = {:.1}\n\
-         # 1-sigma of the principal point, each axis: 1.5 % of the width. It turns every answer alike. More where pictures were cropped.\n\
+         # 1-sigma of the principal point, each axis: 1.5 % of the width. It turns every answer alike. More where \
+         pictures were cropped.\n\
          centre_sigma_px = {:.1}\n",
         focal.percent,
         if focal.percent < EXIF_PERCENT {
@@ -269,7 +272,8 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
     if start.lens == Model::Equidistant {
         let _ = writeln!(
             t,
-            "# theta_max_deg = {:.0}            # where the image circle ends within the picture: its radius in degrees off axis",
+            "# theta_max_deg = {:.0}            # where the image circle ends within the picture: its radius in \
+             degrees off axis",
             0.5 * start.fov_deg
         );
     }
@@ -278,12 +282,14 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
     let _ = match known.altitude_km {
         Some(km) => write!(
             t,
-            "altitude_km = {km}\naltitude_sigma_km = {:.1}        # 1-sigma: 2 % of it, for all pictures; frames.csv gives each its own\n",
+            "altitude_km = {km}\naltitude_sigma_km = {:.1}        # 1-sigma: 2 % of it, for all pictures; frames.csv \
+             gives each its own\n",
             (ALTITUDE_PART * km).max(0.5)
         ),
         None => write!(
             t,
-            "# Every picture needs an altitude in kilometres: the columns file, altitude_km of a frames.csv beside the pictures (or x_km,\n\
+            "# Every picture needs an altitude in kilometres: the columns file, altitude_km of a frames.csv beside the \
+             pictures (or x_km,\n\
              # y_km, z_km), or for all of them\n# altitude_km = 400.0\n"
         ),
     };

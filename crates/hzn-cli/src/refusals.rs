@@ -9,7 +9,8 @@ use hzn_core::{Report, gates};
 use hzn_run::engine::Finished;
 use hzn_run::explain;
 
-/// Why a body was not found in a picture: what became of its longest fitted edge, or where the picture ended without one.
+/// Why a body was not found in a picture: what became of its longest fitted edge, or where the picture ended without
+/// one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Why {
     Verdict(Verdict),
@@ -68,7 +69,8 @@ impl Refusals {
         }
     }
 
-    /// The commonest reason in words, and the number of the first frame with it; of reasons that are as common, the first.
+    /// The commonest reason in words, and the number of the first frame with it; of reasons that are as common, the
+    /// first.
     pub(crate) fn commonest(&self, limits: &gates::Config) -> Option<(String, Option<u64>)> {
         let (why, n, first) = self.each.iter().rev().max_by_key(|(_, n, _)| *n)?;
         let share = if *n == self.total { "all".to_owned() } else { format!("{n}") };

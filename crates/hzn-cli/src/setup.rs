@@ -134,8 +134,8 @@ fn with_altitude(text: &str, km: f64, bodies: &[usize]) -> String {
     document.to_string()
 }
 
-/// Says in the sensor, and in its text, what the pictures themselves tell about their samples, and tells the source which
-/// colour is wanted. Gives what the user should know.
+/// Says in the sensor, and in its text, what the pictures themselves tell about their samples, and tells the source
+/// which colour is wanted. Gives what the user should know.
 pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<String>, Stop> {
     let mut notes = Vec::new();
     source.want_channel(sensor.config.input.channel)?;
@@ -153,8 +153,9 @@ pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Resu
         && let Some((name, how)) = source.to_be_turned()
     {
         notes.push(format!(
-            "{name} says that it is to be shown {how}; pixels are taken as they are stored. If the camera was calibrated with \
-             turned pictures, as OpenCV's imread gives them, turn them with orient in [input] of sensor.toml"
+            "{name} says that it is to be shown {how}; pixels are taken as they are stored. If the camera was \
+             calibrated with turned pictures, as OpenCV's imread gives them, turn them with orient in [input] of \
+             sensor.toml"
         ));
     }
     Ok(notes)
@@ -178,8 +179,9 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
     let Some((name, (width, height))) = first else { return Ok(()) };
     let hint = if (height, width) == own { "turn the pictures with orient in [input], " } else { "" };
     Err(usage(format!(
-        "the sensor is for pictures of {} x {} px, but those here are not: {name} is {width} x {height}; {hint}give the sensor \
-         of this camera with --sensor, or set camera.width and height and scale focal lengths and centre with them",
+        "the sensor is for pictures of {} x {} px, but those here are not: {name} is {width} x {height}; {hint}give \
+         the sensor of this camera with --sensor, or set camera.width and height and scale focal lengths and centre \
+         with them",
         own.0, own.1
     )))
 }
@@ -212,8 +214,8 @@ fn above_the_limb(config: &Config) -> Result<(), Stop> {
     }
 }
 
-/// Removes the pictures of the rendering before, which new tables would not know: those that the folder's truth.csv names,
-/// as only rendered pictures have a truth.
+/// Removes the pictures of the rendering before, which new tables would not know: those that the folder's truth.csv
+/// names, as only rendered pictures have a truth.
 pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
     let Ok(mut before) = csv::Reader::from_path(folder.join("truth.csv")) else { return Ok(()) };
     for truth in before.deserialize::<Truth>().map_while(Result::ok) {

@@ -12,16 +12,21 @@ fn wrong_keys_and_values_of_the_sensor() {
         place.write("in/sensor.toml", format!("{}{rest}", common::SENSOR).as_bytes());
         place.run(&["run", "in"]).expect(2).err
     };
-    insta::assert_snapshot!(with("[reject]\nthreshold_pxx = 3.0\n"), @"error: in/sensor.toml:16: [reject] threshold_pxx: unknown key; did you mean threshold_px?");
-    insta::assert_snapshot!(with("[reject]\nthreshold_px = -1\n"), @"error: in/sensor.toml:16: [reject] threshold_px: -1 is refused: must be above 0");
+    insta::assert_snapshot!(with("[reject]\nthreshold_pxx = 3.0\n"), @"error: in/sensor.toml:16: [reject] \
+        threshold_pxx: unknown key; did you mean threshold_px?");
+    insta::assert_snapshot!(with("[reject]\nthreshold_px = -1\n"), @"error: in/sensor.toml:16: [reject] threshold_px: \
+        -1 is refused: must be above 0");
     insta::assert_snapshot!(with("[binarize]\nmethod = \"otzu\"\n"), @r#"error: in/sensor.toml:16: [binarize] method: "otzu" is not a valid value; did you mean otsu?"#);
     let camera = |from: &str, to: &str| {
         place.write("in/sensor.toml", common::SENSOR.replace(from, to).as_bytes());
         place.run(&["run", "in"]).expect(2).err
     };
-    insta::assert_snapshot!(camera("fx_px = 300.0", "fx_px = nan"), @"error: in/sensor.toml:7: [camera] fx_px: nan is refused: must be a finite number");
-    insta::assert_snapshot!(camera("width = 320", "width = 70000"), @"error: in/sensor.toml:4: [camera] width: 70000 is refused: must be between 2 and 65535");
-    insta::assert_snapshot!(camera("cx_px", "k = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]\ncx_px"), @"error: in/sensor.toml:9: [camera] k: 12 numbers, at most 5 can be given");
+    insta::assert_snapshot!(camera("fx_px = 300.0", "fx_px = nan"), @"error: in/sensor.toml:7: [camera] fx_px: nan is \
+        refused: must be a finite number");
+    insta::assert_snapshot!(camera("width = 320", "width = 70000"), @"error: in/sensor.toml:4: [camera] width: 70000 \
+        is refused: must be between 2 and 65535");
+    insta::assert_snapshot!(camera("cx_px", "k = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]\ncx_px"), @"error: \
+        in/sensor.toml:9: [camera] k: 12 numbers, at most 5 can be given");
     place.write("in/sensor.toml", common::SENSOR.replace("\"pinhole\"", "\"kannala-brandt\"\nk = [-0.9]").as_bytes());
     place.run(&["run", "in"]).expect(2).says("monotone");
     place.write("in/sensor.toml", common::SENSOR.replace("altitude_km = 400.0", "").as_bytes());
@@ -42,11 +47,14 @@ fn wrong_rows_of_frames_csv() {
     let err = with("file,altitude_km\n0000.png,NaN\n").expect(2).err;
     insta::assert_snapshot!(err, @r#"error: in/frames.csv:2: 0000.png altitude_km: "NaN" is not a finite number; leave the cell empty if it is not known"#);
     let err = with("file,altitude_km\n0000.png,400\n0001.png,-3\n").expect(2).err;
-    insta::assert_snapshot!(err, @"error: in/frames.csv:3: 0001.png: altitude_km must be a finite number above -1 (kilometres), not -3");
+    insta::assert_snapshot!(err, @"error: in/frames.csv:3: 0001.png: altitude_km must be a finite number above -1 \
+                                   (kilometres), not -3");
     let err = with("file,x_km,y_km,z_km\n0000.png,6000,0,-0.5\n").expect(2).err;
-    insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres), not 6000, 0, -0.5");
+    insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: x_km, y_km, z_km must be finite and outside the \
+                                   body (ECEF, kilometres), not 6000, 0, -0.5");
     let err = with("file,altitude_km,attitude_sigma_deg\n0000.png,400,-1\n").expect(2).err;
-    insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: attitude_sigma_deg must be a finite number, 0 or more, not -1");
+    insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: attitude_sigma_deg must be a finite number, 0 or \
+                                   more, not -1");
     with("name,altitude_km\n0000.png,400\n").expect(2).says("the column `file` is missing");
     let ran = with("file,altitude_km\n0000.png,400\n0001.png,400\n0009.png,400\n").expect(0);
     assert_eq!(without_time(&ran.out).len(), 2);
@@ -62,7 +70,9 @@ fn the_sensor_of_another_camera_is_said_once() {
     place.write("p.raw", &[0; 100]);
     place.run(&["run", "in", "-o", "a.mcap"]).expect(0);
     let err = place.run(&["run", "in", "-s", "other.toml", "-o", "b.csv"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: the sensor is for pictures of 640 x 480 px, but those here are not: 0000.png is 320 x 240; give the sensor of this camera with --sensor, or set camera.width and height and scale focal lengths and centre with them");
+    insta::assert_snapshot!(err, @"error: the sensor is for pictures of 640 x 480 px, but those here are not: 0000.png \
+                                   is 320 x 240; give the sensor of this camera with --sensor, or set camera.width and \
+                                   height and scale focal lengths and centre with them");
     assert!(!place.path("b.csv.part").exists());
     place.run(&["run", "a.mcap", "-s", "other.toml"]).expect(2).says("0000.png is 320 x 240");
     place.run(&["run", "p.raw", "-s", "other.toml", "--raw", "320x240:mono8"]).expect(2).says("p.raw is 320 x 240");
@@ -163,11 +173,15 @@ fn unwritable_folders_are_said() {
     // A file in the way of the folder; permissions would not stop a test that runs as root.
     place.write("file", b"");
     let told = |option: &str, path: &str| place.run(&["run", "in", option, path]).expect(1).err;
-    insta::assert_snapshot!(told("-o", "file/out.csv"), @"error: file/out.csv.part: a part of this path is a file, not a folder; choose another folder for the output");
-    insta::assert_snapshot!(told("-o", "file/out.mcap"), @"error: cannot write into the folder file: Not a directory (os error 20); make it writable or choose another with -o");
-    insta::assert_snapshot!(told("-o", "nowhere/out.csv"), @"error: nowhere/out.csv.part: the folder does not exist; create it first");
+    insta::assert_snapshot!(told("-o", "file/out.csv"), @"error: file/out.csv.part: a part of this path is a file, not \
+                                                          a folder; choose another folder for the output");
+    insta::assert_snapshot!(told("-o", "file/out.mcap"), @"error: cannot write into the folder file: Not a directory \
+                                                           (os error 20); make it writable or choose another with -o");
+    insta::assert_snapshot!(told("-o", "nowhere/out.csv"), @"error: nowhere/out.csv.part: the folder does not exist; \
+        create it first");
     insta::assert_snapshot!(told("--overlay", "file"), @"error: file: is a file, not a folder; choose another name");
-    insta::assert_snapshot!(told("--overlay", "file/drawn"), @"error: file/drawn: a part of this path is a file, not a folder; choose another folder for the output");
+    insta::assert_snapshot!(told("--overlay", "file/drawn"), @"error: file/drawn: a part of this path is a file, not a \
+        folder; choose another folder for the output");
     assert_eq!(place.read("file"), "");
 }
 

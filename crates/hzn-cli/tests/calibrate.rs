@@ -116,7 +116,8 @@ fn sun_and_moon_have_no_limb_height() {
     let at = dir.path();
     std::fs::create_dir(at.join("in")).unwrap();
     image::GrayImage::new(64, 48).save(at.join("in/a.png")).unwrap();
-    let sensor = "preset = \"sun\"\n[camera]\nwidth = 64\nheight = 48\nfx_px = 900.0\nfy_px = 900.0\ncx_px = 31.5\ncy_px = 23.5\n\
+    let sensor = "preset = \"sun\"\n[camera]\nwidth = 64\nheight = 48\nfx_px = 900.0\nfy_px = 900.0\ncx_px = \
+    31.5\ncy_px = 23.5\n\
                   model = \"pinhole\"\n";
     std::fs::write(at.join("in/sensor.toml"), sensor).unwrap();
     let (code, _, stderr) = hzn(at, &["calibrate", "noise", "in"]);

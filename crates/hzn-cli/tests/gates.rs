@@ -65,8 +65,8 @@ fn a_given_attitude_and_a_given_sun_are_gates() {
         place.write("in/frames.csv", format!("{head}0000.png,6771.0088,0,0,{attitude},{sun}\n").as_bytes());
         statuses(&place.run(&["run", "in"]).expect(0).out).remove(0)
     };
-    // The camera looks along +z of its own, the body's centre is 68 degrees below: in the camera (0, sin 68, cos 68). That is
-    // −x of ECEF for a turn about the camera's x that takes it there.
+    // The camera looks along +z of its own, the body's centre is 68 degrees below: in the camera (0, sin 68, cos 68).
+    // That is −x of ECEF for a turn about the camera's x that takes it there.
     let to_ecef = |more_deg: f64| {
         // Columns of the rotation: x to x', y to y', z to z', with (0, sin, cos) to (−1, 0, 0).
         let (s, c) = (68.0f64 + more_deg).to_radians().sin_cos();

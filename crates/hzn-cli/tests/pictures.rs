@@ -54,8 +54,9 @@ fn sixteen_bits_are_not_cut_to_eight() {
     let faint = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(320, 240, faint).unwrap();
     faint.save(place.path("in/faint.png")).unwrap();
     let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
-    // So faint an edge stands at the global level instead of the local one, and is taken for a wide one as all is bright
-    // around it; cut to 8 bits there would be no edge. The rougher edge leaves more of the answer to the expected limb height.
+    // So faint an edge stands at the global level instead of the local one, and is taken for a wide one as all is
+    // bright around it; cut to 8 bits there would be no edge. The rougher edge leaves more of the answer to the
+    // expected limb height.
     assert!(off < 0.1, "{off}");
 }
 
@@ -75,7 +76,8 @@ fn bits_are_found_once_for_a_sequence() {
         let rows = without_time(&ran.out);
         let off =
             angle_deg(["axis_x", "axis_y", "axis_z"].map(|name| cell(&rows[1], name).parse().unwrap()), plain(0.0));
-        // Where all around is bright, the edge is taken for a wider one, and a rougher edge leaves more to the expected height.
+        // Where all around is bright, the edge is taken for a wider one, and a rougher edge leaves more to the expected
+        // height.
         assert!(off < 0.1, "{off}");
         // By itself, it is one of its folder.
         let told = place.run(&["explain", "in/1.png"]).expect(0);

@@ -190,7 +190,8 @@ fn headerless_pictures() {
     assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("ok", "unreadable"));
     assert_eq!(
         cell(&rows[1], "detail"),
-        "153600 bytes, but a picture of 320x240:mono8 has 76800: these are 2 pictures; give each a file of its own; it fits mono10, mono12, mono16"
+        "153600 bytes, but a picture of 320x240:mono8 has 76800: these are 2 pictures; give each a file of its own; it \
+         fits mono10, mono12, mono16"
     );
     let ran = place.run(&["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml"]).expect(0);
     let found = without_time(&ran.out);
@@ -340,9 +341,11 @@ fn another_input_is_not_appended() {
     place.run(&["run", "in/0000.png", "in/0002.png", "-o", "a.csv"]).expect(0);
     let before = place.read("a.csv");
     let err = place.run(&["run", "in", "-o", "a.csv", "--resume"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: a.csv: its last frame is 0002.png, but the input has 0001.png in that place; give the input that it was begun with, or start over with --force");
+    insta::assert_snapshot!(err, @"error: a.csv: its last frame is 0002.png, but the input has 0001.png in that place; \
+                                   give the input that it was begun with, or start over with --force");
     let err = place.run(&["run", "in/0000.png", "-o", "a.csv", "--resume"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: a.csv: holds 2 frames, but the input has only 1; give the input that it was begun with, or start over with --force");
+    insta::assert_snapshot!(err, @"error: a.csv: holds 2 frames, but the input has only 1; give the input that it was \
+                                   begun with, or start over with --force");
     assert_eq!(place.read("a.csv"), before);
 }
 

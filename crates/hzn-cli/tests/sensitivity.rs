@@ -69,7 +69,8 @@ fn a_sensor_file_brings_camera_body_and_noise() {
     place.run(&[&several[..], &["--body", "moon"]].concat()).expect(0);
 }
 
-/// The commands that book/guide/evaluation.md shows, with a sensor as `hzn simulate` writes it: its altitude is in frames.csv.
+/// The commands that book/guide/evaluation.md shows, with a sensor as `hzn simulate` writes it: its altitude is in
+/// frames.csv.
 #[test]
 fn the_examples_of_the_docs_run() {
     let place = Place::new();

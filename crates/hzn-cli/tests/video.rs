@@ -100,8 +100,8 @@ fn every_frame_has_its_own_time() {
     assert!(seen > 0);
 }
 
-/// `ffmpeg` and `ffprobe` that give frames of 320x240, written as shell scripts: what is tested is how they are called and
-/// read, not the decoding.
+/// `ffmpeg` and `ffprobe` that give frames of 320x240, written as shell scripts: what is tested is how they are called
+/// and read, not the decoding.
 #[cfg(unix)]
 struct Scripts {
     place: Place,

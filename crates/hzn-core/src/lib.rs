@@ -20,8 +20,8 @@
 //! | [`covariance`] | [`covariance::Config`] | the fit and the noise model | covariance, and the expected half-angle fused |
 //! | [`select`] | [`gates::Config`] | the answer | a verdict; the best of all candidates |
 //!
-//! Each module begins with its equations and their source; the project's book/theory/math.md has them in one place. They are tested
-//! beside the code, and against data of other programs (`golden`).
+//! Each module begins with its equations and their source; the project's book/theory/math.md has them in one place.
+//! They are tested beside the code, and against data of other programs (`golden`).
 //!
 //! [`pipeline`] knows them all. Frames and units: [`frames`] (camera x right, y down, z forward), [`pixel`] (pixel
 //! centres at integers); metres, radians and pixels inside, kilometres and degrees in [`Config`].
@@ -53,8 +53,8 @@
 //! # Features
 //!
 //! `std`: the square root from the standard library (the same bits, vectorised). `serde`: [`Config`] to and from files.
-//! `dlr`, `zju`, `horace`: the methods of Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`]. `erf`: the most accurate
-//! sub-pixel points.
+//! `dlr`, `zju`, `horace`: the methods of Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`].
+//! `erf`: the most accurate sub-pixel points.
 
 #![no_std]
 #![forbid(unsafe_code)]

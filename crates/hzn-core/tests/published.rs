@@ -99,8 +99,8 @@ fn every_preset_and_contour_method_finds_a_disc() {
     }
 }
 
-/// Braun & Barf 2022, section 5: the Sun's disc, wider by bloom than it is, by search lines, its radius free, with their
-/// limit for the Sun (7.3).
+/// Braun & Barf 2022, section 5: the Sun's disc, wider by bloom than it is, by search lines, its radius free, with
+/// their limit for the Sun (7.3).
 #[test]
 fn braun_barf_on_the_sun() {
     let mut config = Config::preset(Preset::Dlr2022, camera::Config::ideal(Model::Pinhole, 160, 120, 1235.0));
@@ -298,7 +298,10 @@ proptest! {
         let pick = methods.map(|m| m % 3);
         config.contour.method = CONTOURS[methods[0] % 4];
         config.reject.method = [
-            consensus::Method::None, consensus::Method::Ransac, consensus::Method::TwoPoint, consensus::Method::RansacPreverify,
+            consensus::Method::None,
+            consensus::Method::Ransac,
+            consensus::Method::TwoPoint,
+            consensus::Method::RansacPreverify,
             consensus::Method::Mlesac,
         ][methods[1] % 5];
         config.estimate.method = [
@@ -312,7 +315,8 @@ proptest! {
         config.covariance.overbound = pick[5] == 0;
         config.candidates.sub_pixel =
             [SubPixel::None, SubPixel::Linear, SubPixel::Zernike, SubPixel::Erf][methods[4] % 4];
-        config.binarize.method = [threshold::Method::Otsu, threshold::Method::Dynamic, threshold::Method::Fixed][pick[5]];
+        use threshold::Method::{Dynamic, Fixed, Otsu};
+        config.binarize.method = [Otsu, Dynamic, Fixed][pick[5]];
         config.input.scale_to_height = scaled.then_some(33);
         config.recover.method = if divided { retry::Method::Division } else { retry::Method::None };
         let data = garbage(kind, seed, level);

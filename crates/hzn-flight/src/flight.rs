@@ -46,8 +46,9 @@ impl Line {
     }
 }
 
-/// The lists of a picture: keep them in a `static`. As those of `hzn run --flight` but for the points of an edge, of which
-/// 608 are kept at most, as the default `candidates.keep_points` asks for no more. All that are asked for is as many.
+/// The lists of a picture: keep them in a `static`. As those of `hzn run --flight` but for the points of an edge, of
+/// which 608 are kept at most, as the default `candidates.keep_points` asks for no more. All that are asked for is as
+/// many.
 pub type Lists = Workspace<f32, 2048, 76, 512>;
 
 /// The flight software's memory besides the lists of a picture: keep it in a `static`.
@@ -101,8 +102,8 @@ pub struct Flight<'a, B> {
 }
 
 impl<'a, B: Board> Flight<'a, B> {
-    /// Loads the parameters, checks itself, and waits in standby; in safe mode when a check fails. `None` cannot be: the
-    /// defaults are valid, which a test holds.
+    /// Loads the parameters, checks itself, and waits in standby; in safe mode when a check fails. `None` cannot be:
+    /// the defaults are valid, which a test holds.
     // By itself, as are the other large functions: what one needs of the stack, the next one has again.
     #[inline(never)]
     pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {

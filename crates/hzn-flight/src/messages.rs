@@ -54,8 +54,8 @@ numbered! {
         DumpEdges = 5 => "dump-edges",
         /// Sets the counters of housekeeping to zero.
         ResetCounters = 6 => "reset-counters",
-        /// What navigation knows, for the pictures to come: altitude in metres, ECEF position in metres (4 × f32, NaN: not
-        /// known), and, if they follow, the camera's rate of rotation in its own axes in rad/s (3 × f32).
+        /// What navigation knows, for the pictures to come: altitude in metres, ECEF position in metres (4 × f32, NaN:
+        /// not known), and, if they follow, the camera's rate of rotation in its own axes in rad/s (3 × f32).
         SetKnown = 7 => "known",
     }
 }

@@ -260,7 +260,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_survived(bytes in proptest::collection::vec(prop_oneof![Just(0x1Au8), Just(0xCF), Just(0xFC), Just(0x1D), any::<u8>()], 0..3000)) {
+        fn any_bytes_are_survived(
+            bytes in proptest::collection::vec(
+                prop_oneof![Just(0x1Au8), Just(0xCF), Just(0xFC), Just(0x1D), any::<u8>()],
+                0..3000,
+            ),
+        ) {
             let mut inbox = Inbox::new();
             for byte in bytes {
                 prop_assert!(inbox.push(byte));

@@ -1,5 +1,5 @@
-//! Two copies of the parameters: the newer valid one counts, and only the other one is ever written, so that a power cut
-//! in the middle of writing costs the change and nothing else.
+//! Two copies of the parameters: the newer valid one counts, and only the other one is ever written, so that a power
+//! cut in the middle of writing costs the change and nothing else.
 
 use crate::board::Board;
 use crate::parameters::Parameters;

@@ -1,7 +1,7 @@
 //! The square root of an ARM floating-point unit.
 //!
-//! `vsqrt.f32` rounds correctly, as IEEE 754 asks, so it gives the bits of every other correct square root, in 14 cycles
-//! instead of the 66 instructions of a software one. Core's own `f32::sqrt` is in std only. Targets whose ABI is
+//! `vsqrt.f32` rounds correctly, as IEEE 754 asks, so it gives the bits of every other correct square root, in 14
+//! cycles instead of the 66 instructions of a software one. Core's own `f32::sqrt` is in std only. Targets whose ABI is
 //! `eabihf` have a unit for single precision; for double precision nothing in the compiler's settings tells, so that
 //! stays with `libm`.
 

@@ -58,8 +58,8 @@ pub(crate) fn caption(row: &Row) -> String {
     text
 }
 
-/// Lines, points, and the captions of the bodies from the top left corner. What comes first lies on top among lines; points
-/// lie over all of them.
+/// Lines, points, and the captions of the bodies from the top left corner. What comes first lies on top among lines;
+/// points lie over all of them.
 pub(crate) fn annotations(a: &Annotations, captions: &[String], pen_px: f64, ns: u64) -> ImageAnnotations {
     let mut points = Vec::new();
     let mut draw = |style: Style, xy: &[[f64; 2]]| {

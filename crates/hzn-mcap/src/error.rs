@@ -13,14 +13,16 @@ pub enum Error {
         path: PathBuf,
     },
     /// An unfinished run's file stands beside the output.
-    #[error("{} is left from an unfinished run: add --resume to go on with it, or --force to start over", path.display())]
+    #[error("{} is left from an unfinished run: add --resume to go on with it, or --force to start \
+             over", path.display())]
     Unfinished {
         /// The unfinished file.
         path: PathBuf,
     },
     /// The disk is full.
     #[error(
-        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and --resume goes on from there",
+        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and --resume \
+         goes on from there",
         folder.display(), part.display()
     )]
     DiskFull {
@@ -118,7 +120,8 @@ pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
             Error::DiskFull { folder: folder_of(path), part: path.to_path_buf() }
         }
         io::ErrorKind::FileTooLarge => {
-            let what = "larger than files may be here (ulimit -f); finished frames are kept; resume the run to go on with them";
+            let what = "larger than files may be here (ulimit -f); finished frames are kept; resume the run to go on \
+                        with them";
             Error::Write { path: path.to_path_buf(), source: io::Error::new(io::ErrorKind::FileTooLarge, what) }
         }
         io::ErrorKind::PermissionDenied

@@ -57,9 +57,9 @@ struct Kind {
     encoding: String,
 }
 
-/// Goes through a recording of ours, or anybody's with pictures that [`crate::ImageReader`] understands, without reading
-/// the pictures that stand uncompressed. Pictures are those of the first topic that has some. A file that was cut off
-/// tells everything that is whole; [`Index::is_complete`] says so afterwards.
+/// Goes through a recording of ours, or anybody's with pictures that [`crate::ImageReader`] understands, without
+/// reading the pictures that stand uncompressed. Pictures are those of the first topic that has some. A file that was
+/// cut off tells everything that is whole; [`Index::is_complete`] says so afterwards.
 #[derive(Debug)]
 pub struct Index {
     file: BufReader<File>,

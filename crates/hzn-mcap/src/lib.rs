@@ -17,10 +17,10 @@
 //!
 //! First the attachment `sensor.toml` and the metadata `hzn`, then chunks. Pictures stand uncompressed in chunks of
 //! their own, because they are compressed already; everything else is compressed with zstd. A batch is written
-//! pictures first, so a frame whose report is there is there as a whole: a frame counts as finished when the chunk with its
-//! report is whole in the file. A batch is what came within [`FLUSH_INTERVAL`], or 8 MiB of pictures: that much a crash can
-//! cost. A chunk for each frame would cost nothing beside pictures, but ten times the room without them, and a longer summary.
-//! Every chunk, the data and the summary carry CRCs. Message `sequence` is the frame's index.
+//! pictures first, so a frame whose report is there is there as a whole: a frame counts as finished when the chunk with
+//! its report is whole in the file. A batch is what came within [`FLUSH_INTERVAL`], or 8 MiB of pictures: that much a
+//! crash can cost. A chunk for each frame would cost nothing beside pictures, but ten times the room without them, and
+//! a longer summary. Every chunk, the data and the summary carry CRCs. Message `sequence` is the frame's index.
 //!
 //! | topic | schema | encoding |
 //! |---|---|---|
@@ -62,6 +62,6 @@ pub use row::{Row, RowMeta, roll_pitch_deg};
 pub use topics::{IMAGE_TOPIC, REPORT_SCHEMA};
 pub use writer::{FLUSH_INTERVAL, Options, Writer};
 
-/// A layout of Foxglove's panels for our topics, to be imported there: the picture with what was found, plots over time,
-/// status, log, the report and the axis.
+/// A layout of Foxglove's panels for our topics, to be imported there: the picture with what was found, plots over
+/// time, status, log, the report and the axis.
 pub const LAYOUT: &str = include_str!("../foxglove-layout.json");

@@ -1,5 +1,5 @@
-//! What each kind of annotation looks like, in recordings and in pictures alike: the colours of Okabe and Ito, which stay
-//! apart for colour-blind eyes. Red, green, blue, 0 to 255.
+//! What each kind of annotation looks like, in recordings and in pictures alike: the colours of Okabe and Ito, which
+//! stay apart for colour-blind eyes. Red, green, blue, 0 to 255.
 
 /// Candidate edges.
 pub const EDGE: [u8; 3] = [86, 180, 233];

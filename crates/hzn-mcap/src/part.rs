@@ -11,7 +11,8 @@ pub fn part_path(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// Opens an unfinished file with what is in it, or a new one, for reading and writing. It is this run's until it is closed.
+/// Opens an unfinished file with what is in it, or a new one, for reading and writing. It is this run's until it is
+/// closed.
 ///
 /// # Errors
 /// [`io::ErrorKind::ResourceBusy`] while another run writes it; whatever the system says.

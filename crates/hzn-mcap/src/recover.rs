@@ -35,7 +35,8 @@ pub struct Resumed {
     pub writer: Writer,
 }
 
-/// Closes a broken recording: copies every finished frame (see the crate's documentation) of `input` to `output`, which must not exist.
+/// Closes a broken recording: copies every finished frame (see the crate's documentation) of `input` to `output`, which
+/// must not exist.
 ///
 /// # Errors
 /// `input` cannot be read or is no MCAP; `output` exists or cannot be written.

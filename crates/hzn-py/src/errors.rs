@@ -37,7 +37,8 @@ pub(crate) fn warn(py: Python<'_>, what: impl std::fmt::Display) -> PyResult<()>
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
-/// Works without holding the interpreter. A panic becomes an exception: whatever `work` held is gone, the process lives.
+/// Works without holding the interpreter. A panic becomes an exception: whatever `work` held is gone, the process
+/// lives.
 pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| {
         let what = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));

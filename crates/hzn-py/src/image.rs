@@ -120,8 +120,8 @@ enum Samples<'a> {
     Words(ArrayView3<'a, u16>),
 }
 
-/// A picture of any strides, such as part of another, transposed, upside down, or a colour alone. A pixel costs more than
-/// in a packed one, and few are read.
+/// A picture of any strides, such as part of another, transposed, upside down, or a colour alone. A pixel costs more
+/// than in a packed one, and few are read.
 pub(crate) struct Strided<'a> {
     samples: Samples<'a>,
     layout: Layout,

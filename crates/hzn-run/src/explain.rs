@@ -23,23 +23,29 @@ pub fn why(verdict: Verdict, s: &gates::Config) -> String {
         ),
         Verdict::Uncertain => format!("sigma above {} deg (select.max_sigma_deg)", s.max_sigma_deg),
         Verdict::NoFit => "the fit did not converge".into(),
-        Verdict::Indistinct => "a curve through clutter: many of its points lie close beside the fitted limb, or a part of it follows the limb by chance".into(),
+        Verdict::Indistinct => "a curve through clutter: many of its points lie close beside the fitted limb, or a \
+                                part of it follows the limb by chance"
+            .into(),
         Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
         Verdict::Taken => "it is the limb of another body, found before".into(),
         Verdict::OutOfView => {
             "the limb that is expected about the fitted axis is not in the picture (select.limb_in_view)".into()
         }
         Verdict::Straight => {
-            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature does not tell the body's side (select.min_side_sigma)".into()
+            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature does not tell the \
+             body's side (select.min_side_sigma)"
+                .into()
         }
         Verdict::Radius => "the limb is not that wide at any altitude allowed (select.altitude_limits_km)".into(),
         Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
         Verdict::Circle => format!(
-            "a circle of the image fits it more than {} times better than the limb: a lens flare (select.max_rival_ratio)",
+            "a circle of the image fits it more than {} times better than the limb: a lens flare \
+             (select.max_rival_ratio)",
             s.max_rival_ratio
         ),
         Verdict::Polyline => format!(
-            "straight pieces fit it more than {} times better than the limb: an iris or a vehicle's part (select.max_rival_ratio)",
+            "straight pieces fit it more than {} times better than the limb: an iris or a vehicle's part \
+             (select.max_rival_ratio)",
             s.max_rival_ratio
         ),
         Verdict::Departure => "the edge goes on smoothly beside the fitted limb (select.max_departure)".into(),
@@ -115,10 +121,23 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     let mut tips: Vec<&str> = Vec::new();
     match r.status {
         Status::TooDark => tips.push("the picture is darker than gate.min_mean allows: lower it, or expose longer"),
-        Status::TooBright => tips.push("the picture is brighter than gate.max_mean allows: raise it, or expose shorter"),
-        Status::TooFewPoints => tips.push("only short edges were found, as of stars, noise or hot pixels: is the body in view? if it is as small as that, lower candidates.min_points"),
-        Status::Truncated => tips.push("the picture has more edges than it may cost to look at: raise limits.max_work, mask structure in view, or set a level above the clouds (binarize.method = \"fixed\")"),
-        Status::Ambiguous => tips.push("two directions fit about equally well: mask structure in view (mask.polygons_px)"),
+        Status::TooBright => tips.push(
+            "the picture is brighter than gate.max_mean allows: raise it, or expose \
+                                        shorter",
+        ),
+        Status::TooFewPoints => tips.push(
+            "only short edges were found, as of stars, noise or hot pixels: is the body \
+                                           in view? if it is as small as that, lower candidates.min_points",
+        ),
+        Status::Truncated => tips.push(
+            "the picture has more edges than it may cost to look at: raise limits.max_work, \
+                                        mask structure in view, or set a level above the clouds (binarize.method = \
+                                        \"fixed\")",
+        ),
+        Status::Ambiguous => tips.push(
+            "two directions fit about equally well: mask structure in view \
+                                        (mask.polygons_px)",
+        ),
         _ => {}
     }
     if r.status == Status::NoLimb && r.stage == Stage::Binarize {
@@ -129,25 +148,40 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
         );
     }
     if has(Verdict::NoConsensus) || has(Verdict::FewInliers) {
-        tips.push("no candidate has the form of the expected limb: check altitude_km, the focal length and the lens model; a larger reject.threshold_px forgives a poor calibration");
+        tips.push(
+            "no candidate has the form of the expected limb: check altitude_km, the focal length and the lens \
+                   model; a larger reject.threshold_px forgives a poor calibration",
+        );
     }
     if has(Verdict::HalfAngle) {
-        tips.push("a limb was found, but larger or smaller than expected: check altitude and focal length, or raise body.limb_height_sigma_km");
+        tips.push(
+            "a limb was found, but larger or smaller than expected: check altitude and focal length, or raise \
+                   body.limb_height_sigma_km",
+        );
     }
     if has(Verdict::Residuals) {
         tips.push("the edge does not follow the limb closely: check the calibration, or raise select.max_rms_px");
     }
     if has(Verdict::ShortArc) || has(Verdict::Uncertain) {
-        tips.push("too little of the limb is in view for a good answer: lower select.min_arc_px or raise select.max_sigma_deg if a poor one will do");
+        tips.push(
+            "too little of the limb is in view for a good answer: lower select.min_arc_px or raise \
+                   select.max_sigma_deg if a poor one will do",
+        );
     }
     if has(Verdict::Unsupported) {
         tips.push("an edge fits by chance (cloud, structure): mask what belongs to the vehicle, or try another level");
     }
     if has(Verdict::Attitude) {
-        tips.push("the picture contradicts the given attitude: check the order of the quaternion (qw, qx, qy, qz: camera to ECEF), its time, and attitude_sigma_deg");
+        tips.push(
+            "the picture contradicts the given attitude: check the order of the quaternion (qw, qx, qy, qz: \
+                   camera to ECEF), its time, and attitude_sigma_deg",
+        );
     }
     if has(Verdict::Sun) {
-        tips.push("the limb is on the night side of the given Sun: check sun_x, sun_y, sun_z (in the camera); for a thermal camera set body.sunlit = false");
+        tips.push(
+            "the limb is on the night side of the given Sun: check sun_x, sun_y, sun_z (in the camera); for a \
+                   thermal camera set body.sunlit = false",
+        );
     }
     tips
 }

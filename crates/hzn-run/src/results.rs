@@ -30,8 +30,8 @@ pub fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Error> {
 /// Rows, one after the other.
 pub type AllRows = Box<dyn Iterator<Item = Result<Row, Error>>>;
 
-/// Rows of a table of results: `kind` is its ending, `csv` or `jsonl`. What an unfinished one (`.part`) ends with in the
-/// middle of a row is left out.
+/// Rows of a table of results: `kind` is its ending, `csv` or `jsonl`. What an unfinished one (`.part`) ends with in
+/// the middle of a row is left out.
 ///
 /// # Errors
 /// Another kind of file, or one that cannot be read; a row that is none of results.

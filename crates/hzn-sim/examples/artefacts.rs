@@ -4,9 +4,9 @@
 //! cargo run --release -p hzn-sim --example artefacts -- --kind ring,disc --count 200 --threshold 1 --list
 //! cargo run --release -p hzn-sim --example artefacts -- --kind ring --first 17 --count 1 --png pictures
 //! ```
-//! The line of a false answer: kind, seed, size and lens of the camera, error and sigma in degrees, RMS in pixels, inliers of
-//! points, arc in pixels, and every edge as `verdict:points`. A picture has the chosen edge's inliers in green, its other
-//! points in yellow, the fitted limb in red.
+//! The line of a false answer: kind, seed, size and lens of the camera, error and sigma in degrees, RMS in pixels,
+//! inliers of points, arc in pixels, and every edge as `verdict:points`. A picture has the chosen edge's inliers in
+//! green, its other points in yellow, the fitted limb in red.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;

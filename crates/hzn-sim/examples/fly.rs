@@ -42,7 +42,8 @@ fn main() {
         let d = nalgebra::Vector3::from(axis.xyz()) - nalgebra::Vector3::from(e);
         let one = full.try_inverse().map_or(f64::NAN, |inverse| d.dot(&(inverse * d)));
         println!(
-            "{}: error {error_deg:.4}° sigma {sigma_deg:.4}° NEES {one:.2} rms {:.2} px, {} of {} points, half-angle {:+.3}°, {listed:?}",
+            "{}: error {error_deg:.4}° sigma {sigma_deg:.4}° NEES {one:.2} rms {:.2} px, {} of {} points, half-angle \
+             {:+.3}°, {listed:?}",
             frame.file,
             solution.rms_px,
             solution.inliers,

@@ -32,8 +32,8 @@ pub enum EdgeNoise {
 }
 
 impl Scene {
-    /// Tangent heights above the ellipsoid, kilometres, of rays in the camera frame, as the camera stands at the middle of the
-    /// exposure; empty for a camera inside the body.
+    /// Tangent heights above the ellipsoid, kilometres, of rays in the camera frame, as the camera stands at the middle
+    /// of the exposure; empty for a camera inside the body.
     pub fn tangent_heights_km(&self, rays: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
         let Some(view) = View::try_new(Globe::new(&self.body), &self.pose) else { return Vec::new() };
         rays.into_iter().map(|ray| view.tangent_height_m(&view.look(ray)) * 1e-3).collect()

@@ -73,8 +73,8 @@ impl Canvas {
             .collect()
     }
 
-    /// The part of the disc's outline in the picture and in the lens's view, 0 to 1, `margin_px` from their ends: of 360
-    /// places.
+    /// The part of the disc's outline in the picture and in the lens's view, 0 to 1, `margin_px` from their ends: of
+    /// 360 places.
     pub fn outline_in_view(&self, disc: &Even, margin_px: f64) -> f64 {
         let Some(axis) = UnitVec3::<hzn_core::frames::Cam, f64>::try_new(disc.axis) else { return 0.0 };
         let e = nalgebra::Vector3::from(axis.xyz());

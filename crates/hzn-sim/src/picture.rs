@@ -72,8 +72,8 @@ impl Picture {
         .expect("a rendered picture is as large as it says")
     }
 
-    /// Writes the picture: 8 bits as 8, more as 16, over which samples of 10 and 12 bits are spread, as readers know of no
-    /// other full scale. The format follows the ending of the name.
+    /// Writes the picture: 8 bits as 8, more as 16, over which samples of 10 and 12 bits are spread, as readers know of
+    /// no other full scale. The format follows the ending of the name.
     ///
     /// # Errors
     /// The file cannot be written, or its ending is not that of a format with this many bits.

@@ -162,8 +162,8 @@ impl Radiance {
         for (season, grid) in &table.seasons {
             if let Some(lat) = latitudes.iter().find(|lat| grid.half_level_km(**lat).is_none()) {
                 return Err(format!(
-                    "at latitude {lat} and season {season} deg the radiance at the largest tangent height is still above half \
-                     of that at the lowest: the table must reach beyond the limb"
+                    "at latitude {lat} and season {season} deg the radiance at the largest tangent height is still \
+                     above half of that at the lowest: the table must reach beyond the limb"
                 ));
             }
         }

@@ -174,8 +174,8 @@ impl Default for Sky {
 }
 
 impl Scene {
-    /// A uniformly bright Earth with a sharp limb at the default height, 17 km, in a dark sky, seen by a detector without
-    /// noise.
+    /// A uniformly bright Earth with a sharp limb at the default height, 17 km, in a dark sky, seen by a detector
+    /// without noise.
     pub fn new(camera: camera::Config, pose: Pose) -> Self {
         Self {
             camera,

@@ -1,7 +1,8 @@
 //! hzn for C: one sensor in memory that the caller owns. No heap, no callbacks, nothing global.
 //!
 //! Functions return 0 to 7, the status of a picture as everywhere in hzn (0 is success), or a negative number for a
-//! mistake of the caller's, after which nothing has changed. Parameters have the numbers of book/reference/telemetry.md.
+//! mistake of the caller's, after which nothing has changed. Parameters have the numbers of
+//! book/reference/telemetry.md.
 
 #![no_std]
 
@@ -127,8 +128,8 @@ pub extern "C" fn hzn_workspace_align() -> usize {
 /// Makes a sensor with every parameter at its default in `memory`, and gives it in `out`.
 ///
 /// # Safety
-/// `memory` is null or holds `bytes` writable bytes that nobody else uses as long as the sensor is used; `out` is null or
-/// writable.
+/// `memory` is null or holds `bytes` writable bytes that nobody else uses as long as the sensor is used; `out` is null
+/// or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut HznSensor) -> i32 {
     let place = memory.cast::<HznSensor>();

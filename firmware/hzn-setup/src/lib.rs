@@ -1,6 +1,6 @@
-//! What the sensor does once, or once a picture, and not once a point: compiled for size, where the rest is compiled for
-//! speed (the profile in `firmware/Cargo.toml`). hzn-core's functions are generic, so they are compiled as the crate is that
-//! calls them.
+//! What the sensor does once, or once a picture, and not once a point: compiled for size, where the rest is compiled
+//! for speed (the profile in `firmware/Cargo.toml`). hzn-core's functions are generic, so they are compiled as the
+//! crate is that calls them.
 
 #![no_std]
 #![forbid(unsafe_code)]

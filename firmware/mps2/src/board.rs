@@ -139,8 +139,8 @@ impl Watchdog {
         }
     }
 
-    /// Whether it caused the last reset. These boards do not tell, but there is nothing else on them that resets a program
-    /// while power stays.
+    /// Whether it caused the last reset. These boards do not tell, but there is nothing else on them that resets a
+    /// program while power stays.
     pub fn was_reset(&self) -> bool {
         self.was_reset
     }

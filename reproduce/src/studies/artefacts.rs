@@ -1,4 +1,5 @@
-//! Pictures without a limb: how often an artefact is taken for one, and whether limbs next to artefacts are still found.
+//! Pictures without a limb: how often an artefact is taken for one, and whether limbs next to artefacts are still
+//! found.
 
 use std::collections::BTreeMap;
 
@@ -86,13 +87,13 @@ pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(OF_EACH);
     let mut s = Section::default();
     s.text(format!(
-        "{} pictures without a limb, {count} of each kind, of 480×360 to 1280×960 pixels through pinholes (27° to 110° wide), \
-         equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 bits, with noise of \
-         0.2 to 2.5 % of full scale; the ranges of each kind stand in `hzn_sim::artefact`. PriorKnowledge: the camera and the position, \
-         for the lower half of the table also an attitude that is wrong by {ATTITUDE_DEG}° (1σ about each axis). Every \
-         setting but `reject.threshold_px` has its default. Counted: pictures that are answered. Discs whose half-angle \
-         lies within three told sigmas of the expected one cannot be told from a limb by their shape and have a row of \
-         their own.",
+        "{} pictures without a limb, {count} of each kind, of 480×360 to 1280×960 pixels through pinholes (27° to 110° \
+         wide), equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 \
+         bits, with noise of 0.2 to 2.5 % of full scale; the ranges of each kind stand in `hzn_sim::artefact`. \
+         PriorKnowledge: the camera and the position, for the lower half of the table also an attitude that is wrong \
+         by {ATTITUDE_DEG}° (1σ about each axis). Every setting but `reject.threshold_px` has its default. Counted: \
+         pictures that are answered. Discs whose half-angle lies within three told sigmas of the expected one cannot \
+         be told from a limb by their shape and have a row of their own.",
         Kind::ALL.len() * count
     ));
     skies(&mut s, count)?;
@@ -131,7 +132,8 @@ fn skies(s: &mut Section, count: usize) -> anyhow::Result<()> {
     let own = |i: usize| all.iter().filter(|(_, _, o)| matching(o) && o.get(i).is_some_and(Outcome::is_false)).count();
     let worst = (0..THRESHOLDS_PX.len() + 1).map(own).max().unwrap_or(0);
     s.text(format!(
-        "Discs of the expected half-angle that are answered, at the worst threshold and without an attitude: {worst} of \
+        "Discs of the expected half-angle that are answered, at the worst threshold and without an attitude: {worst} \
+         of \
          {discs} pictures with discs ({:.1} %).",
         100.0 * worst as f64 / discs.max(1) as f64
     ));
@@ -179,10 +181,10 @@ fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
         Ok(Some((kind, with, alone)))
     })?;
     s.text(format!(
-        "Clean limbs with the same artefacts next to them: the body is lit all along, the limb crosses the picture over at \
-         least half its width at a height of 12 to 22 km and falls off exponentially; the artefact leaves at least 90 % of \
-         the limb alone and half of the sky dark. An answer more than {FALSE_SIGMAS}σ or {GROSS_DEG}° from the truth is false. Alone: the same pictures \
-         without the artefact."
+        "Clean limbs with the same artefacts next to them: the body is lit all along, the limb crosses the picture \
+         over at least half its width at a height of 12 to 22 km and falls off exponentially; the artefact leaves at \
+         least 90 % of the limb alone and half of the sky dark. An answer more than {FALSE_SIGMAS}σ or {GROSS_DEG}° \
+         from the truth is false. Alone: the same pictures without the artefact."
     ));
     let row = |name: &str, of: &dyn Fn(Kind) -> bool| {
         let chosen: Vec<_> = all.iter().filter(|(k, ..)| of(*k)).collect();

@@ -128,7 +128,8 @@ impl Outcome {
         evaluate(&self.cases).errors.map_or(f64::NAN, |e| e.rms_deg)
     }
 
-    /// What does not hold of: at most the share `beyond` beyond 3 sigma, none beyond 5, a mean NEES within limits, no false answer.
+    /// What does not hold of: at most the share `beyond` beyond 3 sigma, none beyond 5, a mean NEES within limits, no
+    /// false answer.
     fn fails(&self, nees: [f64; 2], beyond: f64) -> Vec<String> {
         let mut fails = Vec::new();
         let mut say = |fails_so: bool, what: String| fails.extend(fails_so.then_some(what));
@@ -269,16 +270,17 @@ pub(super) fn untold(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut s = Section::default();
     s.text(format!(
-        "{} flights a scene with seeds of their own, {count} pictures each. *camera, position*: sensor.toml holds the camera \
-         (and the mask of the vehicle), every other key is the default, frames.csv the position. *camera, altitude*: the \
-         same with the altitude instead of the position. *truth of another flight*: limb height and noise measured with \
-         the truth on another seed, for comparison. The goals with defaults are at most 2 % beyond 3σ, none beyond 5σ, a \
-         mean NEES of 0.4 to 3, no false answer, and with the altitude alone at most 1.3 times the RMS of the position. \
-         *calibrated on another flight*: limb height and noise as `hzn calibrate noise` finds them without truth on another \
-         seed; the goals are a mean NEES of 0.3 to 3 and at most 1.7 times the RMS with the truth. Rates of rotation are told \
-         in `{SKEWED}` alone, whose rolling shutter needs them, and left out in its last row. *lens*: as the first row, with a \
-         focal length that is wrong by as much as is told in `camera.focal_sigma_percent`; the goal is at most 1 % beyond 3σ. All rows are out of sample: \
-         nothing was fitted to the flight that is answered.",
+        "{} flights a scene with seeds of their own, {count} pictures each. *camera, position*: sensor.toml holds the \
+         camera (and the mask of the vehicle), every other key is the default, frames.csv the position. *camera, \
+         altitude*: the same with the altitude instead of the position. *truth of another flight*: limb height and \
+         noise measured with the truth on another seed, for comparison. The goals with defaults are at most 2 % beyond \
+         3σ, none beyond 5σ, a mean NEES of 0.4 to 3, no false answer, and with the altitude alone at most 1.3 times \
+         the RMS of the position. *calibrated on another flight*: limb height and noise as `hzn calibrate noise` finds \
+         them without truth on another seed; the goals are a mean NEES of 0.3 to 3 and at most 1.7 times the RMS with \
+         the truth. Rates of rotation are told in `{SKEWED}` alone, whose rolling shutter needs them, and left out in \
+         its last row. *lens*: as the first row, with a focal length that is wrong by as much as is told in \
+         `camera.focal_sigma_percent`; the goal is at most 1 % beyond 3σ. All rows are out of sample: nothing was \
+         fitted to the flight that is answered.",
         SEEDS.len()
     ));
     let (mut rows, mut bad, mut calibrations) = (Vec::new(), Vec::new(), Vec::new());
@@ -321,10 +323,11 @@ pub(super) fn untold(effort: &Effort) -> anyhow::Result<Section> {
     }
     s.table(HEADS, rows);
     s.text(
-        "What `hzn calibrate noise` finds on each flight without its truth, next to what the truth of the same pictures says. \
-         In brackets are edge noise over all pictures, scatter between pictures, a shift of all edges by their RMS (0.1 px at least), and a bend that they share. Goals: \
-         at most 2σ off, a sigma of at most 1.5 km in `rocket-clean` and `horace` and 3 km in `leo-infrared`, latitudes within \
-         1 km, an alarm (χ² above 2) or a refusal in `tumble` without rates, and nowhere else.",
+        "What `hzn calibrate noise` finds on each flight without its truth, next to what the truth of the same \
+         pictures says. In brackets are edge noise over all pictures, scatter between pictures, a shift of all edges \
+         by their RMS (0.1 px at least), and a bend that they share. Goals: at most 2σ off, a sigma of at most 1.5 km \
+         in `rocket-clean` and `horace` and 3 km in `leo-infrared`, latitudes within 1 km, an alarm (χ² above 2) or a \
+         refusal in `tumble` without rates, and nowhere else.",
     );
     s.table(CALIBRATION, calibrations);
     if !bad.is_empty() {

@@ -99,12 +99,12 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures of one flight, rendered anew with effects switched off. *found*: the limb height of `hzn calibrate \
-         noise`, from the curvature of the limb. *points*: the mean true height of the edge points. *curvature*: the true \
-         heights of the points, each with its share in the fitted height; where the height varies along the limb a fit with \
-         free half-angle takes the variation for another curvature. *found* less *curvature* is geometry: rolling shutter, whose \
-         rates are not told here. χ²: the scatter of the pictures' limb heights over their errors. RMS and NEES: with the \
-         height of *points* ± 1 km told, and the default noise.",
+        "{count} pictures of one flight, rendered anew with effects switched off. *found*: the limb height of `hzn \
+         calibrate noise`, from the curvature of the limb. *points*: the mean true height of the edge points. \
+         *curvature*: the true heights of the points, each with its share in the fitted height; where the height \
+         varies along the limb a fit with free half-angle takes the variation for another curvature. *found* less \
+         *curvature* is geometry: rolling shutter, whose rates are not told here. χ²: the scatter of the pictures' \
+         limb heights over their errors. RMS and NEES: with the height of *points* ± 1 km told, and the default noise.",
     ));
     for (scene, variants) in [("rocket", ROCKET), ("tumble", TUMBLE)] {
         let mut rows = Vec::new();
@@ -121,15 +121,15 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
         s.table([&format!("`{scene}`"), "found", "points", "curvature", "χ²", "edge RMS", "RMS", "NEES"], rows);
     }
     s.text(
-        "`rocket`: *found* is *curvature* in every row, so the fit and the calibration are right; the limb itself is not of one \
-         height. Its light changes along the limb with the angle from the Sun, the edge stands where half of the local \
-         brightness is left, and a tone curve moves that place up by 6 km and its variation with it. A free half-angle \
-         reads the variation as curvature, which is why the calibrated height is 1 to 2 km below the mean height of the points. The Sun's \
-         stray light falls on none of the answered pictures of this flight, so it is not the cause; JPEG and shutter change \
-         0.2 km or less. `tumble`: the shutter is the smaller part of the excess. The exposure controller \
-         saturates the bright limb; where the band is clipped, half of the clipped value is found farther out, by several \
-         kilometres and not everywhere alike. With an exposure that does not clip the errors are a fifth. A camera for this \
-         sensor should be exposed so that the limb is not saturated.",
+        "`rocket`: *found* is *curvature* in every row, so the fit and the calibration are right; the limb itself is \
+         not of one height. Its light changes along the limb with the angle from the Sun, the edge stands where half \
+         of the local brightness is left, and a tone curve moves that place up by 6 km and its variation with it. A \
+         free half-angle reads the variation as curvature, which is why the calibrated height is 1 to 2 km below the \
+         mean height of the points. The Sun's stray light falls on none of the answered pictures of this flight, so it \
+         is not the cause; JPEG and shutter change 0.2 km or less. `tumble`: the shutter is the smaller part of the \
+         excess. The exposure controller saturates the bright limb; where the band is clipped, half of the clipped \
+         value is found farther out, by several kilometres and not everywhere alike. With an exposure that does not \
+         clip the errors are a fifth. A camera for this sensor should be exposed so that the limb is not saturated.",
     );
     Ok(s)
 }
@@ -162,8 +162,8 @@ fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
     ])
 }
 
-/// Weighted by the pictures' own errors: the mean true height of the edge points, and the mean of these heights by their
-/// shares in the fitted one.
+/// Weighted by the pictures' own errors: the mean true height of the edge points, and the mean of these heights by
+/// their shares in the fitted one.
 fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
     let wide = noise::looks_with(&flight.untold()).context("no body with a limb height")?;
     let camera = Camera::try_new(&wide.camera)?;

@@ -19,12 +19,13 @@ const LIMB_KM: [[f64; 2]; 3] = [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
 const LIMB_SIGMA_KM: f64 = 2.6;
 /// What is left of it for who is told the table.
 const LEFT_KM: f64 = 0.2;
-/// What blur and noise cut off at black shift every edge point by, pixels: 30 km of limb to each. `hzn simulate` measures it.
+/// What blur and noise cut off at black shift every edge point by, pixels: 30 km of limb to each. `hzn simulate`
+/// measures it.
 const BIAS_PX: f64 = 0.05;
 const ATTITUDE_SIGMA_DEG: f64 = 5.0;
 
-const SCENE: &str = "384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb half-level \
-                     25 km ± 4.5 km over latitude with a scale of 5 km, blur 1 px, noise 2 %, 16 bits";
+const SCENE: &str = "384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb \
+                     half-level 25 km ± 4.5 km over latitude with a scale of 5 km, blur 1 px, noise 2 %, 16 bits";
 
 /// `hzn` told one height for all latitudes, with an attitude, and told the height by latitude too: rows of latitude
 /// and height, and what is left to a sigma then.
@@ -74,8 +75,9 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     s.text(format!(
         "{count} pictures at every angle off nadir, evenly over latitude, longitude, azimuth and roll: {SCENE}. [W]'s \
          radiance curves are not printed; ours are analytic. The sensor is told position and a limb height of 25 km \
-         ± {LIMB_SIGMA_KM} km, or that height by latitude ± {LEFT_KM} km, and that all edge points may be shifted by {BIAS_PX} px. RMS error of the axis, errors above \
-         2° counted apart as wrong, pictures without an answer by their status; [W] as they print it.",
+         ± {LIMB_SIGMA_KM} km, or that height by latitude ± {LEFT_KM} km, and that all edge points may be shifted by \
+         {BIAS_PX} px. RMS error of the axis, errors above 2° counted apart as wrong, pictures without an answer by \
+         their status; [W] as they print it.",
     ));
     s.text("**In-sample**: limb height, its sigma, the common shift and the edge noise are those of the scene.");
     let mut rows = Vec::new();
@@ -108,14 +110,15 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     let published = Series::new("[W], published", Style::Dots, [(0.0, 0.04), (120.0, 0.16)]);
     s.figure("infrared", &series.fold(chart, Chart::with).with(published))?;
     s.text(
-        "`zju-2022` rebuilds [W]: Zernike points, RANSAC with pre-verification, an elliptic cone by (weighted) total least \
-         squares. Its five free parameters cost little on a whole disc and much on an arc, where neither altitude nor \
-         limb height helps it; `hzn` uses both, and the shape of the ellipsoid once an attitude good to 5° tells where \
-         east is. What is left is the limb's height by latitude: its first harmonic along the limb cannot be told \
-         from a tilt (0.02° a kilometre here). A sensor that is not told of it but for a sigma that stands for a common \
-         height has a NEES above 2; from 25° to 45° off nadir the free cone of `zju-2022` takes up more of the slope. One \
-         that is told, and knows roughly where north is, is left with the noise and with what shifts all edge points \
-         alike, here a twentieth of a pixel of 30 km: on an arc that is half a hundredth of a degree.",
+        "`zju-2022` rebuilds [W]: Zernike points, RANSAC with pre-verification, an elliptic cone by (weighted) total \
+         least squares. Its five free parameters cost little on a whole disc and much on an arc, where neither \
+         altitude nor limb height helps it; `hzn` uses both, and the shape of the ellipsoid once an attitude good to \
+         5° tells where east is. What is left is the limb's height by latitude: its first harmonic along the limb \
+         cannot be told from a tilt (0.02° a kilometre here). A sensor that is not told of it but for a sigma that \
+         stands for a common height has a NEES above 2; from 25° to 45° off nadir the free cone of `zju-2022` takes up \
+         more of the slope. One that is told, and knows roughly where north is, is left with the noise and with what \
+         shifts all edge points alike, here a twentieth of a pixel of 30 km: on an arc that is half a hundredth of a \
+         degree.",
     );
     Ok(s)
 }
@@ -146,12 +149,12 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
     let body = &flight.sensor.body;
     let sensors = sensors(&flight, &body.limb_height_by_latitude_km, body.limb_height_sigma_km);
     s.text(format!(
-        "{count} pictures of `hzn simulate leo-infrared` over one orbit, the optical axis swinging from nadir to 120° off it: \
-         384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb half-level 25 km ± 4.5 km \
-         over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. Goals: 0.04° RMS to 90°, 0.08° \
-         beyond; with the height by latitude and an attitude to 5° 0.015° and 0.03°; NEES 1 to 4. Measured on {MEASURED} \
-         pictures of other seeds and told to the sensor: {told}; where it is told one height, ± {LIMB_SIGMA_KM} km. The \
-         sensor.toml of the scene has the height by latitude."
+        "{count} pictures of `hzn simulate leo-infrared` over one orbit, the optical axis swinging from nadir to 120° \
+         off it: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb half-level \
+         25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. Goals: 0.04° \
+         RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5° 0.015° and 0.03°; NEES 1 to 4. \
+         Measured on {MEASURED} pictures of other seeds and told to the sensor: {told}; where it is told one height, ± \
+         {LIMB_SIGMA_KM} km. The sensor.toml of the scene has the height by latitude."
     ));
     s.text(OTHER_SEEDS);
     let flown = fly(&flight, &sensors)?;

@@ -20,8 +20,8 @@ use hzn_sim::{Flight, Scenario};
 use crate::document::{Document, Section};
 
 /// What the figures of sensors are worth that were told what [`simulated`] measures.
-const OTHER_SEEDS: &str = "**In-sample for the scene, out of sample for the pictures**: what is told was measured on other seeds of the \
-                           same scene, with other clouds and noise, the same air and detector.";
+const OTHER_SEEDS: &str = "**In-sample for the scene, out of sample for the pictures**: what is told was measured on \
+                           other seeds of the same scene, with other clouds and noise, the same air and detector.";
 
 /// How much is done.
 pub(crate) struct Effort {
@@ -82,8 +82,8 @@ fn halton(mut index: usize, base: usize) -> f64 {
     out
 }
 
-/// A published system on a flight: its own methods; the camera, mask and body that `hzn` is told too, and the edge noise where it
-/// is told.
+/// A published system on a flight: its own methods; the camera, mask and body that `hzn` is told too, and the edge
+/// noise where it is told.
 fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
     let own = Config::preset(preset, flight.sensor.camera.clone());
     let covariance::Config { noise, sigma_px, correlation_px, .. } = flight.sensor.covariance;
@@ -95,8 +95,8 @@ fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
     Config { body, mask: flight.sensor.mask.clone(), covariance, ..own }
 }
 
-/// A scene as `hzn simulate` makes it, JPEG where it is kept as such, with the sensor.toml that comes with it: limb height
-/// and noise measured on other seeds. What was measured, in a cell's words.
+/// A scene as `hzn simulate` makes it, JPEG where it is kept as such, with the sensor.toml that comes with it: limb
+/// height and noise measured on other seeds. What was measured, in a cell's words.
 fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
     let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
     scenario.capture.frames = u32::try_from(count)?;

@@ -22,12 +22,12 @@ pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(120);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures of each scene of `hzn simulate` ({} of the infrared one), each through every preset. All are told \
-         the same: camera, mask, position, limb height and edge errors as measured on other pictures of the scene (`hzn \
-         simulate` writes them into its sensor.toml). The makers of `dlr-2022` set its threshold for their scene; here it is \
-         the median of what `otsu` finds on {LOOKED_AT} of the pictures. RMS, 95 % and NEES (2 is ideal) are those of answers \
-         within {GROSS_DEG}°; gross errors, above it, and false answers, without a limb in view, stand apart. Times are \
-         medians, two pictures at once.",
+        "{count} pictures of each scene of `hzn simulate` ({} of the infrared one), each through every preset. All are \
+         told the same: camera, mask, position, limb height and edge errors as measured on other pictures of the scene \
+         (`hzn simulate` writes them into its sensor.toml). The makers of `dlr-2022` set its threshold for their \
+         scene; here it is the median of what `otsu` finds on {LOOKED_AT} of the pictures. RMS, 95 % and NEES (2 is \
+         ideal) are those of answers within {GROSS_DEG}°; gross errors, above it, and false answers, without a limb in \
+         view, stand apart. Times are medians, two pictures at once.",
         3 * count,
     ));
     s.text(format!("{OTHER_SEEDS} The level of `dlr-2022` is in-sample: it comes from these very pictures."));

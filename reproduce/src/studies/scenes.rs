@@ -48,11 +48,11 @@ pub(super) fn rocket(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(200);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures a scene of 1920×1080 pixels through a fisheye of 92°, from T+60 s to T+430 s of a flight to 238 km \
-         over clouds, sea and land; the limb falls off exponentially (scale 8 km, each colour its own depth), PSF 0.9 px, \
-         noise 2 %, 8 bits. `rocket-clean`: no Sun in view; goals: all answered, 0.06° RMS, none above 2°, NEES 1 to 4. \
-         `rocket`: Sun, lens ghosts and payload in view, colour, sRGB, JPEG; goals: 98 % answered, none above 2°, none \
-         without a limb. Position told. {BY_HAND}"
+        "{count} pictures a scene of 1920×1080 pixels through a fisheye of 92°, from T+60 s to T+430 s of a flight to \
+         238 km over clouds, sea and land; the limb falls off exponentially (scale 8 km, each colour its own depth), \
+         PSF 0.9 px, noise 2 %, 8 bits. `rocket-clean`: no Sun in view; goals: all answered, 0.06° RMS, none above 2°, \
+         NEES 1 to 4. `rocket`: Sun, lens ghosts and payload in view, colour, sRGB, JPEG; goals: 98 % answered, none \
+         above 2°, none without a limb. Position told. {BY_HAND}"
     ));
     let sensors = |flight: &Flight| {
         let hzn = flight.sensor.clone();
@@ -65,10 +65,10 @@ pub(super) fn rocket(effort: &Effort) -> anyhow::Result<Section> {
     };
     rows(&mut s, &["rocket-clean", "rocket"], count, sensors)?;
     s.text(
-        "`dlr-2022` rebuilds [BB]: a fixed threshold, whole pixels, RANSAC on three points and their direct estimate, whose \
-         direction does not use altitude and limb height. Its covariance is the overbound [BB 37]. In `rocket` the limb's \
-         half level moves within the flight, as the Sun's veil lies under a tone curve: that is its sigma, and most of \
-         its error (0.03° a kilometre).",
+        "`dlr-2022` rebuilds [BB]: a fixed threshold, whole pixels, RANSAC on three points and their direct estimate, \
+         whose direction does not use altitude and limb height. Its covariance is the overbound [BB 37]. In `rocket` \
+         the limb's half level moves within the flight, as the Sun's veil lies under a tone curve: that is its sigma, \
+         and most of its error (0.03° a kilometre).",
     );
     Ok(s)
 }

@@ -72,8 +72,8 @@ impl File<'_> {
         Problem::new(
             self.path,
             "is no camera file that is known here: a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
-             resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height) or ROS's camera_info is \
-             expected",
+             resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height) or ROS's camera_info \
+             is expected",
         )
     }
 
@@ -132,7 +132,8 @@ impl File<'_> {
             (None, None) if named => Lens::Fisheye,
             (None, None) if given.meant() == 4 => {
                 let what = "four coefficients are k1 to k4 of a fisheye lens (cv2.fisheye) or k1, k2, p1, p2 of \
-                            Brown-Conrady (cv2.calibrateCamera): add `fisheye_model: 1` or `fisheye_model: 0` to the file";
+                            Brown-Conrady (cv2.calibrateCamera): add `fisheye_model: 1` or `fisheye_model: 0` to the \
+                            file";
                 return Err(self.problem(&given.field, what));
             }
             (None, _) => Lens::PlumbBob,
@@ -214,8 +215,8 @@ impl File<'_> {
                 "{n} coefficients, but this lens has k1, k2, p1, p2 and k3; write 0 for what it does without"
             )),
             (Lens::Radtan | Lens::PlumbBob | Lens::Rational, Some(n), meant) if meant > 5 => wrong(format!(
-                "{n} coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; calibrate without the higher ones \
-                 (plumb_bob, or a fisheye lens)"
+                "{n} coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; calibrate without the higher \
+                 ones (plumb_bob, or a fisheye lens)"
             )),
             (Lens::Rational, None, _) => wrong("missing: this lens has k1, k2, p1, p2, k3, k4, k5, k6".into()),
             (Lens::Rational, Some(n), _) if n < 8 => {
@@ -314,8 +315,8 @@ mod tests {
 
     #[test]
     fn kalibr_camchain() {
-        let text = "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n  distortion_coeffs: [-0.05, 0.01, -3.5e-03, 0]\n  \
-                    distortion_model: equidistant\n  intrinsics: [1235.0, 1231.0, 963.2, 536.7]\n  \
+        let text = "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n  distortion_coeffs: [-0.05, 0.01, -3.5e-03, \
+                    0]\n distortion_model: equidistant\n  intrinsics: [1235.0, 1231.0, 963.2, 536.7]\n  \
                     resolution: [1920, 1080]\n  rostopic: /cam0/image_raw\n";
         let c = read(text).unwrap();
         assert_eq!((c.model, c.width, c.height), (Model::KannalaBrandt, 1920, 1080));
@@ -327,7 +328,8 @@ mod tests {
         );
         assert_eq!(
             read(&text.replace("equidistant", "equidistent")).unwrap_err(),
-            "cam.yaml: cam0.distortion_model: \"equidistent\" is a lens that hzn does not have; did you mean equidistant?"
+            "cam.yaml: cam0.distortion_model: \"equidistent\" is a lens that hzn does not have; did you mean \
+                equidistant?"
         );
     }
 
@@ -384,19 +386,21 @@ mod tests {
         let error = |text: String| read(&text).unwrap_err();
         assert_eq!(
             eight("0.2").unwrap_err(),
-            "cam.yaml: distortion_coefficients: 8 coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; calibrate \
-             without the higher ones (plumb_bob, or a fisheye lens)"
+            "cam.yaml: distortion_coefficients: 8 coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; \
+             calibrate without the higher ones (plumb_bob, or a fisheye lens)"
         );
         assert_eq!(
             error(written("thin_prism", four, 4)),
-            "cam.yaml: distortion_model: \"thin_prism\" is a lens that hzn does not have; valid here: equidistant, fisheye, \
-             kannala_brandt, radtan, radial-tangential, plumb_bob, rational_polynomial, none"
+            "cam.yaml: distortion_model: \"thin_prism\" is a lens that hzn does not have; valid here: equidistant, \
+                                                       fisheye, kannala_brandt, radtan, radial-tangential, plumb_bob, \
+                                                       rational_polynomial, none"
         );
         assert!(error(written("plumbob", four, 4)).contains("did you mean plumb_bob?"));
         // The shape of D.
         assert_eq!(
             error(written("equidistant", &format!("{four}, 0.1"), 5)),
-            "cam.yaml: distortion_coefficients: 5 coefficients, but a fisheye lens has four, k1 to k4; is it another lens?"
+            "cam.yaml: distortion_coefficients: 5 coefficients, but a fisheye lens has four, k1 to k4; is it another \
+             lens?"
         );
         assert!(
             error(written("plumb_bob", "-0.05, 0.01", 2)).contains("2 coefficients, but this lens has k1, k2, p1,")
@@ -405,7 +409,8 @@ mod tests {
         assert!(error(written("plumb_bob", four, 5)).contains("has 4 numbers, but rows and cols say 1 x 5"));
         assert!(error(written("plumb_bob", "\"a\"", 1)).contains("a list of numbers is expected"));
         // As `ros2 topic echo` shows it, and ROS 1.
-        let echoed = "header:\n  frame_id: cam\nheight: 480\nwidth: 640\ndistortion_model: equidistant\nd:\n- -0.05\n- 0.01\n\
+        let echoed = "header:\n  frame_id: cam\nheight: 480\nwidth: 640\ndistortion_model: equidistant\nd:\n- -0.05\n- \
+                      0.01\n\
                       - -0.0035\n- 0.0002\nk:\n- 300.0\n- 0.0\n- 319.5\n- 0.0\n- 301.0\n- 239.5\n- 0.0\n- 0.0\n- 1.0\n\
                       binning_x: 0\n---\n";
         assert_eq!(read(echoed).unwrap(), c);
@@ -427,8 +432,8 @@ mod tests {
             text.replace("[[300, 0, 320], [0, 300, 240], [0, 0, 1]]", "[[300, 0, 0], [0, 300, 0], [320, 240, 1]]");
         assert!(read(&turned).unwrap_err().contains("it is transposed, as MATLAB keeps it"));
         // Coefficients under another name would be a lens without distortion.
-        let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  resolution: [640, 480]\n  \
-                     distortion_model: radtan\n  distortion_coefs: [0.01, 0.0, 0.0, 0.0]\n";
+        let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  resolution: [640, \
+                     480]\n distortion_model: radtan\n  distortion_coefs: [0.01, 0.0, 0.0, 0.0]\n";
         assert_eq!(read(chain).unwrap_err(), "cam.yaml: cam0.distortion_coeffs: missing: this lens has k1, k2, p1, p2");
         assert!(
             read(&chain.replace("coefs", "coeffs").replace("  distortion_model: radtan\n", ""))

@@ -27,8 +27,8 @@ const PRESET: Key = Key {
 const CAMERA_FILE: [Key; 2] = [
     Key {
         path: "camera.file",
-        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file, relative to this one, which brings the calibration; next to it \
-              stand only `theta_max_deg`, `readout_s`, the sigmas and `covariance`.\n",
+        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file, relative to this one, which brings the calibration; \
+              next to it stand only `theta_max_deg`, `readout_s`, the sigmas and `covariance`.\n",
         form: Form::Word,
         limits: Limits::Rule("a path"),
         choices: &[],

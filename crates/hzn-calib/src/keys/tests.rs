@@ -2,7 +2,8 @@ use std::path::Path;
 
 use super::*;
 
-const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px = 319.5\ncy_px = 239.5\n";
+const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px = \
+    319.5\ncy_px = 239.5\n";
 
 /// What sensor.toml says to a value; `None` when it is taken.
 fn refused(key: &Key, value: &str) -> Option<String> {

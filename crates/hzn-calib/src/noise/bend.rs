@@ -1,11 +1,11 @@
 //! A bend that all pictures of a flight share.
 //!
-//! The visible limb is no cone to the last tenth of a pixel: it stands higher where the Sun is higher, a veil is brighter
-//! towards one side. Of such a shape the fit takes up what a cone can follow: a shift, a tilt, and a bend, which it reads
-//! as another half-angle. Edge noise averages out over many pictures; a shape that they share does not, and no scatter
-//! between them shows it. What is left of it does show: the residuals' mean over all pictures, as the next shapes along the
-//! edge (Legendre polynomials of the degrees 3 to 5, each of RMS 1). The bend is taken to be as strong as the strongest
-//! of those.
+//! The visible limb is no cone to the last tenth of a pixel: it stands higher where the Sun is higher, a veil is
+//! brighter towards one side. Of such a shape the fit takes up what a cone can follow: a shift, a tilt, and a bend,
+//! which it reads as another half-angle. Edge noise averages out over many pictures; a shape that they share does not,
+//! and no scatter between them shows it. What is left of it does show: the residuals' mean over all pictures, as the
+//! next shapes along the edge (Legendre polynomials of the degrees 3 to 5, each of RMS 1). The bend is taken to be as
+//! strong as the strongest of those.
 
 use super::cone::Cone;
 use super::sighting::Sighting;
@@ -39,8 +39,8 @@ pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
     sums
 }
 
-/// RMS in pixels of the bend that all edges may share: as strong as the strongest of the next shapes in the mean of their
-/// residuals, or as its error.
+/// RMS in pixels of the bend that all edges may share: as strong as the strongest of the next shapes in the mean of
+/// their residuals, or as its error.
 pub(super) fn common_px(sightings: &[&Sighting]) -> f64 {
     let n = sightings.len().max(1) as f64;
     let of = |k: usize| {

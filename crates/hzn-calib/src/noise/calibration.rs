@@ -54,15 +54,16 @@ pub struct Height {
     pub statistical_km: f64,
     /// Scatter from picture to picture beyond edge noise.
     pub scatter_km: f64,
-    /// A shift of all edges by the residuals' RMS, and 0.1 pixels at least: level and blur do that, alike in every picture.
+    /// A shift of all edges by the residuals' RMS, and 0.1 pixels at least: level and blur do that, alike in every
+    /// picture.
     pub shift_km: f64,
-    /// A bend that all edges share, which the fit reads as another height: as strong as the next shapes along the edge that
-    /// the residuals show in the mean.
+    /// A bend that all edges share, which the fit reads as another height: as strong as the next shapes along the edge
+    /// that the residuals show in the mean.
     pub bend_km: f64,
     /// The local radius, where no position tells it.
     pub radius_km: f64,
-    /// Rows of (geodetic latitude in degrees, height, 1-sigma from edge noise and scatter); empty when one height explains
-    /// all pictures as well.
+    /// Rows of (geodetic latitude in degrees, height, 1-sigma from edge noise and scatter); empty when one height
+    /// explains all pictures as well.
     pub by_latitude: Vec<[f64; 3]>,
 }
 
@@ -71,8 +72,8 @@ pub struct Height {
 pub struct Edge {
     /// 1-sigma of an edge point, pixels: the RMS of the residuals.
     pub sigma_px: f64,
-    /// Length over which errors of this sigma stay alike, pixels: a process of one exponential then says of a fit what the
-    /// pictures' own models say of it.
+    /// Length over which errors of this sigma stay alike, pixels: a process of one exponential then says of a fit what
+    /// the pictures' own models say of it.
     pub correlation_px: f64,
     /// L of the likeliest model of all pictures together, pixels.
     pub length_px: f64,
@@ -117,8 +118,8 @@ pub struct Calibration {
     pub height: Height,
     /// Edge noise.
     pub edge: Edge,
-    /// Mean square of the pictures' heights about the fitted ones over their variances, without the scatter: about 1 when
-    /// edge noise explains them.
+    /// Mean square of the pictures' heights about the fitted ones over their variances, without the scatter: about 1
+    /// when edge noise explains them.
     pub chi2: f64,
     /// What the flight says about the focal length; `None` where the pictures do not tell it from the limb height.
     pub focal: Option<Focal>,

@@ -1,9 +1,9 @@
 //! The cone through the edge points of one picture, its half-angle free.
 //!
 //! State: unit axis e and c = cos α. With the slope g = |∂(s·e)/∂(u, v)| of a ray s the distance from the limb is
-//! r = (c + o − s·e)/g in pixels, o being the offset of cos α by azimuth where an attitude tells it. With the tangent basis
-//! B at e and the weighted mean m of Bᵀs the rows are h = [Bᵀs − m, −1]/g, and (Σ w h hᵀ) δ = Σ w r h; the change of c is
-//! a·δ with a = (m, 1).
+//! r = (c + o − s·e)/g in pixels, o being the offset of cos α by azimuth where an attitude tells it. With the tangent
+//! basis B at e and the weighted mean m of Bᵀs the rows are h = [Bᵀs − m, −1]/g, and (Σ w h hᵀ) δ = Σ w r h; the change
+//! of c is a·δ with a = (m, 1).
 
 use hzn_core::Prior;
 use hzn_core::camera::Camera;
@@ -68,8 +68,8 @@ pub(super) struct Cone {
 }
 
 impl Cone {
-    /// Fits the cone to weighted points (pixels), from the pipeline's axis and cos α on. `azimuth`: the offset of cos α of a
-    /// limb that is no circle. `None` when the points do not determine it.
+    /// Fits the cone to weighted points (pixels), from the pipeline's axis and cos α on. `azimuth`: the offset of cos α
+    /// of a limb that is no circle. `None` when the points do not determine it.
     pub(super) fn fit(
         camera: &Camera<f64>,
         points: &[([f64; 2], f64)],
@@ -162,8 +162,8 @@ impl Cone {
         self.to_cos.dot(&(self.inverse * sum))
     }
 
-    /// The fitted cos α as a weighted mean: by how much it grows when cos α of the limb grows by 1 at this point alone. The
-    /// shares of all points sum to 1.
+    /// The fitted cos α as a weighted mean: by how much it grows when cos α of the limb grows by 1 at this point alone.
+    /// The shares of all points sum to 1.
     pub(super) fn shares(&self) -> Vec<f64> {
         let a = self.inverse * self.to_cos;
         self.rows.iter().map(|r| -r.weight * a.dot(&r.h) / r.slope).collect()

@@ -1,10 +1,10 @@
 //! Edge noise of one picture from the residuals along its limb, by restricted maximum likelihood.
 //!
-//! The residuals are r = H δ + ε with ε a Gauss-Markov process of which a part is white: V = σ²[(1 − ν) e^(−Δs/L) + ν I].
-//! With the three fitted parameters integrated out, −2 ln of the likelihood is (n − 3) ln(q/(n − 3)) + ln|V/σ²| +
-//! ln|HᵀV⁻¹H|, q = rᵀV⁻¹r after the fit; σ² = q/(n − 3). A Kalman filter along the points whitens r and the columns of H in
-//! one pass. The likelihood of one picture is flat in L: so the variance of the fit is averaged over (L, ν), with L about
-//! a quarter of the arc within a factor of two.
+//! The residuals are r = H δ + ε with ε a Gauss-Markov process of which a part is white: V = σ²[(1 − ν) e^(−Δs/L) + ν
+//! I]. With the three fitted parameters integrated out, −2 ln of the likelihood is (n − 3) ln(q/(n − 3)) + ln|V/σ²| +
+//! ln|HᵀV⁻¹H|, q = rᵀV⁻¹r after the fit; σ² = q/(n − 3). A Kalman filter along the points whitens r and the columns of
+//! H in one pass. The likelihood of one picture is flat in L: so the variance of the fit is averaged over (L, ν), with
+//! L about a quarter of the arc within a factor of two.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -88,8 +88,8 @@ fn score_of(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
     Some(Score { unlikely: freedom * (q / freedom).ln() + log_det + log_det_h, variance_px2: q / freedom })
 }
 
-/// The shortest length over which errors of one exponential with `sigma_px` would have to be alike to make the fitted cos α
-/// as uncertain as `variance` says, pixels; where none does, the length that comes nearest.
+/// The shortest length over which errors of one exponential with `sigma_px` would have to be alike to make the fitted
+/// cos α as uncertain as `variance` says, pixels; where none does, the length that comes nearest.
 pub(super) fn equivalent_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
     let most_px = LIKELY_ARC * cone.arc_px();
     let mut nearest = (0.0, 0.0);
@@ -106,9 +106,9 @@ pub(super) fn equivalent_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
     nearest.0
 }
 
-/// Variance of the fitted cos α: averaged over the models by their likelihood, and not below that of residuals which are
-/// alike over a twelfth of the arc, as the sensor takes them by default. A light that changes along the limb moves its height
-/// smoothly; the fit takes such an error for curvature, so that residuals do not show it.
+/// Variance of the fitted cos α: averaged over the models by their likelihood, and not below that of residuals which
+/// are alike over a twelfth of the arc, as the sensor takes them by default. A light that changes along the limb moves
+/// its height smoothly; the fit takes such an error for curvature, so that residuals do not show it.
 pub(super) fn variance_of_cos(cone: &Cone, scores: &Scores) -> f64 {
     let (arc, mean_square) = (cone.arc_px(), cone.rms_px().powi(2));
     let prior = |length: f64| {

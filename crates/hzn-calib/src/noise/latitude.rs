@@ -1,8 +1,9 @@
 //! Limb height by latitude: the rows that the pictures ask for.
 //!
-//! A picture sees a mean over its part of the limb. With hat functions between rows of latitude, that mean is linear in the
-//! rows' heights: d_i = Σ_k a_ik h_k, a_ik the mean of hat k over what the picture saw. More rows are taken only when they
-//! pay for themselves (Bayes' information criterion: ln n a row) and when every row is known better than rows differ.
+//! A picture sees a mean over its part of the limb. With hat functions between rows of latitude, that mean is linear in
+//! the rows' heights: d_i = Σ_k a_ik h_k, a_ik the mean of hat k over what the picture saw. More rows are taken only
+//! when they pay for themselves (Bayes' information criterion: ln n a row) and when every row is known better than rows
+//! differ.
 
 use super::calibration::MOST_SIGMA_KM;
 use super::height::{Measured, Solved, solve};
@@ -62,8 +63,8 @@ pub(super) fn profile(sightings: &[&Sighting]) -> Option<Profile> {
     Some(best.filter(|p| pays(p) < pays(&one)).unwrap_or(one))
 }
 
-/// Whether every row is known better than the rows differ (a third of their range) and than a default is, and some pictures
-/// see more of it than others by half of their limb: what all pictures see alike is no matter of latitude.
+/// Whether every row is known better than the rows differ (a third of their range) and than a default is, and some
+/// pictures see more of it than others by half of their limb: what all pictures see alike is no matter of latitude.
 fn are_told_apart(profile: &Profile, sightings: &[&Sighting]) -> bool {
     let h = &profile.solved.h;
     let range = h.max() - h.min();

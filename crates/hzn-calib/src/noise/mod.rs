@@ -1,8 +1,9 @@
 //! Limb height and noise from the pictures of a flight themselves, without truth: `hzn calibrate noise`.
 //!
-//! Each picture's half-angle-free fit measures the height of the limb ([`Sighting`]), with an error that its own residuals
-//! tell. [`Calibration::new`] joins them: the height by restricted maximum likelihood with the scatter between pictures, by
-//! latitude where the flight spans it; the edge noise of all pictures together. It refuses what the pictures do not tell.
+//! Each picture's half-angle-free fit measures the height of the limb ([`Sighting`]), with an error that its own
+//! residuals tell. [`Calibration::new`] joins them: the height by restricted maximum likelihood with the scatter
+//! between pictures, by latitude where the flight spans it; the edge noise of all pictures together. It refuses what
+//! the pictures do not tell.
 //!
 //! ```text
 //! points, weights ─► Cone (half-angle free) ─► residuals ─► REML of (σ, L, ν) ─► σ of the height ─┐

@@ -1,8 +1,8 @@
 //! One picture's own measurement of the limb's height.
 //!
 //! With the camera at the height H above the ground of radius R, a limb of the height d has the half-angle sin α =
-//! (R + d)/(R + H). So a half-angle that is fitted freely measures d = d₀ + (R + H)(sin α̂ − sin α₀) beside the expected
-//! (d₀, α₀), with ∂d/∂cos α = −(R + H) cot α.
+//! (R + d)/(R + H). So a half-angle that is fitted freely measures d = d₀ + (R + H)(sin α̂ − sin α₀) beside the
+//! expected (d₀, α₀), with ∂d/∂cos α = −(R + H) cot α.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::Camera;
@@ -33,10 +33,11 @@ pub struct Sighting {
     pub limb_height_km: f64,
     /// 1-sigma of it from edge noise (and the unknown direction of north), kilometres.
     pub sigma_km: f64,
-    /// 1-sigma of it from the unknown local radius, kilometres: common to pictures from one latitude. 0 with a position.
+    /// 1-sigma of it from the unknown local radius, kilometres: common to pictures from one latitude. 0 with a
+    /// position.
     pub radius_sigma_km: f64,
-    /// Limb height that one pixel across the limb makes when all points move by it, kilometres: in a wide picture more than
-    /// its size at the limb, as pixels away from the middle are finer and the shift looks like a bend.
+    /// Limb height that one pixel across the limb makes when all points move by it, kilometres: in a wide picture more
+    /// than its size at the limb, as pixels away from the middle are finer and the shift looks like a bend.
     pub km_per_px: f64,
     /// Limb height that a bend of the whole edge makes whose RMS is one pixel, kilometres.
     pub km_per_bend_px: f64,
@@ -73,9 +74,9 @@ struct Place {
 }
 
 impl Sighting {
-    /// Of a picture's answer: `points` are the answer's edge points with their weights, `body` is what the sensor was told of
-    /// the body, `frame` what it knew of the picture. `None` for Sun and Moon, whose half-angle says nothing about a height,
-    /// without an altitude, and where the points do not determine a cone.
+    /// Of a picture's answer: `points` are the answer's edge points with their weights, `body` is what the sensor was
+    /// told of the body, `frame` what it knew of the picture. `None` for Sun and Moon, whose half-angle says nothing
+    /// about a height, without an altitude, and where the points do not determine a cone.
     pub fn measure(
         name: &str,
         camera: &Camera<f64>,
@@ -127,9 +128,10 @@ impl Sighting {
     }
 }
 
-/// What a picture's limb height is made of: the rays of its edge points (camera frame), each with its share of the height.
-/// The shares sum to 1; on a short arc, where the height comes from the curvature, those of the ends and of the middle have
-/// opposite signs and large values, so that a height which varies along the limb is seen enlarged. Arguments as of
+/// What a picture's limb height is made of: the rays of its edge points (camera frame), each with its share of the
+/// height. The shares sum to 1; on a short arc, where the height comes from the curvature, those of the ends and of the
+/// middle have opposite signs and large values, so that a height which varies along the limb is seen enlarged.
+/// Arguments as of
 /// [`Sighting::measure`], without an attitude; `camera` is the one that turns, where rows have times of their own.
 pub fn shares(
     camera: &Camera<f64>,

@@ -34,8 +34,8 @@ fn earth() -> body::Config {
     body::Config { kind: Kind::EarthSphere, limb_height_km: 15.0, limb_height_sigma_km: 30.0, ..Default::default() }
 }
 
-/// Edge points of the limb whose cone is (axis, cos α by ray) in the picture of a camera that looks at it, with noise across
-/// the limb; the axis lies `below` the optical axis, towards the `down` direction in the picture.
+/// Edge points of the limb whose cone is (axis, cos α by ray) in the picture of a camera that looks at it, with noise
+/// across the limb; the axis lies `below` the optical axis, towards the `down` direction in the picture.
 fn limb(
     camera: &Camera<f64>,
     axis: Vector3<f64>,
@@ -271,9 +271,11 @@ fn a_longer_focal_length_makes_the_limb_as_much_higher_as_is_said() {
     assert!((grown / (told.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", told.km_per_focal);
 }
 
-const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px = 600.0\n\
+const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px \
+    = 600.0\n\
                       fy_px = 600.0\ncx_px = 479.5\ncy_px = 359.5\n\n[body]\nkind = \"earth-sphere\"\n# the old guess\n\
-                      limb_height_km = 12.0 # from a book\nlimb_height_sigma_km = 3.0\n\n[reject]\nthreshold_px = 2.5\n";
+                      limb_height_km = 12.0 # from a book\nlimb_height_sigma_km = 3.0\n\n[reject]\nthreshold_px = \
+                      2.5\n";
 
 #[test]
 fn the_keys_are_written_and_all_other_text_stays() {

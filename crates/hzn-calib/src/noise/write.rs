@@ -127,7 +127,9 @@ fn noise_lines(calibration: &Calibration) -> Vec<Line> {
         Line {
             key: "bias_px",
             value: digits(e.bias_px).into(),
-            why: "what shifts all points alike cannot be seen in residuals: taken for as large as their RMS, and 0.1 px at least".into(),
+            why: "what shifts all points alike cannot be seen in residuals: taken for as large as their RMS, and 0.1 \
+                  px at least"
+                .into(),
         },
     ]
 }

@@ -14,8 +14,8 @@ use hzn_run::source::{self, ending, picture};
 
 /// Say what a file is, and what is in it
 ///
-/// Results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, frames.csv, truth.csv, imu.csv, gnss.csv, a
-/// picture.
+/// Results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, frames.csv, truth.csv, imu.csv, gnss.csv,
+/// a picture.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file

@@ -18,9 +18,9 @@ Examples:
 
 /// Write a sensor.toml to start from
 ///
-/// With pictures: for the camera that took them, from a field of view (--fov) or from the focal length in their EXIF. Its
-/// sigmas say how little that is; with an altitude it works at once. Without pictures: every key with its default and a
-/// comment, so that only the camera must be filled in.
+/// With pictures: for the camera that took them, from a field of view (--fov) or from the focal length in their EXIF.
+/// Its sigmas say how little that is; with an altitude it works at once. Without pictures: every key with its default
+/// and a comment, so that only the camera must be filled in.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -97,7 +97,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     ));
     if known.altitude_km.is_none() {
         tell::line(
-            "every picture needs an altitude: from a frames.csv beside them (columns file, altitude_km), or from --altitude KM",
+            "every picture needs an altitude: from a frames.csv beside them (columns file, altitude_km), or from \
+             --altitude KM",
         );
     }
     Ok(Exit::Done)
@@ -128,7 +129,8 @@ fn one_size(source: &dyn Source) -> Result<(u32, u32), Stop> {
     let word = |(w, h): (u32, u32)| format!("{w}x{h}");
     match sizes.find(|(_, other)| *other != size) {
         Some((name, other)) => Err(usage(format!(
-            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give those of one camera and mode",
+            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give those of one camera and \
+             mode",
             word(size),
             word(other)
         ))),

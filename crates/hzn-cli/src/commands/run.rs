@@ -274,7 +274,8 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
     if here != *there {
         let what = format!("its last frame, {}, now comes out differently", there.file);
         return other(format!(
-            "{what}; give the sensor.toml, frames.csv and options (--altitude-km, --fps, --flight) that it was begun with"
+            "{what}; give the sensor.toml, frames.csv and options (--altitude-km, --fps, --flight) that it was begun \
+             with"
         ));
     }
     Ok(())
@@ -313,8 +314,8 @@ impl Several {
         let Some((name, pages)) = &self.first else { return };
         let files = explain::counted(self.files, "file");
         tell::warning(format_args!(
-            "only the first picture was processed of {files} with several pages or frames (the first is {name} with {pages} \
-             pictures): write each picture into a file of its own, or give a video"
+            "only the first picture was processed of {files} with several pages or frames (the first is {name} with \
+             {pages} pictures): write each picture into a file of its own, or give a video"
         ));
     }
 }
@@ -350,8 +351,8 @@ impl Gaps {
             parts.push(format!("{} without a time", self.no_time));
         }
         if self.no_altitude > 0 {
-            let what = "without an altitude, not processed (status no-altitude): give it in frames.csv, as body.altitude_km, or \
-                        by --altitude-km";
+            let what = "without an altitude, not processed (status no-altitude): give it in frames.csv, as \
+                        body.altitude_km, or by --altitude-km";
             parts.push(format!("{} {what}", self.no_altitude));
         }
         if self.below_limb > 0 {

@@ -20,10 +20,11 @@ use hzn_run::sink;
 /// Render a sequence of pictures with truth, and the sensor.toml that fits it
 ///
 /// Writes pictures, frames.csv (what the sensor is told), truth.csv, imu.csv and gnss.csv where the scene has such
-/// instruments, scene.toml, and sensor.toml, whose limb height and noise model are measured on other pictures of the scene.
+/// instruments, scene.toml, and sensor.toml, whose limb height and noise model are measured on other pictures of the
+/// scene.
 ///
-/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble. `hzn simulate SCENE --show`
-/// prints one, to be changed and given as a file.
+/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble. `hzn simulate
+/// SCENE --show` prints one, to be changed and given as a file.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A built-in scene, or a scene.toml
@@ -152,7 +153,8 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
         fit.apply(&mut sensor);
         let [answered, of] = fit.frames;
         how += &format!(
-            "# The {name}: limb height and noise model are measured on {of} other pictures of the scene, {answered} of them\n\
+            "# The {name}: limb height and noise model are measured on {of} other pictures of the scene, {answered} of \
+             them\n\
              # answered; squared errors there are {:.2} times their covariance on average (2 is ideal).\n",
             fit.nees
         );

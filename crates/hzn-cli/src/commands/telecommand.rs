@@ -170,8 +170,8 @@ fn parameter(word: &str) -> Result<u16, String> {
     })
 }
 
-/// A value that this parameter can have, as a number or by the name of a choice. Whether it goes together with the others is
-/// seen by the flight computer, which has them.
+/// A value that this parameter can have, as a number or by the name of a choice. Whether it goes together with the
+/// others is seen by the flight computer, which has them.
 fn value(id: u16, word: &str) -> Result<f64, String> {
     let name = parameters::name(id).unwrap_or("?");
     let cannot = |what: String| Err(format!("{name} cannot be {word}: it is {what}"));

@@ -19,7 +19,8 @@ pub struct Ran {
 }
 
 pub const SENSOR: &str = "preset = \"hzn\"\n\n[camera]\nwidth = 320\nheight = 240\nmodel = \"pinhole\"\nfx_px = 300.0\n\
-                          fy_px = 300.0\ncx_px = 159.5\ncy_px = 119.5\n\n[body]\nkind = \"earth-sphere\"\naltitude_km = 400.0\n";
+                          fy_px = 300.0\ncx_px = 159.5\ncy_px = 119.5\n\n[body]\nkind = \"earth-sphere\"\naltitude_km \
+                          = 400.0\n";
 
 /// A smooth bright body below a limb; `shift` moves it, so that pictures differ.
 pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {

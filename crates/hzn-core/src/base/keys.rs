@@ -17,7 +17,8 @@
 //! }
 //! ```
 //!
-//! A line holds the number in flight (`@-` for a key of the ground only), the name, the type, the default and the limits.
+//! A line holds the number in flight (`@-` for a key of the ground only), the name, the type, the default and the
+//! limits.
 
 use crate::base::error::{ConfigError, Limit, require};
 
@@ -321,8 +322,8 @@ impl<const C: usize, const N: usize> Value for heapless::Vec<heapless::Vec<[f64;
     const FORM: Form = Form::Polygons;
 }
 
-/// An enumeration whose variants are words in sensor.toml, the default first. Each line: `@` and the number in flight or `-`,
-/// the variant, the word, and the feature that it needs. A variant is there in every build; a build without the
+/// An enumeration whose variants are words in sensor.toml, the default first. Each line: `@` and the number in flight
+/// or `-`, the variant, the word, and the feature that it needs. A variant is there in every build; a build without the
 /// feature refuses it by name.
 macro_rules! choices {
     (
@@ -416,23 +417,25 @@ macro_rules! choices {
     };
 }
 
-/// A section of sensor.toml as a structure with its defaults and its table of keys. A field's line: `@` and the number in
-/// flight or `-`, name, type, default, limits in brackets, and in braces what else there is to say (`needs` a feature, `unset`
-/// and `example` for a value without default). Fields without a default (`serde(...)` instead) are for a section
-/// without defaults.
+/// A section of sensor.toml as a structure with its defaults and its table of keys. A field's line: `@` and the number
+/// in flight or `-`, name, type, default, limits in brackets, and in braces what else there is to say (`needs` a
+/// feature, `unset` and `example` for a value without default). Fields without a default (`serde(...)` instead) are for
+/// a section without defaults.
 macro_rules! section {
     (
         $(#[doc = $about:literal])+
         $section:literal pub struct $name:ident $(: $derive:ident)? {
             $(
                 $(#[doc = $doc:literal])+
-                @ $id:tt $field:ident : $ty:ty = $default:expr, $limits:tt $({ $($option:ident : $text:literal),+ $(,)? })?;
+                @ $id:tt $field:ident : $ty:ty = $default:expr, $limits:tt
+                    $({ $($option:ident : $text:literal),+ $(,)? })?;
             )+
         }
     ) => {
         $(#[doc = $about])+
         #[derive(Debug, Clone, $($derive,)? PartialEq)]
-        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
         pub struct $name {
             $(
                 $(#[doc = $doc])+
@@ -448,7 +451,9 @@ macro_rules! section {
         }
 
         $crate::base::keys::table! {
-            ($($about)+) $section $name { $($id $field : $ty = ($default), $limits, ($($doc)+), { $($($option : $text),+)? };)+ }
+            ($($about)+) $section $name {
+                $($id $field : $ty = ($default), $limits, ($($doc)+), { $($($option : $text),+)? };)+
+            }
         }
     };
     (
@@ -456,7 +461,8 @@ macro_rules! section {
         $section:literal pub struct $name:ident $(: $derive:ident)? without defaults {
             $(
                 $(#[doc = $doc:literal])+
-                @ $id:tt $field:ident : $ty:ty, serde $serde:tt, $limits:tt $({ $($option:ident : $text:literal),+ $(,)? })?;
+                @ $id:tt $field:ident : $ty:ty, serde $serde:tt, $limits:tt
+                    $({ $($option:ident : $text:literal),+ $(,)? })?;
             )+
         }
     ) => {
@@ -472,7 +478,9 @@ macro_rules! section {
         }
 
         $crate::base::keys::table! {
-            ($($about)+) $section $name { $($id $field : $ty = (), $limits, ($($doc)+), { $($($option : $text),+)? };)+ }
+            ($($about)+) $section $name {
+                $($id $field : $ty = (), $limits, ($($doc)+), { $($($option : $text),+)? };)+
+            }
         }
     };
 }

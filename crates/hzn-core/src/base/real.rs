@@ -101,7 +101,10 @@ use hzn_fpu::sqrt_f32;
 use libm::sqrtf as sqrt_f32;
 
 macro_rules! real {
-    ($t:ty, $sqrt:path, $sincos:ident, $atan2:ident, $asin:ident, $acos:ident, $tan:ident, $exp:ident, $ln:ident, $erf:ident, $floor:ident, $series:literal) => {
+    (
+        $t:ty, $sqrt:path, $sincos:ident, $atan2:ident, $asin:ident, $acos:ident, $tan:ident, $exp:ident, $ln:ident,
+        $erf:ident, $floor:ident, $series:literal
+    ) => {
         impl Real for $t {
             const EPSILON: Self = <$t>::EPSILON;
             const ZERO: Self = 0.0;

@@ -77,8 +77,8 @@ pub struct Config {
 section! {
     /// `[mount]` of sensor.toml: how the camera sits in the vehicle.
     "mount" pub struct Mount: Copy without defaults {
-        /// Quaternion that takes camera coordinates to vehicle coordinates, scalar first; it gives roll and pitch in the
-        /// results.
+        /// Quaternion that takes camera coordinates to vehicle coordinates, scalar first; it gives roll and pitch in
+        /// the results.
         @20 q_body_from_camera_wxyz: [f64; 4], serde(), ["unit quaternion"]
             { unset: "no mounting", example: "[1.0, 0.0, 0.0, 0.0]" };
     }
@@ -91,13 +91,15 @@ section! {
         @- channel: Channel = Channel::Mean, [choice];
         /// Significant bits of a sample, where the file's words have room for more.
         ///
-        /// A camera of 12 bits whose values stand in the lower bits of 16-bit words has 12. Programs that read files put it
-        /// into the picture's [`Layout`](crate::image::Layout).
+        /// A camera of 12 bits whose values stand in the lower bits of 16-bit words has 12. Programs that read files
+        /// put it into the picture's [`Layout`](crate::image::Layout).
         @- bits: Option<u8> = None, [8.0 to 16.0]
             { unset: "as the file says; for words of 16 bits found from the pictures", example: "12" };
-        /// How a picture is turned before it is processed; the camera's size and calibration are those of the turned picture.
+        /// How a picture is turned before it is processed; the camera's size and calibration are those of the turned
+        /// picture.
         @- orient: Orient = Orient::AsStored, [choice];
-        /// Rows of a smaller copy of the picture that is processed instead; from there on, lengths are in pixels of the copy.
+        /// Rows of a smaller copy of the picture that is processed instead; from there on, lengths are in pixels of the
+        /// copy.
         @- scale_to_height: Option<u16> = None, ["16 to `height`"] { needs: "horace", unset: "none", example: "540" };
     }
 }
@@ -145,8 +147,8 @@ impl Config {
     pub fn each_body(&self) -> &[body::Config] {
         if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
     }
-    /// How body number `which`, from 0, is split from the dark: its own values, or those of all; of a Sun among several the
-    /// level of the preset `sun`, as what is brighter than the dark beside another body is that body.
+    /// How body number `which`, from 0, is split from the dark: its own values, or those of all; of a Sun among several
+    /// the level of the preset `sun`, as what is brighter than the dark beside another body is that body.
     pub fn levels_of(&self, which: u8) -> &threshold::Config {
         let body = self.each_body().get(usize::from(which));
         match body.and_then(|b| b.binarize.as_ref()) {

@@ -41,8 +41,8 @@ macro_rules! sections {
                 Some(self.mount.as_ref().and_then(|mount| mount.number(id)).unwrap_or(f64::NAN))
             }
 
-            /// Sets the value of a number in flight: `None` for a number that no key has, `Some(false)` for a value that its
-            /// key cannot have. Whether the values go together is for [`Config::check`].
+            /// Sets the value of a number in flight: `None` for a number that no key has, `Some(false)` for a value
+            /// that its key cannot have. Whether the values go together is for [`Config::check`].
             pub fn set_number(&mut self, id: u16, number: f64) -> Option<bool> {
                 $(
                     if let Some(taken) = self.$field.set_number(id, number) {

@@ -1,9 +1,10 @@
 //! A circle through points of a plane, in closed form (Barf 2014, (2.17) to (2.22); Kåsa 1976).
 //!
-//! Least squares of x² + y² = 2 x_c x + 2 y_c y + (r² − x_c² − y_c²), which is linear in the three unknowns. The points'
-//! centre is subtracted first and the spread divided out, which makes the sums of x and y zero and leaves two equations;
-//! without, the closed form loses nearly everything in single precision. The paper's closed form has one denominator
-//! for all three unknowns and prints a sum of the right-hand side (Q) in that of its B; solved as here there is none.
+//! Least squares of x² + y² = 2 x_c x + 2 y_c y + (r² − x_c² − y_c²), which is linear in the three unknowns. The
+//! points' centre is subtracted first and the spread divided out, which makes the sums of x and y zero and leaves two
+//! equations; without, the closed form loses nearly everything in single precision. The paper's closed form has one
+//! denominator for all three unknowns and prints a sum of the right-hand side (Q) in that of its B; solved as here
+//! there is none.
 
 use crate::base::linalg::invert_spd2;
 use crate::base::real::Real;
@@ -85,10 +86,12 @@ mod tests {
             let points = arc([x, y], r, from, from + span, 60);
             let found = Circle::through(points.iter().copied()).unwrap();
             prop_assert!((found.radius - r).abs() < 1e-7 * r.max(x.abs()));
-            prop_assert!((found.centre[0] - x).abs() + (found.centre[1] - y).abs() < 1e-6 * r.max(x.abs()).max(y.abs()));
+            let off = (found.centre[0] - x).abs() + (found.centre[1] - y).abs();
+            prop_assert!(off < 1e-6 * r.max(x.abs()).max(y.abs()));
             // In single precision as well: the centre is subtracted first.
             let found = Circle::through(points.iter().map(|p| [p[0] as f32, p[1] as f32])).unwrap();
-            prop_assert!((f64::from(found.radius) - r).abs() < 0.02 * r + 0.05 * x.abs().max(y.abs()) / span, "{}", found.radius);
+            let limit = 0.02 * r + 0.05 * x.abs().max(y.abs()) / span;
+            prop_assert!((f64::from(found.radius) - r).abs() < limit, "{}", found.radius);
         }
     }
 

@@ -82,9 +82,9 @@ impl<T: Real> UnitVec3<Cam, T> {
         let flat = (self.v.x * self.v.x + self.v.y * self.v.y).sqrt();
         (flat > T::from_f64(1e-12)).then(|| [self.v.x / flat, self.v.y / flat])
     }
-    /// Angles in radians by which the camera has to be turned, first about its own y axis (positive: to the right, −π to
-    /// π), then about its x axis (positive: up, −π/2 to π/2), until it looks there (Barf 2014, 2.2.4). A turn about the
-    /// direction itself cannot be told from one direction.
+    /// Angles in radians by which the camera has to be turned, first about its own y axis (positive: to the right, −π
+    /// to π), then about its x axis (positive: up, −π/2 to π/2), until it looks there (Barf 2014, 2.2.4). A turn about
+    /// the direction itself cannot be told from one direction.
     pub fn euler_yx_rad(&self) -> [T; 2] {
         let level = (self.v.x * self.v.x + self.v.z * self.v.z).sqrt();
         [self.v.x.atan2(self.v.z), (-self.v.y).atan2(level)]

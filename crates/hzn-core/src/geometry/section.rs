@@ -56,7 +56,8 @@ impl<T: Real> Section<T> {
     }
 
     /// Semi-axes (along the projected axis, across it) in focal lengths: c sin α/|Δ| and sin α/√|Δ|. The paper's figure
-    /// 16 leaves out the absolute value in the second, which makes it imaginary for hyperbolae. Infinite for a parabola.
+    /// 16 leaves out the absolute value in the second, which makes it imaginary for hyperbolae. Infinite for a
+    /// parabola.
     pub fn semi_axes(&self) -> [T; 2] {
         let d = self.delta.abs();
         [self.cos * self.sin / d, self.sin / d.sqrt()]
@@ -139,12 +140,15 @@ mod tests {
     proptest! {
         /// Limb points are on the section, in both forms of the equation, whichever way the camera looks.
         #[test]
-        fn limb_points_lie_on_the_section(x in -1.0..1.0f64, y in -1.0..1.0f64, z in -0.3..1.0f64, alpha in 0.1..1.5f64) {
+        fn limb_points_lie_on_the_section(
+            x in -1.0..1.0f64, y in -1.0..1.0f64, z in -0.3..1.0f64, alpha in 0.1..1.5f64,
+        ) {
             prop_assume!(x * x + y * y + z * z > 0.1);
             let axis = UnitVec3::try_new([x, y, z]).unwrap();
             let Some(section) = Section::new(&axis, libm::cos(alpha)) else { return Ok(()) };
             for p in limb(&axis, alpha, 0.0) {
-                prop_assert!(section.distance(p).abs() < 1e-6 * (1.0 + p[0] * p[0] + p[1] * p[1]), "{p:?}: {}", section.distance(p));
+                prop_assert!(section.distance(p).abs() < 1e-6 * (1.0 + p[0] * p[0] + p[1] * p[1]), "{p:?}: \
+                    {}", section.distance(p));
                 let [px, py] = section.principal(p);
                 let [a, b] = section.semi_axes();
                 if a < 1e3 {

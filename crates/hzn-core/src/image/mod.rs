@@ -45,8 +45,8 @@ pub trait Pixels {
     fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
         (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()
     }
-    /// The edge point of a border pixel, of a picture that came row by row: it was measured when the rows around it were
-    /// there.
+    /// The edge point of a border pixel, of a picture that came row by row: it was measured when the rows around it
+    /// were there.
     fn streamed_point(&self, _x: u16, _y: u16) -> Option<StreamedPoint> {
         None
     }
@@ -190,8 +190,8 @@ pub trait Sample: Copy + Into<u16> {
 impl Sample for u8 {
     const BITS: u8 = 8;
     const ZERO: Self = 0;
-    /// Eight at once. Whether a byte is at the level or above stands in its high bit: its own high bit and that of the rest
-    /// of it less the rest of the level, both of them for a level with a high bit, either for one without.
+    /// Eight at once. Whether a byte is at the level or above stands in its high bit: its own high bit and that of the
+    /// rest of it less the rest of the level, both of them for a level with a high bit, either for one without.
     #[inline(always)]
     fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
         const EACH: u64 = 0x0101_0101_0101_0101;

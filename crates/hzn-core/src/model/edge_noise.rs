@@ -6,10 +6,11 @@ use crate::base::keys::{Form, Section, Value, choices, section};
 choices! {
     /// Where the noise model of an edge comes from.
     pub enum Noise {
-        /// Sigma, common shift and the RMS of a common tilt are the RMS of the edge's own residuals, and the correlation
-        /// length is a twelfth of the edge's length; the values of `[covariance]` are their floor.
+        /// Sigma, common shift and the RMS of a common tilt are the RMS of the edge's own residuals, and the
+        /// correlation length is a twelfth of the edge's length; the values of `[covariance]` are their floor.
         @1 Rms = "rms";
-        /// The values of `[covariance]` hold; only the sigma is raised to the RMS of the residuals where that is larger.
+        /// The values of `[covariance]` hold; only the sigma is raised to the RMS of the residuals where that is
+        /// larger.
         ///
         /// This is for values that were measured with the same camera and in the same kind of scene.
         @0 Told = "told";
@@ -24,8 +25,8 @@ choices! {
     pub enum Method {
         /// N⁻¹ X N⁻¹ of the fit, where X holds the correlated errors of the edge; the expected half-angle is fused.
         @- Sandwich = "sandwich";
-        /// The covariance of the direct nadir, whatever the fit; the expected half-angle is not fused, and the residuals
-        /// raise nothing (Braun & Barf 2022, (33)).
+        /// The covariance of the direct nadir, whatever the fit; the expected half-angle is not fused, and the
+        /// residuals raise nothing (Braun & Barf 2022, (33)).
         @- BraunBarf = "braun-barf" needs "dlr";
     }
 }

@@ -54,8 +54,8 @@ pub struct ErrorBudget<T> {
     fit: [M3<T>; OF_THE_FIT],
     /// Of the axis, rad², by term.
     axis: [Cov3<Cam, T>; Term::ALL.len()],
-    /// The part of the axis' error along the vertical that the expected half-angle takes away or adds: how far the axis moves,
-    /// rad, for a change of 1 in the difference of the cosines.
+    /// The part of the axis' error along the vertical that the expected half-angle takes away or adds: how far the axis
+    /// moves, rad, for a change of 1 in the difference of the cosines.
     pub axis_by_cos: [T; 3],
 }
 

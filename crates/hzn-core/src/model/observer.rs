@@ -25,8 +25,8 @@ pub trait Observer<T> {
     fn look(&self, _number: u32, _level: u16) {}
     /// An edge was followed and is candidate number `candidate`: every `stride`-th of its border pixels, in order.
     fn edge(&self, _candidate: u32, _border: impl Iterator<Item = Pixel>, _stride: u32) {}
-    /// Whether this edge goes on through the stages. Of an observer that always says no every edge is followed, and there is
-    /// no answer.
+    /// Whether this edge goes on through the stages. Of an observer that always says no every edge is followed, and
+    /// there is no answer.
     #[inline(always)]
     fn wants(&self, _candidate: u32) -> bool {
         true
@@ -42,8 +42,8 @@ pub trait Observer<T> {
     fn wants_budget(&self) -> bool {
         false
     }
-    /// What each source of error adds to the covariance of a candidate's axis, in rad². Only when there was a fit, before its
-    /// verdict.
+    /// What each source of error adds to the covariance of a candidate's axis, in rad². Only when there was a fit,
+    /// before its verdict.
     #[inline(always)]
     fn budget(&self, _candidate: u32, _budget: &ErrorBudget<T>) {}
     /// What became of a candidate, with its solution if there is one.

@@ -22,12 +22,13 @@ pub struct Report<T> {
     pub stage: Stage,
     /// Level between dark and lit in the picture's own counts; 0 when it was not reached.
     pub level: u16,
-    /// The level for the next picture, in counts: for `track`, with an answer only; of a picture that came row by row, always.
+    /// The level for the next picture, in counts: for `track`, with an answer only; of a picture that came row by row,
+    /// always.
     pub next_level: Option<u16>,
     /// What was seen on the way.
     pub counters: Counters,
-    /// The candidates that were looked at, in the order in which they were followed. The chosen one is always among them: in
-    /// the last place, where it came after those that there is room for.
+    /// The candidates that were looked at, in the order in which they were followed. The chosen one is always among
+    /// them: in the last place, where it came after those that there is room for.
     pub candidates: heapless::Vec<Candidate<T>, MAX_LISTED>,
     /// The direction: with status `ok`, and never without.
     pub solution: Option<Solution<T>>,
@@ -108,8 +109,8 @@ pub struct Free<T> {
     pub cos: T,
     /// Variance of `cos`: every term of the covariance except the expected half-angle's own.
     pub var_cos: T,
-    /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of |∂(s·e)/∂(u, v)|
-    /// over the points that carry the fit.
+    /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of |∂(s·e)/∂(u,
+    /// v)| over the points that carry the fit.
     pub cos_per_px: T,
 }
 
@@ -130,7 +131,8 @@ pub struct Solution<T> {
     pub fused_half_angle_rad: T,
     /// Altitude estimate of the half-angle-free fit and its 1-sigma, metres; `None` for Sun and Moon.
     pub altitude_m: Option<(T, T)>,
-    /// The half-angle-free fit in cosines; `None` when the half-angle was not fitted, and of an answer that came by telemetry.
+    /// The half-angle-free fit in cosines; `None` when the half-angle was not fitted, and of an answer that came by
+    /// telemetry.
     pub free: Option<Free<T>>,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,

@@ -23,8 +23,8 @@ section! {
     "binarize" pub struct Config: Copy {
         /// How the threshold is found.
         @50 method: Method = Method::Otsu, [choice];
-        /// For `fixed`: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a fraction of
-        /// full scale.
+        /// For `fixed`: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a
+        /// fraction of full scale.
         @51 level: f64 = 64.0, [above 0.0 to 65535.0];
         /// For `dynamic`: the threshold is this factor times the mean of the sample.
         @52 factor: f64 = 1.0, [above 0.0 to 100.0];

@@ -44,7 +44,8 @@ verdicts! {
     NoFit = 8, "no-fit";
     /// The fitted limb goes on where the picture shows none: too small a part of it is edge.
     Unsupported = 9, "unsupported";
-    /// A curve through clutter: many edge points lie close beside the fitted limb, or a part of the edge follows it by chance.
+    /// A curve through clutter: many edge points lie close beside the fitted limb, or a part of the edge follows it by
+    /// chance.
     Indistinct = 10, "indistinct";
     /// Too much of what lies beyond the fitted limb is lit.
     NoSky = 11, "no-sky";
@@ -54,8 +55,8 @@ verdicts! {
     OutOfView = 13, "out-of-view";
     /// The fitted circle is smaller or larger than the limb can be between the altitude limits.
     Radius = 14, "radius";
-    /// The edge is too short or too rough for its curvature to tell on which side of it the body is, or a straight line of the
-    /// image fits it nearly as well.
+    /// The edge is too short or too rough for its curvature to tell on which side of it the body is, or a straight line
+    /// of the image fits it nearly as well.
     Straight = 15, "straight";
     /// A circle of the image fits the points far better than the limb's cone: a lens flare.
     Circle = 16, "circle";

@@ -9,11 +9,11 @@ use crate::base::keys::section;
 section! {
     /// `[limits]` of sensor.toml: the bound on the time of the worst picture.
     "limits" pub struct Config: Copy {
-        /// Largest cost of one picture and body, in steps of the border follower; when it is used up, the best answer so far
-        /// counts.
+        /// Largest cost of one picture and body, in steps of the border follower; when it is used up, the best answer
+        /// so far counts.
         ///
-        /// An ordinary picture costs about 30 thousand. Without an answer the status is `truncated`. The default is 120 for
-        /// each border pixel that the lists hold, and 2120 with `erf`.
+        /// An ordinary picture costs about 30 thousand. Without an answer the status is `truncated`. The default is 120
+        /// for each border pixel that the lists hold, and 2120 with `erf`.
         @120 max_work: Option<u32> = None, [10000.0 to 1e9]
             { unset: "245 760 in flight lists, 1 966 080 in the host's", example: "1000000" };
     }

@@ -11,12 +11,12 @@ use crate::stages::fit::Fit;
 use crate::stages::gates;
 use crate::stages::{consensus, contour, edge_points, fit, threshold};
 
-/// HORACE: brightness gate, dynamic threshold, a smaller copy, outer borders of the whole picture, a circle through each,
-/// the radius check, and halves of the picture where that gives nothing.
+/// HORACE: brightness gate, dynamic threshold, a smaller copy, outer borders of the whole picture, a circle through
+/// each, the radius check, and halves of the picture where that gives nothing.
 ///
-/// Its own numbers: 0.75 times the mean; the limb's radius from 100 to 20 km, give or take 5000 px of its picture of 768
-/// rows; a pixel that at most γ = 5 of its eight neighbours light is edge, for whom chooses `erode` (counted here with
-/// the pixel itself, and from 0: fewer than 7). Ours: the copy's height, the brightness gate, the shortest edge.
+/// Its own numbers: 0.75 times the mean; the limb's radius from 100 to 20 km, give or take 5000 px of its picture of
+/// 768 rows; a pixel that at most γ = 5 of its eight neighbours light is edge, for whom chooses `erode` (counted here
+/// with the pixel itself, and from 0: fewer than 7). Ours: the copy's height, the brightness gate, the shortest edge.
 pub(super) fn preset(config: &mut Config) {
     told(config);
     config.gate.min_mean = 0.02;

@@ -1,6 +1,6 @@
-//! The stages one at a time, with the parts between them in the open: for comparing methods on simulated points, and for
-//! trying a step of one's own in place of one of these (the Python package's `hzn.ransac` and its neighbours). Feature
-//! `_edges`.
+//! The stages one at a time, with the parts between them in the open: for comparing methods on simulated points, and
+//! for trying a step of one's own in place of one of these (the Python package's `hzn.ransac` and its neighbours).
+//! Feature `_edges`.
 //!
 //! ```text
 //! Sensor::level → Sensor::borders → Edges::pick → reject → fit → fuse
@@ -191,8 +191,8 @@ impl<T: Real> Edges<T> {
         self.weights().filter(|w| *w > T::ZERO).count() as u32
     }
 
-    /// Takes out the points on the limb of another body, which was found before; how many there were. The pipeline tries
-    /// an edge no further that has more than half of its points there.
+    /// Takes out the points on the limb of another body, which was found before; how many there were. The pipeline
+    /// tries an edge no further that has more than half of its points there.
     pub fn withdraw(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T, config: &consensus::Config) -> u32 {
         let taken = FoundLimb { e: *axis.v(), c: cos_half_angle };
         taken.withdraw(&mut self.blocks, T::from_f64(config.threshold_px))

@@ -1,9 +1,9 @@
 //! A second look before a refusal: other levels, and the picture without a dark frame around it.
 //!
-//! Otsu's level follows what is brightest. Of a disc half lit, with clouds, most of the limb may lie below it; of a limb
-//! under a glare all of it. So a picture without an answer is looked at again, a few times, each at another level
-//! and all on the account of one picture. Each look is another chance for a false answer, too: the gates are the same for
-//! all of them, and there are few.
+//! Otsu's level follows what is brightest. Of a disc half lit, with clouds, most of the limb may lie below it; of a
+//! limb under a glare all of it. So a picture without an answer is looked at again, a few times, each at another level
+//! and all on the account of one picture. Each look is another chance for a false answer, too: the gates are the same
+//! for all of them, and there are few.
 
 use super::account;
 use super::found_limb::FoundLimb;
@@ -26,7 +26,8 @@ fn goes_on(status: Status) -> bool {
 
 impl<T: Real> Sensor<T> {
     /// Everything after the first level: the looks, one after the other, until there is an answer or nothing is left to
-    /// try. Without an answer the level is that of the first look, and the status, too, unless a later one came further.
+    /// try. Without an answer the level is that of the first look, and the status, too, unless a later one came
+    /// further.
     pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(
         &self,
         mut lists: Lists<'_, T>,

@@ -382,8 +382,8 @@ fn covariance_equals_the_dense_product() {
     sandwich::<f32>(1e-4);
 }
 
-/// P = N⁻¹ (Hᵀ W G R Gᵀ W H) N⁻¹ by whole matrices, R the correlation of every pair of points: (δ₁, δ₂, δc), and δ₁₂ with
-/// c held.
+/// P = N⁻¹ (Hᵀ W G R Gᵀ W H) N⁻¹ by whole matrices, R the correlation of every pair of points: (δ₁, δ₂, δc), and δ₁₂
+/// with c held.
 fn dense<T: Real>(
     blocks: &[Block<T>],
     count: usize,

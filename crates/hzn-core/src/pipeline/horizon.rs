@@ -37,8 +37,8 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         Ok(Self { sensor: Sensor::new(config)?, workspace: Workspace::new(), levels: [None; MAX_BODIES] })
     }
-    /// As [`Self::new`], in a box, without the sensor ever standing on the caller's stack: the host's is larger than what
-    /// a thread has left at times.
+    /// As [`Self::new`], in a box, without the sensor ever standing on the caller's stack: the host's is larger than
+    /// what a thread has left at times.
     ///
     /// # Errors
     /// As [`Self::new`].

@@ -96,8 +96,8 @@ struct Best<T> {
 }
 
 impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
-    /// Nothing looked at yet. `camera` is the sensor's or [`Sensor::turning`]; `taken` are the bodies found before; `blocks` is
-    /// the room for one edge's points, `work` what the look may cost.
+    /// Nothing looked at yet. `camera` is the sensor's or [`Sensor::turning`]; `taken` are the bodies found before;
+    /// `blocks` is the room for one edge's points, `work` what the look may cost.
     pub(super) fn new(
         sensor: &'a Sensor<T>,
         camera: &'a Camera<T>,
@@ -198,8 +198,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
     }
 
-    /// An edge that a search line meets. When it ends at the border, it began there too, where the border's strides passed
-    /// over it: half of an edge is not judged, but asked for whole.
+    /// An edge that a search line meets. When it ends at the border, it began there too, where the border's strides
+    /// passed over it: half of an edge is not judged, but asked for whole.
     fn edge_on_line<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
@@ -435,8 +435,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             arc_px: fit.arc_px,
             candidate: number,
         };
-        // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself asks for
-        // must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of so many variances.
+        // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself
+        // asks for must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of so many variances.
         let sides = T::from_f64(config.select.min_side_sigma);
         let curved = fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0));
         if config.estimate.half_angle == fit::HalfAngle::Fused && !curved && !expected.free {

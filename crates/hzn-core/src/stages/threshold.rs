@@ -36,8 +36,8 @@ pub struct Level<T> {
 }
 
 impl<T: Real> Level<T> {
-    /// The level that stands `part` of the way from the dark pixels to this one, 1 at this one: half of a level means half
-    /// of the light also where the sky is not black, as in words of a thermal camera.
+    /// The level that stands `part` of the way from the dark pixels to this one, 1 at this one: half of a level means
+    /// half of the light also where the sky is not black, as in words of a thermal camera.
     pub(crate) fn part(&self, part: f64) -> u16 {
         let level = T::from_i32(i32::from(self.level));
         counts(self.dark + (level - self.dark) * T::from_f64(part))
@@ -62,8 +62,8 @@ fn counts<T: Real>(level: T) -> u16 {
     level.to_i32().clamp(1, 65535) as u16
 }
 
-/// How often each brightness occurs, in bins that are as fine as the sample's own range allows: words of 16 bits may hold
-/// a picture of a thousand counts.
+/// How often each brightness occurs, in bins that are as fine as the sample's own range allows: words of 16 bits may
+/// hold a picture of a thousand counts.
 #[derive(Debug)]
 struct Histogram {
     bins: [u16; BINS],
@@ -100,8 +100,8 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     Err(Status::NoLimb)
 }
 
-/// 1-sigma of the noise of the dark pixels in counts, from how far neighbours below the level are apart; 0 where there are
-/// none. Noise that is cut off at 0 makes it smaller.
+/// 1-sigma of the noise of the dark pixels in counts, from how far neighbours below the level are apart; 0 where there
+/// are none. Noise that is cut off at 0 makes it smaller.
 #[cold]
 pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
@@ -186,7 +186,8 @@ impl Sample {
         (self.cells < 1 << self.side_log2).then_some(self.y)
     }
 
-    /// Looks at that row. The cells of a row share theirs: each row of a picture is a page of memory away from the next.
+    /// Looks at that row. The cells of a row share theirs: each row of a picture is a page of memory away from the
+    /// next.
     fn take<T: Real, O: Observer<T>>(&mut self, region: &Region<T>, observer: &O, at: impl Fn(u16) -> Option<u16>) {
         for cell in 0..1u32 << self.side_log2 {
             let x = self.draw(cell, region.width());

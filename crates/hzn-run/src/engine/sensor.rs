@@ -115,8 +115,8 @@ impl AnySensor {
         }
     }
 
-    /// Processes one picture: a result for each body, in order. Of Sun and Moon the direction in ECEF is known too, from
-    /// the time and the position.
+    /// Processes one picture: a result for each body, in order. Of Sun and Moon the direction in ECEF is known too,
+    /// from the time and the position.
     pub fn process(
         &mut self,
         view: &ImageView<'_>,

@@ -50,8 +50,8 @@ impl Text {
         Ok(text)
     }
 
-    /// Goes on after the last frame that has all of its `bodies` rows, or as many as the first frame; without an unfinished
-    /// file, begins one.
+    /// Goes on after the last frame that has all of its `bodies` rows, or as many as the first frame; without an
+    /// unfinished file, begins one.
     pub(crate) fn resume(path: &Path, part: &Path, form: Form, bodies: Option<usize>) -> io::Result<(Self, Held)> {
         if !part.exists() {
             return Ok((Self::create(path, part, form)?, Held::default()));
@@ -111,8 +111,8 @@ pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
     writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))
 }
 
-/// Whole frames of `bodies` rows each, and where they end. Where the number of bodies is not known, the first frame has them
-/// all.
+/// Whole frames of `bodies` rows each, and where they end. Where the number of bodies is not known, the first frame has
+/// them all.
 fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, usize)> {
     let bodies = match bodies {
         Some(bodies) => bodies,

@@ -1,8 +1,9 @@
 //! How many bits of 16-bit words a camera uses, found once for a whole sequence.
 //!
-//! A camera of 10, 12 or 14 bits often writes its counts into the lower bits of words. Full scale is then not 65535, and levels
-//! in fractions of it would be far too high. One picture does not tell: it may be dark. So pictures are taken evenly from the
-//! whole sequence, by their places and not by what comes first, and the answer holds for all of them.
+//! A camera of 10, 12 or 14 bits often writes its counts into the lower bits of words. Full scale is then not 65535,
+//! and levels in fractions of it would be far too high. One picture does not tell: it may be dark. So pictures are
+//! taken evenly from the whole sequence, by their places and not by what comes first, and the answer holds for all of
+//! them.
 
 use super::Source;
 
@@ -30,13 +31,14 @@ impl std::fmt::Display for FoundBits {
         let of = crate::explain::counted(*pictures as u64, "picture");
         write!(
             f,
-            "samples are words of 16 bits that reach {most} in {of} looked at: taken as {bits} bits; if the camera has others, \
-             say so with bits = ... in [input] of sensor.toml"
+            "samples are words of 16 bits that reach {most} in {of} looked at: taken as {bits} bits; if the camera has \
+             others, say so with bits = ... in [input] of sensor.toml"
         )
     }
 }
 
-/// Finds the significant bits of a sequence of words; `None` where its pictures are of bytes, or where the source knows.
+/// Finds the significant bits of a sequence of words; `None` where its pictures are of bytes, or where the source
+/// knows.
 pub fn find_bits(source: &dyn Source) -> Option<FoundBits> {
     if source.bits().is_some() {
         return None;

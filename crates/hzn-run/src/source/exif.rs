@@ -30,8 +30,8 @@ pub(super) fn lens(block: Vec<u8>) -> Option<start::Exif> {
         }
         _ => None,
     };
-    // Millimetres in the unit of the resolution: 2 inches, which is also what a missing one means; 3 centimetres; and what
-    // some programs write, 4 millimetres and 5 micrometres.
+    // Millimetres in the unit of the resolution: 2 inches, which is also what a missing one means; 3 centimetres; and
+    // what some programs write, 4 millimetres and 5 micrometres.
     let unit_mm = match number(Tag::FocalPlaneResolutionUnit).unwrap_or(2.0) as u32 {
         3 => 10.0,
         4 => 1.0,

@@ -135,8 +135,8 @@ impl Files {
     }
 }
 
-/// The first two names that stand in the order of their bytes, as a shell lists them, where their numbers say the opposite.
-/// Only where all names stand in that order: any other was chosen by someone.
+/// The first two names that stand in the order of their bytes, as a shell lists them, where their numbers say the
+/// opposite. Only where all names stand in that order: any other was chosen by someone.
 fn out_of_order(paths: &[PathBuf]) -> Option<[String; 2]> {
     let pairs = || paths.windows(2).filter_map(|w| w.first().zip(w.last()));
     if !pairs().all(|(a, b)| a.as_os_str() <= b.as_os_str()) {
@@ -254,8 +254,8 @@ impl Source for Files {
     fn want_channel(&mut self, channel: Channel) -> Result<(), Error> {
         match self.raw {
             Some(raw) if channel != Channel::Mean && raw.format == raw::Format::Bayer8 => Err(unusable(format!(
-                "raw pictures, {raw}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in [input] of \
-                 sensor.toml"
+                "raw pictures, {raw}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in \
+                    [input] of sensor.toml"
             ))),
             _ => Ok(()),
         }
@@ -272,7 +272,10 @@ impl Source for Files {
         };
         let mut notes: Vec<String> = self.left_out.iter().map(note).collect();
         notes.extend(self.out_of_order.as_ref().map(|[a, b]| {
-            format!("pictures are taken in the order given, {a} before {b}; give the folder, or the pattern in quotes, to count them")
+            format!(
+                "pictures are taken in the order given, {a} before {b}; give the folder, or the pattern in quotes, \
+                     to count them"
+            )
         }));
         notes
     }

@@ -41,8 +41,8 @@ pub struct Item {
     pub payload: Payload,
 }
 
-/// Where the time of a picture comes from. All pictures of a sequence go by one clock: times from two would be counted from
-/// different instants.
+/// Where the time of a picture comes from. All pictures of a sequence go by one clock: times from two would be counted
+/// from different instants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeSource {
     /// frames.csv, or what a recording of ours says.
@@ -106,8 +106,8 @@ pub trait Source: Send {
     }
     /// Folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
-    /// Text of the sensor.toml that the pictures were recorded with; a source that has one also knows what frames.csv said
-    /// ([`Item::data`]).
+    /// Text of the sensor.toml that the pictures were recorded with; a source that has one also knows what frames.csv
+    /// said ([`Item::data`]).
     fn sensor_toml(&self) -> Option<&str> {
         None
     }
@@ -115,8 +115,8 @@ pub trait Source: Send {
     fn bits(&self) -> Option<u8> {
         None
     }
-    /// Pictures from the whole sequence, a few, for what only their samples tell ([`find_bits`]). By their places alone, so that
-    /// the same sequence gives the same ones.
+    /// Pictures from the whole sequence, a few, for what only their samples tell ([`find_bits`]). By their places
+    /// alone, so that the same sequence gives the same ones.
     fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
         Box::new(std::iter::empty())
     }
@@ -157,8 +157,8 @@ impl Item {
 }
 
 impl Payload {
-    /// The picture, decoded, and the file's own bytes where they are PNG or JPEG and can be kept as they are. A sensor says
-    /// which size it must have, how many bits, and how it is turned.
+    /// The picture, decoded, and the file's own bytes where they are PNG or JPEG and can be kept as they are. A sensor
+    /// says which size it must have, how many bits, and how it is turned.
     ///
     /// # Errors
     /// Why it cannot be read, for the record of the frame.

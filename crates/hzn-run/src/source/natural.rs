@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 use std::path::Path;
 
-/// Compares two paths part by part. Numbers in names count by their value; everything else, and numbers that differ only in
-/// their leading zeros, by their bytes.
+/// Compares two paths part by part. Numbers in names count by their value; everything else, and numbers that differ
+/// only in their leading zeros, by their bytes.
 pub(super) fn compare(a: &Path, b: &Path) -> Ordering {
     let parts = |p: &Path| p.components().map(|c| c.as_os_str().as_encoded_bytes().to_vec()).collect::<Vec<_>>();
     let (a, b) = (parts(a), parts(b));

@@ -1,4 +1,5 @@
-//! How many pictures one picture file holds: pages of a TIFF, frames of an animated PNG, pictures of a PNM one after another.
+//! How many pictures one picture file holds: pages of a TIFF, frames of an animated PNG, pictures of a PNM one after
+//! another.
 
 use image::ImageFormat;
 

@@ -57,8 +57,8 @@ impl Picture {
             if u32::from(most) >> bits > 0 {
                 let needed = 16 - most.leading_zeros();
                 return Err(format!(
-                    "a sample of {most} has more bits than input.bits = {bits}, which sensor.toml or the other pictures say: \
-                     write bits = {needed} or more in [input] of sensor.toml"
+                    "a sample of {most} has more bits than input.bits = {bits}, which sensor.toml or the other \
+                     pictures say: write bits = {needed} or more in [input] of sensor.toml"
                 ));
             }
             self.layout.bits = bits;
@@ -154,8 +154,8 @@ pub fn unused_bits(most: u16) -> Option<String> {
     let bits = (16 - most.leading_zeros()).max(8);
     (bits + UNUSED_BITS <= 16).then(|| {
         format!(
-            "samples reach {most} of 65535: if the camera has fewer bits than the file has room for, say so with bits = {bits} in \
-             [input] of sensor.toml"
+            "samples reach {most} of 65535: if the camera has fewer bits than the file has room for, say so with bits \
+             = {bits} in [input] of sensor.toml"
         )
     })
 }
@@ -196,7 +196,8 @@ pub(super) fn has_words(contents: impl std::io::Read + std::io::Seek) -> bool {
     })
 }
 
-/// Whether its header says which sample is white, so that it is scaled to all 16 bits when it is decoded: a PNM of less.
+/// Whether its header says which sample is white, so that it is scaled to all 16 bits when it is decoded: a PNM of
+/// less.
 pub(super) fn tells_its_scale(path: &Path) -> bool {
     use image::codecs::pnm::PnmDecoder;
     let Ok(file) = std::fs::File::open(path) else { return false };

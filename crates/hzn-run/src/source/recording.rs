@@ -9,7 +9,8 @@ use super::picture::{self, Picture, Samples};
 use super::{Item, Payload, SIZES, Source, TimeSource};
 use crate::error::{Error, unusable};
 
-/// A recording does not say how many pictures it has: of its beginning every so many are looked at for [`Source::samples`].
+/// A recording does not say how many pictures it has: of its beginning every so many are looked at for
+/// [`Source::samples`].
 pub(super) const SAMPLE_EVERY: usize = 16;
 
 /// Frames of one topic. They are named after the recording: `flight.mcap#000012`.

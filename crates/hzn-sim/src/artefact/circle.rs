@@ -28,8 +28,8 @@ fn through(dice: &mut Dice, canvas: &Canvas, radius: f64) -> [f32; 2] {
 }
 
 impl Circle {
-    /// A ring: radius 0.15 to 3 diagonals, 4 to 60 px wide, blurred by 0.5 to 6 px on each side on its own, light 0.1 to 1,
-    /// fading by up to 90 % towards one side.
+    /// A ring: radius 0.15 to 3 diagonals, 4 to 60 px wide, blurred by 0.5 to 6 px on each side on its own, light 0.1
+    /// to 1, fading by up to 90 % towards one side.
     pub(super) fn ring(dice: &mut Dice, canvas: &Canvas) -> Self {
         let radius = dice.between_log(0.15, 3.0) * canvas.diagonal;
         let middle = through(dice, canvas, radius);
@@ -46,8 +46,8 @@ impl Circle {
         }
     }
 
-    /// A ghost disc: radius 0.1 to 3 diagonals, blurred by 0.5 to 6 px, light 0.1 to 1, its rim up to twice as bright as its
-    /// middle or down to half, fading by up to 70 % towards one side.
+    /// A ghost disc: radius 0.1 to 3 diagonals, blurred by 0.5 to 6 px, light 0.1 to 1, its rim up to twice as bright
+    /// as its middle or down to half, fading by up to 70 % towards one side.
     pub(super) fn disc(dice: &mut Dice, canvas: &Canvas) -> Self {
         Self::ghost(dice, canvas, 0.1, 3.0)
     }

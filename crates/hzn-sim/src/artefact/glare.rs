@@ -24,8 +24,8 @@ pub(super) struct Glare {
 
 impl Glare {
     /// Around a place up to half a diagonal outside the picture: half light at 0.01 to 0.5 diagonals, falling with the
-    /// power 1 to 4, up to three times as long as wide, light 0.3 to 4 (what exceeds 1 saturates), for two in five with 4
-    /// to 16 spikes, and a slope of up to 0.3 across the picture.
+    /// power 1 to 4, up to three times as long as wide, light 0.3 to 4 (what exceeds 1 saturates), for two in five with
+    /// 4 to 16 spikes, and a slope of up to 0.3 across the picture.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let out = 0.5 * canvas.diagonal * dice.between(0.0, 1.0) * f64::from(dice.count(0, 1));
         let middle = [dice.between(-out, canvas.width + out) as f32, dice.between(-out, canvas.height + out) as f32];

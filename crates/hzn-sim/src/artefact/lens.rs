@@ -16,9 +16,9 @@ const SIZES: [(f64, (u16, u16)); 7] = [
     (1.0, (752, 480)),
 ];
 
-/// A camera for a kind: 27° to 110° wide through a pinhole, to 140° through an equidistant lens, 60° to 150° through one
-/// of Kannala and Brandt's; the principal point up to 2 % of the width beside the middle. A kind that needs a fisheye
-/// gets no pinhole, the Moon sometimes a tele lens of 4° to 27°, and what looks down nothing wider than 75°.
+/// A camera for a kind: 27° to 110° wide through a pinhole, to 140° through an equidistant lens, 60° to 150° through
+/// one of Kannala and Brandt's; the principal point up to 2 % of the width beside the middle. A kind that needs a
+/// fisheye gets no pinhole, the Moon sometimes a tele lens of 4° to 27°, and what looks down nothing wider than 75°.
 pub(super) fn draw(dice: &mut Dice, kind: Kind) -> Config {
     let (width, height) = dice.pick(&SIZES).unwrap_or((640, 480));
     let pinhole = if kind == Kind::FarDisc { 0.0 } else { 4.0 };

@@ -12,8 +12,8 @@ pub(super) struct Lights {
 }
 
 impl Lights {
-    /// 1 to 12 cities of 10 to 120 lamps each, up to 3 roads with lamps every 2 to 15 px along a bent line, up to 3 clouds
-    /// lit by lightning with 10 to 150 px; lamps 0.5 to 2.5 px large, light 0.05 to 2.
+    /// 1 to 12 cities of 10 to 120 lamps each, up to 3 roads with lamps every 2 to 15 px along a bent line, up to 3
+    /// clouds lit by lightning with 10 to 150 px; lamps 0.5 to 2.5 px large, light 0.05 to 2.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let mut spots = Vec::new();
         let place = |dice: &mut Dice| [dice.between(0.0, canvas.width), dice.between(0.0, canvas.height)];

@@ -22,8 +22,8 @@ pub(super) struct Moon {
 }
 
 impl Moon {
-    /// Anywhere in the picture or cut by its border, any phase, bloomed by up to 1.5 times its radius, blurred by 0.5 to
-    /// 2.5 px, light 0.3 to 3, halo up to a fifth.
+    /// Anywhere in the picture or cut by its border, any phase, bloomed by up to 1.5 times its radius, blurred by 0.5
+    /// to 2.5 px, light 0.3 to 3, halo up to a fifth.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let bloom = if dice.chance(0.5) { dice.between(1.0, 2.5) } else { 1.0 };
         let radius = HALF_ANGLE_RAD * canvas.focal_px * bloom;

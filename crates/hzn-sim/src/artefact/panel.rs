@@ -19,8 +19,8 @@ pub(super) struct Panel {
 }
 
 impl Panel {
-    /// One to four sides with edges through the picture, blurred by 0.4 to 8 px; light 0.1 to 1 with a slope of up to 0.3
-    /// a diagonal; one in three has a grid of cells every 12 to 80 px.
+    /// One to four sides with edges through the picture, blurred by 0.4 to 8 px; light 0.1 to 1 with a slope of up to
+    /// 0.3 a diagonal; one in three has a grid of cells every 12 to 80 px.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let (x, y) = (dice.between(0.1, 0.9) * canvas.width, dice.between(0.1, 0.9) * canvas.height);
         let first = dice.turn();

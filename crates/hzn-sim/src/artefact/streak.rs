@@ -24,9 +24,9 @@ pub(super) struct Streak {
 
 impl Streak {
     /// A curve with a radius of 0.3 to 15 diagonals, for one in two with a third-order part that changes it by up to a
-    /// half over the picture. A streak is 6 to 120 px wide, its edges blurred by 1 to 15 px each on its own; every third
-    /// is a veil, blurred by 0.7 to 5 px on one side and fading over 20 to 300 px on the other. Light 0.1 to 1, along
-    /// 0.2 to 2 diagonals.
+    /// half over the picture. A streak is 6 to 120 px wide, its edges blurred by 1 to 15 px each on its own; every
+    /// third is a veil, blurred by 0.7 to 5 px on one side and fading over 20 to 300 px on the other. Light 0.1 to 1,
+    /// along 0.2 to 2 diagonals.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let diagonal = canvas.diagonal;
         let (x, y) = (dice.between(0.15, 0.85) * canvas.width, dice.between(0.15, 0.85) * canvas.height);

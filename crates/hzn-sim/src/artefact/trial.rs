@@ -114,8 +114,8 @@ impl Trial {
     }
 
     /// A clean limb with the artefact next to it: the body is lit all along, the limb crosses the picture over at least
-    /// half its width, and the artefact is in view, leaves at least 90 % of the limb alone and half of the sky dark. Kinds
-    /// of ground become the texture inside the limb. `None` where no such picture was found for this seed.
+    /// half its width, and the artefact is in view, leaves at least 90 % of the limb alone and half of the sky dark.
+    /// Kinds of ground become the texture inside the limb. `None` where no such picture was found for this seed.
     ///
     /// # Errors
     /// As [`Trial::without_limb`].
@@ -227,8 +227,8 @@ impl Trial {
         Ok(self.scene.detector.expose(&[plane], self.scene.seed))
     }
 
-    /// What a navigation system would tell: the position; with `attitude_sigma_deg` an attitude too, which is wrong by as
-    /// much about each axis (1σ).
+    /// What a navigation system would tell: the position; with `attitude_sigma_deg` an attitude too, which is wrong by
+    /// as much about each axis (1σ).
     pub fn known(&self, attitude_sigma_deg: Option<f64>) -> Prior<f64> {
         let pose = &self.scene.pose;
         let dice = &mut Part::Attitude.dice(self.kind, self.seed);

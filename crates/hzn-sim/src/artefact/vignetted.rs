@@ -17,8 +17,8 @@ pub(super) struct Vignetted {
 }
 
 impl Vignetted {
-    /// A disc as [`Circle::disc`] draws it, stretched by 0.9 to 1.1 for one in two; cut by a rim of 0.7 to 1.5 times its
-    /// radius, whose middle is 0.2 to 1.2 radii away, blurred by 0.5 to 6 px.
+    /// A disc as [`Circle::disc`] draws it, stretched by 0.9 to 1.1 for one in two; cut by a rim of 0.7 to 1.5 times
+    /// its radius, whose middle is 0.2 to 1.2 radii away, blurred by 0.5 to 6 px.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let disc = Circle::disc(dice, canvas);
         let (middle, radius) = disc.place();

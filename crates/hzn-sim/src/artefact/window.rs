@@ -23,8 +23,8 @@ pub(super) struct Window {
 
 impl Window {
     /// Half sides of 0.15 to 0.9 diagonals, corners from sharp to a porthole's, tilted at will, its edge through the
-    /// picture; out of focus by 0.5 to 12 px; light 0.05 to 0.8; for one in three the frame is 5 to 60 px deep; for one in
-    /// four the opening is lit and not the frame.
+    /// picture; out of focus by 0.5 to 12 px; light 0.05 to 0.8; for one in three the frame is 5 to 60 px deep; for one
+    /// in four the opening is lit and not the frame.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let half = [dice.between_log(0.15, 0.9), dice.between_log(0.15, 0.9)].map(|h| h * canvas.diagonal);
         let porthole = dice.chance(0.3);

@@ -33,7 +33,8 @@ pub struct Evaluation {
     pub honesty: Option<Honesty>,
     /// HORACE's own criteria.
     pub horace: Horace,
-    /// The same by altitude, by angle off nadir (of Sun and Moon: off axis), by length of limb in view. One that does not vary is left out.
+    /// The same by altitude, by angle off nadir (of Sun and Moon: off axis), by length of limb in view. One that does
+    /// not vary is left out.
     pub groups: Vec<Group>,
 }
 

@@ -76,8 +76,8 @@ impl Scenario {
         self.flight_at(&self.times_s())
     }
 
-    /// As [`Scenario::flight`], with pictures at these times instead of the capture's own. Way and attitude stay those of
-    /// the whole capture; the exposure, too, which has followed the pictures that the capture takes before.
+    /// As [`Scenario::flight`], with pictures at these times instead of the capture's own. Way and attitude stay those
+    /// of the whole capture; the exposure, too, which has followed the pictures that the capture takes before.
     pub(super) fn flight_at(&self, times_s: &[f64]) -> Result<Flight, ScenarioError> {
         self.check()?;
         let sensor = self.sensor();

@@ -1,8 +1,9 @@
 //! A whole simulated sequence in one description: what a `scene.toml` says.
 //!
-//! A [`Scenario`] becomes a [`Flight`](crate::Flight): scenes with truth, and the sensor that took them. [`BUILTIN`] are the scenes that
-//! come with hzn. Reading a file (with lines and suggestions in errors) is the command line's business; every value is
-//! checked here, by [`Scenario::check`], and whether anything can be seen, by [`Scenario::flight`].
+//! A [`Scenario`] becomes a [`Flight`](crate::Flight): scenes with truth, and the sensor that took them. [`BUILTIN`]
+//! are the scenes that come with hzn. Reading a file (with lines and suggestions in errors) is the command line's
+//! business; every value is checked here, by [`Scenario::check`], and whether anything can be seen, by
+//! [`Scenario::flight`].
 
 mod check;
 mod exposure;

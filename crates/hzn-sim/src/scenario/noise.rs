@@ -1,13 +1,13 @@
 //! The noise model that fits a scenario: how high its limb stands, and how edge points scatter about it.
 //!
 //! Pictures of the same scenario with other seeds (other clouds, another drift) go through the sensor. Edge points that
-//! it holds for limb are compared with the exact limb: their mean height is the limb height, the scatter of the pictures'
-//! means its sigma. For a limb, each picture's own residuals then tell the noise (`covariance.noise = "rms"`): one picture may be
-//! far worse than the others, and it need not be among those that are measured. Where the residuals alone make the answers too
-//! sure, the model below is their floor. For Sun and Moon the model is told: a process along the edge with a variance and an integral length: of the lengths tried
-//! the likeliest, each with the variance that makes the answers' errors as large as they are said to be. (The points
-//! themselves do not tell the length: what turns an answer is alike along the whole edge, and small beside each one's
-//! noise.)
+//! it holds for limb are compared with the exact limb: their mean height is the limb height, the scatter of the
+//! pictures' means its sigma. For a limb, each picture's own residuals then tell the noise (`covariance.noise =
+//! "rms"`): one picture may be far worse than the others, and it need not be among those that are measured. Where the
+//! residuals alone make the answers too sure, the model below is their floor. For Sun and Moon the model is told: a
+//! process along the edge with a variance and an integral length: of the lengths tried the likeliest, each with the
+//! variance that makes the answers' errors as large as they are said to be. (The points themselves do not tell the
+//! length: what turns an answer is alike along the whole edge, and small beside each one's noise.)
 
 use hzn_calib::noise::{Points, Weighted};
 use hzn_core::body::{self, Kind};
@@ -62,8 +62,8 @@ const ROUNDS: u32 = 4;
 const GROSS_RAD: f64 = std::f64::consts::PI / 90.0;
 
 impl Fit {
-    /// Measures `pictures` pictures of the scenario, spread over sixteen other seeds; `progress` hears of every one. One fit a
-    /// body, but for those of which too few pictures are answered to say anything.
+    /// Measures `pictures` pictures of the scenario, spread over sixteen other seeds; `progress` hears of every one.
+    /// One fit a body, but for those of which too few pictures are answered to say anything.
     ///
     /// # Errors
     /// As [`crate::Scene::render`].
@@ -130,7 +130,8 @@ impl Fit {
             nees: f64::NAN,
             frames: [answered.len(), seen.len()],
         };
-        // What the points of a picture share is in the limb height's sigma, so that no floor is left but that of rounding.
+        // What the points of a picture share is in the limb height's sigma, so that no floor is left but that of
+        // rounding.
         let by_picture = Self { noise: Noise::Rms, sigma_px: LEAST_PX, correlation_px: 0.0, ..fit };
         let noise = if disc { Noise::Told } else { Noise::Rms };
         let by_itself = (!disc).then(|| by_picture.settled(scenario, alone, seen)).flatten();
@@ -143,8 +144,8 @@ impl Fit {
         })
     }
 
-    /// With the sigmas at which the answers' errors are as large as they are said to be; and how unlikely these errors are
-    /// then: the mean of the negative log-likelihood, twice, but for a constant.
+    /// With the sigmas at which the answers' errors are as large as they are said to be; and how unlikely these errors
+    /// are then: the mean of the negative log-likelihood, twice, but for a constant.
     fn settled(
         mut self,
         scenario: &Scenario,

@@ -1,8 +1,9 @@
-//! What equations 33 and 37 of Braun & Barf 2022 give, worked out apart from this program with the paper's errata put right
-//! (book/theory/math.md): the tests and `cargo xtask reproduce` compare with these numbers.
+//! What equations 33 and 37 of Braun & Barf 2022 give, worked out apart from this program with the paper's errata put
+//! right (book/theory/math.md): the tests and `cargo xtask reproduce` compare with these numbers.
 //!
-//! Three standard deviations in degrees; a level pinhole camera of 1920×1080 px 200 km above a sphere of 6371 km with its limb
-//! at 0 km, edge errors of 1 px over 300 px. Roll is about the optical axis, pitch about the picture's horizontal.
+//! Three standard deviations in degrees; a level pinhole camera of 1920×1080 px 200 km above a sphere of 6371 km with
+//! its limb at 0 km, edge errors of 1 px over 300 px. Roll is about the optical axis, pitch about the picture's
+//! horizontal.
 
 /// By altitude (km), 94.4° wide: roll and pitch with the half-angle free (33), pitch with it known, overbound (37).
 pub const BY_ALTITUDE_KM: [(f64, [f64; 4]); 5] = [

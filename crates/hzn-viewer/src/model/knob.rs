@@ -14,8 +14,8 @@ pub struct Knob {
 }
 
 impl Knob {
-    /// For a value with these limits that usually is about `usual`; `None` for what is no number. A slider does not reach
-    /// limits that are far from what is usual; they can be typed.
+    /// For a value with these limits that usually is about `usual`; `None` for what is no number. A slider does not
+    /// reach limits that are far from what is usual; they can be typed.
     pub fn from_limits(limits: &Limits, usual: f64) -> Option<Self> {
         let Limits::Number { low, above, high } = *limits else { return None };
         let usual = if usual.abs() > 0.0 { usual.abs() } else { 1.0 };

@@ -34,7 +34,8 @@ pub fn inside(polygon: &[Point], [x, y]: Point) -> bool {
 }
 
 impl MaskEdit {
-    /// A corner is set at `p`; on the first one, within `reach`, the polygon is closed. Gives the polygons when one came.
+    /// A corner is set at `p`; on the first one, within `reach`, the polygon is closed. Gives the polygons when one
+    /// came.
     pub fn click(&mut self, polygons: &Polygons, p: Point, reach: f64) -> Option<Polygons> {
         if self.open.len() >= 3 && self.open.first().is_some_and(|first| apart(*first, p) <= reach) {
             return self.close(polygons);

@@ -59,8 +59,8 @@ impl Sequence {
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
-    /// Where a file that is made of it goes, unless another place is named: beside it. In a folder of pictures, a further
-    /// picture would be a further frame.
+    /// Where a file that is made of it goes, unless another place is named: beside it. In a folder of pictures, a
+    /// further picture would be a further frame.
     pub fn beside(&self, name: &str) -> PathBuf {
         let folder = match self.inputs.as_slice() {
             [one] if one.is_dir() => std::path::absolute(one).ok().and_then(|p| Some(p.parent()?.to_owned())),

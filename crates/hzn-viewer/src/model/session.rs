@@ -121,8 +121,8 @@ impl Session {
         &self.preset
     }
 
-    /// The value that counts: the text's, or else the preset's; `None` where there is none. Of a body, its own level and
-    /// edge errors come before the sensor's.
+    /// The value that counts: the text's, or else the preset's; `None` where there is none. Of a body, its own level
+    /// and edge errors come before the sensor's.
     pub fn value(&self, section: &str, name: &str, body: usize) -> Option<&toml::Value> {
         Self::find(&self.values, section, name, body)
     }
@@ -144,8 +144,8 @@ impl Session {
         number(self.value(section, name, body)?)
     }
 
-    /// About what a number usually is, a power of ten: a slider's reach. It follows what was saved, so that it stays while
-    /// the slider is moved; a key that had no value then goes by the one that counts.
+    /// About what a number usually is, a power of ten: a slider's reach. It follows what was saved, so that it stays
+    /// while the slider is moved; a key that had no value then goes by the one that counts.
     pub fn usual(&self, section: &str, name: &str, body: usize) -> f64 {
         let saved = Self::find(&self.saved_values, section, name, body).and_then(number);
         match saved.or_else(|| self.number(section, name, body)) {
@@ -321,7 +321,9 @@ fn tidy_px(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const TEXT: &str = "preset = \"hzn\"\n[camera]\nwidth = 640\nheight = 480\nfx_px = 500.0\nfy_px = 500.0\ncx_px = 319.5\ncy_px = 239.5\nmodel = \"pinhole\"\n[reject]\nthreshold_px = 3.0 # mine\n";
+    const TEXT: &str = "preset = \"hzn\"\n[camera]\nwidth = 640\nheight = 480\nfx_px = 500.0\nfy_px = 500.0\ncx_px = \
+                                        319.5\ncy_px = 239.5\nmodel = \"pinhole\"\n[reject]\nthreshold_px = 3.0 # \
+                                        mine\n";
 
     fn session() -> Session {
         Session::new(TEXT, Path::new("sensor.toml"), false)

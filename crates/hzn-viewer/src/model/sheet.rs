@@ -68,7 +68,8 @@ impl Sheet {
         Ok(Self(document.to_string()))
     }
 
-    /// Lines that differ from `other`, with a `-` for those of `other` and a `+` for ours, and no line for what is equal.
+    /// Lines that differ from `other`, with a `-` for those of `other` and a `+` for ours, and no line for what is
+    /// equal.
     pub fn diff(&self, other: &Self) -> Vec<String> {
         let (old, new): (Vec<&str>, Vec<&str>) = (other.0.lines().collect(), self.0.lines().collect());
         let mut out = Vec::new();
@@ -161,7 +162,8 @@ fn section<'a>(root: &'a mut Table, name: &str, create: bool) -> Option<&'a mut 
 mod tests {
     use super::*;
 
-    const TEXT: &str = "# mine\npreset = \"hzn\"   # best\n\n[reject]  # outliers\nthreshold_px = 3.0     # wide\n\n[body]\nkind = \"earth\"\n";
+    const TEXT: &str = "# mine\npreset = \"hzn\"   # best\n\n[reject]  # outliers\nthreshold_px = 3.0     # \
+                                                wide\n\n[body]\nkind = \"earth\"\n";
 
     fn key<'a>(section: &'a str, name: &'a str) -> Key<'a> {
         Key { section, name, body: 0 }
@@ -193,7 +195,8 @@ mod tests {
 
     #[test]
     fn a_body_of_several_has_its_own_values() {
-        let text = "[binarize]\nscale = 1.0\n[[bodies]]\nkind = \"earth\"\n[[bodies]]\nkind = \"sun\"\n[bodies.binarize]\nlevel = 0.9\n";
+        let text = "[binarize]\nscale = 1.0\n[[bodies]]\nkind = \"earth\"\n[[bodies]]\nkind = \
+            \"sun\"\n[bodies.binarize]\nlevel = 0.9\n";
         let at = |section, name, body, value: f64| {
             Sheet::new(text).with(Key { section, name, body }, Some(value.into())).unwrap().text().to_owned()
         };

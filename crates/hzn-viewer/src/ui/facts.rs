@@ -151,8 +151,8 @@ fn level(answer: &BodyResult, config: &Config) -> Vec<String> {
     }
 }
 
-/// What a row says of a frame without an answer, such as `ended at select: short-arc, short-arc`, with the verdicts that
-/// many edges share said once.
+/// What a row says of a frame without an answer, such as `ended at select: short-arc, short-arc`, with the verdicts
+/// that many edges share said once.
 pub(super) fn in_short(detail: &str) -> String {
     let Some((stage, verdicts)) = detail.split_once(": ") else { return detail.to_owned() };
     let mut counted: Vec<(&str, usize)> = Vec::new();

@@ -212,8 +212,8 @@ fn tick_label(value: f64, step: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// Points in a row, broken where one is missing. Of those within the same `column` (a width, 0 for none) the lowest and the
-/// highest stay: more cannot be seen, and a sequence may have thousands of frames a column.
+/// Points in a row, broken where one is missing. Of those within the same `column` (a width, 0 for none) the lowest and
+/// the highest stay: more cannot be seen, and a sequence may have thousands of frames a column.
 fn parts(count: usize, column: f64, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
     let mut out: Vec<Vec<[f64; 2]>> = Vec::new();
     let (mut open, mut last, mut in_last) = (false, f64::NAN, 0);

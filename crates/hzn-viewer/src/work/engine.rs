@@ -1,5 +1,5 @@
-//! The thread that looks: it takes the newest wish, forgets older ones, and answers with a [`FrameView`]. While nothing is
-//! wished for it decodes the frames that will come next.
+//! The thread that looks: it takes the newest wish, forgets older ones, and answers with a [`FrameView`]. While nothing
+//! is wished for it decodes the frames that will come next.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -206,7 +206,8 @@ pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySenso
     let (own_w, own_h) = (u32::from(config.camera.width), u32::from(config.camera.height));
     if (w, h) != (own_w, own_h) {
         outcome.refused = Some(format!(
-            "the picture is {w} x {h} px, the sensor's camera {own_w} x {own_h}: open the sensor.toml of this camera, or set camera.width and height and scale focal lengths and centre with them"
+            "the picture is {w} x {h} px, the sensor's camera {own_w} x {own_h}: open the sensor.toml of this camera, \
+             or set camera.width and height and scale focal lengths and centre with them"
         ));
         return outcome;
     }

@@ -99,8 +99,8 @@ fn colours(picture: &Picture) -> Vec<Color32> {
     }
 }
 
-/// Each pixel by its value and full scale. A level is turned while one looks: so every value has its colour only once, and
-/// the room is there from the start.
+/// Each pixel by its value and full scale. A level is turned while one looks: so every value has its colour only once,
+/// and the room is there from the start.
 fn each(view: &ImageView<'_>, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
     fn all<P: Pixels>(p: &P, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
         let full = p.full_scale();

@@ -1,8 +1,8 @@
-//! The sensor alone, as small as it gets: one configuration in flash, one picture in external memory, one answer. What of
-//! this image is flash and RAM is what the `hzn` chain takes of a flight computer.
+//! The sensor alone, as small as it gets: one configuration in flash, one picture in external memory, one answer. What
+//! of this image is flash and RAM is what the `hzn` chain takes of a flight computer.
 //!
-//! `picture.bin` is the picture, 1920×1080 bytes. `answer.bin` is what it gave, little-endian: status, axis (3), covariance
-//! (xx, xy, xz, yy, yz, zz), words of which all but the first are singles, and the stack's high-water mark.
+//! `picture.bin` is the picture, 1920×1080 bytes. `answer.bin` is what it gave, little-endian: status, axis (3),
+//! covariance (xx, xy, xz, yy, yz, zz), words of which all but the first are singles, and the stack's high-water mark.
 
 #![no_std]
 #![no_main]

@@ -3,8 +3,8 @@
 //! Line: UART 0. Clock: timer 0. Watchdog: the board's, two seconds. What these boards lack, the machine that emulates
 //! them stands in for, by files in its working folder: `frames.bin` is the camera (for each picture "FRAM", its length,
 //! pictures lost before it, one spare word, little-endian; then its bytes; "HANG" instead is a camera that never comes
-//! back), `copy1.bin` and `copy2.bin` are the flash. With `cut.bin` (one word) power is cut after so many bytes written to
-//! flash.
+//! back), `copy1.bin` and `copy2.bin` are the flash. With `cut.bin` (one word) power is cut after so many bytes written
+//! to flash.
 
 #![no_std]
 #![no_main]

@@ -1,10 +1,10 @@
 //! Runs frames from a file of the host and writes what each gave: answers with every bit, and instructions by stage.
 //!
 //! `cases.bin`: for each case eight words (little-endian): "CASE", length of the parameter table, length of the frame,
-//! altitude and ECEF position as singles in metres (NaN: not given), one spare; then the table; then the frame, one byte
-//! a pixel. `results.bin`: for each case "DONE", the ticks of making the sensor, of `expect`, of the whole picture, of
-//! each of the eight stages (two words each, from a second, observed run), the stack's high-water mark, the length of the answer; then
-//! the answer.
+//! altitude and ECEF position as singles in metres (NaN: not given), one spare; then the table; then the frame, one
+//! byte a pixel. `results.bin`: for each case "DONE", the ticks of making the sensor, of `expect`, of the whole
+//! picture, of each of the eight stages (two words each, from a second, observed run), the stack's high-water mark, the
+//! length of the answer; then the answer.
 
 #![no_std]
 #![no_main]

@@ -21,12 +21,12 @@ use hzn_run::source::ending;
 
 /// Measure limb height and edge noise on the pictures of a flight
 ///
-/// The flight needs an altitude or a position for each picture (frames.csv, --altitude-km, body.altitude_km), and no truth.
-/// Each picture's limb tells how high it stands, because the altitude tells how large it should look; the residuals along it
-/// tell the edge noise. The report goes to stdout. `-o sensor.toml` writes the keys, with comments, into a copy of the
-/// sensor.toml; `-o report.html` writes plots of both. Nothing is written when the flight does not tell enough (fewer than 12
-/// answered pictures, too small a field of view), or when its pictures contradict each other: then the exit code is 1 and the
-/// message has the measured number.
+/// The flight needs an altitude or a position for each picture (frames.csv, --altitude-km, body.altitude_km), and no
+/// truth. Each picture's limb tells how high it stands, because the altitude tells how large it should look; the
+/// residuals along it tell the edge noise. The report goes to stdout. `-o sensor.toml` writes the keys, with comments,
+/// into a copy of the sensor.toml; `-o report.html` writes plots of both. Nothing is written when the flight does not
+/// tell enough (fewer than 12 answered pictures, too small a field of view), or when its pictures contradict each
+/// other: then the exit code is 1 and the message has the measured number.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A folder, a pattern in quotes, pictures, a video, or an MCAP

@@ -5,9 +5,11 @@ use hzn_calib::noise::Calibration;
 use super::text;
 use crate::plot::{Chart, Series, Style};
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 1rem;color:#222}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 \
+                     1rem;color:#222}\
 h1{font-size:1.5rem}td{padding:.2rem .8rem;border-bottom:1px solid #eee}\
-.plots{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}.plots svg{width:100%;height:auto}";
+.plots{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}.plots \
+svg{width:100%;height:auto}";
 
 pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str) -> anyhow::Result<String> {
     let rows: String = text::lines(calibration, pictures)
@@ -16,7 +18,8 @@ pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str) -> an
         .collect();
     let alarm = calibration.alarm().map(|a| format!("<p><b>{}</b></p>", escape(&a.to_string()))).unwrap_or_default();
     Ok(format!(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Limb height and noise</title><style>{STYLE}</style>\
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Limb height and \
+            noise</title><style>{STYLE}</style>\
          <h1>Limb height and noise: {}</h1>{alarm}<table>{rows}</table><div class=\"plots\">{}{}</div></html>\n",
         escape(flight),
         heights(calibration).svg()?,

@@ -55,16 +55,17 @@ pub enum Intrinsic {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Covariance {
-    /// The parameters of the rows and columns: `fx_px`, `fy_px`, `cx_px`, `cy_px`, and the coefficients by their names, `k1` to
-    /// `k4` of `kannala-brandt`, `k1, k2, p1, p2, k3` of `brown-conrady`. What is left out counts as known exactly.
+    /// The parameters of the rows and columns: `fx_px`, `fy_px`, `cx_px`, `cy_px`, and the coefficients by their names,
+    /// `k1` to `k4` of `kannala-brandt`, `k1, k2, p1, p2, k3` of `brown-conrady`. What is left out counts as known
+    /// exactly.
     pub order: heapless::Vec<Intrinsic, INTRINSICS>,
     /// The matrix row by row, symmetric and positive semidefinite, in px² and the coefficients' own unit.
     pub rows: heapless::Vec<heapless::Vec<f64, INTRINSICS>, INTRINSICS>,
 }
 
 section! {
-    /// `[camera]` of sensor.toml: the calibration. Pixel centres are at integers, x points right, y down, z forward, as in
-    /// OpenCV.
+    /// `[camera]` of sensor.toml: the calibration. Pixel centres are at integers, x points right, y down, z forward, as
+    /// in OpenCV.
     "camera" pub struct Config without defaults {
         /// Columns of the picture, px.
         @1 width: u16, serde(), [2.0 to 65535.0] { example: "1920" };
@@ -83,8 +84,8 @@ section! {
         @7 cy_px: f64, serde(), ["−1 to 2 times the height"] { example: "539.5" };
         /// Coefficients: k1 to k4 of `kannala-brandt`, or k1, k2, p1, p2, k3 of `brown-conrady`.
         ///
-        /// Coefficients that are left out are 0. The other models have none. The factor 1 of the first power of the angle
-        /// is not among them.
+        /// Coefficients that are left out are 0. The other models have none. The factor 1 of the first power of the
+        /// angle is not among them.
         @8 k: heapless::Vec<f64, 5>, serde(default), ["4 or 5 numbers; the lens is monotone"]
             { unset: "none", example: "[-0.055, 0.011, -0.0035, 0.0002]" };
         /// Radius of the image circle, degrees off the optical axis; pixels beyond it count as masked.
@@ -98,16 +99,16 @@ section! {
         /// 1σ of each coordinate of the principal point, px; it widens the covariance.
         @15 centre_sigma_px: f64, serde(default, skip_serializing_if = "is_zero"), [0.0 to 1e6]
             { unset: "0", example: "0.5" };
-        /// Covariance of the intrinsic parameters, which counts instead of the two sigmas; `order` names rows and columns
-        /// (`fx_px`, `fy_px`, `cx_px`, `cy_px`, `k1` ...), `rows` is the matrix.
+        /// Covariance of the intrinsic parameters, which counts instead of the two sigmas; `order` names rows and
+        /// columns (`fx_px`, `fy_px`, `cx_px`, `cy_px`, `k1` ...), `rows` is the matrix.
         @- covariance: Option<Covariance>, serde(default, skip_serializing_if = "Option::is_none"),
             ["symmetric, positive semidefinite"]
             { unset: "none", example: "{ order = [\"fx_px\", \"fy_px\"], rows = [[1.0, 0.9], [0.9, 1.0]] }" };
         /// Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,
         /// negative where the last row comes first.
         ///
-        /// It counts where the prior of a picture holds the camera's rate of rotation: the rays of each row are turned to
-        /// the time of the middle row.
+        /// It counts where the prior of a picture holds the camera's rate of rotation: the rays of each row are turned
+        /// to the time of the middle row.
         @16 readout_s: f64, serde(default, skip_serializing_if = "is_zero"), [-10.0 to 10.0]
             { unset: "0", example: "0.03" };
     }

@@ -172,8 +172,8 @@ impl<T: Real> Camera<T> {
     pub fn height(&self) -> u16 {
         self.height
     }
-    /// Largest angle off axis in use, radians: the image circle or the farthest corner; of `brown-conrady` 1 % of the radius
-    /// beyond the corner, which tangential terms move.
+    /// Largest angle off axis in use, radians: the image circle or the farthest corner; of `brown-conrady` 1 % of the
+    /// radius beyond the corner, which tangential terms move.
     pub fn theta_max_rad(&self) -> T {
         self.theta_max
     }
@@ -268,9 +268,9 @@ impl<T: Real> Camera<T> {
         [(p.u - self.cx) * self.inv_fx, (p.v - self.cy) * self.inv_fy]
     }
 
-    /// The direction of a point so far from the principal point, in focal lengths, also beyond the picture and the image
-    /// circle: a radial lens goes on as it ends there, up to 180° off axis, and others go on as a pinhole. `None` for
-    /// what is not finite.
+    /// The direction of a point so far from the principal point, in focal lengths, also beyond the picture and the
+    /// image circle: a radial lens goes on as it ends there, up to 180° off axis, and others go on as a pinhole. `None`
+    /// for what is not finite.
     #[cfg(feature = "horace")]
     pub(crate) fn continued(&self, [x, y]: [T; 2]) -> Option<UnitVec3<Cam, T>> {
         let rho2 = x * x + y * y;

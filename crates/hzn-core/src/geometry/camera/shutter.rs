@@ -1,8 +1,8 @@
 //! A rolling shutter: rows are exposed one after the other, while the camera turns.
 //!
-//! The picture's time is that of its middle row. A direction that stands still is seen at the ray s_t in the camera as it
-//! stands t later; with the camera's rate ω in its own axes it lies at exp([ω t]×) s_t in the camera of the picture's time,
-//! t = readout · (row/(h − 1) − ½). Rays are handed out in that camera.
+//! The picture's time is that of its middle row. A direction that stands still is seen at the ray s_t in the camera as
+//! it stands t later; with the camera's rate ω in its own axes it lies at exp([ω t]×) s_t in the camera of the
+//! picture's time, t = readout · (row/(h − 1) − ½). Rays are handed out in that camera.
 
 use super::{Camera, Ray, tangent};
 use crate::base::linalg::V3;
@@ -22,8 +22,8 @@ pub(super) struct Turning<T> {
 const LOOKS: usize = 4;
 
 impl<T: Real> Camera<T> {
-    /// This camera while it turns: rays and image points are those of the time of the middle row, where the rows have times
-    /// of their own. `rate_rad_s` is its rate of rotation against the stars or the ground in its own axes, rad/s.
+    /// This camera while it turns: rays and image points are those of the time of the middle row, where the rows have
+    /// times of their own. `rate_rad_s` is its rate of rotation against the stars or the ground in its own axes, rad/s.
     pub fn turning(&self, rate_rad_s: Option<[T; 3]>) -> Self {
         let turning = rate_rad_s
             .filter(|_| self.has_rolling_shutter())

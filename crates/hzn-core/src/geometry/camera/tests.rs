@@ -50,7 +50,8 @@ proptest! {
         let p = ImagePoint { u: fx * f64::from(config.width), v: fy * f64::from(config.height) };
         let h = 1e-3;
         let at = |du: f64, dv: f64| camera.unproject(ImagePoint { u: p.u + du, v: p.v + dv }).map(|d| d.xyz());
-        let (Some(ray), Some(r), Some(l), Some(d), Some(u)) = (camera.ray(p), at(h, 0.), at(-h, 0.), at(0., h), at(0., -h)) else {
+        let near = [at(h, 0.), at(-h, 0.), at(0., h), at(0., -h)];
+        let (Some(ray), [Some(r), Some(l), Some(d), Some(u)]) = (camera.ray(p), near) else {
             return Ok(());
         };
         let j = ray.jacobian();

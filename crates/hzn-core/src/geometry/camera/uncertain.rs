@@ -1,8 +1,8 @@
-//! What a wrong calibration does: 1-sigma modes of the intrinsic parameters, and how each parameter moves the image point of
-//! a ray.
+//! What a wrong calibration does: 1-sigma modes of the intrinsic parameters, and how each parameter moves the image
+//! point of a ray.
 //!
-//! Parameters are relative: focal lengths as parts of themselves, the principal point in focal lengths. In these units a
-//! part of the picture and a scaled one have the same numbers.
+//! Parameters are relative: focal lengths as parts of themselves, the principal point in focal lengths. In these units
+//! a part of the picture and a scaled one have the same numbers.
 
 use super::config::{Config, Intrinsic, Model};
 use super::{Camera, Lens};
@@ -108,8 +108,8 @@ impl<T: Real> Camera<T> {
         (!self.modes.is_empty()).then_some(&self.modes)
     }
 
-    /// How far the image point of the ray `s` moves, in pixels (u, v), when each parameter grows by 1, in the parameters'
-    /// relative units.
+    /// How far the image point of the ray `s` moves, in pixels (u, v), when each parameter grows by 1, in the
+    /// parameters' relative units.
     pub(crate) fn moves(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
         let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
         let h2 = s.x * s.x + s.y * s.y;

@@ -27,7 +27,8 @@ pub type Polygon = heapless::Vec<[f64; 2], MAX_CORNERS>;
 section! {
     /// `[mask]` of sensor.toml: parts of the vehicle in view.
     "mask" pub struct Config {
-        /// Areas that never count, as polygons of corners [x, y], px; nothing in them is lit, and their outline is no edge.
+        /// Areas that never count, as polygons of corners [x, y], px; nothing in them is lit, and their outline is no
+        /// edge.
         @- polygons_px: heapless::Vec<Polygon, MAX_POLYGONS> = heapless::Vec::new(),
             ["up to 8 polygons of 3 to 16 corners"]
             { unset: "none", example: "[[[1500, 0], [1919, 0], [1919, 1079], [1450, 1079]]]" };
@@ -110,7 +111,8 @@ impl<T: Real> Region<T> {
         Self { width, height, frame: 0, circle: None, polygons: heapless::Vec::new() }
     }
 
-    /// The region without a frame of `px` pixels along each side of the picture, which must be narrower than half of it.
+    /// The region without a frame of `px` pixels along each side of the picture, which must be narrower than half of
+    /// it.
     pub(crate) fn within(&self, px: u16) -> Self {
         Self { frame: px, ..self.clone() }
     }
@@ -212,7 +214,8 @@ impl<T: Real> Region<T> {
     pub(crate) fn has_mask(&self) -> bool {
         !self.polygons.is_empty()
     }
-    /// What it costs at most to see whether a pixel is masked, in the unit of [`crate::model::work`], which is four sides.
+    /// What it costs at most to see whether a pixel is masked, in the unit of [`crate::model::work`], which is four
+    /// sides.
     pub(crate) fn mask_cost(&self) -> u32 {
         self.polygons.iter().map(|p| 1 + p.corners.len() as u32 / 4).sum()
     }

@@ -10,7 +10,8 @@ use super::{
     PriorError, SUN_RADIUS_KM, shape,
 };
 
-/// An attitude that is known no better than this is worth no more than none: 30 degrees (book/theory/math.md, ellipsoid).
+/// An attitude that is known no better than this is worth no more than none: 30 degrees (book/theory/math.md,
+/// ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude that comes without one: 5 degrees.
 const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
@@ -27,8 +28,8 @@ pub struct Expected<T> {
     pub(crate) sin: T,
     /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
     pub(crate) sigma_cos: T,
-    /// 1-sigmas of the limb height that this comes of: of the limb itself, of the altitude, of the unknown radius, of clipping;
-    /// metres.
+    /// 1-sigmas of the limb height that this comes of: of the limb itself, of the altitude, of the unknown radius, of
+    /// clipping; metres.
     pub(crate) sigma_parts: [T; 4],
     /// What clipping adds to the height of a limb that is clipped all along, and its 1-sigma; metres.
     pub(crate) clipped_m: [T; 2],
@@ -36,10 +37,11 @@ pub struct Expected<T> {
     pub(crate) ellipsoid: Option<LimbCone<T>>,
     /// Prior attitude, camera to ECEF.
     pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
-    /// How the limb differs from the mean cone by azimuth about the axis: first and second harmonic of cos α, from north.
+    /// How the limb differs from the mean cone by azimuth about the axis: first and second harmonic of cos α, from
+    /// north.
     pub(crate) harmonics_cos: [T; 2],
-    /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct: because the azimuth of north is
-    /// unknown, or because the position is.
+    /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct: because the azimuth of north
+    /// is unknown, or because the position is.
     pub(crate) uneven_cos: [T; 2],
     /// Level that the picture before asks for, counts.
     pub(crate) level: Option<u16>,
@@ -221,11 +223,11 @@ impl<T: Real> Expected<T> {
         self.sigma_parts[0] * self.sin / (self.cos.max(T::from_f64(1e-6)) * (self.radius_m + self.limb_m))
     }
 
-    /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Full scale cuts its light off at 1/B
-    /// of the peak. Half of full scale then lies h ln B above half of the light; over the height h the air thins out to 1/e. B is
-    /// not known and differs along the limb. What differs counts as a first harmonic of the azimuth: between points
-    /// that are clipped and such that are not, part (1 − part) of the height squared; and of two ends whose heights differ
-    /// independently, each by σ, half the difference is σ/√2.
+    /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Full scale cuts its light
+    /// off at 1/B of the peak. Half of full scale then lies h ln B above half of the light; over the height h the air
+    /// thins out to 1/e. B is not known and differs along the limb. What differs counts as a first harmonic of the
+    /// azimuth: between points that are clipped and such that are not, part (1 − part) of the height squared; and of
+    /// two ends whose heights differ independently, each by σ, half the difference is σ/√2.
     pub(crate) fn clipped(&self, part: T) -> Self {
         if self.free || !(part > T::zero()) {
             return *self;
@@ -273,8 +275,8 @@ impl<T: Real> Expected<T> {
     }
 
     /// Limb height in metres that a measured cos α asks for at the expected altitude, and how it changes with cos α:
-    /// d = (R + H) sin α − R, ∂d/∂cos = −(R + H) cot α, m. With the body's limb raised to d, the expected half-angle is the
-    /// measured one. `None` when the half-angle says nothing about the distance.
+    /// d = (R + H) sin α − R, ∂d/∂cos = −(R + H) cot α, m. With the body's limb raised to d, the expected half-angle is
+    /// the measured one. `None` when the half-angle says nothing about the distance.
     pub fn limb_height_m(&self, cos: T) -> Option<(T, T)> {
         let sin = (T::one() - cos * cos).sqrt();
         if self.free || !(sin > T::zero() && cos > T::zero()) {

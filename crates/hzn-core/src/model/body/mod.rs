@@ -51,8 +51,8 @@ choices! {
     pub enum AltitudeReference {
         /// The WGS-84 ellipsoid, as satellite navigation gives it.
         ///
-        /// A local radius that differs from the mean one moves the camera with the surface, and shows in the half-angle by
-        /// only (H − d)/(R + H) of itself.
+        /// A local radius that differs from the mean one moves the camera with the surface, and shows in the half-angle
+        /// by only (H − d)/(R + H) of itself.
         @0 Ellipsoid = "ellipsoid";
         /// A sphere of 6371 km, such as orbit radius minus 6371 km; the local radius stays unknown by about 17 km (1σ).
         @1 Sphere = "sphere";
@@ -66,7 +66,8 @@ section! {
         @30 kind: Kind = Kind::Earth, [choice];
         /// Radius of a `sphere`, km; other bodies take none.
         @31 radius_km: Option<f64> = None, ["above 0, for `sphere` only"] { unset: "none", example: "1188.3" };
-        /// Altitude of the camera where a picture's prior gives none, km; above WGS-84 for `earth`, else above the radius.
+        /// Altitude of the camera where a picture's prior gives none, km; above WGS-84 for `earth`, else above the
+        /// radius.
         ///
         /// `sun` and `moon` do not use it. For a camera in orbit about the Moon the body is a `sphere` of 1737.4 km.
         @32 altitude_km: Option<f64> = None, [above 0.0] { unset: "none", example: "400.0" };
@@ -76,26 +77,27 @@ section! {
         @36 altitude_reference: AltitudeReference = AltitudeReference::Ellipsoid, [choice];
         /// Height of the visible limb above the surface, km; 17 km is a cloudless limb in sunlight at 550 nm.
         ///
-        /// It is the height at which the limb has half of its brightness. A value that is too high makes the expected cone
-        /// too wide.
+        /// It is the height at which the limb has half of its brightness. A value that is too high makes the expected
+        /// cone too wide.
         @34 limb_height_km: f64 = 17.0, [-50.0 to 500.0];
         /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds.
         ///
         /// Wavelengths: 24 km at 440 nm, 12 km at 650 nm. Thresholds: a quarter to three quarters of the limb's
         /// brightness. The larger the sigma, the less the expected half-angle counts.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
-        /// Height that overexposure adds to the limb, km; it counts by the part of the limb that is clipped at full scale.
+        /// Height that overexposure adds to the limb, km; it counts by the part of the limb that is clipped at full
+        /// scale.
         ///
-        /// Half of full scale lies h ln B above half of the light, where h = 7.5 km is the scale height of the air and the
-        /// light exceeds full scale by the factor B. The default is the mean for B from 1 to 8, even in ln B.
+        /// Half of full scale lies h ln B above half of the light, where h = 7.5 km is the scale height of the air and
+        /// the light exceeds full scale by the factor B. The default is the mean for B from 1 to 8, even in ln B.
         @37 clipped_height_km: f64 = 7.8, [0.0 to 500.0];
         /// 1σ of `clipped_height_km`, km; the height varies along the limb.
         @38 clipped_sigma_km: f64 = 4.5, [0.0 to 1e4];
-        /// Limb height by latitude instead of `limb_height_km`: rows of [geodetic latitude in degrees, height in km], with
-        /// rising latitudes.
+        /// Limb height by latitude instead of `limb_height_km`: rows of [geodetic latitude in degrees, height in km],
+        /// with rising latitudes.
         ///
-        /// It is for `earth` with a position. Heights are linear between rows and constant beyond them. Without an attitude
-        /// the variation along the limb widens the covariance.
+        /// It is for `earth` with a position. Heights are linear between rows and constant beyond them. Without an
+        /// attitude the variation along the limb widens the covariance.
         @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
         /// Whether only the sunlit part of the limb is a limb, where the direction to the Sun is known.
@@ -197,8 +199,8 @@ impl Config {
         self.kind == Kind::Sun
     }
 
-    /// Whether it is seen in the Sun's light, as far as is known: not where `sunlit = false` says that it shines by itself, as
-    /// in the thermal infrared.
+    /// Whether it is seen in the Sun's light, as far as is known: not where `sunlit = false` says that it shines by
+    /// itself, as in the thermal infrared.
     pub fn is_seen_in_sunlight(&self) -> bool {
         self.sunlit != Some(false) && self.kind != Kind::Sun
     }
@@ -216,8 +218,8 @@ pub struct Prior<T> {
     pub altitude_m: Option<T>,
     /// Position of the camera in ECEF, metres. It beats the altitude.
     pub position_m: Option<[T; 3]>,
-    /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction, and is a
-    /// gate where the position is known, see `select.max_attitude_sigma`.
+    /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction,
+    /// and is a gate where the position is known, see `select.max_attitude_sigma`.
     pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
     /// Level between dark and lit that the picture before asks for, in counts: its report's `next_level`, for
     /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) remembers it itself.
@@ -302,7 +304,8 @@ mod tests {
         for (latitude, height) in [(-90.0, 20.0), (-45.0, 22.5), (0.0, 25.0), (45.0, 32.5), (90.0, 40.0)] {
             assert_eq!(body.limb_height_km(latitude), height);
         }
-        // Where the height is linear in latitude, the limb to the north is as much higher as that to the south is lower.
+        // Where the height is linear in latitude, the limb to the north is as much higher as that to the south is
+        // lower.
         let sin = 66f64.to_radians().sin();
         let [mean, first, second] = body.limb_harmonics_km(45f64.to_radians(), sin);
         assert!(

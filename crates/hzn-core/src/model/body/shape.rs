@@ -9,8 +9,8 @@
 //! - the limb is uneven by a second harmonic of height with the amplitude ¾ k cos²φ cos²α.
 //!
 //! What remains is how latitudes are distributed. A polar orbit spends as much time at each, which leaves the radius
-//! widest open (RMS of P₂ 0.586, against 0.447 for places evenly distributed over the globe); places on the globe lie nearer
-//! to the equator, which leaves the second harmonic widest open (RMS of cos²φ 0.730, against 0.612).
+//! widest open (RMS of P₂ 0.586, against 0.447 for places evenly distributed over the globe); places on the globe lie
+//! nearer to the equator, which leaves the second harmonic widest open (RMS of cos²φ 0.730, against 0.612).
 
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M};
@@ -27,7 +27,8 @@ pub(super) fn radius_sigma_m<T: Real>(sin: T) -> T {
     (T::from_f64(3.0) * sin + T::one()) * T::from_f64(0.5 * K_M * RADIUS_RMS)
 }
 
-/// 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km, 1.3 km at 600 km.
+/// 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km, 1.3 km at 600
+/// km.
 pub(super) fn second_harmonic_m<T: Real>(sin: T) -> T {
     (T::one() - sin * sin) * T::from_f64(0.75 * K_M * SECOND_RMS)
 }

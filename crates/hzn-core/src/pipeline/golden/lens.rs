@@ -65,8 +65,8 @@ fn fitted(
     (fit.e, fit.c, budget)
 }
 
-/// The shift (δ₁₂, δc) that the other lens makes, against the lens term of the covariance, which is its outer product: the
-/// relative difference.
+/// The shift (δ₁₂, δc) that the other lens makes, against the lens term of the covariance, which is its outer product:
+/// the relative difference.
 fn difference(right: &CameraConfig, used: &CameraConfig, half_angle_deg: f64, towards: [f64; 3]) -> f64 {
     let exact = CameraConfig { focal_sigma_percent: 0.0, centre_sigma_px: 0.0, covariance: None, ..right.clone() };
     let (e0, c0, _) = fitted(&exact, &exact, half_angle_deg, towards);

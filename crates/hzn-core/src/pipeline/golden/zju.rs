@@ -214,7 +214,8 @@ proptest::proptest! {
                     proptest::prop_assert!((got.e.dot(&got.e).to_f64() - 1.0).abs() < 1e-5 && got.c.is_finite());
                     let expected = expected();
                     let noise = covariance::Config::default();
-                    if let Some(fused) = covariance::fuse(&blocks, &got, &expected, &noise, &fit::Config::default(), &camera, None) {
+                    let fused = covariance::fuse(&blocks, &got, &expected, &noise, &fit::Config::default(), &camera, None);
+                    if let Some(fused) = fused {
                         proptest::prop_assert!(fused.p.iter().all(|x| !x.to_f64().is_nan()), "{:?}", fused.p);
                     }
                 }
@@ -331,7 +332,10 @@ proptest::proptest! {
         for method in [consensus::Method::RansacPreverify, consensus::Method::Mlesac] {
             let mut blocks = blocks(&camera, &points, &direction([0.0, 0.0, 1.0]));
             let config = consensus::Config { method, max_draws: 300, ..consensus::Config::default() };
-            if let Some(found) = consensus::keep(&mut blocks, points.len() as u32, &expected(), 92.0, consensus::Threshold::told(&config), &config, &mut WorkBudget::unlimited()) {
+            let (count, threshold) = (points.len() as u32, consensus::Threshold::told(&config));
+            let mut work = WorkBudget::unlimited();
+            let found = consensus::keep(&mut blocks, count, &expected(), 92.0, threshold, &config, &mut work);
+            if let Some(found) = found {
                 proptest::prop_assert!((found.e.dot(&found.e) - 1.0).abs() < 1e-4 && found.c.is_finite());
             }
         }

@@ -5,11 +5,11 @@
 //! `contour` on go over runs and points as they go over a picture in memory: the same edges, the same points, the same
 //! answer. So the level must be known beforehand: it is `fixed`, or the one that the picture before gave.
 //!
-//! What is not in memory any more cannot be asked for. When runs or points do not fit, the picture ends with the last row
-//! that did, or pixels are left out evenly: `dropped` counts them. An edge so wide that its plateau is not within the rows
-//! held has the last of them for a plateau: `cut_points`. There is one look: `[recover]` does not count, a
-//! dark frame is not found, and a picture without an answer stays without one. The contrast that an edge's own mid-level needs
-//! is a part of full scale, as what the picture has is known only after its last row.
+//! What is not in memory any more cannot be asked for. When runs or points do not fit, the picture ends with the last
+//! row that did, or pixels are left out evenly: `dropped` counts them. An edge so wide that its plateau is not within
+//! the rows held has the last of them for a plateau: `cut_points`. There is one look: `[recover]` does not count, a
+//! dark frame is not found, and a picture without an answer stays without one. The contrast that an edge's own
+//! mid-level needs is a part of full scale, as what the picture has is known only after its last row.
 
 mod points;
 mod recent_rows;
@@ -42,8 +42,9 @@ pub const ROWS_HELD: u16 = 32;
 /// RowBuffers that must have come after a border pixel's before it is measured; not fewer are held before it.
 const AHEAD: u16 = 15;
 
-/// What a picture of passing rows needs besides a [`Workspace`]: `WINDOW` samples, [`ROWS_HELD`] times the width; `HEIGHT` rows;
-/// `TURNS` changes between dark and lit in a row, of all rows together; `POINTS` edge points of all edges together.
+/// What a picture of passing rows needs besides a [`Workspace`]: `WINDOW` samples, [`ROWS_HELD`] times the width;
+/// `HEIGHT` rows; `TURNS` changes between dark and lit in a row, of all rows together; `POINTS` edge points of all
+/// edges together.
 ///
 /// A new one is all zeros: in a `static` it takes no room in flash.
 #[derive(Debug)]
@@ -133,9 +134,9 @@ pub struct RowStream<'a, T, S> {
 impl<T: Real> Sensor<T> {
     /// Begins a picture whose rows will be given one by one, of samples with `bits` significant bits.
     ///
-    /// With the level `fixed` every picture has an answer. With every other method the level is `expected.level`, to which
-    /// the caller gives the last report's `next_level`; without one the status is `no-limb` at the first stage, with the
-    /// level for the next picture.
+    /// With the level `fixed` every picture has an answer. With every other method the level is `expected.level`, to
+    /// which the caller gives the last report's `next_level`; without one the status is `no-limb` at the first stage,
+    /// with the level for the next picture.
     ///
     /// # Errors
     /// No room, or a method that needs the whole picture.

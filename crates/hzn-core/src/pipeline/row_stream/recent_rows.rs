@@ -5,7 +5,8 @@ use core::cell::Cell;
 use super::ROWS_HELD;
 use crate::image::{Pixels, Sample};
 
-/// The last [`ROWS_HELD`] rows. Where others are asked for, the first or the last of them stands for them, which is counted.
+/// The last [`ROWS_HELD`] rows. Where others are asked for, the first or the last of them stands for them, which is
+/// counted.
 #[derive(Debug)]
 pub(super) struct RecentRows<'a, S> {
     samples: &'a mut [S],

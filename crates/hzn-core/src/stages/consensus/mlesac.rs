@@ -57,8 +57,8 @@ struct Mixture<T> {
 }
 
 impl<T: Real> Mixture<T> {
-    /// Of the inliers, at a squared distance; nothing beyond eight standard deviations, where numbers become too small to
-    /// be computed with at speed.
+    /// Of the inliers, at a squared distance; nothing beyond eight standard deviations, where numbers become too small
+    /// to be computed with at speed.
     #[inline]
     fn density(&self, d2: T) -> T {
         let z2 = d2 / (self.sigma * self.sigma);

@@ -27,15 +27,15 @@ use crate::model::work::{DRAW, SCORE, WorkBudget};
 choices! {
     /// How the inliers are found.
     pub enum Method {
-        /// RANSAC on two points with the expected half-angle (three points where that is too uncertain); a further point
-        /// verifies a draw before it is scored.
+        /// RANSAC on two points with the expected half-angle (three points where that is too uncertain); a further
+        /// point verifies a draw before it is scored.
         @0 TwoPoint = "two-point";
         /// Every point is an inlier.
         @1 None = "none";
         /// RANSAC on three points; every draw is scored with every point (Braun & Barf 2022, 3.6).
         @- Ransac = "ransac" needs "dlr";
-        /// RANSAC on five points, of which two verify the cone through the other three before it is scored (Wang et al. 2022,
-        /// 2.3); it needs about 20000 draws.
+        /// RANSAC on five points, of which two verify the cone through the other three before it is scored (Wang et al.
+        /// 2022, 2.3); it needs about 20000 draws.
         @- RansacPreverify = "ransac-preverify" needs "zju";
         /// RANSAC on three points by the likelihood of a mixture (Torr & Zisserman 2000).
         @- Mlesac = "mlesac" needs "zju";
@@ -49,10 +49,11 @@ section! {
         @80 method: Method = Method::TwoPoint, [choice];
         /// Largest distance of an inlier from the limb, px.
         @81 threshold_px: f64 = 3.0, [above 0.0 to 1000.0];
-        /// The largest distance is at least this many times the noise from point to point; 0 leaves it at `threshold_px`.
+        /// The largest distance is at least this many times the noise from point to point; 0 leaves it at
+        /// `threshold_px`.
         ///
-        /// It is at most the sigma of the limb height. A threshold that cuts into the noise keeps the points that happen to
-        /// lie near some limb. Two sigmas hold 95 % of a limb's points.
+        /// It is at most the sigma of the limb height. A threshold that cuts into the noise keeps the points that
+        /// happen to lie near some limb. Two sigmas hold 95 % of a limb's points.
         @84 noise_sigma: f64 = 2.0, [0.0 to 100.0];
         /// Seed of the random draws; the same seed gives the same answer.
         @82 seed: u32 = 1, [0.0 to 4294967295.0];
@@ -78,8 +79,8 @@ impl<T: Real> Threshold<T> {
     }
     /// The threshold for the first `count` points of the blocks, which are rays in the order of the edge.
     ///
-    /// Noise raises it to no more than the sigma of the limb's own height. The air spreads a limb no farther, so an edge
-    /// that scatters more belongs to something else.
+    /// Noise raises it to no more than the sigma of the limb's own height. The air spreads a limb no farther, so an
+    /// edge that scatters more belongs to something else.
     pub(crate) fn new(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
         let told = T::from_f64(config.threshold_px);
         let most = if expected.free { told } else { told.max(expected.limb_sigma_rad() * focal_px) };

@@ -121,8 +121,9 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         }
     }
 
-    /// With the contrast between the picture's dark and its lit pixels in counts: where it is a small part of full scale, as
-    /// in words of a thermal camera, an edge has less of it, too. Of bytes three counts are little in any case.
+    /// With the contrast between the picture's dark and its lit pixels in counts: where it is a small part of full
+    /// scale, as in words of a thermal camera, an edge has less of it, too. Of bytes three counts are little in any
+    /// case.
     pub(crate) fn contrasting(self, contrast: T) -> Self {
         let own = (contrast / T::from_i32(CONTRAST_PART)).to_i32();
         let least = if own > 0 && self.picture.full_scale() > 255 { own.max(LEAST_CONTRAST) } else { i32::MAX };
@@ -261,8 +262,8 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     }
 
     /// Looks around a pixel where more counts than the level: at the border, at the mask, on a search line, at home.
-    /// Every neighbour is looked at, also the dark ones that are known already. `home`: at the start again, the direction
-    /// whose dark neighbour closes the edge.
+    /// Every neighbour is looked at, also the dark ones that are known already. `home`: at the start again, the
+    /// direction whose dark neighbour closes the edge.
     #[inline(never)]
     fn look(&self, walk: &Walk, home: Option<u8>, marks: &mut Marks<'_>) -> Seen {
         let here = walk.at;

@@ -8,8 +8,8 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::model::work::{self, WorkBudget};
 
-/// Of a frame's pixels fewer than one in so many is lit, and of those next to it more than one in so many, of all around
-/// the picture: where an image circle leaves few of them, they tell nothing.
+/// Of a frame's pixels fewer than one in so many is lit, and of those next to it more than one in so many, of all
+/// around the picture: where an image circle leaves few of them, they tell nothing.
 const SPECKS: u32 = 64;
 const LIT: u32 = 8;
 /// Pixels between those that are looked at first: they tell of nearly every picture that it has none.

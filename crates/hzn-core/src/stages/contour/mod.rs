@@ -1,7 +1,8 @@
 //! Lazy border following: a pixel is compared with the level only when the search or the follower touches it.
 //!
-//! Edges begin at the border of the region, where dark turns to lit; they are followed until they leave the picture. Edges that close on themselves are found on horizontal search lines. So the cost grows
-//! with the length of the edges, not with the number of pixels.
+//! Edges begin at the border of the region, where dark turns to lit; they are followed until they leave the picture.
+//! Edges that close on themselves are found on horizontal search lines. So the cost grows with the length of the edges,
+//! not with the number of pixels.
 
 #[cfg(feature = "horace")]
 pub(crate) mod erode;

@@ -126,9 +126,9 @@ struct Border {
     cut: Option<At>,
 }
 
-/// Follows an outer border counter-clockwise as seen on the screen, once around or `most` pixels far, as long as `visit`
-/// says so; it gets every pixel, and whether it is no edge point because what the border faces there is the end of the
-/// region, or a mask. `None` when the steps are used up.
+/// Follows an outer border counter-clockwise as seen on the screen, once around or `most` pixels far, as long as
+/// `visit` says so; it gets every pixel, and whether it is no edge point because what the border faces there is the end
+/// of the region, or a mask. `None` when the steps are used up.
 fn follow<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     start: At,

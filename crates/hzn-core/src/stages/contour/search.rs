@@ -107,7 +107,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         stretch
     }
 
-    /// How many times `stride` pixels can be passed over from number `k` of a run and what is there is lit, or dark, as it.
+    /// How many times `stride` pixels can be passed over from number `k` of a run and what is there is lit, or dark, as
+    /// it.
     #[inline(always)]
     fn leaps(&self, run: &Run, k: u16, stride: u16, lit: bool) -> u16 {
         let Pixel { x, y } = run.at(k);
@@ -191,8 +192,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     }
 
     /// Calls `found` with every unmarked lit pixel of a search line, from column `x0` to `x1` of row `y`, whose western
-    /// neighbour is dark, until it says to stop. `found` gets the marks back, for the follower. Gives how often the line
-    /// was lit after dark.
+    /// neighbour is dark, until it says to stop. `found` gets the marks back, for the follower. Gives how often the
+    /// line was lit after dark.
     pub(crate) fn each_crossing<'m>(
         &self,
         y: u16,
@@ -218,8 +219,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         crossings
     }
 
-    /// Of the `count` pixels east of column `x` of row `y`, how many are lit as that one, or dark as it, before the first
-    /// that is not.
+    /// Of the `count` pixels east of column `x` of row `y`, how many are lit as that one, or dark as it, before the
+    /// first that is not.
     #[inline(never)]
     fn alike_beyond(&self, x: u16, y: u16, count: u16) -> u16 {
         let index = self.picture.index(x, y);

@@ -1,10 +1,10 @@
 //! Edges of the whole picture by Sobel's gradient (Wang et al. 2022, 2.1).
 //!
-//! Every pixel's gradient is looked at, and every edge of the picture is in one list, whatever it belongs to: rejection is
-//! left to the sampler. An edge pixel has a gradient of more than twice the root mean square of all, as the automatic
-//! threshold of common tools, and no larger one beside it along the axis on which it is larger. A limb is found even
-//! where one level does not part ground from sky. To give the points an order along the limb they are sorted about the
-//! centre of the circle through all of them, from the widest gap on.
+//! Every pixel's gradient is looked at, and every edge of the picture is in one list, whatever it belongs to: rejection
+//! is left to the sampler. An edge pixel has a gradient of more than twice the root mean square of all, as the
+//! automatic threshold of common tools, and no larger one beside it along the axis on which it is larger. A limb is
+//! found even where one level does not part ground from sky. To give the points an order along the limb they are sorted
+//! about the centre of the circle through all of them, from the widest gap on.
 
 use super::BinaryPicture;
 use super::order::about_their_circle;
@@ -96,7 +96,8 @@ fn gradient<T: Real, P: Pixels, O: Observer<T>>(
     Some(((ne + 2 * e + se) - (nw + 2 * w + sw), (sw + 2 * s + se) - (nw + 2 * n + ne)))
 }
 
-/// Whether the gradient is no smaller than those beside it along the axis on which it is larger; of two alike the first.
+/// Whether the gradient is no smaller than those beside it along the axis on which it is larger; of two alike the
+/// first.
 fn is_largest<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: u16,

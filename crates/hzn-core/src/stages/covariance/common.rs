@@ -10,14 +10,14 @@
 //! | unknown azimuth | cos kφ and sin kφ of the azimuth φ about the axis, k = 1, 2 |
 //! | lens | g·∂u/∂p, the pixel's move for an intrinsic parameter p |
 //!
-//! Of the azimuth: the limb of an ellipsoid differs from its mean cone by a second harmonic, one whose height varies with
-//! latitude also by a first. Unless an attitude tells where north is, the phase is anything: with the amplitude a the
-//! residuals hold a cos(kφ + ψ), ψ evenly distributed, so that each of the two signals counts with a²/2. Around the whole
-//! limb the second harmonic leaves nothing behind, on a short arc nearly all of it is taken for a tilt or another
+//! Of the azimuth: the limb of an ellipsoid differs from its mean cone by a second harmonic, one whose height varies
+//! with latitude also by a first. Unless an attitude tells where north is, the phase is anything: with the amplitude a
+//! the residuals hold a cos(kφ + ψ), ψ evenly distributed, so that each of the two signals counts with a²/2. Around the
+//! whole limb the second harmonic leaves nothing behind, on a short arc nearly all of it is taken for a tilt or another
 //! half-angle: which, the visible arc tells.
 //!
-//! The signals vary slowly along the limb: a part of the points is fitted in their place, with its own normal equations, so
-//! that a signal which the cone can follow comes out whole.
+//! The signals vary slowly along the limb: a part of the points is fitted in their place, with its own normal
+//! equations, so that a signal which the cone can follow comes out whole.
 
 use super::noise::Levels;
 use super::{Term, response};

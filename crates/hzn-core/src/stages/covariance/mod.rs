@@ -6,8 +6,8 @@
 //! c₁ = b₁ and c_{j+1} = ρ_j c_j + b_{j+1}, X = Σ (1 − ρ_j²) c_j c_jᵀ, the last ρ being 0. Taking the errors for
 //! independent instead would give a sigma some twenty times too small.
 //!
-//! R and L are told, or come from the residuals ([`Noise`]). Errors that all points of the edge share show in no residual,
-//! and each adds its own term; the expected half-angle is fused last.
+//! R and L are told, or come from the residuals ([`Noise`]). Errors that all points of the edge share show in no
+//! residual, and each adds its own term; the expected half-angle is fused last.
 
 #[cfg(feature = "dlr")]
 pub(crate) mod braun_barf;
@@ -56,8 +56,8 @@ pub(crate) struct EdgeNoise<T> {
     pub(crate) length_px: T,
 }
 
-/// Covariance of the fit from every source of error, never below the told values'; then the expected half-angle is fused.
-/// Leaves each source's part in `budget`.
+/// Covariance of the fit from every source of error, never below the told values'; then the expected half-angle is
+/// fused. Leaves each source's part in `budget`.
 pub(crate) fn fuse<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
@@ -93,8 +93,8 @@ pub(crate) fn fuse<T: Real>(
     fused(fit, &p, edge, expected, estimate, budget)
 }
 
-/// The linear map from Σ w h x, about the means, to the errors (δ₁₂, δc) that the signal x in the residuals makes: T N⁻¹ with
-/// T = [[I, 0], [mᵀ, 1]], or, with the half-angle held, the inverse of the upper block, which leaves δc at 0.
+/// The linear map from Σ w h x, about the means, to the errors (δ₁₂, δc) that the signal x in the residuals makes: T
+/// N⁻¹ with T = [[I, 0], [mᵀ, 1]], or, with the half-angle held, the inverse of the upper block, which leaves δc at 0.
 pub(crate) fn response<T: Real>(sums: &fit::Sums<T>, [m1, m2]: [T; 2], free: bool) -> Option<M3<T>> {
     let (one, zero) = (T::one(), T::ZERO);
     if free {

@@ -7,10 +7,10 @@ use crate::geometry::block::Block;
 use crate::model::body::Expected;
 use crate::stages::fit::Fit;
 
-/// With `rms` the correlation length is the length of the edge over this. The fit takes up the longest wavelengths of the
-/// errors (shift, tilt, bend of the whole edge); the residuals show the shorter ones, best those of about half the edge. The
-/// spectrum of a Gauss-Markov process is flat above the wavelength 2πL, which is 0.52 edges for a twelfth of the edge: the
-/// wavelengths that the fit takes up are assumed to be as strong as the longest that the residuals show.
+/// With `rms` the correlation length is the length of the edge over this. The fit takes up the longest wavelengths of
+/// the errors (shift, tilt, bend of the whole edge); the residuals show the shorter ones, best those of about half the
+/// edge. The spectrum of a Gauss-Markov process is flat above the wavelength 2πL, which is 0.52 edges for a twelfth of
+/// the edge: the wavelengths that the fit takes up are assumed to be as strong as the longest that the residuals show.
 const LENGTHS_PER_EDGE: f64 = 12.0;
 
 /// The correlation length that an edge's own residuals are taken to have, pixels.

@@ -6,10 +6,10 @@
 //!
 //! −2 ℓ = (n − 3) ln(q/(n − 3)) + ln|V/σ²| + ln|Hᵀ(V/σ²)⁻¹H|, σ² = q/(n − 3),
 //!
-//! q the generalised least squares' sum of squares. A scalar Kalman filter along the edge with the columns (r, H) gives all
-//! of it in one pass. The likelihood of one picture says little about L (a tenth to ten times are alike), so that the
-//! covariance is averaged over the posterior with ln L ~ N(ln(arc/4), 0.7²): a flat prior makes a disc's sigma three times
-//! too large, and a process without a white part picks a few pixels.
+//! q the generalised least squares' sum of squares. A scalar Kalman filter along the edge with the columns (r, H) gives
+//! all of it in one pass. The likelihood of one picture says little about L (a tenth to ten times are alike), so that
+//! the covariance is averaged over the posterior with ln L ~ N(ln(arc/4), 0.7²): a flat prior makes a disc's sigma
+//! three times too large, and a process without a white part picks a few pixels.
 
 use super::correlated;
 use crate::base::linalg::{basis, invert_spd3};
@@ -41,8 +41,8 @@ pub struct Likelihood {
     pub freedoms: f64,
 }
 
-/// Restricted likelihood of the correlation length (pixels, above 0) and the white part ν (0 to 1). `None` when there are
-/// too few rows or the columns do not tell the three parameters apart.
+/// Restricted likelihood of the correlation length (pixels, above 0) and the white part ν (0 to 1). `None` when there
+/// are too few rows or the columns do not tell the three parameters apart.
 pub fn likelihood(rows: impl IntoIterator<Item = Row>, length_px: f64, white: f64) -> Option<Likelihood> {
     let alike = 1.0 - white;
     // The correlated part's estimate for each column, and its variance.
@@ -115,8 +115,8 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// Of the rows of an edge of the length `arc_px`, whose residuals have the given RMS. Variances lie between `floor_px` and
-    /// twice the RMS, squared. `None` as of [`likelihood`].
+    /// Of the rows of an edge of the length `arc_px`, whose residuals have the given RMS. Variances lie between
+    /// `floor_px` and twice the RMS, squared. `None` as of [`likelihood`].
     pub fn new<R: IntoIterator<Item = Row>>(
         rows: impl Fn() -> R,
         arc_px: f64,

@@ -28,15 +28,16 @@ use crate::stages::contour::BinaryPicture;
 choices! {
     /// How a border pixel becomes an edge point.
     pub enum SubPixel {
-        /// The point is where the brightness crosses the middle between the plateaus on both sides, in three rows smoothed
-        /// along the edge.
+        /// The point is where the brightness crosses the middle between the plateaus on both sides, in three rows
+        /// smoothed along the edge.
         ///
-        /// The Sun blooms into a glare that is no plateau: its edge point is where the brightness crosses the threshold.
+        /// The Sun blooms into a glare that is no plateau: its edge point is where the brightness crosses the
+        /// threshold.
         @0 Linear = "linear";
         /// The point is the border pixel's centre, moved half a pixel to the dark side.
         @1 None = "none";
-        /// A blurred step is fitted to 7×7 pixels between the means of the plateaus: the best accuracy, at about a hundred
-        /// times the cost.
+        /// A blurred step is fitted to 7×7 pixels between the means of the plateaus: the best accuracy, at about a
+        /// hundred times the cost.
         @- Erf = "erf" needs "erf";
         /// Zernike moments of 7×7 pixels locate a step across a disc (Wang et al. 2022).
         @- Zernike = "zernike" needs "zju";
@@ -48,8 +49,8 @@ section! {
     "candidates" pub struct Config: Copy {
         /// Shortest edge, border pixels; a small body or picture needs fewer.
         ///
-        /// For a small disc, half of its circumference in pixels is enough; in a picture of fewer than 80 rows or columns,
-        /// half of its shorter side.
+        /// For a small disc, half of its circumference in pixels is enough; in a picture of fewer than 80 rows or
+        /// columns, half of its shorter side.
         @70 min_points: u16 = 40, [8.0 or more];
         /// Points kept per edge, evenly along it; 0 keeps all that fit into memory.
         ///
@@ -77,8 +78,8 @@ const WIDEST: i32 = 6;
 const MARGIN: i32 = REACH + 3;
 /// Where an edge that is no wider than four pixels has faded to half of the level, pixels.
 const FADED: i32 = 3;
-/// A plateau is clipped when it is within this part of full scale below it, which is room for what JPEG makes of one. A bright one
-/// with noise seldom comes so near.
+/// A plateau is clipped when it is within this part of full scale below it, which is room for what JPEG makes of one. A
+/// bright one with noise seldom comes so near.
 const CLIPPED_PART: i32 = 128;
 /// Farther than an edge point can stand from its border pixel, pixels.
 const FARTHEST: i32 = 1024;
@@ -315,8 +316,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O,
     }
 }
 
-/// The pixel at column `x`, row `y`, which stands at `index`; `None` beyond the region and under the mask. `FREE`: it is
-/// known to be within and unmasked.
+/// The pixel at column `x`, row `y`, which stands at `index`; `None` beyond the region and under the mask. `FREE`: it
+/// is known to be within and unmasked.
 #[inline(always)]
 fn read<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -414,9 +415,9 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
         let part = T::from_i32(inner - level4) / T::from_i32((inner - outer).max(1));
         return (inner > outer).then(|| EdgePoint::plain(point_off(p, (dx, dy), part), lit));
     }
-    // The edge fades over level / gradient pixels; at the top of a narrow one the gradient says less than how soon it is dark.
-    // A step is half of that, so that air seen from a rocket is read to where it ends; but of haze through a long lens, below
-    // which the clouds begin, only a fifth.
+    // The edge fades over level / gradient pixels; at the top of a narrow one the gradient says less than how soon it
+    // is dark. A step is half of that, so that air seen from a rocket is read to where it ends; but of haze through a
+    // long lens, below which the clouds begin, only a fifth.
     let steep = gradient.0.abs().max(gradient.1.abs());
     let line = Line::new(&around, (dx, dy), 1);
     if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
@@ -439,8 +440,8 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
 /// Most times that a profile is read again from where it crosses.
 const CLIMBS: u32 = 4;
 
-/// A profile that still grows brighter where it was read to has no plateau there, and its middle moves with the level that
-/// led to its border: it is read again about its crossing, until that is its middle.
+/// A profile that still grows brighter where it was read to has no plateau there, and its middle moves with the level
+/// that led to its border: it is read again about its crossing, until that is its middle.
 #[inline(never)]
 fn climb<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -579,8 +580,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         }
     }
 
-    /// Steps from the border pixel to the crossing of the mid-level; also whether the global level had to stand in for it.
-    /// From the smoothed brightness one step to the lit side, here, and one step to the dark side.
+    /// Steps from the border pixel to the crossing of the mid-level; also whether the global level had to stand in for
+    /// it. From the smoothed brightness one step to the lit side, here, and one step to the dark side.
     #[inline(always)]
     fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3]) -> Option<Crossing<T>> {
         let binary = self.around.binary;
@@ -596,7 +597,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         } else {
             return None;
         };
-        // The crossing next to the border pixel: outwards from it while lit, else inwards. `a` at k is lit, `b` at k + 1 not.
+        // The crossing next to the border pixel: outwards from it while lit, else inwards. `a` at k is lit, `b` at k +
+        // 1 not.
         let (mut k, mut a, mut b) =
             if 2 * first_lit >= mid2 { (0, first_lit, first_dark) } else { (-1, inside, first_lit) };
         while 2 * b >= mid2 {

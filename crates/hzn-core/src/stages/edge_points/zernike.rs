@@ -3,8 +3,8 @@
 //! For a step of height k at distance l from the centre of the unit disc, the moments turned to the edge's direction
 //! are A₁₁ = (2k/3)(1 − l²)^(3/2) and A₂₀ = l A₁₁, so the edge lies at l = A₂₀/A₁₁ along the direction of A₁₁. The limb
 //! is no step but a ramp, which pulls the point towards the centre of the patch. As with Wang et al. the patch stands
-//! on the pixel with the largest of Sobel's gradients, so that the edge and with it the bias are small; beyond a blur of
-//! about 1.5 px `linear` is better.
+//! on the pixel with the largest of Sobel's gradients, so that the edge and with it the bias are small; beyond a blur
+//! of about 1.5 px `linear` is better.
 
 use super::patch::{Patch, SIDE, brightness};
 use crate::base::real::Real;

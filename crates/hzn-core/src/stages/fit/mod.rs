@@ -1,10 +1,10 @@
 //! Gauss-Newton on the sphere: the cone s·e = cos α through the edge points.
 //!
 //! State: the unit axis e and k = 1 − cos α, which keeps its digits for a small disc where cos α does not; for the same
-//! reason 1 − s·e is formed as |s − e|²/2. In what follows c = cos α. For each point r = c − s·e is the residual, g = ∂(s·e)/∂(u, v), and |r|/|g|
-//! the distance from the limb in pixels, so w = 1/|g|² weighs by pixels. With h = [Bᵀs − m, −1], B the tangent basis
-//! at e and m the mean of Bᵀs, a step solves (Σ w h hᵀ) δ = Σ w r h. Subtracting the means keeps the sums
-//! well-conditioned in single precision; the third unknown then is δc' = δc − m·δ₁₂.
+//! reason 1 − s·e is formed as |s − e|²/2. In what follows c = cos α. For each point r = c − s·e is the residual, g =
+//! ∂(s·e)/∂(u, v), and |r|/|g| the distance from the limb in pixels, so w = 1/|g|² weighs by pixels. With h = [Bᵀs − m,
+//! −1], B the tangent basis at e and m the mean of Bᵀs, a step solves (Σ w h hᵀ) δ = Σ w r h. Subtracting the means
+//! keeps the sums well-conditioned in single precision; the third unknown then is δc' = δc − m·δ₁₂.
 //!
 //! The expected half-angle enters the robust iterations as one more row, weighed against the edge's *correlated*
 //! errors. With the weights so found the half-angle is then fitted freely, for the covariance, for the altitude
@@ -34,8 +34,8 @@ pub(crate) use quadric::Quadric;
 choices! {
     /// Which half-angle the fitted cone has.
     pub enum HalfAngle {
-        /// The half-angle is fitted freely, then fused with the expected one by their covariances; the result is never worse
-        /// than the better of the two.
+        /// The half-angle is fitted freely, then fused with the expected one by their covariances; the result is never
+        /// worse than the better of the two.
         @0 Fused = "fused";
         /// The half-angle is the expected one, exactly.
         @1 Known = "known";
@@ -69,8 +69,8 @@ section! {
         @- method: Method = Method::Sphere, [choice];
         /// Which half-angle the fitted cone has.
         @90 half_angle: HalfAngle = HalfAngle::Fused, [choice];
-        /// For `wtls`: points are weighed where the axis is farther off the optical axis than this, degrees; 0 always weighs
-        /// them.
+        /// For `wtls`: points are weighed where the axis is farther off the optical axis than this, degrees; 0 always
+        /// weighs them.
         @- weigh_above_deg: f64 = 0.0, [0.0 to 180.0] { needs: "zju" };
     }
 }
@@ -368,7 +368,8 @@ fn robust<T: Real>(
         at.k = clamp(at.k);
         let spread = (sums.cost / sums.weight.max(T::from_f64(1e-20))).sqrt() * T::from_f64(1.2);
         let next = (spread * T::from_f64(TUKEY)).max(narrowest).min(widest);
-        // Over all points a step leaves a small part of itself to the next; over some of them it is as good as they are.
+        // Over all points a step leaves a small part of itself to the next; over some of them it is as good as they
+        // are.
         let small = T::from_f64(if every == 1 { 5e-4 } else { 1e-4 });
         let settled = (next - cutoff).abs() < cutoff * T::from_f64(0.05) && size < small * at.sin();
         cutoff = next;
@@ -388,8 +389,8 @@ fn robust<T: Real>(
 }
 
 /// Iterations with the weights kept, to the end, and the normal equations there with the means they are about. `None`
-/// when the points do not determine the cone: for a free half-angle, when the arc is too short. `first`: the sums at the
-/// start, where they are known.
+/// when the points do not determine the cone: for a free half-angle, when the arc is too short. `first`: the sums at
+/// the start, where they are known.
 fn settle<T: Real>(
     blocks: &mut [Block<T>],
     start: State<T>,

@@ -4,9 +4,9 @@
 //! 22). With e = (x², xy, y², xz, yz, 1), where 1 stands for x² + y² + z², this is e·v = 0:
 //! M₁₁ = v₁ + v₆, M₂₂ = v₃ + v₆, M₃₃ = v₆, M₁₂ = v₂/2, M₁₃ = v₄/2, M₂₃ = v₅/2.
 //!
-//! * `tls` (10-17): the v of length 1 with the least Σ (e·v)², which is the right singular vector of the smallest singular
-//!   value. Wang et al. divide by v₆ to have five unknowns, which fails for M₃₃ → 0, a limb through the image centre;
-//!   the vector itself is their solution wherever they have one.
+//! * `tls` (10-17): the v of length 1 with the least Σ (e·v)², which is the right singular vector of the smallest
+//!   singular value. Wang et al. divide by v₆ to have five unknowns, which fails for M₃₃ → 0, a limb through the image
+//!   centre; the vector itself is their solution wherever they have one.
 //! * `wtls` (18-21): every point's error weighed by what a pixel is to it, that is the least Σ (e·v)²/q with
 //!   q = |∂(e·v)/∂(u, v)|². Their cofactor matrix has (5n)² elements; the points are independent, so that it falls
 //!   apart into one block a point, and each iteration is one pass: least squares of the rows e − δ with

@@ -7,8 +7,8 @@ use crate::geometry::frames::{Cam, UnitVec3};
 use crate::model::body::Expected;
 use crate::model::verdict::Verdict;
 
-/// `Passed`, `Attitude` where the axis is farther from the one that the prior attitude and the position lead to than both
-/// sigmas allow, or `Rate` where it is farther from the last answer than the vehicle can have turned.
+/// `Passed`, `Attitude` where the axis is farther from the one that the prior attitude and the position lead to than
+/// both sigmas allow, or `Rate` where it is farther from the last answer than the vehicle can have turned.
 pub(super) fn verdict<T: Real>(e: &V3<T>, sigma_max_rad: T, expected: &Expected<T>, config: &Config) -> Verdict {
     let off = |other: &V3<T>| UnitVec3::<Cam, T>::assume_unit(*e).angle_rad(&UnitVec3::assume_unit(*other));
     let within = |limit: T, sigma: T| (sigma * sigma + sigma_max_rad * sigma_max_rad).sqrt() * limit;

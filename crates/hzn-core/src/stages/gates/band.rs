@@ -23,8 +23,8 @@ const FOR_GOOD: [usize; 2] = [2, 3];
 /// Of the limb's step so much stands above the sky at the most where there is sky again: blur and stray light.
 const SKY_PART: f64 = 0.1;
 
-/// The part of the looks inwards that come back to the sky across a second edge, at least `step` times as high as the limb,
-/// 0 to 1. A terminator fades and is no edge. `disc_px` is the diameter of the body's disc.
+/// The part of the looks inwards that come back to the sky across a second edge, at least `step` times as high as the
+/// limb, 0 to 1. A terminator fades and is no edge. `disc_px` is the diameter of the body's disc.
 pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],

@@ -123,11 +123,13 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     }
 }
 
-/// Whether the edge goes on beside the cone, where it keeps its contrast: smoothly over more than `select.max_departure` of
-/// the longest run of inliers, or at all, where less than `select.min_support_abrupt` of the limb in view is edge.
-/// `noise_px` is the noise from point to point, `support` the part of the limb in view that is edge.
+/// Whether the edge goes on beside the cone, where it keeps its contrast: smoothly over more than
+/// `select.max_departure` of the longest run of inliers, or at all, where less than `select.min_support_abrupt` of the
+/// limb in view is edge. `noise_px` is the noise from point to point, `support` the part of the limb in view that is
+/// edge.
 ///
-/// Smooth is a turn from box to box of less than `select.departure_turn_deg` and what the noise of the boxes' places makes.
+/// Smooth is a turn from box to box of less than `select.departure_turn_deg` and what the noise of the boxes' places
+/// makes.
 pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     blocks: &[Block<T>],
     points: u32,

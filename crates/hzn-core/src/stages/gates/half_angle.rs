@@ -8,13 +8,13 @@ use crate::model::body::Expected;
 use crate::stages::covariance::{self, Fused};
 use crate::stages::fit::Fit;
 
-/// Whether the half-angles differ by more than the residuals allow: an edge that is told to be rough and is smooth says more
-/// of its own curvature than its told noise admits.
+/// Whether the half-angles differ by more than the residuals allow: an edge that is told to be rough and is smooth says
+/// more of its own curvature than its told noise admits.
 ///
 /// (c₀ − ĉ)² / (P₃₃ + σ_c² + what else was told), where P₃₃ has the RMS of the residuals, `select.residual_floor_px` at
-/// least, alike over the length that the edge itself tells ([`covariance::measured_length_px`]). P₃₃ grows with the square
-/// of the first and at most in proportion to the second; the points are gone through once more only where that bound does
-/// not settle it.
+/// least, alike over the length that the edge itself tells ([`covariance::measured_length_px`]). P₃₃ grows with the
+/// square of the first and at most in proportion to the second; the points are gone through once more only where that
+/// bound does not settle it.
 pub(super) fn disagrees<T: Real>(
     fit: &Fit<T>,
     fused: &Fused<T>,

@@ -41,8 +41,8 @@ section! {
             unset: "a tenth of the diagonal, or a third of the body's circumference if less",
             example: "60.0",
         };
-        /// Largest weighted RMS distance of the inliers from the limb, px; it grows as `reject.noise_sigma` raises the largest
-        /// distance of an inlier.
+        /// Largest weighted RMS distance of the inliers from the limb, px; it grows as `reject.noise_sigma` raises the
+        /// largest distance of an inlier.
         @112 max_rms_px: f64 = 2.0, [above 0.0];
         /// Largest difference between the fitted and the expected half-angle, in standard deviations.
         @113 max_half_angle_sigma: f64 = 3.0, [above 0.0];
@@ -58,12 +58,13 @@ section! {
         @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
         /// Smallest part of an edge's points that must be inliers.
         ///
-        /// With one point in 20, three pixels of threshold and a cone that is free to turn, a curve passes through clutter by
-        /// chance.
+        /// With one point in 20, three pixels of threshold and a cone that is free to turn, a curve passes through
+        /// clutter by chance.
         @- min_inlier_share: f64 = 0.05, [0.0 to 1.0];
         /// Largest number of points close to the fitted limb that are no inliers, as a part of the inliers.
         ///
-        /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has others close to it.
+        /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has others close
+        /// to it.
         @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
         /// An edge lies on the limb as a whole where at least this part of its points are inliers; 0 checks no edge for
         /// `max_way`.
@@ -72,14 +73,16 @@ section! {
         ///
         /// A cloud's edge winds, and a part of it may lie on a limb by chance.
         @- max_way: f64 = 3.0, [1.0 to 1e6];
-        /// For the Sun: smallest part of the fitted limb in view that edge points must cover, where `min_support` is above 0.
+        /// For the Sun: smallest part of the fitted limb in view that edge points must cover, where `min_support` is
+        /// above 0.
         ///
         /// The Sun is a whole disc; a gibbous Moon shows less.
         @- min_support_whole: f64 = 0.7, [0.0 to 1.0];
-        /// Largest residual of the cone over that of a circle of the image or of four straight pieces; 1e6 turns the gate off.
+        /// Largest residual of the cone over that of a circle of the image or of four straight pieces; 1e6 turns the
+        /// gate off.
         ///
-        /// Lens flares are circles of the image; an iris and a vehicle have straight edges. Where residuals are noise the
-        /// ratio is about 1. A ratio of 2 stands for a likelihood of 4 to the power of half the independent points.
+        /// Lens flares are circles of the image; an iris and a vehicle have straight edges. Where residuals are noise
+        /// the ratio is about 1. A ratio of 2 stands for a likelihood of 4 to the power of half the independent points.
         @- max_rival_ratio: f64 = 2.0, [1.0 to 1e6];
         /// Evidence for the limb over a straight line, and largest evidence for a rival shape over the limb: twice the
         /// logarithm of the likelihood ratio; −1e6 turns the gate off.
@@ -90,19 +93,19 @@ section! {
         ///
         /// Sampling and interpolation leave about this residual of a perfect edge.
         @- rival_floor_px: f64 = 0.03, [above 0.0 to 1e4];
-        /// Smallest noise of an edge in the gate of the half-angle, where its residuals are smaller than the told noise, px; 1e4
-        /// leaves the gate to the told noise.
+        /// Smallest noise of an edge in the gate of the half-angle, where its residuals are smaller than the told
+        /// noise, px; 1e4 leaves the gate to the told noise.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
-        /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6 turns
-        /// the gate off.
+        /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
+        /// turns the gate off.
         ///
         /// A continuation counts where it keeps its contrast, see `departure_contrast`.
         @- max_departure: f64 = 0.2, [0.0 to 1e6];
-        /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb with its contrast
-        /// kept; 0 turns the gate off.
+        /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb with
+        /// its contrast kept; 0 turns the gate off.
         ///
-        /// The corner of an iris and the crossing of two flares end an edge like that. The default is 0, because 0.7 also
-        /// refuses half-lit discs and crescents.
+        /// The corner of an iris and the crossing of two flares end an edge like that. The default is 0, because 0.7
+        /// also refuses half-lit discs and crescents.
         @- min_support_abrupt: f64 = 0.0, [0.0 to 1.0];
         /// Largest turn between two lengths of 16 px of edge that counts as smooth, degrees.
         ///
@@ -112,13 +115,15 @@ section! {
         ///
         /// A terminator fades; the rim of a flare does not.
         @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
-        /// Largest part of the looks inwards from the limb that may end in the sky behind a second edge; 1 turns the gate off.
+        /// Largest part of the looks inwards from the limb that may end in the sky behind a second edge; 1 turns the
+        /// gate off.
         ///
         /// The gate is for a body that cannot lie whole in the picture: a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
         /// Smallest step of a second edge, as a part of the limb's step.
         @- band_step: f64 = 0.4, [above 0.0 to 1.0];
-        /// Largest angle between the axis and the axis that a given attitude and position predict, in standard deviations.
+        /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
+        /// deviations.
         @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
         /// Fastest turn of the vehicle, degrees per second: an axis farther from the previous answer is refused.
         ///
@@ -129,7 +134,8 @@ section! {
         @- max_unlit: f64 = 0.5, [0.0 to 1.0];
         /// Lowest elevation of the Sun that lights a limb, degrees; −18 is the end of twilight.
         @- min_sun_elevation_deg: f64 = -18.0, [-90.0 to 90.0];
-        /// Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard deviations.
+        /// Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard
+        /// deviations.
         ///
         /// The curvature of the edge tells on which side the body is.
         @- min_side_sigma: f64 = 4.0, [0.0 to 1e6];
@@ -185,7 +191,8 @@ impl Config {
         Ok(())
     }
 
-    /// Turns off every gate that compares an edge with what is no limb, for chains that are rebuilt as they were published.
+    /// Turns off every gate that compares an edge with what is no limb, for chains that are rebuilt as they were
+    /// published.
     pub(crate) fn trust_every_shape(&mut self) {
         (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
         (self.min_support_abrupt, self.whole_edge) = (0.0, 0.0);
@@ -205,8 +212,8 @@ pub(crate) struct Judged<T> {
     pub(crate) support: T,
 }
 
-/// Looks a fit over, with the points that carry it. `points` of the edge were made. `raised` is how many times larger the
-/// noise of the edge makes the threshold of the rejection, and with it the largest RMS.
+/// Looks a fit over, with the points that carry it. `points` of the edge were made. `raised` is how many times larger
+/// the noise of the edge makes the threshold of the rejection, and with it the largest RMS.
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
@@ -300,8 +307,8 @@ fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T {
     expected.half_angle_rad() * (fx + fy)
 }
 
-/// Whether the points are another curve's: that they fit the cone no worse than what is no limb, agree with its half-angle
-/// by their own noise, and do not go on beside it.
+/// Whether the points are another curve's: that they fit the cone no worse than what is no limb, agree with its
+/// half-angle by their own noise, and do not go on beside it.
 fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
@@ -389,7 +396,8 @@ pub(crate) fn small<T: Real>(sin: T, camera: &Camera<T>, part: i32) -> u16 {
 /// Pictures with shorter sides than this are small: an edge across one has fewer points than the defaults ask for.
 const SMALL_PICTURE: u16 = 80;
 
-/// A part of a small picture's shorter side, one in `part`, 8 or more: of a thermal array of 24 rows a limb has no more.
+/// A part of a small picture's shorter side, one in `part`, 8 or more: of a thermal array of 24 rows a limb has no
+/// more.
 pub(crate) fn few_rows<T: Real>(camera: &Camera<T>, part: u16) -> u16 {
     let side = camera.width().min(camera.height());
     if side < SMALL_PICTURE { (side / part.max(1)).max(8) } else { u16::MAX }

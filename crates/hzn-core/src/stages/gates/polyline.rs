@@ -8,8 +8,8 @@ const PIECES: usize = 4;
 /// Places at which a piece may end, besides the last.
 const PLACES: usize = 40;
 
-/// Sums of points about an origin, in a frame along one direction: of a straight line the second coordinate stays small,
-/// so that single precision keeps it.
+/// Sums of points about an origin, in a frame along one direction: of a straight line the second coordinate stays
+/// small, so that single precision keeps it.
 struct Line<T> {
     origin: [T; 2],
     along: [T; 2],
@@ -51,8 +51,8 @@ impl<T: Real> Line<T> {
     }
 }
 
-/// Weighted RMS distance of the points from the polyline of up to four pieces that fits them best, in pixels. Costs above
-/// those of the residual `worst_px` are not told apart.
+/// Weighted RMS distance of the points from the polyline of up to four pieces that fits them best, in pixels. Costs
+/// above those of the residual `worst_px` are not told apart.
 pub(super) fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
     let places = PLACES.min(shape.len() / 4).max(1);
     let start = |place: usize| place * shape.len() / places;

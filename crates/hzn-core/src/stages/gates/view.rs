@@ -8,8 +8,8 @@ use crate::geometry::frames::UnitVec3;
 use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
 
-/// Length in pixels that the inliers cover along the limb about `e`: a step from one to the next counts as far as it leads
-/// along it, forth and back. The way along a noisy edge is many times as long.
+/// Length in pixels that the inliers cover along the limb about `e`: a step from one to the next counts as far as it
+/// leads along it, forth and back. The way along a noisy edge is many times as long.
 pub(super) fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
     let mut length = T::ZERO;
     let mut before: Option<V3<T>> = None;

@@ -1,11 +1,12 @@
 //! Videos, through `ffmpeg` and `ffprobe` on PATH.
 //!
 //! Brightness is the luma plane as it stands in the stream (`extractplanes=y`): converting to grey would stretch
-//! limited range. Where one colour is wanted (`input.channel`), ffmpeg converts to RGB of full range. Pixels are taken as they are
-//! stored, whatever the container says about turning them. Times are every frame's own, from ffprobe, which runs alongside; a constant rate is never assumed.
+//! limited range. Where one colour is wanted (`input.channel`), ffmpeg converts to RGB of full range. Pixels are taken
+//! as they are stored, whatever the container says about turning them. Times are every frame's own, from ffprobe, which
+//! runs alongside; a constant rate is never assumed.
 //!
-//! That the end is missing is known by what ffmpeg says and by the sizes in an AVI. A y4m, or a stream such as MPEG-TS that was cut
-//! between two frames, does not tell.
+//! That the end is missing is known by what ffmpeg says and by the sizes in an AVI. A y4m, or a stream such as MPEG-TS
+//! that was cut between two frames, does not tell.
 
 mod riff;
 mod times;
@@ -107,8 +108,8 @@ impl Video {
         })
     }
 
-    /// Nothing more comes. What is missing at the end of a video, or was lost in it, is told by [`Source::lost`]; a video of
-    /// which nothing came, and an ffmpeg that was ended from outside, are errors.
+    /// Nothing more comes. What is missing at the end of a video, or was lost in it, is told by [`Source::lost`]; a
+    /// video of which nothing came, and an ffmpeg that was ended from outside, are errors.
     fn end(&mut self, rest: usize) -> Option<anyhow::Result<Item>> {
         self.ended = true;
         let name = self.path.display();

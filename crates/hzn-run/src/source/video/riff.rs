@@ -1,11 +1,12 @@
-//! Whether an AVI is whole: ffmpeg reads one that was cut without a word, and the number of frames in its header also counts
-//! those that were left out on purpose.
+//! Whether an AVI is whole: ffmpeg reads one that was cut without a word, and the number of frames in its header also
+//! counts those that were left out on purpose.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Bytes that are missing at the end of a RIFF file, by the sizes of its parts; `None` where none are, and for other files.
+/// Bytes that are missing at the end of a RIFF file, by the sizes of its parts; `None` where none are, and for other
+/// files.
 pub(super) fn missing_bytes(path: &Path) -> Option<u64> {
     let mut file = File::open(path).ok()?;
     let length = file.metadata().ok()?.len();

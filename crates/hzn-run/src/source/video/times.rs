@@ -55,8 +55,8 @@ impl Times {
     }
 }
 
-/// The time of the next frame that ffprobe lists, which may have none; `None` at the end of the list. Whatever else it says of a
-/// frame is passed over.
+/// The time of the next frame that ffprobe lists, which may have none; `None` at the end of the list. Whatever else it
+/// says of a frame is passed over.
 fn next_time_s(lines: &mut impl BufRead) -> Option<Option<f64>> {
     let mut line = String::new();
     while lines.read_line(&mut line).ok()? > 0 {

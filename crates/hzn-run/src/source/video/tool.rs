@@ -9,8 +9,8 @@ use crate::error::{Error, failed, unusable};
 /// What ffmpeg calls errors and what loses nothing: frames at the same time, and what some cameras write into JPEG.
 const HARMLESS: &[&str] = &["non monotonically increasing dts", "unable to decode APP fields"];
 
-/// A program that says nothing but errors. The Ctrl-C of a terminal goes to us alone, who still want the frames that were
-/// begun.
+/// A program that says nothing but errors. The Ctrl-C of a terminal goes to us alone, who still want the frames that
+/// were begun.
 pub(super) fn tool(name: &str) -> Command {
     let mut command = Command::new(name);
     command.args(["-v", "repeat+error"]).stdin(Stdio::null());
@@ -103,7 +103,8 @@ mod tests {
         let told = |text: &str| Said::read(text.as_bytes()).summary();
         assert_eq!(told(""), None);
         assert_eq!(told("[matroska,webm @ 0x55c8] File ended prematurely\n").unwrap(), "File ended prematurely");
-        let several = "[h264 @ 0x1] Invalid NAL unit size\n\nError while decoding stream #0:0: no\n[mjpeg @ 0x2] unable to decode APP fields: x\n";
+        let several = "[h264 @ 0x1] Invalid NAL unit size\n\nError while decoding stream #0:0: no\n[mjpeg @ 0x2] \
+                       unable to decode APP fields: x\n";
         assert_eq!(told(several).unwrap(), "Error while decoding stream #0:0: no; 2 errors in all");
         assert_eq!(
             told("[rawvideo @ 0x1] Application provided invalid, non monotonically increasing dts to muxer\n"),

@@ -70,7 +70,8 @@ pub(super) fn draw(tool: &MaskEdit, viewer: &Viewer, painter: &Painter, stage: &
         line.extend(ui.ctx().pointer_hover_pos());
     }
     painter.add(Shape::line(line, stroke));
-    let text = "Mask: click corners, close on the first one or with Enter. Drag a corner to move it; right-click removes a corner or an area. Backspace: one corner back. Esc: done.";
+    let text = "Mask: click corners, close on the first one or with Enter. Drag a corner to move it; right-click \
+                removes a corner or an area. Backspace: one corner back. Esc: done.";
     let rect = painter.clip_rect();
     label(painter, rect.center_top() + vec2(0.0, 10.0), Align2::CENTER_TOP, text);
 }

@@ -23,8 +23,8 @@ use threads::Asked;
 
 /// Frames that are decoded beforehand.
 const AHEAD: usize = 4;
-/// The window waits so long at most for an answer, from the wish on, so that it comes with the frame of the change: what is
-/// left of a displayed frame's 16 ms is enough to lay the window out and to hand it over.
+/// The window waits so long at most for an answer, from the wish on, so that it comes with the frame of the change:
+/// what is left of a displayed frame's 16 ms is enough to lay the window out and to hand it over.
 const AT_ONCE: Duration = Duration::from_millis(10);
 
 /// A window that stood still for longer goes on from where it was.
@@ -266,8 +266,8 @@ impl Viewer {
         self.ask();
     }
 
-    /// Time goes on. No frame is passed over because it is slow: each has been drawn before the next one is asked for, which
-    /// is then made while this one is painted.
+    /// Time goes on. No frame is passed over because it is slow: each has been drawn before the next one is asked for,
+    /// which is then made while this one is painted.
     fn advance(&mut self, ctx: &egui::Context) {
         let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
         let lasts_s = |frame| self.sequence.duration_s(frame);

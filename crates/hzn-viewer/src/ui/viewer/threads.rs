@@ -92,7 +92,8 @@ impl Viewer {
                 match opened.sensor {
                     Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
                     None if self.session.is_none() => self.say(
-                        "There is no sensor.toml here, so pictures are only shown. Open one (or drop it on the window); `hzn init` writes one to start from.",
+                        "There is no sensor.toml here, so pictures are only shown. Open one (or drop it on the \
+                         window); `hzn init` writes one to start from.",
                     ),
                     None => {}
                 }
@@ -120,7 +121,10 @@ impl Viewer {
                 if cut_off {
                     let path = self.request.inputs.first().cloned();
                     self.message(Message {
-                        text: "This recording was not closed: its run broke off, or the file was cut. What is whole is shown.".into(),
+                        text:
+                            "This recording was not closed: its run broke off, or the file was cut. What is whole is \
+                               shown."
+                                .into(),
                         bad: true,
                         recover: path,
                     });
@@ -128,7 +132,10 @@ impl Viewer {
                 if self.sequence.is_empty() {
                     self.say_bad("There is no frame in it.");
                 } else if self.sequence.entries.iter().all(|e| e.place == Place::Nowhere) {
-                    self.say("This recording was made without pictures (--no-images): results are shown, but nothing can be processed again.");
+                    self.say(
+                        "This recording was made without pictures (--no-images): results are shown, but nothing \
+                              can be processed again.",
+                    );
                 }
                 if let Some(note) = note {
                     self.say_bad(note);
