@@ -283,8 +283,8 @@ mod tests {
             }
             let _ = triangle.singular();
             if let Some(x) = triangle.solve([1.0; 3]) {
-                let odd = |x: &f64| !x.is_finite() || x.abs() > 1e15 || x.abs() < 1e-15;
-                prop_assert!(!x[0].is_nan() || m.iter().flatten().any(odd));
+                let odd = |x: f32| !x.is_finite() || x.abs() > 1e15 || x.abs() < 1e-15;
+                prop_assert!(!x[0].is_nan() || m.iter().flatten().any(|x| odd(*x)));
             }
         }
     }

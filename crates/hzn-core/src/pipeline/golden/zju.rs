@@ -214,7 +214,8 @@ proptest::proptest! {
                     proptest::prop_assert!((got.e.dot(&got.e).to_f64() - 1.0).abs() < 1e-5 && got.c.is_finite());
                     let expected = expected();
                     let noise = covariance::Config::default();
-                    let fused = covariance::fuse(&blocks, &got, &expected, &noise, &fit::Config::default(), &camera, None);
+                    let config = fit::Config::default();
+                    let fused = covariance::fuse(&blocks, &got, &expected, &noise, &config, &camera, None);
                     if let Some(fused) = fused {
                         proptest::prop_assert!(fused.p.iter().all(|x| !x.to_f64().is_nan()), "{:?}", fused.p);
                     }
