@@ -9,19 +9,18 @@ use crate::studies::{ALL, Study};
 
 const HEAD: &str = "# Reproduction
 
-Our numbers beside the published ones. Written by `cargo xtask reproduce`; a section alone by the command in it. Every
-picture follows from its seed and every answer from its picture, so the numbers come out alike on every machine.
+Our numbers next to the published ones. `cargo xtask reproduce` writes this page; the command in a section writes that
+section alone. Every picture follows from its seed and every answer from its picture, so that every machine finds the same
+numbers.
 
 Sources: **[BB]** Braun & Barf 2022, **[W]** Wang, Wang & Jin 2022, **[B14]** Barf 2014, **[H15]** Barf et al. 2015.
-NEES is the squared error over the covariance (two degrees of freedom): 2 is ideal, more is too sure.
+NEES is the squared error over the covariance, with two degrees of freedom: its mean is 2 for an honest covariance and
+larger for one that is too small.
 
-What a sensor is told beside the pictures decides what a figure is worth, so every section says it. **In-sample**: \
-limb height or
-edge errors were fitted to, or chosen on, the scene that is measured. **Out of sample**: they know nothing of it. \
-Between the two
-stands what was measured on other seeds of the same scene: other clouds and noise, the same air and detector. Sections \
-without
-these words are calculations.
+What a sensor is told about the scene decides the worth of a figure, so every section says it. **In-sample**: limb
+height or edge errors were fitted to the scene that is measured, or chosen on it. **Out of sample**: they come from
+nowhere near it. Values that were measured on other seeds of the same scene stand between the two: other clouds and
+noise, the same air and detector. Sections without these words are calculations.
 ";
 
 /// A file that holds sections.
@@ -34,11 +33,11 @@ pub(crate) enum Document {
 }
 
 impl Document {
-    /// Its name in the docs folder.
+    /// Its place in the book.
     pub(crate) const fn file(self) -> &'static str {
         match self {
-            Self::Reproduction => "reproduction.md",
-            Self::Methods => "methods.md",
+            Self::Reproduction => "results/reproduction.md",
+            Self::Methods => "theory/methods.md",
         }
     }
     /// Its text with the section of `study` in its place.
@@ -183,7 +182,7 @@ mod tests {
 
     #[test]
     fn the_documents_hold_every_study_and_its_figures() {
-        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../book");
         let text = |document: Document| std::fs::read_to_string(docs.join(document.file())).unwrap();
         for study in ALL {
             let document = text(study.document);
@@ -192,7 +191,7 @@ mod tests {
         }
         for figure in text(Document::Reproduction).split("](figures/").skip(1) {
             let file = figure.split(')').next().unwrap();
-            assert!(docs.join("figures").join(file).is_file(), "{file}");
+            assert!(docs.join("results/figures").join(file).is_file(), "{file}");
         }
     }
 }

@@ -28,8 +28,8 @@ struct Args {
     /// Name the studies
     #[arg(long)]
     list: bool,
-    /// The project's docs folder
-    #[arg(long, value_name = "DIR", default_value = "docs")]
+    /// The folder of the book
+    #[arg(long, value_name = "DIR", default_value = "book")]
     docs: PathBuf,
 }
 
@@ -56,7 +56,7 @@ fn main() -> anyhow::Result<()> {
         if args.frames.is_some() {
             continue;
         }
-        section.write_figures(&args.docs)?;
+        section.write_figures(&args.docs.join("results"))?;
         // After each: what was measured is not lost when a later one is stopped.
         let path = args.docs.join(study.document.file());
         let document = std::fs::read_to_string(&path).unwrap_or_default();
