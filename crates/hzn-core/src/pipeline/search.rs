@@ -7,7 +7,7 @@ use crate::base::linalg::basis;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::camera::Camera;
-use crate::geometry::frames::{Cov3, UnitVec3};
+use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::geometry::pixel::Pixel;
 use crate::image::Pixels;
 use crate::model::body::Expected;
@@ -18,13 +18,13 @@ use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
 use crate::model::work::{self, WorkBudget};
 use crate::papers;
-use crate::stages::consensus;
+use crate::stages::consensus::{self, Threshold};
 #[cfg(feature = "horace")]
 use crate::stages::contour;
 use crate::stages::contour::{BinaryPicture, End, Marks, Thinned};
-use crate::stages::covariance;
-use crate::stages::edge_points;
-use crate::stages::fit;
+use crate::stages::covariance::{self, Fused};
+use crate::stages::edge_points::{self, Points};
+use crate::stages::fit::{self, Fit};
 use crate::stages::gates;
 use crate::stages::rays;
 use crate::stages::threshold;
@@ -316,6 +316,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         self.observer.enter(Stage::Contour);
     }
 
+    /// Takes an edge from its border to a verdict; the answer, where it passes every gate.
     fn candidate<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
@@ -323,8 +324,6 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         length: u32,
         border: &[Pixel],
     ) -> (Candidate<T>, Option<Best<T>>) {
-        let Sensor { config, cam_to_body, .. } = self.sensor;
-        let camera = self.camera;
         let mut outcome = Candidate {
             number,
             length_px: length,
@@ -333,25 +332,51 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             rms_px: T::from_f64(f64::NAN),
             verdict: Verdict::NoConsensus,
         };
+        let best = self.edge_points(binary, border, &mut outcome).and_then(|points| {
+            let clipped = T::from_i32(points.clipped as i32) / T::from_i32(points.count.max(1) as i32);
+            let expected = self.expected.clipped(clipped);
+            let (fit, threshold) = self.fit(&points, &expected, &mut outcome)?;
+            self.judge(binary, &points, &expected, &fit, threshold, &mut outcome)
+        });
+        (outcome, best)
+    }
 
+    /// The edge points, whose work is paid for.
+    #[inline(always)]
+    fn edge_points<P: Pixels>(
+        &mut self,
+        binary: &BinaryPicture<'_, T, P, O>,
+        border: &[Pixel],
+        outcome: &mut Candidate<T>,
+    ) -> Option<Points> {
         self.enter(Stage::Candidates);
         let slow = work::slow_point(binary.mask_cost());
         let most_slow = self.work.remaining() / slow;
-        let points = edge_points::pick(binary, &config.candidates, border, number, self.blocks, most_slow);
+        let config = &self.sensor.config.candidates;
+        let points = edge_points::pick(binary, config, border, outcome.number, self.blocks, most_slow);
         if points.slow == most_slow {
             self.work.exhaust();
-            return (outcome, None);
+            return None;
         }
         self.work.charge(points.slow * slow);
         outcome.points = points.count;
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;
         self.report.counters.cut_points += points.cut;
-        let used = (points.count as usize).div_ceil(LANES);
-        let Some(blocks) = self.blocks.get_mut(..used) else { return (outcome, None) };
+        Some(points)
+    }
 
-        let clipped = T::from_i32(points.clipped as i32) / T::from_i32(points.count.max(1) as i32);
-        let expected = &self.expected.clipped(clipped);
+    /// Rays, consensus and fit, with the threshold of the consensus.
+    #[inline(always)]
+    fn fit(
+        &mut self,
+        points: &Points,
+        expected: &Expected<T>,
+        outcome: &mut Candidate<T>,
+    ) -> Option<(Fit<T>, Threshold<T>)> {
+        let (config, camera) = (&self.sensor.config, self.camera);
+        let used = (points.count as usize).div_ceil(LANES);
+        let blocks = self.blocks.get_mut(..used)?;
         enter(self.report, self.observer, Stage::Undistort);
         rays::to_rays(camera, blocks);
 
@@ -360,39 +385,49 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, told_px)).sum();
         if on_another * 2 > points.count {
             outcome.verdict = Verdict::Taken;
-            return (outcome, None);
+            return None;
         }
         let (fx, fy) = camera.focal_px();
         let focal = (fx + fy) * T::from_f64(0.5);
-        let threshold = consensus::Threshold::new(blocks, points.count, expected, focal, &config.reject);
-        let consensus =
-            consensus::keep(blocks, points.count, expected, focal, threshold, &config.reject, &mut self.work);
-        let Some(consensus) = consensus else {
-            return (outcome, None);
-        };
+        let threshold = Threshold::new(blocks, points.count, expected, focal, &config.reject);
+        let work = &mut self.work;
+        let consensus = consensus::keep(blocks, points.count, expected, focal, threshold, &config.reject, work)?;
         self.report.counters.draws += consensus.draws;
 
         enter(self.report, self.observer, Stage::Estimate);
         outcome.verdict = Verdict::NoFit;
         if !self.work.try_spend(used as u32 * work::FIT + work::GATES) {
-            return (outcome, None);
+            return None;
         }
-        let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.estimate, self.noise);
-        let Some(fit) = fit else { return (outcome, None) };
+        let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.estimate, self.noise)?;
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;
         for place in 0..points.count {
             if let Some(block) = blocks.get(place as usize / LANES) {
-                self.observer.weight(number, place, block.weight[place as usize % LANES]);
+                self.observer.weight(outcome.number, place, block.weight[place as usize % LANES]);
             }
         }
+        Some((fit, threshold))
+    }
 
+    /// Covariance and gates.
+    #[inline(always)]
+    fn judge<P: Pixels>(
+        &mut self,
+        binary: &BinaryPicture<'_, T, P, O>,
+        points: &Points,
+        expected: &Expected<T>,
+        fit: &Fit<T>,
+        threshold: Threshold<T>,
+        outcome: &mut Candidate<T>,
+    ) -> Option<Best<T>> {
+        let (config, camera) = (&self.sensor.config, self.camera);
+        let blocks = self.blocks.get(..(points.count as usize).div_ceil(LANES))?;
         enter(self.report, self.observer, Stage::Covariance);
         let mut budget = self.observer.wants_budget().then(ErrorBudget::new);
-        let fused = covariance::fuse(blocks, &fit, expected, self.noise, &config.estimate, camera, budget.as_mut());
-        let Some(fused) = fused else { return (outcome, None) };
+        let fused = covariance::fuse(blocks, fit, expected, self.noise, &config.estimate, camera, budget.as_mut())?;
         if let Some(budget) = &budget {
-            self.observer.budget(number, budget);
+            self.observer.budget(outcome.number, budget);
         }
 
         enter(self.report, self.observer, Stage::Select);
@@ -400,27 +435,61 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
         let (made, raised) = (points.count, threshold.raised);
-        let judged = gates::judge(&fit, &fused, sigma, expected, blocks, made, raised, binary, camera, &config.select);
+        let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, raised, binary, camera, &config.select);
         outcome.verdict = match judged.verdict {
-            Verdict::Passed => papers::verdict(&fit, expected, blocks, camera, binary.region, &config.select),
+            Verdict::Passed => papers::verdict(fit, expected, blocks, camera, binary.region, &config.select),
             failed => failed,
         };
-        let most = T::from_i32(points.count as i32) * T::from_f64(config.recover.min_part);
-        if self.report.counters.looks > 0 && T::from_i32(fit.inliers as i32) < most {
+        let fewest = T::from_i32(points.count as i32) * T::from_f64(config.recover.min_part);
+        if self.report.counters.looks > 0 && T::from_i32(fit.inliers as i32) < fewest {
             outcome.verdict = Verdict::NoConsensus;
-            return (outcome, None);
+            return None;
         }
         if outcome.verdict != Verdict::Passed || !sigma.is_finite() {
-            return (outcome, None);
+            return None;
         }
+        if config.estimate.half_angle == fit::HalfAngle::Fused
+            && !self.tells_side(fit, &fused, expected)
+            && !expected.free
+        {
+            outcome.verdict = Verdict::Straight;
+            return None;
+        }
+        let solution = self.solution(fit, &fused, covariance, expected, outcome.number);
+        let share = T::from_i32(fit.inliers as i32)
+            > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
+        let certain = judged.support > T::from_f64(config.select.certain_support)
+            && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
+        let tracks = (self.tracks && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
+        Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: tracks.flatten() })
+    }
+
+    /// Whether the curvature of the edge tells on which side of it the body is.
+    ///
+    /// The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself
+    /// asks for must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ exceeds `min_side_sigma`² variances.
+    fn tells_side(&self, fit: &Fit<T>, fused: &Fused<T>, expected: &Expected<T>) -> bool {
+        let sides = T::from_f64(self.sensor.config.select.min_side_sigma);
+        fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0))
+    }
+
+    #[inline(always)]
+    fn solution(
+        &self,
+        fit: &Fit<T>,
+        fused: &Fused<T>,
+        covariance: Cov3<Cam, T>,
+        expected: &Expected<T>,
+        number: u32,
+    ) -> Solution<T> {
         let axis = UnitVec3::assume_unit(fused.e);
         let one = T::one();
         let half_angle = |k: T| (k * (one + one - k)).max(T::ZERO).sqrt().atan2(one - k);
-        let solution = Solution {
+        Solution {
             axis,
             covariance,
             axis_ecef: expected.axis_ecef(),
-            axis_body: cam_to_body.as_ref().map(|r| r.apply(&axis)),
+            axis_body: self.sensor.cam_to_body.as_ref().map(|r| r.apply(&axis)),
             half_angle_rad: half_angle(fit.k),
             fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
             altitude_m: fused.var_free_cos.and_then(|v| expected.altitude(fit.c, v)),
@@ -434,21 +503,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             inliers: fit.inliers,
             arc_px: fit.arc_px,
             candidate: number,
-        };
-        // The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself
-        // asks for must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ of so many variances.
-        let sides = T::from_f64(config.select.min_side_sigma);
-        let curved = fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0));
-        if config.estimate.half_angle == fit::HalfAngle::Fused && !curved && !expected.free {
-            outcome.verdict = Verdict::Straight;
-            return (outcome, None);
         }
-        let share = T::from_i32(fit.inliers as i32)
-            > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
-        let certain = judged.support > T::from_f64(config.select.certain_support)
-            && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
-        let tracks = (self.tracks && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
-        (outcome, Some(Best { solution, outcome, score: judged.score, certain, level: tracks.flatten() }))
     }
 
     /// Keeps the better of two answers, and remembers how good the other was if it says something else.

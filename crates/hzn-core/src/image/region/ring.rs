@@ -12,32 +12,59 @@ impl<T: Real> Region<T> {
     /// Gives the outermost pixels of the region once around as straight runs, clockwise as seen on the screen, from
     /// the left end of the top row, until `visit` says to stop. They are the pixels with an outer 4-neighbour.
     pub(crate) fn each_run(&self, mut visit: impl FnMut(Run) -> bool) {
-        let run = |x: u16, y: u16, dx: i32, dy: i32, len: u16| Run { x, y, dx, dy, len };
+        let _ = if self.circle.is_none() { self.sides(&mut visit) } else { self.around(&mut visit) };
+    }
+
+    /// [`Self::each_run`] of a rectangle. `None`: it was stopped.
+    #[inline(always)]
+    fn sides(&self, visit: &mut impl FnMut(Run) -> bool) -> Option<()> {
         let ((first, last), (upper, lower)) = (self.columns(), self.rows());
-        if self.circle.is_none() {
-            let (across, down) = (last.saturating_sub(first), lower.saturating_sub(upper));
-            let sides = [
-                run(first, upper, 1, 0, across + 1),
-                run(last, upper + 1, 0, 1, down),
-                run(last.saturating_sub(1), lower, -1, 0, across),
-                run(first, lower.saturating_sub(1), 0, -1, down.saturating_sub(1)),
-            ];
-            for side in sides {
-                if side.len > 0 && !visit(side) {
-                    return;
-                }
+        let (across, down) = (last.saturating_sub(first), lower.saturating_sub(upper));
+        let sides = [
+            run(first, upper, 1, 0, across + 1),
+            run(last, upper + 1, 0, 1, down),
+            run(last.saturating_sub(1), lower, -1, 0, across),
+            run(first, lower.saturating_sub(1), 0, -1, down.saturating_sub(1)),
+        ];
+        for side in sides {
+            if side.len > 0 && !visit(side) {
+                return None;
             }
-            return;
         }
-        let Some((top, (left, right))) = (upper..=lower).find_map(|y| self.span(y).map(|s| (y, s))) else { return };
+        Some(())
+    }
+
+    /// [`Self::each_run`] of a region that the image circle cuts. `None`: it was stopped.
+    #[inline(always)]
+    fn around(&self, visit: &mut impl FnMut(Run) -> bool) -> Option<()> {
+        let (upper, lower) = self.rows();
+        let (top, (left, right)) = (upper..=lower).find_map(|y| self.span(y).map(|s| (y, s)))?;
         // The rows of a convex region follow each other.
-        let Some((bottom, (low, _))) = (top..=lower).rev().find_map(|y| self.span(y).map(|s| (y, s))) else { return };
+        let (bottom, (low, _)) = (top..=lower).rev().find_map(|y| self.span(y).map(|s| (y, s)))?;
         if !visit(run(left, top, 1, 0, right - left + 1)) {
-            return;
+            return None;
         }
-        // Down the right side: the end of each row is found from that of the row above.
-        let mut x = right;
-        let mut y = top + 1;
+        let x = self.down_the_right(right, top, bottom, visit)?;
+        if bottom == top {
+            return None;
+        }
+        if x > low && !visit(run(x - 1, bottom, -1, 0, x - low)) {
+            return None;
+        }
+        let x = self.up_the_left(low, top, bottom, visit)?;
+        // Up to the left end of the top row, along the second row where the top row is shorter.
+        if x + 1 < left {
+            visit(run(x + 1, top + 1, 1, 0, left - x - 1));
+        }
+        Some(())
+    }
+
+    /// The right side from the row below `top` on; gives the last row's end. The end of each row is found from that of the
+    /// row above.
+    #[inline(always)]
+    fn down_the_right(&self, right: u16, top: u16, bottom: u16, visit: &mut impl FnMut(Run) -> bool) -> Option<u16> {
+        let (first, last) = self.columns();
+        let (mut x, mut y) = (right, top + 1);
         while y <= bottom {
             let mut end = x;
             if self.contains(x, y) {
@@ -60,30 +87,29 @@ impl<T: Real> Region<T> {
                     y += 1;
                 }
                 if !visit(run(x, from, 0, 1, y - from)) {
-                    return;
+                    return None;
                 }
                 continue;
             }
             // Inwards along the row above, then outwards along this one.
             if x > end + 1 && !visit(run(x - 1, y - 1, -1, 0, x - end - 1)) {
-                return;
+                return None;
             }
             let from = if end > x { x + 1 } else { end };
             if !visit(run(from, y, 1, 0, end - from + 1)) {
-                return;
+                return None;
             }
             x = end;
             y += 1;
         }
-        if bottom == top {
-            return;
-        }
-        if x > low && !visit(run(x - 1, bottom, -1, 0, x - low)) {
-            return;
-        }
-        // Up the left side, in the same way.
-        x = low;
-        y = bottom - 1;
+        Some(x)
+    }
+
+    /// The left side from the row above `bottom` up to that below `top`, as [`Self::down_the_right`].
+    #[inline(always)]
+    fn up_the_left(&self, low: u16, top: u16, bottom: u16, visit: &mut impl FnMut(Run) -> bool) -> Option<u16> {
+        let (first, last) = self.columns();
+        let (mut x, mut y) = (low, bottom - 1);
         while y > top {
             let mut start = x;
             if self.contains(x, y) {
@@ -104,25 +130,26 @@ impl<T: Real> Region<T> {
                     y -= 1;
                 }
                 if !visit(run(x, from, 0, -1, from - y)) {
-                    return;
+                    return None;
                 }
                 continue;
             }
             if x + 1 < start && !visit(run(x + 1, y + 1, 1, 0, start - x - 1)) {
-                return;
+                return None;
             }
             let from = if start < x { x - 1 } else { start };
             if !visit(run(from, y, -1, 0, from - start + 1)) {
-                return;
+                return None;
             }
             x = start;
             y -= 1;
         }
-        // Up to the left end of the top row, along the second row where the top row is shorter.
-        if x + 1 < left {
-            visit(run(x + 1, top + 1, 1, 0, left - x - 1));
-        }
+        Some(x)
     }
+}
+
+fn run(x: u16, y: u16, dx: i32, dy: i32, len: u16) -> Run {
+    Run { x, y, dx, dy, len }
 }
 
 /// A straight piece of the ring: `len` pixels from (x, y) on, each (dx, dy) further.

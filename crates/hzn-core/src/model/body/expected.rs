@@ -68,6 +68,133 @@ pub struct Expected<T> {
     pub(crate) which: u8,
 }
 
+/// Refuses numbers of a prior that cannot be; gives the 1-sigma of its attitude in radians.
+fn check<T: Real>(frame: &Prior<T>) -> Result<T, PriorError> {
+    if frame.altitude_m.is_some_and(|h| !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite())) {
+        return Err(PriorError::Altitude);
+    }
+    if frame.position_m.is_some_and(|p| !p.iter().all(|x| x.is_finite())) {
+        return Err(PriorError::Position);
+    }
+    let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(T::from_f64(ATTITUDE_SIGMA_RAD));
+    if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
+        return Err(PriorError::AttitudeSigma);
+    }
+    if frame.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::from_f64(MAX_RATE_RAD_S))) {
+        return Err(PriorError::Rate);
+    }
+    Ok(attitude_sigma)
+}
+
+fn below<T: Real>(altitude: T, limb: T) -> PriorError {
+    PriorError::BelowLimb { altitude_m: rounded_m(altitude), limb_m: rounded_m(limb) }
+}
+
+/// The body as it is seen from where the camera is; lengths in metres.
+struct Seen<T> {
+    /// Radius of the sphere with this half-angle at this altitude.
+    radius: T,
+    altitude: T,
+    /// Sine of the half-angle.
+    sin: T,
+    /// Mean height of the limb, and its first and second harmonic by azimuth from north.
+    limb: T,
+    harmonics: [T; 2],
+    ellipsoid: Option<LimbCone<T>>,
+    /// 1-sigma of the local radius, and of its second harmonic, where the latitude is unknown.
+    unknown_m: T,
+    unknown_second_m: T,
+}
+
+impl<T: Real> Seen<T> {
+    fn new(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
+        match (body.kind, frame.position_m) {
+            (Kind::Earth, Some(p)) => Self::ellipsoid(body, p),
+            _ => Self::sphere(body, frame),
+        }
+    }
+
+    /// The Earth from a position in ECEF.
+    fn ellipsoid(body: &Config, p: [T; 3]) -> Result<Self, PriorError> {
+        let km = T::from_f64(1000.0);
+        let (mut limb, mut harmonics) = (T::from_f64(body.limb_height_km) * km, [T::zero(); 2]);
+        let raised = |limb: T| {
+            let (a, b) = (T::from_f64(WGS84_A_M) + limb, T::from_f64(WGS84_B_M) + limb);
+            LimbCone::try_new(p, a, b).ok_or(PriorError::Position)
+        };
+        let (h, latitude) = geodetic(p, T::from_f64(WGS84_A_M), T::from_f64(WGS84_B_M));
+        if !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite()) {
+            return Err(PriorError::Position);
+        }
+        let mut cone = raised(limb);
+        if !body.limb_height_by_latitude_km.is_empty() {
+            // Below the limb height the limb is all around at the camera's own latitude.
+            let sin = cone.as_ref().map_or(T::one(), |cone| cone.mean_half_angle_rad().sin_cos().0);
+            let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
+            (limb, harmonics) = (mean * km, [first * km, second * km]);
+            cone = raised(limb);
+        }
+        if !(h > limb) {
+            return Err(below(h, limb));
+        }
+        let cone = cone?;
+        let (sin, _) = cone.mean_half_angle_rad().sin_cos();
+        Ok(Self {
+            radius: (sin * h - limb) / (T::one() - sin),
+            altitude: h,
+            sin,
+            limb,
+            harmonics,
+            ellipsoid: Some(cone),
+            unknown_m: T::zero(),
+            unknown_second_m: T::zero(),
+        })
+    }
+
+    /// A sphere, from a position or an altitude.
+    fn sphere(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
+        let km = T::from_f64(1000.0);
+        let limb = T::from_f64(body.limb_height_km) * km;
+        let given = frame.altitude_m.or(body.altitude_km.map(|h| T::from_f64(h) * km));
+        let r = T::from_f64(body.mean_radius_km()) * km;
+        let altitude = match (frame.position_m, given, body.kind) {
+            (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
+                let h = (x * x + y * y + z * z).sqrt() - r;
+                if !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite()) {
+                    return Err(PriorError::Position);
+                }
+                h
+            }
+            (_, _, Kind::Sun) => T::from_f64((AU_KM - SUN_RADIUS_KM) * 1e3),
+            (_, _, Kind::Moon) => T::from_f64((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
+            (_, Some(h), _) => h,
+            (_, None, _) => return Err(PriorError::NoAltitude),
+        };
+        let sin = (r + limb) / (r + altitude);
+        let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
+        if body.kind == Kind::Earth {
+            // A height above the ellipsoid rises with the local radius: most of its error cancels.
+            let counts = match body.altitude_reference {
+                AltitudeReference::Ellipsoid => (altitude - limb) / (r + altitude),
+                AltitudeReference::Sphere => T::one(),
+            };
+            unknown_m = shape::radius_sigma_m(sin) * counts;
+            unknown_second_m = shape::second_harmonic_m(sin);
+        }
+        let harmonics = [T::zero(); 2];
+        Ok(Self { radius: r, altitude, sin, limb, harmonics, ellipsoid: None, unknown_m, unknown_second_m })
+    }
+
+    /// The limb axis that the position leads to.
+    fn axis_ecef(&self, body: &Config, frame: &Prior<T>) -> Option<UnitVec3<Ecef, T>> {
+        match (&self.ellipsoid, frame.position_m, body.kind) {
+            (Some(cone), ..) => Some(cone.axis),
+            (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
+            _ => None,
+        }
+    }
+}
+
 impl<T> Expected<T> {
     /// As [`Config::blooms`].
     pub(crate) fn blooms(&self) -> bool {
@@ -83,101 +210,25 @@ impl<T: Real> Expected<T> {
 
     /// sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
     pub(crate) fn new(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
+        let attitude_sigma = check(frame)?;
         let km = T::from_f64(1000.0);
-        let mut limb = T::from_f64(body.limb_height_km) * km;
-        let mut harmonics = [T::zero(); 2];
         let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
-        let mut altitude_sigma = T::from_f64(body.altitude_sigma_km) * km;
-        let lowest = T::from_f64(LOWEST_ALTITUDE_M);
-        let below = |h: T, limb: T| PriorError::BelowLimb { altitude_m: rounded_m(h), limb_m: rounded_m(limb) };
-        let given = match frame.altitude_m {
-            Some(h) if !(h > lowest && h.is_finite()) => return Err(PriorError::Altitude),
-            Some(h) => Some(h),
-            None => body.altitude_km.map(|h| T::from_f64(h) * km),
-        };
-        let position = match frame.position_m {
-            Some(p) if !p.iter().all(|x| x.is_finite()) => return Err(PriorError::Position),
-            other => other,
-        };
-        let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(T::from_f64(ATTITUDE_SIGMA_RAD));
-        if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
-            return Err(PriorError::AttitudeSigma);
-        }
-        if frame.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::from_f64(MAX_RATE_RAD_S))) {
-            return Err(PriorError::Rate);
-        }
-        let mut ellipsoid = None;
-        let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
-        let (radius, altitude, sin) = match (body.kind, position) {
-            (Kind::Earth, Some(p)) => {
-                let raised = |limb: T| {
-                    let (a, b) = (T::from_f64(WGS84_A_M) + limb, T::from_f64(WGS84_B_M) + limb);
-                    LimbCone::try_new(p, a, b).ok_or(PriorError::Position)
-                };
-                let (h, latitude) = geodetic(p, T::from_f64(WGS84_A_M), T::from_f64(WGS84_B_M));
-                if !(h > lowest && h.is_finite()) {
-                    return Err(PriorError::Position);
-                }
-                let mut cone = raised(limb);
-                if !body.limb_height_by_latitude_km.is_empty() {
-                    // Below the limb height the limb is all around at the camera's own latitude.
-                    let sin = cone.as_ref().map_or(T::one(), |cone| cone.mean_half_angle_rad().sin_cos().0);
-                    let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
-                    (limb, harmonics) = (mean * km, [first * km, second * km]);
-                    cone = raised(limb);
-                }
-                if !(h > limb) {
-                    return Err(below(h, limb));
-                }
-                let cone = cone?;
-                let (sin, _) = cone.mean_half_angle_rad().sin_cos();
-                ellipsoid = Some(cone);
-                // The sphere with this half-angle at this altitude.
-                ((sin * h - limb) / (T::one() - sin), h, sin)
-            }
-            (_, position) => {
-                let r = T::from_f64(body.mean_radius_km()) * km;
-                let altitude = match (position, given, body.kind) {
-                    (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
-                        let h = (x * x + y * y + z * z).sqrt() - r;
-                        if !(h > lowest && h.is_finite()) {
-                            return Err(PriorError::Position);
-                        }
-                        h
-                    }
-                    (_, _, Kind::Sun) => T::from_f64((AU_KM - SUN_RADIUS_KM) * 1e3),
-                    (_, _, Kind::Moon) => T::from_f64((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
-                    (_, Some(h), _) => h,
-                    (_, None, _) => return Err(PriorError::NoAltitude),
-                };
-                let sin = (r + limb) / (r + altitude);
-                if body.kind == Kind::Earth {
-                    // A height above the ellipsoid rises with the local radius: most of its error cancels.
-                    let counts = match body.altitude_reference {
-                        AltitudeReference::Ellipsoid => (altitude - limb) / (r + altitude),
-                        AltitudeReference::Sphere => T::one(),
-                    };
-                    unknown_m = shape::radius_sigma_m(sin) * counts;
-                    unknown_second_m = shape::second_harmonic_m(sin);
-                }
-                (r, altitude, sin)
-            }
-        };
+        let seen = Seen::new(body, frame)?;
+        let Seen { sin, limb, .. } = seen;
         let cos2 = T::one() - sin * sin;
         if !(sin > T::zero() && cos2 > T::EPSILON) {
-            return Err(below(altitude, limb));
+            return Err(below(seen.altitude, limb));
         }
         let cos = cos2.sqrt();
-        if body.half_angle_is_free() {
-            altitude_sigma = T::zero();
-        }
+        let free = body.half_angle_is_free();
+        let altitude_sigma = if free { T::zero() } else { T::from_f64(body.altitude_sigma_km) * km };
         // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
         let tan = sin / cos;
-        let scale = tan / (radius + altitude);
+        let scale = tan / (seen.radius + seen.altitude);
         let known = frame.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
-        // A higher limb is a wider cone. Of the ellipsoid's own shape half the difference of its half-angles' cosines.
-        let harmonics_cos = harmonics.map(|h| -scale * h);
-        let own = ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
+        // A higher limb is a wider cone. The ellipsoid's own shape adds half the difference of its half-angles' cosines.
+        let harmonics_cos = seen.harmonics.map(|h| -scale * h);
+        let own = seen.ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
             let (east, meridian) = cone.half_angles_rad();
             (meridian.sin_cos().1 - east.sin_cos().1) * T::from_f64(0.5)
         });
@@ -186,33 +237,31 @@ impl<T: Real> Expected<T> {
             Some(_) => amplitude.abs() * (attitude_sigma * T::from_f64(k)).min(T::one()),
             None => amplitude.abs(),
         };
-        let sigma_parts = [limb_sigma, sin * altitude_sigma, unknown_m, T::zero()];
+        let uneven_cos =
+            [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m];
+        let sigma_parts = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
         let variance = sigma_parts.iter().fold(T::zero(), |sum, s| sum + *s * *s);
-        let axis_ecef = match (&ellipsoid, position, body.kind) {
-            (Some(cone), ..) => Some(cone.axis),
-            (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
-            _ => None,
-        };
+        let axis_ecef = seen.axis_ecef(body, frame);
         Ok(Self {
             cos,
             sin,
             sigma_cos: scale * variance.sqrt(),
             sigma_parts,
             clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::from_f64(h) * km),
-            ellipsoid,
+            ellipsoid: seen.ellipsoid,
             cam_to_ecef: known,
             harmonics_cos,
-            uneven_cos: [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * unknown_second_m],
+            uneven_cos,
             level: frame.level,
             sun: frame.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             sun_seen: frame.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
             predicted: frame.cam_to_ecef.zip(axis_ecef).map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
             last: frame.last,
             rate_rad_s: frame.rate_rad_s,
-            radius_m: radius,
+            radius_m: seen.radius,
             limb_m: limb,
-            limb_sigma_m: (limb_sigma * limb_sigma + unknown_m * unknown_m).sqrt(),
-            free: body.half_angle_is_free(),
+            limb_sigma_m: (limb_sigma * limb_sigma + seen.unknown_m * seen.unknown_m).sqrt(),
+            free,
             phases: body.kind != Kind::Sun,
             which: 0,
         })
