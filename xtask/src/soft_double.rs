@@ -9,36 +9,24 @@ use crate::machine::output;
 use crate::steps::{Outcome, Trouble};
 
 /// Modules that a picture goes through.
-const STAGES: [&str; 10] = [
-    "binarize",
-    "block",
-    "camera::Camera",
-    "candidates",
-    "contour",
-    "covariance",
-    "estimate",
-    "pipeline::judge",
-    "reject",
-    "select",
+const STAGES: [&str; 11] = [
+    "geometry::block",
+    "geometry::camera::Camera",
+    "pipeline::search",
+    "stages::consensus",
+    "stages::contour",
+    "stages::covariance",
+    "stages::edge_points",
+    "stages::fit",
+    "stages::gates",
+    "stages::rays",
+    "stages::threshold",
 ];
 /// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
 /// places where they do.
-const ONCE: [(&str, usize); 12] = [
-    ("hzn_core::threshold::Config::fixed_level", 4),
-    ("hzn_core::threshold::Histogram::mean", 2),
-    ("hzn_core::threshold::Histogram::otsu", 3),
-    ("hzn_core::consensus::keep", 2),
-    ("hzn_core::consensus::Threshold<T>::of", 3),
-    ("hzn_core::fit::fit", 4),
-    ("hzn_core::covariance::fuse", 5),
-    ("hzn_core::gates::attitude::verdict", 4),
-    ("hzn_core::gates::judge", 18),
-    ("hzn_core::gates::rivals", 14),
-    ("hzn_core::gates::surroundings", 7),
-    ("hzn_core::pipeline::judge::Judge<T,O>::piece", 14),
-];
+const ONCE: [(&str, usize); 0] = [];
 /// Loops that must be found, or the check would say nothing.
-const LOOPS: [&str; 3] = ["contour::follow", "candidates::", "estimate::pass"];
+const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::pass"];
 
 /// Looks into an image for a core with single precision only.
 pub(crate) fn look_into(image: &Path) -> Outcome {

@@ -192,11 +192,12 @@ pub trait Section: Sized {
     fn set_number(&mut self, id: u16, number: f64) -> Option<bool>;
     /// The first key of the ground only whose value differs from another configuration's.
     fn differing_on_ground(&self, other: &Self) -> Option<&'static str>;
-    /// Every number in flight.
-    fn numbers() -> impl Iterator<Item = u16>;
+    /// The first number in flight of each key, and how many numbers it has.
+    const NUMBERS: &'static [(Option<u16>, u16)];
 }
 
-/// Checks one number.
+/// Checks one number. It stands once in flash: every key calls it.
+#[inline(never)]
 pub(crate) fn check_number(path: &'static str, x: f64, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
     require(x.is_finite(), path, x, Limit::Finite)?;
     require(!above || x > low, path, x, Limit::Above(low))?;
@@ -512,6 +513,10 @@ macro_rules! table {
                 }),+],
             };
 
+            const NUMBERS: &'static [(Option<u16>, u16)] = &[
+                $(($crate::base::keys::flight!($id), <$ty as $crate::base::keys::Value>::NUMBERS)),+
+            ];
+
             fn check_keys(&self) -> Result<(), $crate::base::error::ConfigError> {
                 $(
                     $crate::base::keys::check!(self.$field, concat!($section, ".", stringify!($field)), $limits);
@@ -556,13 +561,6 @@ macro_rules! table {
                     }
                 )+
                 None
-            }
-
-            fn numbers() -> impl Iterator<Item = u16> {
-                let each: &'static [(Option<u16>, u16)] = &[
-                    $(($crate::base::keys::flight!($id), <$ty as $crate::base::keys::Value>::NUMBERS)),+
-                ];
-                each.iter().filter_map(|(first, count)| first.map(|first| first..first + count)).flatten()
             }
         }
     };

@@ -27,7 +27,9 @@ macro_rules! sections {
 
             /// The numbers in flight of every key that has one, in the order in which they must be set.
             pub fn numbers() -> impl Iterator<Item = u16> {
-                core::iter::empty()$(.chain(<$section>::numbers()))+.chain(Mount::numbers())
+                const SECTIONS: &[&[(Option<u16>, u16)]] = &[$(<$section>::NUMBERS),+, Mount::NUMBERS];
+                let keys = SECTIONS.iter().copied().flatten();
+                keys.filter_map(|(first, count)| first.map(|first| first..first + count)).flatten()
             }
 
             /// The value of a number in flight: NaN for a value that is left out, `None` for a number that no key has.

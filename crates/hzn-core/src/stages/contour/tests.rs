@@ -128,8 +128,8 @@ proptest! {
     fn points_are_lit_and_beside_the_dark(w in 2u16..40, h in 2u16..40, density in 0u8..=100, seed in 0u32..10_000) {
         let map = random_bitmap(w, h, density, seed);
         let lit = |x: i32, y: i32| {
-            let (inside, place) = (x >= 0 && y >= 0, y as usize * usize::from(w) + x as usize);
-            inside && x < i32::from(w) && y < i32::from(h) && map.data[place] >= 128
+            let place = || y as usize * usize::from(w) + x as usize;
+            x >= 0 && y >= 0 && x < i32::from(w) && y < i32::from(h) && map.data[place()] >= 128
         };
         for edge in map.open() {
             for (x, y) in edge {
