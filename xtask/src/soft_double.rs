@@ -24,7 +24,18 @@ const STAGES: [&str; 11] = [
 ];
 /// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
 /// places where they do.
-const ONCE: [(&str, usize); 0] = [];
+const ONCE: [(&str, usize); 10] = [
+    ("<hzn_core::stages::consensus::Config as hzn_core::base::keys::Section>::check_keys", 2),
+    ("<hzn_core::stages::contour::Config as hzn_core::base::keys::Section>::check_keys", 1),
+    ("<hzn_core::stages::edge_points::Config as hzn_core::base::keys::Section>::check_keys", 1),
+    ("<hzn_core::stages::fit::Config as hzn_core::base::keys::Section>::check_keys", 1),
+    ("hzn_core::pipeline::search::Search<T,O>::candidate::{{closure}}", 34),
+    ("hzn_core::pipeline::search::Search<T,O>::piece", 2),
+    ("hzn_core::stages::gates::attitude::verdict", 4),
+    ("hzn_core::stages::gates::rivals", 14),
+    ("hzn_core::stages::gates::surroundings", 7),
+    ("hzn_core::stages::threshold::Histogram::mean", 2),
+];
 /// Loops that must be found, or the check would say nothing.
 const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::pass"];
 

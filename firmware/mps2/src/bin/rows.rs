@@ -7,7 +7,10 @@
 
 use cortex_m_rt::entry;
 use hzn_core::{Prior, Sensor};
-use hzn_core::{observer::Unobserved, pipeline::{ROWS_HELD, RowBuffers, Workspace}};
+use hzn_core::{
+    observer::Unobserved,
+    pipeline::{ROWS_HELD, RowBuffers, Workspace},
+};
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::Writer;
 use hzn_flight::table;
