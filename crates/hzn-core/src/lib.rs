@@ -1,30 +1,32 @@
 //! The horizon sensor's core: from a picture of a limb to the direction of the body, with a covariance for a
 //! navigation filter.
 //!
-//! No heap, fixed memory, no unsafe code; `process` answers any picture with a report. Functions that IEEE 754 does not
-//! round correctly come from one library and sums have one order, so that the answer does not depend on the machine. A
-//! picture goes one way, one module a stage, and nothing runs back:
+//! The crate uses no heap, a fixed amount of memory and no unsafe code. `process` gives a report for every picture, and
+//! never a number that is NaN or infinite. Functions that IEEE 754 does not round correctly come from one library, and
+//! sums have one order, so that the answer does not depend on the machine. A picture goes one way, through one module
+//! for each stage:
 //!
 //! ```text
-//! image → binarize → contour → candidates → undistort → reject → estimate → covariance → select → Report
+//! image → threshold → contour → edge points → rays → consensus → fit → covariance → gates → Report
 //! ```
 //!
-//! | stage | parameters | from | to |
+//! | stage | parameters | input | output |
 //! |---|---|---|---|
-//! | [`binarize`] | [`threshold::Config`], [`threshold::Gate`] | a sparse sample of the picture | the level between dark and lit |
-//! | [`contour`] | [`contour::Config`] | pixels at the border, then along the edges | border pixels of one edge after another |
-//! | [`candidates`] | [`edge_points::Config`] | border pixels | sub-pixel points at the local mid-level |
-//! | undistort | [`camera::Config`] | points | unit rays with their derivatives |
-//! | [`reject`] | [`consensus::Config`] | rays | the cone that most agree on |
-//! | [`estimate`] | [`fit::Config`] | that cone and the rays | the fitted cone, half-angle free, and weights |
-//! | [`covariance`] | [`covariance::Config`] | the fit and the noise model | covariance, and the expected half-angle fused |
-//! | [`select`] | [`gates::Config`] | the answer | a verdict; the best of all candidates |
+//! | [`threshold`] | [`threshold::Config`], [`threshold::Gate`] | a sparse sample of the picture | the threshold |
+//! | [`contour`] | [`contour::Config`] | pixels at the border, then along the edges | border pixels of the edges |
+//! | [`edge_points`] | [`edge_points::Config`] | border pixels | sub-pixel points at the local mid-level |
+//! | rays | [`camera::Config`] | edge points | unit rays with their derivatives |
+//! | [`consensus`] | [`consensus::Config`] | rays | the cone that most of them agree on |
+//! | [`fit`] | [`fit::Config`] | that cone and the rays | the fitted cone, half-angle free, and weights |
+//! | [`covariance`] | [`covariance::Config`] | the fit and the noise model | the covariance; the prior half-angle is fused |
+//! | [`gates`] | [`gates::Config`] | the answer | a verdict; the best of all candidates |
 //!
-//! Each module begins with its equations and their source; the project's book/theory/math.md has them in one place.
-//! They are tested beside the code, and against data of other programs (`golden`).
+//! Each module begins with its equations and their source; the page book/theory/math.md of the repository has all of
+//! them. Tests compare them with data of other programs.
 //!
-//! [`pipeline`] knows them all. Frames and units: [`frames`] (camera x right, y down, z forward), [`pixel`] (pixel
-//! centres at integers); metres, radians and pixels inside, kilometres and degrees in [`Config`].
+//! [`Sensor`] holds a checked configuration, [`Horizon`] holds a sensor with its memory. Frames and units: [`frames`]
+//! (camera x right, y down, z forward), [`pixel`] (pixel centres at integers). Lengths are metres and angles radians
+//! inside, kilometres and degrees in [`Config`].
 //!
 //! ```
 //! use hzn_core::camera::{self, Model};
@@ -34,7 +36,7 @@
 //! let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
 //! config.body.altitude_km = Some(230.0);
 //! let mut horizon = FlightHorizon::new(&config)?;
-//! // Sky above, ground below, of a body as wide as the Earth.
+//! // The sky is above, the ground below, of a body as wide as the Earth.
 //! let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
 //! let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
 //! let expected = horizon.expect(&Prior::default())?;
@@ -52,9 +54,10 @@
 //!
 //! # Features
 //!
-//! `std`: the square root from the standard library (the same bits, vectorised). `serde`: [`Config`] to and from files.
-//! `dlr`, `zju`, `horace`: the methods of Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`].
-//! `erf`: the most accurate sub-pixel points.
+//! A feature adds code and never changes a type. `std`: the square root comes from the standard library (the same bits,
+//! vectorised). `serde`: [`Config`] is read from files and written to them. `dlr`, `zju`, `horace`: the methods of
+//! Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`]. `erf`: the most accurate sub-pixel points.
+//! `reml`: edge noise by restricted maximum likelihood.
 
 #![no_std]
 #![forbid(unsafe_code)]

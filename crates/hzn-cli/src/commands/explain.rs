@@ -1,6 +1,6 @@
 //! `hzn explain`: one frame, stage by stage.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use hzn_calib::FrameData;
@@ -8,11 +8,11 @@ use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_mcap::Annotations;
 
-use crate::exit::{Exit, Outcome, usage};
+use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::setup::{InputArgs, SensorArgs, need_altitude, settle_input};
 use crate::tell;
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
-use hzn_run::source::{self, Picture};
+use hzn_run::source::{self, Item, Picture, Source};
 use hzn_run::{explain, overlay, sink};
 
 /// Show what happens to one frame: what was kept, what was dropped, and why
@@ -37,16 +37,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.overlay {
-        if source::ending(path) != "png" {
-            return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
-        }
-        if sink::is_same(path, &args.frame) {
-            return Err(usage(format!(
-                "{}: is the picture itself; choose another name for the overlay",
-                path.display()
-            )));
-        }
-        sink::refuse_existing(path, args.force)?;
+        check_overlay(path, args)?;
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
     let mut sensor = args.sensor.load(source.as_ref())?;
@@ -54,17 +45,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
     need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
-    let mut item = None;
-    for n in 0..=args.index {
-        item = source.next().transpose()?;
-        if item.is_none() {
-            return Err(usage(format!("--index {}: the sequence has {n} frames, numbered from 0", args.index)));
-        }
-    }
-    let Some(mut item) = item else { return Err(usage("the sequence is empty")) };
+    let mut item = item(source.as_mut(), args.index)?;
     let config = &sensor.config;
     let data = item.known(frames.as_ref());
-    let data = data.as_ref();
     let decoding = Instant::now();
     let picture = match item.payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
@@ -78,55 +61,88 @@ pub(super) fn run(args: &Args) -> Outcome {
         let what = "pictures, of which this is the first";
         tell::line(format_args!("note: {} holds {} {what}", item.name, picture.pages));
     }
-    let flight = args.sensor.flight;
-    let mut sensor = AnySensor::new(config, flight).map_err(usage)?;
-    let half_angles = sensor.expected_half_angles_rad(data);
-    let view = picture.view(config.input.channel).map_err(|e| usage(format!("input.channel: {e}")))?;
-    // Once to warm up: the first picture of a process pays for memory that is touched for the first time.
-    sensor.process(&view, data, None);
-    let times = sensor.process(&view, data, None);
-    let traces = Traces::new(config.each_body().len());
-    let mut drawing = Annotations::default();
-    let mut statuses = Vec::new();
-    let several = config.each_body().len() > 1;
-    let processed = sensor.process(&view, data, Some(&traces)).into_iter().zip(times);
-    let mut exit = Exit::Done;
-    for (which, ((processed, time), half_angle)) in processed.zip(half_angles).enumerate() {
-        let (Some(body), Some(trace)) = (config.each_body().get(which), traces.each.get(which)) else { continue };
-        let between = if which > 0 { "\n" } else { "" };
-        let name = body.kind.name();
-        let (report, half_angle) = match (processed.report, half_angle) {
-            (Ok(report), Ok(half_angle)) => (report, half_angle),
-            (Err(why), _) | (_, Err(why)) => {
-                let Unprocessed { status, why, .. } = why.into();
-                tell::result(format_args!("{between}{}: {name}: {status}: {why}\n", item.name))?;
-                statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
-                exit = Exit::SomeUnreadable;
-                continue;
-            }
-        };
-        let told = Explained {
-            name: &item.name,
-            config,
-            body,
-            levels: config.levels_of(which as u8),
-            data,
-            picture: &picture,
-            trace,
-            report: &report,
-            half_angle,
-        };
-        tell::result(format_args!("{between}{}", told.text(decoding, time.elapsed)))?;
-        // Drawn where each row sees it.
-        let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
-        drawing.add(sink::annotations(trace, report.solution.as_ref(), &camera));
-        statuses.push(if several { format!("{name} {}", report.status) } else { report.status.name().to_owned() });
+    let looked = Looked { name: &item.name, config, data: data.as_ref(), picture: &picture };
+    looked.explain(args, decoding)
+}
+
+/// Refuses an overlay that is no PNG, is the picture itself, or exists.
+fn check_overlay(path: &Path, args: &Args) -> Result<(), Stop> {
+    if source::ending(path) != "png" {
+        return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
     }
-    if let Some(path) = &args.overlay {
-        overlay::save(&overlay::draw_annotations(picture.to_rgb(), &drawing, &statuses.join(", ")), path)?;
-        tell::line(format_args!("overlay: {}", path.display()));
+    if sink::is_same(path, &args.frame) {
+        let what = "is the picture itself; choose another name for the overlay";
+        return Err(usage(format!("{}: {what}", path.display())));
     }
-    Ok(exit)
+    Ok(sink::refuse_existing(path, args.force)?)
+}
+
+/// The picture number `index` of a sequence, from 0.
+fn item(source: &mut dyn Source, index: u64) -> Result<Item, Stop> {
+    let mut item = None;
+    for n in 0..=index {
+        item = source.next().transpose()?;
+        if item.is_none() {
+            return Err(usage(format!("--index {index}: the sequence has {n} frames, numbered from 0")));
+        }
+    }
+    item.ok_or_else(|| usage("the sequence is empty"))
+}
+
+/// A picture, with what is known about it.
+struct Looked<'a> {
+    name: &'a str,
+    config: &'a Config,
+    data: Option<&'a FrameData>,
+    picture: &'a Picture,
+}
+
+impl Looked<'_> {
+    /// Processes the picture and explains each body; draws the overlay.
+    fn explain(&self, args: &Args, decoding: Duration) -> Outcome {
+        let Self { name: file, config, data, picture } = *self;
+        let mut sensor = AnySensor::new(config, args.sensor.flight).map_err(usage)?;
+        let half_angles = sensor.expected_half_angles_rad(data);
+        let view = picture.view(config.input.channel).map_err(|e| usage(format!("input.channel: {e}")))?;
+        // Once to warm up: the first picture of a process pays for memory that is touched for the first time.
+        sensor.process(&view, data, None);
+        let times = sensor.process(&view, data, None);
+        let traces = Traces::new(config.each_body().len());
+        let mut drawing = Annotations::default();
+        let mut statuses = Vec::new();
+        let several = config.each_body().len() > 1;
+        let processed = sensor.process(&view, data, Some(&traces)).into_iter().zip(times);
+        let mut exit = Exit::Done;
+        for (which, ((processed, time), half_angle)) in processed.zip(half_angles).enumerate() {
+            let (Some(body), Some(trace)) = (config.each_body().get(which), traces.each.get(which)) else { continue };
+            let between = if which > 0 { "\n" } else { "" };
+            let name = body.kind.name();
+            let (report, half_angle) = match (processed.report, half_angle) {
+                (Ok(report), Ok(half_angle)) => (report, half_angle),
+                (Err(why), _) | (_, Err(why)) => {
+                    let Unprocessed { status, why, .. } = why.into();
+                    tell::result(format_args!("{between}{file}: {name}: {status}: {why}\n"))?;
+                    statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
+                    exit = Exit::SomeUnreadable;
+                    continue;
+                }
+            };
+            let levels = config.levels_of(which as u8);
+            let explained =
+                Explained { name: file, config, body, levels, data, picture, trace, report: &report, half_angle };
+            tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;
+            // Drawn where each row sees it.
+            let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
+            drawing.add(sink::annotations(trace, report.solution.as_ref(), &camera));
+            let status = report.status;
+            statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
+        }
+        if let Some(path) = &args.overlay {
+            overlay::save(&overlay::draw_annotations(picture.to_rgb(), &drawing, &statuses.join(", ")), path)?;
+            tell::line(format_args!("overlay: {}", path.display()));
+        }
+        Ok(exit)
+    }
 }
 
 /// Everything that is known about the frame.
@@ -149,82 +165,88 @@ impl Explained<'_> {
             out.push_str(format!("{name:<11} {value}").trim_end());
             out.push('\n');
         };
+        line("picture", self.layout());
+        line("expected", self.expected());
+        line("binarize", self.level());
+        self.looks(&mut line);
+        self.edges(&mut line);
+        self.candidates(&mut line);
+        self.points(&mut line);
+        line("work", format!("{} (limits.max_work bounds it)", self.report.counters.work));
+        line("status", self.report.status.name().to_owned());
+        match &self.report.solution {
+            Some(s) => self.answer(s, &mut line),
+            None => advice(self.report, self.picture, &mut line),
+        }
+        self.times(decoding, elapsed, &mut line);
+        out
+    }
+
+    fn layout(&self) -> String {
         let l = self.picture.layout;
         let colours = if l.channels >= 3 {
             format!(", brightness: {:?}", self.config.input.channel).to_lowercase()
         } else {
             String::new()
         };
-        line(
-            "picture",
-            format!(
-                "{}: {} x {} px, {} of {} bits{colours}",
-                self.name,
-                l.width,
-                l.height,
-                explain::counted(l.channels.into(), "channel"),
-                l.bits
-            ),
-        );
-        line("expected", self.expected());
-        let r = self.report;
-        let c = r.counters;
-        let reached = |stage: Stage| r.stage >= stage;
-        line("binarize", self.level());
+        let channels = explain::counted(l.channels.into(), "channel");
+        format!("{}: {} x {} px, {channels} of {} bits{colours}", self.name, l.width, l.height, l.bits)
+    }
+
+    /// Further looks, and a dark frame that was left out.
+    fn looks(&self, line: &mut impl FnMut(&str, String)) {
         let again = self.trace.again();
         if !again.is_empty() {
             let levels: Vec<String> = again.iter().map(u16::to_string).collect();
-            line("looks", format!("{}: without an answer at that level, also at {}", c.looks, levels.join(", ")));
+            let looks = self.report.counters.looks;
+            line("looks", format!("{looks}: without an answer at that level, also at {}", levels.join(", ")));
         }
         if self.trace.frame_px() > 0 {
             line("frame", format!("{} px of dark frame around the picture left out", self.trace.frame_px()));
         }
-        if reached(Stage::Contour) {
-            let masks = self.config.mask.polygons_px.len();
-            let masked = if masks > 0 { format!(", {masks} masked areas left out") } else { String::new() };
-            line("contour", format!("{} border pixels followed{masked}", c.followed));
-            let dropped = if c.dropped > 0 {
-                format!("; {} border pixels dropped because a list was full", c.dropped)
-            } else {
-                String::new()
-            };
-            line(
-                "candidates",
-                format!("{} edges of at least {} px{dropped}", c.candidates, self.config.candidates.min_points),
-            );
+    }
+
+    fn edges(&self, line: &mut impl FnMut(&str, String)) {
+        if self.report.stage < Stage::Contour {
+            return;
         }
-        if !r.candidates.is_empty() {
-            line("", "   #   length   points  inliers   rms px  verdict".into());
-            for k in &r.candidates {
-                let rms = if k.rms_px.is_finite() { format!("{:.3}", k.rms_px) } else { "-".into() };
-                line(
-                    "",
-                    format!(
-                        "{:>4} {:>8} {:>8} {:>8} {rms:>8}  {}: {}",
-                        k.number,
-                        k.length_px,
-                        k.points,
-                        k.inliers,
-                        k.verdict.name(),
-                        explain::why(k.verdict, &self.config.select)
-                    ),
-                );
-            }
-            let more = (c.candidates as usize).saturating_sub(r.candidates.len());
-            if more > 0 {
-                line("", format!("and {more} further ones that are not listed"));
-            }
+        let c = self.report.counters;
+        let masks = self.config.mask.polygons_px.len();
+        let masked = if masks > 0 { format!(", {masks} masked areas left out") } else { String::new() };
+        line("contour", format!("{} border pixels followed{masked}", c.followed));
+        let dropped = match c.dropped {
+            0 => String::new(),
+            n => format!("; {n} border pixels dropped because a list was full"),
+        };
+        let shortest = self.config.candidates.min_points;
+        line("candidates", format!("{} edges of at least {shortest} px{dropped}", c.candidates));
+    }
+
+    /// The table of candidates, with the verdict of each.
+    fn candidates(&self, line: &mut impl FnMut(&str, String)) {
+        let r = self.report;
+        if r.candidates.is_empty() {
+            return;
         }
+        line("", "   #   length   points  inliers   rms px  verdict".into());
+        for k in &r.candidates {
+            let rms = if k.rms_px.is_finite() { format!("{:.3}", k.rms_px) } else { "-".into() };
+            let numbers = format!("{:>4} {:>8} {:>8} {:>8} {rms:>8}", k.number, k.length_px, k.points, k.inliers);
+            line("", format!("{numbers}  {}: {}", k.verdict.name(), explain::why(k.verdict, &self.config.select)));
+        }
+        let more = (r.counters.candidates as usize).saturating_sub(r.candidates.len());
+        if more > 0 {
+            line("", format!("and {more} further ones that are not listed"));
+        }
+    }
+
+    fn points(&self, line: &mut impl FnMut(&str, String)) {
+        let c = self.report.counters;
         if c.fallback_points > 0 {
-            line(
-                "sub-pixel",
-                format!(
-                    "{} of {} points stand at the global level, because their local one was not found",
-                    c.fallback_points, c.edge_points
-                ),
-            );
+            let what = "points stand at the global level, because their local one was not found";
+            line("sub-pixel", format!("{} of {} {what}", c.fallback_points, c.edge_points));
         }
-        if reached(Stage::Reject) {
+        if self.report.stage >= Stage::Reject {
             let reject = &self.config.reject;
             let noisy = match reject.noise_sigma {
                 0.0 => String::new(),
@@ -233,27 +255,18 @@ impl Explained<'_> {
             let px = reject.threshold_px;
             line("reject", format!("{} draws; points up to {px} px from the limb can belong to it{noisy}", c.draws));
         }
-        line("work", format!("{} (limits.max_work bounds it)", c.work));
-        line("status", r.status.name().to_owned());
-        match &r.solution {
-            Some(s) => self.answer(s, &mut line),
-            None => advice(r, self.picture, &mut line),
-        }
+    }
+
+    fn times(&self, decoding: Duration, elapsed: Duration, line: &mut impl FnMut(&str, String)) {
         let us = |d: Duration| d.as_nanos() as f64 / 1e3;
-        line(
-            "time",
-            format!(
-                "{:.0} us in all, after {:.1} ms of decoding; by stage, while watched (which takes time too):",
-                us(elapsed),
-                decoding.as_secs_f64() * 1e3
-            ),
-        );
+        let (all, ms) = (us(elapsed), decoding.as_secs_f64() * 1e3);
+        let by_stage = "by stage, while watched (which takes time too):";
+        line("time", format!("{all:.0} us in all, after {ms:.1} ms of decoding; {by_stage}"));
         for (stage, time) in self.trace.times() {
             if time > Duration::ZERO {
                 line("", format!("{:<11} {:>9.1} us", stage.name(), us(time)));
             }
         }
-        out
     }
 
     fn expected(&self) -> String {

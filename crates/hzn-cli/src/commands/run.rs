@@ -3,7 +3,7 @@
 use hzn_run::explain;
 use std::path::{Path, PathBuf};
 
-use hzn_calib::Frames;
+use hzn_calib::{Frames, Sensor};
 use hzn_core::config::Orient;
 use hzn_core::status::Status;
 use hzn_mcap::{Row, part_path};
@@ -75,17 +75,7 @@ impl Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    if let Some(path) = &args.output {
-        sink::target(path)?;
-    }
-    if let Some(path) = &args.output
-        && let Some(input) = args.input.iter().find(|i| sink::is_same(path, i) || sink::is_same(&part_path(path), i))
-    {
-        return Err(usage(format!("{}: is the input itself; choose another name for the output", input.display())));
-    }
-    if args.no_images && args.output.as_deref().is_none_or(|p| ending(p) != "mcap") {
-        return Err(usage("--no-images: only an MCAP holds pictures; give -o out.mcap, or leave it out"));
-    }
+    check_arguments(args)?;
     let mut source = args.source.open(&args.input)?;
     let folder = source.folder();
     let mut sensor = args.sensor.load(source.as_ref())?;
@@ -99,44 +89,16 @@ pub(super) fn run(args: &Args) -> Outcome {
         warn_of_missing(frames, &folder);
     }
     if let Some(drawn) = &args.overlay {
-        std::fs::create_dir_all(drawn).map_err(|e| sink::cannot(drawn, &e))?;
-        if sink::is_same(drawn, &folder) {
-            let what = "is where the pictures are, which would be replaced; choose another folder";
-            return Err(usage(format!("--overlay {}: {what}", drawn.display())));
-        }
-        let holds = std::fs::read_dir(drawn).map_err(|e| sink::cannot(drawn, &e))?.next().is_some();
-        if holds && !(args.force || args.resume) {
-            let what = "holds files already; choose another folder, or --force replaces those of the same name";
-            return Err(usage(format!("--overlay {}: {what}", drawn.display())));
-        }
+        prepare_overlays(drawn, &folder, args.force || args.resume)?;
     }
-    let existing = match (args.force, args.resume) {
-        (true, _) => Existing::Replace,
-        (_, true) => Existing::Resume,
-        _ => Existing::Refuse,
-    };
     let path = args.output.as_deref();
-    let trace = Output::wants_trace(path);
-    // One after another, where a picture's level or gate comes from the one before.
-    let threads = if sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
-    let plan = Plan {
-        config: sensor.config,
-        flight: args.sensor.flight,
-        threads,
-        frames,
-        fps: args.source.fps,
-        trace,
-        keep_traces: false,
-        keep_picture: trace && !args.no_images,
-        overlay: args.overlay.clone(),
-        last: Vec::new(),
-    };
-    // Pictures are recorded as they were looked at.
-    let recorded = match plan.config.input.orient {
-        Orient::AsStored => sensor.text,
+    // A recording holds pictures as they were processed.
+    let recorded = match sensor.config.input.orient {
+        Orient::AsStored => sensor.text.clone(),
         _ => source::with_key(&sensor.text, "orient", "as-stored"),
     };
-    let (mut output, held) = sink::open(path, existing, &plan.config, &recorded)?;
+    let plan = plan(args, sensor, frames);
+    let (mut output, held) = sink::open(path, existing(args), &plan.config, &recorded)?;
     let plan = Plan { last: held.answered.clone(), ..plan };
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
@@ -150,66 +112,152 @@ pub(super) fn run(args: &Args) -> Outcome {
         output.finish()?;
         return Err(stop);
     }
-    let mut progress = Progress::new(total, held.frames, args.quiet);
+    let mut watch = Watch::new(Progress::new(total, held.frames, args.quiet), args.quiet);
     let stop = stop_flag();
-    let mut tipped = args.quiet;
-    let mut gaps = Gaps::default();
-    let mut refusals = Refusals::default();
-    let mut several = Several::default();
-    let mut seen = |frame: &Finished| {
-        gaps.count(frame);
-        refusals.count(frame);
-        several.count(frame);
-        if let Some(tip) = frame.tip.as_ref().filter(|_| !tipped) {
-            tipped = true;
-            progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
-        }
-        // A picture that cannot be read is so for every body.
-        if let Some(e) = frame.unreadable().filter(|_| !args.quiet) {
-            progress.say(&format!("unreadable: {}: {e}", frame.name));
-        }
-        progress.count(frame.found.iter().map(|f| f.status()));
-    };
-    let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut seen);
+    let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut |frame| watch.see(frame));
     let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| b.kind.name()).collect();
-    let summary = progress.summary(&bodies);
+    let summary = watch.progress.summary(&bodies);
     let end = end?;
     output.finish()?;
     let lost = source.lost().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
-    gaps.tell(plan.frames.as_ref());
-    several.tell();
+    watch.gaps.tell(plan.frames.as_ref());
+    watch.several.tell();
     if !args.quiet {
-        let before = match held.frames {
+        watch.sum_up(args, &plan, source.as_ref(), &summary, held.frames);
+    }
+    let done = held.frames + watch.progress.frames();
+    if end == End::Interrupted && total.is_none_or(|n| done < n) {
+        tell_interruption(done, total, path);
+        return Ok(Exit::Interrupted);
+    }
+    let missed = watch.progress.any_unprocessed() || lost.is_some() || watch.several.files > 0;
+    Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Refuses arguments that contradict each other, before anything is opened.
+fn check_arguments(args: &Args) -> Result<(), Stop> {
+    if let Some(path) = &args.output {
+        sink::target(path)?;
+    }
+    if let Some(path) = &args.output
+        && let Some(input) = args.input.iter().find(|i| sink::is_same(path, i) || sink::is_same(&part_path(path), i))
+    {
+        return Err(usage(format!("{}: is the input itself; choose another name for the output", input.display())));
+    }
+    if args.no_images && args.output.as_deref().is_none_or(|p| ending(p) != "mcap") {
+        return Err(usage("--no-images: only an MCAP holds pictures; give -o out.mcap, or leave it out"));
+    }
+    Ok(())
+}
+
+/// Makes the folder of the overlays; `may_hold`: it may hold files already.
+fn prepare_overlays(drawn: &Path, pictures: &Path, may_hold: bool) -> Result<(), Stop> {
+    std::fs::create_dir_all(drawn).map_err(|e| sink::cannot(drawn, &e))?;
+    if sink::is_same(drawn, pictures) {
+        let what = "is where the pictures are, which would be replaced; choose another folder";
+        return Err(usage(format!("--overlay {}: {what}", drawn.display())));
+    }
+    let holds = std::fs::read_dir(drawn).map_err(|e| sink::cannot(drawn, &e))?.next().is_some();
+    if holds && !may_hold {
+        let what = "holds files already; choose another folder, or --force replaces those of the same name";
+        return Err(usage(format!("--overlay {}: {what}", drawn.display())));
+    }
+    Ok(())
+}
+
+fn existing(args: &Args) -> Existing {
+    match (args.force, args.resume) {
+        (true, _) => Existing::Replace,
+        (_, true) => Existing::Resume,
+        _ => Existing::Refuse,
+    }
+}
+
+fn plan(args: &Args, sensor: Sensor, frames: Option<Frames>) -> Plan {
+    let trace = Output::wants_trace(args.output.as_deref());
+    // One picture after another, where the threshold or a gate comes from the previous one.
+    let threads = if sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
+    Plan {
+        config: sensor.config,
+        flight: args.sensor.flight,
+        threads,
+        frames,
+        fps: args.source.fps,
+        trace,
+        keep_traces: false,
+        keep_picture: trace && !args.no_images,
+        overlay: args.overlay.clone(),
+        last: Vec::new(),
+    }
+}
+
+/// What is counted and told while the run goes on.
+struct Watch {
+    progress: Progress,
+    quiet: bool,
+    tipped: bool,
+    gaps: Gaps,
+    refusals: Refusals,
+    several: Several,
+}
+
+impl Watch {
+    fn new(progress: Progress, quiet: bool) -> Self {
+        Self {
+            progress,
+            quiet,
+            tipped: quiet,
+            gaps: Gaps::default(),
+            refusals: Refusals::default(),
+            several: Several::default(),
+        }
+    }
+
+    fn see(&mut self, frame: &Finished) {
+        self.gaps.count(frame);
+        self.refusals.count(frame);
+        self.several.count(frame);
+        if let Some(tip) = frame.tip.as_ref().filter(|_| !self.tipped) {
+            self.tipped = true;
+            self.progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
+        }
+        // A picture that cannot be read is unreadable for every body.
+        if let Some(e) = frame.unreadable().filter(|_| !self.quiet) {
+            self.progress.say(&format!("unreadable: {}: {e}", frame.name));
+        }
+        self.progress.count(frame.found.iter().map(|f| f.status()));
+    }
+
+    /// Tells the summary, the commonest refusal, and the command that explains it.
+    fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, summary: &str, held: u64) {
+        let before = match held {
             0 => String::new(),
             n => format!(" (after {n} that were finished before)"),
         };
         tell::line(format_args!("{summary}{before}"));
-        if let Some(further) = refusals.further() {
+        if let Some(further) = self.refusals.further() {
             tell::line(format_args!("note: {further}"));
         }
-        if let Some((why, frame)) = refusals.commonest(&plan.config.select) {
-            let nothing = !progress.any_answered() && held.frames == 0;
+        if let Some((why, frame)) = self.refusals.commonest(&plan.config.select) {
+            let nothing = !self.progress.any_answered() && held == 0;
             let found = if nothing { "nothing was found in any picture; " } else { "" };
             let more = frame.map(|frame| {
-                let command = explain_command(args, source.as_ref(), frame);
+                let command = explain_command(args, source, frame);
                 format!("; what happens to one, and what to try: {command}")
             });
             tell::line(format_args!("note: {found}{why}{}", more.unwrap_or_default()));
         }
     }
-    let done = held.frames + progress.frames();
-    if end == End::Interrupted && total.is_none_or(|n| done < n) {
-        let of = total.map(|n| format!(" of {n}")).unwrap_or_default();
-        let next = match path {
-            Some(path) => format!("; {} is valid, and --resume continues it", path.display()),
-            None => String::new(),
-        };
-        tell::line(format_args!("interrupted after {done}{of} frames{next}"));
-        return Ok(Exit::Interrupted);
-    }
-    let missed = progress.any_unprocessed() || lost.is_some() || several.files > 0;
-    Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+fn tell_interruption(done: u64, total: Option<u64>, path: Option<&Path>) {
+    let of = total.map(|n| format!(" of {n}")).unwrap_or_default();
+    let next = match path {
+        Some(path) => format!("; {} is valid, and --resume continues it", path.display()),
+        None => String::new(),
+    };
+    tell::line(format_args!("interrupted after {done}{of} frames{next}"));
 }
 
 /// The command that explains a frame of this run, as it is to be typed.

@@ -1,7 +1,7 @@
 //! The keys of sensor.toml: one entry each, next to the code that reads it.
 //!
-//! The macro [`section!`] declares a section's structure, its defaults and its table of keys together, and
-//! [`choices!`] an enumeration whose variants are words in sensor.toml. Everything else comes from these entries: the
+//! The macro `section!` declares a section's structure, its defaults and its table of keys together, and
+//! `choices!` an enumeration whose variants are words in sensor.toml. Everything else comes from these entries: the
 //! checks and their messages, the parameters that a flight computer knows by number, and, on the ground, the table in
 //! the documentation, the commented template, the JSON schema, the sliders of the viewer.
 //!

@@ -18,7 +18,7 @@ pub(crate) use cropped::Cropped;
 
 /// What the pipeline reads: one brightness per pixel.
 pub trait Pixels {
-    /// The picture is gone, and of its edges only [`Self::passed`] is left.
+    /// The picture is gone, and of its edges only [`Self::streamed_point`] is left.
     const STREAMED: bool = false;
     /// Columns, 1 to 65535.
     fn width(&self) -> u16;

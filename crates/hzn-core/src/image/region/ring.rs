@@ -59,8 +59,8 @@ impl<T: Real> Region<T> {
         Some(())
     }
 
-    /// The right side from the row below `top` on; gives the last row's end. The end of each row is found from that of the
-    /// row above.
+    /// The right side from the row below `top` on; gives the last row's end. The end of each row is found from that of
+    /// the row above.
     #[inline(always)]
     fn down_the_right(&self, right: u16, top: u16, bottom: u16, visit: &mut impl FnMut(Run) -> bool) -> Option<u16> {
         let (first, last) = self.columns();

@@ -226,7 +226,8 @@ impl<T: Real> Expected<T> {
         let tan = sin / cos;
         let scale = tan / (seen.radius + seen.altitude);
         let known = frame.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
-        // A higher limb is a wider cone. The ellipsoid's own shape adds half the difference of its half-angles' cosines.
+        // A higher limb is a wider cone. The ellipsoid's own shape adds half the difference of its half-angles'
+        // cosines.
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);
         let own = seen.ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
             let (east, meridian) = cone.half_angles_rad();
