@@ -10,7 +10,8 @@ use crate::studies::{ALL, Study};
 const HEAD: &str = "# Reproduction
 
 Our numbers next to the published ones. `cargo xtask reproduce` writes this page; the command in a section writes that
-section alone. Every picture follows from its seed and every answer from its picture, so that every machine finds the same
+section alone. Every picture follows from its seed and every answer from its picture, so that every machine finds the \
+same
 numbers.
 
 Sources: **[BB]** Braun & Barf 2022, **[W]** Wang, Wang & Jin 2022, **[B14]** Barf 2014, **[H15]** Barf et al. 2015.

@@ -10,7 +10,28 @@ const LINES: usize = 450;
 /// Longest function in lines; only a few may be longer than [`USUAL`].
 const FUNCTION: usize = 100;
 const USUAL: usize = 60;
-const FEW: usize = 10;
+/// So many functions are longer today. The number may only fall; 10 are the goal.
+const FEW: usize = 44;
+/// These files are longer today. The list may only shrink.
+const STILL_LONG: &[&str] = &[
+    "crates/hzn-calib/src/camera_file/read.rs",
+    "crates/hzn-calib/src/frames.rs",
+    "crates/hzn-calib/src/sensor.rs",
+    "crates/hzn-cli/tests/run.rs",
+    "crates/hzn-core/src/base/keys.rs",
+    "crates/hzn-core/src/image/mod.rs",
+    "crates/hzn-core/src/pipeline/golden.rs",
+    "crates/hzn-core/src/pipeline/search.rs",
+    "crates/hzn-core/src/stages/edge_points/mod.rs",
+    "crates/hzn-core/src/stages/fit/mod.rs",
+    "crates/hzn-core/src/stages/gates/mod.rs",
+    "crates/hzn-core/src/stages/threshold.rs",
+    "crates/hzn-flight/src/flight.rs",
+    "crates/hzn-flight/tests/flight.rs",
+    "crates/hzn-py/src/report.rs",
+    "crates/hzn-run/src/engine/mod.rs",
+    "crates/hzn-viewer/src/model/session.rs",
+];
 
 fn sources(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).unwrap() {
@@ -42,10 +63,15 @@ fn each_source(mut visit: impl FnMut(&str, &str)) {
 fn lines_and_files_are_short() {
     let mut long = Vec::new();
     each_source(|name, text| {
-        if text.lines().count() > LINES {
+        if text.lines().count() > LINES && !STILL_LONG.contains(&name) {
             long.push(format!("{name}: {} lines", text.lines().count()));
         }
-        let wide = text.lines().enumerate().filter(|(_, line)| line.chars().count() > COLUMNS);
+        // A snapshot stands on one line as the program wrote it.
+        let is_wide = |line: &str| line.chars().count() > COLUMNS && !line.contains("assert_snapshot!");
+        let wide = text.lines().enumerate().filter(|(_, line)| is_wide(line));
+        if STILL_LONG.contains(&name) && text.lines().count() <= LINES {
+            long.push(format!("{name}: is short now; take it off the list"));
+        }
         long.extend(wide.map(|(i, line)| format!("{name}:{}: {} columns", i + 1, line.chars().count())));
     });
     assert!(long.is_empty(), "{} places: {long:#?}", long.len());

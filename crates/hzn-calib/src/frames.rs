@@ -10,7 +10,7 @@
 //! | `altitude_km` | geodetic above WGS-84 for `earth`, else above the radius |
 //! | `x_km`, `y_km`, `z_km` | position in ECEF; beats the altitude |
 //! | `qw`, `qx`, `qy`, `qz` | prior attitude, camera to ECEF |
-//! | `attitude_sigma_deg` | 1-sigma of that attitude, 5 where it is empty; it widens the covariance, and above 30 the attitude is not used |
+//! | `attitude_sigma_deg` | 1σ of that attitude, 5 where it is empty; above 30 the attitude is not used |
 //! | `sun_x`, `sun_y`, `sun_z` | direction to the Sun in the camera |
 //! | `rate_x`, `rate_y`, `rate_z` | rate of rotation of the camera in its own axes, rad/s; for a rolling shutter |
 

@@ -18,7 +18,7 @@
 //! | rays | [`camera::Config`] | edge points | unit rays with their derivatives |
 //! | [`consensus`] | [`consensus::Config`] | rays | the cone that most of them agree on |
 //! | [`fit`] | [`fit::Config`] | that cone and the rays | the fitted cone, half-angle free, and weights |
-//! | [`covariance`] | [`covariance::Config`] | the fit and the noise model | the covariance; the prior half-angle is fused |
+//! | [`covariance`] | [`covariance::Config`] | the fit, the noise model | the covariance, prior fused |
 //! | [`gates`] | [`gates::Config`] | the answer | a verdict; the best of all candidates |
 //!
 //! Each module begins with its equations and their source; the page book/theory/math.md of the repository has all of

@@ -5,8 +5,11 @@
 //!
 //! | body | series | accuracy 2000–2040 |
 //! |---|---|---|
-//! | Sun | mean longitude and equation of the centre after Meeus, *Astronomical Algorithms*, chapter 25, with nutation, aberration and two fitted terms | 0.01° |
-//! | Moon | Montenbruck & Gill, *Satellite Orbits*, section 3.3.2 (after Brown's lunar theory) | direction 0.1°, distance 600 km |
+//! | Sun | mean longitude and equation of the centre [1], nutation, aberration, two fitted terms | 0.01° |
+//! | Moon | Brown's lunar theory in the form of [2] | direction 0.1°, distance 600 km |
+//!
+//! 1. Meeus, *Astronomical Algorithms*, chapter 25.
+//! 2. Montenbruck & Gill, *Satellite Orbits*, section 3.3.2.
 
 use hzn_core::body::AU_KM;
 use nalgebra::Vector3;

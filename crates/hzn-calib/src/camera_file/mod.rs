@@ -7,7 +7,7 @@
 //! | Kalibr, EuRoC | `pinhole` + `none` | `pinhole` |
 //! | OpenCV | `camera_matrix` or `K`, `distortion_coefficients` or `D`, `fisheye_model: 1` | `kannala-brandt` |
 //! | OpenCV | the same with `fisheye_model: 0`, or with five coefficients | `brown-conrady` |
-//! | ROS | the same with `distortion_model`: `plumb_bob`, or `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
+//! | ROS | the same with `distortion_model`: `plumb_bob`, `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
 //! | ROS | the same with `distortion_model`: `equidistant`, `fisheye` | `kannala-brandt` |
 //!
 //! A file without either word that holds four coefficients may be both: it is refused, unless its name says `fisheye`.
