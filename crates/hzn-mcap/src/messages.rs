@@ -236,7 +236,12 @@ pub(crate) fn parse_log(data: &[u8]) -> Result<LogLine, prost::DecodeError> {
 
 /// The calibration. Its principal point keeps hzn's pixel centres at integers, as ROS has them.
 pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
-    let (model, coefficients) = if c.model.is_planar() { ("plumb_bob", 5) } else { ("kannala_brandt", 4) };
+    let (model, coefficients) = match c.model {
+        // Foxglove has no name for them: a viewer of others draws without distortion.
+        camera::Model::DoubleSphere | camera::Model::Eucm => ("", 0),
+        planar if planar.is_planar() => ("plumb_bob", 5),
+        _ => ("kannala_brandt", 4),
+    };
     let (fx, fy, cx, cy) = (c.fx_px, c.fy_px, c.cx_px, c.cy_px);
     CameraCalibration {
         timestamp: stamp(ns),

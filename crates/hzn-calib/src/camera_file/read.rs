@@ -81,13 +81,25 @@ impl File<'_> {
         let field = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
         let list = |key: &str| numbers(&camera[key]);
         let projection = camera["camera_model"].as_str().unwrap_or("pinhole");
-        if projection != "pinhole" {
-            let what = format!("{projection:?} is a projection that hzn does not have; calibrate with pinhole");
-            return Err(self.problem(&field("camera_model"), what));
-        }
-        let intrinsics = list("intrinsics").filter(|v| v.len() == 4);
-        let Some([fx, fy, cx, cy]) = intrinsics.and_then(|v| <[f64; 4]>::try_from(v).ok()) else {
-            return Err(self.problem(&field("intrinsics"), "four numbers fx, fy, cx, cy are expected"));
+        let own = match projection {
+            "pinhole" => None,
+            "ds" => Some((Model::DoubleSphere, "xi, alpha")),
+            "eucm" => Some((Model::Eucm, "alpha, beta")),
+            _ => {
+                let what = format!(
+                    "{projection:?} is a projection that hzn does not have; calibrate with pinhole, ds or eucm"
+                );
+                return Err(self.problem(&field("camera_model"), what));
+            }
+        };
+        // The projections with coefficients of their own have them before the focal lengths.
+        let (names, count) = own.map_or(("four numbers ".to_owned(), 0), |(_, k)| (format!("six numbers {k}, "), 2));
+        let intrinsics = list("intrinsics").filter(|v| v.len() == 4 + count);
+        let Some((k, [fx, fy, cx, cy])) = intrinsics.and_then(|v| {
+            let (k, rest) = v.split_at(count);
+            Some((k.to_vec(), <[f64; 4]>::try_from(rest).ok()?))
+        }) else {
+            return Err(self.problem(&field("intrinsics"), format!("{names}fx, fy, cx, cy are expected")));
         };
         let size = list("resolution").filter(|v| v.len() == 2);
         let Some([width, height]) = size.and_then(|v| <[f64; 2]>::try_from(v).ok()) else {
@@ -100,6 +112,15 @@ impl File<'_> {
         };
         let given = Coefficients { values: self.coefficients(camera.get(key), &field(key))?, field: field(key) };
         let lens = self.stated_lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
+        if let Some((model, _)) = own {
+            if given.meant() > 0 {
+                return Err(
+                    self.problem(&field(key), format!("{projection} has no further distortion; calibrate with none"))
+                );
+            }
+            let given = Coefficients { values: Some(k), field: field("intrinsics") };
+            return self.camera(model, [width, height], [fx, fy, cx, cy], &given);
+        }
         let model = self.model(lens, &given)?;
         self.camera(model, [width, height], [fx, fy, cx, cy], &given)
     }
@@ -316,7 +337,7 @@ mod tests {
     #[test]
     fn kalibr_camchain() {
         let text = "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n  distortion_coeffs: [-0.05, 0.01, -3.5e-03, \
-                    0]\n distortion_model: equidistant\n  intrinsics: [1235.0, 1231.0, 963.2, 536.7]\n  \
+                    0]\n  distortion_model: equidistant\n  intrinsics: [1235.0, 1231.0, 963.2, 536.7]\n  \
                     resolution: [1920, 1080]\n  rostopic: /cam0/image_raw\n";
         let c = read(text).unwrap();
         assert_eq!((c.model, c.width, c.height), (Model::KannalaBrandt, 1920, 1080));
@@ -331,6 +352,23 @@ mod tests {
             "cam.yaml: cam0.distortion_model: \"equidistent\" is a lens that hzn does not have; did you mean \
                 equidistant?"
         );
+    }
+
+    #[test]
+    fn projections_of_kalibr() {
+        let text = "cam0:\n  camera_model: ds\n  intrinsics: [-0.18, 0.59, 157.0, 157.1, 254.2, 256.3]\n  \
+                    distortion_model: none\n  distortion_coeffs: []\n  resolution: [512, 512]\n";
+        let c = read(text).unwrap();
+        assert_eq!((c.model, c.k.as_slice()), (Model::DoubleSphere, &[-0.18, 0.59][..]));
+        assert_eq!((c.fx_px, c.fy_px, c.cx_px, c.cy_px), (157.0, 157.1, 254.2, 256.3));
+        let back = super::super::write(&c, super::super::Format::Kalibr).unwrap();
+        assert_eq!(read(&back).unwrap(), c, "{back}");
+        let eucm = read(&text.replace("ds", "eucm").replace("-0.18, 0.59", "0.63, 1.04")).unwrap();
+        assert_eq!((eucm.model, eucm.k.as_slice()), (Model::Eucm, &[0.63, 1.04][..]));
+        let short = read(&text.replace("-0.18, ", "")).unwrap_err();
+        assert_eq!(short, "cam.yaml: cam0.intrinsics: six numbers xi, alpha, fx, fy, cx, cy are expected");
+        let omni = read(&text.replace("ds", "omni")).unwrap_err();
+        assert!(omni.contains("calibrate with pinhole, ds or eucm"), "{omni}");
     }
 
     #[test]
@@ -433,7 +471,7 @@ mod tests {
         assert!(read(&turned).unwrap_err().contains("it is transposed, as MATLAB keeps it"));
         // Coefficients under another name would be a lens without distortion.
         let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  resolution: [640, \
-                     480]\n distortion_model: radtan\n  distortion_coefs: [0.01, 0.0, 0.0, 0.0]\n";
+                     480]\n  distortion_model: radtan\n  distortion_coefs: [0.01, 0.0, 0.0, 0.0]\n";
         assert_eq!(read(chain).unwrap_err(), "cam.yaml: cam0.distortion_coeffs: missing: this lens has k1, k2, p1, p2");
         assert!(
             read(&chain.replace("coefs", "coeffs").replace("  distortion_model: radtan\n", ""))

@@ -53,9 +53,15 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
     match format {
         Format::Sensor => Ok(sensor(camera)),
         Format::Kalibr => {
-            let mut out = String::from("cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n");
-            let k = four(camera, format)?;
+            let own = match camera.model {
+                Model::DoubleSphere => Some("ds"),
+                Model::Eucm => Some("eucm"),
+                _ => None,
+            };
+            let mut out = format!("cam0:\n  cam_overlaps: []\n  camera_model: {}\n", own.unwrap_or("pinhole"));
+            let k = if own.is_some() { Vec::new() } else { four(camera, format)? };
             let model = match camera.model {
+                _ if own.is_some() => "none",
                 Model::Pinhole => "none",
                 planar if planar.is_planar() => "radtan",
                 _ => "equidistant",
@@ -64,7 +70,7 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
                 out,
                 "  distortion_coeffs: {}\n  distortion_model: {model}\n  intrinsics: {}\n  resolution: [{}, {}]\n",
                 list(&k),
-                list(&intrinsics(camera)),
+                list(&[own.map_or(&[][..], |_| &camera.k), &intrinsics(camera)[..]].concat()),
                 camera.width,
                 camera.height
             );
@@ -82,7 +88,7 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
                 list(&k)
             ))
         }
-        Format::OpenCv => Ok(opencv(camera)),
+        Format::OpenCv => opencv(camera),
     }
 }
 
@@ -101,7 +107,8 @@ fn sensor(c: &Config) -> String {
     out
 }
 
-fn opencv(c: &Config) -> String {
+fn opencv(c: &Config) -> Result<String, Unfit> {
+    refuse_own_projection(c, Format::OpenCv)?;
     let fisheye = matches!(c.model, Model::KannalaBrandt | Model::Equidistant);
     let count = if fisheye { 4 } else { 5 };
     let k: Vec<f64> = (0..count).map(|i| c.coefficient(i)).collect();
@@ -109,7 +116,7 @@ fn opencv(c: &Config) -> String {
     let matrix = |rows: usize, cols: usize, data: &[f64]| {
         format!("!!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: {}", list(data))
     };
-    format!(
+    Ok(format!(
         "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\nfisheye_model: {}\ncamera_matrix: {}\n\
          distortion_coefficients: {}\n",
         c.width,
@@ -117,7 +124,16 @@ fn opencv(c: &Config) -> String {
         u8::from(fisheye),
         matrix(3, 3, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
         matrix(count, 1, &k)
-    )
+    ))
+}
+
+/// Only Kalibr writes the projections with coefficients of their own.
+fn refuse_own_projection(c: &Config, format: Format) -> Result<(), Unfit> {
+    match c.model {
+        Model::DoubleSphere => Err(Unfit { what: "the double sphere lens", format }),
+        Model::Eucm => Err(Unfit { what: "the enhanced unified camera model", format }),
+        _ => Ok(()),
+    }
 }
 
 fn intrinsics(c: &Config) -> [f64; 4] {
@@ -126,6 +142,7 @@ fn intrinsics(c: &Config) -> [f64; 4] {
 
 /// The four coefficients that Kalibr and EuRoC know.
 fn four(c: &Config, format: Format) -> Result<Vec<f64>, Unfit> {
+    refuse_own_projection(c, format)?;
     if c.model == Model::BrownConrady && c.coefficient(4) != 0.0 {
         return Err(Unfit { what: "k3, the fifth coefficient of brown-conrady,", format });
     }
@@ -195,6 +212,16 @@ mod tests {
         assert_eq!(refused, "k3, the fifth coefficient of brown-conrady, has no place in a Kalibr camchain");
         let text = write(&camera, Format::OpenCv).unwrap();
         assert_eq!(parse(&text, Path::new("c.yaml"), None).unwrap(), camera);
+    }
+
+    #[test]
+    fn only_kalibr_has_the_double_sphere() {
+        let mut camera = cameras().remove(0);
+        camera.model = Model::DoubleSphere;
+        camera.k = [-0.18, 0.59].into_iter().collect();
+        let refused = write(&camera, Format::OpenCv).unwrap_err().to_string();
+        assert_eq!(refused, "the double sphere lens has no place in a OpenCV YAML");
+        assert!(write(&camera, Format::Euroc).is_err() && write(&camera, Format::Kalibr).is_ok());
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! | `lens` | the cameras that are drawn |
 //! | `shape` | light and cover of a figure at a place of the picture |
 //! | `solid` | things in space as a lens shows them: panels and windows |
-//! | `circle`, `polygon`, `streak`, `glare`, `panel`, `window`, `moon`, `clouds`, ... | one figure each, with its ranges |
+//! | `circle`, `polygon`, `streak`, `glare`, `panel`, `window`, `moon`, `clouds` and more | one figure each |
 //! | `recipe` | the figures of a kind |
 //! | `trial` | a picture with its truth: without a limb, or with one and the artefact next to it |
 //! | `outcome` | what a sensor says of a trial, and whether that is false |

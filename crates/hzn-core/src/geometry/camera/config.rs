@@ -15,6 +15,10 @@ choices! {
         @2 Pinhole = "pinhole";
         /// Pinhole with radial and tangential distortion: k = [k1, k2, p1, p2, k3], in OpenCV's order.
         @3 BrownConrady = "brown-conrady";
+        /// Kalibr's `ds`: k = [ξ, α].
+        @- DoubleSphere = "double-sphere" needs "kalibr";
+        /// Kalibr's `eucm`: k = [α, β].
+        @- Eucm = "eucm" needs "kalibr";
     }
 }
 
@@ -24,6 +28,8 @@ impl Model {
         match self {
             Self::KannalaBrandt => &["k1", "k2", "k3", "k4"],
             Self::BrownConrady => &["k1", "k2", "p1", "p2", "k3"],
+            Self::DoubleSphere => &["xi", "alpha"],
+            Self::Eucm => &["alpha", "beta"],
             Self::Equidistant | Self::Pinhole => &[],
         }
     }
@@ -49,6 +55,9 @@ pub enum Intrinsic {
     K4,
     P1,
     P2,
+    Xi,
+    Alpha,
+    Beta,
 }
 
 /// `[camera.covariance]`: covariance of the intrinsic parameters, as a calibration program gives it.
@@ -82,11 +91,12 @@ section! {
         @6 cx_px: f64, serde(), ["−1 to 2 times the width"] { example: "959.5" };
         /// Row of the principal point, px.
         @7 cy_px: f64, serde(), ["−1 to 2 times the height"] { example: "539.5" };
-        /// Coefficients: k1 to k4 of `kannala-brandt`, or k1, k2, p1, p2, k3 of `brown-conrady`.
+        /// Coefficients: k1 to k4 of `kannala-brandt`, k1, k2, p1, p2, k3 of `brown-conrady`, ξ, α of `double-sphere`, α, β of
+        /// `eucm`.
         ///
         /// Coefficients that are left out are 0. The other models have none. The factor 1 of the first power of the
         /// angle is not among them.
-        @8 k: heapless::Vec<f64, 5>, serde(default), ["4 or 5 numbers; the lens is monotone"]
+        @8 k: heapless::Vec<f64, 5>, serde(default), ["as many as the model has; the lens is monotone"]
             { unset: "none", example: "[-0.055, 0.011, -0.0035, 0.0002]" };
         /// Radius of the image circle, degrees off the optical axis; pixels beyond it count as masked.
         ///
@@ -165,10 +175,20 @@ impl Config {
                 Limit::Rule(match self.model {
                     Model::KannalaBrandt => "kannala-brandt has four coefficients k1 to k4",
                     Model::BrownConrady => "brown-conrady has five coefficients k1, k2, p1, p2, k3",
+                    Model::DoubleSphere => "double-sphere has two coefficients, xi and alpha",
+                    Model::Eucm => "eucm has two coefficients, alpha and beta",
                     Model::Equidistant | Model::Pinhole => "this model has no coefficients: leave camera.k out",
                 }),
             )?;
         }
+        let (first, second) = (self.coefficient(0), self.coefficient(1));
+        let right = match self.model {
+            Model::DoubleSphere => first > -1.0 && first < 1.0 && (0.0..=1.0).contains(&second),
+            Model::Eucm => (0.0..=1.0).contains(&first) && second > 0.0,
+            _ => true,
+        };
+        let rule = "xi must lie between -1 and 1, alpha from 0 to 1, beta above 0";
+        require(right, "camera.k", first, Limit::Rule(rule))?;
         Ok(())
     }
 }

@@ -5,6 +5,11 @@
 
 mod brown;
 mod config;
+mod curve;
+#[cfg(feature = "kalibr")]
+mod double_sphere;
+#[cfg(feature = "kalibr")]
+mod eucm;
 mod radial;
 mod shutter;
 mod uncertain;
@@ -101,10 +106,6 @@ impl<T: Real> Camera<T> {
         let rho_corner =
             corner(-0.5, -0.5).max(corner(right, -0.5)).max(corner(-0.5, bottom)).max(corner(right, bottom));
         let (lens, rho_max, theta_max) = match c.model {
-            Model::KannalaBrandt | Model::Equidistant => {
-                let (lens, rho, theta) = radial::Radial::try_new(c, rho_corner)?;
-                (Lens::Radial(lens), rho, theta)
-            }
             Model::Pinhole => {
                 let theta = match c.theta_max_deg {
                     Some(deg) => {
@@ -123,6 +124,11 @@ impl<T: Real> Camera<T> {
             Model::BrownConrady => {
                 let (lens, rho, theta) = brown::Brown::try_new(c, rho_corner)?;
                 (Lens::Brown(lens), rho, theta)
+            }
+            // `Config::check` refuses a model that is not built in.
+            _ => {
+                let (lens, rho, theta) = radial::Radial::try_new(c, rho_corner)?;
+                (Lens::Radial(lens), rho, theta)
             }
         };
         Ok(Self {

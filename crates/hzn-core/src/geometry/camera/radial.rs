@@ -1,4 +1,4 @@
-//! Kannala-Brandt and equidistant lenses.
+//! Radially symmetric lenses.
 //!
 //! The inverse θ(ρ) has no closed form. On loading it is solved by Newton's method at Chebyshev nodes, and what a
 //! ray needs (sin θ/ρ, cos θ, dθ/dρ) is kept as three polynomials in ρ², made from Chebyshev series. They are checked
@@ -6,6 +6,7 @@
 //! are solved by Newton instead.
 
 use super::config::Config;
+use super::curve::Curve;
 use super::radial_ray;
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
@@ -17,7 +18,7 @@ const TERMS: usize = 24;
 
 #[derive(Debug, Clone)]
 pub(super) struct Radial<T> {
-    k: [T; 4],
+    curve: Curve<T>,
     theta_max: T,
     r_max: T,
     inverse: Inverse<T>,
@@ -38,36 +39,28 @@ enum Inverse<T> {
 /// Eight unit vectors, and eight derivatives in the tangent basis.
 pub(super) type Lanes<T> = ([[T; LANES]; 3], [[T; LANES]; 4]);
 
-/// r(θ) and r'(θ).
-fn forward<T: Real>(k: &[T; 4], theta: T) -> (T, T) {
-    let t2 = theta * theta;
-    let [k1, k2, k3, k4] = *k;
-    let one = T::one();
-    let r = theta * (one + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))));
-    let d = one
-        + t2 * (T::from_f64(3.0) * k1
-            + t2 * (T::from_f64(5.0) * k2 + t2 * (T::from_f64(7.0) * k3 + t2 * T::from_f64(9.0) * k4)));
-    (r, d)
-}
-
-/// First root of r'(θ) below 180°, in radians: bracketed on a fine grid, then halved.
-pub(super) fn monotonic_limit(k: &[f64; 4]) -> Option<f64> {
+/// First root of r'(θ) below 180°, or the first pole of r(θ), in radians: bracketed on a fine grid, then halved.
+pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
     const STEPS: i32 = 1800;
     let at = |i: i32| core::f64::consts::PI * f64::from(i) / f64::from(STEPS);
-    let (mut low, mut high) = (1..=STEPS).find(|&i| forward(k, at(i)).1 <= 0.0).map(|i| (at(i - 1), at(i)))?;
+    let grows = |theta: f64| {
+        let (r, slope) = curve.forward(theta);
+        slope > 0.0 && r >= 0.0
+    };
+    let (mut low, mut high) = (1..=STEPS).find(|&i| !grows(at(i))).map(|i| (at(i - 1), at(i)))?;
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
-        if forward(k, mid).1 > 0.0 { low = mid } else { high = mid }
+        if grows(mid) { low = mid } else { high = mid }
     }
     Some(low)
 }
 
 /// θ with r(θ) = ρ: Newton clamped to 0…θ_max from ρ θ_max/r(θ_max).
 #[inline(never)]
-fn invert<T: Real>(k: &[T; 4], rho: T, theta_max: T, r_max: T) -> T {
+fn invert<T: Real>(curve: &Curve<T>, rho: T, theta_max: T, r_max: T) -> T {
     let mut theta = rho * theta_max / r_max;
     for _ in 0..8 {
-        let (r, d) = forward(k, theta);
+        let (r, d) = curve.forward(theta);
         let step = (r - rho) / d;
         theta = (theta - step).max(T::zero()).min(theta_max);
         if step.abs() <= T::EPSILON * theta {
@@ -80,13 +73,13 @@ fn invert<T: Real>(k: &[T; 4], rho: T, theta_max: T, r_max: T) -> T {
 impl<T: Real> Radial<T> {
     /// The lens, ρ_max and θ_max in radians.
     pub(super) fn try_new(config: &Config, rho_corner: f64) -> Result<(Self, f64, f64), ConfigError> {
-        let k: [f64; 4] = core::array::from_fn(|i| config.coefficient(i));
-        let limit = monotonic_limit(&k).unwrap_or(core::f64::consts::PI);
+        let curve = Curve::new(config);
+        let limit = monotonic_limit(&curve).unwrap_or(core::f64::consts::PI);
         let margin = 2f64.to_radians();
         let usable = limit - margin;
         // Where the corner is reached, if it is reached before the lens folds back.
-        let corner =
-            (forward(&k, usable).0 >= rho_corner).then(|| invert(&k, rho_corner, usable, forward(&k, usable).0));
+        let corner = (curve.forward(usable).0 >= rho_corner)
+            .then(|| invert(&curve, rho_corner, usable, curve.forward(usable).0));
         let theta_max = match (config.theta_max_deg.map(f64::to_radians), corner) {
             (Some(circle), Some(corner)) => circle.min(corner),
             (None, Some(corner)) => corner,
@@ -104,21 +97,22 @@ impl<T: Real> Radial<T> {
                 });
             }
         };
-        let r_max = forward(&k, theta_max).0;
-        let (kt, tt, rt) = (k.map(T::from_f64), T::from_f64(theta_max), T::from_f64(r_max));
-        let inverse = Self::series(&k, theta_max, r_max);
-        Ok((Self { k: kt, theta_max: tt, r_max: rt, inverse }, r_max, theta_max))
+        let r_max = curve.forward(theta_max).0;
+        let (tt, rt) = (T::from_f64(theta_max), T::from_f64(r_max));
+        let inverse = Self::series(&curve, theta_max, r_max);
+        Ok((Self { curve: curve.cast(), theta_max: tt, r_max: rt, inverse }, r_max, theta_max))
     }
 
     /// The three series, or Newton where they are not good enough.
-    fn series(k: &[f64; 4], theta_max: f64, r_max: f64) -> Inverse<T> {
+    fn series(curve: &Curve<f64>, theta_max: f64, r_max: f64) -> Inverse<T> {
         let values = |rho: f64| -> [f64; 3] {
             if rho == 0.0 {
-                return [1.0, 1.0, 1.0];
+                let slope = 1.0 / curve.forward(0.0).1;
+                return [slope, 1.0, slope];
             }
-            let theta = invert(k, rho, theta_max, r_max);
+            let theta = invert(curve, rho, theta_max, r_max);
             let (sin, cos) = libm::sincos(theta);
-            [sin / rho, cos, 1.0 / forward(k, theta).1]
+            [sin / rho, cos, 1.0 / curve.forward(theta).1]
         };
         let rho_of = |t: f64| libm::sqrt(0.5 * (t + 1.0)) * r_max;
         let mut terms = [[0.0f64; 3]; TERMS];
@@ -208,22 +202,29 @@ impl<T: Real> Radial<T> {
     #[inline(never)]
     fn ray_by_newton(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
         let rho = rho2.sqrt();
-        let theta = invert(&self.k, rho, self.theta_max, self.r_max);
+        let theta = invert(&self.curve, rho, self.theta_max, self.r_max);
         let (sin, cos) = theta.sin_cos();
-        let s = if rho > T::from_f64(1e-12) { sin / rho } else { T::one() };
-        radial_ray(x, y, s, cos, T::one() / forward(&self.k, theta).1)
+        let dtheta = T::one() / self.curve.forward(theta).1;
+        // At the centre sin θ/ρ is dθ/dρ.
+        let s = if rho > T::from_f64(1e-12) { sin / rho } else { dtheta };
+        radial_ray(x, y, s, cos, dtheta)
     }
 
     /// θ beyond the largest radius, along the tangent there.
     #[cfg(feature = "horace")]
     pub(super) fn beyond(&self, rho: T) -> T {
-        let (r, d) = forward(&self.k, self.theta_max);
+        let (r, d) = self.curve.forward(self.theta_max);
         (self.theta_max + (rho - r) / d).min(T::from_f64(core::f64::consts::PI))
+    }
+
+    /// ∂r/∂k at θ, for every coefficient, times `per`.
+    pub(super) fn by_coefficients(&self, theta: T, per: T) -> [T; 5] {
+        self.curve.by_coefficients(theta, per)
     }
 
     /// r(θ) in units of the focal length.
     pub(super) fn radius(&self, theta: T) -> T {
-        forward(&self.k, theta).0
+        self.curve.forward(theta).0
     }
 }
 

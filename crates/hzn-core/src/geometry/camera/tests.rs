@@ -1,13 +1,16 @@
 use super::*;
 use proptest::prelude::*;
+use std::vec;
+use std::vec::Vec;
 
-fn lenses() -> [Config; 5] {
+fn lenses() -> Vec<Config> {
     let kb = |k: &[f64], theta: Option<f64>| Config {
         k: heapless::Vec::from_slice(k).unwrap(),
         theta_max_deg: theta,
         ..Config::ideal(Model::KannalaBrandt, 1920, 1080, 600.0)
     };
-    [
+    #[allow(unused_mut, reason = "a build without the feature has no more lenses")]
+    let mut lenses = vec![
         kb(&[0.05, -0.01, 0.004, -0.001], Some(110.0)),
         kb(&[-0.05, -0.004, 0.001, -0.0001], Some(110.0)),
         Config::ideal(Model::Equidistant, 384, 288, 92.0),
@@ -16,7 +19,67 @@ fn lenses() -> [Config; 5] {
             k: heapless::Vec::from_slice(&[-0.28, 0.07, 0.0002, 0.00002, 0.0]).unwrap(),
             ..Config::ideal(Model::BrownConrady, 752, 480, 460.0)
         },
-    ]
+    ];
+    #[cfg(feature = "kalibr")]
+    lenses.extend([
+        with(Model::DoubleSphere, &[-0.18, 0.59], 157.0),
+        with(Model::DoubleSphere, &[0.3, 0.45], 460.0),
+        with(Model::Eucm, &[0.63, 1.04], 160.0),
+        with(Model::Eucm, &[0.4, 0.8], 460.0),
+    ]);
+    lenses
+}
+
+#[cfg(feature = "kalibr")]
+fn with(model: Model, k: &[f64], focal_px: f64) -> Config {
+    Config {
+        k: heapless::Vec::from_slice(k).unwrap(),
+        theta_max_deg: Some(80.0),
+        ..Config::ideal(model, 752, 480, focal_px)
+    }
+}
+
+/// The papers' equations in space, for a ray of any length.
+#[cfg(feature = "kalibr")]
+#[test]
+fn kalibr_lenses_project_as_their_papers_say() {
+    let double_sphere = |[xi, alpha]: [f64; 2], [x, y, z]: [f64; 3]| {
+        let d1 = (x * x + y * y + z * z).sqrt();
+        let d2 = (x * x + y * y + (xi * d1 + z) * (xi * d1 + z)).sqrt();
+        let below = alpha * d2 + (1.0 - alpha) * (xi * d1 + z);
+        [x / below, y / below]
+    };
+    let eucm = |[alpha, beta]: [f64; 2], [x, y, z]: [f64; 3]| {
+        let d = (beta * (x * x + y * y) + z * z).sqrt();
+        let below = alpha * d + (1.0 - alpha) * z;
+        [x / below, y / below]
+    };
+    for config in lenses().iter().filter(|c| c.k.len() == 2) {
+        let camera = Camera::<f64>::try_new(config).unwrap();
+        let k = [config.k[0], config.k[1]];
+        for ray in [[0.0, 0.0, 2.0], [0.3, -0.2, 1.0], [-2.0, 1.0, 3.0], [0.4, 0.9, 1.2], [0.0, -1e-7, 1.0]] {
+            let [x, y] = if config.model == Model::Eucm { eucm(k, ray) } else { double_sphere(k, ray) };
+            let Some(p) = camera.project(&UnitVec3::try_new(ray).unwrap()) else {
+                panic!("{:?} {ray:?} is beyond the image circle", config.model)
+            };
+            let off = (p.u - config.cx_px - config.fx_px * x).abs() + (p.v - config.cy_px - config.fy_px * y).abs();
+            assert!(off < 1e-9, "{:?} {ray:?}: {off:e}", config.model);
+        }
+    }
+}
+
+/// The point in the middle of the picture has a ray and a derivative, though sin θ/ρ is 0/0 there.
+#[test]
+fn the_middle_of_the_picture_has_a_derivative() {
+    for config in lenses() {
+        let camera = Camera::<f64>::try_new(&config).unwrap();
+        let middle = ImagePoint { u: config.cx_px, v: config.cy_px };
+        let near = ImagePoint { u: config.cx_px + 1e-4, v: config.cy_px };
+        let (a, b) = (camera.ray(middle).unwrap().jacobian(), camera.ray(near).unwrap().jacobian());
+        for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
+            assert!((a - b).abs() < 1e-6, "{:?}: {a} {b}", config.model);
+        }
+    }
 }
 
 fn round_trip<T: Real>(tolerance_rad: f64) {
@@ -44,7 +107,7 @@ fn there_and_back() {
 
 proptest! {
     #[test]
-    fn derivative_equals_central_difference(which in 0usize..5, fx in 0.02..0.98f64, fy in 0.02..0.98f64) {
+    fn derivative_equals_central_difference(which in 0usize..lenses().len(), fx in 0.02..0.98f64, fy in 0.02..0.98f64) {
         let config = &lenses()[which];
         let camera = Camera::<f64>::try_new(config).unwrap();
         let p = ImagePoint { u: fx * f64::from(config.width), v: fy * f64::from(config.height) };

@@ -120,13 +120,7 @@ impl<T: Real> Camera<T> {
                 let theta = h.atan2(s.z);
                 let per = if h > zero { one / h } else { zero };
                 let radius = if h > zero { lens.radius(theta) * per } else { one };
-                let q = theta * theta;
-                let mut power = theta * q * per;
-                let by_k = core::array::from_fn(|_| {
-                    let this = power;
-                    power *= q;
-                    [s.x * this, s.y * this]
-                });
+                let by_k = lens.by_coefficients(theta, per).map(|by| [s.x * by, s.y * by]);
                 (s.x * radius, s.y * radius, by_k)
             }
             Lens::Pinhole => (s.x / s.z, s.y / s.z, [[zero; 2]; 5]),
@@ -152,22 +146,32 @@ impl<T: Real> Camera<T> {
 impl Intrinsic {
     /// Its place among the parameters of a model; `None` where the model has no such parameter.
     fn place(self, model: Model) -> Option<usize> {
-        let is_radial = model == Model::KannalaBrandt;
-        let is_brown = model == Model::BrownConrady;
-        Some(match self {
-            Self::FxPx => 0,
-            Self::FyPx => 1,
-            Self::CxPx => 2,
-            Self::CyPx => 3,
-            Self::K1 if is_radial || is_brown => 4,
-            Self::K2 if is_radial || is_brown => 5,
-            Self::K3 if is_radial => 6,
-            Self::K4 if is_radial => 7,
-            Self::P1 if is_brown => 6,
-            Self::P2 if is_brown => 7,
-            Self::K3 if is_brown => 8,
-            _ => return None,
-        })
+        match self {
+            Self::FxPx => Some(0),
+            Self::FyPx => Some(1),
+            Self::CxPx => Some(2),
+            Self::CyPx => Some(3),
+            _ => model.coefficients().iter().position(|name| *name == self.name()).map(|place| 4 + place),
+        }
+    }
+
+    /// Its name in sensor.toml.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::FxPx => "fx_px",
+            Self::FyPx => "fy_px",
+            Self::CxPx => "cx_px",
+            Self::CyPx => "cy_px",
+            Self::K1 => "k1",
+            Self::K2 => "k2",
+            Self::K3 => "k3",
+            Self::K4 => "k4",
+            Self::P1 => "p1",
+            Self::P2 => "p2",
+            Self::Xi => "xi",
+            Self::Alpha => "alpha",
+            Self::Beta => "beta",
+        }
     }
 
     /// One relative unit in its own.

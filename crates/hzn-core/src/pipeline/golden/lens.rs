@@ -111,7 +111,7 @@ fn so_do_the_principal_point_and_the_coefficients() {
             CameraConfig { cx_px: right.cx_px + 1.5, covariance: one(&[Intrinsic::CxPx], 1.5), ..right.clone() };
         let off = difference(&right, &moved, half_angle_deg, towards);
         assert!(off < 0.04, "{name} cx: {off}");
-        if right.model == Model::KannalaBrandt || right.model == Model::BrownConrady {
+        if matches!(right.model, Model::KannalaBrandt | Model::BrownConrady) {
             let mut other = right.clone();
             if let Some(k) = other.k.first_mut() {
                 *k += 1e-3;

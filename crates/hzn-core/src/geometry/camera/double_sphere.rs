@@ -1,0 +1,34 @@
+//! The double sphere lens of Kalibr (`ds`) and Basalt (Usenko, Demmel & Cremers 2018, (40) to (42)).
+//!
+//! A ray is projected onto a unit sphere, then onto a second one that is shifted by ξ along the axis, then into a plane that is
+//! shifted by α/(1 − α). Of a unit ray (sin θ, cos θ): z₁ = ξ + cos θ, d₂ = √(sin² θ + z₁²),
+//! r = sin θ/(α d₂ + (1 − α) z₁).
+//!
+//! r'(0) is 1/(1 + ξ) and not 1: the focal length of this model is not that of the picture's middle.
+
+use crate::base::real::Real;
+
+/// r(θ) and r'(θ).
+pub(super) fn forward<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
+    let [xi, alpha] = *k;
+    let one = T::one();
+    let (sin, cos) = theta.sin_cos();
+    let z = xi + cos;
+    let d = (sin * sin + z * z).sqrt();
+    let below = alpha * d + (one - alpha) * z;
+    // d₂' = −ξ sin θ/d₂.
+    let below_slope = -alpha * xi * sin / d - (one - alpha) * sin;
+    (sin / below, (cos * below - sin * below_slope) / (below * below))
+}
+
+/// ∂r/∂ξ and ∂r/∂α.
+pub(super) fn by_coefficients<T: Real>(k: &[T; 2], theta: T) -> [T; 2] {
+    let [xi, alpha] = *k;
+    let one = T::one();
+    let (sin, cos) = theta.sin_cos();
+    let z = xi + cos;
+    let d = (sin * sin + z * z).sqrt();
+    let below = alpha * d + (one - alpha) * z;
+    let scale = -sin / (below * below);
+    [scale * (alpha * z / d + one - alpha), scale * (d - z)]
+}
