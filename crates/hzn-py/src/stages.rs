@@ -1,4 +1,4 @@
-//! The stages one at a time: what `hzn.binarize` and its neighbours call.
+//! The stages one at a time: what `hzn.threshold` and its neighbours call.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -46,7 +46,7 @@ impl Expected {
 }
 
 #[doc = doc!("Cone")]
-#[pyclass(frozen, subclass, module = "hzn.ransac")]
+#[pyclass(frozen, subclass, module = "hzn.consensus")]
 pub(crate) struct Cone(Agreed<f64>);
 
 #[pymethods]

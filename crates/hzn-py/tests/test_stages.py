@@ -1,5 +1,10 @@
 """The stages one at a time, and one step swapped for another."""
 
+import importlib.metadata
+import re
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -18,14 +23,14 @@ def test_the_stages_are_the_pipeline(sensor):
     image = limb()
     report = sensor.process(image, altitude_km=401.0, detail=True)
     expected = sensor.expect(altitude_km=401.0)
-    level = hzn.binarize.level(sensor, image, expected)
+    level = hzn.threshold.level(sensor, image, expected)
     assert level == report.level
-    borders = hzn.contours.find(sensor, image, level, expected)
+    borders = hzn.contour.find(sensor, image, level, expected)
     assert np.array_equal(borders[0], report.edges[0])
-    rays = hzn.contours.points(sensor, image, level, borders[0])
+    rays = hzn.contour.points(sensor, image, level, borders[0])
     assert len(rays) == report.edge_points
     assert np.allclose(np.linalg.norm(rays.directions, axis=1), 1.0) and set(np.abs(rays.lit).sum(1)) == {1.0}
-    start = hzn.ransac.keep(sensor, rays, expected)
+    start = hzn.consensus.keep(sensor, rays, expected)
     fit = hzn.fit.cone(sensor, rays, start, expected)
     assert (fit.rms_px, fit.inliers) == (report.rms_px, len(report.inliers)) and start.draws > 0
     assert np.array_equal(rays.points[rays.weights > 0], report.inliers)
@@ -56,29 +61,29 @@ def test_the_stages_of_each_body():
     for body, report in enumerate((reports, *reports.others)):
         assert report.ok
         expected = sensor.expect(body=body)
-        level = hzn.binarize.level(sensor, image, expected)
+        level = hzn.threshold.level(sensor, image, expected)
         assert level == report.level == (60, 90)[body]
-        borders = hzn.contours.find(sensor, image, level, expected)
+        borders = hzn.contour.find(sensor, image, level, expected)
         # Both discs are seen by either, and not only as far as the answer.
         assert len(borders) == 2
         answers = []
         for border in borders:
-            rays = hzn.contours.points(sensor, image, level, border)
-            on_another = 0 if found is None else hzn.ransac.withdraw(sensor, rays, found)
+            rays = hzn.contour.points(sensor, image, level, border)
+            on_another = 0 if found is None else hzn.consensus.withdraw(sensor, rays, found)
             if 2 * on_another > len(rays):
                 continue
-            start = hzn.ransac.keep(sensor, rays, expected)
+            start = hzn.consensus.keep(sensor, rays, expected)
             fit = start and hzn.fit.cone(sensor, rays, start, expected)
             fused = fit and hzn.covariance.fuse(sensor, rays, fit, expected)
             answers.append(fused)
             if fit and (fit.rms_px, fit.inliers) == (report.rms_px, len(report.inliers)):
-                assert isinstance(fit, hzn.ransac.Cone) and fit.draws == start.draws
+                assert isinstance(fit, hzn.consensus.Cone) and fit.draws == start.draws
                 # The report's axis was normalised once more.
                 assert np.allclose(fused.axis, report.axis, rtol=0, atol=1e-15)
                 assert np.array_equal(fused.covariance, report.covariance)
                 own = fused
         assert len(answers) == 2 - body
-        found = hzn.ransac.Cone(own.axis, own.cos_half_angle)
+        found = hzn.consensus.Cone(own.axis, own.cos_half_angle)
     with pytest.raises(hzn.ConfigError, match="0 to 1"):
         sensor.expect(body=2)
 
@@ -86,8 +91,8 @@ def test_the_stages_of_each_body():
 def test_find_stops_neither_at_the_limb_nor_at_the_limits(sensor):
     image = disc(limb(), 160, 40, 12, 220)
     few = hzn.Sensor(**{**sensor.parameters, "limits": {"max_work": 10_000}})
-    found = hzn.contours.find(sensor, image, 110)
-    assert len(found) == 2 and all(map(np.array_equal, found, hzn.contours.find(few, image, 110)))
+    found = hzn.contour.find(sensor, image, 110)
+    assert len(found) == 2 and all(map(np.array_equal, found, hzn.contour.find(few, image, 110)))
     lit = image >= 110
     for border in found:
         x, y = border.astype(int).T
@@ -96,10 +101,10 @@ def test_find_stops_neither_at_the_limb_nor_at_the_limits(sensor):
 
 def test_other_strides_and_a_round_trip_through_arrays(sensor):
     image = limb()
-    level = hzn.binarize.level(sensor, np.asfortranarray(image))
-    borders = hzn.contours.find(sensor, np.asfortranarray(image), level)
-    assert np.array_equal(borders[0], hzn.contours.find(sensor, image, level)[0])
-    there = hzn.contours.points(sensor, image, level, borders[0])
+    level = hzn.threshold.level(sensor, np.asfortranarray(image))
+    borders = hzn.contour.find(sensor, np.asfortranarray(image), level)
+    assert np.array_equal(borders[0], hzn.contour.find(sensor, image, level)[0])
+    there = hzn.contour.points(sensor, image, level, borders[0])
     back = hzn.rays.of(sensor, there.points, there.lit)
     assert np.array_equal(back.directions, there.directions) and np.array_equal(back.lit, there.lit)
 
@@ -116,7 +121,7 @@ def test_every_step_can_be_ones_own(sensor):
     points[::10, 1] += 40.0
     rays = hzn.rays.of(sensor, points, np.tile([0.0, 1.0], (160, 1)))
     # Consensus: the truth is known.
-    start = hzn.ransac.Cone(TRUTH, np.cos(np.radians(70.38)))
+    start = hzn.consensus.Cone(TRUTH, np.cos(np.radians(70.38)))
     weights = np.ones(160)
     weights[::10] = 0.0
     rays.weights = weights
@@ -126,7 +131,7 @@ def test_every_step_can_be_ones_own(sensor):
     chosen = rays.directions[weights > 0]
     n = np.linalg.lstsq(chosen, np.ones(len(chosen)), rcond=None)[0]
     rays.weights = weights
-    own = hzn.ransac.Cone(n / np.linalg.norm(n), 1 / np.linalg.norm(n))
+    own = hzn.consensus.Cone(n / np.linalg.norm(n), 1 / np.linalg.norm(n))
     fused = hzn.covariance.fuse(sensor, rays, own)
     assert degrees(fused.axis, TRUTH) < 0.1 and np.allclose(fused.covariance @ fused.axis, 0, atol=1e-12)
 
@@ -138,13 +143,34 @@ def test_what_the_stages_refuse(sensor):
         with pytest.raises(hzn.ConfigError, match="weights"):
             rays.weights = wrong
     with pytest.raises(hzn.ImageError, match="outside"):
-        hzn.contours.points(sensor, image, 100, [[500.0, 0.0]])
+        hzn.contour.points(sensor, image, 100, [[500.0, 0.0]])
     with pytest.raises(hzn.ImageError, match="lit"):
         hzn.rays.of(sensor, [[1.0, 2.0]], [[0.0, 1.0]] * 2)
     with pytest.raises(hzn.HznError, match="no-limb"):
-        hzn.binarize.level(sensor, np.full_like(image, 100))
+        hzn.threshold.level(sensor, np.full_like(image, 100))
     with pytest.raises(hzn.ConfigError, match="cos_half_angle"):
-        hzn.ransac.Cone([0.0, 0.0, 1.0], 2.0)
+        hzn.consensus.Cone([0.0, 0.0, 1.0], 2.0)
     with pytest.raises(hzn.ConfigError, match="flight"):
-        hzn.binarize.level(hzn.Sensor(**sensor.parameters, flight=True), image)
-    assert hzn.ransac.keep(sensor, rays) is None or hzn.fit.cone(sensor, rays, hzn.ransac.keep(sensor, rays)) is None
+        hzn.threshold.level(hzn.Sensor(**sensor.parameters, flight=True), image)
+    assert hzn.consensus.keep(sensor, rays) is None or hzn.fit.cone(sensor, rays, hzn.consensus.keep(sensor, rays)) is None
+
+
+@pytest.mark.parametrize(("old", "new"), [("binarize", "threshold"), ("contours", "contour"), ("ransac", "consensus")])
+def test_old_names_of_stages_work_and_warn(old, new):
+    sys.modules.pop(f"hzn.{old}", None)
+    vars(hzn).pop(old, None)
+    with pytest.warns(DeprecationWarning, match=f"hzn.{old} is now hzn.{new}"):
+        module = getattr(hzn, old)
+    public = [name for name in vars(getattr(hzn, new)) if not name.startswith("_")]
+    assert all(getattr(module, name) is getattr(getattr(hzn, new), name) for name in public)
+
+
+def test_the_distribution_is_hzn_sensor():
+    metadata = importlib.metadata.metadata("hzn-sensor")
+    assert metadata["Name"] == "hzn-sensor" and metadata["Version"] == hzn.__version__
+    # On the Python index `hzn` belongs to another project: no page may tell anybody to install it.
+    root = Path(__file__).parents[3]
+    pages = [*root.glob("*.md"), *root.glob("book/**/*.md"), *root.glob("crates/hzn-py/python/**/*.py")]
+    assert len(pages) > 20
+    for page in pages:
+        assert not re.search(r"pip install ['\"]?hzn(?!-sensor)\b", page.read_text()), page

@@ -1,5 +1,5 @@
 //! The stages one at a time, with the parts between them in the open: for comparing methods on simulated points, and
-//! for trying a step of one's own in place of one of these (the Python package's `hzn.ransac` and its neighbours).
+//! for trying a step of one's own in place of one of these (the Python package's `hzn.consensus` and its neighbours).
 //! Feature `_edges`.
 //!
 //! ```text

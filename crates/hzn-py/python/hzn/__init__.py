@@ -8,12 +8,12 @@ Everything is in the camera frame (x right, y down, z forward) unless its name s
 integers, as in OpenCV. Names end with their unit.
 """
 
-from . import binarize as binarize
-from . import contours as contours
+from . import consensus as consensus
+from . import contour as contour
 from . import covariance as covariance
 from . import fit as fit
-from . import ransac as ransac
 from . import rays as rays
+from . import threshold as threshold
 from ._hzn import Camera as Camera
 from ._hzn import ConfigError as ConfigError
 from ._hzn import Expected as Expected
@@ -32,3 +32,12 @@ from ._hzn import read_mcap as read_mcap
 from ._simulation import evaluate as evaluate
 from ._simulation import sensitivity as sensitivity
 from ._simulation import simulate as simulate
+
+
+def __getattr__(name: str) -> object:
+    """Give the stages under their old names, with a warning."""
+    if name in ("binarize", "contours", "ransac"):
+        import importlib
+
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

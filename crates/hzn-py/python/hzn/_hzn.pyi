@@ -264,7 +264,7 @@ class Sensor:
         rate_rad_s: Sequence[float] | None = None,
         time_s: float | None = None,
     ) -> Expected:
-        """Work out the cone to expect, for the single stages (`hzn.ransac` and its neighbours).
+        """Work out the cone to expect, for the single stages (`hzn.consensus` and its neighbours).
 
         Parameters
         ----------

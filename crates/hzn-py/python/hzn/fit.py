@@ -16,7 +16,7 @@ def cone(sensor: Sensor, rays: Rays, start: Cone, expected: Expected | None = No
     rays
         Those with a weight are fitted; afterwards each has the weight that it had in the fit.
     start
-        From `hzn.ransac.keep`, or one's own.
+        From `hzn.consensus.keep`, or one's own.
     expected
         From `hzn.Sensor.expect`; without it, from the parameters alone.
 
