@@ -91,8 +91,8 @@ section! {
         @6 cx_px: f64, serde(), ["−1 to 2 times the width"] { example: "959.5" };
         /// Row of the principal point, px.
         @7 cy_px: f64, serde(), ["−1 to 2 times the height"] { example: "539.5" };
-        /// Coefficients: k1 to k4 of `kannala-brandt`, k1, k2, p1, p2, k3 of `brown-conrady`, ξ, α of `double-sphere`, α, β of
-        /// `eucm`.
+        /// Coefficients: k1 to k4 of `kannala-brandt`, k1, k2, p1, p2, k3 of `brown-conrady`, ξ, α of `double-sphere`,
+        /// α, β of `eucm`.
         ///
         /// Coefficients that are left out are 0. The other models have none. The factor 1 of the first power of the
         /// angle is not among them.

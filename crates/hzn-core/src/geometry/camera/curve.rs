@@ -1,7 +1,7 @@
 //! The image radius of a radially symmetric lens: r(θ) in focal lengths, with its derivative.
 //!
-//! A lens of this kind is an entry of `Curve` and a file with its equations; everything else (the inverse, its series, the
-//! check that it is monotone, rays, projection) is the same for all of them.
+//! A lens of this kind is an entry of `Curve` and a file with its equations; everything else (the inverse, its series,
+//! the check that it is monotone, rays, projection) is the same for all of them.
 
 #[cfg(feature = "kalibr")]
 use super::{double_sphere, eucm};
