@@ -59,7 +59,7 @@ pub use part::{create_part, open_part, part_path};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, roll_pitch_deg};
-pub use topics::{IMAGE_TOPIC, REPORT_SCHEMA};
+pub use topics::{IMAGE_TOPIC, report_schema};
 pub use writer::{FLUSH_INTERVAL, Options, Writer};
 
 /// A layout of Foxglove's panels for our topics, to be imported there: the picture with what was found, plots over

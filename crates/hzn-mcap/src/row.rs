@@ -21,116 +21,151 @@ pub struct RowMeta {
     pub altitude_km: Option<f64>,
 }
 
-/// The result of one picture and body. The fields are the columns, in order; an empty cell is `None`.
-///
-/// With the `csv` crate a row is written by `serialize` and read by `deserialize`; with `serde_json` one row is one
-/// line. Angles of the vehicle follow [`roll_pitch_deg`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// Place in the sequence, from 0.
-    pub index: u64,
-    /// Name of the picture.
-    pub file: String,
-    /// Time in seconds, where it is known.
-    pub time_s: Option<f64>,
-    /// Name of the body: `earth`, `earth-sphere`, `sun`, `moon`, `sphere`.
-    pub body: String,
-    /// Outcome, by its name such as `no-limb`.
-    #[serde(with = "status_name")]
-    pub status: Status,
-    /// Unit vector to the body in the camera frame, x; only beside `ok`, like all that follows up to `inliers`.
-    pub axis_x: Option<f64>,
-    /// Unit vector to the body in the camera frame, y.
-    pub axis_y: Option<f64>,
-    /// Unit vector to the body in the camera frame, z.
-    pub axis_z: Option<f64>,
-    /// Covariance of the axis, xx, rad².
-    pub cov_xx: Option<f64>,
-    /// Covariance of the axis, xy, rad².
-    pub cov_xy: Option<f64>,
-    /// Covariance of the axis, xz, rad².
-    pub cov_xz: Option<f64>,
-    /// Covariance of the axis, yy, rad².
-    pub cov_yy: Option<f64>,
-    /// Covariance of the axis, yz, rad².
-    pub cov_yz: Option<f64>,
-    /// Covariance of the axis, zz, rad².
-    pub cov_zz: Option<f64>,
-    /// The larger of the axis' two standard deviations, degrees.
-    pub sigma_max_deg: Option<f64>,
-    /// The same direction in ECEF, x; when the position is known.
-    pub axis_e_x: Option<f64>,
-    /// The same direction in ECEF, y.
-    pub axis_e_y: Option<f64>,
-    /// The same direction in ECEF, z.
-    pub axis_e_z: Option<f64>,
-    /// Half-angle of the half-angle-free fit, degrees.
-    pub half_angle_deg: Option<f64>,
-    /// The altitude of the position, or else the one that was given, kilometres; beside every status.
-    pub altitude_km: Option<f64>,
-    /// The altitude that follows from the half-angle-free fit, kilometres.
-    pub altitude_est_km: Option<f64>,
-    /// Its standard deviation, kilometres.
-    pub altitude_est_sigma_km: Option<f64>,
-    /// Weighted RMS distance of the inliers from the fitted limb, pixels.
-    pub rms_px: Option<f64>,
-    /// Sub-pixel edge points that were measured.
-    pub edge_points: Option<u32>,
-    /// Edge points that carry the answer.
-    pub inliers: Option<u32>,
-    /// Edges that were candidates.
-    pub candidates: Option<u32>,
-    /// Border pixels dropped because a list was full.
-    pub dropped: Option<u32>,
-    /// Level between dark and lit in the picture's own counts.
-    pub level: Option<u16>,
-    /// Roll of the vehicle, degrees; with a mounting.
-    pub roll_deg: Option<f64>,
-    /// Pitch of the vehicle, degrees; with a mounting.
-    pub pitch_deg: Option<f64>,
-    /// Time that the processing took, microseconds, decoding not included.
-    pub elapsed_us: Option<f64>,
-    /// Why there is no answer, in words; empty beside `ok`.
-    pub detail: String,
+/// The columns of the results: structure, names, JSON schema and empty row from one line a column. A column `as` a module is
+/// written and read by that module.
+macro_rules! columns {
+    (
+        $(#[doc = $about:literal])+
+        pub struct Row {
+            $($(#[doc = $doc:literal])+ $name:ident: $ty:ty $(as $with:literal)?,)+
+        }
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        pub struct Row {
+            $(
+                $(#[doc = $doc])+
+                $(#[serde(with = $with)])?
+                pub $name: $ty,
+            )+
+        }
+
+        impl Row {
+            /// The names of the columns in order.
+            pub const COLUMNS: [&'static str; [$(stringify!($name)),+].len()] = [$(stringify!($name)),+];
+
+            /// (name, JSON type, whether it is always there, meaning) of every column.
+            pub(crate) const CELLS: &'static [(&'static str, &'static str, bool, &'static str)] =
+                &[$((stringify!($name), <$ty as Cell>::JSON, <$ty as Cell>::ALWAYS, concat!($($doc),+))),+];
+
+            /// A row whose cells are empty.
+            fn blank() -> Self {
+                Self { $($name: Cell::blank(),)+ }
+            }
+        }
+    };
+}
+
+/// The type of a cell.
+trait Cell {
+    /// Its type in JSON.
+    const JSON: &'static str;
+    /// A row always has it.
+    const ALWAYS: bool = true;
+    fn blank() -> Self;
+}
+
+macro_rules! cells {
+    ($($ty:ty, $json:literal, $blank:expr;)+) => {$(
+        impl Cell for $ty {
+            const JSON: &'static str = $json;
+            fn blank() -> Self {
+                $blank
+            }
+        }
+    )+};
+}
+cells! {
+    f64, "number", 0.0;
+    u16, "integer", 0;
+    u32, "integer", 0;
+    u64, "integer", 0;
+    String, "string", String::new();
+    Status, "string", Status::Rejected;
+}
+
+impl<T: Cell> Cell for Option<T> {
+    const JSON: &'static str = T::JSON;
+    const ALWAYS: bool = false;
+    fn blank() -> Self {
+        None
+    }
+}
+
+columns! {
+    /// The result of one picture and body. The fields are the columns, in order; an empty cell is `None`.
+    ///
+    /// With the `csv` crate a row is written by `serialize` and read by `deserialize`; with `serde_json` one row is one
+    /// line. Angles of the vehicle follow [`roll_pitch_deg`].
+    pub struct Row {
+        /// Place in the sequence, from 0.
+        index: u64,
+        /// Name of the picture.
+        file: String,
+        /// Time in seconds, where it is known.
+        time_s: Option<f64>,
+        /// Name of the body: `earth`, `earth-sphere`, `sun`, `moon`, `sphere`.
+        body: String,
+        /// Outcome, by its name such as `no-limb`.
+        status: Status as "status_name",
+        /// Unit vector to the body in the camera frame, x; only beside `ok`, like all that follows up to `inliers`.
+        axis_x: Option<f64>,
+        /// Unit vector to the body in the camera frame, y.
+        axis_y: Option<f64>,
+        /// Unit vector to the body in the camera frame, z.
+        axis_z: Option<f64>,
+        /// Covariance of the axis, xx, rad².
+        cov_xx: Option<f64>,
+        /// Covariance of the axis, xy, rad².
+        cov_xy: Option<f64>,
+        /// Covariance of the axis, xz, rad².
+        cov_xz: Option<f64>,
+        /// Covariance of the axis, yy, rad².
+        cov_yy: Option<f64>,
+        /// Covariance of the axis, yz, rad².
+        cov_yz: Option<f64>,
+        /// Covariance of the axis, zz, rad².
+        cov_zz: Option<f64>,
+        /// The larger of the axis' two standard deviations, degrees.
+        sigma_max_deg: Option<f64>,
+        /// The same direction in ECEF, x; when the position is known.
+        axis_e_x: Option<f64>,
+        /// The same direction in ECEF, y.
+        axis_e_y: Option<f64>,
+        /// The same direction in ECEF, z.
+        axis_e_z: Option<f64>,
+        /// Half-angle of the half-angle-free fit, degrees.
+        half_angle_deg: Option<f64>,
+        /// The altitude of the position, or else the one that was given, kilometres; beside every status.
+        altitude_km: Option<f64>,
+        /// The altitude that follows from the half-angle-free fit, kilometres.
+        altitude_est_km: Option<f64>,
+        /// Its standard deviation, kilometres.
+        altitude_est_sigma_km: Option<f64>,
+        /// Weighted RMS distance of the inliers from the fitted limb, pixels.
+        rms_px: Option<f64>,
+        /// Sub-pixel edge points that were measured.
+        edge_points: Option<u32>,
+        /// Edge points that carry the answer.
+        inliers: Option<u32>,
+        /// Edges that were candidates.
+        candidates: Option<u32>,
+        /// Border pixels dropped because a list was full.
+        dropped: Option<u32>,
+        /// Level between dark and lit in the picture's own counts.
+        level: Option<u16>,
+        /// Roll of the vehicle, degrees; with a mounting.
+        roll_deg: Option<f64>,
+        /// Pitch of the vehicle, degrees; with a mounting.
+        pitch_deg: Option<f64>,
+        /// Time that the processing took, microseconds, decoding not included.
+        elapsed_us: Option<f64>,
+        /// Why there is no answer, in words; empty beside `ok`.
+        detail: String,
+    }
 }
 
 impl Row {
-    /// The names of the columns in order.
-    pub const COLUMNS: [&'static str; 32] = [
-        "index",
-        "file",
-        "time_s",
-        "body",
-        "status",
-        "axis_x",
-        "axis_y",
-        "axis_z",
-        "cov_xx",
-        "cov_xy",
-        "cov_xz",
-        "cov_yy",
-        "cov_yz",
-        "cov_zz",
-        "sigma_max_deg",
-        "axis_e_x",
-        "axis_e_y",
-        "axis_e_z",
-        "half_angle_deg",
-        "altitude_km",
-        "altitude_est_km",
-        "altitude_est_sigma_km",
-        "rms_px",
-        "edge_points",
-        "inliers",
-        "candidates",
-        "dropped",
-        "level",
-        "roll_deg",
-        "pitch_deg",
-        "elapsed_us",
-        "detail",
-    ];
-
     /// The row of a processed picture. `elapsed_us` is the time `process` took in microseconds, if it was measured.
     pub fn from_report<T: Real>(meta: &RowMeta, report: &Report<T>, elapsed_us: Option<f64>) -> Self {
         let c = &report.counters;
@@ -161,33 +196,8 @@ impl Row {
             time_s: meta.time_s,
             body: meta.body.clone(),
             status,
-            axis_x: None,
-            axis_y: None,
-            axis_z: None,
-            cov_xx: None,
-            cov_xy: None,
-            cov_xz: None,
-            cov_yy: None,
-            cov_yz: None,
-            cov_zz: None,
-            sigma_max_deg: None,
-            axis_e_x: None,
-            axis_e_y: None,
-            axis_e_z: None,
-            half_angle_deg: None,
             altitude_km: meta.altitude_km.and_then(finite),
-            altitude_est_km: None,
-            altitude_est_sigma_km: None,
-            rms_px: None,
-            edge_points: None,
-            inliers: None,
-            candidates: None,
-            dropped: None,
-            level: None,
-            roll_deg: None,
-            pitch_deg: None,
-            elapsed_us: None,
-            detail: String::new(),
+            ..Self::blank()
         }
     }
 

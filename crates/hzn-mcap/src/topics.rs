@@ -4,9 +4,34 @@ use foxglove::Encode;
 use foxglove::messages::{
     CameraCalibration, CompressedImage, FrameTransform, ImageAnnotations, Log, PoseInFrame, RawImage,
 };
+use hzn_core::status::Status;
+use serde_json::{Map, Value, json};
+
+use crate::row::Row;
+
+/// What a message on `/hzn/report` holds besides the columns of a row.
+const FURTHER: &str = include_str!("../schema/further.json");
 
 /// JSON Schema of the messages on `/hzn/report`, named `hzn.Report`. Cells that are empty in a table are left out.
-pub const REPORT_SCHEMA: &str = include_str!("../schema/hzn.Report.json");
+pub fn report_schema() -> serde_json::Value {
+    let mut properties: Map<String, Value> = serde_json::from_str(FURTHER).unwrap_or_default();
+    for (name, json_type, _, doc) in Row::CELLS {
+        let mut property = json!({"type": json_type, "description": doc.trim()});
+        if *name == "status" {
+            property["enum"] = Status::ALL.iter().map(|status| status.name()).collect();
+        }
+        properties.insert((*name).to_owned(), property);
+    }
+    let required: Vec<_> = Row::CELLS.iter().filter(|(_, _, always, _)| *always).map(|(name, ..)| name).collect();
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "hzn.Report",
+        "description": "Result of one picture and body. Cells without a value are left out.",
+        "type": "object",
+        "required": required,
+        "properties": properties,
+    })
+}
 
 /// The topic of the pictures in our recordings.
 pub const IMAGE_TOPIC: &str = "/camera/image";
@@ -57,7 +82,7 @@ impl Topic {
             M::get_schema().map_or_else(Default::default, |s| (s.name, s.encoding, s.data.into_owned(), "protobuf"))
         }
         match self {
-            Self::Report => ("hzn.Report".into(), "jsonschema".into(), REPORT_SCHEMA.into(), "json"),
+            Self::Report => ("hzn.Report".into(), "jsonschema".into(), report_schema().to_string().into(), "json"),
             Self::Image => of::<CompressedImage>(),
             Self::Calibration => of::<CameraCalibration>(),
             Self::Annotations => of::<ImageAnnotations>(),

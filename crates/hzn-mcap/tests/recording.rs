@@ -138,7 +138,11 @@ fn an_independent_reader_agrees() {
 
 #[test]
 fn the_schema_names_every_column() {
-    let schema: serde_json::Value = serde_json::from_str(hzn_mcap::REPORT_SCHEMA).unwrap();
+    let schema = hzn_mcap::report_schema();
+    let always = ["index", "file", "body", "status", "detail"];
+    assert!(schema["required"].as_array().unwrap().iter().eq(always));
+    assert_eq!(schema["properties"]["level"]["type"], "integer");
+    assert_eq!(schema["properties"]["status"]["enum"].as_array().unwrap().len(), Status::ALL.len());
     let named = schema["properties"].as_object().unwrap();
     assert!(Row::COLUMNS.iter().all(|c| named.contains_key(*c)));
     assert_eq!(named.len(), Row::COLUMNS.len() + 2);
