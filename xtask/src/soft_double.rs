@@ -26,7 +26,7 @@ const STAGES: [&str; 11] = [
 /// places where they do.
 const ONCE: [(&str, usize); 6] = [
     ("hzn_core::pipeline::search::Search<T,O>::candidate::{{closure}}", 34),
-    ("hzn_core::pipeline::search::Search<T,O>::piece", 2),
+    ("hzn_core::pipeline::search::Search<T,O>::piece", 36),
     ("hzn_core::stages::gates::attitude::verdict", 4),
     ("hzn_core::stages::gates::rivals", 14),
     ("hzn_core::stages::gates::surroundings", 7),

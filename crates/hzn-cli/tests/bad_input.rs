@@ -176,7 +176,7 @@ fn unwritable_folders_are_said() {
     insta::assert_snapshot!(told("-o", "file/out.csv"), @"error: file/out.csv.part: a part of this path is a file, not \
                                                           a folder; choose another folder for the output");
     insta::assert_snapshot!(told("-o", "file/out.mcap"), @"error: cannot write into the folder file: Not a directory \
-                                                           (os error 20); make it writable or choose another with -o");
+                                                           (os error 20); make it writable or choose another");
     insta::assert_snapshot!(told("-o", "nowhere/out.csv"), @"error: nowhere/out.csv.part: the folder does not exist; \
         create it first");
     insta::assert_snapshot!(told("--overlay", "file"), @"error: file: is a file, not a folder; choose another name");

@@ -7,22 +7,21 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The output is there already and `force` was not given.
-    #[error("{} exists: choose another name, or add --force to replace it", path.display())]
+    #[error("{} exists: choose another name, or replace it", path.display())]
     Exists {
         /// The output that exists.
         path: PathBuf,
     },
     /// An unfinished run's file stands beside the output.
-    #[error("{} is left from an unfinished run: add --resume to go on with it, or --force to start \
-             over", path.display())]
+    #[error("{} is left from an unfinished run: continue it, or start over", path.display())]
     Unfinished {
         /// The unfinished file.
         path: PathBuf,
     },
     /// The disk is full.
     #[error(
-        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and --resume \
-         goes on from there",
+        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and a \
+         resumed run goes on from there",
         folder.display(), part.display()
     )]
     DiskFull {
@@ -32,7 +31,7 @@ pub enum Error {
         part: PathBuf,
     },
     /// The folder cannot be written to.
-    #[error("cannot write into the folder {}: {source}; make it writable or choose another with -o", folder.display())]
+    #[error("cannot write into the folder {}: {source}; make it writable or choose another", folder.display())]
     Folder {
         /// The folder.
         folder: PathBuf,
@@ -71,7 +70,7 @@ pub enum Error {
     },
     /// The unfinished run was made with another sensor.toml.
     #[error(
-        "{} was begun with another sensor.toml: resume with the same one, or add --force to start over", path.display()
+        "{} was begun with another sensor.toml: resume with the same one, or start over", path.display()
     )]
     OtherSensor {
         /// The unfinished file.
@@ -98,7 +97,7 @@ pub enum Error {
         path: PathBuf,
     },
     /// An earlier write failed; the recording takes no further frames.
-    #[error("an earlier write to {} failed: finished frames are kept there, --resume goes on", path.display())]
+    #[error("an earlier write to {} failed: finished frames are kept there, and a resumed run goes on", path.display())]
     AfterFailure {
         /// The unfinished file.
         path: PathBuf,

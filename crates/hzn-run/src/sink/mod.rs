@@ -177,7 +177,8 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
         None => {
             let before = last_frames(part);
             let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(|e| match e {
-                hzn_mcap::Error::OtherSensor { .. } | hzn_mcap::Error::Foreign { .. } => unusable(e),
+                hzn_mcap::Error::OtherSensor { .. } => unusable(e).with(Remedy::Restart),
+                hzn_mcap::Error::Foreign { .. } => unusable(e),
                 e => failed(e),
             })?;
             let frames = resumed.frames / config.each_body().len() as u64;
