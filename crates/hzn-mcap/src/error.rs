@@ -20,8 +20,8 @@ pub enum Error {
     },
     /// The disk is full.
     #[error(
-        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and a \
-         resumed run goes on from there",
+        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and --resume \
+         goes on from there",
         folder.display(), part.display()
     )]
     DiskFull {

@@ -21,8 +21,8 @@ pub struct RowMeta {
     pub altitude_km: Option<f64>,
 }
 
-/// The columns of the results: structure, names, JSON schema and empty row from one line a column. A column `as` a module is
-/// written and read by that module.
+/// The columns of the results: structure, names, JSON schema and empty row from one line a column. A column `as` a
+/// module is written and read by that module.
 macro_rules! columns {
     (
         $(#[doc = $about:literal])+
