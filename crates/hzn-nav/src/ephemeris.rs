@@ -5,8 +5,8 @@
 //!
 //! | body | series | accuracy 2000–2040 |
 //! |---|---|---|
-//! | Sun | mean longitude and equation of the centre [1], nutation, aberration, two fitted terms | 0.01° |
-//! | Moon | Brown's lunar theory in the form of [2] | direction 0.1°, distance 600 km |
+//! | Sun | mean longitude and equation of the centre (1), nutation, aberration, two fitted terms | 0.01° |
+//! | Moon | Brown's lunar theory in the form of (2) | direction 0.1°, distance 600 km |
 //!
 //! 1. Meeus, *Astronomical Algorithms*, chapter 25.
 //! 2. Montenbruck & Gill, *Satellite Orbits*, section 3.3.2.
