@@ -24,13 +24,22 @@ const STAGES: [&str; 11] = [
 ];
 /// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
 /// places where they do.
-const ONCE: [(&str, usize); 6] = [
+const ONCE: [(&str, usize); 15] = [
     ("hzn_core::pipeline::search::Search<T,O>::candidate::{{closure}}", 34),
     ("hzn_core::pipeline::search::Search<T,O>::piece", 36),
+    ("hzn_core::stages::consensus::Threshold<T>::new", 3),
+    ("hzn_core::stages::consensus::keep", 2),
+    ("hzn_core::stages::covariance::fuse", 5),
+    ("hzn_core::stages::fit::fit", 4),
     ("hzn_core::stages::gates::attitude::verdict", 4),
+    ("hzn_core::stages::gates::blooms_to", 7),
+    ("hzn_core::stages::gates::judge", 18),
+    ("hzn_core::stages::gates::min_arc", 1),
     ("hzn_core::stages::gates::rivals", 14),
     ("hzn_core::stages::gates::surroundings", 7),
     ("hzn_core::stages::threshold::Histogram::mean", 2),
+    ("hzn_core::stages::threshold::Histogram::otsu", 3),
+    ("hzn_core::stages::threshold::fixed_level", 4),
 ];
 /// Loops that must be found, or the check would say nothing.
 const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::pass"];
