@@ -96,8 +96,8 @@ size_t hzn_workspace_align(void);
 // Makes a sensor with every parameter at its default in `memory`, and gives it in `out`.
 //
 // # Safety
-// `memory` is null or holds `bytes` writable bytes that nobody else uses as long as the sensor is used; `out` is null or
-// writable.
+// `memory` is null or holds `bytes` writable bytes that nobody else uses as long as the sensor is used; `out` is null
+// or writable.
 int32_t hzn_open(uint8_t *memory,
                  size_t bytes,
                  HznSensor **out);
