@@ -53,7 +53,7 @@ int example(void) {
     if (hzn_open(memory, sizeof memory, &sensor) != 0) {
         return 2;
     }
-    /* Numbers of parameters: docs/telemetry.md. */
+    /* Numbers of parameters: book/reference/telemetry.md. */
     const struct { uint16_t number; double value; } parameters[] = {
         { 1, WIDTH }, { 2, HEIGHT }, { 4, 300 }, { 5, 300 }, { 6, 159.5 }, { 7, 119.5 }, /* the camera */
         { 32, 400 },                                                                    /* body.altitude_km */
