@@ -1,4 +1,5 @@
-//! This crate holds what navigation needs beside the horizon sensor. It needs neither the standard library nor a heap.
+//! This crate has the functions that navigation needs in addition to the horizon sensor. It needs neither the standard
+//! library nor a heap.
 //!
 //! | module | what it holds |
 //! |---|---|
