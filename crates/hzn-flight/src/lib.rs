@@ -1,7 +1,7 @@
-//! What flies around [`hzn_core`]: parameters that survive a reset, modes, telecommands and telemetry.
+//! The flight software around [`hzn_core`]: parameters that survive a reset, modes, telecommands and telemetry.
 //!
-//! No heap, no unsafe code, no clock and no hardware: a board brings those (`firmware/` of this project), and the tests
-//! of this crate bring their own.
+//! There is no heap, no unsafe code, no clock and no hardware. A board provides clock and hardware (`firmware/` of this
+//! project); the tests of this crate have their own board.
 //!
 //! | module | idea |
 //! |---|---|
