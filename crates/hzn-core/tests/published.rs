@@ -156,7 +156,8 @@ fn a_smaller_copy_is_looked_at_in_the_pictures_own_coordinates() {
     assert_eq!(config.check().unwrap_err().field, "input.scale_to_height");
 }
 
-/// Draws a disc whose right part has other lit squares. The limb runs into them, and only the left parts show a limb.
+/// Draws a disc, and lit squares over the right half of the picture. The limb runs into them, and only the left parts
+/// show a limb.
 fn spoilt(config: &Config) -> Vec<u8> {
     let (w, radius) = (u32::from(config.camera.width), 240.0 * 20f64.to_radians().tan());
     let mut data = disc(config, 191.5, 127.5, radius);

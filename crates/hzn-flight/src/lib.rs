@@ -6,11 +6,11 @@
 //! | module | idea |
 //! |---|---|
 //! | [`parameters`] | every parameter by number, and its limits |
-//! | [`bytes`] | numbers into bytes and back |
+//! | [`bytes`] | conversion of numbers to bytes and back |
 //! | [`answer`] | a report with every bit |
 //! | [`packet`] | space packets on a serial line |
-//! | [`messages`] | what stands in them |
-//! | [`board`] | what a board brings |
+//! | [`messages`] | the contents of packets |
+//! | [`board`] | the functions that a board provides |
 //! | [`store`] | two copies of the parameters |
 //! | [`flight`] | the loop |
 //! | [`table`] | the parameters as bytes with a checksum |

@@ -57,8 +57,7 @@ numbered! {
         /// Sets the counters of housekeeping to zero.
         ResetCounters = 6 => "reset-counters",
         /// Sets the prior of the pictures that follow: altitude in metres and ECEF position in metres (4 × f32, NaN if
-        /// not known). Three more numbers may follow: the camera's rate of rotation in the camera frame in rad/s (3 ×
-        /// f32).
+        /// not known). The rate of rotation of the camera may follow (3 × f32, rad/s, camera frame).
         SetKnown = 7 => "known",
     }
 }

@@ -13,7 +13,7 @@ pub fn tt_days_since_j2000(unix_s: f64) -> f64 {
     ut_days_since_j2000(unix_s) + (tai_minus_utc_s(unix_s) + 32.184) / 86_400.0
 }
 
-/// Returns the days of UTC, which stands for UT1, since 2000-01-01T12:00.
+/// Returns the days since 2000-01-01T12:00 in UTC, which is used as UT1.
 pub fn ut_days_since_j2000(unix_s: f64) -> f64 {
     (unix_s - 946_728_000.0) / 86_400.0
 }

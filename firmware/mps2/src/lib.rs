@@ -1,11 +1,11 @@
-//! The parts that all images for the MPS2 boards share, with all addresses of the board.
+//! The code that all images for the MPS2 boards share. Only this crate has addresses of the board.
 //!
 //! | module | idea |
 //! |---|---|
 //! | [`board`] | external memory, timer, serial line, watchdog |
-//! | [`host`] | files of the machine that emulates the board, by semihosting |
-//! | [`port`] | the flight software's view of it |
-//! | [`watermark`] | how much stack was used |
+//! | [`host`] | files of the computer that emulates the board, by semihosting |
+//! | [`port`] | the board for the flight software |
+//! | [`watermark`] | the largest use of the stack |
 
 #![no_std]
 

@@ -93,7 +93,7 @@ impl<T: Real> Sensor<T> {
     /// Finds the threshold between dark and lit, by the method that is configured for the body.
     ///
     /// # Errors
-    /// `too-dark`, `too-bright`, or `no-limb` when dark and lit pixels cannot be separated.
+    /// Returns `too-dark`, `too-bright`, or `no-limb` when dark and lit pixels cannot be separated.
     pub fn level<P: Pixels>(&self, picture: &P, expected: &Expected<T>) -> Result<Level<T>, Status> {
         let config = self.config();
         let levels = config.levels_of(expected.which);

@@ -124,7 +124,7 @@ fn limb_cone<T: Real>(tolerance_deg: f64) {
     for case in load(include_str!("../../tests/golden/limb_ellipsoid.json")) {
         let d = num(&case["atmosphere_d_m"]);
         let (mut a, mut b) = (num(&case["a_m"]), num(&case["b_m"]));
-        // a_m and b_m include the atmosphere.
+        // The semi-axes must include the atmosphere; it is added if the case has them without it.
         if a < crate::geometry::ellipsoid::WGS84_A_M + d - 1.0 {
             (a, b) = (a + d, b + d);
         }

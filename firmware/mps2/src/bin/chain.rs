@@ -35,7 +35,7 @@ fn main() -> ! {
     })
 }
 
-/// Returns the configuration of the rocket's lens at 150 km.
+/// Returns the configuration with the lens of the rocket's flight, at an altitude of 150 km.
 fn config() -> Config {
     let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
     let lens = camera::Config { k, ..camera::Config::ideal(Model::KannalaBrandt, WIDTH, HEIGHT, 1233.0) };

@@ -122,8 +122,8 @@ fn braun_barf_covariance_equals_the_dense_product() {
     covariances::<f32>(1e-4);
 }
 
-/// As printed, (35) assumes that the points are one pixel apart. With the 16 px of the golden cases it is wrong by a
-/// factor above 3.
+/// As printed, (35) assumes that the points are one pixel apart. With the 16 px of the golden cases the variance is too
+/// small by a factor above 3.
 #[test]
 fn correlation_by_sample_is_not_that_by_distance() {
     let case = &load(include_str!("../../../tests/golden/covariance.json"))[0];

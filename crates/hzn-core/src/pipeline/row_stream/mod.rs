@@ -48,7 +48,7 @@ pub const ROWS_HELD: u16 = 32;
 /// memory then.
 const AHEAD: u16 = 15;
 
-/// The memory that a picture needs besides a [`Workspace`] when it comes row by row.
+/// The memory that a picture needs in addition to a [`Workspace`] when it comes row by row.
 ///
 /// `WINDOW` is the number of samples, [`ROWS_HELD`] times the width. `HEIGHT` is the number of rows. `TURNS` is the
 /// number of changes between dark and lit along the rows, for all rows together. `POINTS` is the number of edge points
@@ -135,7 +135,7 @@ pub struct RowStream<'a, T, S> {
     points: Points<'a>,
     /// Number of rows that have arrived.
     rows: u16,
-    /// Whether a row did not fit. Later rows are not processed.
+    /// Whether a row did not fit. The rows after it only serve to find the next threshold.
     full: bool,
 }
 

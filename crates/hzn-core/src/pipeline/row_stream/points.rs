@@ -21,8 +21,8 @@ impl Point {
     pub(super) const NONE: Self = Self { towards_dark_px: 0.0, x: 0, lit: Lit::Right, marks: 0 };
 }
 
-/// The points of the rows so far, in borrowed memory. When the memory is full, every second pixel is left out, from
-/// then on and among the points so far. A hash of the pixel's coordinates decides which, independently of the course of
+/// The points of the rows so far, in borrowed memory. When the memory is full, every second pixel is left out, both of
+/// the points so far and from then on. A hash of the coordinates selects the pixels, independently of the course of
 /// edges.
 #[derive(Debug)]
 pub(super) struct Points<'a> {
