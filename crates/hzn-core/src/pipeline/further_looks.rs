@@ -26,8 +26,10 @@ fn goes_on(status: Status) -> bool {
 
 impl<T: Real> Sensor<T> {
     /// Runs everything after the first threshold: the looks, one after the other, until there is an answer or nothing
-    /// is left to try. Without an answer, the report has the threshold and the status of the first look; if a later
-    /// look was `rejected`, it has that status.
+    /// is left to try.
+    ///
+    /// Without an answer, the report has the threshold of the first look. Its status is `rejected` if one of the looks
+    /// was rejected, otherwise that of the last look with `no-limb` or `too-few-points`.
     pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(
         &self,
         mut lists: Lists<'_, T>,

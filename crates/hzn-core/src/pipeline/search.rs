@@ -37,11 +37,13 @@ const LINE_WORDS: usize = 16384;
 /// memory.
 const BORDER_LOOKS: u16 = 128;
 
-/// Returns the rows between search lines: the usual number, and the largest one, for when memory is short. The largest
-/// is the smallest extent of the body's disc. The usual number is a quarter of it where crescents occur, because search
-/// lines must cross these too, and otherwise the same.
+/// Returns the spacing of search lines in rows: the usual one (1 to 64), and the largest one for when memory is short
+/// (1 to 256).
 ///
-/// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows. The code takes half of f for f min(r', r/sin θ);
+/// The largest spacing is the smallest extent of the body's disc. The usual spacing is a quarter of it if crescents
+/// occur, because search lines must cross these too; otherwise it is the same.
+///
+/// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows. The code uses f/2 in place of f min(r', r/sin θ);
 /// every lens in use exceeds this.
 fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u16) {
     let (_, fy) = camera.focal_px();
@@ -203,8 +205,9 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     }
 
     /// Examines an edge that a search line meets. An edge that ends at the border also begins there, between two pixels
-    /// that were read. Only a part of it is followed from the search line, so it is not judged. Instead `missed`
-    /// requests a search of the whole border, which finds the edge from its beginning.
+    /// that were read, and only a part of it is followed from the search line. It is therefore not judged; instead,
+    /// `missed` requests a search of the whole border, which finds the edge from its beginning. After that search,
+    /// every edge is judged.
     fn edge_on_line<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
@@ -289,7 +292,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         (!hole).then_some(end)
     }
 
-    /// Takes an edge that was followed through every stage.
+    /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
     pub(super) fn piece<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
         let counters = &mut self.report.counters;
         let length = edge.total();

@@ -2,9 +2,9 @@
 //! 2015, 4.2.1; Barf 2014, 2.2.6).
 //!
 //! A part is examined as a picture with its own camera, whose principal point is moved and whose focal length is
-//! scaled. The observer gets everything in the coordinates of the whole picture. Equation (2.39) ends the division when
-//! a part is too small *and* too bright and too dark at once; here it ends when a part is too small, or too bright, or
-//! too dark.
+//! scaled. The observer gets everything in the coordinates of the whole picture. Equation (2.39) ends the division only
+//! when a part is too small *and* too bright and too dark at once; here it ends when a part is too small, or too
+//! bright, or too dark.
 
 use super::account;
 use super::found_limb::FoundLimb;
