@@ -1,4 +1,4 @@
-//! Gives the linker the memory of the part that the board stands for.
+//! Gives the linker the memory layout of the processor that the board stands for.
 
 use std::path::PathBuf;
 use std::{env, fs};

@@ -1,4 +1,5 @@
-//! The order of the folders: each knows those before it in `FOLDERS` and none after it. A stage knows earlier stages.
+//! Checks the order of the folders: each imports only from the folders before it in `FOLDERS`. A stage imports only
+//! earlier stages.
 //!
 //! Every path that begins with `crate::` counts, in imports and in code. Tests inside a file do not count.
 
@@ -20,18 +21,18 @@ fn files(dir: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// The name of a file or folder without `.rs`.
+/// Returns the name of a file or folder without `.rs`.
 fn name(part: &std::ffi::OsStr) -> String {
     Path::new(part).file_stem().unwrap().to_str().unwrap().to_owned()
 }
 
-/// The identifier that a text begins with.
+/// Returns the identifier at the beginning of a text.
 fn word(text: &str) -> &str {
     let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len());
     &text[..end]
 }
 
-/// The modules that stand after `crate::folder::`: one, or those of a list in braces.
+/// Returns the modules after `crate::folder::`: one, or those of a list in braces.
 fn modules(rest: &str) -> Vec<&str> {
     match rest.strip_prefix('{') {
         Some(list) => list.split('}').next().unwrap().split(',').map(|item| word(item.trim())).collect(),
@@ -39,7 +40,7 @@ fn modules(rest: &str) -> Vec<&str> {
     }
 }
 
-/// (folder, module, imported folder, imported module) of every path in the crate.
+/// Returns (folder, module, imported folder, imported module) for every path in the crate.
 fn imports() -> BTreeSet<[String; 4]> {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut paths = Vec::new();

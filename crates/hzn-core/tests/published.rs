@@ -1,5 +1,5 @@
-//! The methods of published systems through the whole pipeline: they find a drawn disc, in parts and in smaller copies
-//! too, and any picture gets a sound report.
+//! Tests the methods of published systems in the whole pipeline. They find a drawn disc, also in halves and in smaller
+//! copies of the picture, and give a sound report for every picture.
 
 mod common;
 
@@ -18,7 +18,8 @@ use hzn_core::{Config, FlightHorizon, HostHorizon, Observer, Preset, Report, con
 use hzn_core::{consensus, threshold};
 use proptest::prelude::*;
 
-/// A sphere 20° in radius seen by a pinhole of 60 px: a disc of 21.8 px.
+/// Makes a configuration for a sphere of 20° angular radius and a pinhole with f = 60 px times `scale`. The radius of
+/// the disc is 21.8 px times `scale`.
 fn config(preset: Preset, scale: u16) -> Config {
     let f = 60.0 * f64::from(scale);
     let mut config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 96 * scale, 64 * scale, f));
@@ -27,14 +28,14 @@ fn config(preset: Preset, scale: u16) -> Config {
     config.body.altitude_km = Some(1923.8);
     config.body.limb_height_km = 0.0;
     config.candidates.min_points = 30;
-    // HORACE's own numbers are for its camera and rocket.
+    // HORACE's values are for its camera and rocket.
     config.input.scale_to_height = None;
     config.select.altitude_limits_km = Some([1800.0, 2000.0]);
     (config.select.radius_margin, config.select.radius_margin_px) = (0.5, 0.0);
     config
 }
 
-/// A lit disc about (u, v).
+/// Draws a lit disc about (u, v).
 fn disc(config: &Config, u: f64, v: f64, radius_px: f64) -> Vec<u8> {
     let (w, h) = (u32::from(config.camera.width), u32::from(config.camera.height));
     (0..w * h)
@@ -52,7 +53,7 @@ fn answer(config: &Config, data: &[u8], observer: &impl Observer<f64>) -> Report
     host.process_observed(&Grey::try_new(data, layout).unwrap(), &expected, observer)
 }
 
-/// Counts levels, and keeps what it is told of places.
+/// Counts thresholds, and collects the positions that the observer gets.
 #[derive(Default)]
 struct Watch {
     levels: Cell<u32>,
@@ -93,14 +94,14 @@ fn every_preset_and_contour_method_finds_a_disc() {
             let radius = 120.0 * 20f64.to_radians().tan();
             let report = answer(&config, &disc(&config, 95.5, 63.5, radius), &Watch::default());
             let off = off_deg(&report, [0.0, 0.0, 1.0]);
-            // Whole pixels, and an edge of one to two pixels under erosion.
+            // The limit covers points at whole pixels, and an edge of one to two pixels with erosion.
             assert!(off < 0.3, "{} {method:?}: {off}", preset.name());
         }
     }
 }
 
-/// Braun & Barf 2022, section 5: the Sun's disc, wider by bloom than it is, by search lines, its radius free, with
-/// their limit for the Sun (7.3).
+/// Braun & Barf 2022, section 5: search lines find the Sun's disc, which bloom makes wider. The radius is fitted
+/// freely, and their limit for the Sun (7.3) applies.
 #[test]
 fn braun_barf_on_the_sun() {
     let mut config = Config::preset(Preset::Dlr2022, camera::Config::ideal(Model::Pinhole, 160, 120, 1235.0));
@@ -118,7 +119,7 @@ fn braun_barf_on_the_sun() {
         let solution = report.solution.unwrap();
         assert!((solution.half_angle_rad * 1235.0 - radius).abs() < 0.3 && solution.altitude_m.is_none());
     }
-    // Something else that is round, but not the Sun's edge: an ellipse's points lie off any circle.
+    // An oval is not the Sun: the points of an ellipse do not lie on any circle.
     let (w, h) = (160u32, 120u32);
     let oval: Vec<u8> = (0..w * h)
         .map(|i| {
@@ -140,7 +141,7 @@ fn a_smaller_copy_is_looked_at_in_the_pictures_own_coordinates() {
     let watch = Watch::default();
     let report = answer(&config, &data, &watch);
     let scaled = off_deg(&report, want);
-    // A pixel of the copy is a degree.
+    // A pixel of the copy is about one degree.
     assert!(full < 0.1 && scaled < 0.4, "{full} {scaled}");
     assert!(report.candidates[0].length_px < 200, "{:?}", report.candidates);
     for p in watch.points.borrow().iter() {
@@ -155,7 +156,8 @@ fn a_smaller_copy_is_looked_at_in_the_pictures_own_coordinates() {
     assert_eq!(config.check().unwrap_err().field, "input.scale_to_height");
 }
 
-/// The right part of the picture lit by something: the limb runs into it, and only the left parts show a limb.
+/// Draws a disc, and lit squares over the right half of the picture. The limb runs into them, and only the left parts
+/// show a limb.
 fn spoilt(config: &Config) -> Vec<u8> {
     let (w, radius) = (u32::from(config.camera.width), 240.0 * 20f64.to_radians().tan());
     let mut data = disc(config, 191.5, 127.5, radius);
@@ -185,19 +187,19 @@ fn halves_answer_where_the_whole_does_not() {
         let off = off_deg(&report, [0.0, 0.0, 1.0]);
         assert!(off < 0.5, "{combine:?} {off}");
         assert!(watch.levels.get() > 2);
-        // Candidates of all parts are numbered on.
+        // The numbers of the candidates go on from part to part.
         assert!(report.counters.candidates as usize >= report.candidates.len());
         let solution = report.solution.unwrap();
         assert!(solution.covariance.sigma_max_rad() > 0.0 && report.counters.candidates > solution.candidate);
     }
-    // No part is small enough to be cut: two halves.
+    // No half is large enough to be cut again, so there are the whole picture and two halves.
     config.recover.least_part = 1.0;
     let watch = Watch::default();
     let _ = answer(&config, &data, &watch);
     assert_eq!(watch.levels.get(), 3);
 }
 
-/// HORACE's own values, for its camera: limits 100 and 20 km, 5000 px of 768 rows.
+/// HORACE's values for its camera are altitude limits of 20 and 100 km and a margin of 5000 px at 768 rows.
 #[test]
 fn the_radius_check_of_horace_is_in_pixels() {
     let camera = camera::Config::ideal(Model::Pinhole, 1024, 768, 2133.3);
@@ -205,7 +207,7 @@ fn the_radius_check_of_horace_is_in_pixels() {
     assert_eq!(own.binarize.factor, 0.75);
     assert_eq!((own.select.altitude_limits_km, own.input.scale_to_height), (Some([20.0, 100.0]), Some(240)));
     assert!((own.select.radius_margin_px * 768.0 / 240.0 - 5000.0).abs() < 1e-9);
-    // The disc's radius is 87.4 px; limits that begin 3 px above it refuse it, unless the margin is wider.
+    // The radius of the disc is 87.4 px. Limits that begin 3 px above it reject the disc, unless the margin is wider.
     let mut config = config(Preset::Horace2015, 4);
     config.recover.method = retry::Method::None;
     let data = disc(&config, 191.5, 127.5, 240.0 * 20f64.to_radians().tan());
@@ -220,7 +222,7 @@ fn the_radius_check_of_horace_is_in_pixels() {
     }
 }
 
-/// (2.39) as printed divides on unless a part is too bright and too dark at once.
+/// As printed, (2.39) goes on with the division unless a part is too bright and too dark at once.
 #[test]
 fn division_ends_at_pictures_that_are_too_dark_or_too_bright() {
     let mut config = config(Preset::Horace2015, 2);
@@ -231,7 +233,8 @@ fn division_ends_at_pictures_that_are_too_dark_or_too_bright() {
         let report = answer(&config, &data, &watch);
         assert_eq!((report.status, watch.levels.get()), (status, 0));
     }
-    // One dark and one bright half, of a picture that is neither: each ends at once.
+    // The whole picture is neither too dark nor too bright, but one half is dark and the other bright: the division
+    // ends at both.
     let data: Vec<u8> = (0..192 * 128).map(|i| if i % 192 < 96 { 0 } else { 255 }).collect();
     let watch = Watch::default();
     let report = answer(&config, &data, &watch);
@@ -247,7 +250,7 @@ fn a_picture_with_more_pixels_than_bits_is_truncated() {
     let expected = flight.expect(&Prior::default()).unwrap();
     let picture = Grey::try_new(&data, Layout::packed(384, 256, 1, 8)).unwrap();
     assert_eq!(flight.process(&picture, &expected).status, Status::Truncated);
-    // A copy that fits is answered.
+    // A smaller copy that fits gets an answer.
     config.input.scale_to_height = Some(96);
     let mut flight = FlightHorizon::boxed(&config).unwrap();
     let report = flight.process(&picture, &expected);

@@ -1,4 +1,4 @@
-//! A picture that comes row by row has the answer of the same picture in memory.
+//! A picture that comes row by row has the same answer as the same picture in memory.
 
 use std::cell::RefCell;
 
@@ -18,7 +18,7 @@ const W: usize = 96;
 const H: usize = 64;
 type Small = RowBuffers<u8, { ROWS_HELD as usize * W }, H, 8192, 8192>;
 
-/// The edge points of each candidate, with every bit.
+/// Collects the edge points of each candidate, with every bit.
 #[derive(Default)]
 struct Seen(RefCell<Vec<(u32, [u32; 2])>>);
 impl Observer<f32> for Seen {
@@ -35,7 +35,7 @@ fn config(mask: bool, circle: bool) -> Config {
     config.select.min_inliers = 8;
     config.binarize.method = Method::Fixed;
     config.binarize.level = 100.0;
-    // A picture that came row by row is looked at once.
+    // There is only one look at a picture that comes row by row.
     config.recover.levels.clear();
     config.recover.frame_px = 0;
     if mask {
@@ -66,7 +66,7 @@ fn whole(sensor: &Sensor<f32>, data: &[u8], observer: &impl Observer<f32>) -> Re
     sensor.process(&mut Box::new(FlightWorkspace::new()), &picture, &expected, observer)
 }
 
-/// Noise, blocks and discs, with edges of three pixels.
+/// Draws noise, blocks and discs, with edges three pixels wide.
 fn garbage(kind: u8, seed: u64, level: u8) -> Vec<u8> {
     let mut state = seed | 1;
     let hard: Vec<u8> = (0..(W * H) as u32)
@@ -103,7 +103,7 @@ proptest! {
         let (there, here) = (Seen::default(), Seen::default());
         let want = whole(&sensor, &data, &there);
         let got = stream(&sensor, &mut Box::new(Small::new()), &data, None, &here);
-        // Edges so wide that their plateaus are not within the rows held stand apart, and are counted.
+        // Edges whose plateaus lie beyond the rows in memory may have other points; these are counted.
         let wide = got.counters.cut_points;
         let (there, here) = (there.0.into_inner(), here.0.into_inner());
         let apart = there.iter().zip(&here).filter(|(a, b)| a != b).count();
@@ -115,7 +115,7 @@ proptest! {
         }
     }
 
-    /// Lists that are too short for any picture: an answer all the same, without a panic.
+    /// Buffers that are too short for every picture still give a sound report, without a panic.
     #[test]
     fn short_lists_are_borne(kind in 0u8..8, seed in any::<u64>(), level in any::<u8>(), mask: bool, circle: bool) {
         let data = garbage(kind, seed, level);
@@ -129,7 +129,7 @@ proptest! {
     }
 }
 
-/// A limb above garbage, of which no list has room: what fits is enough.
+/// The picture has a limb above garbage that does not fit into the buffers. The rows that fit are enough.
 #[test]
 fn the_picture_ends_where_the_lists_do() {
     let shade = |x: usize, y: usize| match y {
@@ -145,7 +145,7 @@ fn the_picture_ends_where_the_lists_do() {
     assert!(report.candidates.len() == 1 && report.candidates[0].length_px == W as u32, "{:?}", report.candidates);
 }
 
-/// Without a fixed level the first picture gives the second its level.
+/// Without a fixed threshold, the first picture gives the threshold for the second.
 #[test]
 fn the_level_comes_from_the_picture_before() {
     let mut config = config(false, false);

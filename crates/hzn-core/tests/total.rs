@@ -1,4 +1,4 @@
-//! `process` answers any picture, and never with a number that is none.
+//! `process` returns a report for every picture and never reports NaN or infinity in an answer.
 
 mod common;
 
@@ -39,7 +39,7 @@ fn sound(report: &Report<f64>) {
     }
 }
 
-/// The chosen candidate, and no other, is listed as chosen, with the numbers of the answer.
+/// Checks that the chosen candidate, and no other, is listed as chosen, with the numbers of the answer.
 fn listed<T: Real>(report: &Report<T>) {
     let chosen = report.candidates.iter().filter(|c| c.verdict == Verdict::Chosen);
     let chosen: Vec<_> = chosen.map(|c| (c.number, c.inliers, c.points)).collect();
@@ -47,8 +47,8 @@ fn listed<T: Real>(report: &Report<T>) {
     assert_eq!(chosen, Vec::from_iter(answer));
 }
 
-/// A body in the middle of the picture, and along its border so many lit things that the body's edge comes after all
-/// that a report lists.
+/// The picture has a body in its middle, and so many lit things along its border that the body's edge comes after all
+/// edges that a report lists.
 #[test]
 fn the_chosen_edge_is_listed_however_late_it_comes() {
     let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 300.0));
@@ -90,7 +90,7 @@ proptest! {
         let expected = host.expect(&Prior::default()).unwrap();
         let first = host.process(&picture, &expected);
         sound(&first);
-        // The same picture gives the same answer, whatever came between.
+        // The same picture gives the same answer, independently of the pictures in between.
         let data = garbage(0, seed ^ 7, 128);
         let _ = host.process(&Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap(), &expected);
         let again = host.process(&picture, &expected);
@@ -126,7 +126,7 @@ proptest! {
         let frame = Prior { sun: sun.and_then(UnitVec3::try_new), ..Prior::default() };
         let expected = host.expect(&frame).unwrap();
         sound(&host.process(&picture, &expected));
-        // The same body thrice: what is taken is not given again.
+        // The same body is expected three times: an edge that was used is not used again.
         let reports = host.process_each(&picture, &[expected; 3]);
         prop_assert_eq!(reports.len(), 3);
         reports.iter().for_each(sound);
@@ -135,7 +135,7 @@ proptest! {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
-    /// No picture costs more than it may; a limit that is not reached changes nothing.
+    /// No picture costs more than its work budget, and a budget that is not used up changes nothing.
     #[test]
     fn work_is_bounded(
         kind in 0u8..10, seed in any::<u64>(), level in any::<u8>(), most in 10_000u32..200_000,

@@ -1,4 +1,4 @@
-//! A report as bytes, with every bit of its numbers: what science telemetry carries.
+//! A report as bytes for science telemetry, with every bit of its numbers.
 
 use hzn_core::frames::{Cov3, UnitVec3};
 use hzn_core::status::{Stage, Status};
@@ -15,13 +15,13 @@ type Candidates = heapless::Vec<Candidate<f64>, MAX_LISTED>;
 /// A candidate edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge {
-    /// Border pixels.
+    /// Number of border pixels.
     pub length_px: u32,
-    /// Sub-pixel points.
+    /// Number of sub-pixel points.
     pub points: u32,
-    /// Points that fit the limb.
+    /// Number of points that fit the limb.
     pub inliers: u32,
-    /// RMS distance from the limb in pixels; NaN without a fit.
+    /// RMS distance of the inliers from the limb in pixels; NaN without a fit.
     pub rms_px: f32,
     /// [`hzn_core::verdict::Verdict`] as a number.
     pub verdict: u8,
@@ -30,9 +30,9 @@ pub struct Edge {
 /// A direction; see [`hzn_core::Solution`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction {
-    /// Unit vector to the body, camera frame.
+    /// Unit vector to the body, in the camera frame.
     pub axis: [f32; 3],
-    /// Its covariance (xx, xy, xz, yy, yz, zz), rad².
+    /// Covariance of `axis` (xx, xy, xz, yy, yz, zz), rad².
     pub cov: [f32; 6],
     /// The same direction in ECEF; NaN without a position.
     pub axis_ecef: [f32; 3],
@@ -42,17 +42,17 @@ pub struct Direction {
     pub half_angle_rad: f32,
     /// Half-angle of the answer, rad.
     pub fused_half_angle_rad: f32,
-    /// Altitude from the free fit, m; NaN where the half-angle says nothing.
+    /// Altitude from the free fit, m; NaN where the half-angle does not give one.
     pub altitude_m: f32,
-    /// Its 1-sigma, m.
+    /// 1-sigma of the altitude, m.
     pub altitude_sigma_m: f32,
     /// RMS distance of the inliers, px.
     pub rms_px: f32,
-    /// Edge that the inliers cover, px.
+    /// Length of the edge that the inliers cover, px.
     pub arc_px: f32,
-    /// Edge points that carry the answer.
+    /// Number of edge points that carry the answer.
     pub inliers: u32,
-    /// The candidate that it is.
+    /// Number of the chosen candidate.
     pub candidate: u32,
 }
 
@@ -61,37 +61,37 @@ pub struct Direction {
 pub struct PictureAnswer {
     /// [`hzn_core::status::Status`] as a number.
     pub status: u8,
-    /// [`hzn_core::status::Stage`] as a number: the last that was entered.
+    /// [`hzn_core::status::Stage`] as a number: the last stage that was entered.
     pub stage: u8,
-    /// How often the picture was looked at, each time at another level: 1 to 16.
+    /// Number of looks at the picture, each at another threshold: 1 to 16.
     pub looks: u8,
-    /// Level between dark and lit in counts.
+    /// Threshold between dark and lit in counts.
     pub level: u16,
-    /// Border pixels followed.
+    /// Border pixels that were followed.
     pub followed: u32,
-    /// Edges that were candidates, listed or not.
+    /// Number of edges that were examined as candidates, listed or not.
     pub candidates: u32,
-    /// Border pixels dropped.
+    /// Border pixels that were dropped.
     pub dropped: u32,
-    /// Points at the global level.
+    /// Points at the threshold of the whole picture, because their local mid-level was not found.
     pub fallback_points: u32,
-    /// Points of the chosen edge.
+    /// Edge points of the chosen edge.
     pub edge_points: u32,
-    /// Draws of the rejection.
+    /// Draws of the consensus.
     pub draws: u32,
-    /// What the picture cost, in the unit of `limits.max_work`.
+    /// Work of the picture, in the unit of `limits.max_work`.
     pub work: u32,
-    /// The direction, with status `ok`.
+    /// The direction; only with status `ok`.
     pub direction: Option<Direction>,
-    /// The first candidates, and the chosen one.
+    /// The first candidates, including the chosen one.
     pub edges: [Option<Edge>; MAX_LISTED],
 }
 
-/// So many looks fit into a packet.
+/// Most looks that the packet can show.
 const MOST_LOOKS: u32 = 16;
 
 impl PictureAnswer {
-    /// What a report says.
+    /// Makes the answer from a report.
     pub fn from_report(report: &Report<f32>) -> Self {
         let c = &report.counters;
         let mut edges = [None; MAX_LISTED];
@@ -139,12 +139,12 @@ impl PictureAnswer {
         }
     }
 
-    /// The report in double precision, as a workstation has it; `None` when a number in it means nothing.
+    /// Returns the report in double precision, as on a workstation; `None` if a number in it has no meaning.
     pub fn report(&self) -> Option<Report<f64>> {
         let mut candidates = Candidates::default();
         for (place, e) in (0..).zip(self.edges.iter().flatten()) {
             let verdict = *Verdict::ALL.get(usize::from(e.verdict))?;
-            // Numbers are not sent down: only the chosen one may stand in another's place.
+            // Telemetry has no candidate numbers. Only the chosen candidate can be at a place other than its number.
             let own = self.direction.filter(|_| verdict == Verdict::Chosen).map(|d| d.candidate);
             let candidate = Candidate {
                 number: own.unwrap_or(place),
@@ -178,7 +178,7 @@ impl PictureAnswer {
             status: *Status::ALL.get(usize::from(self.status))?,
             stage: *Stage::ALL.get(usize::from(self.stage))?,
             level: self.level,
-            // Of the frame that came down; the next one has been taken long since.
+            // Telemetry does not have it: the next picture was exposed long before.
             next_level: None,
             counters: Counters {
                 followed: self.followed,
@@ -188,7 +188,7 @@ impl PictureAnswer {
                 edge_points: self.edge_points,
                 draws: self.draws,
                 work: self.work,
-                // No pictures come row by row.
+                // Pictures of the flight software do not come row by row.
                 cut_points: 0,
                 looks: self.looks.into(),
             },
@@ -197,10 +197,10 @@ impl PictureAnswer {
         })
     }
 
-    /// Appends the answer.
+    /// Appends the answer to `out`.
     pub fn write(&self, out: &mut Writer<'_>) {
         out.u8(self.status);
-        // Two numbers in a byte: the stage, and the further looks above it.
+        // This byte has two numbers: the stage in its lower four bits, the number of further looks in its upper four.
         out.u8(self.stage | self.looks.saturating_sub(1).min(15) << 4);
         out.u16(self.level);
         let counts = [self.followed, self.candidates, self.dropped, self.fallback_points, self.edge_points, self.draws];
@@ -227,7 +227,7 @@ impl PictureAnswer {
         }
     }
 
-    /// Reads an answer; `None` when it is cut off.
+    /// Reads an answer; `None` if it is cut off.
     pub fn read(from: &mut Reader<'_>) -> Option<Self> {
         let (status, stage) = (from.u8()?, from.u8()?);
         let mut answer = Self {

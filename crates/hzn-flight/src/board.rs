@@ -1,11 +1,11 @@
-//! What a board brings. A port is one implementation of this trait.
+//! The functions that a board provides. A port is one implementation of this trait.
 
-/// A picture that the camera has written.
+/// A picture that the camera has written to memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shot {
     /// Bytes that the camera wrote.
     pub bytes: usize,
-    /// Exposure, µs since the start.
+    /// Time of the exposure, µs since the start.
     pub exposure_us: u64,
     /// Pictures lost since the last one, because both buffers were full.
     pub lost: u32,
@@ -13,30 +13,31 @@ pub struct Shot {
 
 /// A board: clock, line, camera, memory, watchdog.
 pub trait Board {
-    /// Microseconds since the start; never goes back.
+    /// Returns the microseconds since the start. The time never goes back.
     fn now_us(&mut self) -> u64;
-    /// The next byte that was received, if there is one.
+    /// Returns the next byte that was received, if there is one.
     fn receive(&mut self) -> Option<u8>;
-    /// Sends bytes; returns when they are on their way.
+    /// Sends bytes. Returns when the line has taken them.
     fn send(&mut self, bytes: &[u8]);
-    /// The lift-off signal: pulled out once the rocket leaves.
+    /// Returns whether there is the lift-off signal: its plug is pulled out when the rocket leaves.
     fn lift_off(&mut self) -> bool;
-    /// The warning that power will be cut.
+    /// Returns whether there is a warning that power will be cut.
     fn power_fails(&mut self) -> bool;
-    /// Whether the last reset was the watchdog's.
+    /// Returns whether the watchdog caused the last reset.
     fn was_watchdog_reset(&mut self) -> bool;
-    /// Tells the watchdog that there was progress.
+    /// Tells the watchdog that the program makes progress.
     fn feed_watchdog(&mut self);
-    /// Whether the camera answers.
+    /// Returns whether the camera answers.
     fn camera_answers(&mut self) -> bool;
-    /// The newest picture that was not taken yet. The buffer that is given up is the camera's again.
+    /// Takes the newest picture that was not taken yet, if there is one. The camera gets the buffer of the picture
+    /// before.
     fn next_shot(&mut self) -> Option<Shot>;
-    /// The bytes of the picture taken last: one a pixel, row by row.
+    /// Returns the picture that was taken last: one byte per pixel, row by row.
     fn picture(&self) -> &[u8];
-    /// A copy of the parameters, 1 or 2, as it stands in memory.
+    /// Reads copy 1 or 2 of the parameters from memory.
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);
-    /// Writes a copy of the parameters, 1 or 2; false when the memory refuses.
+    /// Writes copy 1 or 2 of the parameters. Returns false if the memory refuses.
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool;
-    /// Most bytes of stack since the start; 0 when unknown.
+    /// Returns the largest use of the stack since the start in bytes; 0 if unknown.
     fn stack_bytes(&mut self) -> u32;
 }

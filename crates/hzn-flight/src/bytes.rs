@@ -1,5 +1,5 @@
-//! Numbers into bytes and back, most significant byte first as in every CCSDS packet. A writer that is full and a
-//! reader that is empty say so; nothing is written or read in part.
+//! Converts numbers to bytes and back, most significant byte first as in every CCSDS packet. A full writer and an empty
+//! reader report this. No number is written or read in part.
 
 /// Writes into a slice.
 #[derive(Debug)]
@@ -10,7 +10,7 @@ pub struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// An empty writer over `out`.
+    /// Makes an empty writer over `out`.
     pub fn new(out: &'a mut [u8]) -> Self {
         Self { out, len: 0, full: false }
     }
@@ -40,15 +40,15 @@ impl<'a> Writer<'a> {
     pub fn u64(&mut self, x: u64) {
         self.bytes(&x.to_be_bytes());
     }
-    /// Appends a single, IEEE 754.
+    /// Appends a single-precision number, IEEE 754.
     pub fn f32(&mut self, x: f32) {
         self.u32(x.to_bits());
     }
-    /// Appends a double, IEEE 754.
+    /// Appends a double-precision number, IEEE 754.
     pub fn f64(&mut self, x: f64) {
         self.u64(x.to_bits());
     }
-    /// How many bytes were written; `None` when something did not fit.
+    /// Returns the number of bytes written; `None` if something did not fit.
     pub fn finish(self) -> Option<usize> {
         (!self.full).then_some(self.len)
     }
@@ -61,11 +61,11 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// A reader at the start of `bytes`.
+    /// Makes a reader at the start of `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { rest: bytes }
     }
-    /// What was not read yet.
+    /// Returns the bytes that were not read yet.
     pub fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -74,27 +74,27 @@ impl<'a> Reader<'a> {
         self.rest = rest;
         Some(*first)
     }
-    /// The next byte.
+    /// Reads a byte; `None` at the end.
     pub fn u8(&mut self) -> Option<u8> {
         self.array().map(|[b]| b)
     }
-    /// The next two bytes.
+    /// Reads two bytes; `None`, without a change, if fewer are left.
     pub fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_be_bytes)
     }
-    /// The next four bytes.
+    /// Reads four bytes; `None`, without a change, if fewer are left.
     pub fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_be_bytes)
     }
-    /// The next eight bytes.
+    /// Reads eight bytes; `None`, without a change, if fewer are left.
     pub fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_be_bytes)
     }
-    /// The next single.
+    /// Reads a single-precision number, as [`Self::u32`] does.
     pub fn f32(&mut self) -> Option<f32> {
         self.u32().map(f32::from_bits)
     }
-    /// The next double.
+    /// Reads a double-precision number, as [`Self::u64`] does.
     pub fn f64(&mut self) -> Option<f64> {
         self.u64().map(f64::from_bits)
     }

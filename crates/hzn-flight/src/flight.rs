@@ -18,12 +18,12 @@ use crate::parameters::{Parameters, Refused};
 use crate::store;
 use crate::table::{self, TableError};
 
-/// A telecommand that is not finished within this time is broken.
+/// A telecommand is broken if no byte arrives for this time before it is complete.
 const COMMAND_TIMEOUT_US: u64 = 1_000_000;
-/// Pixels of an edge in a packet.
+/// Most pixels of an edge in one packet.
 const EDGE_PIXELS: usize = 200;
 
-/// Where telemetry goes: the board's line, with sequence counts.
+/// The line for telemetry, with a sequence count for each APID.
 #[derive(Debug)]
 struct Line {
     out: [u8; MAX_BYTES],
@@ -46,12 +46,12 @@ impl Line {
     }
 }
 
-/// The lists of a picture: keep them in a `static`. As those of `hzn run --flight` but for the points of an edge, of
-/// which 608 are kept at most, as the default `candidates.keep_points` asks for no more. All that are asked for is as
-/// many.
+/// The lists that a picture needs; keep them in a `static`. They are those of `hzn run --flight`, except that at most
+/// 608 points are kept per edge. The default `candidates.keep_points` needs no more; `keep_points = 0` (all) also means
+/// 608 here.
 pub type Lists = Workspace<f32, 2048, 76, 512>;
 
-/// The flight software's memory besides the lists of a picture: keep it in a `static`.
+/// The memory of the flight software in addition to the lists of a picture; keep it in a `static`.
 #[derive(Debug)]
 pub struct Buffers {
     line: Line,
@@ -67,7 +67,7 @@ impl Default for Buffers {
 }
 
 impl Buffers {
-    /// All zeros.
+    /// Makes buffers of all zeros.
     pub const fn new() -> Self {
         Self {
             line: Line { out: [0; MAX_BYTES], sequences: [0; Apid::ALL.len()] },
@@ -87,24 +87,24 @@ pub struct Flight<'a, B> {
     sensor: Sensor<f32>,
     housekeeping_every: u16,
     known: Prior<f32>,
-    /// The last answer, and when its picture was exposed.
+    /// The last answer, and the time when its picture was exposed, µs since the start.
     last: Option<(Last<f32>, u64)>,
     mode: Mode,
     state: Housekeeping,
-    /// Pictures since the last housekeeping packet.
+    /// Number of pictures since the last housekeeping packet.
     since: u16,
-    /// A picture was asked for.
+    /// Whether a command asked for the next picture to be processed.
     once: bool,
-    /// The edges of the next picture were asked for.
+    /// Whether a command asked for the edges of the next picture.
     dump: bool,
-    /// When the last byte came in.
+    /// Time when the last byte arrived, µs since the start.
     heard_us: u64,
 }
 
 impl<'a, B: Board> Flight<'a, B> {
-    /// Loads the parameters, checks itself, and waits in standby; in safe mode when a check fails. `None` cannot be:
-    /// the defaults are valid, which a test holds.
-    // By itself, as are the other large functions: what one needs of the stack, the next one has again.
+    /// Loads the parameters, runs the self-checks and waits in standby, or in safe mode if a check fails. `None` cannot
+    /// occur: stored parameters are checked, and a test shows that the defaults are valid.
+    // Not inlined, like the other large functions, so that each can use the same part of the stack.
     #[inline(never)]
     pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
         let loaded = store::load(&mut board, &mut buffers.table);
@@ -151,17 +151,17 @@ impl<'a, B: Board> Flight<'a, B> {
         Some(flight)
     }
 
-    /// The mode.
+    /// Returns the mode.
     pub fn mode(&self) -> Mode {
         self.mode
     }
-    /// The board.
+    /// Returns the board.
     pub fn board(&mut self) -> &mut B {
         &mut self.board
     }
 
-    /// Self-checks: camera, memory, parameters. Defaults are no reason to do nothing but wait: a sensor that was told
-    /// nothing is of no use, so this is safe mode.
+    /// Runs the self-checks of camera, memory and parameters. Default parameters fail the check: a sensor that was not
+    /// configured is of no use, so the computer enters safe mode.
     fn check(&mut self, parameters: bool) {
         let camera = self.board.camera_answers();
         let memory = holds(&mut self.buffers.line.out, |_| ());
@@ -173,7 +173,7 @@ impl<'a, B: Board> Flight<'a, B> {
         }
     }
 
-    /// One turn of the loop: at most one telecommand and one picture. Call it for ever.
+    /// Runs one turn of the loop, with at most one telecommand and one picture. Call it for ever.
     pub fn turn(&mut self) {
         self.board.feed_watchdog();
         if self.mode == Mode::ShutDown {
@@ -214,10 +214,10 @@ impl<'a, B: Board> Flight<'a, B> {
         }
     }
 
-    /// Carries out the telecommand that has come in, if there is one.
+    /// Carries out the telecommand that has arrived. Returns whether there was one.
     #[inline(never)]
     fn command(&mut self) -> bool {
-        // The packet is copied out of the inbox, as carrying it out may use every buffer.
+        // The packet is copied out of the inbox, because the command may use every buffer.
         let mut user = [0; MAX_BYTES];
         let next = self.buffers.inbox.next(|packet| {
             let Packet { apid, sequence, user: data, .. } = packet?;
@@ -263,7 +263,7 @@ impl<'a, B: Board> Flight<'a, B> {
                 if let Some(code) = done(from) {
                     return code;
                 }
-                // Also after a failed self-check: that is the operator's own decision.
+                // The operator may leave safe mode even after a failed self-check.
                 self.enter(mode);
                 Code::Done
             }
@@ -305,7 +305,7 @@ impl<'a, B: Board> Flight<'a, B> {
                     [Some(x), Some(y), Some(z)] => Some([x, y, z]),
                     _ => None,
                 };
-                // Three numbers or none: a rate that is cut off is no rate.
+                // A rate has three numbers; if it is cut off, the command is refused.
                 if rate.is_some_and(|r| r.iter().any(Option::is_none)) {
                     return Code::Arguments;
                 }
@@ -325,7 +325,7 @@ impl<'a, B: Board> Flight<'a, B> {
         Parameters { sensor: self.sensor.config().clone(), housekeeping_every: self.housekeeping_every }
     }
 
-    /// All or none.
+    /// Sets all parameters, or none.
     #[inline(never)]
     fn set_parameters(&mut self, from: &mut Reader<'_>) -> Code {
         let Some(count) = from.u8() else { return Code::Arguments };
@@ -525,7 +525,7 @@ impl Longest {
     }
 }
 
-/// Takes the longest edge when it is wanted. There is one kind of observer, so that the pipeline is linked once.
+/// Keeps the longest edge if it is wanted. There is only one type of observer, so that the pipeline is linked once.
 struct Watch<'a> {
     wanted: bool,
     longest: RefCell<&'a mut Longest>,
@@ -553,7 +553,8 @@ impl Observer<f32> for Watch<'_> {
     }
 }
 
-/// Whether memory holds every bit, set and cleared. `meanwhile` is what becomes of what was written, for the tests.
+/// Returns whether memory holds every bit, set and cleared. `meanwhile` changes the memory after each write; tests use
+/// it for stuck bits.
 fn holds(memory: &mut [u8], meanwhile: impl Fn(&mut [u8])) -> bool {
     [0x55u8, 0xAA].iter().all(|&pattern| {
         memory.fill(pattern);

@@ -1,16 +1,16 @@
-//! What flies around [`hzn_core`]: parameters that survive a reset, modes, telecommands and telemetry.
+//! The flight software around [`hzn_core`]: parameters that survive a reset, modes, telecommands and telemetry.
 //!
-//! No heap, no unsafe code, no clock and no hardware: a board brings those (`firmware/` of this project), and the tests
-//! of this crate bring their own.
+//! There is no heap, no unsafe code, no clock and no hardware. A board provides clock and hardware (`firmware/` of this
+//! project); the tests of this crate have their own board.
 //!
 //! | module | idea |
 //! |---|---|
 //! | [`parameters`] | every parameter by number, and its limits |
-//! | [`bytes`] | numbers into bytes and back |
+//! | [`bytes`] | conversion of numbers to bytes and back |
 //! | [`answer`] | a report with every bit |
 //! | [`packet`] | space packets on a serial line |
-//! | [`messages`] | what stands in them |
-//! | [`board`] | what a board brings |
+//! | [`messages`] | the contents of packets |
+//! | [`board`] | the functions that a board provides |
 //! | [`store`] | two copies of the parameters |
 //! | [`flight`] | the loop |
 //! | [`table`] | the parameters as bytes with a checksum |

@@ -1,40 +1,41 @@
-//! What stands in packets: telecommands, and telemetry besides the answers. Numbers are frozen.
+//! The contents of packets: telecommands, and telemetry other than the answers. The numbers are frozen.
 
 use crate::bytes::{Reader, Writer};
 use crate::numbered::numbered;
 
 numbered! {
-    /// Modes, after HORACE (Barf 2014).
+    /// Modes, as in HORACE (Barf 2014).
     pub enum Mode: u8 {
-        /// Checked and waiting for lift-off or a command; pictures are processed on command.
+        /// The self-checks are done, and the computer waits for lift-off or a command. A picture is processed on
+        /// command only.
         Standby = 0 => "standby",
         /// Every picture is processed.
         Flight = 1 => "flight",
-        /// No picture is processed; commands are answered. Entered when a self-check fails.
+        /// No picture is processed; commands are answered. The computer enters this mode when a self-check fails.
         Safe = 2 => "safe",
-        /// Nothing is written any more: power may be cut. Left by a reset only.
+        /// The loop does nothing more, so power may be cut. Only a reset ends this mode.
         ShutDown = 3 => "shut-down",
     }
 }
 
 numbered! {
-    /// What became of a telecommand.
+    /// The outcome of a telecommand.
     pub enum Code: u8 {
-        /// Done.
+        /// The telecommand was carried out.
         Done = 0 => "done",
         /// The packet was broken or cut off.
         Broken = 1 => "packet broken or cut off",
-        /// The arguments are too short, too long, or not of this function.
+        /// The arguments are too short, too long, or do not belong to this function.
         Arguments = 2 => "wrong arguments",
         /// There is no such function, or the packet is no telecommand.
         Unknown = 3 => "no such function",
-        /// Not in this mode.
+        /// The function is not allowed in this mode.
         Mode = 4 => "not in this mode",
         /// No parameter has this number.
         UnknownParameter = 5 => "no such parameter",
-        /// A parameter, or all together, was refused; nothing changed.
+        /// A parameter, or the combination of all, was refused. Nothing changed.
         Refused = 6 => "value refused, nothing changed",
-        /// The memory did not keep the parameters; they hold until the next reset.
+        /// The parameters are in use, but the memory did not keep them: they are lost at the next reset.
         NotStored = 7 => "in force, but not stored",
     }
 }
@@ -42,30 +43,31 @@ numbered! {
 numbered! {
     /// Functions of telecommands: the first byte of the user data.
     pub enum Function: u8 {
-        /// A mode (u8).
+        /// Changes the mode (u8).
         SetMode = 1 => "mode",
-        /// How many (u8), then number (u16) and value (f64) of each: all or none, then stored.
+        /// Sets parameters: their count (u8), then number (u16) and value (f64) of each. All are set and then stored,
+        /// or none.
         SetParameters = 2 => "set",
-        /// How many (u8), then the number (u16) of each.
+        /// Reads parameters: their count (u8, at most 96), then the number (u16) of each.
         ReadParameters = 3 => "read",
-        /// Processes the next picture, in standby.
+        /// Processes the next picture; only in standby.
         ProcessOnce = 4 => "process-once",
         /// Sends the edges of the next picture that is processed.
         DumpEdges = 5 => "dump-edges",
         /// Sets the counters of housekeeping to zero.
         ResetCounters = 6 => "reset-counters",
-        /// What navigation knows, for the pictures to come: altitude in metres, ECEF position in metres (4 × f32, NaN:
-        /// not known), and, if they follow, the camera's rate of rotation in its own axes in rad/s (3 × f32).
+        /// Sets the prior of the pictures that follow: altitude in metres and ECEF position in metres (4 × f32, NaN if
+        /// not known). The rate of rotation of the camera may follow (3 × f32, rad/s, camera frame).
         SetKnown = 7 => "known",
     }
 }
 
 numbered! {
-    /// How bad an event is.
+    /// Severity of an event.
     pub enum Severity: u8 {
-        /// As it should be.
+        /// Everything is as it should be.
         Information = 0 => "information",
-        /// Something was wrong and was dealt with.
+        /// Something was wrong, and the computer dealt with it.
         Warning = 1 => "warning",
         /// Something is wrong.
         Error = 2 => "error",
@@ -73,37 +75,38 @@ numbered! {
 }
 
 numbered! {
-    /// Something that happened, with two numbers that say more.
+    /// Something that happened, with two numbers, a and b, that say more.
     pub enum Event: u16 {
-        /// Started. Copy of the parameters that was taken (1, 2; 0 defaults), their generation.
+        /// The computer started. a: copy of the parameters in use (1 or 2; 0 for the defaults). b: their generation.
         Started = 1 => "started",
-        /// A copy of the parameters cannot be used. Copy (1, 2); 1 no table, 2 checksum, 3 refused.
+        /// A copy of the parameters cannot be used. a: copy (1 or 2). b: 1 no table, 2 wrong checksum, 3 values
+        /// refused.
         CopyBroken = 2 => "a copy of the parameters cannot be used",
-        /// No copy can be used: the defaults hold. 0, 0.
+        /// No copy can be used, so the defaults apply. a: 0. b: 0.
         Defaults = 3 => "no copy of the parameters can be used: defaults",
-        /// The mode changed. From, to.
+        /// The mode changed. a: mode before. b: mode now.
         ModeChanged = 4 => "mode changed",
-        /// A telecommand was rejected. [`Code`], function.
+        /// A telecommand was rejected. a: [`Code`]. b: function.
         CommandRejected = 5 => "telecommand rejected",
-        /// A picture has the wrong size. Bytes, expected bytes.
+        /// A picture has the wrong size. a: bytes. b: expected bytes.
         WrongSize = 6 => "picture of wrong size",
-        /// Pictures were lost because the processing was not done. How many, 0.
+        /// Pictures were lost because the processing was not finished. a: number of pictures. b: 0.
         Overrun = 7 => "pictures lost",
-        /// The parameters were stored. Copy (1, 2), generation.
+        /// The parameters were stored. a: copy (1 or 2). b: generation.
         Stored = 8 => "parameters stored",
-        /// A self-check failed. Bits: 1 camera, 2 memory, 4 parameters; 0.
+        /// A self-check failed. a: bits, 1 camera, 2 memory, 4 parameters. b: 0.
         SelfCheck = 9 => "self-check failed",
-        /// The last reset was the watchdog's. 0, 0.
+        /// The watchdog caused the last reset. a: 0. b: 0.
         Watchdog = 10 => "reset by the watchdog",
-        /// The memory did not keep the parameters. Copy (1, 2), 0.
+        /// The memory did not keep the parameters. a: copy (1 or 2). b: 0.
         StoreFailed = 11 => "parameters not stored",
-        /// What navigation told cannot be. 0, 0.
+        /// The prior from navigation is impossible. a: 0. b: 0.
         KnownRefused = 12 => "what navigation told cannot be",
     }
 }
 
 impl Event {
-    /// How bad it is.
+    /// Returns the severity of the event.
     pub const fn severity(self) -> Severity {
         match self {
             Self::Started | Self::ModeChanged | Self::Stored => Severity::Information,
@@ -123,17 +126,17 @@ macro_rules! record {
             $($(#[$field_doc])* pub $field: $t,)*
         }
         impl $name {
-            /// The names of the fields, in the order in which they stand in the packet.
+            /// The names of the fields, in the order of the packet.
             pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
             /// Appends the fields.
             pub fn write(&self, out: &mut Writer<'_>) {
                 $(out.$t(self.$field);)*
             }
-            /// Reads the fields; `None` when they are cut off.
+            /// Reads the fields; `None` if they are cut off.
             pub fn read(from: &mut Reader<'_>) -> Option<Self> {
                 Some(Self { $($field: from.$t()?,)* })
             }
-            /// Every field as a number.
+            /// Returns every field as a number.
             pub fn values(&self) -> [f64; Self::FIELDS.len()] {
                 [$(self.$field as f64),*]
             }
@@ -144,7 +147,7 @@ macro_rules! record {
 record! {
     /// User data of a housekeeping packet. Counters stop at their largest value.
     Housekeeping {
-        /// [`Mode`].
+        /// [`Mode`] as a number.
         mode: u8,
         /// Self-checks that failed: 1 camera, 2 memory, 4 parameters.
         self_check: u8,
@@ -152,43 +155,43 @@ record! {
         parameter_copy: u8,
         /// Status of the last picture; 255 before the first.
         last_status: u8,
-        /// Generation of the parameters.
+        /// Generation of the parameters; 0 for the defaults.
         parameter_generation: u32,
         /// Pictures processed.
         pictures: u32,
-        /// Of them with status `ok`.
+        /// Pictures with the status `ok`.
         answers: u32,
         /// Pictures lost by overrun.
         lost: u32,
-        /// Pictures refused for their size.
+        /// Pictures refused for their size or for an impossible prior.
         refused: u32,
-        /// Telecommands done.
+        /// Telecommands that were carried out.
         commands: u16,
-        /// Telecommands rejected.
+        /// Telecommands that were rejected.
         rejected: u16,
-        /// Calculation of the last picture, µs.
+        /// Calculation time of the last picture, µs.
         last_us: u32,
-        /// Longest calculation, µs.
+        /// Longest calculation time, µs.
         longest_us: u32,
-        /// Most bytes of stack since the start.
+        /// Largest use of the stack since the start, bytes.
         stack_bytes: u32,
     }
 }
 
 record! {
-    /// What stands before the answer in the user data of a science packet.
+    /// The data before the answer in the user data of a science packet.
     Exposure {
         /// Number of the picture since the start, from 1.
         picture: u32,
-        /// Exposure, µs since the start.
+        /// Time of the exposure, µs since the start.
         exposure_us: u64,
         /// End of the calculation, µs since the start.
         done_us: u64,
-        /// Calculation, µs.
+        /// Calculation time, µs.
         calculation_us: u32,
-        /// The body that was looked for, as parameter 30.
+        /// Body that the sensor looks for, as in parameter 30.
         body: u8,
-        /// Altitude that navigation told or the parameters say, m; NaN when none is known.
+        /// Altitude from navigation or else from the parameters, m; NaN if neither has one.
         altitude_m: f32,
     }
 }
@@ -196,11 +199,11 @@ record! {
 record! {
     /// User data of an acknowledgement.
     Acknowledge {
-        /// Function, 0 when it could not be read.
+        /// Function; 0 if it could not be read.
         function: u8,
         /// Sequence count of the telecommand.
         sequence: u16,
-        /// [`Code`].
+        /// [`Code`] as a number.
         code: u8,
     }
 }
@@ -208,31 +211,31 @@ record! {
 record! {
     /// User data of an event.
     EventRecord {
-        /// [`Event`].
+        /// [`Event`] as a number.
         number: u16,
-        /// [`Severity`].
+        /// [`Severity`] as a number.
         severity: u8,
-        /// First number.
+        /// First number of the event.
         a: u32,
-        /// Second number.
+        /// Second number of the event.
         b: u32,
     }
 }
 
 record! {
-    /// What stands before the pixels (x, y as u16 each) of a part of an edge.
+    /// The data before the pixels (x and y as u16) of a part of an edge.
     EdgePart {
         /// Number of the picture.
         picture: u32,
-        /// Candidate, from 0.
+        /// Number of the candidate, from 0.
         candidate: u32,
-        /// Every how many border pixels one is given.
+        /// Distance in border pixels from one listed pixel to the next.
         stride: u32,
-        /// Place of the first pixel within the candidate's list.
+        /// Index of the first pixel in the candidate's list.
         first: u16,
-        /// Pixels of the candidate's list in all.
+        /// Number of pixels in the candidate's list.
         total: u16,
-        /// Pixels in this packet.
+        /// Number of pixels in this packet.
         count: u16,
     }
 }

@@ -1,6 +1,6 @@
-//! Enumerations whose numbers are frozen, because they stand in packets.
+//! Enumerations with frozen numbers, because the numbers are in packets.
 
-/// An enumeration with the number and the word of every variant beside it: `ALL`, `numbered` and `name`.
+/// Makes an enumeration from its variants, each with a number and a word, and the items `ALL`, `numbered` and `name`.
 macro_rules! numbered {
     (
         $(#[$doc:meta])*
@@ -16,13 +16,13 @@ macro_rules! numbered {
         }
 
         impl $name {
-            /// All.
+            /// All variants, in the order of their definition.
             pub const ALL: &'static [Self] = &[$(Self::$variant),*];
-            /// By number.
+            /// Returns the variant with the number `n`, if there is one.
             pub fn numbered(n: $number) -> Option<Self> {
                 Self::ALL.iter().copied().find(|&x| x as $number == n)
             }
-            /// The word for it in messages and commands.
+            /// Returns the word for the variant in messages and commands.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $word,)*

@@ -15,7 +15,7 @@ use crate::numbered::numbered;
 
 /// The sync marker before every packet.
 pub const SYNC: [u8; 4] = [0x1A, 0xCF, 0xFC, 0x1D];
-/// Most bytes of a packet, sync marker included.
+/// Most bytes of a packet, including the sync marker.
 pub const MAX_BYTES: usize = 1024;
 const HEADER: usize = 6;
 const TIME: usize = 8;
@@ -24,15 +24,15 @@ const CRC: usize = 2;
 const CRC16: crc::Crc<u16, crc::NoTable> = crc::Crc::<u16, crc::NoTable>::new(&crc::CRC_16_IBM_3740);
 
 numbered! {
-    /// What a packet is about: its application process identifier (APID). Frozen.
+    /// The subject of a packet: its application process identifier (APID). The numbers are frozen.
     pub enum Apid: u16 {
-        /// How the computer is.
+        /// State of the computer.
         Housekeeping = 0x100 => "housekeeping",
         /// The answer to one picture.
         Science = 0x101 => "science",
-        /// Something happened.
+        /// An event.
         Event = 0x102 => "event",
-        /// What became of a telecommand.
+        /// The outcome of a telecommand.
         Acknowledge = 0x103 => "acknowledgement",
         /// Values of parameters.
         Parameters = 0x104 => "parameters",
@@ -43,7 +43,8 @@ numbered! {
     }
 }
 
-/// Writes a packet with `user` as its user data into `out`; gives its length, `None` without room.
+/// Writes a packet with `user` as its user data into `out`. Returns its length; `None` if it does not fit into `out` or
+/// into [`MAX_BYTES`].
 pub fn write(
     out: &mut [u8],
     apid: Apid,
@@ -68,12 +69,12 @@ pub fn write(
     (end + CRC <= MAX_BYTES).then_some(end + CRC)
 }
 
-/// A packet as it was received.
+/// A received packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet<'a> {
-    /// The identifier's number.
+    /// Number of the APID.
     pub apid: u16,
-    /// Sequence count, 0 to 16383, of this APID.
+    /// Sequence count of this APID, 0 to 16383.
     pub sequence: u16,
     /// Time in microseconds since the start of the computer.
     pub time_us: u64,
@@ -81,32 +82,32 @@ pub struct Packet<'a> {
     pub user: &'a [u8],
 }
 
-/// What stands at the start of received bytes.
+/// The result of a search for a packet in received bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scan<'a> {
-    /// The first `skip` bytes belong to no packet; what follows may become one.
+    /// There is no complete packet. The first `skip` bytes belong to no packet; the bytes after them may become one.
     More {
-        /// Bytes to leave out.
+        /// Number of bytes to leave out.
         skip: usize,
     },
-    /// A packet, and the bytes up to its end.
+    /// A packet was found.
     Packet {
-        /// Bytes up to its end.
+        /// Number of bytes up to the end of the packet.
         end: usize,
         /// The packet.
         packet: Packet<'a>,
     },
-    /// A sync marker without a packet: broken or cut off. Go on after `skip` bytes.
+    /// There is a sync marker, but its packet is broken or cut off. The search goes on after `skip` bytes.
     Bad {
-        /// Bytes to leave out.
+        /// Number of bytes to leave out.
         skip: usize,
     },
 }
 
-/// Looks for the first packet in `bytes`.
+/// Searches for the first packet in `bytes`.
 pub fn scan(bytes: &[u8]) -> Scan<'_> {
     let Some(at) = bytes.windows(SYNC.len()).position(|w| w == SYNC) else {
-        // The end may be the first bytes of a marker.
+        // The last bytes may be the beginning of a marker.
         return Scan::More { skip: bytes.len().saturating_sub(SYNC.len() - 1) };
     };
     let begin = at + SYNC.len();
@@ -145,11 +146,11 @@ impl Default for Inbox {
 }
 
 impl Inbox {
-    /// Nothing received yet.
+    /// Makes an empty inbox.
     pub const fn new() -> Self {
         Self { bytes: [0; MAX_BYTES], len: 0 }
     }
-    /// Takes a byte; false when there is no room: [`Self::next`] makes some.
+    /// Adds a byte. Returns false if there is no room; [`Self::next`] makes room.
     pub fn push(&mut self, byte: u8) -> bool {
         match self.bytes.get_mut(self.len) {
             Some(place) => {
@@ -160,14 +161,15 @@ impl Inbox {
             None => false,
         }
     }
-    /// Whether something waits that is no packet yet.
+    /// Returns whether there are bytes that are not a packet yet.
     pub fn is_waiting(&self) -> bool {
         self.len > 0
     }
-    /// Hands the next packet to `with`, or says that there was a broken one.
+    /// Passes the next packet to `with`, or `None` for a broken packet. Returns the result of `with`; `None` if there
+    /// is no packet yet.
     pub fn next<R>(&mut self, with: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
         let (drop, result) = match scan(self.bytes.get(..self.len).unwrap_or_default()) {
-            // A full inbox without a packet will not become one.
+            // A full inbox without a packet cannot become one.
             Scan::More { skip } => (if self.len == MAX_BYTES { skip.max(1) } else { skip }, None),
             Scan::Packet { end, packet } => (end, Some(with(Some(packet)))),
             Scan::Bad { skip } => (skip, Some(with(None))),
@@ -175,7 +177,7 @@ impl Inbox {
         self.remove(drop);
         result
     }
-    /// Gives up the packet that was begun; what came after its sync marker may hold another.
+    /// Gives up the packet that has begun. The bytes after its sync marker may contain another packet.
     pub fn give_up(&mut self) {
         self.remove(SYNC.len());
     }
@@ -208,7 +210,7 @@ mod tests {
         assert_eq!(bytes[..10], [0x1A, 0xCF, 0xFC, 0x1D, 0x19, 0xC0, 0xC0, 77, 0, 12]);
         assert_eq!(bytes[10..18], 123_456_789_012u64.to_be_bytes());
         assert_eq!(bytes[18..21], [1, 2, 3]);
-        // CRC-16/CCITT-FALSE's check value.
+        // The check value of CRC-16/CCITT-FALSE.
         assert_eq!(CRC16.checksum(b"123456789"), 0x29B1);
         let bytes = sample(Apid::Science, &[]);
         assert_eq!(bytes[4..6], [0x09, 0x01]);
@@ -245,7 +247,7 @@ mod tests {
                 }
             }
         }
-        // The packet that was cut off has swallowed the start of the next and gives it back.
+        // The packet that was cut off includes the start of the next packet, which is found nevertheless.
         assert_eq!(good, [(0x101, 40), (0x102, 5), (0x102, 5)]);
         assert!(bad >= 1, "{bad}");
     }

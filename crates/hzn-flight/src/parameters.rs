@@ -1,7 +1,7 @@
-//! Every parameter by number. Numbers are frozen: a number is never given to another parameter.
+//! Every parameter by number. The numbers are frozen: a number is never used for another parameter.
 //!
-//! A value is a double, whatever the parameter: whole numbers and choices are refused when they are not whole, and a
-//! parameter that may be left out is NaN when it is.
+//! The value of every parameter is a double. Whole numbers and choices are refused if the value is not whole. NaN means
+//! that an optional parameter is not set.
 
 use hzn_core::Config;
 use hzn_core::body::Kind;
@@ -10,23 +10,23 @@ use hzn_core::error::ConfigError;
 use hzn_core::keys::Value;
 use hzn_core::region::{MAX_CORNERS, MAX_POLYGONS, Polygon};
 
-/// What a flight computer can be told: the sensor, and how often it tells about itself.
+/// The parameters of a flight computer: the sensor, and the rate of housekeeping packets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// The sensor.
     pub sensor: Config,
-    /// Frames between two housekeeping packets, 1 to 65535.
+    /// Number of pictures from one housekeeping packet to the next, 1 to 65535.
     pub housekeeping_every: u16,
 }
 
-/// Why a parameter was not taken.
+/// Why a parameter was refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refused {
     /// No parameter has this number.
     Unknown(u16),
-    /// This parameter cannot have this value: not whole, no such choice, or out of its type.
+    /// This parameter cannot have this value: it is not whole, not a valid choice, or out of the range of its type.
     Value(u16, f64),
-    /// The parameters together are refused.
+    /// The combination of the parameters is refused.
     Config(ConfigError),
 }
 
@@ -41,15 +41,16 @@ impl core::fmt::Display for Refused {
 }
 impl core::error::Error for Refused {}
 
-/// Frames between two housekeeping packets; every other number is a key of sensor.toml, see [`Config::path`].
+/// Pictures from one housekeeping packet to the next. Every other number is a key of sensor.toml, see [`Config::path`].
 const HOUSEKEEPING: u16 = 300;
-/// Corners of polygon 0 and on. Setting it makes so many corners, all at the origin where they are new.
+/// Number of corners of polygon 0; the polygons after it follow. Setting it adds or removes corners; new corners are at
+/// the origin.
 const CORNERS: u16 = 200;
-/// x of corner 0 of polygon 0; then its y, the next corner, the next polygon.
+/// x of corner 0 of polygon 0; its y, the next corner and the next polygon follow.
 const CORNER: u16 = 1000;
 const POLYGON: u16 = 2 * MAX_CORNERS as u16;
 
-/// The name of a parameter: the key in sensor.toml, which may have several numbers.
+/// Returns the name of a parameter: its key in sensor.toml. One key can have several numbers.
 pub fn name(id: u16) -> Option<&'static str> {
     Config::path(id).or(match id {
         200..=207 => Some("mask corners"),
@@ -60,36 +61,37 @@ pub fn name(id: u16) -> Option<&'static str> {
 }
 
 impl Parameters {
-    /// The defaults for a sensor.
+    /// Makes the default parameters for a sensor.
     pub fn new(sensor: Config) -> Self {
         Self { sensor, housekeeping_every: 10 }
     }
 
-    /// The defaults before anything was loaded: an ideal lens of 640×480 at 230 km above the Earth.
+    /// Makes the default parameters before any are loaded: an ideal lens of 640×480 pixels at 230 km above the Earth.
     pub fn idle() -> Self {
         let mut sensor = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 600.0));
         sensor.body.altitude_km = Some(230.0);
         Self::new(sensor)
     }
 
-    /// The number of the body that a sensor looks for: parameter 30.
+    /// Returns the number of the body that a sensor looks for, as in parameter 30.
     pub fn body_number(config: &Config) -> u8 {
         config.body.kind.number(0) as u8
     }
 
-    /// The body of a number, as parameter 30 has it.
+    /// Returns the body with a number, as in parameter 30.
     pub fn body(number: u8) -> Option<Kind> {
         let mut kind = Kind::default();
         kind.set_number(0, f64::from(number))?;
         Some(kind)
     }
 
-    /// The number of a parameter by its name in sensor.toml; of one that has several numbers, the first.
+    /// Returns the number of a parameter by its name in sensor.toml. If the name has several numbers, returns the
+    /// first.
     pub fn named(name: &str) -> Option<u16> {
         Config::numbers().chain([HOUSEKEEPING]).find(|&id| self::name(id) == Some(name))
     }
 
-    /// The numbers of every parameter that has a value now, in the order in which they must be set.
+    /// Returns the numbers of all parameters that have a value now, in the order in which they must be set.
     pub fn numbers(&self) -> impl Iterator<Item = u16> + '_ {
         let polygons = &self.sensor.mask.polygons_px;
         let corners = (CORNER..).step_by(usize::from(POLYGON)).zip(polygons);
@@ -99,7 +101,7 @@ impl Parameters {
             .chain(corners.flat_map(|(first, polygon)| first..first + 2 * polygon.len() as u16))
     }
 
-    /// The value of a parameter; `None` for a number that has none.
+    /// Returns the value of a parameter; `None` if there is no such parameter.
     pub fn get(&self, id: u16) -> Option<f64> {
         if id == HOUSEKEEPING {
             return Some(f64::from(self.housekeeping_every));
@@ -116,10 +118,10 @@ impl Parameters {
         polygon.get(i % usize::from(POLYGON) / 2)?.get(i % 2).copied()
     }
 
-    /// Sets a parameter. Whether it goes together with the others is the business of [`Self::check`].
+    /// Sets a parameter. [`Self::check`] checks the combination with the others.
     ///
     /// # Errors
-    /// No such parameter, or not a value for it.
+    /// There is no such parameter, or the value is not possible for it.
     pub fn set(&mut self, id: u16, value: f64) -> Result<(), Refused> {
         let no = Refused::Value(id, value);
         let c = &mut self.sensor;
@@ -138,7 +140,7 @@ impl Parameters {
                 polygons.truncate(i);
                 return Ok(());
             }
-            // Polygons stand one after another.
+            // Polygons are numbered without gaps.
             if polygons.len() == i {
                 polygons.push(Polygon::new()).map_err(|_| no)?;
             }
@@ -155,10 +157,10 @@ impl Parameters {
         Err(Refused::Unknown(id))
     }
 
-    /// Whether a flight computer can be told every value: each key needs a number, and each choice.
+    /// Checks that a flight computer can take all values: each key and each choice needs a number.
     ///
     /// # Errors
-    /// The first key that does not fly.
+    /// Returns the first key that a flight computer cannot take.
     pub fn flyable(&self) -> Result<(), &'static str> {
         let mut same =
             Self { sensor: Config::new(self.sensor.camera.clone()), housekeeping_every: self.housekeeping_every };
@@ -168,7 +170,8 @@ impl Parameters {
                 return Err(name(id).unwrap_or("mask"));
             }
         }
-        // The ground mixes the colours and turns the pictures; the mask was set by its corners.
+        // Colours and orientation of pictures are handled on the ground, so `input` does not count. The mask was set by
+        // its corners.
         same.sensor.input = self.sensor.input;
         match self.sensor.differing_on_ground(&same.sensor) {
             Some(path) => Err(path),
@@ -176,10 +179,10 @@ impl Parameters {
         }
     }
 
-    /// Whether the parameters go together.
+    /// Checks the combination of all parameters.
     ///
     /// # Errors
-    /// The first field out of its limits.
+    /// Returns the first field that is out of its limits.
     pub fn check(&self) -> Result<(), Refused> {
         if self.housekeeping_every == 0 {
             return Err(Refused::Value(HOUSEKEEPING, 0.0));
@@ -189,7 +192,7 @@ impl Parameters {
     }
 }
 
-/// The place of a number within a range of them.
+/// Returns the index of a number within a range of numbers.
 fn within(id: u16, first: u16, count: u16) -> Option<usize> {
     id.checked_sub(first).filter(|&i| i < count).map(usize::from)
 }
@@ -225,7 +228,7 @@ mod tests {
             to.set(id, from.get(id).unwrap()).unwrap();
         }
         assert_eq!(to, from);
-        // And back: what is not there is taken away again.
+        // In the other direction, parameters that the defaults do not have are removed.
         for id in Parameters::idle().numbers() {
             to.set(id, Parameters::idle().get(id).unwrap()).unwrap();
         }
@@ -255,7 +258,7 @@ mod tests {
         }
         assert_eq!(p.set(999, 1.0), Err(Refused::Unknown(999)));
         assert_eq!(p, before);
-        // A value of the right type and beyond its limits is for `check`.
+        // A value of the right type that is out of its limits is refused by `check` only.
         p.set(4, -5.0).unwrap();
         assert!(matches!(p.check(), Err(Refused::Config(e)) if e.field == "camera.fx_px"));
     }

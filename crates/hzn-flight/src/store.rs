@@ -1,24 +1,24 @@
-//! Two copies of the parameters: the newer valid one counts, and only the other one is ever written, so that a power
-//! cut in the middle of writing costs the change and nothing else.
+//! Two copies of the parameters. The newer valid copy is in use, and only the other copy is ever written. A power cut
+//! in the middle of writing therefore loses only the change.
 
 use crate::board::Board;
 use crate::parameters::Parameters;
 use crate::table::{self, TableError};
 
-/// What was found at the start.
+/// The parameters that were found at the start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loaded {
     /// The parameters.
     pub parameters: Parameters,
-    /// The copy that they come from, 1 or 2; 0 for the defaults.
+    /// The copy of the parameters, 1 or 2; 0 for the defaults.
     pub copy: u8,
-    /// Their generation; 0 for the defaults.
+    /// Generation of the parameters; 0 for the defaults.
     pub generation: u32,
-    /// Why copies 1 and 2 cannot be used.
+    /// Why copies 1 and 2 cannot be used; `None` for a valid copy.
     pub broken: [Option<TableError>; 2],
 }
 
-/// Reads both copies; `buffer` is used to read them.
+/// Reads both copies by way of `buffer` and returns the newer valid one.
 #[inline(never)]
 pub fn load(board: &mut impl Board, buffer: &mut [u8]) -> Loaded {
     let mut out = Loaded { parameters: Parameters::idle(), copy: 0, generation: 0, broken: [None; 2] };
@@ -35,10 +35,10 @@ pub fn load(board: &mut impl Board, buffer: &mut [u8]) -> Loaded {
     out
 }
 
-/// Writes the next generation over the copy that does not count, and reads it back. Gives the copy and the generation.
+/// Writes the next generation over the copy that is not in use, and reads it back. Returns the copy and the generation.
 ///
 /// # Errors
-/// The copy that was not kept.
+/// Returns the copy that the memory did not keep.
 #[inline(never)]
 pub fn save(
     board: &mut impl Board,

@@ -1,4 +1,4 @@
-//! The parameters as bytes, for a memory that keeps them: header, one entry a parameter, checksum.
+//! The parameters as bytes for permanent memory: header, one entry per parameter, checksum.
 //!
 //! ```text
 //! offset  bytes  field (little-endian)
@@ -20,20 +20,20 @@ const VERSION: u16 = 1;
 const HEADER: usize = 12;
 const ENTRY: usize = 10;
 
-/// CRC-32 as in zlib, without a table: it is needed seldom.
+/// CRC-32 as in zlib. It needs no table, because it is seldom used.
 pub(crate) const CRC32: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Most bytes of a table.
 pub const MAX_BYTES: usize = 4096;
 
-/// Why bytes are no table.
+/// Why bytes are not a valid table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TableError {
-    /// Not a table, cut off, or of another version.
+    /// The bytes are not a table, are cut off, or have another version.
     Header,
-    /// The checksum does not fit.
+    /// The checksum is wrong.
     Checksum,
-    /// An entry, or all together, was refused.
+    /// An entry, or the combination of all, was refused.
     Refused(Refused),
 }
 
@@ -48,7 +48,7 @@ impl core::fmt::Display for TableError {
 }
 impl core::error::Error for TableError {}
 
-/// Writes a table into `out` and gives its length; `None` when there is no room.
+/// Writes a table into `out` and returns its length; `None` if there is no room.
 pub fn write(parameters: &Parameters, generation: u32, out: &mut [u8]) -> Option<usize> {
     let mut at = HEADER;
     let mut count = 0u16;
@@ -69,11 +69,11 @@ pub fn write(parameters: &Parameters, generation: u32, out: &mut [u8]) -> Option
     Some(at + 4)
 }
 
-/// Reads the table at the start of `bytes`; what follows it does not count. Gives the parameters, checked, and the
+/// Reads the table at the start of `bytes` and ignores the bytes after it. Returns the checked parameters and the
 /// generation.
 ///
 /// # Errors
-/// The bytes are no whole table, or its parameters are refused.
+/// The bytes are not a complete table, or its parameters are refused.
 pub fn read(bytes: &[u8]) -> Result<(Parameters, u32), TableError> {
     let (entries, generation) = open(bytes)?;
     let mut parameters = Parameters::idle();
@@ -86,12 +86,12 @@ pub fn read(bytes: &[u8]) -> Result<(Parameters, u32), TableError> {
     Ok((parameters, generation))
 }
 
-/// The generation of the table at the start of `bytes`, when its checksum fits.
+/// Returns the generation of the table at the start of `bytes`; `None` if it is not complete or its checksum is wrong.
 pub fn generation(bytes: &[u8]) -> Option<u32> {
     open(bytes).ok().map(|(_, generation)| generation)
 }
 
-/// The entries and the generation of a table with the right checksum.
+/// Returns the entries and the generation of a table with the right checksum.
 fn open(bytes: &[u8]) -> Result<(&[u8], u32), TableError> {
     let header: &[u8; HEADER] = bytes.first_chunk().ok_or(TableError::Header)?;
     let [m0, m1, m2, m3, v0, v1, n0, n1, g0, g1, g2, g3] = *header;

@@ -1,4 +1,4 @@
-//! The flight software on a board made of vectors.
+//! Tests the flight software on a board that is made of vectors.
 
 use std::collections::VecDeque;
 
@@ -22,7 +22,7 @@ struct Bench {
     shots: VecDeque<(Vec<u8>, u32)>,
     picture: Vec<u8>,
     copies: [Vec<u8>; 2],
-    /// Bytes that may still be written before power is cut.
+    /// Bytes that can still be written before power is cut.
     power: Option<usize>,
     lift_off: bool,
     power_fails: bool,
@@ -71,7 +71,7 @@ impl Board for Bench {
     }
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
         let n = self.power.unwrap_or(bytes.len()).min(bytes.len());
-        // A memory is erased before it is written.
+        // The memory is erased before it is written.
         self.copies[usize::from(copy) - 1] = bytes[..n].to_vec();
         n == bytes.len()
     }
@@ -80,12 +80,12 @@ impl Board for Bench {
     }
 }
 
-/// Sky above, ground below the limb of a body as wide as the Earth at 230 km.
+/// Draws sky above and ground below the limb of a body as wide as the Earth at 230 km.
 fn limb() -> Vec<u8> {
     (0..WIDTH * HEIGHT)
         .map(|i| {
             let (x, y) = ((i % WIDTH) as f64 - 319.5, (i / WIDTH) as f64 - 239.5);
-            // The axis is 75 degrees below the optical axis, the half-angle 74.8.
+            // The axis is 75 degrees below the optical axis, and the half-angle is 74.8 degrees.
             let (sin, cos) = 75f64.to_radians().sin_cos();
             let ray = [x / 600.0, y / 600.0, 1.0];
             let along = (ray[1] * sin + cos) / (ray[0] * ray[0] + ray[1] * ray[1] + 1.0).sqrt();
@@ -133,7 +133,7 @@ struct Heard {
     edge: Vec<pixel::Pixel>,
 }
 
-/// What was sent since the last time.
+/// Returns everything that was sent since the last call.
 fn heard(flight: &mut Flight<'_, Bench>) -> Heard {
     let sent = std::mem::take(&mut flight.board().sent);
     let (mut rest, mut out) = (&sent[..], Heard::default());
@@ -207,7 +207,7 @@ fn all_points_are_as_many_as_there_is_room_for() {
         let h = tell(f, &command(2, Function::ProcessOnce, |_| ()));
         let answer = &h.science[0].1;
         assert_eq!(answer.status, Status::Ok as u8);
-        // The edge has 640 pixels, of which every second one fits.
+        // The edge has 640 pixels, and every second one fits.
         assert!((300..=608).contains(&answer.edge_points), "{}", answer.edge_points);
     });
 }
@@ -229,7 +229,7 @@ fn flies_at_lift_off_and_stops_before_power_is_cut() {
             let axis = answer.direction.unwrap().axis;
             assert!((axis[1] - 75f32.to_radians().sin()).abs() < 2e-3, "{axis:?}");
         }
-        // At the change of mode, and after the tenth picture.
+        // Housekeeping packets follow the change of mode and the tenth picture.
         assert_eq!(h.housekeeping.len(), 2);
         assert_eq!((h.housekeeping[1].pictures, h.housekeeping[1].answers), (10, 10));
         f.board().power_fails = true;
@@ -268,7 +268,7 @@ fn parameters_are_set_read_and_stored() {
             w.u16(32);
         });
         assert_eq!(tell(f, &read).parameters, [(81, 2.5), (32, 200.0)]);
-        // All or none: the second is refused.
+        // All parameters are set or none: here the second is refused.
         for (id, value, code) in
             [(4, -1.0, Code::Refused), (9999, 1.0, Code::UnknownParameter), (3, 0.5, Code::Refused)]
         {
@@ -284,7 +284,7 @@ fn parameters_are_set_read_and_stored() {
         }
         f.board().copies.clone()
     });
-    // After a reset.
+    // The computer starts again after a reset.
     fly(Bench { copies, ..Bench::default() }, |f| {
         assert_eq!(heard(f).events, [(Event::Started, 1, 3)]);
         let read = command(8, Function::ReadParameters, |w| {
@@ -320,7 +320,7 @@ fn a_power_cut_at_any_byte_of_a_write_costs_the_change_only() {
             if cut == length {
                 assert_eq!((events[0], now), ((Event::Started, 1, 3), 0.25));
             } else {
-                // The copy that was not written stays the one that counts.
+                // The copy that was not written stays in use.
                 assert_eq!((events[0], now), ((Event::Started, 2, 2), 2.0), "{cut}");
                 assert!(matches!(events[1], (Event::CopyBroken, 1, _)));
             }
@@ -344,7 +344,7 @@ fn broken_copies_end_in_the_defaults_and_in_safe_mode() {
         ];
         assert_eq!(h.events, expected);
         assert_eq!(f.mode(), Mode::Safe);
-        // Told its parameters again, it is well.
+        // When its parameters are set again, the self-check of the parameters passes.
         let set = command(1, Function::SetParameters, |w| {
             w.u8(1);
             w.u16(32);
@@ -375,12 +375,12 @@ fn bad_commands_are_rejected_with_a_code() {
         assert_eq!(tell(f, &out[..n]).answers, [(200, 5, Code::Unknown)]);
         let n = packet::write(&mut out, Apid::Science, 6, 0, |w| w.u8(1)).unwrap();
         assert_eq!(tell(f, &out[..n]).answers, [(1, 6, Code::Unknown)]);
-        // Cut off, and nothing follows: broken after a second.
+        // The command is cut off and nothing follows: it is broken after a second.
         assert!(tell(f, &good[..9]).answers.is_empty());
         f.board().now_us += 2_000_000;
         f.turn();
         assert_eq!(heard(f).answers, [(0, 0, Code::Broken)]);
-        // Cut off by the next one: that one is done.
+        // The command is cut off by the next one, which is carried out.
         f.board().line.extend(&good[..9]);
         f.board().line.extend(&good);
         f.turn();
@@ -404,7 +404,7 @@ fn any_bytes_on_the_line_leave_it_in_order() {
             let noise: Vec<u8> = (0..97)
                 .map(|_| {
                     state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    // Sync markers now and then.
+                    // Some of the bytes are sync markers.
                     packet::SYNC.get((state >> 29) as usize).copied().unwrap_or((state >> 16) as u8)
                 })
                 .collect();
@@ -473,7 +473,7 @@ fn a_picture_is_processed_on_command_and_its_edge_sent() {
         assert!(h.edge.len() > 300 && h.edge.len() <= 512, "{}", h.edge.len());
         assert!(h.edge.iter().all(|p| p.y > 200 && p.y < 480));
         assert!(h.edge.iter().any(|p| p.x < 5) && h.edge.iter().any(|p| p.x > 630));
-        // Once.
+        // The command processes one picture only.
         f.board().shots.push_back((limb(), 0));
         f.turn();
         assert!(heard(f).science.is_empty());

@@ -1,13 +1,13 @@
 //! The square root of an ARM floating-point unit.
 //!
-//! `vsqrt.f32` rounds correctly, as IEEE 754 asks, so it gives the bits of every other correct square root, in 14
-//! cycles instead of the 66 instructions of a software one. Core's own `f32::sqrt` is in std only. Targets whose ABI is
-//! `eabihf` have a unit for single precision; for double precision nothing in the compiler's settings tells, so that
-//! stays with `libm`.
+//! `vsqrt.f32` rounds correctly, as IEEE 754 requires, so it gives the same bits as every other correct square root. It
+//! takes 14 cycles, compared with 66 instructions of a software one. Core's own `f32::sqrt` is in std only. Targets
+//! with the ABI `eabihf` have a unit for single precision. No compiler setting shows a unit for double precision, so
+//! doubles stay with `libm`.
 
 #![no_std]
 
-/// Square root of `x`, correctly rounded; NaN below zero.
+/// Returns the square root of `x`, correctly rounded; NaN below zero.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[inline(always)]
 pub fn sqrt_f32(x: f32) -> f32 {

@@ -1,7 +1,7 @@
-//! Where Sun and Moon stand, in ECEF.
+//! Positions of Sun and Moon in ECEF.
 //!
-//! Both follow from short series of the equinox of date, turned by Greenwich apparent sidereal time, which shares that
-//! equinox: no precession matrix is needed. UTC stands for UT1, which moves both by up to 0.004°.
+//! Both come from short series in the equinox of date. They are rotated by Greenwich apparent sidereal time, which uses
+//! the same equinox, so no precession matrix is needed. UTC is used as UT1, which moves both by up to 0.004°.
 //!
 //! | body | series | accuracy 2000–2040 |
 //! |---|---|---|
@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 
 use crate::time::{tt_days_since_j2000, ut_days_since_j2000};
 
-/// A body of the sky, from the Earth's centre.
+/// Position of a celestial body, from the Earth's centre or from another position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Direction in ECEF, apparent, of unit length.
@@ -26,44 +26,44 @@ pub struct Place {
 }
 
 impl Place {
-    /// The place along a vector in ECEF of any length.
+    /// Makes a place from a vector in ECEF of any length; only its direction counts.
     fn along(ecef: Vector3<f64>, distance_m: f64) -> Self {
         Self { direction: (ecef / norm(&ecef)).into(), distance_m }
     }
 
-    /// Position in ECEF, metres.
+    /// Returns the position in ECEF, metres.
     pub fn position_m(&self) -> [f64; 3] {
         self.direction.map(|x| x * self.distance_m)
     }
 
-    /// The body as seen from a position (ECEF, metres).
+    /// Returns the place of the body as seen from a position (ECEF, metres).
     pub fn seen_from(&self, position_m: [f64; 3]) -> Self {
         let d = Vector3::from(self.position_m()) - Vector3::from(position_m);
         Self::along(d, norm(&d))
     }
 }
 
-/// Length of a vector: nalgebra's own needs the standard library's square root.
+/// Returns the length of a vector. The norm of nalgebra needs the standard library's square root.
 fn norm(v: &Vector3<f64>) -> f64 {
     libm::sqrt(v.dot(v))
 }
 
-/// sin of degrees.
+/// Returns the sine of an angle in degrees.
 fn sin(deg: f64) -> f64 {
     libm::sin(deg.to_radians())
 }
-/// cos of degrees.
+/// Returns the cosine of an angle in degrees.
 fn cos(deg: f64) -> f64 {
     libm::cos(deg.to_radians())
 }
 
-/// What both series need of a time.
+/// The values that both series need at a time.
 struct Time {
     /// Julian centuries of terrestrial time since J2000.
     t: f64,
     /// Obliquity of the ecliptic in degrees, with nutation.
     obliquity_deg: f64,
-    /// Nutation in longitude in degrees, its largest term.
+    /// Largest term of the nutation in longitude, in degrees.
     nutation_deg: f64,
     /// Greenwich apparent sidereal time in degrees.
     sidereal_deg: f64,
@@ -82,7 +82,7 @@ impl Time {
         Self { t, obliquity_deg, nutation_deg, sidereal_deg }
     }
 
-    /// From ecliptic longitude and latitude of date (degrees) to ECEF.
+    /// Converts ecliptic longitude and latitude of date (degrees) to ECEF.
     fn ecef(&self, longitude_deg: f64, latitude_deg: f64) -> Vector3<f64> {
         let (se, ce) = (sin(self.obliquity_deg), cos(self.obliquity_deg));
         let (sb, cb) = (sin(latitude_deg), cos(latitude_deg));
@@ -93,15 +93,15 @@ impl Time {
     }
 }
 
-/// Greenwich apparent sidereal time in radians: the angle from the equinox to the meridian of Greenwich. `unix_s` is
-/// UTC in seconds since 1970.
+/// Returns Greenwich apparent sidereal time in radians, from 0 to 2π: the angle from the equinox to the meridian of
+/// Greenwich. `unix_s` is UTC in seconds since 1970.
 pub fn sidereal_rad(unix_s: f64) -> f64 {
-    // `f64::rem_euclid`, which the standard library alone has.
+    // Does the same as `f64::rem_euclid`, which only the standard library has.
     let rest = Time::at(unix_s).sidereal_deg % 360.0;
     (if rest < 0.0 { rest + 360.0 } else { rest }).to_radians()
 }
 
-/// The Sun from the Earth's centre; `unix_s` is UTC in seconds since 1970.
+/// Returns the Sun as seen from the Earth's centre. `unix_s` is UTC in seconds since 1970.
 pub fn sun(unix_s: f64) -> Place {
     let time = Time::at(unix_s);
     let t = time.t;
@@ -111,15 +111,15 @@ pub fn sun(unix_s: f64) -> Place {
         + (0.019993 - 0.000101 * t) * sin(2.0 * anomaly)
         + 0.000289 * sin(3.0 * anomaly);
     let elongation = 297.85 + 445267.1115 * t;
-    // Aberration; and what was fitted to an ephemeris for 2000 to 2040, the Earth's path about the common centre of
-    // mass with the Moon above all.
+    // Aberration, and terms that were fitted to an ephemeris for 2000 to 2040. The largest of these is the Earth's
+    // motion about the common centre of mass with the Moon.
     let longitude = mean_longitude + centre - 0.00569 + time.nutation_deg - 0.0025 + 0.00179 * sin(elongation);
     let eccentricity = 0.016708634 - 0.000042037 * t;
     let distance_au = 1.000001018 * (1.0 - eccentricity * eccentricity) / (1.0 + eccentricity * cos(anomaly + centre));
     Place::along(time.ecef(longitude, 0.0), distance_au * AU_KM * 1e3)
 }
 
-/// The Moon from the Earth's centre; `unix_s` is UTC in seconds since 1970.
+/// Returns the Moon as seen from the Earth's centre. `unix_s` is UTC in seconds since 1970.
 pub fn moon(unix_s: f64) -> Place {
     let time = Time::at(unix_s);
     let t = time.t;
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn parallax_of_the_moon() {
-        // From the equator below the Moon's meridian it is nearer by an Earth's radius.
+        // From the equator below the Moon's meridian, the Moon is nearer by the Earth's radius.
         let moon = moon(1.6e9);
         let under = moon.direction.map(|x| x * 6.378e6);
         let seen = moon.seen_from(under);

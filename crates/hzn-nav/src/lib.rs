@@ -1,9 +1,10 @@
-//! This crate holds what navigation needs beside the horizon sensor. It needs neither the standard library nor a heap.
+//! This crate has the functions that navigation needs in addition to the horizon sensor. It needs neither the standard
+//! library nor a heap.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | [`ephemeris`] | where Sun and Moon stand |
-//! | [`time`] | leap seconds, and days of the time scales that an ephemeris counts in |
+//! | [`ephemeris`] | positions of Sun and Moon |
+//! | [`time`] | leap seconds, and days in the time scales of an ephemeris |
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -1,18 +1,19 @@
-//! Time scales: UTC counts in seconds since 1970-01-01T00:00:00, as Unix does, without leap seconds.
+//! Time scales. UTC is counted in seconds since 1970-01-01T00:00:00 without leap seconds, as Unix does.
 
-/// TAI − UTC in seconds at a time in UTC. Dates before 1999 count as 1999, and no leap second after 2017 is known.
+/// Returns TAI − UTC in seconds at a time in UTC. Dates before 1999 count as 1999, and no leap second after 2017 is
+/// known.
 pub fn tai_minus_utc_s(unix_s: f64) -> f64 {
-    // 2006, 2009, 2012-07, 2015-07, 2017 (IERS Bulletin C).
+    // Leap seconds of 2006, 2009, 2012-07, 2015-07 and 2017 (IERS Bulletin C).
     let since = [1_136_073_600.0, 1_230_768_000.0, 1_341_100_800.0, 1_435_708_800.0, 1_483_228_800.0];
     32.0 + since.iter().filter(|&&from| unix_s >= from).count() as f64
 }
 
-/// Days of terrestrial time since J2000 (2000-01-01T12:00 TT), from UTC.
+/// Returns the days of terrestrial time since J2000 (2000-01-01T12:00 TT), from UTC in seconds since 1970.
 pub fn tt_days_since_j2000(unix_s: f64) -> f64 {
     ut_days_since_j2000(unix_s) + (tai_minus_utc_s(unix_s) + 32.184) / 86_400.0
 }
 
-/// Days of UTC, which stands for UT1, since 2000-01-01T12:00.
+/// Returns the days since 2000-01-01T12:00 in UTC, which is used as UT1.
 pub fn ut_days_since_j2000(unix_s: f64) -> f64 {
     (unix_s - 946_728_000.0) / 86_400.0
 }
@@ -23,7 +24,7 @@ mod tests {
 
     #[test]
     fn leap_seconds_begin_at_midnight() {
-        // From `date -u -d 2017-01-01 +%s`.
+        // The time comes from `date -u -d 2017-01-01 +%s`.
         assert_eq!(tai_minus_utc_s(1_483_228_799.0), 36.0);
         assert_eq!(tai_minus_utc_s(1_483_228_800.0), 37.0);
         assert_eq!(tai_minus_utc_s(0.0), 32.0);
@@ -31,7 +32,7 @@ mod tests {
 
     #[test]
     fn j2000_is_at_noon_of_terrestrial_time() {
-        // 2000-01-01T11:58:55.816 UTC; 32 leap seconds, 32.184 s from TAI to TT.
+        // This is 2000-01-01T11:58:55.816 UTC, with 32 leap seconds and 32.184 s from TAI to TT.
         assert!(tt_days_since_j2000(946_727_935.816).abs() < 1e-12);
     }
 }

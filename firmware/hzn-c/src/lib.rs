@@ -1,7 +1,7 @@
-//! hzn for C: one sensor in memory that the caller owns. No heap, no callbacks, nothing global.
+//! hzn for C: one sensor in memory that the caller owns. There is no heap, no callback and no global state.
 //!
-//! Functions return 0 to 7, the status of a picture as everywhere in hzn (0 is success), or a negative number for a
-//! mistake of the caller's, after which nothing has changed. Parameters have the numbers of
+//! Functions return 0 to 7 or a negative number. 0 to 7 is the status of a picture, as everywhere in hzn; 0 is success.
+//! A negative number means an error of the caller, after which nothing has changed. Parameters have the numbers of
 //! book/reference/telemetry.md.
 
 #![no_std]
@@ -19,7 +19,7 @@ use hzn_flight::parameters::Refused;
 #[cfg(feature = "standalone")]
 mod standalone {
     unsafe extern "C" {
-        /// Defined nowhere: a library that can panic does not link.
+        /// Is not defined anywhere: a library that can panic does not link.
         safe fn panic_path_is_linked() -> !;
     }
 
@@ -35,29 +35,29 @@ pub const HZN_NULL: i32 = -1;
 pub const HZN_MEMORY: i32 = -2;
 /// No parameter has this number.
 pub const HZN_UNKNOWN_PARAMETER: i32 = -3;
-/// A parameter cannot have this value, or they do not go together.
+/// A parameter cannot have this value, or the combination of the parameters is refused.
 pub const HZN_REFUSED: i32 = -4;
-/// The picture is smaller than it says.
+/// The picture has no pixels, an impossible size or stride, or fewer bytes than its size needs.
 pub const HZN_PICTURE: i32 = -5;
-/// What is known about the picture cannot be.
+/// The altitude or the position in `HznKnown` is impossible.
 pub const HZN_KNOWN: i32 = -6;
 
-/// A sensor. Opaque: only pointers to it are passed around.
+/// A sensor. Its content is hidden: only pointers to it are passed.
 #[derive(Debug)]
 pub struct HznSensor {
-    /// What [`hzn_set`] has set; holds from [`hzn_apply`] on.
+    /// The parameters from [`hzn_set`]; they are in use after [`hzn_apply`].
     wanted: Parameters,
     sensor: Sensor<f32>,
     workspace: FlightWorkspace,
 }
 
-/// A picture: one byte a pixel, row by row.
+/// A picture: one byte per pixel, row by row.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct HznPicture {
     /// The first pixel of the first row.
     pub pixels: *const u8,
-    /// Bytes from `pixels` on that may be read.
+    /// Readable bytes from `pixels` on.
     pub bytes: usize,
     /// Columns.
     pub width: u32,
@@ -67,25 +67,26 @@ pub struct HznPicture {
     pub stride: usize,
 }
 
-/// What is known about a picture besides it. NaN: not known.
+/// The prior of a picture. NaN means that a value is not known.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct HznKnown {
-    /// Altitude in metres: geodetic for the Earth, else above the radius.
+    /// Altitude in metres: geodetic for the Earth, above the radius for other bodies.
     pub altitude_m: f32,
-    /// Position of the camera in ECEF, metres. It beats the altitude.
+    /// Position of the camera in ECEF, metres. If it is known, the altitude is not used.
     pub position_m: [f32; 3],
-    /// Rate of rotation of the camera in its own axes, rad/s; it counts with a rolling shutter.
+    /// Rate of rotation of the camera in the camera frame, rad/s; it has an effect only with a rolling shutter.
     pub rate_rad_s: [f32; 3],
 }
 
-/// The answer to a picture. Without a direction (status not 0) its numbers are NaN and 0.
+/// The answer to a picture. Without a direction (status not 0) the values from `axis` to `rms_px` are NaN and `inliers`
+/// is 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct HznAnswer {
     /// Unit vector to the body, camera frame (x right, y down, z forward).
     pub axis: [f32; 3],
-    /// Its covariance: xx, xy, xz, yy, yz, zz, rad².
+    /// Covariance of `axis`: xx, xy, xz, yy, yz, zz, rad².
     pub cov_rad2: [f32; 6],
     /// The same direction in ECEF; NaN without a position.
     pub axis_ecef: [f32; 3],
@@ -93,42 +94,42 @@ pub struct HznAnswer {
     pub half_angle_rad: f32,
     /// Altitude from the free fit, m; NaN for Sun and Moon.
     pub altitude_m: f32,
-    /// Its 1-sigma, m.
+    /// 1-sigma of the altitude, m.
     pub altitude_sigma_m: f32,
     /// RMS distance of the inliers from the limb, px.
     pub rms_px: f32,
-    /// Edge points that carry the answer.
+    /// Number of edge points that carry the answer.
     pub inliers: u32,
-    /// Points of the chosen edge.
+    /// Number of edge points of the chosen edge.
     pub edge_points: u32,
-    /// Edges that were candidates.
+    /// Number of edges that were candidates.
     pub candidates: u32,
-    /// Border pixels left out because lists were full.
+    /// Number of border pixels left out because lists were full.
     pub dropped: u32,
-    /// Level between dark and lit, counts.
+    /// Threshold between dark and lit, counts.
     pub level: u16,
-    /// Status, as returned.
+    /// Status: the value that `hzn_process` returned.
     pub status: u8,
     /// The last stage that was entered.
     pub stage: u8,
 }
 
-/// Bytes that a sensor needs.
+/// Returns the number of bytes that a sensor needs.
 #[unsafe(no_mangle)]
 pub extern "C" fn hzn_workspace_size() -> usize {
     size_of::<HznSensor>()
 }
 
-/// Alignment that a sensor needs, in bytes.
+/// Returns the alignment that a sensor needs, in bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn hzn_workspace_align() -> usize {
     align_of::<HznSensor>()
 }
 
-/// Makes a sensor with every parameter at its default in `memory`, and gives it in `out`.
+/// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`.
 ///
 /// # Safety
-/// `memory` is null or holds `bytes` writable bytes that nobody else uses as long as the sensor is used; `out` is null
+/// `memory` is null or has `bytes` writable bytes that nothing else uses as long as the sensor is used. `out` is null
 /// or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut HznSensor) -> i32 {
@@ -139,8 +140,8 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut 
     }
     let wanted = Parameters::idle();
     let Ok(sensor) = Sensor::new(&wanted.sensor) else { return HZN_REFUSED };
-    // SAFETY: `place` is aligned and has room, as checked; nothing there is dropped, as it is not a sensor yet. A
-    // workspace is arrays of numbers: any bytes are one, and zeros are an empty one.
+    // SAFETY: `place` is aligned and has room, as checked. Nothing there is dropped, because there is no sensor yet. A
+    // workspace consists of arrays of numbers: all bytes are valid, and zeros are an empty workspace.
     unsafe {
         (&raw mut (*place).wanted).write(wanted);
         (&raw mut (*place).sensor).write(sensor);
@@ -150,24 +151,24 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut 
     0
 }
 
-/// Sets a parameter by its number. It holds from the next `hzn_apply` on.
+/// Sets a parameter by its number. The value is in use after the next `hzn_apply`.
 ///
 /// # Safety
 /// `sensor` is null or from `hzn_open`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_set(sensor: *mut HznSensor, number: u16, value: f64) -> i32 {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
     code(sensor.wanted.set(number, value))
 }
 
-/// Gives a parameter as it was set last.
+/// Writes the value of a parameter, as it was set last, to `value`.
 ///
 /// # Safety
-/// `sensor` is null or from `hzn_open`; `value` is null or writable.
+/// `sensor` is null or from `hzn_open`. `value` is null or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *mut f64) -> i32 {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     let (Some(sensor), Some(value)) = (unsafe { sensor.as_ref() }, unsafe { value.as_mut() }) else { return HZN_NULL };
     match sensor.wanted.get(number) {
         Some(found) => {
@@ -178,13 +179,14 @@ pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *
     }
 }
 
-/// Takes the parameters that were set, all or none: refused, the sensor stays as it was and what was set is forgotten.
+/// Puts the parameters that were set into use, all or none. If they are refused, the sensor does not change and the
+/// values that were set are lost.
 ///
 /// # Safety
 /// `sensor` is null or from `hzn_open`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
     match (sensor.wanted.check(), Sensor::new(&sensor.wanted.sensor)) {
         (Ok(()), Ok(new)) => {
@@ -198,11 +200,11 @@ pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
     }
 }
 
-/// Finds the limb. Any picture gives a status, and an answer in `out`.
+/// Finds the limb. Every valid picture gets a status, which is returned, and an answer in `out`.
 ///
 /// # Safety
-/// `sensor` is null or from `hzn_open`; `picture` is null or its `pixels` hold `bytes` readable bytes; `known` is null
-/// (nothing is known) or readable; `out` is null or writable.
+/// `sensor` is null or from `hzn_open`. `picture` is null, or its `pixels` have `bytes` readable bytes. `known` is null
+/// (nothing is known) or readable. `out` is null or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_process(
     sensor: *mut HznSensor,
@@ -210,7 +212,7 @@ pub unsafe extern "C" fn hzn_process(
     known: *const HznKnown,
     out: *mut HznAnswer,
 ) -> i32 {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     let (Some(sensor), Some(picture), Some(out)) =
         (unsafe { sensor.as_mut() }, unsafe { picture.as_ref() }, unsafe { out.as_mut() })
     else {
@@ -219,11 +221,11 @@ pub unsafe extern "C" fn hzn_process(
     if picture.pixels.is_null() || picture.bytes > isize::MAX as usize {
         return HZN_PICTURE;
     }
-    // SAFETY: the caller's promise; not null, and no longer than a slice can be.
+    // SAFETY: the caller guarantees it; the pointer is not null, and the length is possible for a slice.
     let pixels = unsafe { core::slice::from_raw_parts(picture.pixels, picture.bytes) };
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
     let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     let frame = unsafe { known.as_ref() }.map_or_else(Prior::default, frame);
     let Ok(expected) = sensor.sensor.expect(&frame) else { return HZN_KNOWN };
     let report = sensor.sensor.process(&mut sensor.workspace, &grey, &expected, &Unobserved);

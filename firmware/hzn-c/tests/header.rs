@@ -1,4 +1,4 @@
-//! The header is what the library says.
+//! The header agrees with the library.
 
 use std::path::Path;
 

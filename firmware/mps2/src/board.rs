@@ -1,4 +1,4 @@
-//! The board: external memory and the timer.
+//! The board: external memory, timer, serial line and watchdog.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -8,12 +8,12 @@ const PSRAM: usize = 0x6000_0000;
 #[cfg(not(feature = "an500"))]
 const PSRAM: usize = 0x2100_0000;
 
-/// Bytes of one frame buffer.
+/// Size of one frame buffer in bytes.
 pub const FRAME_BYTES: usize = 4 << 20;
-/// Frame buffers: a camera fills one while the other is processed.
+/// Number of frame buffers: a camera fills one while the other is processed.
 pub const FRAMES: usize = 2;
 
-/// Timer 0 (CMSDK APB timer), 25 MHz, counting down.
+/// Timer 0 (CMSDK APB timer), which counts down at 25 MHz.
 const TIMER: *mut u32 = 0x4000_0000 as *mut u32;
 
 /// UART 0 (CMSDK APB UART): DATA (0), STATE (1), CTRL (2), BAUDDIV (4).
@@ -21,33 +21,33 @@ const UART: *mut u32 = 0x4000_4000 as *mut u32;
 
 /// The watchdog (CMSDK APB watchdog), 25 MHz: LOAD (0), CONTROL (2), INTCLR (3), LOCK (0x300).
 const WATCHDOG: *mut u32 = 0x4000_8000 as *mut u32;
-/// Two seconds: the first time without food it complains, the second time it resets the board.
+/// One second. After one second without feeding the watchdog raises its interrupt, after another it resets the board.
 const WATCHDOG_TICKS: u32 = 25_000_000;
 
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// The board's parts. There is one board.
+/// The parts of the board, which exist only once.
 #[derive(Debug)]
 pub struct Board {
     /// Frame buffers in external memory.
     pub frames: [&'static mut [u8]; FRAMES],
-    /// The timer, running.
+    /// The timer, which runs.
     pub timer: Timer,
     /// The serial line.
     pub uart: Uart,
-    /// The watchdog, not running yet.
+    /// The watchdog, which does not run yet.
     pub watchdog: Watchdog,
 }
 
 impl Board {
-    /// Takes the board; `None` the second time.
+    /// Takes the board. Returns `None` the second time.
     pub fn take() -> Option<Self> {
         if TAKEN.swap(true, Ordering::Relaxed) {
             return None;
         }
         let frames = core::array::from_fn(|i| {
-            // SAFETY: the board has 16 MiB of memory at PSRAM that no linker section uses, any bytes are valid u8, the
-            // buffers do not overlap, and `TAKEN` makes sure that they are handed out once.
+            // SAFETY: the board has 16 MiB of memory at PSRAM that no linker section uses. All bytes are valid u8, the
+            // buffers do not overlap, and `TAKEN` ensures that they are handed out only once.
             unsafe { core::slice::from_raw_parts_mut((PSRAM + i * FRAME_BYTES) as *mut u8, FRAME_BYTES) }
         });
         Some(Self { frames, timer: Timer::start(), uart: Uart::start(), watchdog: Watchdog::new() })
@@ -60,7 +60,8 @@ pub struct Timer(());
 
 impl Timer {
     fn start() -> Self {
-        // SAFETY: CTRL (0), VALUE (1) and RELOAD (2) of the timer, as in the CMSDK reference; nothing else owns it.
+        // SAFETY: these are CTRL (0), VALUE (1) and RELOAD (2) of the timer, as in the CMSDK reference. Nothing else
+        // uses them.
         unsafe {
             TIMER.add(2).write_volatile(u32::MAX);
             TIMER.add(1).write_volatile(u32::MAX);
@@ -69,10 +70,10 @@ impl Timer {
         Self(())
     }
 
-    /// Ticks since the start, modulo 2³².
+    /// Returns the ticks since the start, modulo 2³².
     #[inline(always)]
     pub fn ticks(&self) -> u32 {
-        // SAFETY: reads the timer's VALUE register.
+        // SAFETY: this reads the timer's VALUE register.
         unsafe { !TIMER.add(1).read_volatile() }
     }
 }
@@ -83,7 +84,8 @@ pub struct Uart(());
 
 impl Uart {
     fn start() -> Self {
-        // SAFETY: sets the divider (the least that is allowed) and turns both directions on; nothing else owns it.
+        // SAFETY: this sets the divider (the smallest that is allowed) and enables both directions. Nothing else uses
+        // the UART.
         unsafe {
             UART.add(4).write_volatile(16);
             UART.add(2).write_volatile(0b11);
@@ -91,15 +93,15 @@ impl Uart {
         Self(())
     }
 
-    /// A byte that has come in.
+    /// Returns a byte that has arrived, if there is one.
     pub fn receive(&mut self) -> Option<u8> {
-        // SAFETY: bit 1 of STATE says that DATA holds a byte; reading it takes it.
+        // SAFETY: bit 1 of STATE says that DATA has a byte; reading DATA removes it.
         unsafe { (UART.add(1).read_volatile() & 0b10 != 0).then(|| UART.read_volatile() as u8) }
     }
 
-    /// Sends a byte, waiting for room.
+    /// Sends a byte. Waits until there is room.
     pub fn send(&mut self, byte: u8) {
-        // SAFETY: bit 0 of STATE says that there is no room; DATA takes the byte.
+        // SAFETY: bit 0 of STATE says that there is no room. DATA takes the byte.
         unsafe {
             while UART.add(1).read_volatile() & 0b01 != 0 {}
             UART.write_volatile(u32::from(byte));
@@ -107,14 +109,14 @@ impl Uart {
     }
 }
 
-/// The watchdog: runs from the first feeding on.
+/// The watchdog. It runs from the first call of `feed` on.
 #[derive(Debug)]
 pub struct Watchdog {
     running: bool,
     was_reset: bool,
 }
 
-/// That the program was running, in memory that a reset leaves as it is, and power-on does not.
+/// Shows that the program was running. The word is in memory that a reset leaves unchanged and power-on does not.
 #[unsafe(link_section = ".uninit.RUNNING")]
 static RUNNING: AtomicU32 = AtomicU32::new(0);
 const WAS_RUNNING: u32 = 0x5AFE_C0DE;
@@ -124,10 +126,10 @@ impl Watchdog {
         Self { running: false, was_reset: RUNNING.swap(WAS_RUNNING, Ordering::Relaxed) == WAS_RUNNING }
     }
 
-    /// Starts it, or starts its time anew.
+    /// Starts the watchdog, or restarts its time.
     pub fn feed(&mut self) {
-        // SAFETY: LOCK takes the key that allows writing, LOAD and CONTROL start it (interrupt and reset on), INTCLR
-        // starts its time anew; nothing else owns it.
+        // SAFETY: LOCK takes the key that allows writing. LOAD and CONTROL start the watchdog (interrupt and reset on).
+        // INTCLR restarts its time. Nothing else uses the watchdog.
         unsafe {
             WATCHDOG.add(0x300).write_volatile(0x1ACC_E551);
             if !self.running {
@@ -139,8 +141,8 @@ impl Watchdog {
         }
     }
 
-    /// Whether it caused the last reset. These boards do not tell, but there is nothing else on them that resets a
-    /// program while power stays.
+    /// Returns whether the watchdog caused the last reset. These boards cannot report this, but nothing else on them
+    /// resets a program while the power stays on.
     pub fn was_reset(&self) -> bool {
         self.was_reset
     }

@@ -1,11 +1,11 @@
-//! What the images for the MPS2 boards share: everything that knows an address of the board.
+//! The code that all images for the MPS2 boards share. Only this crate has addresses of the board.
 //!
 //! | module | idea |
 //! |---|---|
 //! | [`board`] | external memory, timer, serial line, watchdog |
-//! | [`host`] | files of the machine that emulates the board, by semihosting |
-//! | [`port`] | the flight software's view of it |
-//! | [`watermark`] | how much stack was used |
+//! | [`host`] | files of the computer that emulates the board, by semihosting |
+//! | [`port`] | the board for the flight software |
+//! | [`watermark`] | the largest use of the stack |
 
 #![no_std]
 
@@ -17,7 +17,7 @@ pub mod watermark;
 use core::panic::PanicInfo;
 
 unsafe extern "C" {
-    /// Defined nowhere: an image that can panic does not link.
+    /// Is not defined anywhere: an image that can panic does not link.
     safe fn panic_path_is_linked() -> !;
 }
 
@@ -26,10 +26,10 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     panic_path_is_linked()
 }
 
-/// A fault ends the run with a status of its own: without a handler it would be an endless loop.
+/// Ends the run with the status 102 after a fault. Without a handler a fault would be an endless loop.
 ///
 /// # Safety
-/// Called by the processor only.
+/// Only the processor may call it.
 #[cortex_m_rt::exception]
 unsafe fn HardFault(_: &cortex_m_rt::ExceptionFrame) -> ! {
     host::exit(102)

@@ -1,4 +1,4 @@
-//! The port of the flight software: the one file that a new board rewrites, with `board`.
+//! The port of the flight software: the only file, besides `board`, that a new board rewrites.
 
 use hzn_flight::board::{Board, Shot};
 
@@ -6,10 +6,10 @@ use crate::board::{self, FRAME_BYTES, Timer, Uart, Watchdog};
 use crate::host::{File, exit};
 use crate::watermark;
 
-/// Ticks of the timer in a microsecond.
+/// Ticks of the timer per microsecond.
 const TICKS_PER_US: u64 = 25;
 
-/// The board as the flight software sees it.
+/// The board for the flight software.
 #[derive(Debug)]
 pub struct Mps2 {
     timer: Timer,
@@ -17,17 +17,17 @@ pub struct Mps2 {
     watchdog: Watchdog,
     camera: Option<File>,
     frames: [&'static mut [u8]; board::FRAMES],
-    /// The buffer that is processed; the camera has the other.
+    /// Index of the buffer that is processed. The camera has the other one.
     held: usize,
     held_bytes: usize,
     ticks: u32,
     wraps: u64,
-    /// Bytes that may still be written to flash before power is cut.
+    /// Bytes that can still be written to flash before power is cut.
     power: Option<u32>,
 }
 
 impl Mps2 {
-    /// Takes the board; `None` the second time.
+    /// Takes the board. Returns `None` the second time.
     pub fn take() -> Option<Self> {
         let board = board::Board::take()?;
         let mut word = [0; 4];
@@ -49,7 +49,7 @@ impl Mps2 {
 
 impl Board for Mps2 {
     fn now_us(&mut self) -> u64 {
-        // The timer wraps after 171 s; the loop asks far more often.
+        // The timer wraps after 171 s; the loop reads it far more often.
         let now = self.timer.ticks();
         self.wraps += u64::from(now < self.ticks);
         self.ticks = now;
@@ -64,7 +64,7 @@ impl Board for Mps2 {
         }
     }
     fn lift_off(&mut self) -> bool {
-        // These boards have no such line: flight begins by command.
+        // These boards have no lift-off line: flight begins by command.
         false
     }
     fn power_fails(&mut self) -> bool {
@@ -88,7 +88,7 @@ impl Board for Mps2 {
         let word = |i: usize| header.get(4 * i..).and_then(|h| h.first_chunk()).map_or(0, |w| u32::from_le_bytes(*w));
         let (magic, bytes, lost) = (word(0), word(1) as usize, word(2));
         if magic == u32::from_le_bytes(*b"HANG") {
-            // A wait that never ends: only the watchdog can end it.
+            // This wait never ends: only the watchdog can end it.
             loop {
                 core::hint::spin_loop();
             }
@@ -96,7 +96,7 @@ impl Board for Mps2 {
         if magic != u32::from_le_bytes(*b"FRAM") || bytes > FRAME_BYTES {
             return None;
         }
-        // The camera fills the buffer that is not being processed; then they change places.
+        // The camera fills the buffer that is not processed; then both buffers change roles.
         let next = (self.held + 1) % board::FRAMES;
         if !camera.read(self.frames.get_mut(next)?.get_mut(..bytes)?) {
             return None;
@@ -108,16 +108,16 @@ impl Board for Mps2 {
         self.frames.get(self.held).and_then(|f| f.get(..self.held_bytes)).unwrap_or_default()
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
-        // Erased flash.
+        // Erased flash reads as 0xFF.
         into.fill(0xFF);
         if let Some(mut file) = File::open(if copy == 1 { c"copy1.bin" } else { c"copy2.bin" }) {
-            // Shorter than the buffer: what there is.
+            // A file that is shorter than the buffer fills only its beginning.
             let _ = file.read(into);
         }
     }
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
         let Some(mut file) = File::create(if copy == 1 { c"copy1.bin" } else { c"copy2.bin" }) else { return false };
-        // A flash is written in small pieces, between any two of which power can be cut.
+        // A flash is written in small pieces, and power can be cut between any two of them.
         for piece in bytes.chunks(8) {
             if let Some(left) = &mut self.power {
                 match left.checked_sub(piece.len() as u32) {

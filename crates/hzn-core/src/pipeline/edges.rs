@@ -1,5 +1,5 @@
-//! The stages one at a time, with the parts between them in the open: for comparing methods on simulated points, and
-//! for trying a step of one's own in place of one of these (the Python package's `hzn.consensus` and its neighbours).
+//! The single stages, with access to the data between them. They serve to compare methods on simulated points, and to
+//! replace one stage by another implementation (`hzn.consensus` and the modules next to it in the Python package).
 //! Feature `_edges`.
 //!
 //! ```text
@@ -38,41 +38,41 @@ pub struct Edges<T> {
     pub(crate) blocks: Vec<Block<T>>,
     points: Vec<(ImagePoint<T>, Lit)>,
     focal_px: T,
-    /// The part of the points whose lit side is clipped, where they were picked from a picture.
+    /// Fraction of the points whose lit side is clipped; 0 unless the points were picked from a picture.
     clipped: T,
 }
 
-/// What a method of rejection finds.
+/// The consensus: the cone that a method of rejection finds.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreed<T> {
-    /// Axis of the cone, towards the body.
+    /// Axis of the cone, towards the body, in the camera frame.
     pub axis: UnitVec3<Cam, T>,
-    /// cos of its half-angle.
+    /// cos of the half-angle.
     pub cos_half_angle: T,
-    /// Draws made.
+    /// Number of draws.
     pub draws: u32,
-    /// No point is to be left out.
+    /// Whether no point was rejected, because the method leaves outliers to the weights of the fit.
     pub all: bool,
 }
 
-/// A cone that was fitted, with its normal equations.
+/// A fitted cone with its normal equations.
 #[derive(Debug, Clone, Copy)]
 pub struct Fitted<T>(fit::Fit<T>);
 
 impl<T: Real> Fitted<T> {
-    /// Axis of the cone, towards the body.
+    /// Returns the axis of the cone, towards the body, in the camera frame.
     pub fn axis(&self) -> UnitVec3<Cam, T> {
         UnitVec3::assume_unit(self.0.e)
     }
-    /// cos of its half-angle.
+    /// Returns the cos of the half-angle.
     pub fn cos_half_angle(&self) -> T {
         self.0.c
     }
-    /// Weighted RMS distance of the points from the limb, pixels.
+    /// Returns the weighted RMS distance of the points from the limb, in pixels.
     pub fn rms_px(&self) -> T {
         self.0.rms_px
     }
-    /// Points with a weight.
+    /// Returns the number of points with a weight above 0.
     pub fn inliers(&self) -> u32 {
         self.0.inliers
     }
@@ -81,19 +81,19 @@ impl<T: Real> Fitted<T> {
 /// The answer: a fit with the expected half-angle fused.
 #[derive(Debug, Clone, Copy)]
 pub struct Fused<T> {
-    /// Axis, towards the body.
+    /// Axis, towards the body, in the camera frame.
     pub axis: UnitVec3<Cam, T>,
-    /// Its covariance, rad².
+    /// Covariance of the axis, rad².
     pub covariance: Cov3<Cam, T>,
     /// cos of the half-angle.
     pub cos_half_angle: T,
 }
 
 impl<T: Real> Sensor<T> {
-    /// The level between dark and lit, of the body's own method.
+    /// Finds the threshold between dark and lit, by the method that is configured for the body.
     ///
     /// # Errors
-    /// `too-dark`, `too-bright`, or `no-limb` when there are no two sides.
+    /// Returns `too-dark`, `too-bright`, or `no-limb` when dark and lit pixels cannot be separated.
     pub fn level<P: Pixels>(&self, picture: &P, expected: &Expected<T>) -> Result<Level<T>, Status> {
         let config = self.config();
         let levels = config.levels_of(expected.which);
@@ -101,8 +101,8 @@ impl<T: Real> Sensor<T> {
         threshold::split(picture, self.region(), &config.gate, levels, expected.level, seed, &Unobserved)
     }
 
-    /// Border pixels of every edge of a picture at a level, in order along each; the edges in the order in which the
-    /// pipeline looks at them. It stops at none, whatever `[limits]` say.
+    /// Returns the border pixels of every edge of a picture at a threshold, in order along each edge. The edges are in
+    /// the order in which the pipeline examines them. `[limits]` does not apply: all edges are returned.
     pub fn borders<P: Pixels>(&self, picture: &P, level: u16, expected: &Expected<T>) -> Vec<Vec<Pixel>> {
         let (mut border, mut marks) = (vec![Pixel { x: 0, y: 0 }; HOST_POINTS], vec![0; HOST_WORDS]);
         let lists = Lists { border: &mut border, blocks: &mut [], marks: &mut marks };
@@ -113,7 +113,7 @@ impl<T: Real> Sensor<T> {
     }
 }
 
-/// Collects the edges and lets none go on.
+/// Collects the edges and skips the later stages, so that the search reaches every edge.
 #[derive(Default)]
 struct Borders(RefCell<Vec<Vec<Pixel>>>);
 
@@ -127,7 +127,8 @@ impl<T> Observer<T> for Borders {
 }
 
 impl<T: Real> Edges<T> {
-    /// Points as the candidates stage leaves them, in the order of the list; on each the light is on the side of `lit`.
+    /// Makes edge points in the order of the list, as the stage `candidates` does. The lit side of each point is the
+    /// side of the direction `lit`.
     pub fn new(camera: &Camera<T>, points: &[ImagePoint<T>], lit: &UnitVec3<Cam, T>) -> Self {
         let side = |p: &ImagePoint<T>| {
             camera.ray(*p).map_or(Lit::Below, |ray| {
@@ -140,12 +141,12 @@ impl<T: Real> Edges<T> {
         Self::from_points(camera, points.iter().map(|p| (*p, side(p))).collect())
     }
 
-    /// As [`Self::new`], with the direction of the light in the picture, (u, v), for each point.
+    /// Same as [`Self::new`], with the direction towards the light in the picture, (u, v), for each point.
     pub fn towards(camera: &Camera<T>, points: &[(ImagePoint<T>, [T; 2])]) -> Self {
         Self::from_points(camera, points.iter().map(|(p, lit)| (*p, Lit::towards(*lit))).collect())
     }
 
-    /// The points that the candidates stage makes of a border.
+    /// Locates the edge points of a border, as the stage `candidates` does.
     pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
         let binary =
             BinaryPicture::new(picture, sensor.region(), level, &Unobserved).blooming(sensor.config().body.blooms());
@@ -166,19 +167,20 @@ impl<T: Real> Edges<T> {
         Self { blocks, points, focal_px: (fx + fy) * T::from_f64(0.5), clipped: T::ZERO }
     }
 
-    /// The points in the picture, and on which side of each the light is: a step along u or v.
+    /// Returns the points in the picture, and the lit side of each as a step of ±1 along u or v.
     pub fn points(&self) -> impl ExactSizeIterator<Item = (ImagePoint<T>, [i8; 2])> {
         self.points.iter().map(|(p, lit)| (*p, lit.step()))
     }
-    /// Their unit rays.
+    /// Returns the unit ray of each point, in the camera frame.
     pub fn rays(&self) -> impl Iterator<Item = [T; 3]> {
         (0..self.points.len()).map(|i| self.blocks[i / LANES].ray(i % LANES).into())
     }
-    /// Their weights: 0 for a point that may not count, after the fit the one that it had.
+    /// Returns the weight of each point: 0 for a point that does not count; after the fit, the weight in the fit.
     pub fn weights(&self) -> impl Iterator<Item = T> {
         (0..self.points.len()).map(|i| self.blocks[i / LANES].weight[i % LANES])
     }
-    /// Sets the weights of the first points, from 0 to 1. A point that the lens does not see stays at 0.
+    /// Sets the weights of the first points, from 0 to 1. The weight of a point outside the lens's field of view stays
+    /// 0.
     pub fn set_weights(&mut self, weights: &[T]) {
         for (i, &weight) in weights.iter().enumerate().take(self.points.len()) {
             let block = &mut self.blocks[i / LANES];
@@ -186,25 +188,25 @@ impl<T: Real> Edges<T> {
             block.weight[i % LANES] = if seen { weight } else { T::ZERO };
         }
     }
-    /// Points that were not rejected.
+    /// Returns the number of points that were not rejected.
     pub fn inliers(&self) -> u32 {
         self.weights().filter(|w| *w > T::ZERO).count() as u32
     }
 
-    /// Takes out the points on the limb of another body, which was found before; how many there were. The pipeline
-    /// tries an edge no further that has more than half of its points there.
+    /// Removes the points on the limb of another body that was found before, and returns their number. The pipeline
+    /// drops an edge if more than half of its points are removed.
     pub fn withdraw(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T, config: &consensus::Config) -> u32 {
         let taken = FoundLimb { e: *axis.v(), c: cos_half_angle };
         taken.withdraw(&mut self.blocks, T::from_f64(config.threshold_px))
     }
 
-    /// The distance from the limb up to which a point can be an inlier: by the noise from point to point, whatever the
-    /// weights are.
+    /// Returns the largest distance of an inlier from the limb. The distance comes from the noise between neighbouring
+    /// points and does not depend on the weights.
     fn threshold(&self, expected: &Expected<T>, config: &consensus::Config) -> consensus::Threshold<T> {
         consensus::Threshold::new(&self.blocks, self.points.len() as u32, expected, self.focal_px, config)
     }
 
-    /// Rejects outliers.
+    /// Rejects outliers and returns the consensus; `None` if there is none.
     pub fn reject(&mut self, expected: &Expected<T>, config: &consensus::Config) -> Option<Agreed<T>> {
         let (count, mut work) = (self.points.len() as u32, WorkBudget::unlimited());
         let expected = &expected.clipped(self.clipped);
@@ -214,7 +216,7 @@ impl<T: Real> Edges<T> {
         Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
     }
 
-    /// Fits the cone, from what a method of rejection has found. Leaves in each point the weight that it had.
+    /// Fits the cone, beginning at the consensus. Stores in each point its weight in the fit.
     pub fn fit(&mut self, sensor: &Sensor<T>, start: &Agreed<T>, expected: &Expected<T>) -> Option<Fitted<T>> {
         let config = sensor.config();
         let expected = &expected.clipped(self.clipped);
@@ -225,12 +227,13 @@ impl<T: Real> Edges<T> {
         fit::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise).map(Fitted)
     }
 
-    /// The cone that somebody else has fitted, with the normal equations of the points at it, by their weights.
+    /// Makes a fit of a cone that was fitted elsewhere: computes the normal equations of the weighted points at this
+    /// cone.
     pub fn given(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T) -> Option<Fitted<T>> {
         fit::given(&mut self.blocks, *axis.v(), cos_half_angle).map(Fitted)
     }
 
-    /// The covariance of a fit, and the expected half-angle fused with it.
+    /// Computes the covariance of a fit and fuses the fit with the expected half-angle.
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
         let noise = sensor.config.noise_of(expected.which);
         let expected = &expected.clipped(self.clipped);

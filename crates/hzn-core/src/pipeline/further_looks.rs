@@ -1,9 +1,9 @@
-//! A second look before a refusal: other levels, and the picture without a dark frame around it.
+//! Further looks before a picture is refused: at other thresholds, and without a dark frame around the picture.
 //!
-//! Otsu's level follows what is brightest. Of a disc half lit, with clouds, most of the limb may lie below it; of a
-//! limb under a glare all of it. So a picture without an answer is looked at again, a few times, each at another level
-//! and all on the account of one picture. Each look is another chance for a false answer, too: the gates are the same
-//! for all of them, and there are few.
+//! Otsu's threshold follows the brightest parts of a picture. Most of the limb of a half-lit disc with clouds may lie
+//! below it, and all of a limb under a glare. A picture without an answer is therefore examined again a few times, each
+//! time at another threshold. All looks draw on the one work budget of the picture. Each look is also another chance
+//! for a false answer: all looks have the same gates, and there are few of them.
 
 use super::account;
 use super::found_limb::FoundLimb;
@@ -19,15 +19,17 @@ use crate::model::work;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold::{self, Level};
 
-/// A look without an answer, after which another may have one.
+/// Returns whether the look gave no answer and a further look may give one.
 fn goes_on(status: Status) -> bool {
     matches!(status, Status::NoLimb | Status::TooFewPoints | Status::Rejected)
 }
 
 impl<T: Real> Sensor<T> {
-    /// Everything after the first level: the looks, one after the other, until there is an answer or nothing is left to
-    /// try. Without an answer the level is that of the first look, and the status, too, unless a later one came
-    /// further.
+    /// Runs everything after the first threshold: the looks, one after the other, until there is an answer or nothing
+    /// is left to try.
+    ///
+    /// Without an answer, the report has the threshold of the first look. Its status is `rejected` if one of the looks
+    /// was rejected, otherwise that of the last look with `no-limb` or `too-few-points`.
     pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(
         &self,
         mut lists: Lists<'_, T>,
@@ -39,7 +41,7 @@ impl<T: Real> Sensor<T> {
         report: &mut Report<T>,
     ) {
         let config = &self.config;
-        // A level that is told to be fixed is kept.
+        // A `fixed` threshold is kept: there are no other thresholds.
         let fixed = config.levels_of(expected.which).method == threshold::Method::Fixed;
         let mut others = if fixed { [].iter() } else { config.recover.levels.iter() };
         let mut work = account::open(config, lists.border.len());

@@ -1,5 +1,5 @@
-//! Reference data from independent sources (`tests/golden/`, origin in its README) and Monte Carlo on edge points.
-//! Here, because the stages between an edge point and an answer are not public.
+//! Compares with reference data from independent sources (`tests/golden/`, origin in the README there) and with Monte
+//! Carlo runs on edge points. The tests are here because the stages between an edge point and an answer are not public.
 
 #[cfg(feature = "dlr")]
 mod dlr;
@@ -55,18 +55,18 @@ fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
     UnitVec3::try_new(v.map(T::from_f64)).unwrap()
 }
 
-/// Edge points as the candidates stage leaves them; the lit side is where the axis `e` lies.
+/// Makes edge points as the stage `candidates` does. The lit side is the side of the axis `e`.
 fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
     let points: Vec<_> = points.iter().map(|&(u, v)| ImagePoint { u: T::from_f64(u), v: T::from_f64(v) }).collect();
     Edges::new(camera, &points, e).blocks
 }
 
-/// `kb_lens.json`: OpenCV 5.0 fisheye and mpmath.
+/// Compares with `kb_lens.json`, which comes from OpenCV 5.0 fisheye and mpmath.
 fn lens<T: Real>(tolerance_rad: f64, tolerance_px: f64) {
     for case in load(include_str!("../../tests/golden/kb_lens.json")) {
         let k: Vec<f64> = case["k"].as_array().unwrap().iter().map(num).collect();
         let limit = case["monotonic_limit_deg"].as_f64();
-        // As far as the case goes and the lens allows.
+        // The cases end at 112°. A lens with a monotone limit is compared up to 2° before this limit.
         let theta_max = limit.map_or(112.0, |l| (l - 2.0).min(112.0));
         let config = CameraConfig {
             fx_px: num(&case["fx"]),
@@ -114,17 +114,17 @@ fn lens<T: Real>(tolerance_rad: f64, tolerance_px: f64) {
 
 #[test]
 fn kannala_brandt_equals_opencv() {
-    // 1e-10 rad: the pixels are printed to about 1e-13 of their value.
+    // The tolerance is 1e-10 rad because the pixels are printed to about 1e-13 of their value.
     lens::<f64>(1e-10, 1e-9);
     lens::<f32>(2e-6, 2e-3);
 }
 
-/// `limb_ellipsoid.json`: SPICE.
+/// Compares with `limb_ellipsoid.json`, which comes from SPICE.
 fn limb_cone<T: Real>(tolerance_deg: f64) {
     for case in load(include_str!("../../tests/golden/limb_ellipsoid.json")) {
         let d = num(&case["atmosphere_d_m"]);
         let (mut a, mut b) = (num(&case["a_m"]), num(&case["b_m"]));
-        // a_m and b_m include the atmosphere.
+        // The semi-axes must include the atmosphere; it is added if the case has them without it.
         if a < crate::geometry::ellipsoid::WGS84_A_M + d - 1.0 {
             (a, b) = (a + d, b + d);
         }
@@ -146,7 +146,7 @@ fn limb_cone<T: Real>(tolerance_deg: f64) {
 #[test]
 fn limb_axis_equals_spice() {
     limb_cone::<f64>(1e-10);
-    // Half a metre of rounding in the position at low altitude: 3e-4° in the half-angle.
+    // At low altitude the position is rounded by half a metre, which changes the half-angle by 3e-4°.
     limb_cone::<f32>(1e-3);
 }
 
@@ -185,7 +185,7 @@ fn azimuth_correction_removes_the_ellipsoid_bias() {
                 frame.cam_to_ecef = None;
             }
             let expected = Expected::new(&body, &frame).unwrap();
-            // Half of the limb: a full circle would cancel the correction.
+            // Only half of the limb is used: over a full circle the correction would cancel.
             let half = &points[..points.len() / 2];
             let answer = solve(&camera, half, &axis, &expected, HalfAngle::Known, 1.0, 0.0).unwrap();
             *worst = worst.max(answer.axis.angle_rad(&axis).to_degrees());
@@ -195,7 +195,7 @@ fn azimuth_correction_removes_the_ellipsoid_bias() {
     assert!(worst.1 > 10.0 * worst.0, "without it the bias must show: {worst:?}");
 }
 
-/// Quaternion (scalar first) of a rotation matrix whose rows map camera to ECEF.
+/// Returns the quaternion (scalar first) of a rotation matrix whose rows map camera to ECEF.
 fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
     let m = nalgebra::Matrix3::from_fn(|i, j| r[i][j]);
     let q = nalgebra::UnitQuaternion::from_matrix(&m);
@@ -259,7 +259,7 @@ fn single<T: Real>(frame: &Prior<f64>) -> Prior<T> {
     Prior { altitude_m: frame.altitude_m.map(T::from_f64), ..Prior::default() }
 }
 
-/// `nadir_cases.json`: scipy maximum-likelihood fits.
+/// Compares with `nadir_cases.json`, which has maximum-likelihood fits by scipy.
 fn nadir<T: Real>(noise_free_deg: f64) {
     let (mut noisy, mut clean) = (0, 0);
     for case in load(include_str!("../../tests/golden/nadir_cases.json")) {
@@ -280,7 +280,7 @@ fn nadir<T: Real>(noise_free_deg: f64) {
         let reference = &case["reference"];
         for (which, key) in [(HalfAngle::Known, "known_alpha_nadir_c"), (HalfAngle::Free, "free_alpha_nadir_c")] {
             let want = direction::<T>(triple(&reference[key]));
-            // The reference weighs all inliers alike: so does the fit without robust weights.
+            // The reference gives all inliers the same weight, as does the fit without robust weights.
             let got = plain(&camera, &inliers, &truth, &expected, which);
             let off = got.angle_rad(&want).to_f64().to_degrees();
             let limit = if sigma == 0.0 {
@@ -296,7 +296,7 @@ fn nadir<T: Real>(noise_free_deg: f64) {
             };
             assert!(off < limit.max(noise_free_deg), "{} {key}: {off:e} > {limit:e}", case["id"]);
         }
-        // And with the outliers in, the whole chain stays within the noise.
+        // With the outliers included, the error of the whole chain stays within the noise.
         if outlier.iter().any(|o| *o) {
             let answer = solve(&camera, &points, &truth, &expected, HalfAngle::Known, sigma.max(0.1), 0.0).unwrap();
             let off = answer.axis.angle_rad(&truth).to_f64().to_degrees();
@@ -308,7 +308,7 @@ fn nadir<T: Real>(noise_free_deg: f64) {
     assert!(noisy >= 5 && clean >= 4, "{noisy} {clean}");
 }
 
-/// Fit of all points with equal weights from a start two degrees off.
+/// Fits all points with equal weights, from a start that is two degrees off.
 fn plain<T: Real>(
     camera: &Camera<T>,
     points: &[(f64, f64)],
@@ -325,7 +325,7 @@ fn plain<T: Real>(
         all: false,
     };
     let estimate = fit::Config { half_angle: which, ..Default::default() };
-    // A threshold so wide that Tukey's weights are one.
+    // With this wide threshold all of Tukey's weights are one.
     let fit =
         fit::fit(&mut blocks, &start, expected, camera, T::from_f64(1e5), &estimate, &covariance::Config::default())
             .unwrap();
@@ -338,7 +338,8 @@ fn fits_equal_scipy() {
     nadir::<f32>(1e-5);
 }
 
-/// `covariance.json`: dense matrices. `tangent` is evaluated at the true nadir with the rays themselves.
+/// Compares with `covariance.json`, which comes from dense matrices. `tangent` is evaluated at the true nadir with the
+/// rays themselves.
 fn sandwich<T: Real>(tolerance: f64) {
     for case in load(include_str!("../../tests/golden/covariance.json")) {
         let camera = Camera::<T>::try_new(&camera_config(&case["camera"])).unwrap();
@@ -382,8 +383,8 @@ fn covariance_equals_the_dense_product() {
     sandwich::<f32>(1e-4);
 }
 
-/// P = N⁻¹ (Hᵀ W G R Gᵀ W H) N⁻¹ by whole matrices, R the correlation of every pair of points: (δ₁, δ₂, δc), and δ₁₂
-/// with c held.
+/// Computes P = N⁻¹ (Hᵀ W G R Gᵀ W H) N⁻¹ with whole matrices, where R is the correlation of every pair of points.
+/// Returns P of (δ₁, δ₂, δc), and P of δ₁₂ with c fixed.
 fn dense<T: Real>(
     blocks: &[Block<T>],
     count: usize,
@@ -400,7 +401,7 @@ fn dense<T: Real>(
             along
         })
         .collect();
-    // Rows w h of both parts of every point's error, (u, v).
+    // Rows w h for both components, (u, v), of the error of every point.
     let mut wh = [DMatrix::<f64>::zeros(count, 3), DMatrix::<f64>::zeros(count, 3)];
     let mut n = Matrix3::<f64>::zeros();
     for i in 0..count {
@@ -422,11 +423,11 @@ fn dense<T: Real>(
     (inverse * x * inverse, known * x.fixed_view::<2, 2>(0, 0) * known)
 }
 
-/// The recursion over an edge as long as those of real pictures, against the dense product of the same numbers.
+/// Compares the recursion with the dense product of the same numbers, on an edge as long as in real pictures.
 fn recursion<T: Real>(tolerance: f64) {
     let (camera, e) = rocket_camera();
     let c = 0.157;
-    // Steps of one pixel and more, as a thinned border has them.
+    // The steps are one pixel and more, as on a thinned border.
     let mut rng = crate::base::rng::Rng::new(11);
     let points: Vec<_> = limb(&camera, &e, c, 1.0).into_iter().filter(|_| rng.below(3) > 0).collect();
     let camera =
@@ -464,7 +465,7 @@ fn the_recursion_equals_the_dense_product() {
     recursion::<f32>(1e-4);
 }
 
-/// Gaussian numbers for the Monte Carlo, by the sum of twelve.
+/// Approximately normal random numbers for the Monte Carlo runs: sums of twelve uniform ones.
 struct Gauss(crate::base::rng::Rng);
 impl Gauss {
     fn next(&mut self) -> f64 {
@@ -472,7 +473,7 @@ impl Gauss {
     }
 }
 
-/// Points of the limb in view, one per `step_px` along it, in order.
+/// Returns points of the limb in view, in order, one per `step_px` along it.
 fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> Vec<(f64, f64)> {
     let (b1, b2) = basis(e.v());
     let s = libm::sqrt(1.0 - c * c);
@@ -482,7 +483,7 @@ fn limb(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, c: f64, step_px: f64) -> V
     })
 }
 
-/// Those of the rays of all azimuths that are in view, one per `step_px` along them, in order.
+/// Returns the points in view of a curve that has a ray for each azimuth, in order, one per `step_px` along it.
 fn in_view(camera: &Camera<f64>, step_px: f64, ray: impl Fn(f64) -> UnitVec3<Cam, f64>) -> Vec<(f64, f64)> {
     let inside = |p: &ImagePoint<f64>| {
         p.u >= 0.0 && p.v >= 0.0 && p.u <= f64::from(camera.width()) - 1.0 && p.v <= f64::from(camera.height()) - 1.0
@@ -496,7 +497,7 @@ fn in_view(camera: &Camera<f64>, step_px: f64, ray: impl Fn(f64) -> UnitVec3<Cam
             points.push((p.u, p.v));
         }
     }
-    // Start after the longest gap, so that the list runs along the limb once.
+    // The list starts after the longest gap, so that it follows the limb once.
     let gap = (0..points.len())
         .max_by(|&i, &j| {
             let d = |i: usize| {
@@ -513,12 +514,12 @@ fn in_view(camera: &Camera<f64>, step_px: f64, ray: impl Fn(f64) -> UnitVec3<Cam
 
 struct Statistics {
     rms_deg: f64,
-    /// The same as the covariances tell it.
+    /// RMS error in degrees that the covariances predict.
     told_deg: f64,
     nees: f64,
 }
 
-/// Errors of many fits.
+/// Sums of the errors of many fits.
 #[derive(Default)]
 struct Errors {
     runs: u32,
@@ -548,7 +549,7 @@ impl Errors {
     }
 }
 
-/// Errors of `runs` fits with Gauss-Markov (or white, `length_px` = 0) pixel errors.
+/// Returns the errors of `runs` fits to points with Gauss-Markov pixel errors (white if `length_px` = 0).
 fn monte_carlo(
     camera: &Camera<f64>,
     e: &UnitVec3<Cam, f64>,
@@ -565,7 +566,7 @@ fn monte_carlo(
     let mut gauss = Gauss(crate::base::rng::Rng::new(7));
     let mut errors = Errors::default();
     for _ in 0..runs {
-        // The limb height is what the prior says, give or take its sigma.
+        // The limb height differs from the prior by a random error with the sigma of the prior.
         let d = gauss.next() * limb_sigma_km * 1e3;
         let sin = (radius + d) / (radius + altitude_m);
         let exact = limb(camera, e, libm::sqrt(1.0 - sin * sin), if length_px > 0.0 { 1.0 } else { 3.0 });
@@ -583,14 +584,14 @@ fn monte_carlo(
     errors.statistics()
 }
 
-/// 1920×1080, 94.4° horizontal, 20° below the horizontal: the camera of math §5.1.
+/// Returns the camera of math §5.1 and nadir: 1920×1080, 94.4° horizontal field of view, 20° below the horizontal.
 fn rocket_camera() -> (Camera<f64>, UnitVec3<Cam, f64>) {
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
     let tilt = 20f64.to_radians();
     (camera, direction([0.0, libm::cos(tilt), libm::sin(tilt)]))
 }
 
-/// The bound for a known half-angle and white errors: σ² (Σ w Bᵀs (Bᵀs)ᵀ)⁻¹.
+/// Returns the bound for a known half-angle and white errors: σ² (Σ w Bᵀs (Bᵀs)ᵀ)⁻¹, as an angle in degrees.
 fn bound_deg(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, altitude_m: f64, sigma_px: f64) -> f64 {
     let sin = 6_371_008.8 / (6_371_008.8 + altitude_m);
     let c = libm::sqrt(1.0 - sin * sin);
@@ -607,7 +608,7 @@ fn white_errors_reach_the_bound() {
     for (altitude, sigma) in [(60e3, 0.1), (60e3, 1.0), (240e3, 0.5)] {
         let got = monte_carlo(&camera, &e, altitude, 0.0, sigma, 0.0, HalfAngle::Known, 1000);
         let bound = bound_deg(&camera, &e, altitude, sigma);
-        // Tukey's weights cost 2.6 %, and 1000 runs of two degrees of freedom spread by 2 %.
+        // Tukey's weights cost 2.6 %, and the result of 1000 runs with two degrees of freedom scatters by 2 %.
         assert!(got.rms_deg / bound < 1.1, "{altitude} {sigma}: {} of the bound", got.rms_deg / bound);
         assert!((1.6..2.5).contains(&got.nees), "{altitude} {sigma}: NEES {}", got.nees);
     }
@@ -621,9 +622,9 @@ fn correlated_errors_are_told_honestly() {
         let got = monte_carlo(&camera, &e, altitude, limb_sigma, 1.0, 300.0, HalfAngle::Fused, runs);
         assert!((1.6..2.5).contains(&got.nees), "{altitude} {limb_sigma}: NEES {} RMS {}", got.nees, got.rms_deg);
         if limb_sigma <= 0.5 {
-            // Against 0.16 to 0.21° of the estimators that leave the half-angle free. At 80 km half a kilometre of limb
-            // height is 0.03° of the half-angle, which no estimator sees, on top of 0.055°: 3200 runs give 0.0648°, and
-            // what few runs are off by, 1/√(2n) of it, is allowed.
+            // Estimators that leave the half-angle free reach 0.16 to 0.21°. At 80 km, half a kilometre of limb height
+            // is 0.03° of the half-angle. No estimator sees this error, which adds to 0.055°: 3200 runs give 0.0648°.
+            // The scatter of few runs, 1/√(2n) of the value, is allowed.
             let statistical = 1.0 + 1.0 / libm::sqrt(2.0 * f64::from(runs));
             let limit = if altitude < 100e3 { 0.065 * statistical } else { 0.065 };
             assert!(got.rms_deg < limit, "{altitude} {limb_sigma}: {}", got.rms_deg);
@@ -632,8 +633,8 @@ fn correlated_errors_are_told_honestly() {
     }
 }
 
-/// Errors with a panoramic lens of 92 px/rad at 600 km above the ellipsoid: white errors of 0.2 px, the attitude about
-/// the axis known to 5°, places and attitudes all around.
+/// Returns the errors with a panoramic lens of 92 px/rad at 600 km above the ellipsoid. The errors of points are white
+/// with 0.2 px, and the attitude about the axis is known to 5°. Positions and attitudes cover all directions.
 fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
     use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic};
     use core::f64::consts::{PI, TAU};
@@ -655,7 +656,8 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         let latitude = libm::asin(2.0 * even() - 1.0);
         let position = from_geodetic(latitude, TAU * even(), 600e3, WGS84_A_M, WGS84_B_M);
         let truth = LimbCone::<f64>::try_new(position, WGS84_A_M, WGS84_B_M).unwrap().axis;
-        // Camera axes in ECEF: z so far off the limb axis, in any direction and with any roll.
+        // Camera axes in ECEF: z is `off_nadir_deg` away from the limb axis, in a random direction and with a random
+        // roll.
         let (b1, b2) = basis(truth.v());
         let (turn, roll) = (TAU * even(), TAU * even());
         let side = b1 * libm::cos(turn) + b2 * libm::sin(turn);
@@ -664,7 +666,7 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         let x = c1 * libm::cos(roll) + c2 * libm::sin(roll);
         let y = z.cross(&x);
         let to_camera = |v: V3<f64>| direction::<f64>([v.dot(&x), v.dot(&y), v.dot(&z)]);
-        // Where rays touch the ellipsoid: a circle, once the axes are scaled to one.
+        // The rays touch the ellipsoid on a curve that is a circle when the axes are scaled to one.
         let scaled = V3::new(position[0] / WGS84_A_M, position[1] / WGS84_A_M, position[2] / WGS84_B_M);
         let k2 = scaled.norm_squared();
         let (t1, t2) = basis(&unit(&scaled).unwrap());
@@ -675,7 +677,7 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         });
         let points: Vec<_> =
             points.iter().map(|(u, v)| (u + SIGMA_PX * gauss.next(), v + SIGMA_PX * gauss.next())).collect();
-        // The attitude that is known is turned about the limb axis.
+        // The known attitude has an error: a rotation about the limb axis.
         let turned = nalgebra::Rotation3::from_axis_angle(
             &nalgebra::Unit::new_normalize(nalgebra::Vector3::from(truth.xyz())),
             YAW_SIGMA_RAD * gauss.next(),
@@ -707,7 +709,7 @@ fn a_panoramic_lens_in_low_orbit() {
     }
 }
 
-/// 80 % of the points anywhere in the picture: two-point draws find the limb.
+/// With 80 % of the points anywhere in the picture, two-point draws find the limb.
 #[test]
 fn eighty_percent_outliers() {
     let (camera, e) = rocket_camera();
@@ -740,7 +742,7 @@ fn eighty_percent_outliers() {
 
 #[test]
 fn workspaces_fit_their_budgets() {
-    // 96 KiB beside the frame, with room for the stack.
+    // The flight computer has 96 KiB next to the picture, which must also hold the stack.
     assert!(size_of::<crate::pipeline::FlightHorizon>() < 92 * 1024, "{}", size_of::<crate::pipeline::FlightHorizon>());
     assert!(size_of::<crate::pipeline::HostHorizon>() < 1536 * 1024, "{}", size_of::<crate::pipeline::HostHorizon>());
 }

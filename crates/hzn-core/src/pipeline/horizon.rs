@@ -1,4 +1,4 @@
-//! The sensor with its lists: what most programs hold.
+//! The sensor together with its lists: the type that most programs use.
 
 use super::sensor::Sensor;
 use super::workspace::{HOST_POINTS, HOST_WORDS, Workspace};
@@ -13,9 +13,9 @@ use crate::model::observer::{Observer, Unobserved};
 use crate::model::report::MAX_BODIES;
 use crate::model::report::{Report, Reports};
 
-/// The sensor of a workstation: f64, 16384 points.
+/// The sensor of a workstation: f64, at most 16384 border pixels of an edge.
 pub type HostHorizon = Horizon<f64, HOST_POINTS, 2048, HOST_WORDS>;
-/// The sensor of a flight computer: f32, 2048 points.
+/// The sensor of a flight computer: f32, at most 2048 border pixels of an edge.
 pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 
 /// A horizon sensor: a [`Sensor`] with its [`Workspace`].
@@ -25,77 +25,78 @@ pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 pub struct Horizon<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
     sensor: Sensor<T>,
     workspace: Workspace<T, POINTS, BLOCKS, WORDS>,
-    /// Levels that the last picture asks for, by body.
+    /// Thresholds for the next picture in counts, one for each body.
     levels: [Option<u16>; MAX_BODIES],
 }
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Horizon<T, POINTS, BLOCKS, WORDS> {
-    /// Checks everything that can be refused.
+    /// Makes a sensor. Checks the whole configuration first.
     ///
     /// # Errors
-    /// The first field out of its limits.
+    /// Returns the first field that is out of its limits.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         Ok(Self { sensor: Sensor::new(config)?, workspace: Workspace::new(), levels: [None; MAX_BODIES] })
     }
-    /// As [`Self::new`], in a box, without the sensor ever standing on the caller's stack: the host's is larger than
-    /// what a thread has left at times.
+    /// Same as [`Self::new`], in a box. Another thread builds the sensor, so that it does not pass over the caller's
+    /// stack: the sensor of a workstation can be larger than the stack that a thread has left.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// Same as [`Self::new`].
     #[cfg(feature = "std")]
     pub fn boxed(config: &Config) -> Result<std::boxed::Box<Self>, ConfigError> {
         const STACK_BYTES: usize = 16 << 20;
-        // Called through a pointer that the compiler cannot see through, so that its frame does not become this one's.
+        // The call goes through a pointer that the compiler cannot see through, so that the stack frame of `new` does
+        // not become a part of this one.
         let build: fn(&Config) -> Result<std::boxed::Box<Self>, ConfigError> =
             core::hint::black_box(|config: &Config| Self::new(config).map(std::boxed::Box::new));
         std::thread::scope(|scope| {
             let builder = std::thread::Builder::new().stack_size(STACK_BYTES);
-            // Without another thread, on this one.
+            // If no thread can be started, the sensor is built on this one.
             builder.spawn_scoped(scope, move || build(config)).ok().and_then(|thread| thread.join().ok())
         })
         .unwrap_or_else(|| build(config))
     }
-    /// Takes another configuration, from the next picture on. Refused, everything stays as it was.
+    /// Replaces the configuration, from the next picture on. If it is refused, nothing changes.
     ///
     /// # Errors
-    /// The first field out of its limits.
+    /// Returns the first field that is out of its limits.
     pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
         self.sensor = Sensor::new(config)?;
         self.levels = [None; MAX_BODIES];
         Ok(())
     }
-    /// The configuration.
+    /// Returns the configuration.
     pub fn config(&self) -> &Config {
         self.sensor.config()
     }
-    /// The lens.
+    /// Returns the camera with its lens.
     pub fn camera(&self) -> &Camera<T> {
         self.sensor.camera()
     }
-    /// The part of the picture that counts.
+    /// Returns the part of the picture that counts.
     pub fn region(&self) -> &Region<T> {
         self.sensor.region()
     }
-    /// As [`Sensor::expect`].
+    /// Same as [`Sensor::expect`].
     ///
     /// # Errors
-    /// An altitude or a position that cannot be.
+    /// The altitude or the position is impossible.
     pub fn expect(&self, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         self.sensor.expect(frame)
     }
-    /// As [`Sensor::expect_body`].
+    /// Same as [`Sensor::expect_body`].
     ///
     /// # Errors
-    /// An altitude or a position that cannot be; a number beyond the last.
+    /// The altitude or the position is impossible, or there is no body of this number.
     pub fn expect_body(&self, which: usize, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         self.sensor.expect_body(which, frame)
     }
-    /// Finds the limb. Total: any picture gives a report. One of another size than the camera's is `rejected` at the
-    /// first stage.
+    /// Finds the limb. Returns a report for every input; a picture whose size is not that of the camera is `rejected`
+    /// at the first stage.
     pub fn process<P: Pixels>(&mut self, picture: &P, expected: &Expected<T>) -> Report<T> {
         self.process_observed(picture, expected, &Unobserved)
     }
-    /// As [`Self::process`], watched.
+    /// Same as [`Self::process`], with an observer.
     pub fn process_observed<P: Pixels, O: Observer<T>>(
         &mut self,
         picture: &P,
@@ -107,11 +108,11 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         self.remember(&expected, &report);
         report
     }
-    /// As [`Sensor::process_each`].
+    /// Same as [`Sensor::process_each`].
     pub fn process_each<P: Pixels>(&mut self, picture: &P, expected: &[Expected<T>]) -> Reports<T> {
         self.process_each_observed(picture, expected, &Unobserved)
     }
-    /// As [`Self::process_each`], watched.
+    /// Same as [`Self::process_each`], with an observer.
     pub fn process_each_observed<P: Pixels, O: Observer<T>>(
         &mut self,
         picture: &P,
@@ -126,7 +127,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         }
         reports
     }
-    /// With the level that the last picture asks for, where none is given.
+    /// Adds the threshold that the last picture gave for this body, if `expected` has none.
     fn remembered(&self, expected: &Expected<T>) -> Expected<T> {
         let last = self.levels.get(usize::from(expected.which)).copied().flatten();
         Expected { level: expected.level.or(last), ..*expected }

@@ -1,10 +1,10 @@
-//! The whole: stages in order, nothing runs back.
+//! The whole chain: the stages run in order and never go back.
 //!
-//! One candidate after another goes from its border to a verdict. Edges are looked at in the order in which they are
-//! likely to be the limb: those beside the longest dark stretches of the border first, then every other edge that
-//! begins at the border, then the closed ones. The picture is done as soon as an edge passes every gate and is beyond
-//! doubt; otherwise the best of all that begin at the border is taken, and closed ones are looked at when none is. A
-//! picture without an answer is looked at again, at other levels (`[recover]`).
+//! Each candidate goes from its border to a verdict before the next one begins. Edges are examined in the order in
+//! which they are likely to be the limb: first those next to the longest dark stretches of the border, then every other
+//! edge that begins at the border, then closed edges. The search ends when an edge passes every gate and is beyond
+//! doubt. Otherwise the best of all edges that begin at the border is chosen; closed edges are examined only if there
+//! is none. A picture without an answer is examined again, at other thresholds (`[recover]`).
 
 mod account;
 #[cfg(any(test, feature = "_edges"))]

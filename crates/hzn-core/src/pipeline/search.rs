@@ -1,4 +1,4 @@
-//! The edges of one picture, one after the other from border to verdict, and which of them is the limb.
+//! Takes the edges of one picture from border to verdict, one after the other, and decides which of them is the limb.
 
 use super::account;
 use super::found_limb::FoundLimb;
@@ -29,18 +29,22 @@ use crate::stages::gates;
 use crate::stages::rays;
 use crate::stages::threshold;
 
-/// Words that search lines are marked in, at most: more of them find nothing new.
+/// Most words in which search lines are marked. More search lines find nothing new.
 const LINE_WORDS: usize = 16384;
 
-/// The shorter side of the border is looked at in about this many places: a limb's dark and lit stretches are longer
-/// than what lies between, and each look at a column is a page of memory.
+/// Approximate number of places at which the shorter side of the border is read. The dark and lit stretches that a limb
+/// makes on the border are longer than the distance between two places. Every read of a column touches another page of
+/// memory.
 const BORDER_LOOKS: u16 = 128;
 
-/// Rows between search lines, and the most where memory is short: the least extent of the body's disc; a quarter of it
-/// where there are crescents, which are to be crossed too.
+/// Returns the spacing of search lines in rows: the usual one (1 to 64), and the largest one for when memory is short
+/// (1 to 256).
 ///
-/// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows; the lens's own minimum is taken for half of f,
-/// which every lens in use exceeds.
+/// The largest spacing is the smallest extent of the body's disc. The usual spacing is a quarter of it if crescents
+/// occur, because search lines must cross these too; otherwise it is the same.
+///
+/// A disc of half-angle α spans at least 2 α f min(r', r/sin θ) rows. The code uses f/2 in place of f min(r', r/sin θ);
+/// every lens in use exceeds this.
 fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u16) {
     let (_, fy) = camera.focal_px();
     let disc = expected.half_angle_rad() * fy;
@@ -48,56 +52,57 @@ fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u1
     (narrow.to_i32().clamp(1, 64) as u16, disc.to_i32().clamp(1, 256) as u16)
 }
 
-/// The edges of one picture, judged one by one.
+/// The search over the edges of one picture, which are judged one by one.
 pub(super) struct Search<'a, T, O> {
     sensor: &'a Sensor<T>,
-    /// The sensor's, or as it turns while the picture is read out.
+    /// Camera of the sensor, or [`Sensor::turning`] if the camera turns while the picture is read out.
     camera: &'a Camera<T>,
     expected: &'a Expected<T>,
     taken: &'a [FoundLimb<T>],
     noise: &'a covariance::Config,
-    /// The answer's level is asked for.
+    /// Whether the answer needs a threshold for the next picture (method `track`).
     tracks: bool,
-    /// Shortest edge, border pixels.
+    /// Length of the shortest candidate, border pixels.
     min_points: u16,
     observer: &'a O,
     blocks: &'a mut [Block<T>],
-    /// What may still be done.
+    /// The rest of the work budget.
     work: WorkBudget,
     best: Option<Best<T>>,
-    /// The best score of an answer that points elsewhere.
+    /// The best score of an answer that points in another direction.
     rival: Option<T>,
-    /// Edges with too few points.
+    /// Number of edges with too few points.
     short: u32,
-    /// An edge was fitted, whatever became of it.
+    /// Whether any edge was fitted, whatever its verdict.
     fitted: bool,
     report: &'a mut Report<T>,
 }
 
-/// Whether an edge begins on the border between two of its strides.
+/// Whether an edge begins at the border between two pixels that were read.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Missed {
-    /// Nothing says so.
+    /// No edge shows this so far.
     Unknown,
-    /// At least one does.
+    /// At least one edge does.
     Some,
-    /// They were looked for pixel by pixel.
+    /// The border was searched for them pixel by pixel.
     Found,
 }
 
 struct Best<T> {
     solution: Solution<T>,
     outcome: Candidate<T>,
-    /// Level for the next picture.
+    /// Threshold for the next picture.
     level: Option<u16>,
     score: T,
-    /// It explains most of the limb in view, and most of its edge or with small residuals: no need to look further.
+    /// The answer explains most of the limb in view, and either most points of its edge are inliers or the residuals
+    /// are small. The search can end.
     certain: bool,
 }
 
 impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
-    /// Nothing looked at yet. `camera` is the sensor's or [`Sensor::turning`]; `taken` are the bodies found before;
-    /// `blocks` is the room for one edge's points, `work` what the look may cost.
+    /// Begins a search. `camera` is the camera of the sensor or [`Sensor::turning`], `taken` are the limbs found
+    /// before, `blocks` has room for the points of one edge, and `work` is the work budget of the look.
     pub(super) fn new(
         sensor: &'a Sensor<T>,
         camera: &'a Camera<T>,
@@ -132,12 +137,13 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
     }
 
-    /// Nothing more to look for: the limb is found, or the picture may cost no more.
+    /// Returns whether the search is over: the limb is found, or the work budget is used up.
     fn done(&self) -> bool {
         self.work.is_exhausted() || self.best.as_ref().is_some_and(|b| b.certain)
     }
 
-    /// Edges from the border of the picture, the likeliest first, then those that search lines meet.
+    /// Examines the edges that begin at the border of the picture, the likeliest first, then those that search lines
+    /// meet.
     #[inline(always)]
     pub(super) fn border_following<P: Pixels>(
         &mut self,
@@ -151,7 +157,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let bits = bits.get_mut(..LINE_WORDS.min(bits.len())).unwrap_or_default();
         let (width, height) = (binary.region.width(), binary.region.height());
         let mut marks = Marks::new(bits, width, height, spacing, widest);
-        // What is narrower on the border than a search line is apart from the next is no limb.
+        // A stretch of the border that is narrower than the distance between two search lines is no limb.
         let stride = spacing.min(width.min(height) / BORDER_LOOKS).max(1);
         let ranked = binary.ranked_starts(stride);
         self.work.charge(binary.cost());
@@ -198,8 +204,10 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
     }
 
-    /// An edge that a search line meets. When it ends at the border, it began there too, where the border's strides
-    /// passed over it: half of an edge is not judged, but asked for whole.
+    /// Examines an edge that a search line meets. An edge that ends at the border also begins there, between two pixels
+    /// that were read, and only a part of it is followed from the search line. It is therefore not judged; instead,
+    /// `missed` requests a search of the whole border, which finds the edge from its beginning. After that search,
+    /// every edge is judged.
     fn edge_on_line<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
@@ -217,7 +225,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
     }
 
-    /// Every outer border of the picture.
+    /// Examines every outer border of the picture.
     #[cfg(feature = "horace")]
     pub(super) fn raster<P: Pixels>(
         &mut self,
@@ -238,7 +246,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
     }
 
-    /// Every edge pixel of the picture as one edge, by a method that finds them so.
+    /// Examines all edge pixels of the picture as one edge, for methods that do not separate edges.
     #[cfg(any(feature = "horace", feature = "zju"))]
     pub(super) fn whole<'b, P: Pixels>(
         &mut self,
@@ -264,7 +272,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
     }
 
-    /// Follows one edge, and says how it ended; `None` when it is none, or cannot be paid for.
+    /// Follows one edge and returns how it ended; `None` if the edge is a hole, or if the work budget does not allow
+    /// it.
     fn follow<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
@@ -278,12 +287,12 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
         let end = self.work.on_edge(|steps| binary.follow(pixel, dark, edge, marks, steps));
         self.report.counters.followed += edge.total();
-        // A hole: sky or ground seen through something.
+        // A hole is sky or ground that is seen through something.
         let hole = matches!(end, End::Closed { twice_area } if twice_area > 0);
         (!hole).then_some(end)
     }
 
-    /// Takes an edge through every stage.
+    /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
     pub(super) fn piece<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
         let counters = &mut self.report.counters;
         let length = edge.total();
@@ -311,12 +320,12 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
         self.fitted |=
             !matches!(outcome.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken);
-        // Full: only counted, unless it is chosen in the end.
+        // When the list is full, the candidate is only counted. `Report::choose` lists it later if it is chosen.
         let _ = self.report.candidates.push(outcome);
         self.observer.enter(Stage::Contour);
     }
 
-    /// Takes an edge from its border to a verdict; the answer, where it passes every gate.
+    /// Takes an edge from its border to a verdict. Returns the answer if the edge passes every gate.
     fn candidate<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
@@ -341,7 +350,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         (outcome, best)
     }
 
-    /// The edge points, whose work is paid for.
+    /// Locates the edge points. The caller has paid for them; the extra work of slow points is charged here.
     #[inline(always)]
     fn edge_points<P: Pixels>(
         &mut self,
@@ -366,7 +375,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         Some(points)
     }
 
-    /// Rays, consensus and fit, with the threshold of the consensus.
+    /// Computes the rays, finds the consensus and fits the cone. Returns the fit with the threshold of the consensus.
     #[inline(always)]
     fn fit(
         &mut self,
@@ -410,7 +419,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         Some((fit, threshold))
     }
 
-    /// Covariance and gates.
+    /// Computes the covariance and applies the gates. Returns the answer if every gate is passed.
     #[inline(always)]
     fn judge<P: Pixels>(
         &mut self,
@@ -464,10 +473,10 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: tracks.flatten() })
     }
 
-    /// Whether the curvature of the edge tells on which side of it the body is.
+    /// Returns whether the curvature of the edge shows on which side of the edge the body is.
     ///
-    /// The body on the other side of the same edge would have the half-angle π − α. The one that the edge itself
-    /// asks for must be nearer to α by far: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ exceeds `min_side_sigma`² variances.
+    /// A body on the other side of the same edge would have the half-angle π − α. The half-angle that the edge itself
+    /// gives must be much nearer to α: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ must exceed `min_side_sigma`² variances.
     fn tells_side(&self, fit: &Fit<T>, fused: &Fused<T>, expected: &Expected<T>) -> bool {
         let sides = T::from_f64(self.sensor.config.select.min_side_sigma);
         fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0))
@@ -506,7 +515,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
     }
 
-    /// Keeps the better of two answers, and remembers how good the other was if it says something else.
+    /// Keeps the better of two answers. If they point in different directions, the score of the other is kept as the
+    /// rival's.
     fn weigh(&mut self, new: Best<T>) {
         let Some(old) = self.best.take() else {
             self.best = Some(new);
@@ -525,7 +535,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         enter(self.report, self.observer, stage);
     }
 
-    /// Writes the answer into the report. Gives back what is left of the account.
+    /// Writes the answer into the report. Returns the rest of the work budget.
     pub(super) fn conclude(self) -> WorkBudget {
         let (report, work) = (self.report, self.work);
         report.counters.work = work.spent();

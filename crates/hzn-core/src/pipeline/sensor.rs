@@ -1,4 +1,4 @@
-//! A configuration that was accepted, and the order of the stages.
+//! A checked configuration, and the order of the stages.
 
 use super::found_limb::FoundLimb;
 use super::search::Search;
@@ -21,8 +21,8 @@ use crate::stages::contour;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold;
 
-/// A configuration that was accepted, with all that follows from it: lens, region, mounting. Some kilobytes; the lists
-/// that a picture needs are in a [`Workspace`]. [`Horizon`](super::Horizon) is both together.
+/// A checked configuration with everything that follows from it: lens, region, mounting. It takes some kilobytes. The
+/// lists that a picture needs are in a [`Workspace`]; [`Horizon`](super::Horizon) holds both.
 #[derive(Debug, Clone)]
 pub struct Sensor<T> {
     pub(super) config: Config,
@@ -32,11 +32,11 @@ pub struct Sensor<T> {
 }
 
 impl<T: Real> Sensor<T> {
-    /// Checks everything that can be refused.
+    /// Makes a sensor. Checks the whole configuration first.
     ///
     /// # Errors
-    /// The first field out of its limits.
-    // Its workings, some kilobytes, are not to lie on the caller's stack.
+    /// Returns the first field that is out of its limits.
+    // Not inlined: the temporary values, some kilobytes, must not lie on the caller's stack.
     #[inline(never)]
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
@@ -49,35 +49,35 @@ impl<T: Real> Sensor<T> {
             config: config.clone(),
         })
     }
-    /// The configuration.
+    /// Returns the configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }
-    /// The lens.
+    /// Returns the camera with its lens.
     pub fn camera(&self) -> &Camera<T> {
         &self.camera
     }
-    /// The part of the picture that counts.
+    /// Returns the part of the picture that counts.
     pub fn region(&self) -> &Region<T> {
         &self.region
     }
-    /// Checks what is known about a picture and works out the cone to expect: of the body, or of the first of several.
+    /// Checks the prior of a picture and computes the expected cone of the body, or of the first of several bodies.
     ///
     /// # Errors
-    /// An altitude or a position that cannot be.
+    /// The altitude or the position is impossible.
     pub fn expect(&self, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         self.expect_body(0, frame)
     }
-    /// As [`Self::expect`], of the body number `which` of [`Config::each_body`], from 0.
+    /// Same as [`Self::expect`], for the body number `which` of [`Config::each_body`], from 0.
     ///
     /// # Errors
-    /// An altitude or a position that cannot be; a number beyond the last.
+    /// The altitude or the position is impossible, or there is no body of this number.
     pub fn expect_body(&self, which: usize, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         let body = self.config.each_body().get(which).ok_or(PriorError::NoBody)?;
         Ok(Expected { which: which as u8, ..Expected::new(body, frame)? })
     }
-    /// Finds the limb, watched. Total: any picture gives a report. One of another size than the camera's is `rejected`
-    /// at the first stage.
+    /// Finds the limb, with an observer. Returns a report for every input; a picture whose size is not that of the
+    /// camera is `rejected` at the first stage.
     pub fn process<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
         &self,
         workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
@@ -87,8 +87,8 @@ impl<T: Real> Sensor<T> {
     ) -> Report<T> {
         self.process_beside(workspace.lists(), picture, expected, &[], observer)
     }
-    /// Finds several bodies in one picture, one after the other in the order of `expected`; at most [`MAX_BODIES`].
-    /// An edge on the limb of one that was found is not taken for another's.
+    /// Finds several bodies in one picture, at most [`MAX_BODIES`], one after the other in the order of `expected`. An
+    /// edge on the limb of a body that was found is not used for another body.
     pub fn process_each<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
         &self,
         workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
@@ -103,7 +103,7 @@ impl<T: Real> Sensor<T> {
             let report = self.process_beside(workspace.lists(), picture, one, &taken, observer);
             let found = report.solution.as_ref();
             let found = found.map(|s| FoundLimb { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
-            // There is room for as many as there can be bodies.
+            // Both lists have room for the largest number of bodies.
             if reports.push(report).is_err() || found.is_some_and(|f| taken.push(f).is_err()) {
                 break;
             }
@@ -130,7 +130,8 @@ impl<T: Real> Sensor<T> {
         report
     }
 
-    /// The camera as it turns while a picture is read out row by row, where that is known.
+    /// Returns the camera as it turns while a picture is read out row by row; `None` if the rate is unknown or there is
+    /// no rolling shutter.
     pub(super) fn turning(&self, expected: &Expected<T>) -> Option<Camera<T>> {
         let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter())?;
         Some(self.camera.turning(Some(rate)))
@@ -166,7 +167,7 @@ impl<T: Real> Sensor<T> {
         self.look_at_levels(lists, picture, &level, expected, taken, observer, report);
     }
 
-    /// One look: everything after the level. What it leaves of the picture's account.
+    /// Runs one look: everything after the threshold. Returns the rest of the work budget.
     #[inline(always)]
     pub(super) fn search<P: Pixels, O: Observer<T>>(
         &self,

@@ -1,9 +1,10 @@
-//! A picture in parts: a smaller copy of it, and halves of halves where the whole gives no answer (Barf et al. 2015,
-//! 4.2.1; Barf 2014, 2.2.6).
+//! Crops of a picture: a smaller copy of it, and halves of halves when the whole picture gives no answer (Barf et al.
+//! 2015, 4.2.1; Barf 2014, 2.2.6).
 //!
-//! A part is a picture of its own, with the camera's principal point moved and its focal length scaled; what is watched
-//! of it is told in the whole picture's coordinates. (2.39) ends the division where a part is too small *and* too
-//! bright and too dark at once; it ends where a part is too small, or too bright, or too dark.
+//! A part is examined as a picture with its own camera, whose principal point is moved and whose focal length is
+//! scaled. The observer gets everything in the coordinates of the whole picture. Equation (2.39) ends the division only
+//! when a part is too small *and* too bright and too dark at once; here it ends when a part is too small, or too
+//! bright, or too dark.
 
 use super::account;
 use super::found_limb::FoundLimb;
@@ -25,15 +26,15 @@ use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
 use crate::model::work;
 
-/// Most parts that can answer.
+/// Most parts that can have an answer.
 const ANSWERS: usize = 64;
-/// Parts that wait: one a halving.
+/// Most parts that wait at the same time: one for each halving.
 const WAITING: usize = 16;
 
 type Answers<T> = heapless::Vec<Solution<T>, ANSWERS>;
 
 impl<T: Real> Sensor<T> {
-    /// The whole picture, scaled if that is asked for, and its parts when it has no answer.
+    /// Examines the whole picture, scaled if the configuration asks for it, and its parts if it has no answer.
     pub(super) fn look_at_parts<P: Pixels, O: Observer<T>>(
         &self,
         mut lists: Lists<'_, T>,
@@ -66,7 +67,7 @@ impl<T: Real> Sensor<T> {
         report: &mut Report<T>,
     ) {
         let (status, level) = (report.status, report.level);
-        // What the whole picture left.
+        // The work budget that the whole picture has left.
         let mut work = account::open(&self.config, lists.border.len());
         work.charge(report.counters.work);
         let mut cut = false;
@@ -74,7 +75,7 @@ impl<T: Real> Sensor<T> {
         let mut answers = Answers::<T>::new();
         let mut chosen = heapless::Vec::<Candidate<T>, ANSWERS>::new();
         let mut waiting = heapless::Vec::<Crop, WAITING>::new();
-        // A half at a time: as many wait as there have been halvings.
+        // One half is examined at a time, so at most one part for each halving waits.
         let _ = waiting.extend_from_slice(whole.halves().as_ref().map_or(&[][..], |h| h));
         while let Some(part) = waiting.pop() {
             if !work.try_spend(work::PART) {
@@ -85,7 +86,7 @@ impl<T: Real> Sensor<T> {
             work.charge(report.counters.work);
             cut |= report.status == Status::Truncated;
             if let Some(answer) = report.solution.take() {
-                // As many as the smallest parts can be.
+                // The list has room: there are at most `ANSWERS` parts of the smallest size.
                 let _ = answers.push(answer);
                 if let Some(edge) = report.candidates.iter_mut().find(|c| c.verdict == Verdict::Chosen) {
                     edge.verdict = Verdict::Passed;
@@ -113,7 +114,7 @@ impl<T: Real> Sensor<T> {
         }
     }
 
-    /// Looks at a part with the camera and the region that are its own; `left` is what it may cost.
+    /// Examines a part with the part's own camera and region. `left` is the largest work that it may cost.
     fn look_through<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
@@ -137,7 +138,8 @@ impl<T: Real> Sensor<T> {
     }
 }
 
-/// The answer nearest to the median or mean of all, with that for its axis, and the scatter of all in its covariance.
+/// Combines the answers of the parts. The axis is their median or mean, the covariance includes their scatter, and the
+/// rest comes from the answer that is nearest to this axis.
 fn together<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Option<Solution<T>> {
     let count = T::from_f64(answers.len() as f64);
     let axis = match combine {
@@ -188,7 +190,7 @@ fn together<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Option<Solut
     })
 }
 
-/// Tells of a part in the picture's coordinates.
+/// Passes on what is observed in a part, in the coordinates of the whole picture.
 struct Through<'a, O> {
     observer: &'a O,
     crop: Crop,

@@ -4,22 +4,22 @@ use crate::base::real::Real;
 use crate::geometry::block::Block;
 use crate::geometry::pixel::Pixel;
 
-/// Border pixels of an edge that a workstation stores.
+/// Most border pixels of one edge that a workstation stores.
 pub(super) const HOST_POINTS: usize = 16384;
-/// Words in which it marks search lines.
+/// Words of 32 bits in which a workstation marks search lines.
 pub(super) const HOST_WORDS: usize = 65536;
 
 /// The lists of a workstation.
 pub type HostWorkspace = Workspace<f64, HOST_POINTS, 2048, HOST_WORDS>;
 /// The lists of a flight computer.
 pub type FlightWorkspace = Workspace<f32, 2048, 256, 512>;
-/// Every list that a picture needs; nothing of it outlives the picture. There is no heap.
+/// All lists that a picture needs, without a heap. No content is kept from one picture to the next.
 ///
-/// `POINTS` border pixels of an edge are stored (beyond, the stride doubles), `BLOCKS` blocks of eight edge points are
-/// fitted, and search lines are marked in `WORDS` words of 32 bits, in which the contour method `raster` marks every
-/// pixel. See [`HostWorkspace`] and [`FlightWorkspace`].
+/// `POINTS` border pixels of an edge are stored; for a longer edge the stride doubles. `BLOCKS` blocks of eight edge
+/// points are fitted. Search lines are marked in `WORDS` words of 32 bits; the contour method `raster` marks every
+/// pixel in them. See [`HostWorkspace`] and [`FlightWorkspace`].
 ///
-/// It is large. A new one is all zeros: in a `static` it takes no room in flash, and is made without passing over the
+/// A workspace is large. A new one is all zeros: as a `static` it takes no room in flash and never passes over the
 /// stack.
 #[derive(Debug, Clone)]
 pub struct Workspace<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
@@ -28,7 +28,7 @@ pub struct Workspace<T, const POINTS: usize, const BLOCKS: usize, const WORDS: u
     marks: [u32; WORDS],
 }
 
-/// The lists of a workspace without their lengths, so that stages are compiled once.
+/// The lists of a workspace without their lengths in the type, so that the stages are compiled only once.
 pub(super) struct Lists<'a, T> {
     pub(super) border: &'a mut [Pixel],
     pub(super) blocks: &'a mut [Block<T>],
@@ -36,7 +36,7 @@ pub(super) struct Lists<'a, T> {
 }
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Workspace<T, POINTS, BLOCKS, WORDS> {
-    /// Empty lists.
+    /// Makes empty lists.
     pub const fn new() -> Self {
         Self { border: [Pixel { x: 0, y: 0 }; POINTS], blocks: [Block::EMPTY; BLOCKS], marks: [0; WORDS] }
     }
@@ -46,7 +46,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Work
 }
 
 impl<T> Lists<'_, T> {
-    /// The same, for one look of several.
+    /// Borrows the same lists for one of several looks.
     pub(super) fn again(&mut self) -> Lists<'_, T> {
         Lists { border: self.border, blocks: self.blocks, marks: self.marks }
     }

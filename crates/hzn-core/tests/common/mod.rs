@@ -1,9 +1,9 @@
-//! Pictures that several tests look at.
+//! Pictures that several tests use.
 
-/// How many kinds of [`garbage`] there are.
+/// Number of kinds of [`garbage`].
 pub(crate) const KINDS: u8 = 10;
 
-/// 96 by 64 pixels of no sense: noise, stripes, blocks, one lit pixel, discs, slopes.
+/// Draws 96 by 64 pixels without a meaning: noise, stripes, blocks, one lit pixel, discs, slopes.
 pub(crate) fn garbage(kind: u8, seed: u64, level: u8) -> Vec<u8> {
     let mut state = seed | 1;
     (0..96u32 * 64)

@@ -1,8 +1,9 @@
-//! The sensor alone, as small as it gets: one configuration in flash, one picture in external memory, one answer. What
-//! of this image is flash and RAM is what the `hzn` chain takes of a flight computer.
+//! The sensor alone, as small as possible: one configuration in flash, one picture in external memory, one answer. The
+//! flash and RAM of this image are the resources that the `hzn` chain needs on a flight computer.
 //!
-//! `picture.bin` is the picture, 1920×1080 bytes. `answer.bin` is what it gave, little-endian: status, axis (3),
-//! covariance (xx, xy, xz, yy, yz, zz), words of which all but the first are singles, and the stack's high-water mark.
+//! `picture.bin` is the picture, 1920×1080 bytes. `answer.bin` is the result in little-endian words: status, axis (3),
+//! covariance (xx, xy, xz, yy, yz, zz), and the high-water mark of the stack in bytes. Axis and covariance are
+//! single-precision numbers; the other two words are integers.
 
 #![no_std]
 #![no_main]
@@ -22,7 +23,7 @@ use static_cell::ConstStaticCell;
 const WIDTH: u16 = 1920;
 const HEIGHT: u16 = 1080;
 
-/// For 600 points of an edge, which is what the default `candidates.keep_points` asks for.
+/// Has room for the 600 points of an edge that the default `candidates.keep_points` keeps.
 type Lists = Workspace<f32, 2048, 76, 512>;
 static WORKSPACE: ConstStaticCell<Lists> = ConstStaticCell::new(Lists::new());
 
@@ -34,7 +35,7 @@ fn main() -> ! {
     })
 }
 
-/// The lens of the rocket's flight, 150 km up.
+/// Returns the configuration with the lens of the rocket's flight, at an altitude of 150 km.
 fn config() -> Config {
     let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
     let lens = camera::Config { k, ..camera::Config::ideal(Model::KannalaBrandt, WIDTH, HEIGHT, 1233.0) };
@@ -51,7 +52,8 @@ fn run() -> Option<()> {
         return None;
     }
     let workspace = WORKSPACE.try_take()?;
-    // Seen through, the methods that this configuration does not choose would be left out.
+    // `black_box` hides the configuration from the compiler, which would otherwise leave out the methods that it does
+    // not choose.
     let sensor = hzn_setup::sensor(black_box(&config())).ok()?;
     let expected = hzn_setup::expect(&sensor, &Prior::default()).ok()?;
     let picture = Grey::try_new(&*picture, Layout::packed(WIDTH.into(), HEIGHT.into(), 1, 8)).ok()?;

@@ -1,10 +1,13 @@
 //! The flight software on the MPS2 boards.
 //!
-//! Line: UART 0. Clock: timer 0. Watchdog: the board's, two seconds. What these boards lack, the machine that emulates
-//! them stands in for, by files in its working folder: `frames.bin` is the camera (for each picture "FRAM", its length,
-//! pictures lost before it, one spare word, little-endian; then its bytes; "HANG" instead is a camera that never comes
-//! back), `copy1.bin` and `copy2.bin` are the flash. With `cut.bin` (one word) power is cut after so many bytes written
-//! to flash.
+//! The line is UART 0, the clock is timer 0, and the watchdog is that of the board, with two seconds.
+//!
+//! These boards have no camera and no flash. Files in the working folder of the emulator stand for them:
+//! - `frames.bin` is the camera. For each picture it has "FRAM", the length, the number of pictures lost before it and
+//!   one spare word, little-endian, and then the bytes of the picture. "HANG" in place of "FRAM" stands for a camera
+//!   that never answers.
+//! - `copy1.bin` and `copy2.bin` are the flash.
+//! - `cut.bin` has one word: power is cut after this number of bytes was written to flash.
 
 #![no_std]
 #![no_main]

@@ -1,10 +1,12 @@
-//! Runs frames from a file of the host and writes what each gave: answers with every bit, and instructions by stage.
+//! Processes pictures from a file of the host. Writes the answers with every bit, and the instructions of each stage.
 //!
-//! `cases.bin`: for each case eight words (little-endian): "CASE", length of the parameter table, length of the frame,
-//! altitude and ECEF position as singles in metres (NaN: not given), one spare; then the table; then the frame, one
-//! byte a pixel. `results.bin`: for each case "DONE", the ticks of making the sensor, of `expect`, of the whole
-//! picture, of each of the eight stages (two words each, from a second, observed run), the stack's high-water mark, the
-//! length of the answer; then the answer.
+//! `cases.bin` has for each case eight words (little-endian): "CASE", the length of the parameter table, the length of
+//! the picture, altitude and ECEF position as single-precision numbers in metres (NaN if not known), and one spare. The
+//! table follows, and then the picture with one byte per pixel.
+//!
+//! `results.bin` has for each case "DONE" and the ticks for making the sensor, for `expect` and for the whole picture.
+//! Then follow the ticks of each of the eight stages (two words each, from a second run with an observer), the
+//! high-water mark of the stack, the length of the answer, and the answer.
 
 #![no_std]
 #![no_main]
@@ -26,7 +28,7 @@ use static_cell::ConstStaticCell;
 
 static WORKSPACE: ConstStaticCell<FlightWorkspace> = ConstStaticCell::new(FlightWorkspace::new());
 
-/// Ticks by stage.
+/// Counts the ticks of each stage.
 struct Clock {
     timer: Timer,
     since: Cell<u32>,
@@ -38,7 +40,7 @@ impl Clock {
     fn lap(&self) {
         let now = self.timer.ticks();
         if let Some(cell) = self.ticks.get(self.stage.get()) {
-            // A lap is shorter than the timer's 168 million instructions; their sum need not be.
+            // A lap is shorter than the timer's 168 million instructions, but the sum of laps may be longer.
             cell.set(cell.get().wrapping_add(u64::from(now.wrapping_sub(self.since.get()))));
         }
     }

@@ -1,6 +1,6 @@
-//! As `measure`, without a frame in memory: pictures of 640×480 pixels come row by row, as from a camera, and external
-//! memory is not touched. `cases.bin` and `results.bin` are those of `measure`; the second of the three calls that are
-//! counted is the taking of all rows, the third the end of the picture, and stages stay 0.
+//! Does the same as `measure` without a picture in memory: pictures of 640×480 pixels come row by row, as from a
+//! camera, and external memory is not used. `cases.bin` and `results.bin` are those of `measure`. The second count of
+//! ticks is for taking all rows, the third for the end of the picture; the counts of the stages are 0.
 
 #![no_std]
 #![no_main]
@@ -22,7 +22,7 @@ use static_cell::ConstStaticCell;
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
 type Picture = RowBuffers<u8, { ROWS_HELD as usize * WIDTH }, HEIGHT, 8192, 2560>;
-/// For 600 points of an edge.
+/// Has room for 600 points of an edge.
 type Lists = Workspace<f32, 2048, 76, 512>;
 
 static PICTURE: ConstStaticCell<Picture> = ConstStaticCell::new(Picture::new());

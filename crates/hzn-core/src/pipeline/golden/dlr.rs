@@ -1,4 +1,5 @@
-//! The methods of Braun & Barf 2022 against reference data, and each erratum of the paper against its printed form.
+//! Compares the methods of Braun & Barf 2022 with reference data, and the correct form of each equation with the
+//! printed erratum.
 
 use super::*;
 use crate::base::linalg::{M3, symmetric_eigen};
@@ -6,7 +7,7 @@ use crate::model::work::WorkBudget;
 use crate::stages::covariance::braun_barf;
 use crate::stages::fit::{conic, direct};
 
-/// `nadir_cases.json`: (24) by scipy, inliers only, pinholes only.
+/// Compares with `nadir_cases.json`: (24) by scipy, with inliers only and pinholes only.
 fn directions<T: Real>(tolerance_deg: f64) {
     let mut compared = 0;
     for case in load(include_str!("../../../tests/golden/nadir_cases.json")) {
@@ -28,7 +29,8 @@ fn directions<T: Real>(tolerance_deg: f64) {
         let off = UnitVec3::<Cam, T>::assume_unit(e).angle_rad(&want).to_f64().to_degrees();
         assert!(off < tolerance_deg, "{}: {off:e}", case["id"]);
         if num(&case["noise_sigma_px"]) == 0.0 {
-            // Its length is the half-angle, whatever is assumed: the paper's "needs α" does not hold.
+            // The length of the vector gives the half-angle without any assumption: the paper's "needs α" does not
+            // hold.
             assert!((c.to_f64() - num(&case["cos_alpha"])).abs() < 1e-6, "{}: {c}", case["id"]);
         }
         compared += 1;
@@ -42,8 +44,9 @@ fn direct_nadir_equals_scipy() {
     directions::<f32>(1e-4);
 }
 
-/// (13) has five coefficients in pixels, r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹: the same lens with f = κ₁ and the others
-/// divided by it. (16), the point on the plane by tan θ, ends at 90°; rays do not.
+/// Equation (13) has five coefficients in pixels, r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹. The same lens has f = κ₁, and
+/// the other four are divided by κ₁. Equation (16) gives the point on the image plane by tan θ and ends at 90°; rays do
+/// not.
 #[test]
 fn five_coefficients_are_a_focal_length_and_four() {
     let kappa = [1235.0, -67.9, 13.6, -4.3, 0.25];
@@ -61,13 +64,14 @@ fn five_coefficients_are_a_focal_length_and_four() {
         let radius: f64 = (0..5i32).zip(kappa).map(|(j, k)| k * theta.powi(2 * j + 1)).sum();
         assert!((p.u - config.cx_px - 0.6 * radius).abs() < 1e-9 && (p.v - config.cy_px - 0.8 * radius).abs() < 1e-9);
         assert!(camera.unproject(p).unwrap().angle_rad(&d) < 1e-11);
-        // The printed inverse, with the ray's side chosen by hand.
+        // The printed inverse, with the correct side of the ray chosen by hand.
         let printed = direction::<f64>([0.6 * libm::tan(theta), 0.8 * libm::tan(theta), 1.0]);
         assert_eq!(printed.angle_rad(&d) < 1e-6, deg < 90.0, "{deg}");
     }
 }
 
-/// `covariance.json`: (33) by dense matrices, with the paper's correlation from sample to sample and with ours.
+/// Compares with `covariance.json`: (33) by dense matrices, with the paper's correlation by sample and with ours by
+/// distance.
 fn covariances<T: Real>(tolerance: f64) {
     let mut compared = 0;
     for case in load(include_str!("../../../tests/golden/covariance.json")) {
@@ -77,7 +81,7 @@ fn covariances<T: Real>(tolerance: f64) {
         let e = direction::<T>(triple(&case["nadir_c"]));
         let length = num(&case["L_px"]);
         for form in ["eq33", "eq33_arc"] {
-            // The paper's form is for pinholes.
+            // The form of the paper is for pinholes only.
             if case[form].is_null() {
                 continue;
             }
@@ -104,7 +108,7 @@ fn covariances<T: Real>(tolerance: f64) {
                 assert!((bound.to_f64() / num(&case[form]["lambda_max"]) - 1.0).abs() < tolerance);
             }
             assert!(zero == T::ZERO && same == bound);
-            // Across the axis nothing is larger than the overbound.
+            // No variance across the axis is larger than the overbound.
             let [a, b, d] = braun_barf::across(&got, e.v(), false);
             assert!(a > T::ZERO && a * d > b * b && a + d < (bound + bound) * T::from_f64(1.0001));
         }
@@ -118,7 +122,8 @@ fn braun_barf_covariance_equals_the_dense_product() {
     covariances::<f32>(1e-4);
 }
 
-/// (35) as printed takes the points for one pixel apart: with the golden cases' 16 px it is wrong by a factor.
+/// As printed, (35) assumes that the points are one pixel apart. With the 16 px of the golden cases the variance is too
+/// small by a factor above 3.
 #[test]
 fn correlation_by_sample_is_not_that_by_distance() {
     let case = &load(include_str!("../../../tests/golden/covariance.json"))[0];
@@ -126,10 +131,10 @@ fn correlation_by_sample_is_not_that_by_distance() {
     assert!(right[1][1] / printed[1][1] > 3.0);
 }
 
-/// Camera, nadir, cos α, limb.
+/// Camera, nadir in the camera frame, cos α, points of the limb.
 type Rocket = (Camera<f64>, UnitVec3<Cam, f64>, f64, Vec<(f64, f64)>);
 
-/// A pinhole 20° below the horizontal, and its exact limb from 120 km.
+/// Returns a pinhole camera 20° below the horizontal, and the exact limb that it sees from 120 km.
 fn rocket() -> Rocket {
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
     let tilt = 20f64.to_radians();
@@ -140,7 +145,8 @@ fn rocket() -> Rocket {
     (camera, e, c, points)
 }
 
-/// (29): the derivative of an equation's value by its edge point, left as printed and as it must be.
+/// Compares both forms of the left side of (29), the printed one and the correct one, with the numerical derivative of
+/// the equation's value with respect to its edge point.
 #[test]
 fn error_of_an_equation_follows_from_that_of_its_point() {
     let (_, e, c, _) = rocket();
@@ -148,7 +154,7 @@ fn error_of_an_equation_follows_from_that_of_its_point() {
     let p = V3::new(0.3, -0.35, 1.0);
     let value = |p: &V3<f64>| c * p.norm() - p.dot(&e);
     let right = p * (c / p.norm()) - e;
-    // As printed the left side is δpᵀ e: its derivative is e itself.
+    // As printed, the left side is δpᵀ e, whose derivative is e.
     let printed = e;
     for k in 0..2 {
         let mut step = V3::new(0.0, 0.0, 0.0);
@@ -159,7 +165,7 @@ fn error_of_an_equation_follows_from_that_of_its_point() {
     }
 }
 
-/// (33) with raw pixels ignores what the lens does: through a fisheye it is not what the errors are.
+/// Equation (33) with raw pixels ignores the lens: through a fisheye it differs from the measured errors.
 #[test]
 fn covariance_goes_through_the_lens() {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 1200, 900, 500.0)).unwrap();
@@ -180,7 +186,7 @@ fn covariance_goes_through_the_lens() {
     let mut claimed = braun_barf::of(&blocks(&camera, &exact, &e), e.v(), 0.0).unwrap() * (sigma * sigma);
     let ratio = measured.trace() / claimed.trace();
     assert!((0.8..1.25).contains(&ratio), "{ratio}");
-    // The same points through a pinhole of that focal length: the printed form.
+    // The printed form corresponds to the same rays through a pinhole with this focal length.
     let flat = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Pinhole, 9000, 9000, 500.0)).unwrap();
     let printed: Vec<(f64, f64)> = exact
         .iter()
@@ -194,8 +200,9 @@ fn covariance_goes_through_the_lens() {
     assert!(!(0.8..1.25).contains(&ratio), "the printed form must not hold: {ratio}");
 }
 
-/// Honesty at 200 km with errors alike along the edge: squared errors over the covariance across the axis are two on
-/// average, over the overbound (37) a twentieth of that; and the errors are those of a free half-angle.
+/// The covariance is honest at 200 km with errors that are correlated along the edge. Squared errors divided by the
+/// covariance across the axis are two on average; divided by the overbound (37) they are a twentieth of that. The
+/// errors are those of a free half-angle.
 #[test]
 fn covariance_is_honest_and_the_overbound_is_not() {
     let (camera, e) = rocket_camera();
@@ -230,13 +237,13 @@ fn covariance_is_honest_and_the_overbound_is_not() {
     assert!((0.05..0.15).contains(&bounded), "{bounded}");
 }
 
-/// The conic as a quadratic form of rays, times any factor.
+/// Returns the conic as a quadratic form of rays, times any factor.
 fn form(e: &V3<f64>, c: f64, factor: f64) -> [[f64; 3]; 3] {
     let m = (e * e.transpose() - M3::identity() * (c * c)) * factor;
     core::array::from_fn(|i| core::array::from_fn(|j| m[(i, j)]))
 }
 
-/// (18): the axis of a conic with all signs, whatever factor its coefficients have.
+/// The axis from (18) is correct for a conic with any signs and any factor of its coefficients.
 #[test]
 fn axis_of_a_conic_keeps_its_signs() {
     for e in [[-0.57, 0.79, -0.23], [0.1, 0.2, 0.97], [0.9, -0.3, 0.3], [-0.6, -0.6, 0.5]] {
@@ -245,17 +252,18 @@ fn axis_of_a_conic_keeps_its_signs() {
             let m = form(&e, 0.25, factor);
             let (got, c) = conic::cone(&m, &e).unwrap();
             assert!((got - e).norm() < 1e-12 && (c - 0.25).abs() < 1e-12, "{e:?} {factor}");
-            // As printed: roots of coefficients, the factor taken for 1.
+            // The printed form takes roots of coefficients and assumes that the factor is 1.
             let printed = V3::from_fn(|i, _| libm::sqrt((m[i][i] + 0.25 * 0.25).abs()));
             let cannot = (printed - e).norm() > 0.1 || factor == 1.0 && e.iter().all(|x| *x > 0.0);
             assert!(cannot, "{e:?} {factor}: {printed:?}");
         }
     }
-    // All eigenvalues of one sign: no cone.
+    // If all eigenvalues have the same sign, there is no cone.
     assert!(conic::cone(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]], &V3::x()).is_none());
 }
 
-/// (20), (21): what ties the coefficients of a conic to cos α, with the last term f² as it must be and f⁴ as printed.
+/// Equations (20) and (21) relate the coefficients of a conic to cos α. Their last term has f² in the correct form and
+/// f⁴ in print.
 #[test]
 fn coefficients_of_a_limb_fulfil_the_constraints() {
     let e = unit(&V3::new(0.3, -0.5, 0.6)).unwrap();
@@ -271,13 +279,14 @@ fn coefficients_of_a_limb_fulfil_the_constraints() {
         assert!(right.abs() / scale < 1e-12, "{right}");
         assert!(sum(4.0 * c2 * c2 * f.powi(4), own).abs() / scale > 1.0);
         if own == cc {
-            // (21) prints A where C belongs.
+            // Equation (21) is printed with A in place of C.
             assert!(sum(4.0 * c2 * c2 * f * f, a).abs() / scale > 1e-3);
         }
     }
 }
 
-/// Both estimators find a noise-free limb, ellipses, hyperbolae and (nearly) parabolae alike, in both precisions.
+/// Checks that both estimators find a noise-free limb. Ellipses, hyperbolae and (nearly) parabolae are covered, in both
+/// precisions.
 fn exact<T: Real>(altitude_km: f64, tilt_deg: f64, tolerance_deg: f64) {
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
     let tilt = tilt_deg.to_radians();
@@ -302,13 +311,13 @@ fn conic_and_direct_find_exact_limbs() {
     for (altitude, tilt) in [(60.0, 20.0), (240.0, 20.0), (800.0, 30.0), (6000.0, 60.0), (36000.0, 80.0)] {
         exact::<f64>(altitude, tilt, 1e-6);
     }
-    // A parabola: Δ = sin²α − e_z² = 0.
+    // The limb is a parabola: Δ = sin²α − e_z² = 0.
     exact::<f64>(3000.0, libm::asin(6371.0 / 9371.0).to_degrees(), 1e-6);
     exact::<f32>(800.0, 30.0, 0.01);
     exact::<f32>(36000.0, 80.0, 0.01);
 }
 
-/// Coefficients are fitted in normalised coordinates; the conic's constraint keeps it an ellipse under noise.
+/// Coefficients are fitted in normalised coordinates. The constraint of the conic keeps it an ellipse under noise.
 #[test]
 fn conic_bears_noise_on_a_whole_disc() {
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 1000, 1000, 500.0)).unwrap();
@@ -321,7 +330,7 @@ fn conic_bears_noise_on_a_whole_disc() {
     assert!((libm::acos(c) - 0.5).abs() < 1e-3);
 }
 
-/// What does not determine a cone gives none.
+/// Points that do not determine a cone give none.
 #[test]
 fn degenerate_points_give_no_cone() {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Pinhole, 1920, 1080, 888.97)).unwrap();
@@ -330,9 +339,9 @@ fn degenerate_points_give_no_cone() {
         Vec::new(),
         Vec::from([(100.0, 100.0)]),
         Vec::from([(100.0, 100.0), (200.0, 100.0)]),
-        // All in one place.
+        // All points are in one place.
         Vec::from([(700.5, 300.5); 40]),
-        // A straight line: the limb of a body as wide as the hemisphere.
+        // The points are on a straight line: the limb of a body that fills a hemisphere.
         (0..200).map(|i| (f64::from(i) * 9.0, 300.0)).collect(),
         (0..200).map(|i| (f64::from(i) * 9.0, 539.5)).collect(),
     ];
@@ -351,7 +360,8 @@ fn degenerate_points_give_no_cone() {
     }
 }
 
-/// Three-point RANSAC: half of the points anywhere, and what is far from the limb has no weight afterwards.
+/// Three-point RANSAC finds the limb with half of the points anywhere. Points far from the limb have no weight
+/// afterwards.
 #[test]
 fn ransac_leaves_outliers_out() {
     let (camera, e, c, exact) = rocket();
@@ -398,7 +408,7 @@ fn ransac_leaves_outliers_out() {
     assert!(few.is_none());
 }
 
-/// The eigenvalues of (33) are those of the overbound: (37) is the largest.
+/// The overbound (37) is the largest eigenvalue of (33).
 #[test]
 fn overbound_is_the_largest_eigenvalue() {
     let p = M3::new(2.0, 0.3, 0.1, 0.3, 1.0, -0.2, 0.1, -0.2, 0.5);

@@ -1,4 +1,5 @@
-//! HORACE's circle against exact limbs, and each erratum of the theses against its printed form.
+//! Compares HORACE's circle with exact limbs, and the correct form of each equation of the theses with the printed
+//! erratum.
 
 use super::*;
 use crate::stages::consensus::Consensus;
@@ -29,10 +30,10 @@ fn fitted<T: Real>(
     Some((UnitVec3::assume_unit(fit.e), fit.c))
 }
 
-/// Camera, nadir, limb.
+/// Camera, nadir in the camera frame, points of the limb.
 type Seen = (Camera<f64>, UnitVec3<Cam, f64>, Vec<(f64, f64)>);
 
-/// The limb of a sphere seen `off_nadir_deg` beside the optical axis of a pinhole.
+/// Returns the limb of a sphere whose centre is `off_nadir_deg` away from the optical axis of a pinhole.
 fn binary(altitude_km: f64, off_nadir_deg: f64) -> Seen {
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 2400, 1800, 100.0)).unwrap();
     let (s, c) = libm::sincos(off_nadir_deg.to_radians());
@@ -42,7 +43,7 @@ fn binary(altitude_km: f64, off_nadir_deg: f64) -> Seen {
     (camera, e, points)
 }
 
-/// (2.31) to (2.36) there and back at 80 km; with (2.27) as printed the radius belongs to another altitude.
+/// Checks (2.31) to (2.36) in both directions at 80 km. With (2.27) as printed, the radius belongs to another altitude.
 fn eighty_kilometres<T: Real>(tolerance_m: f64) {
     let (camera, e, points) = binary(80.0, 0.0);
     let _ = camera;
@@ -55,7 +56,7 @@ fn eighty_kilometres<T: Real>(tolerance_m: f64) {
     assert!((altitude.to_f64() - 80e3).abs() < tolerance_m, "{altitude}");
     let sin = libm::sqrt(1.0 - c.to_f64() * c.to_f64());
     assert!((sin - 0.98760).abs() < 5e-6);
-    // sin α = (R − h)/R: h = R (1 − sin α).
+    // As printed, sin α = (R − h)/R, and therefore h = R (1 − sin α).
     let printed_m = RADIUS_KM * 1e3 * (1.0 - sin);
     assert!((printed_m - 80e3).abs() > 900.0, "{printed_m}");
 }
@@ -66,7 +67,7 @@ fn altitude_from_the_radius() {
     eighty_kilometres::<f32>(30.0);
 }
 
-/// (2.37) counts the centre from the picture's corner: half a pixel off in both directions.
+/// Equation (2.37) counts the centre from the corner of the picture, which is half a pixel off in both directions.
 #[test]
 fn the_centre_of_a_picture_is_that_of_its_pixels() {
     let (camera, e, points) = binary(80.0, 0.0);
@@ -77,8 +78,8 @@ fn the_centre_of_a_picture_is_that_of_its_pixels() {
     assert!((found.u - w / 2.0).abs() > 0.4 && (found.v - h / 2.0).abs() > 0.4);
 }
 
-/// What the method is worth on exact limbs: nothing is wrong straight down; beside that next to nothing through an
-/// equidistant lens at 25°, degrees at 60°, and tens of degrees in the picture of a pinhole.
+/// Shows the error of the method on exact limbs. Straight down there is none. Off nadir, the error through an
+/// equidistant lens is small at 25° and some degrees at 60°; with a pinhole it reaches tens of degrees.
 #[test]
 fn a_circle_is_right_straight_down_only() {
     let error_deg = |model: Model, focal_px: f64, altitude_km: f64, off_nadir_deg: f64| {
@@ -95,7 +96,8 @@ fn a_circle_is_right_straight_down_only() {
     assert!(wide(0.0) < 1e-6);
     assert!((0.02..0.5).contains(&wide(25.0)), "{}", wide(25.0));
     assert!((1.0..15.0).contains(&wide(60.0)), "{}", wide(60.0));
-    // A rocket's camera, 10° to 40° below the horizontal: from a short flat arc at the upper edge to one at the lower.
+    // A rocket's camera is 10° to 40° below the horizontal. The limb lies between the centre of the picture and a short
+    // flat arc at the upper edge.
     let rocket = [50.0, 60.0, 70.0, 80.0].map(|off| error_deg(Model::Pinhole, 888.97, 120.0, off));
     assert!(rocket.iter().all(|off| (0.5..30.0).contains(off)) && rocket[0] > 6.0, "{rocket:?}");
 }

@@ -1,11 +1,11 @@
-//! What a wrong calibration does to a fit, against what the covariance says it does.
+//! Compares the effect of a wrong calibration on a fit with the effect that the covariance predicts.
 
 use super::*;
 use crate::geometry::camera::{Covariance, Intrinsic};
 use crate::stages::covariance::{ErrorBudget, Noise, Term};
 use std::vec;
 
-/// A lens, its limb's half-angle, and the axis.
+/// Returns lenses with their names, the half-angle of the limb in degrees, and the axis in the camera frame.
 fn scenes() -> Vec<(&'static str, CameraConfig, f64, [f64; 3])> {
     let rocket = CameraConfig {
         fx_px: 1235.0,
@@ -31,7 +31,7 @@ fn scenes() -> Vec<(&'static str, CameraConfig, f64, [f64; 3])> {
     ]
 }
 
-/// The free fit of points made with the lens `right` by the lens `used`: axis and cos, and the budget.
+/// Fits points of the lens `right` with the lens `used` and a free half-angle. Returns axis, cos and error budget.
 fn fitted(
     right: &CameraConfig,
     used: &CameraConfig,
@@ -65,12 +65,12 @@ fn fitted(
     (fit.e, fit.c, budget)
 }
 
-/// The shift (δ₁₂, δc) that the other lens makes, against the lens term of the covariance, which is its outer product:
-/// the relative difference.
+/// Returns the relative difference between the outer product of the shift (δ₁₂, δc) that the other lens makes, and the
+/// lens term of the covariance.
 fn difference(right: &CameraConfig, used: &CameraConfig, half_angle_deg: f64, towards: [f64; 3]) -> f64 {
     let exact = CameraConfig { focal_sigma_percent: 0.0, centre_sigma_px: 0.0, covariance: None, ..right.clone() };
     let (e0, c0, _) = fitted(&exact, &exact, half_angle_deg, towards);
-    // Linearised halfway between the two lenses.
+    // The shift is linearised at the fit with the other lens.
     let (e1, c1, budget) = fitted(&exact, used, half_angle_deg, towards);
     let (b1, b2) = basis(&e1);
     let off = e1 - e0;
@@ -91,7 +91,7 @@ fn a_wrong_focal_length_moves_the_fit_as_the_covariance_says() {
                 ..right.clone()
             };
             let off = difference(&right, &used, half_angle_deg, towards);
-            // Of the squares: twice that of the shift, of which 2 % are allowed.
+            // The difference is that of squares, twice that of the shift, for which 2 % are allowed.
             assert!(off < 0.04, "{name} {percent} %: {off}");
         }
     }
@@ -156,7 +156,8 @@ fn a_full_covariance_beats_the_scalars_and_says_the_same_where_it_is_the_same() 
     assert_eq!(refused(&|c| c.order[0] = Intrinsic::P1), "camera.covariance.order");
 }
 
-/// Every source's part adds up to the whole, and measured noise never says less than the told values do.
+/// The parts of all sources add up to the whole covariance. Measured noise never gives a smaller covariance than the
+/// given noise.
 #[test]
 fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
     for (name, right, half_angle_deg, towards) in scenes() {
@@ -204,7 +205,7 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
             let whole = Cov3::<Cam, f64>::from_tangent(&n1, &n2, fused.p).upper_rad2;
             let scale = whole[0] + whole[3] + whole[5];
             for (s, w) in sum.iter().zip(whole) {
-                // The tangent planes before and after fusing are some hundredths of a degree apart.
+                // The tangent planes before and after the fusion are some hundredths of a degree apart.
                 assert!((s - w).abs() < 0.01 * scale, "{name}: {sum:?} {whole:?}");
             }
             let floor: [f64; 3] = *told.get_or_insert(fused.p);

@@ -1,4 +1,4 @@
-//! The elliptic cone of Wang et al. 2022: reference solutions, errata, degenerate points, and honesty.
+//! Tests the elliptic cone of Wang et al. 2022: reference solutions, errata, degenerate points, and honest covariances.
 
 use super::*;
 use crate::base::linalg::{M3, Triangle};
@@ -16,13 +16,13 @@ fn pairs(v: &Value) -> Vec<(f64, f64)> {
     v.as_array().unwrap().iter().map(|p| (num(&p[0]), num(&p[1]))).collect()
 }
 
-/// A sphere of the Earth's size seen from 600 km.
+/// Returns the expected limb of a sphere of the Earth's size at 600 km.
 fn expected<T: Real>() -> Expected<T> {
     let body = body::Config { kind: body::Kind::EarthSphere, ..body::Config::default() };
     Expected::new(&body, &Prior { altitude_m: Some(T::from_f64(600e3)), ..Prior::default() }).unwrap()
 }
 
-/// The fit alone, through all the points.
+/// Runs the fit alone, through all points.
 fn fit<T: Real>(blocks: &mut [Block<T>], method: Method, weigh_above_deg: f64) -> Option<Fit<T>> {
     let zero = T::ZERO;
     let start = Consensus { e: V3::new(zero, zero, T::one()), c: T::from_f64(0.5), draws: 1, all: true };
@@ -32,7 +32,7 @@ fn fit<T: Real>(blocks: &mut [Block<T>], method: Method, weigh_above_deg: f64) -
     fit::fit(blocks, &start, &expected, &camera, T::from_f64(3.0), &config, &covariance::Config::default())
 }
 
-/// Reference solutions: total least squares by SVD, weighted with the dense cofactor matrix.
+/// Compares with reference solutions: total least squares by SVD, and weighted ones with the dense cofactor matrix.
 fn references<T: Real>(tolerance: f64) {
     for case in file()["cone_cases"].as_array().unwrap() {
         let camera = Camera::<T>::try_new(&camera_config(&case["camera"])).unwrap();
@@ -43,7 +43,7 @@ fn references<T: Real>(tolerance: f64) {
             let expected = V3::from(triple(&case[axis]));
             let error = (got.e.map(Real::to_f64) - expected).norm();
             assert!(error < tolerance, "{} {axis}: {error:e}", case["id"]);
-            // Theirs has M₃₃ = 1.
+            // The reference is scaled to M₃₃ = 1.
             let [v1, v2, v3, v4, v5, v6] = got.quadric.unwrap().numbers().map(Real::to_f64);
             let ours = M3::new(v1 + v6, v2 / 2.0, v4 / 2.0, v2 / 2.0, v3 + v6, v5 / 2.0, v4 / 2.0, v5 / 2.0, v6) / v6;
             let theirs = M3::from(rows(&case[m]));
@@ -64,7 +64,7 @@ fn singular_vectors_solve_the_generic_cases() {
     let mut compared = 0;
     for case in file()["generic_cases"].as_array().unwrap() {
         let x = list(&case["x_tls"]);
-        // Of four unknowns; the triangle is made for five columns.
+        // Only cases with four unknowns are compared: the triangle has five columns.
         let [x1, x2, x3, x4] = x[..] else { continue };
         compared += 1;
         let mut triangle = Triangle::<f64, 5>::new();
@@ -82,7 +82,7 @@ fn singular_vectors_solve_the_generic_cases() {
     assert!(compared >= 1, "no case of four unknowns");
 }
 
-/// Printed (18) has x z = sin²θ cos²θ u/ρ and y z likewise: on those numbers limb rays lie on no cone.
+/// As printed, (18) has x z = sin²θ cos²θ u/ρ, and y z in the same form. With these values limb rays lie on no cone.
 #[test]
 fn printed_equation_18_is_no_cone() {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0)).unwrap();
@@ -94,7 +94,7 @@ fn printed_equation_18_is_no_cone() {
         let [x, y, z] = s.xyz();
         right.push([x * x, x * y, y * y, x * z, y * z, 1.0]);
         let sin = libm::sqrt(x * x + y * y);
-        // sin²θ cos²θ u/ρ: u/ρ is x/sin θ.
+        // In sin²θ cos²θ u/ρ, the factor u/ρ is x/sin θ.
         let (xz, yz) = (sin * z * z * x, sin * z * z * y);
         printed.push([x * x, x * y, y * y, xz, yz, 1.0]);
     }
@@ -104,7 +104,7 @@ fn printed_equation_18_is_no_cone() {
     assert!(printed[0] > 0.1, "{printed:?}");
 }
 
-/// A limb through the image centre has M₃₃ = 0, which their five unknowns divide by.
+/// A limb through the image centre has M₃₃ = 0, by which the five unknowns of the paper are divided.
 #[test]
 fn a_limb_through_the_image_centre_is_a_limb_as_any() {
     let config = CameraConfig { cx_px: 192.0, cy_px: 144.0, ..CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0) };
@@ -112,7 +112,7 @@ fn a_limb_through_the_image_centre_is_a_limb_as_any() {
     let alpha = 66f64.to_radians();
     let e = direction([libm::sin(alpha), 0.0, libm::cos(alpha)]);
     let points = limb(&camera, &e, libm::cos(alpha), 2.0);
-    // Wang (17) in five unknowns: the normal matrix of (x², xy, y², xz, yz) cannot give 1.
+    // Wang (17) in five unknowns: the normal equations of (x², xy, y², xz, yz) cannot give 1.
     let mut five = Triangle::<f64, 5>::new();
     let mut sums = [0.0; 5];
     for &(u, v) in &points {
@@ -137,7 +137,7 @@ fn a_limb_through_the_image_centre_is_a_limb_as_any() {
     }
 }
 
-/// The covariance of each method against the errors it makes, white and correlated.
+/// The covariance of each method agrees with the errors of the method, white and correlated.
 #[test]
 fn elliptic_cones_are_told_honestly() {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0)).unwrap();
@@ -184,7 +184,7 @@ fn elliptic_cones_are_told_honestly() {
     }
 }
 
-/// Points that determine no cone about one axis.
+/// Points that determine no cone about one axis give none.
 #[test]
 fn degenerate_points_are_no_cone() {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0)).unwrap();
@@ -202,7 +202,7 @@ fn degenerate_points_are_no_cone() {
 }
 
 proptest::proptest! {
-    /// Any points: an answer is finite and a direction, or there is none.
+    /// For any points, the answer is finite and a direction, or there is none.
     #[test]
     fn garbage_gives_finite_cones_or_none(points in proptest::collection::vec((0.0..383.0f64, 0.0..287.0f64), 0..60)) {
         fn check<T: Real>(points: &[(f64, f64)]) -> Result<(), proptest::test_runner::TestCaseError> {
@@ -228,7 +228,7 @@ proptest::proptest! {
     }
 }
 
-/// The quadric is that of the points with a weight.
+/// The quadric uses only the points with a weight.
 #[test]
 fn points_without_a_weight_do_not_count() {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0)).unwrap();
@@ -246,7 +246,8 @@ fn points_without_a_weight_do_not_count() {
     assert!(off.norm() < 1e-9, "{off}");
 }
 
-/// 400 points, a share of them anywhere in the picture, the others on the limb within 0.3 px.
+/// Returns 400 points: a fraction `outliers` of them anywhere in the picture, the others on the limb with an error of
+/// 0.3 px.
 fn scattered(camera: &Camera<f64>, exact: &[(f64, f64)], outliers: f64, seed: u32) -> Vec<(f64, f64)> {
     let mut rng = crate::base::rng::Rng::new(seed);
     let mut gauss = Gauss(crate::base::rng::Rng::new(seed + 1));
@@ -262,7 +263,7 @@ fn scattered(camera: &Camera<f64>, exact: &[(f64, f64)], outliers: f64, seed: u3
         .collect()
 }
 
-/// How many of `runs` sets of points with such a share of outliers a method solves to 2 degrees.
+/// Returns how many of `runs` sets of points with this fraction of outliers a method solves to 2 degrees.
 fn solved(config: &consensus::Config, outliers: f64, runs: u32) -> u32 {
     let camera = Camera::<f64>::try_new(&CameraConfig::ideal(Model::Equidistant, 384, 288, 92.0)).unwrap();
     let e = direction([0.3, 0.4, 0.8]);
@@ -299,7 +300,7 @@ fn published_samplers_find_the_limb() {
     }
 }
 
-/// Printed (25) ends after 286 draws; the five-point test lets one in 3000 through when 80 % are outliers.
+/// As printed, (25) ends after 286 draws. With 80 % outliers, only one draw in 3000 passes the five-point test.
 #[test]
 fn printed_equation_25_ends_too_early() {
     let config = consensus::Config {
@@ -315,7 +316,7 @@ fn printed_equation_25_ends_too_early() {
 }
 
 proptest::proptest! {
-    /// Any points, few or many, on one line or on one place: a consensus is a unit axis, or there is none.
+    /// For any points, few or many, on one line or in one place, a consensus has a unit axis, or there is none.
     #[test]
     fn samplers_end_on_garbage(
         points in proptest::collection::vec((-20.0..400.0f64, -20.0..300.0f64), 0..40),

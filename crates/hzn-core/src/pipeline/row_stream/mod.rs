@@ -1,15 +1,20 @@
 //! A picture that comes row by row, for a flight computer without room for a whole one.
 //!
-//! As a row comes it is turned into runs of lit and dark pixels ([`runs`]), and pixels that a border can pass through
-//! become edge points once the rows around them are there ([`window`], [`points`]). After the last row the stages from
-//! `contour` on go over runs and points as they go over a picture in memory: the same edges, the same points, the same
-//! answer. So the level must be known beforehand: it is `fixed`, or the one that the picture before gave.
+//! Each row is turned into runs of lit and dark pixels ([`runs`]). Pixels that a border can pass through become edge
+//! points as soon as the rows around them have arrived ([`recent_rows`], [`points`]). After the last row, the stages
+//! from `contour` on use runs and points in the same way as a picture in memory: with the same edges, the same points
+//! and the same answer. The threshold must therefore be known beforehand: it is `fixed`, or it comes from the picture
+//! before.
 //!
-//! What is not in memory any more cannot be asked for. When runs or points do not fit, the picture ends with the last
-//! row that did, or pixels are left out evenly: `dropped` counts them. An edge so wide that its plateau is not within
-//! the rows held has the last of them for a plateau: `cut_points`. There is one look: `[recover]` does not count, a
-//! dark frame is not found, and a picture without an answer stays without one. The contrast that an edge's own
-//! mid-level needs is a part of full scale, as what the picture has is known only after its last row.
+//! Rows that have left the memory cannot be read again, with these consequences:
+//! - When the runs do not fit, the picture ends with the last row that did. When the points do not fit, pixels are left
+//!   out evenly. `dropped` counts the pixels.
+//! - If an edge is so wide that its plateau lies beyond the rows in memory, the last of these rows stands for the
+//!   plateau. `cut_points` counts these points.
+//! - There is only one look: `[recover]` has no effect, a dark frame is not found, and a picture without an answer
+//!   stays without one.
+//! - The contrast that the local mid-level of an edge needs is a fraction of full scale, because the contrast of the
+//!   picture itself is known only after its last row.
 
 mod points;
 mod recent_rows;
@@ -37,16 +42,19 @@ use points::{Point, Points};
 use recent_rows::RecentRows;
 use runs::Runs;
 
-/// RowBuffers of the picture that are held.
+/// Rows of the picture that are kept in memory.
 pub const ROWS_HELD: u16 = 32;
-/// RowBuffers that must have come after a border pixel's before it is measured; not fewer are held before it.
+/// Rows that must follow a border pixel's row before the pixel is measured. At least as many rows before it are in
+/// memory then.
 const AHEAD: u16 = 15;
 
-/// What a picture of passing rows needs besides a [`Workspace`]: `WINDOW` samples, [`ROWS_HELD`] times the width;
-/// `HEIGHT` rows; `TURNS` changes between dark and lit in a row, of all rows together; `POINTS` edge points of all
-/// edges together.
+/// The memory that a picture needs in addition to a [`Workspace`] when it comes row by row.
 ///
-/// A new one is all zeros: in a `static` it takes no room in flash.
+/// `WINDOW` is the number of samples, [`ROWS_HELD`] times the width. `HEIGHT` is the number of rows. `TURNS` is the
+/// number of changes between dark and lit along the rows, for all rows together. `POINTS` is the number of edge points
+/// of all edges together.
+///
+/// New buffers are all zeros: as a `static` they take no room in flash.
 #[derive(Debug)]
 pub struct RowBuffers<S, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize> {
     window: [S; WINDOW],
@@ -67,7 +75,7 @@ impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, co
 impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize>
     RowBuffers<S, WINDOW, HEIGHT, TURNS, POINTS>
 {
-    /// Empty.
+    /// Makes empty buffers.
     pub const fn new() -> Self {
         Self {
             window: [S::ZERO; WINDOW],
@@ -79,23 +87,23 @@ impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, co
     }
 }
 
-/// Why a picture cannot be taken by rows.
+/// Why a picture cannot be processed row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowStreamError {
-    /// [`RowBuffers`] has no room for it: so many samples and rows are needed.
+    /// The [`RowBuffers`] are too small for the picture; the fields say what it needs.
     Room {
-        /// `WINDOW`.
+        /// Samples in the window, the least value of `WINDOW`.
         window: usize,
-        /// `HEIGHT`.
+        /// Rows, the least value of `HEIGHT`.
         height: usize,
     },
-    /// A method that needs the whole picture: the key of sensor.toml.
+    /// A method needs the whole picture. The string is the key in sensor.toml.
     Method(&'static str),
-    /// Bits per sample.
+    /// The number of bits per sample is not supported.
     Bits,
-    /// A row of another length than the picture is wide, which was not taken.
+    /// The length of a row is not the width of the picture. The row was not added.
     Length,
-    /// More rows than the picture has.
+    /// The picture has no more rows.
     Finished,
 }
 
@@ -114,32 +122,32 @@ impl fmt::Display for RowStreamError {
 }
 impl core::error::Error for RowStreamError {}
 
-/// A picture of which rows are taken.
+/// A picture whose rows are being added.
 #[derive(Debug)]
 pub struct RowStream<'a, T, S> {
     sensor: &'a Sensor<T>,
     expected: &'a Expected<T>,
-    /// `None`: the picture is for the next one's level only.
+    /// Threshold in counts; `None` if the picture only serves to find the threshold of the next one.
     level: Option<u16>,
     samples: RowSampler,
     window: RecentRows<'a, S>,
     runs: Runs<'a>,
     points: Points<'a>,
-    /// RowBuffers that came.
+    /// Number of rows that have arrived.
     rows: u16,
-    /// A row did not fit: what comes is not looked at.
+    /// Whether a row did not fit. The rows after it only serve to find the next threshold.
     full: bool,
 }
 
 impl<T: Real> Sensor<T> {
-    /// Begins a picture whose rows will be given one by one, of samples with `bits` significant bits.
+    /// Begins a picture whose rows come one by one. The samples have `bits` significant bits.
     ///
-    /// With the level `fixed` every picture has an answer. With every other method the level is `expected.level`, to
-    /// which the caller gives the last report's `next_level`; without one the status is `no-limb` at the first stage,
-    /// with the level for the next picture.
+    /// With a `fixed` threshold every picture can have an answer. With every other method the threshold is
+    /// `expected.level`; the caller sets it to the `next_level` of the last report. Without it the status is `no-limb`
+    /// at the first stage, and the report has the threshold for the next picture.
     ///
     /// # Errors
-    /// No room, or a method that needs the whole picture.
+    /// The buffers are too small, a method needs the whole picture, or the number of bits is not supported.
     pub fn rows<'a, S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize>(
         &'a self,
         rows: &'a mut RowBuffers<S, WINDOW, HEIGHT, TURNS, POINTS>,
@@ -187,10 +195,10 @@ impl<T: Real> Sensor<T> {
 }
 
 impl<T: Real, S: Sample> RowStream<'_, T, S> {
-    /// Takes the next row, from the top.
+    /// Adds the next row, from the top.
     ///
     /// # Errors
-    /// A row of another length, or one too many: nothing has changed.
+    /// The row has another length, or the picture already has all its rows. Nothing changes then.
     pub fn push_row(&mut self, row: &[S]) -> Result<(), RowStreamError> {
         let camera = &self.sensor.camera;
         if row.len() != usize::from(camera.width()) {
@@ -213,7 +221,8 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         Ok(())
     }
 
-    /// The rows are through: finds the limb. With fewer rows than the picture has, `rejected` at the first stage.
+    /// Finds the limb after the last row. With fewer rows than the picture has, the status is `rejected` at the first
+    /// stage.
     pub fn finish<O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
         mut self,
         workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
@@ -276,7 +285,7 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         }
     }
 
-    /// Measures the edge points of a row, the rows around which have come.
+    /// Measures the edge points of a row. The rows around it must have arrived.
     fn measure(&mut self, y: u16, level: u16, region: &Region<T>) {
         let config = &self.sensor.config.candidates;
         let binary = BinaryPicture::new(&self.window, region, level, &Unobserved).blooming(self.expected.blooms());
@@ -292,7 +301,7 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
     }
 }
 
-/// What is left of the rows: two shades, and edge points.
+/// The part of the picture that is still in memory after the last row: two shades, and edge points.
 struct Memory<'a> {
     runs: &'a Runs<'a>,
     points: &'a Points<'a>,

@@ -1,9 +1,9 @@
-//! Edge points by the border pixel that they were measured at, in the order of the rows.
+//! Edge points by the border pixel at which they were measured, in the order of the rows.
 
 use crate::geometry::block::Lit;
 use crate::image::StreamedPoint;
 
-/// An edge point: the column of its border pixel, and where it lies from there.
+/// An edge point: the column of its border pixel, and the distance from there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
     towards_dark_px: f32,
@@ -21,16 +21,17 @@ impl Point {
     pub(super) const NONE: Self = Self { towards_dark_px: 0.0, x: 0, lit: Lit::Right, marks: 0 };
 }
 
-/// The points of the rows so far; views of memory that belongs to someone else. When it is full, every second pixel is
-/// left out, here and from then on, by a number that has nothing to do with where edges run.
+/// The points of the rows so far, in borrowed memory. When the memory is full, every second pixel is left out, both of
+/// the points so far and from then on. A hash of the coordinates selects the pixels, independently of the course of
+/// edges.
 #[derive(Debug)]
 pub(super) struct Points<'a> {
-    /// Where each row ends in `points`.
+    /// Index in `points` at which each row ends.
     ends: &'a mut [u16],
     points: &'a mut [Point],
     rows: u16,
     used: usize,
-    /// Of 2^thinned pixels one is measured.
+    /// One of 2^thinned pixels is measured.
     thinned: u32,
     dropped: u32,
 }
@@ -42,7 +43,7 @@ impl<'a> Points<'a> {
         Self { ends, points, rows: 0, used: 0, thinned: 0, dropped: 0 }
     }
 
-    /// Border pixels left out.
+    /// Returns the number of border pixels that were left out.
     pub(super) fn dropped(&self) -> u32 {
         self.dropped
     }
@@ -52,7 +53,7 @@ impl<'a> Points<'a> {
         (n ^ n >> 15).wrapping_mul(0x2C1B_3C6D).checked_shr(32 - thinned).unwrap_or(0) == 0
     }
 
-    /// Whether the pixel is to be measured; makes room for it.
+    /// Returns whether the pixel must be measured, and makes room for its point.
     pub(super) fn wants(&mut self, x: u16, y: u16) -> bool {
         while Self::kept(x, y, self.thinned) {
             if self.used < self.points.len() {
@@ -67,7 +68,7 @@ impl<'a> Points<'a> {
         false
     }
 
-    /// Leaves every second pixel out, of the finished rows and of `y`, which is not finished.
+    /// Leaves out every second pixel of the finished rows and of row `y`, which is not finished.
     #[cold]
     fn halve(&mut self, y: u16) {
         self.thinned += 1;
@@ -99,7 +100,7 @@ impl<'a> Points<'a> {
         self.used = to;
     }
 
-    /// Adds a point of the row that is not finished; columns rise.
+    /// Adds a point to the row that is not finished, in order of increasing columns.
     pub(super) fn push(&mut self, x: u16, found: StreamedPoint) {
         if let Some(place) = self.points.get_mut(self.used) {
             let marks =
@@ -109,7 +110,7 @@ impl<'a> Points<'a> {
         }
     }
 
-    /// The row is finished.
+    /// Ends the row.
     pub(super) fn end_row(&mut self) {
         if let Some(end) = self.ends.get_mut(usize::from(self.rows)) {
             *end = self.used as u16;
@@ -117,7 +118,7 @@ impl<'a> Points<'a> {
         self.rows += 1;
     }
 
-    /// The point of a border pixel of a finished row.
+    /// Returns the point at a border pixel of a finished row.
     pub(super) fn get(&self, x: u16, y: u16) -> Option<StreamedPoint> {
         let at = |y: u16| self.ends.get(usize::from(y)).map_or(0, |&e| usize::from(e));
         let start = if y == 0 { 0 } else { at(y - 1) };

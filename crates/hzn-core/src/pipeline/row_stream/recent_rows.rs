@@ -1,19 +1,19 @@
-//! The last rows of a picture that passes.
+//! The last rows of a picture that comes row by row.
 
 use core::cell::Cell;
 
 use super::ROWS_HELD;
 use crate::image::{Pixels, Sample};
 
-/// The last [`ROWS_HELD`] rows. Where others are asked for, the first or the last of them stands for them, which is
-/// counted.
+/// The last [`ROWS_HELD`] rows. A read of an older or a later row returns the first or the last of these rows instead,
+/// and is counted.
 #[derive(Debug)]
 pub(super) struct RecentRows<'a, S> {
     samples: &'a mut [S],
     width: u16,
     height: u16,
     full_scale: u16,
-    /// RowBuffers so far.
+    /// Number of rows so far.
     rows: u16,
     beyond: Cell<u32>,
 }
@@ -25,7 +25,7 @@ impl<'a, S: Sample> RecentRows<'a, S> {
     fn start(&self, y: u16) -> usize {
         usize::from(y % ROWS_HELD) * usize::from(self.width)
     }
-    /// Takes the next row in the place of the oldest.
+    /// Stores the next row in place of the oldest.
     pub(super) fn push(&mut self, row: &[S]) {
         let start = self.start(self.rows);
         if let Some(place) = self.samples.get_mut(start..start + usize::from(self.width))
@@ -35,7 +35,7 @@ impl<'a, S: Sample> RecentRows<'a, S> {
         }
         self.rows += 1;
     }
-    /// Whether rows were asked for, since the last time, that are not held.
+    /// Returns whether rows that are not in memory were read since the last call.
     pub(super) fn went_beyond(&self) -> bool {
         self.beyond.replace(0) > 0
     }

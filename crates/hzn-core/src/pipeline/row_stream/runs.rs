@@ -1,11 +1,12 @@
-//! A picture of two shades as runs: of each row the columns where dark turns to lit and lit to dark.
+//! A picture of two shades as runs: for each row, the columns where dark changes to lit and lit to dark.
 
-/// RowBuffers so far; views of memory that belongs to someone else.
+/// The runs of the rows so far, in borrowed memory.
 #[derive(Debug)]
 pub(super) struct Runs<'a> {
-    /// Where each row ends in `turns`.
+    /// Index in `turns` at which each row ends.
     ends: &'a mut [u16],
-    /// Columns where the shade changes, from dark at the left; a lit run at the right ends with the width.
+    /// Columns where the shade changes, beginning with dark at the left. A lit run at the right end has the width as
+    /// its end.
     turns: &'a mut [u16],
     rows: u16,
     used: usize,
@@ -14,12 +15,12 @@ pub(super) struct Runs<'a> {
 
 impl<'a> Runs<'a> {
     pub(super) fn new(ends: &'a mut [u16], turns: &'a mut [u16], width: u16) -> Self {
-        // Places are 16 bits.
+        // Indices have 16 bits.
         let room = turns.len().min(usize::from(u16::MAX));
         Self { ends, turns: turns.get_mut(..room).unwrap_or_default(), rows: 0, used: 0, width }
     }
 
-    /// Takes the next row, whole or not at all: false when it does not fit.
+    /// Adds the next row as a whole. Returns false and adds nothing if it does not fit.
     pub(super) fn push(&mut self, row: impl Iterator<Item = bool>) -> bool {
         let (mut used, mut before) = (self.used, false);
         for (lit, x) in row.zip(0u16..) {
@@ -38,12 +39,12 @@ impl<'a> Runs<'a> {
         true
     }
 
-    /// RowBuffers taken.
+    /// Returns the number of rows so far.
     pub(super) fn rows(&self) -> u16 {
         self.rows
     }
 
-    /// The turns of a row that was taken.
+    /// Returns the columns of row `y` where the shade changes.
     #[inline]
     pub(super) fn row(&self, y: u16) -> &[u16] {
         let at = |y: u16| self.ends.get(usize::from(y)).map_or(0, |&e| usize::from(e));
@@ -56,8 +57,9 @@ impl<'a> Runs<'a> {
         self.row(y).partition_point(|&turn| turn <= x) % 2 == 1
     }
 
-    /// Lit pixels of row `y` that a border can pass through: with a dark one among their eight neighbours in the rows
-    /// taken, or at the end of a run. Calls `found` with their columns, rising.
+    /// Calls `found` with the column of every lit pixel of row `y` that a border can pass through, in increasing order.
+    /// These are pixels at the end of a run, and pixels with a dark one among their neighbours in the rows above and
+    /// below, as far as these rows have been added.
     pub(super) fn each_border(&self, y: u16, mut found: impl FnMut(u16)) {
         let neighbour = |row: Option<u16>| row.filter(|&r| r < self.rows).map(|r| self.row(r));
         let mut beside =
@@ -77,7 +79,7 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// The dark runs of a row, looked through from left to right.
+/// The dark runs of a row, searched from left to right.
 struct Dark<'a> {
     turns: &'a [u16],
     width: u16,
@@ -88,7 +90,8 @@ impl<'a> Dark<'a> {
     fn new(turns: &'a [u16], width: u16) -> Self {
         Self { turns, width, at: 0 }
     }
-    /// The first column from `x` on with a dark pixel in this row beside it or at it; rising `x` only.
+    /// Returns the first column from `x` on with a dark pixel of this row at the same or at a neighbouring column. `x`
+    /// must not decrease from call to call.
     fn next_near(&mut self, x: u16) -> u16 {
         loop {
             let start = match self.at {
