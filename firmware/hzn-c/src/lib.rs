@@ -194,7 +194,7 @@ pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
             0
         }
         _ => {
-            sensor.wanted.sensor = sensor.sensor.config().clone();
+            sensor.wanted = Parameters::new(sensor.sensor.config().clone());
             HZN_REFUSED
         }
     }
