@@ -37,7 +37,7 @@ impl Why {
     }
 }
 
-/// Counts pictures without an answer by their reason.
+/// Counts refusals (a body without an answer in a picture) by their reason.
 #[derive(Debug, Default)]
 pub(crate) struct Refusals {
     /// Number of answers that a further look at another threshold gave.
