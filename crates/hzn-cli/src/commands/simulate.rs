@@ -45,7 +45,7 @@ pub(super) struct Args {
     /// Render only the pictures that are missing in the folder
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// No progress on stderr
+    /// Print no progress on stderr
     #[arg(short, long)]
     quiet: bool,
     /// Print the scene.toml and do nothing else

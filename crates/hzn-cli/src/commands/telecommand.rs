@@ -22,7 +22,7 @@ use hzn_run::sink;
 ///   "read NAME [NAME]..."
 ///   "known ALTITUDE_KM [X_KM Y_KM Z_KM [RATE_X RATE_Y RATE_Z]]"   rates in rad/s; NaN: not known
 ///   "process-once", "dump-edges", "reset-counters"
-/// The bytes go to standard output unless -o is given. The format: book/reference/telemetry.md.
+/// The bytes go to standard output unless -o is given. book/reference/telemetry.md describes the format.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {

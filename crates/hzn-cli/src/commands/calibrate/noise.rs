@@ -24,9 +24,9 @@ use hzn_run::source::ending;
 /// The flight needs an altitude or a position for each picture (frames.csv, --altitude-km, body.altitude_km), but no
 /// truth. The altitude gives the expected size of the limb, so the measured size gives the limb height. The residuals
 /// along the limb give the edge noise. The report goes to stdout. `-o sensor.toml` writes the keys, with comments, into
-/// a copy of the sensor.toml; `-o report.html` writes plots of both. Nothing is written if the flight is not sufficient
-/// (fewer than 12 answered pictures, too small a field of view), or if its pictures contradict each other. Then the
-/// exit code is 1 and the message has the measured number.
+/// a copy of the sensor.toml; `-o report.html` writes plots of both. No sensor.toml is written if the flight is not
+/// sufficient (fewer than 12 answered pictures, too small a field of view), or if its pictures contradict each other.
+/// Then the exit code is 1 and the message has the measured number.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A folder, a pattern in quotes, pictures, a video, or an MCAP
@@ -42,10 +42,10 @@ pub(super) struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
-    /// Threads; without it, all cores
+    /// Number of threads; without it, all cores
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// No progress on stderr
+    /// Print no progress on stderr
     #[arg(short, long)]
     quiet: bool,
 }

@@ -372,7 +372,7 @@ fn chart(grid: &Grid<'_>, results: &[(Vec<f64>, Option<Sigmas>)], x: usize, othe
     names.dedup();
     names.sort();
     names.dedup();
-    // With several lines for each quantity, roll and the other estimates would fill the plot.
+    // With several lines for each quantity, roll and the pitch with free or known half-angle would fill the plot.
     let lines: &[(&str, Pick)] = if others.is_empty() {
         &[
             ("pitch, half-angle free", |s| Some(s.free.pitch_deg)),
