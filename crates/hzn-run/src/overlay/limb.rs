@@ -61,7 +61,8 @@ mod tests {
         assert_eq!(disc[0].first(), disc[0].last());
         let radius = |p: &[f64; 2]| (p[0] - 319.5).hypot(p[1] - 239.5);
         assert!(disc[0].iter().all(|p| (radius(p) - 500.0 * 0.1f64.tan()).abs() < 1e-9));
-        // The body has a half-angle of 69 degrees and is below the camera's horizon: one arc crosses the picture.
+        // The half-angle is about 70 degrees, and the body is straight below the camera's horizon: one arc crosses the
+        // picture.
         let down = 1.25f64;
         let arc = lines([0.0, down.sin(), down.cos()], 1.2, &camera);
         assert_eq!(arc.len(), 1, "{arc:?}");
