@@ -134,8 +134,8 @@ fn with_altitude(text: &str, km: f64, bodies: &[usize]) -> String {
     document.to_string()
 }
 
-/// Writes the properties of the samples that only the pictures show into the sensor and its text, and tells the source
-/// which colour channel is wanted. Returns notes for the user.
+/// Requests the colour channel from the source. If sensor.toml does not state the number of bits, finds it from the
+/// pictures and sets it in the sensor and its text. Returns notes for the user.
 pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<String>, Stop> {
     let mut notes = Vec::new();
     source.want_channel(sensor.config.input.channel)?;

@@ -1,4 +1,4 @@
-//! Explanations for people, in words and numbers: what happened to a picture.
+//! Explains in words and numbers what happened to a picture.
 
 use hzn_core::covariance::Term;
 use hzn_core::status::{Stage, Status};

@@ -15,12 +15,12 @@ use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::source::{self, Item, Picture, Source};
 use hzn_run::{explain, overlay, sink};
 
-/// Show what happens to one frame: what is kept, what is dropped, and why
+/// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A picture; or a folder, video or MCAP together with --index
     frame: PathBuf,
-    /// Number of the frame in a sequence, from 0
+    /// Number of the picture in a sequence, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     index: u64,
     #[command(flatten)]

@@ -23,8 +23,8 @@ use crate::exit::Outcome;
 
 /// Find the limb of a planet in pictures, and measure the direction to the body with its covariance.
 ///
-/// Exit codes: 0 every frame was read and processed; 1 failed; 2 wrong usage or configuration; 3 finished, but some
-/// frames could not be read or had no altitude; 130 interrupted (the output is valid and can be continued with
+/// Exit codes: 0 every picture was read and processed; 1 failed; 2 wrong usage or configuration; 3 finished, but some
+/// pictures could not be read or had no altitude; 130 interrupted (the output is valid and can be continued with
 /// --resume).
 #[derive(Debug, Parser)]
 #[command(name = "hzn", version, max_term_width = 100)]

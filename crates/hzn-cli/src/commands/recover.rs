@@ -10,8 +10,8 @@ use hzn_run::source;
 
 /// Close a file that a crash left unfinished
 ///
-/// The complete parts of the file are kept: all complete batches of frames of a recording, all complete rows of a
-/// table. The incomplete end is dropped: at most the frames of the last quarter of a second. To continue the run
+/// The complete parts of the file are kept: all complete batches of pictures of a recording, all complete rows of a
+/// table. The incomplete end is dropped: at most the pictures of the last quarter of a second. To continue the run
 /// instead, use `hzn run --resume`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {

@@ -39,7 +39,7 @@ pub(super) struct Args {
     /// Replace an output that exists
     #[arg(long)]
     force: bool,
-    /// Continue an output after its last finished frame
+    /// Continue an output after its last finished picture
     #[arg(long, conflicts_with = "force", requires = "output")]
     resume: bool,
     /// Leave the pictures out of an MCAP

@@ -48,7 +48,7 @@ pub struct Plan {
     pub keep_traces: bool,
     /// Hand the picture to the sink.
     pub keep_picture: bool,
-    /// Draw an overlay of every frame into this folder.
+    /// Draw an overlay of every picture into this folder.
     pub overlay: Option<std::path::PathBuf>,
     /// The last answers of the run that this one continues, one for each body.
     pub last: Vec<Option<Answered>>,

@@ -1,7 +1,7 @@
 //! The outputs for results: `.mcap`, `.csv`, `.jsonl` by the ending, or a CSV table on stdout.
 //!
 //! A file is written as `NAME.part` and gets its final name at the end, also after Ctrl-C. Therefore every file with
-//! the final name is complete. A crash leaves the `.part` file. [`open`] can continue both.
+//! the final name is complete. A crash leaves the `.part` file. [`open`] can continue either.
 
 mod record;
 mod text;

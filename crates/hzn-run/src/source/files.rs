@@ -46,8 +46,8 @@ enum Kind {
 }
 
 impl Kind {
-    /// A path without metadata counts as a file: it is a picture that cannot be read, such as a broken link into an
-    /// archive.
+    /// A path without metadata counts as a file: it is a picture that cannot be read, such as a link into an archive
+    /// that is not mounted.
     fn from_path(path: &Path) -> Self {
         match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => Self::Folder,

@@ -33,7 +33,7 @@ use crate::error::{Error, Remedy, unusable};
 pub struct Item {
     /// The name of the picture in results and in frames.csv.
     pub name: String,
-    /// The origin of its time, unless [`Self::time_source`] returns a better one.
+    /// The origin of its time, unless [`Self::time_source`] returns another one.
     pub time: TimeSource,
     /// The prior from the source itself, as a row of frames.csv. A recording of ours has one: the prior of its first
     /// run.
@@ -161,8 +161,8 @@ impl Item {
 }
 
 impl Payload {
-    /// Decodes the picture. Also returns the file's own bytes if they are PNG or JPEG and can be kept unchanged. With a
-    /// sensor, the picture must have the sensor's size, and is given the sensor's bits and turn.
+    /// Decodes the picture. With a sensor, the picture must have the sensor's size, and gets the sensor's number of
+    /// bits and turn. Also returns the file's own bytes, if they are PNG or JPEG and can be kept unchanged.
     ///
     /// # Errors
     /// The reason why the picture cannot be read, for its result.
@@ -261,8 +261,10 @@ pub fn recorded(image: hzn_mcap::EncodedImage) -> Payload {
     recording::payload(image)
 }
 
-/// Checks that a file exists that a command reads. Returns the ending of its kind, and whether an unfinished run left
-/// it. An unfinished file has the ending of its kind before `.part`.
+/// Checks that an input file exists. Returns the ending of its kind, and whether an unfinished run left it. An unfinished file has the ending of its kind before `.part`.
+///
+/// # Errors
+/// The file does not exist, or is a folder.
 pub fn existing(file: &Path) -> Result<(String, bool), Error> {
     if !file.is_file() {
         let what = if file.is_dir() { "is a folder; a file is expected here" } else { "no such file" };

@@ -20,8 +20,8 @@ use hzn_run::source::ending;
 /// Compare results with the truth: shares of answers, errors, and whether the covariance is right
 ///
 /// Every picture counts. A picture with a limb in view but without an answer is missed; an answer without a limb in
-/// view is false. The report goes to stdout; -o writes it as JSON with every frame, or as one HTML page with plots and
-/// the worst frames. Angles are in degrees.
+/// view is false. The report goes to stdout; -o writes it as JSON with every picture, or as one HTML page with plots
+/// and the worst pictures. Angles are in degrees.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The output of `hzn run`: .mcap, .csv or .jsonl
@@ -35,7 +35,7 @@ pub(super) struct Args {
     /// Also write the report: .json or .html; may be given twice
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
-    /// Number of the worst frames that are listed and drawn
+    /// Number of the worst pictures that are listed and drawn
     #[arg(long, value_name = "N", default_value_t = 6)]
     worst: usize,
     /// Replace files that exist
