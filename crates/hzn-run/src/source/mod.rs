@@ -261,7 +261,8 @@ pub fn recorded(image: hzn_mcap::EncodedImage) -> Payload {
     recording::payload(image)
 }
 
-/// Checks that an input file exists. Returns the ending of its kind, and whether an unfinished run left it. An unfinished file has the ending of its kind before `.part`.
+/// Checks that an input file exists. Returns the ending of its kind, and whether an unfinished run left it. An
+/// unfinished file has the ending of its kind before `.part`.
 ///
 /// # Errors
 /// The file does not exist, or is a folder.
