@@ -1,4 +1,4 @@
-//! How a run ends: the exit code, and an error with the code that belongs to it.
+//! Exit codes, and errors with their exit code.
 
 use std::process::ExitCode;
 
@@ -9,15 +9,15 @@ use hzn_run::{Kind, Remedy};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// Every frame was read and processed.
+    /// Every picture was read and processed.
     Done = 0,
-    /// Something failed on the way: a disk, a file that is broken.
+    /// Something failed during the run, for example a disk or a broken file.
     Failed = 1,
     /// The command line or a configuration is wrong; nothing was done.
     Usage = 2,
-    /// Finished, but some frames could not be read.
+    /// The run finished, but some pictures could not be read.
     SomeUnreadable = 3,
-    /// Interrupted; what was written is valid and can be continued.
+    /// The run was interrupted; its output is valid and can be continued.
     Interrupted = 130,
 }
 
@@ -36,7 +36,7 @@ pub struct Stop {
     pub error: anyhow::Error,
 }
 
-/// What a command comes to.
+/// The result of a command.
 pub type Outcome = Result<Exit, Stop>;
 
 impl From<anyhow::Error> for Stop {
@@ -65,7 +65,7 @@ impl From<hzn_run::Error> for Stop {
     }
 }
 
-/// What the command line offers against an error.
+/// Returns the option of the command line that helps against an error.
 fn option(remedy: Remedy) -> Option<&'static str> {
     Some(match remedy {
         Remedy::Replace => "--force replaces it",
@@ -84,12 +84,12 @@ impl From<Problem> for Stop {
     }
 }
 
-/// A wrong command line or configuration.
+/// Returns the error for a wrong command line or configuration.
 pub fn usage(message: impl std::fmt::Display) -> Stop {
     Stop { exit: Exit::Usage, error: anyhow::anyhow!("{message}") }
 }
 
-/// Something that failed.
+/// Returns the error for something that failed.
 pub fn failed(message: impl std::fmt::Display) -> Stop {
     Stop { exit: Exit::Failed, error: anyhow::anyhow!("{message}") }
 }

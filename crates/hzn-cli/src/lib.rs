@@ -1,8 +1,9 @@
-//! The command `hzn`: from a sequence of pictures to directions with covariances, in files that others can read.
+//! The command `hzn`: it turns a sequence of pictures into directions with covariances, in files that other programs
+//! can read.
 //!
-//! `main.rs` turns [`main`]'s answer into an exit code. Commands live in [`commands`], one file each; they are put
-//! together from what `hzn-run` has. Here are the arguments, the progress bar, the exit codes ([`exit`]) and the charts
-//! of reports ([`plot`]).
+//! `main.rs` turns the result of [`main`] into an exit code. Each command has one file in [`commands`] and is built
+//! from the parts of `hzn-run`. This crate has the arguments, the progress bar, the exit codes ([`exit`]) and the
+//! charts of reports ([`plot`]).
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when nobody reads; `tell` does not")]
 
@@ -18,14 +19,14 @@ use clap::Parser;
 
 use exit::Exit;
 
-/// Runs the command line and says how it ended. Errors are printed on stderr.
+/// Runs the command line and returns how it ended. Errors are printed on stderr.
 pub fn main() -> Exit {
-    // clap itself prints help and usage errors, and leaves with 0 or 2.
+    // clap itself prints help and usage errors, and exits with 0 or 2.
     let cli = commands::Cli::parse();
     match commands::run(cli) {
         Ok(exit) => exit,
         Err(stop) => {
-            // A reader that has seen enough (`hzn run ... | head`) is no error worth a message.
+            // A reader that has read enough (`hzn run ... | head`) is not an error worth a message.
             if !is_broken_pipe(&stop.error) {
                 tell::line(format_args!("error: {:#}", stop.error));
             }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use anyhow::anyhow;
 use plotters::prelude::*;
 
-/// The colours of Okabe and Ito, which stay apart for colour-blind eyes, in the order in which they are taken.
+/// The colours of Okabe and Ito, in the order in which they are used. Colour-blind people can distinguish them.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -16,30 +16,30 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(60, 60, 60),
 ];
 
-/// How a series is drawn.
+/// The style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
-    /// A line through the points; a point that is not finite breaks it.
+    /// A line through the points. A point that is not finite interrupts it.
     Line,
-    /// A thin grey line, for what is expected.
+    /// A thin grey line, for expected values.
     Ideal,
-    /// A dot a point.
+    /// One dot for each point.
     Dots,
 }
 
 /// Points with a name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What the legend says; empty is not listed.
+    /// Name in the legend; a series with an empty name is not listed.
     pub name: String,
-    /// How it is drawn.
+    /// Style of the series.
     pub style: Style,
     /// (x, y).
     pub points: Vec<(f64, f64)>,
 }
 
 impl Series {
-    /// Points with a name and a style.
+    /// Makes a series from points, a name and a style.
     pub fn new(name: impl Into<String>, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self { name: name.into(), style, points: points.into_iter().collect() }
     }
@@ -48,35 +48,35 @@ impl Series {
 /// A chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// Above the chart.
+    /// Title above the chart.
     pub title: String,
-    /// Below the x axis, with its unit.
+    /// Label below the x axis, with its unit.
     pub x: String,
-    /// Beside the y axis, with its unit.
+    /// Label next to the y axis, with its unit.
     pub y: String,
-    /// What is drawn.
+    /// The series that are drawn.
     pub series: Vec<Series>,
-    /// Width and height.
+    /// Width and height in pixels.
     pub size: (u32, u32),
 }
 
 impl Chart {
-    /// An empty chart of the usual size.
+    /// Makes an empty chart of the usual size.
     pub fn new(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
         let size = (640, 360);
         Self { title: title.into(), x: x.into(), y: y.into(), series: Vec::new(), size }
     }
-    /// The same with one series more.
+    /// Adds a series.
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// As a text of SVG.
+    /// Returns the chart as SVG text.
     ///
     /// # Errors
-    /// Nothing that can be drawn: no finite point.
+    /// There is nothing to draw: no point is finite.
     pub fn svg(&self) -> anyhow::Result<String> {
         let range = |of: fn(&(f64, f64)) -> f64| {
             let values = self.series.iter().flat_map(|s| &s.points).filter(|p| shown(p)).map(of);
@@ -87,10 +87,11 @@ impl Chart {
             return Err(anyhow!("{}: there is nothing to draw", self.title));
         }
         let x = margin(x);
-        // The legend has the top of the chart for itself.
+        // The legend has the top of the chart to itself.
         let named = self.series.iter().filter(|s| !s.name.is_empty()).count();
         let room = named as f64 * 18.0 / f64::from(self.size.1.max(100) - 90);
-        // Errors and sigmas begin at zero, so that small differences do not look large.
+        // Values that are never negative, such as errors and sigmas, start at zero, so that small differences do not
+        // look large.
         let (low, high) = margin(if y.0 >= 0.0 { (0.0, y.1) } else { y });
         let low = if y.0 >= 0.0 { 0.0 } else { low };
         self.draw(x, low..high + room * (high - low))
@@ -138,7 +139,7 @@ impl Chart {
                 for piece in series.points.split(|p| !shown(p)) {
                     chart.draw_series(LineSeries::new(piece.iter().copied(), style))?;
                 }
-                // The legend is one for all pieces.
+                // All parts of a line share one legend entry.
                 chart.draw_series(LineSeries::new([], style))?
             };
             if !series.name.is_empty() {
@@ -165,18 +166,18 @@ impl Chart {
     }
 }
 
-/// Whether a point has a place in a chart.
+/// Returns whether a point can be drawn.
 fn shown(&(x, y): &(f64, f64)) -> bool {
     x.is_finite() && y.is_finite()
 }
 
-/// A range with a little room at both ends, also where it has no length.
+/// Widens a range a little at both ends, also a range of length zero.
 fn margin((low, high): (f64, f64)) -> (f64, f64) {
     let room = if high > low { 0.04 * (high - low) } else { (0.1 * high.abs()).max(0.5) };
     (low - room, high + room)
 }
 
-/// A tick's number, without digits that say nothing.
+/// Formats the number of a tick, rounded to five significant digits.
 fn number(v: f64) -> String {
     let digits = format!("{v:.4e}");
     let v: f64 = digits.parse().unwrap_or(v);

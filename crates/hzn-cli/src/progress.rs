@@ -1,4 +1,4 @@
-//! Progress on stderr: a bar on a terminal, a line now and then otherwise.
+//! Progress on stderr: a bar on a terminal, otherwise a line every few seconds.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -8,13 +8,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::tell;
 
-/// Between two lines where there is no terminal.
+/// Time between two progress lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
-/// How often each status was the answer.
+/// Number of pictures for each status.
 type Counts = [u64; Status::ALL.len()];
 
-/// Counts frames and shows how far the run is.
+/// Counts pictures and shows the progress of the run.
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     quiet: bool,
@@ -22,9 +22,9 @@ pub(crate) struct Progress {
     start: Instant,
     last_line: Instant,
     frames: u64,
-    /// What became of each body, by its place in the sensor.toml.
+    /// Counts for each body, in the order of the sensor.toml.
     bodies: Vec<Counts>,
-    /// Frames that were finished before this run.
+    /// Number of pictures that were finished before this run.
     before: u64,
 }
 
@@ -51,7 +51,7 @@ impl Progress {
         Self { bar, quiet, total, start: now, last_line: now, frames: 0, bodies: Vec::new(), before }
     }
 
-    /// A frame is finished; `statuses` are those of its bodies.
+    /// Counts a finished picture; `statuses` are those of its bodies.
     pub(crate) fn count(&mut self, statuses: impl IntoIterator<Item = Status>) {
         self.frames += 1;
         for (i, status) in statuses.into_iter().enumerate() {
@@ -70,7 +70,7 @@ impl Progress {
         }
     }
 
-    /// A message above the bar.
+    /// Prints a message above the bar.
     pub(crate) fn say(&self, message: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| tell::line(message)),
@@ -81,11 +81,11 @@ impl Progress {
     pub(crate) fn frames(&self) -> u64 {
         self.frames
     }
-    /// Whether anything was found.
+    /// Returns whether any picture was answered.
     pub(crate) fn any_answered(&self) -> bool {
         self.bodies.iter().any(|counts| counts[Status::Ok as usize] > 0)
     }
-    /// Whether a picture could not be processed.
+    /// Returns whether any picture could not be processed.
     pub(crate) fn any_unprocessed(&self) -> bool {
         let none = [Status::Unreadable, Status::NoAltitude];
         self.bodies.iter().any(|counts| none.iter().any(|s| counts[*s as usize] > 0))
@@ -94,8 +94,8 @@ impl Progress {
         self.frames as f64 / self.start.elapsed().as_secs_f64().max(1e-9)
     }
 
-    /// Takes the bar away and sums up: `123 frames: 120 ok, 2 no-limb, 1 unreadable; 85.2 frames a second`, and with
-    /// several bodies `4 frames: sun 3 ok, 1 rejected; moon 4 no-limb; 85.2 frames a second`.
+    /// Removes the bar and returns a summary: `123 frames: 120 ok, 2 no-limb, 1 unreadable; 85.2 frames a second`. With
+    /// several bodies it is `4 frames: sun 3 ok, 1 rejected; moon 4 no-limb; 85.2 frames a second`.
     pub(crate) fn summary(&self, bodies: &[&str]) -> String {
         self.finish();
         let frames = match self.frames {
@@ -115,7 +115,7 @@ impl Progress {
         format!("{frames}: {found}; {:.1} frames a second", self.rate())
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -1,4 +1,4 @@
-//! What the pictures without an answer have in common, for the end of a run.
+//! The common reasons of pictures without an answer, for the end of a run.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use hzn_core::{Report, gates};
 use hzn_run::engine::Finished;
 use hzn_run::explain;
 
-/// Why a body was not found in a picture: what became of its longest fitted edge, or where the picture ended without
-/// one.
+/// The reason why a body was not found in a picture: the verdict on the fitted edge with the most inliers, or the
+/// status if no edge was fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Why {
     Verdict(Verdict),
@@ -18,12 +18,13 @@ enum Why {
 }
 
 impl Why {
-    /// `None` of an answer.
+    /// Returns the reason; `None` for an answer.
     fn from_report(report: &Report<f64>) -> Option<Self> {
         if report.status == Status::Ok {
             return None;
         }
-        // Of edges that carry alike the first, which lies beside the longest dark stretch of the border.
+        // Among edges with equally many inliers the first is used. It begins next to the longest dark stretch of the
+        // border.
         let most = report.candidates.iter().rev().max_by_key(|c| c.inliers);
         Some(most.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
     }
@@ -36,12 +37,13 @@ impl Why {
     }
 }
 
-/// Counts refusals by their reason.
+/// Counts refusals (a body without an answer in a picture) by their reason.
 #[derive(Debug, Default)]
 pub(crate) struct Refusals {
-    /// Answers that a further look at another level gave.
+    /// Number of answers that a further look at another threshold gave.
     further: u64,
-    /// Reason, how often, and the number of the first frame with it that was processed for every body.
+    /// For each reason: the reason, its count, and the number of the first picture with it that was processed for every
+    /// body.
     each: Vec<(Why, u64, Option<u64>)>,
     total: u64,
 }
@@ -60,7 +62,7 @@ impl Refusals {
         }
     }
 
-    /// How many answers a further look gave, in words; `None` of none.
+    /// Returns the number of answers from further looks, in words; `None` if there are none.
     pub(crate) fn further(&self) -> Option<String> {
         match self.further {
             0 => None,
@@ -69,8 +71,8 @@ impl Refusals {
         }
     }
 
-    /// The commonest reason in words, and the number of the first frame with it; of reasons that are as common, the
-    /// first.
+    /// Returns the commonest reason in words, and the number of the first picture with it. Among equally common reasons
+    /// the first is used.
     pub(crate) fn commonest(&self, limits: &gates::Config) -> Option<(String, Option<u64>)> {
         let (why, n, first) = self.each.iter().rev().max_by_key(|(_, n, _)| *n)?;
         let share = if *n == self.total { "all".to_owned() } else { format!("{n}") };
@@ -78,7 +80,7 @@ impl Refusals {
     }
 }
 
-/// A word of a command line, quoted where a shell would read more into it.
+/// Quotes a word of a command line if a shell would interpret it.
 pub(crate) fn quoted(word: &Path) -> String {
     let text = word.to_string_lossy();
     let plain = |c: char| c.is_ascii_alphanumeric() || "_./:=@%+,-".contains(c);
@@ -88,7 +90,7 @@ pub(crate) fn quoted(word: &Path) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
-/// A path that no program takes for an option.
+/// Quotes a path so that no program takes it for an option.
 pub(crate) fn quoted_path(path: &Path) -> String {
     if path.to_string_lossy().starts_with('-') { quoted(&Path::new(".").join(path)) } else { quoted(path) }
 }

@@ -1,4 +1,4 @@
-//! What several commands need before they begin: sensor, frames.csv, sequence.
+//! The common preparations of several commands: sensor, frames.csv, sequence.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,47 +17,47 @@ use hzn_run::engine::{self, AnySensor};
 use hzn_run::sink;
 use hzn_run::source::{self, Raw, Source};
 
-/// Which sensor.
+/// The arguments that select the sensor.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SensorArgs {
-    /// The sensor.toml; without it, the one in the recording or beside the pictures
+    /// The sensor.toml; without it, the one in the recording or next to the pictures
     #[arg(short, long, value_name = "FILE")]
     pub(crate) sensor: Option<PathBuf>,
-    /// Altitude of the camera where frames.csv or the recording gives none, instead of body.altitude_km
+    /// Altitude of the camera for pictures without one in frames.csv or the recording; replaces body.altitude_km
     #[arg(long, value_name = "KM", allow_negative_numbers = true)]
     pub(crate) altitude_km: Option<f64>,
-    /// Single precision and 2048 points, as on the flight computer
+    /// Use single precision and 2048 points, as on the flight computer
     #[arg(long)]
     pub(crate) flight: bool,
 }
 
-/// Which pictures.
+/// The arguments that select the pictures.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct InputArgs {
-    /// Table with time, altitude, position, attitude of the pictures; without it, what the recording of an earlier run
-    /// holds, or frames.csv beside the pictures
+    /// Table with time, altitude, position and attitude of the pictures; without it, the data in the recording of an
+    /// earlier run, or frames.csv next to the pictures
     #[arg(long, value_name = "FILE")]
     pub(crate) frames: Option<PathBuf>,
-    /// Frames a second, where neither frames.csv nor the container nor EXIF gives a time
+    /// Frames a second, for pictures without a time in frames.csv, the container or EXIF
     #[arg(long, value_name = "RATE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub(crate) fps: f64,
-    /// Pictures are headerless: their size and format (mono8, mono10, mono12, mono16: little-endian words; mono10p,
-    /// mono12p: packed; bayer8: every 2x2 cell becomes one pixel)
+    /// Size and format of headerless pictures (mono8, mono10, mono12, mono16: little-endian words; mono10p, mono12p:
+    /// packed; bayer8: every 2x2 cell becomes one pixel)
     #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
     pub(crate) raw: Option<Raw>,
-    /// Topic of the pictures in an MCAP; without it, the first with pictures
+    /// Topic of the pictures in an MCAP; without it, the first topic with pictures
     #[arg(long, value_name = "TOPIC")]
     pub(crate) topic: Option<String>,
 }
 
 impl SensorArgs {
-    /// Reads the sensor of the pictures.
+    /// Reads the sensor for the pictures.
     pub(crate) fn load(&self, source: &dyn Source) -> Result<Sensor, Stop> {
         let folder = source.folder();
         let beside = folder.join("sensor.toml");
         let mut sensor = match (&self.sensor, source.sensor_toml()) {
             (Some(path), _) => hzn_calib::sensor::load(path)?,
-            // A camera file that it names is looked for beside the recording.
+            // If the text names a camera file, the file is expected next to the recording.
             (None, Some(text)) => hzn_calib::sensor::parse(text, &beside)
                 .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE takes its place")))?,
             (None, None) if beside.exists() => hzn_calib::sensor::load(&beside)?,
@@ -69,7 +69,7 @@ impl SensorArgs {
         sensor.warnings.iter().for_each(tell::warning);
         if let Some(km) = self.altitude_km {
             let only_free = sensor.config.each_body().iter().all(body::Config::half_angle_is_free);
-            // What is the altitude above the Earth is none above the Moon beside it.
+            // The altitude above the Earth is not the altitude above a Moon in the same picture.
             let mut taken = Vec::new();
             for (which, body) in sensor.config.each_body_mut().iter_mut().enumerate() {
                 if only_free || !body.half_angle_is_free() {
@@ -77,7 +77,7 @@ impl SensorArgs {
                     taken.push(which);
                 }
             }
-            // A recording is processed again with the altitude that it was processed with.
+            // With the changed text, a recording is processed again with the same altitude.
             sensor.text = with_altitude(&sensor.text, km, &taken);
             hzn_calib::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
             let doubts = plausible::doubts(&sensor.config);
@@ -98,7 +98,7 @@ impl InputArgs {
         Ok(source::open(inputs, self.raw, self.topic.as_deref())?)
     }
 
-    /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings go to stderr.
+    /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings are printed to stderr.
     pub(crate) fn frames(&self, source: &dyn Source, sensor: &Sensor, flight: bool) -> Result<Option<Frames>, Stop> {
         let beside = source.folder().join("frames.csv");
         let path = match &self.frames {
@@ -118,7 +118,7 @@ impl InputArgs {
     }
 }
 
-/// The text of a sensor.toml with the altitude of these of its bodies.
+/// Returns the text of a sensor.toml with this altitude for these bodies.
 fn with_altitude(text: &str, km: f64, bodies: &[usize]) -> String {
     let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_owned() };
     let several = document.contains_key("bodies");
@@ -134,14 +134,15 @@ fn with_altitude(text: &str, km: f64, bodies: &[usize]) -> String {
     document.to_string()
 }
 
-/// Says in the sensor, and in its text, what the pictures themselves tell about their samples, and tells the source
-/// which colour is wanted. Gives what the user should know.
+/// Requests the colour channel from the source. If sensor.toml does not state the number of bits, finds it from the
+/// pictures and sets it in the sensor and its text. Returns notes for the user.
 pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<String>, Stop> {
     let mut notes = Vec::new();
     source.want_channel(sensor.config.input.channel)?;
     if sensor.config.input.bits.is_none() {
         let found = source::find_bits(source);
-        // Recorded pictures are PNG, which has room for more: who reads them is told by the recorded sensor.
+        // Recorded pictures are PNG, which has room for more bits. Therefore the recorded sensor states the number of
+        // bits.
         let bits = source.bits().filter(|bits| *bits > 8).or(found.map(|f| f.bits));
         if let Some(bits) = bits {
             sensor.config.input.bits = Some(bits);
@@ -161,8 +162,8 @@ pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Resu
     Ok(notes)
 }
 
-/// A sensor whose pictures have another size than all that are there is the wrong sensor, and that is said once and
-/// early. Single pictures of another size are records.
+/// Checks that at least one picture has the sensor's size. Otherwise the command fails once, before it begins. Single
+/// pictures of another size are not an error here; their status becomes `unreadable`.
 pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Stop> {
     let camera = &sensor.config.camera;
     let own = (u32::from(camera.width), u32::from(camera.height));
@@ -186,7 +187,7 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
     )))
 }
 
-/// Without an altitude from anywhere, every frame would fail.
+/// Checks that an altitude is known from any source. Without one, every picture would fail.
 pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option<&Frames>) -> Result<(), Stop> {
     let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some();
     let tells = |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some();
@@ -201,7 +202,7 @@ pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option
     Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
 }
 
-/// Where the sensor's own altitude is the only one, it must be above the limb height of one of its bodies.
+/// Checks the sensor's own altitude if no other is known: it must be above the limb height of at least one body.
 fn above_the_limb(config: &Config) -> Result<(), Stop> {
     let Ok(sensor) = AnySensor::new(config, false) else { return Ok(()) };
     let half_angles = sensor.expected_half_angles_rad(None);
@@ -214,8 +215,8 @@ fn above_the_limb(config: &Config) -> Result<(), Stop> {
     }
 }
 
-/// Removes the pictures of the rendering before, which new tables would not know: those that the folder's truth.csv
-/// names, as only rendered pictures have a truth.
+/// Removes the pictures of an earlier rendering, because new tables would not list them. These are the pictures that
+/// truth.csv in the folder lists, as only rendered pictures have a truth.
 pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
     let Ok(mut before) = csv::Reader::from_path(folder.join("truth.csv")) else { return Ok(()) };
     for truth in before.deserialize::<Truth>().map_while(Result::ok) {
@@ -227,12 +228,12 @@ pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
     Ok(())
 }
 
-/// A folder's name for messages.
+/// Returns a folder's name for messages.
 pub(crate) fn shown(folder: &Path) -> String {
     if folder.as_os_str().is_empty() { "this folder".into() } else { folder.display().to_string() }
 }
 
-/// Set by Ctrl-C (and by a request to end); a second one leaves at once.
+/// Returns a flag that Ctrl-C or a request to terminate sets. A second Ctrl-C ends the program at once.
 pub(crate) fn stop_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let shared = Arc::clone(&flag);
@@ -242,7 +243,7 @@ pub(crate) fn stop_flag() -> Arc<AtomicBool> {
         }
         tell::line(format_args!("\nfinishing the frames that were begun; press Ctrl-C again to leave at once"));
     });
-    // Without a handler Ctrl-C ends the program at once, and the output can still be continued.
+    // Without a handler, Ctrl-C ends the program at once; the output can still be continued.
     drop(handler);
     flag
 }

@@ -1,11 +1,11 @@
-//! What is said to the user: results on stdout, messages on stderr.
+//! Output to the user: results on stdout, messages on stderr.
 //!
-//! Nothing here panics, as `println!` and `eprintln!` do, when the other end is closed.
+//! Unlike `println!` and `eprintln!`, nothing here panics if the other end is closed.
 
 use std::fmt::Display;
 use std::io::{self, Write};
 
-/// A result, to stdout, as it stands.
+/// Prints a result to stdout, unchanged.
 ///
 /// # Errors
 /// stdout is closed or its disk is full.
@@ -15,12 +15,12 @@ pub(crate) fn result(text: impl Display) -> io::Result<()> {
     out.flush()
 }
 
-/// A line to stderr. Where stderr is closed there is nobody left to tell, and the work goes on.
+/// Prints a line to stderr. If stderr is closed, the message is lost and the work goes on.
 pub(crate) fn line(text: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// A line to stderr about something that stops nothing but that the user should look at.
+/// Prints a warning to stderr. It stops nothing, but the user should read it.
 pub(crate) fn warning(text: impl Display) {
     line(format_args!("warning: {text}"));
 }

@@ -1,4 +1,4 @@
-//! Whatever is wrong gets a message that says what to do, and loses no frame.
+//! Every wrong input gets a message that says what to do, and no picture is lost.
 
 mod common;
 
@@ -76,12 +76,12 @@ fn the_sensor_of_another_camera_is_said_once() {
     assert!(!place.path("b.csv.part").exists());
     place.run(&["run", "a.mcap", "-s", "other.toml"]).expect(2).says("0000.png is 320 x 240");
     place.run(&["run", "p.raw", "-s", "other.toml", "--raw", "320x240:mono8"]).expect(2).says("p.raw is 320 x 240");
-    // One that fits is enough: the others are records.
+    // One picture of the sensor's size is enough; the others become unreadable rows.
     limb(640, 480, 0.0).save(place.path("in/0003.png")).unwrap();
     place.run(&["run", "in", "-s", "other.toml"]).expect(3).says("4 unreadable");
 }
 
-/// A PNG that only claims a size, as an attacker or a flipped bit would write it.
+/// Returns a PNG whose header claims a size, as an attacker or a flipped bit would write it.
 fn png_of_size(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = Vec::new();
     limb(2, 2, 0.0).write_to(&mut std::io::Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
@@ -125,7 +125,7 @@ fn broken_pictures_are_records_and_the_run_goes_on() {
     has(9, "j-good.jpg ok");
 }
 
-/// A PNG with a palette, written by hand: stored blocks of deflate.
+/// Returns a PNG with a palette, written by hand with stored blocks of deflate.
 fn palette_png(image: &image::GrayImage) -> Vec<u8> {
     let chunk = |kind: &[u8], data: &[u8]| {
         let body = [kind, data].concat();
@@ -170,7 +170,7 @@ fn palettes_are_read_and_animations_refused_by_name() {
 #[test]
 fn unwritable_folders_are_said() {
     let place = Place::with_pictures(1);
-    // A file in the way of the folder; permissions would not stop a test that runs as root.
+    // A file is in the place of the folder. Missing permissions would not stop a test that runs as root.
     place.write("file", b"");
     let told = |option: &str, path: &str| place.run(&["run", "in", option, path]).expect(1).err;
     insta::assert_snapshot!(told("-o", "file/out.csv"), @"error: file/out.csv.part: a part of this path is a file, not \
@@ -236,7 +236,7 @@ fn what_looks_wrong_is_a_warning_and_the_run_goes_on() {
     );
     let moon = told("earth-sphere", "moon");
     insta::assert_snapshot!(moon.lines().next().unwrap(), @r#"warning: in/sensor.toml:14: [body] altitude_km: is not used: kind = "moon" is the Moon as a disc of half a degree, seen from about the Earth; for a camera in orbit about the Moon write kind = "sphere" and radius_km = 1737.4"#);
-    // Beside the Earth the altitude is that above the Earth.
+    // With the Moon as a second body, the altitude is still the altitude above the Earth.
     let two = common::SENSOR.replace("[body]", "[[bodies]]") + "[[bodies]]\nkind = \"moon\"\n";
     place.write("in/sensor.toml", two.as_bytes());
     place.write("in/frames.csv", b"file,altitude_km\n0000.png,400\n");

@@ -5,7 +5,7 @@ mod common;
 use common::{Place, SENSOR, cell, limb, without_time};
 use image::{ImageFormat, Luma};
 
-/// A limb with a bright disc in the sky above it, `n` pictures.
+/// Returns a folder with `n` pictures of a limb and a bright disc in the sky above it.
 fn earth_and_sun(n: usize) -> Place {
     let place = Place::new();
     let one = "[body]\nkind = \"earth-sphere\"\naltitude_km = 400.0\n";
@@ -37,11 +37,11 @@ fn each_body_has_its_row() {
         // There is no altitude above the Sun.
         assert_eq!(cell(row, "altitude_km"), ["400.0", ""][i % 2]);
     }
-    // The sun where it was drawn; its level is at the top of the edge, which looks wide from there.
+    // The Sun is at the place where it was drawn. Its threshold is at the top of the edge, where the edge looks wide.
     let [x, y, z] = ["axis_x", "axis_y", "axis_z"].map(|n| cell(&rows[1], n).parse::<f64>().unwrap());
     let at = [x / z * 300.0 + 159.5, y / z * 300.0 + 119.5];
     assert!((at[0] - 80.3).hypot(at[1] - 40.7) < 0.06, "{at:?}");
-    // One body alone gives the same.
+    // One body alone gives the same result.
     place.write("in/sensor.toml", SENSOR.as_bytes());
     let alone = without_time(&place.run(&["run", "in"]).expect(0).out);
     assert_eq!(alone[0], rows[0]);
@@ -54,7 +54,7 @@ fn recover_keeps_no_part_of_a_frame() {
         place.run(&["run", "in", "-o", out]).expect(0);
         let whole = place.read(out);
         let rows: Vec<&str> = whole.split_inclusive('\n').collect();
-        // The Sun's row of the last frame is not there, and then neither a part of it.
+        // The Sun's row of the last picture is missing, completely or in part.
         for cut in [&rows[rows.len() - 1][..0], &rows[rows.len() - 1][..9]] {
             let part = rows[..rows.len() - 1].concat() + cut;
             place.write(&format!("{out}.part"), part.as_bytes());
@@ -68,7 +68,8 @@ fn recover_keeps_no_part_of_a_frame() {
 fn a_sun_beside_the_earth_has_a_level_of_its_own() {
     let place = earth_and_sun(1);
     let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
-    // Left out, it is the same; the Earth's would take the Earth for what shines.
+    // Without this section the result is the same. With the Earth's threshold, the Earth would be taken for the bright
+    // body.
     let told = place.read("in/sensor.toml").replace("[bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n", "");
     assert!(!told.contains("bodies.binarize"));
     place.write("in/sensor.toml", told.as_bytes());
@@ -92,7 +93,7 @@ fn frames_of_several_bodies_are_kept_whole() {
     assert_eq!((without_time(&place.read("b.csv")), without_time(&place.read("c.csv"))), (rows.clone(), rows.clone()));
     place.run(&["export", "a.mcap", "--images", "pics"]).expect(0).says("3 pictures");
     assert!(place.path("drawn/0002.png").exists());
-    // Cut off after the first row of the third frame: that frame is done again.
+    // The file ends after the first row of the third picture, so this picture is processed again.
     for name in ["a.csv", "a.jsonl"] {
         let text = place.read(name);
         let lines: Vec<&str> = text.lines().collect();

@@ -1,4 +1,4 @@
-//! `hzn calibrate noise`, end to end through the binary.
+//! `hzn calibrate noise`, from beginning to end through the binary.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ azimuth_deg = [0.0, 200.0]
 read_noise = 0.02
 "#;
 
-/// Runs hzn in a folder: exit code, stdout, stderr.
+/// Runs hzn in a folder. Returns exit code, stdout, stderr.
 fn hzn(folder: &Path, args: &[&str]) -> (i32, String, String) {
     let out = assert_cmd::Command::cargo_bin("hzn")
         .expect("the binary is built")
@@ -38,7 +38,7 @@ fn hzn(folder: &Path, args: &[&str]) -> (i32, String, String) {
     (out.status.code().unwrap_or(-1), text(&out.stdout), text(&out.stderr))
 }
 
-/// The number after a key in the text of a sensor.toml.
+/// Returns the number after a key in the text of a sensor.toml.
 fn value(text: &str, key: &str) -> f64 {
     let line = text.lines().find(|l| l.starts_with(&format!("{key} = "))).unwrap_or_else(|| panic!("{key} in {text}"));
     line.split(" = ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap()
@@ -52,7 +52,7 @@ fn a_flight_tells_limb_height_and_noise_or_why_not() {
     let (code, _, stderr) = hzn(at, &["simulate", "my.toml", "-o", "flight", "-q"]);
     assert_eq!(code, 0, "{stderr}");
     let told = std::fs::read_to_string(at.join("flight/sensor.toml")).unwrap();
-    // What a user has who knows the camera only.
+    // This sensor.toml is that of a user who knows only the camera.
     let (_, camera) = told.split_once("[camera]").unwrap();
     let camera = camera.split("\n[").next().unwrap();
     std::fs::write(at.join("mine.toml"), format!("# my camera\n[camera]{camera}\n")).unwrap();
@@ -67,25 +67,25 @@ fn a_flight_tells_limb_height_and_noise_or_why_not() {
     let text = std::fs::read_to_string(at.join("out.toml")).unwrap();
     assert!(text.starts_with("# my camera\n") && text.contains("# calibrated: measured on "), "{text}");
     let (km, sigma) = (value(&text, "limb_height_km"), value(&text, "limb_height_sigma_km"));
-    // The truth, as `hzn simulate` measured it on other pictures of the scene.
+    // The truth is the height that `hzn simulate` measured on other pictures of the scene.
     let true_km = value(&told, "limb_height_km");
-    // Where a pixel is 7 km wide, as here, blur bends the edge of the air: it stands 2 to 3 km too low in this scene.
+    // A pixel is 7 km wide here, so blur bends the edge of the air. The limb height is 2 to 3 km too low in this scene.
     assert!((km - true_km).abs() < 3.0 * sigma && sigma < 3.5, "{km} ± {sigma}, {true_km}");
     let html = std::fs::read_to_string(at.join("out.html")).unwrap();
     assert_eq!(html.matches("<svg").count(), 2);
     assert!(html.contains("Correlation of the residuals"));
 
-    // The sensor that came of it answers.
+    // The new sensor answers.
     let (code, _, stderr) = hzn(at, &["run", "flight", "--sensor", "out.toml", "-o", "out.csv", "-q"]);
     assert_eq!(code, 0, "{stderr}");
 
-    // Outputs are not replaced unasked, and have to be of a kind.
+    // Outputs are not replaced without --force, and their ending must be of a known kind.
     let (code, _, stderr) = hzn(at, &[&calibrate[..], &outputs].concat());
     assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
     let (code, _, stderr) = hzn(at, &[&calibrate[..], &["-o", "out.csv"]].concat());
     assert!(code == 2 && stderr.contains("a sensor ends in .toml"), "{stderr}");
 
-    // Too few pictures.
+    // The flight has too few pictures.
     let few: Vec<String> = (0..5).map(|i| format!("flight/small-{i:05}.png")).collect();
     let few: Vec<&str> = few.iter().map(String::as_str).collect();
     let (code, stdout, stderr) =
@@ -93,7 +93,7 @@ fn a_flight_tells_limb_height_and_noise_or_why_not() {
     assert_eq!(code, 1, "{stdout}{stderr}");
     assert!(stderr.contains("5 pictures were answered, but at least 12 are needed"), "{stderr}");
 
-    // Altitudes of other pictures: 10 km too low and too high by turns.
+    // The altitudes are wrong: alternately 10 km too low and too high.
     let mut rows = csv::Reader::from_path(at.join("flight/frames.csv")).unwrap();
     let column = rows.headers().unwrap().iter().position(|h| h == "altitude_km").unwrap();
     let mut wrong = String::from("file,altitude_km\n");

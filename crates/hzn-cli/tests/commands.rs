@@ -6,19 +6,19 @@ use common::{Place, cell};
 use hzn_mcap::palette;
 use image::{GrayImage, Luma, RgbImage};
 
-/// The row in which a column crosses the limb of [`common::limb`].
+/// Returns the row in which a column crosses the limb of [`common::limb`].
 fn true_row(x: f64) -> f64 {
     let (s, c) = 68f64.to_radians().sin_cos();
     let (u, cos) = ((x - 159.5) / 300.0, 70.38f64.to_radians().cos());
-    // v s + c = cos √(1 + u² + v²); the root hardly moves with v.
+    // The equation is v s + c = cos √(1 + u² + v²); the root depends only slightly on v.
     let v = (0..30).fold(0.0f64, |v, _| (cos * (1.0 + u * u + v * v).sqrt() - c) / s);
     119.5 + 300.0 * v
 }
 
-/// Where the axis of [`disc`] meets the picture, pixels.
+/// The place in the picture where the axis of [`disc`] is, in pixels.
 const AXIS_PX: [f64; 2] = [159.5 + 300.0 * 0.05, 119.5 + 300.0 * 0.08];
 
-/// How far a place of the picture lies beyond the rim of [`disc`], pixels of the picture's middle.
+/// Returns the distance of a place of the picture beyond the rim of [`disc`], in pixels at the picture's centre.
 fn beyond_px([x, y]: [f64; 2]) -> f64 {
     let ray = |[x, y]: [f64; 2]| [(x - 159.5) / 300.0, (y - 119.5) / 300.0, 1.0];
     let (a, b) = (ray([x, y]), ray(AXIS_PX));
@@ -27,7 +27,7 @@ fn beyond_px([x, y]: [f64; 2]) -> f64 {
     300.0 * (cos.clamp(-1.0, 1.0).acos() - 15f64.to_radians())
 }
 
-/// A folder with the picture of a bright disc of 15° half-angle.
+/// Returns a folder with the picture of a bright disc of 15° half-angle.
 fn disc() -> Place {
     let place = Place::new();
     let body = "kind = \"sphere\"\nradius_km = 1000.0\nlimb_height_km = 0.0\naltitude_km = 2863.7033";
@@ -41,7 +41,7 @@ fn disc() -> Place {
     place
 }
 
-/// The pixels of a colour that lie below the legend.
+/// Returns the pixels of a colour that are below the legend.
 fn places(drawn: &RgbImage, colour: [u8; 3]) -> Vec<[f64; 2]> {
     let below = drawn.enumerate_pixels().filter(|(_, y, p)| *y > 75 && p.0 == colour);
     below.map(|(x, y, _)| [f64::from(x), f64::from(y)]).collect()
@@ -98,7 +98,7 @@ fn overlays_of_a_run() {
     for [x, y] in limb.iter().chain(&inliers) {
         assert!((y - true_row(*x)).abs() <= 2.0, "{x}, {y}: the limb is in row {}", true_row(*x));
     }
-    // From one side to the other, and the points on it.
+    // The limb reaches from one side to the other, and points lie on it.
     for x in (0..320).step_by(16).map(f64::from) {
         assert!(limb.iter().any(|p| p[0] == x), "no limb in column {x}");
         assert!(inliers.iter().any(|p| (p[0] - x).abs() <= 2.0), "no inliers about column {x}");
@@ -121,7 +121,7 @@ fn the_axis_is_marked_where_it_is() {
     assert!(limb.len() > 300 && limb.iter().all(|p| beyond_px(*p).abs() <= 2.5), "{}", limb.len());
 }
 
-/// Foxglove counts pixels from the corner of the first: what it gets is the truth and half a pixel.
+/// Foxglove counts pixels from the corner of the first pixel, so annotations are the true places plus half a pixel.
 #[test]
 fn annotations_count_from_the_corner() {
     use prost::Message;
@@ -139,7 +139,7 @@ fn annotations_count_from_the_corner() {
         let own = drawn.iter().filter(|p| p.metadata.iter().any(|m| m.key == "kind" && m.value == kind));
         own.flat_map(|p| p.points.iter().map(|p| [p.x - 0.5, p.y - 0.5])).collect()
     };
-    // Left and right, above and below: a shift along either axis shows.
+    // Points on all four sides show a shift along either axis.
     for kind in ["inlier", "limb"] {
         let points = of(kind);
         assert!(points.len() > 200, "{} of {kind}", points.len());
@@ -284,7 +284,7 @@ fn a_telecommand_has_values_that_can_be() {
     assert!(refused("200 inf").contains("mask corners cannot be inf"));
     place.run(&["telecommand", "known -5"]).expect(2).says("the altitude cannot be -5 km: above 0");
     place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("no finite number of kilometres");
-    // A choice by its name is the same command as by its number, and what may be left out may be NaN.
+    // A choice by name gives the same command as by number. An optional value may be NaN.
     let (named, numbered) = (set("binarize.method fixed"), set("50 1"));
     assert!(named.status.success() && named.stdout == numbered.stdout);
     for pair in ["camera.theta_max_deg NaN", "1000 -3.5", "camera.k -0.1", "200 4 201 3 body.kind moon"] {
@@ -303,19 +303,20 @@ fn the_farthest_corner_of_any_lens() {
         assert_eq!(text, last, "{shown}");
         text.parse::<f64>().unwrap()
     };
-    // 320 x 240 with a focal length of 300.
+    // The picture has 320 x 240 px, with a focal length of 300 px.
     let exact = (200.0f64 / 300.0).atan().to_degrees();
     assert!((corner(common::SENSOR) - exact).abs() < 0.006);
     let brown = common::SENSOR.replace("\"pinhole\"", "\"brown-conrady\"\nk = [0.0, 0.0, 0.0, 0.0, 0.0]");
     assert!((corner(&brown) - exact).abs() < 0.006);
 }
 
-/// A JPEG of the limb in which a camera wrote its focal length, in millimetres and as on 35 mm film.
+/// Returns a JPEG of the limb with a focal length in its EXIF, in millimetres and as on 35 mm film.
 fn jpeg_with_exif(focal_mm: u32, on_film_mm: u16) -> Vec<u8> {
     let mut jpeg = std::io::Cursor::new(Vec::new());
     common::limb(320, 240, 0.0).write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
     let jpeg = jpeg.into_inner();
-    // One directory with the model and the way to another: FocalLength (a fraction at its end), FocalLengthIn35mmFilm.
+    // One directory has the model and the offset of another: FocalLength (a fraction at its end),
+    // FocalLengthIn35mmFilm.
     let entry = |tag: u16, kind: u16, count: u32, value: u32| {
         [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
     };
@@ -337,7 +338,7 @@ fn jpeg_with_exif(focal_mm: u32, on_film_mm: u16) -> Vec<u8> {
 #[test]
 fn init_from_a_field_of_view_works_at_once() {
     let place = Place::with_pictures(2);
-    // 300 px through a pinhole, as the pictures were drawn.
+    // The pictures were drawn with a pinhole of 300 px.
     let says = "320 x 240 px, pinhole, 56.1 degrees wide, f = 300 px";
     place.run(&["init", "in", "--fov", "56.145", "--altitude", "400", "-o", "s.toml"]).expect(0).says(says);
     assert!(place.read("s.toml").contains("focal_sigma_percent"), "{}", place.read("s.toml"));
@@ -347,7 +348,7 @@ fn init_from_a_field_of_view_works_at_once() {
         assert_eq!(cell(&row, "status"), "ok", "{row:?}");
         assert!((number("axis_y").atan2(number("axis_z")).to_degrees() - 68.0).abs() < 3.0 * number("sigma_max_deg"));
     }
-    // 5 % beside the truth: the sigma covers what comes of it.
+    // The field of view is 5 % wrong; sigma covers the resulting error.
     place.run(&["init", "in", "--fov", "58.8", "--altitude", "400", "-o", "off.toml"]).expect(0);
     place.run(&["run", "in", "--sensor", "off.toml", "-o", "off.csv"]).expect(0);
     for row in place.rows("off.csv") {
@@ -367,13 +368,13 @@ fn init_from_a_field_of_view_works_at_once() {
 #[test]
 fn init_reads_the_focal_length_that_the_camera_wrote() {
     let place = Place::new();
-    // 40 mm on film of 36 x 24 mm: over the diagonal of 43.27 mm.
+    // The focal length is 40 mm on film of 36 x 24 mm, with a diagonal of 43.27 mm.
     place.write("in/a.jpg", &jpeg_with_exif(10, 40));
     let says = "pinhole, 46.8 degrees wide, f = 370 px";
     place.run(&["init", "in/a.jpg", "-o", "s.toml"]).expect(0).says(says);
     let text = place.read("s.toml");
     assert!(text.contains("# X-1\n") && text.contains("as 40 mm on 35 mm film"), "{text}");
-    // A field of view that it contradicts.
+    // This field of view contradicts the EXIF.
     place.run(&["init", "in/a.jpg", "--fov", "80", "-o", "t.toml"]).expect(0).says("warning").says("contradicts");
 }
 

@@ -7,7 +7,7 @@ use common::{Place, SENSOR};
 const HEADER: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\
                       moon_y,moon_z,qw,qx,qy,qz\n";
 
-/// Six pictures that were run, the last of them black, with their truth.
+/// Returns a folder with the results and the truth of six pictures; the last picture is black.
 fn place() -> Place {
     let place = Place::with_pictures(5);
     image::GrayImage::new(320, 240).save(place.path("in/black.png")).unwrap();
@@ -32,7 +32,7 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     for text in ["answered           5 of 5 frames", "false answers      0 of 1 frames", "HORACE criteria"] {
         assert!(ran.out.contains(text), "{text} in {}", ran.out);
     }
-    // The folder is enough, and a table says the same as the recording.
+    // The folder of the truth is sufficient, and a table gives the same report as the recording.
     let again = place.run(&["evaluate", "out.csv", "--truth", "in"]).expect(0);
     assert_eq!(again.out, ran.out);
 
@@ -45,7 +45,7 @@ fn a_run_against_its_truth_as_text_json_and_page() {
 
     let page = place.read("r.html");
     assert!(page.matches("<svg").count() >= 4 && page.contains("data:image/jpeg;base64,"));
-    // Nothing is fetched from anywhere.
+    // The page loads nothing from elsewhere.
     assert!(!page.contains("src=\"http") && !page.contains("href") && !page.contains("@import"));
     place.run(&args).expect(2).says("r.json: exists already; --force replaces it");
 }

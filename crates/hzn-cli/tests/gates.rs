@@ -4,7 +4,7 @@ mod common;
 
 use common::{Place, SENSOR, cell, limb, without_time};
 
-/// Three pictures, of which the middle one has turned by ten degrees.
+/// Returns a folder with three pictures; the middle one is turned by ten degrees.
 fn turned() -> Place {
     let place = Place::new();
     for (i, shift) in [0.0, 200.0, 4.0].into_iter().enumerate() {
@@ -27,12 +27,12 @@ fn an_answer_farther_than_the_vehicle_can_turn_is_refused() {
     let slow = statuses(&place.run(&["run", "in"]).expect(0).out);
     assert_eq!([&slow[0].0, &slow[1].0, &slow[2].0], ["ok", "rejected", "ok"], "{slow:?}");
     assert!(slow[1].1.contains("rate"), "{slow:?}");
-    // Ten times the time between pictures is room for ten degrees.
+    // With ten times the time between pictures, the vehicle can turn by ten degrees.
     let slow = statuses(&place.run(&["run", "in", "--fps", "0.1"]).expect(0).out);
     assert!(slow.iter().all(|(status, _)| status == "ok"), "{slow:?}");
 }
 
-/// A run that goes on knows the last answer of the one that broke off.
+/// A continued run uses the last answer of the run that was interrupted.
 #[test]
 fn resume_goes_on_from_the_last_answer() {
     let place = turned();
@@ -56,7 +56,7 @@ fn resume_goes_on_from_the_last_answer() {
     }
 }
 
-/// By the attitude and the position the Earth is elsewhere; by the Sun it is night there.
+/// The attitude and the position put the Earth elsewhere; the Sun makes it night there.
 #[test]
 fn a_given_attitude_and_a_given_sun_are_gates() {
     let place = Place::with_pictures(1);
@@ -65,10 +65,10 @@ fn a_given_attitude_and_a_given_sun_are_gates() {
         place.write("in/frames.csv", format!("{head}0000.png,6771.0088,0,0,{attitude},{sun}\n").as_bytes());
         statuses(&place.run(&["run", "in"]).expect(0).out).remove(0)
     };
-    // The camera looks along +z of its own, the body's centre is 68 degrees below: in the camera (0, sin 68, cos 68).
-    // That is −x of ECEF for a turn about the camera's x that takes it there.
+    // The camera looks along its own +z, and the body's centre is 68 degrees below: (0, sin 68, cos 68) in the camera
+    // frame. The attitude takes this direction to −x of ECEF. `more_deg` turns the camera about its x axis.
     let to_ecef = |more_deg: f64| {
-        // Columns of the rotation: x to x', y to y', z to z', with (0, sin, cos) to (−1, 0, 0).
+        // These are the columns of the rotation: x to x', y to y', z to z', with (0, sin, cos) to (−1, 0, 0).
         let (s, c) = (68.0f64 + more_deg).to_radians().sin_cos();
         let m = quaternion_of([[0.0, -s, -c], [1.0, 0.0, 0.0], [0.0, -c, s]]);
         format!("{},{},{},{},1", m[0], m[1], m[2], m[3])
@@ -79,12 +79,12 @@ fn a_given_attitude_and_a_given_sun_are_gates() {
     assert!(status == "rejected" && why.contains("attitude"), "{status}: {why}");
     let (status, why) = frames(&to_ecef(0.0), "0,0.9,0.4358898943540674");
     assert!(status == "rejected" && why.contains("sun"), "{status}: {why}");
-    // A camera for its own warmth does not need the Sun.
+    // A camera that sees thermal radiation does not need the Sun.
     place.write("in/sensor.toml", SENSOR.replace("[body]\n", "[body]\nsunlit = false\n").as_bytes());
     assert_eq!(frames(&to_ecef(0.0), "0,0.9,0.4358898943540674").0, "ok");
 }
 
-/// The quaternion, scalar first, of a rotation matrix by rows.
+/// Returns the quaternion, scalar first, of a rotation matrix given by rows.
 fn quaternion_of(m: [[f64; 3]; 3]) -> [f64; 4] {
     let trace = m[0][0] + m[1][1] + m[2][2];
     let w = (1.0 + trace).max(0.0).sqrt() / 2.0;

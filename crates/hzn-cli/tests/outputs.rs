@@ -1,10 +1,10 @@
-//! An output takes the place of nothing that the user has not given up.
+//! An output replaces no file without the user's consent.
 
 mod common;
 
 use common::Place;
 
-/// The beginning of an MCAP of another program.
+/// Returns the beginning of an MCAP of another program.
 fn foreign() -> Vec<u8> {
     let library = b"another program";
     let mut header = [0u32.to_le_bytes(), (library.len() as u32).to_le_bytes()].concat();
@@ -32,7 +32,7 @@ fn resume_goes_on_with_nothing_that_is_not_ours() {
         );
         assert_eq!(std::fs::read(place.path(name)).unwrap(), bytes, "{name}");
     }
-    // What a crash of ours has left before anything was written is nothing.
+    // A file that our crash left before any result was written counts as empty.
     for (name, bytes) in [("a.mcap.part", &foreign()[..5]), ("b.jsonl.part", b""), ("c.jsonl.part", b"{\"ind")] {
         place.write(name, bytes);
         place.run(&["run", "in", "-o", name.strip_suffix(".part").unwrap(), "--resume"]).expect(0);
@@ -65,7 +65,7 @@ fn one_run_at_a_time_writes_a_file() {
             assert!(ran.err.contains("another run is writing it; wait until that ends"), "{}", ran.err);
             assert_eq!(std::fs::read(&part).unwrap(), b"its frames");
         }
-        // Ended, it leaves the file to others.
+        // After its process has ended, the lock on the file is free.
         drop(other);
         place.run(&["run", "in", "-o", out, "--force"]).expect(0);
     }

@@ -1,4 +1,4 @@
-//! Kinds of pictures: whatever their coding, the same scene gives the same direction.
+//! Kinds of pictures: the same scene gives the same direction in every coding.
 
 mod common;
 
@@ -6,7 +6,7 @@ use common::{Place, angle_deg, axes, cell, limb, without_time};
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, GrayImage, ImageEncoder, ImageFormat};
 
-/// The direction that the limb of `shift` is seen in, from a plain 8-bit PNG.
+/// Returns the axis for the limb of `shift` in a plain 8-bit PNG, in the camera frame.
 fn plain(shift: f64) -> [f64; 3] {
     let place = Place::new();
     limb(320, 240, shift).save(place.path("in/plain.png")).unwrap();
@@ -17,7 +17,7 @@ fn plain(shift: f64) -> [f64; 3] {
 fn every_lossless_kind_gives_the_same_answer() {
     let place = Place::new();
     let grey = DynamicImage::ImageLuma8(limb(320, 240, 0.0));
-    // What stands in an alpha channel is no brightness.
+    // The values of an alpha channel are not brightness.
     let mut clear = grey.to_rgba8();
     clear.pixels_mut().enumerate().for_each(|(i, p)| p.0[3] = (i % 251) as u8);
     for (name, picture) in [
@@ -45,7 +45,7 @@ fn every_lossless_kind_gives_the_same_answer() {
 #[test]
 fn sixteen_bits_are_not_cut_to_eight() {
     let place = Place::new();
-    // All brightness lies within one step of 8 bits, and so does the level.
+    // All brightness lies within one step of 8 bits, and so does the threshold.
     place.write(
         "in/sensor.toml",
         format!("{}[binarize]\nmethod = \"fixed\"\nlevel = 622.0\n", common::SENSOR).as_bytes(),
@@ -54,13 +54,13 @@ fn sixteen_bits_are_not_cut_to_eight() {
     let faint = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(320, 240, faint).unwrap();
     faint.save(place.path("in/faint.png")).unwrap();
     let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
-    // So faint an edge stands at the global level instead of the local one, and is taken for a wide one as all is
-    // bright around it; cut to 8 bits there would be no edge. The rougher edge leaves more of the answer to the
-    // expected limb height.
+    // With 8 bits there would be no edge here. With 16 bits the edge is faint: its points are at the global threshold
+    // instead of the local one. It is also taken for a wide edge, because everything around it is bright. The edge is
+    // rougher, so the expected limb height has more weight in the answer.
     assert!(off < 0.1, "{off}");
 }
 
-/// A limb in words, such as a camera of few bits writes them; `dark` leaves so much of its brightness.
+/// Returns a limb in 16-bit words, as a camera of few bits writes them; `of` maps each 8-bit sample to a word.
 fn words(shift: f64, of: impl Fn(u16) -> u16) -> image::ImageBuffer<image::Luma<u16>, Vec<u16>> {
     let words = limb(320, 240, shift).into_raw().into_iter().map(|v| of(u16::from(v))).collect();
     image::ImageBuffer::from_raw(320, 240, words).unwrap()
@@ -76,10 +76,10 @@ fn bits_are_found_once_for_a_sequence() {
         let rows = without_time(&ran.out);
         let off =
             angle_deg(["axis_x", "axis_y", "axis_z"].map(|name| cell(&rows[1], name).parse().unwrap()), plain(0.0));
-        // Where all around is bright, the edge is taken for a wider one, and a rougher edge leaves more to the expected
-        // height.
+        // If everything around is bright, the edge is taken for a wider and rougher one, so the expected limb height
+        // has more weight.
         assert!(off < 0.1, "{off}");
-        // By itself, it is one of its folder.
+        // A single picture is treated as one of its folder.
         let told = place.run(&["explain", "in/1.png"]).expect(0);
         let found = ran.err.split("taken as ").nth(1).map_or("16".into(), |t| t.split(' ').next().unwrap().to_owned());
         assert!(told.out.contains(&format!("1 channel of {found} bits")), "{}", told.out);
@@ -89,10 +89,10 @@ fn bits_are_found_once_for_a_sequence() {
     for (bits, most) in [(10, 1023u16), (12, 4095), (14, 16383), (16, 65535)] {
         let of = |v: u16| (u32::from(v) * u32::from(most) / 255) as u16;
         assert_eq!(bits_of(&of, &of), bits.to_string());
-        // The first picture is dark, and the last decides.
+        // The first picture is dark, so the last one decides.
         assert_eq!(bits_of(&of, &dark), bits.to_string());
     }
-    // A thermal array: 1200 counts, far above 0.
+    // A thermal camera has a range of 1200 counts far above 0.
     assert_eq!(bits_of(&|v| 7000 + v * 5, &|v| 7000 + v * 5), "14");
 }
 
@@ -100,7 +100,7 @@ fn bits_are_found_once_for_a_sequence() {
 fn a_picture_with_more_bits_than_the_others_is_not_taken_for_another() {
     let place = Place::new();
     for i in 0..33 {
-        // Of 33 pictures 16 are looked at; this is not one of them.
+        // Of 33 pictures 16 are examined; this one is not.
         let shift = if i == 9 { 4 } else { 2 };
         words(f64::from(i), |v| v << shift).save(place.path(&format!("in/{i:02}.png"))).unwrap();
     }
@@ -114,7 +114,7 @@ fn a_picture_with_more_bits_than_the_others_is_not_taken_for_another() {
     let three = place.run(&["run", "in", "-j", "3"]).expect(3);
     place.run(&["export", "a.mcap", "-o", "a.csv"]).expect(0);
     assert_eq!(without_time(&place.read("a.csv")), without_time(&three.out));
-    // The recording's sensor knows; the lost picture is not in it.
+    // The recorded sensor states the bits. The recording does not contain the lost picture.
     let again = place.run(&["run", "a.mcap"]).expect(3);
     assert!(!again.err.contains("taken as"), "{}", again.err);
     let axis = |rows: &[Vec<(String, String)>]| rows.iter().map(|r| cell(r, "axis_y").to_owned()).collect::<Vec<_>>();
@@ -132,7 +132,7 @@ fn bits_of_headerless_words_and_of_transparent_ones() {
     let ran = place.run(&["run", "in", "--raw", "320x240:mono16"]).expect(0).says("taken as 12 bits");
     assert_eq!(without_time(&ran.out).len(), 1);
     std::fs::remove_file(place.path("in/a.raw")).unwrap();
-    // What stands in an alpha channel is no brightness, nor is what a header says about full scale found again.
+    // The values of an alpha channel are not brightness. The full scale in a header is used as it is.
     let grey = words(0.0, |v| v << 4);
     let clear = image::ImageBuffer::from_fn(320, 240, |x, y| image::LumaA([grey.get_pixel(x, y).0[0], u16::MAX]));
     DynamicImage::ImageLumaA16(clear).save(place.path("in/a.png")).unwrap();
@@ -152,7 +152,7 @@ fn bits_that_are_told_hold() {
     place.write("in/sensor.toml", told(10).as_bytes());
     let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
     assert!(off < 1e-3, "{off}");
-    // Too few.
+    // There are too few bits.
     place.write("in/sensor.toml", told(9).as_bytes());
     let rows = without_time(&place.run(&["run", "in"]).expect(3).out);
     assert!(cell(&rows[0], "detail").contains("has more bits than input.bits = 9"), "{rows:?}");
@@ -164,7 +164,8 @@ fn bits_that_are_told_hold() {
 fn inks_become_brightness() {
     let place = Place::new();
     place.write("in/cmyk.jpg", include_bytes!("data/cmyk.jpg"));
-    // Lossy, and a picture of inverted inks would be bright where the sky is: the axis would point to the other side.
+    // JPEG is lossy. If the inks were inverted, the picture would be bright in the sky, and the axis would point to the
+    // other side.
     let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
     assert!(off < 8e-3, "{off}");
 }
@@ -183,7 +184,7 @@ fn the_sun_has_a_direction_in_ecef() {
     });
     disc.save(place.path("in/0.png")).unwrap();
     disc.save(place.path("in/1.png")).unwrap();
-    // The equinox of March 2020; the equation of time is -7.5 minutes.
+    // The date is the equinox of March 2020; the equation of time is -7.5 minutes.
     place.write(
         "in/frames.csv",
         b"file,utc,x_km,y_km,z_km\n0.png,2020-03-20T03:50:00Z,7000,0,0\n1.png,2020-03-20T03:50:00Z,,,\n",
@@ -198,7 +199,7 @@ fn the_sun_has_a_direction_in_ecef() {
     assert_eq!(cell(&rows[1], "axis_e_x"), "");
 }
 
-/// The chunks of a PNG: kind and data.
+/// Returns the chunks of a PNG: kind and data.
 fn chunks(png: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
     let mut rest = &png[8..];
     let mut out = Vec::new();
@@ -210,7 +211,7 @@ fn chunks(png: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
     out
 }
 
-/// A PNG that shows `first` and then `second`.
+/// Returns a PNG that shows `first` and then `second`.
 fn animated_png(first: &GrayImage, second: &GrayImage) -> Vec<u8> {
     let encoded = |image: &GrayImage| {
         let mut bytes = Vec::new();
@@ -226,7 +227,7 @@ fn animated_png(first: &GrayImage, second: &GrayImage) -> Vec<u8> {
     };
     let control = |sequence: u32| {
         let numbers = [sequence, first.width(), first.height(), 0, 0].map(u32::to_be_bytes).concat();
-        // A tenth of a second; nothing disposed of, nothing blended.
+        // The frame lasts a tenth of a second, with no disposal and no blending.
         [numbers, vec![0, 1, 0, 10, 0, 0]].concat()
     };
     let data = |png: &[u8]| chunks(png).into_iter().filter(|(k, _)| k == b"IDAT").flat_map(|(_, d)| d).collect();
@@ -256,13 +257,13 @@ fn of_an_animation_the_first_picture_is_taken_and_the_others_are_told() {
     assert!(angle_deg(axis, plain(40.0)) > 1.0);
     let told = place.run(&["info", "in/film.png"]).expect(0).out;
     assert!(told.contains("pictures         2, of which hzn takes the first"), "{told}");
-    // A stack of pages, written one behind the other.
+    // The file is a stack of pages, one after another.
     std::fs::remove_file(place.path("in/film.png")).unwrap();
     place.write("in/stack.tif", &two_pages(&limb(320, 240, 0.0)));
     place.run(&["run", "in"]).expect(3).says("stack.tif with 2 pictures").says("1 frame: 1 ok");
 }
 
-/// A TIFF of two pages that are the same picture.
+/// Returns a TIFF with two pages of the same picture.
 fn two_pages(picture: &GrayImage) -> Vec<u8> {
     let mut out = b"II*\0\x08\0\0\0".to_vec();
     let (w, h) = picture.dimensions();
@@ -283,7 +284,7 @@ fn two_pages(picture: &GrayImage) -> Vec<u8> {
     out
 }
 
-/// A disc that search lines find, after so many lit things along the border that the report has no room for more.
+/// Search lines find the disc only after many lit objects along the border; the report has no room for all of them.
 #[test]
 fn an_edge_that_comes_late_is_listed_as_chosen() {
     let place = Place::new();
@@ -311,7 +312,7 @@ fn an_edge_that_comes_late_is_listed_as_chosen() {
     assert!(frame.annotations.inliers.len() > 50);
 }
 
-/// EXIF that says how a picture is to be shown, and nothing else.
+/// Returns EXIF that contains only the orientation of the picture.
 fn exif_orientation(number: u16) -> Vec<u8> {
     let value = [number.to_le_bytes(), [0; 2]].concat();
     let entry = [&0x0112u16.to_le_bytes()[..], &3u16.to_le_bytes(), &1u32.to_le_bytes(), &value].concat();
@@ -332,14 +333,14 @@ fn pictures_are_turned_only_when_it_is_asked_for() {
     let orient = |word: &str| {
         place.write("in/sensor.toml", format!("{}[input]\norient = \"{word}\"\n", common::SENSOR).as_bytes());
     };
-    // To be turned by 90 degrees clockwise.
+    // Orientation 6 asks for a turn by 90 degrees clockwise.
     save(6);
     let err = place.run(&["run", "in"]).expect(2).err;
     assert!(err.contains("a.png is 240 x 320; turn the pictures with orient in [input]"), "{err}");
     for word in ["exif", "rotate-90"] {
         orient(word);
         assert_eq!(axes(&place, &["run", "in"])[0], plain(0.0));
-        // The recording has it as it was looked at, and is not turned again.
+        // The recording stores the turned picture, which is not turned again.
         place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(0);
         assert_eq!(axes(&place, &["run", "a.mcap"])[0], plain(0.0));
         place.run(&["export", "a.mcap", "--images", "pictures", "--force"]).expect(0);
@@ -347,7 +348,7 @@ fn pictures_are_turned_only_when_it_is_asked_for() {
     }
     let told = place.run(&["explain", "in/a.png", "--overlay", "o.png"]).expect(0).out;
     assert!(told.contains("a.png: 320 x 240 px"), "{told}");
-    // As it is stored: said once.
+    // If the picture is used as stored, a note says so once.
     orient("as-stored");
     let sensor = place.read("in/sensor.toml").replace("width = 320\nheight = 240", "width = 240\nheight = 320");
     place.write("in/sensor.toml", sensor.as_bytes());
@@ -364,9 +365,9 @@ fn pictures_are_turned_only_when_it_is_asked_for() {
     place.run(&["run", "in"]).expect(2).says("[input] orient: ");
 }
 
-/// EXIF that holds `DateTimeOriginal`, 19 characters, and nothing else.
+/// Returns EXIF that contains only `DateTimeOriginal`, 19 characters.
 fn exif(stamp: &str) -> Vec<u8> {
-    // One entry of the first directory leads to the second, whose one entry leads to the text.
+    // The entry of the first directory leads to the second directory, whose entry leads to the text.
     let entry = |tag: u16, kind: u16, count: u32, value: u32| {
         [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
     };
@@ -394,12 +395,12 @@ fn pictures_go_by_one_clock() {
     };
     jpeg("b.jpg", Some("1970:01:02 00:00:01"));
     jpeg("c.jpg", None);
-    // The camera's clock, which did not say when it took the second: not 0.25 s.
+    // The time comes from the camera's clock. The second picture has no time on it, so its time is empty, not 0.25 s.
     assert_eq!(times(), ["86401.0", ""]);
-    // What the first picture does not know, the others are not asked for.
+    // If the first picture has no EXIF time, EXIF is not used for the others either.
     jpeg("a.jpg", None);
     assert_eq!(times(), ["0.0", "0.25", "0.5"]);
-    // One that cannot be read says nothing of the clock.
+    // An unreadable picture does not decide about the clock.
     place.write("in/a.jpg", b"no picture");
     let rows = without_time(&place.run(&["run", "in", "--fps", "4"]).expect(3).out);
     assert_eq!(rows.iter().map(|r| cell(r, "time_s")).collect::<Vec<_>>(), ["", "86401.0", ""]);

@@ -1,4 +1,4 @@
-//! `hzn run` of a recording of `hzn run`.
+//! Tests `hzn run` on a recording of `hzn run`.
 
 mod common;
 
@@ -7,7 +7,7 @@ use common::{Place, SENSOR, cell, without_time};
 const TRUTH: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\
                      moon_y,moon_z,qw,qx,qy,qz\n";
 
-/// Pictures with all that frames.csv can say, recorded as `out.mcap`, in a folder without a sensor.toml.
+/// Returns a folder without a sensor.toml, with pictures and all columns of frames.csv recorded as `out.mcap`.
 fn place() -> Place {
     let place = Place::with_pictures(4);
     let mut frames =
@@ -43,13 +43,13 @@ fn a_recording_is_run_again_with_all_that_it_holds() {
     assert_eq!(without_time(&place.read("again.csv")), rows);
     let evaluated = |results: &str| place.run(&["evaluate", results, "--truth", "truth.csv"]).expect(0).out;
     assert_eq!(evaluated("again.mcap"), evaluated("out.mcap"));
-    // What is given by hand takes the place of what was recorded.
+    // Options replace the recorded values.
     place.write("other.toml", SENSOR.replace("altitude_km = 400.0", "altitude_km = 410.0").as_bytes());
     place.write("other.csv", b"file,altitude_km\n0001.png,380\n0003.png,\n");
     let ran = place.run(&["run", "out.mcap", "-s", "other.toml", "--frames", "other.csv"]).expect(0);
     let altitudes = without_time(&ran.out).iter().map(|r| cell(r, "altitude_km").to_owned()).collect::<Vec<_>>();
     assert_eq!(altitudes, ["410.0", "380.0", "410.0", "410.0"]);
-    // One frame of it, by its number.
+    // One picture of the recording is explained by its number.
     let told = place.run(&["explain", "out.mcap", "--index", "1"]).expect(0).out;
     assert!(told.contains("0001.png: 320 x 240") && told.contains("position at 400.00 km given with"), "{told}");
 }
@@ -74,7 +74,7 @@ fn what_a_recording_does_not_hold_is_said() {
     place.run(&["run", "in", "-o", "one.mcap"]).expect(3);
     let ran = place.run(&["run", "one.mcap"]).expect(3).says("the recording holds no picture of it");
     assert_eq!(cell(&without_time(&ran.out)[4], "file"), "b-empty.png");
-    // The bytes of a picture in its chunk are damaged: what they were is not known any more.
+    // The bytes of a picture in its chunk are damaged, so the picture is lost.
     let whole = std::fs::read(place.path("out.mcap")).unwrap();
     let picture = std::fs::read(place.path("in/0003.png")).unwrap();
     let at = whole.windows(picture.len()).position(|w| w == picture).unwrap();
@@ -115,13 +115,14 @@ fn a_recording_that_is_not_whole_is_told_wherever_it_is_read() {
     );
     place.run(&["info", "out.mcap"]).expect(0);
     place.run(&["export", "out.mcap", "-o", "rows.csv", "--force"]).expect(0);
-    // Of another program: pictures alone.
+    // A recording of another program has only pictures.
     let bare = |bytes: &[u8], name: &str| {
-        // Without the name of our attachment it is nobody's recording.
+        // Without the name of our attachment, the recording is not one of ours.
         let mut bytes = bytes.to_vec();
         let at = bytes.windows(11).position(|w| w == b"sensor.toml").unwrap();
         bytes[at] = b'S';
-        // The record's length stands before it, and before the name two times and a length; its checksum is its end.
+        // The record's length is stored before it. Two times and a length precede the name; the checksum is the
+        // record's end.
         let start = at - 20;
         let length = u64::from_le_bytes(bytes[start - 8..start].try_into().unwrap()) as usize;
         let checksum = common::crc32(&bytes[start..start + length - 4]).to_le_bytes();

@@ -1,4 +1,4 @@
-//! `hzn run`: inputs, outputs, order, going on after an end of any kind.
+//! Tests of `hzn run`: inputs, outputs, order, and continuation after any kind of end.
 
 mod common;
 
@@ -38,7 +38,7 @@ fn all_outputs_hold_the_same_rows() {
     assert!(place.path("drawn/0005.png").exists());
     let info = place.run(&["info", "a.mcap"]).expect(0).out;
     assert!(info.contains("frames           6") && info.contains("ok               6 (100.0 %)"), "{info}");
-    // A recording is an input again.
+    // A recording can be an input.
     let again = place.run(&["run", "a.mcap", "-s", "in/sensor.toml"]).expect(0);
     let axis = |r: &Vec<(String, String)>| cell(r, "axis_y").to_owned();
     let again = without_time(&again.out);
@@ -55,7 +55,7 @@ fn times_and_altitudes_come_from_frames_csv() {
     assert_eq!((cell(&rows[1], "time_s"), cell(&rows[1], "altitude_km")), ("77.5", "390.0"));
     // The table is the only clock.
     assert_eq!((cell(&rows[2], "time_s"), cell(&rows[2], "altitude_km")), ("", "400.0"));
-    // Without times in it, it is none.
+    // A table without times is not used as the clock.
     place.write("in/frames.csv", b"file,altitude_km\n0001.png,390\n");
     let rows = without_time(&place.run(&["run", "in", "--fps", "4"]).expect(0).out);
     assert_eq!((cell(&rows[1], "time_s"), cell(&rows[2], "time_s")), ("0.25", "0.5"));
@@ -81,10 +81,10 @@ fn a_frame_without_altitude_is_a_row_that_says_so() {
         assert!(of("detail")[1].contains("no altitude: set body.altitude_km"), "{:?}", of("detail"));
         place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
     }
-    // Run again, it comes out the same.
+    // A second run gives the same results.
     let again = place.run(&["run", "a.mcap"]).expect(3);
     assert_eq!(without_time(&again.out), without_time(&place.read("rows.csv")));
-    // No picture could be processed: said before.
+    // If no picture can be processed, the command says so before it begins.
     place.write("in/frames.csv", b"file,altitude_km\n0000.png,\n");
     place.run(&["run", "in"]).expect(2).says("no altitude: ");
 }
@@ -106,7 +106,7 @@ fn a_rocket_begins_below_the_limb_height() {
     let told = place.run(&["explain", "in", "--index", "1"]).expect(3).out;
     assert_eq!(told, "0001.png: earth-sphere: no-altitude: altitude 3.2 km is below the limb height 17 km\n");
     place.run(&["explain", "in/0002.png"]).expect(0);
-    // An altitude that serves no frame at all is said before.
+    // If the altitude allows no picture at all, the command says so before it begins.
     std::fs::remove_file(place.path("in/frames.csv")).unwrap();
     place.run(&["run", "in", "--altitude-km", "3.2"]).expect(2).says("altitude 3.2 km is below the limb height 17 km");
 }
@@ -128,7 +128,7 @@ fn patterns_and_single_pictures() {
     assert_eq!(without_time(&place.run(&["run", "in/000*.png"]).expect(0).out).len(), 10);
     assert_eq!(without_time(&place.run(&["run", "in/0003.png", "in/0001.png"]).expect(0).out).len(), 2);
     place.run(&["run", "in/9*.png"]).expect(2).says("in/9*.png: no picture matches");
-    // What the shell makes of in/*: the files beside the pictures are none.
+    // The shell expands in/* to this list; the files that are not pictures are ignored.
     place.write("in/notes.txt", b"x");
     let all = ["run", "in/0000.png", "in/0001.png", "in/notes.txt", "in/sensor.toml"];
     assert_eq!(without_time(&place.run(&all).expect(0).out).len(), 2);
@@ -151,7 +151,7 @@ fn numbers_in_names_count_by_their_value() {
         assert!(!ran.err.contains("order given"), "{}", ran.err);
         assert_eq!(names(ran), "img1.png img2.png img10.png");
     }
-    // As a shell writes the pattern out: what is given in a list stays in its order, and that is told.
+    // A shell expands the pattern to this list. A list keeps its order, and a note says so.
     let ran = place.run(&["run", "in/img1.png", "in/img10.png", "in/img2.png"]).expect(0);
     let ran = ran.says("note: pictures are taken in the order given, img10.png before img2.png; give the folder");
     assert_eq!(names(ran), "img1.png img10.png img2.png");
@@ -197,7 +197,7 @@ fn headerless_pictures() {
     let found = without_time(&ran.out);
     assert_eq!(cell(&found[0], "axis_y")[..4], cell(&rows[0], "axis_y")[..4]);
 
-    // The recording's own sensor says how many bits its pictures have.
+    // The recorded sensor states the number of bits of the pictures.
     let raw = ["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml", "-o", "b.mcap"];
     place.run(&raw).expect(0);
     let recorded = hzn_mcap::Reader::open(place.path("b.mcap"), hzn_mcap::Contents::default()).unwrap();
@@ -225,7 +225,7 @@ fn outputs_that_exist_are_kept() {
 #[test]
 fn a_full_disk_is_said_and_finished_frames_stay() {
     let place = Place::with_pictures(3);
-    // /dev/full takes the place of the unfinished file: every write to it says that the disk is full.
+    // /dev/full replaces the unfinished file: every write to it reports a full disk.
     std::os::unix::fs::symlink("/dev/full", place.path("a.csv.part")).unwrap();
     place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(1).says("the disk is full");
     std::os::unix::fs::symlink("/dev/full", place.path("a.mcap.part")).unwrap();
@@ -237,7 +237,7 @@ fn a_full_disk_is_said_and_finished_frames_stay() {
     common::Ran::from_output(&output, &place.path("")).expect(1).says("cannot be written to stdout");
 }
 
-/// A limit on the size of files stands for a disk that fills up in the middle of a run.
+/// A limit on the file size simulates a disk that fills up during a run.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_disk_that_fills_up_keeps_what_is_finished() {
@@ -245,7 +245,7 @@ fn a_disk_that_fills_up_keeps_what_is_finished() {
     place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
     let whole = without_time(&place.read("whole.csv"));
     for (out, blocks) in [("a.csv", 60), ("a.jsonl", 120), ("a.mcap", 800)] {
-        // Without its signal, so that writing fails as on a full disk.
+        // The signal of the limit is ignored, so that a write fails as on a full disk.
         let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run in -o {out}");
         let hzn = place.command(&[]);
         let mut shell = std::process::Command::new("bash");
@@ -263,20 +263,20 @@ fn a_disk_that_fills_up_keeps_what_is_finished() {
     }
 }
 
-/// Starts a run of many frames, waits until some are finished, and ends it with `end`.
+/// Starts a run of many pictures, waits until some are finished, and ends it with the signal `end`.
 #[cfg(unix)]
 fn cut_short(place: &Place, out: &str, end: &str) -> Option<i32> {
     let mut child =
         place.command(&["run", "in", "-o", out, "-j", "1"]).stderr(std::process::Stdio::null()).spawn().unwrap();
     let part = place.path(&format!("{out}.part"));
     let begin = Instant::now();
-    // Larger than what stands before the first frame.
+    // The file is larger than the part before the first picture.
     let grown = |part: &std::path::Path| std::fs::metadata(part).is_ok_and(|m| m.len() > 100_000);
     while !grown(&part) && begin.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(2));
     }
     if out.ends_with(".mcap") {
-        // Pictures come before results in a recording: give those time to follow.
+        // Pictures precede their results in a recording; the pause lets the results follow.
         std::thread::sleep(Duration::from_millis(60));
     }
     let id = child.id().to_string();
@@ -307,7 +307,7 @@ fn recover_closes_what_a_crash_left() {
     let place = Place::with_pictures(2000);
     for out in ["a.csv", "a.mcap"] {
         cut_short(&place, out, "-9");
-        // What was written last is cut in the middle.
+        // The end of the last write is cut off.
         let part = place.path(&format!("{out}.part"));
         let file = std::fs::OpenOptions::new().write(true).open(&part).unwrap();
         file.set_len(std::fs::metadata(&part).unwrap().len() - 3).unwrap();
@@ -316,7 +316,7 @@ fn recover_closes_what_a_crash_left() {
         place.run(&["export", out, "-o", "kept.csv", "--force"]).expect(0).says(&format!("{kept} rows"));
         place.run(&["info", out]).expect(0);
         assert!(!place.path(&format!("{out}.part")).exists());
-        // Even that can be continued.
+        // The recovered file can be continued.
         place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
         place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
     }
@@ -358,7 +358,7 @@ fn another_sensor_is_not_appended() {
         place
             .run(&["run", "in", "-o", out, "--resume", "--altitude-km", "410"])
             .expect(2)
-            // A recording knows its sensor.
+            // A recording contains its sensor.
             .says(if out == "a.mcap" { "was begun with another sensor.toml" } else { "now comes out differently" });
         assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
         place.write("other.toml", format!("{}[reject]\nseed = 2\n", common::SENSOR).as_bytes());
@@ -373,7 +373,7 @@ fn another_sensor_is_not_appended() {
 #[test]
 fn nobody_listening_is_no_crash() {
     let place = Place::with_pictures(3);
-    // A pipe whose other end is closed.
+    // This is a pipe whose other end is closed.
     let closed = || std::io::pipe().unwrap().1;
     for args in [&["run", "in"][..], &["info", "in/0000.png"], &["explain", "in/0000.png"], &["completions", "bash"]] {
         let output = place.command(args).stdout(closed()).output().unwrap();
@@ -393,7 +393,7 @@ fn nobody_listening_is_no_crash() {
     assert_eq!(without_time(&place.read("a.csv")).len(), 3);
 }
 
-/// What `hzn run` prints after `what to try: `.
+/// Returns the command that `hzn run` prints after `what to try: `.
 fn suggested(ran: &common::Ran) -> String {
     let line = ran.err.lines().find(|l| l.contains("what to try: ")).unwrap_or_else(|| panic!("{}", ran.err));
     line.split("what to try: ").nth(1).unwrap().to_owned()
@@ -428,7 +428,7 @@ fn the_commonest_refusal_is_named_and_the_command_runs_as_printed() {
     let with = |more: &[&str]| place.run(&[&["run"], more, &base].concat());
     let ran = with(&[other]).expect(0).says("note: 3 refused, 2 as no-limb: ");
     assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
-    // A pattern, files, and a table that is named.
+    // The inputs are a pattern, then files with a named table.
     let ran =
         with(&["some flight's/*/*black.png"]).expect(0).says("nothing was found in any picture; 2 refused, all as");
     assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
@@ -437,16 +437,16 @@ fn the_commonest_refusal_is_named_and_the_command_runs_as_printed() {
     let ran = place.run(&["run", other, "-s", "its sensor.toml", "--frames", "frames.csv", "--flight"]).expect(3);
     assert!(suggested(&ran).ends_with("--frames frames.csv --flight"), "{}", suggested(&ran));
     assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
-    // A recording has frames by their numbers.
+    // In a recording, pictures have numbers.
     with(&[other, "-o", "out file.mcap"]).expect(0);
     let ran = place.run(&["run", "out file.mcap"]).expect(0);
     assert_eq!(suggested(&ran), "hzn explain 'out file.mcap' --index 1");
     assert!(explain(&ran).contains("1 black.png: 320 x 240"), "{}", suggested(&ran));
-    // Headerless.
+    // The pictures are headerless.
     std::fs::create_dir(place.path("raw")).unwrap();
     place.write("raw/a b.raw", &[0; 320 * 240]);
     let ran = with(&["raw", "--raw", "320x240:mono8"]).expect(0);
     assert!(explain(&ran).contains("a b.raw: 320 x 240"), "{}", suggested(&ran));
-    // All answered: nothing to say.
+    // All pictures are answered, so there is no note.
     assert!(!with(&["some flight's/a/0 0000.png"]).expect(0).err.contains("refused"));
 }

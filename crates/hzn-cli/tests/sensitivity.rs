@@ -1,4 +1,4 @@
-//! `hzn sensitivity`: tables, plots, and what is said about designs that cannot be.
+//! Tests of `hzn sensitivity`: tables, plots, and messages about impossible designs.
 
 mod common;
 
@@ -27,7 +27,8 @@ fn a_sweep_as_text_table_and_plot() {
     assert!(ran.err.contains("smallest pitch, fused:"), "{}", ran.err);
     let table = rows(&place.read("s.csv"));
     let number = |row: usize, name: &str| cell(&table[row], name).parse::<f64>().unwrap();
-    // The reference of Braun & Barf 33 at 98 degrees, 3 sigma: 0.5400 in pitch, 0.1248 in roll; α known 0.0998.
+    // The reference values of Braun & Barf 33 at 98 degrees, 3 sigma, are 0.5400 in pitch and 0.1248 in roll; 0.0998
+    // with α known.
     assert_eq!(cell(&table[2], "fov_deg"), "98");
     for (name, expected) in
         [("pitch_braun_barf_33_deg", 0.54), ("roll_braun_barf_33_deg", 0.1248), ("pitch_known_deg", 0.0998)]
@@ -55,10 +56,10 @@ fn a_sensor_file_brings_camera_body_and_noise() {
     let place = Place::new();
     let own = place.run(&["sensitivity", "-s", "in/sensor.toml", "--depression", "20"]).expect(0);
     let line = own.out.lines().nth(1).unwrap();
-    // Of the file: 400 km above a sphere with the limb at 17 km.
+    // The file has 400 km above a sphere with the limb at 17 km.
     assert!(line.trim_start().starts_with("400") && line.contains("70.64"), "{}", own.out);
     place.run(&["sensitivity", "-s", "in/sensor.toml", "--fov", "60"]).expect(2).says("cannot be used with");
-    // Of several bodies one must be named.
+    // If the sensor has several bodies, one must be named.
     let bodies = "[[bodies]]\nkind = \"sun\"\n[[bodies]]\nkind = \"moon\"\n";
     let sensor = place.read("in/sensor.toml");
     let (before, after) = sensor.split_once("[body]").unwrap();
@@ -69,8 +70,7 @@ fn a_sensor_file_brings_camera_body_and_noise() {
     place.run(&[&several[..], &["--body", "moon"]].concat()).expect(0);
 }
 
-/// The commands that book/guide/evaluation.md shows, with a sensor as `hzn simulate` writes it: its altitude is in
-/// frames.csv.
+/// Runs the commands of book/guide/evaluation.md, with a sensor from `hzn simulate`: its altitude is in frames.csv.
 #[test]
 fn the_examples_of_the_docs_run() {
     let place = Place::new();
@@ -121,7 +121,7 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
     refused(&["--altitude", "200", "-o", "x.pdf"], "a table ends in .csv, a plot in .svg");
     refused(&["--altitude", "200", "-o", "x.svg"], "give one value a range");
     refused(&["visibility", "--altitude", "5"], "5 km is not above the limb at 10 km");
-    // No limb in view is an answer, with advice.
+    // No limb in view is a valid result, with advice.
     let ran = place.run(&["sensitivity", "--altitude", "3000", "--fov", "30"]).expect(0);
     assert!(ran.out.lines().nth(1).unwrap().ends_with('-'), "{}", ran.out);
     ran.says(

@@ -1,4 +1,4 @@
-//! `hzn simulate`, end to end through the binary.
+//! `hzn simulate`, from beginning to end through the binary.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ rate_hz = 10
 [gnss]
 "#;
 
-/// Runs hzn in a folder: exit code, stdout, stderr.
+/// Runs hzn in a folder. Returns exit code, stdout, stderr.
 fn hzn(folder: &Path, threads: &str, args: &[&str]) -> (i32, String, String) {
     let out = assert_cmd::Command::cargo_bin("hzn")
         .expect("the binary is built")
@@ -55,12 +55,12 @@ fn a_scene_becomes_pictures_that_the_sensor_answers() {
     );
     let lines = |name: &str| std::fs::read_to_string(at.join("out").join(name)).unwrap().lines().count();
     assert_eq!((lines("frames.csv"), lines("truth.csv")), (6, 6));
-    // 350 s, both ends included, and the header.
+    // The tables cover 350 s with both ends, and have a header.
     assert_eq!((lines("imu.csv"), lines("gnss.csv")), (3502, 352));
     let sensor = std::fs::read_to_string(at.join("out/sensor.toml")).unwrap();
     assert!(sensor.contains("measured on 32 other pictures") && sensor.contains("sigma_px"), "{sensor}");
 
-    // Every file says what it is.
+    // `hzn info` describes every file.
     for (file, kind, more) in [
         ("scene.toml", "scene, for `hzn simulate FILE`", "5, at "),
         ("sensor.toml", "sensor.toml", "lens "),
@@ -77,12 +77,12 @@ fn a_scene_becomes_pictures_that_the_sensor_answers() {
     std::fs::write(at.join("any.csv"), "a,b\n1,2\n").unwrap();
     assert!(hzn(at, "1", &["info", "any.csv"]).1.starts_with("file             table that is none of hzn's"));
 
-    // The sensor takes them as they are.
+    // The sensor processes the pictures without changes.
     let (code, stdout, stderr) = hzn(at, "2", &["run", "out"]);
     assert_eq!((code, stdout.lines().count()), (0, 6), "{stderr}");
     assert!(stdout.matches(",ok,").count() >= 4, "{stdout}");
 
-    // The same pictures on one thread, and where some are missing.
+    // One thread gives the same pictures, and so does a continued run.
     let read = |folder: &str, i: usize| std::fs::read(at.join(folder).join(format!("small-{i:05}.png"))).unwrap();
     assert_eq!(hzn(at, "1", &["simulate", "my.toml", "-o", "one", "-q"]).0, 0);
     assert!((0..5).all(|i| read("out", i) == read("one", i)));
@@ -91,7 +91,7 @@ fn a_scene_becomes_pictures_that_the_sensor_answers() {
     assert_eq!(code, 0, "{stderr}");
     assert_eq!(read("out", 3), read("one", 3));
 
-    // What is there is not overwritten, and not mixed with another scene.
+    // Existing files are not overwritten, and not mixed with another scene.
     let (code, _, stderr) = hzn(at, "1", &["simulate", "my.toml", "-o", "one"]);
     assert_eq!(code, 2);
     assert!(stderr.contains("one: exists already"), "{stderr}");
@@ -108,7 +108,7 @@ fn pictures_of_the_rendering_before_do_not_stay() {
     let simulate =
         |frames: &str| hzn(at, "2", &["simulate", "my.toml", "-o", "out", "--frames", frames, "--force", "-q"]).0;
     assert_eq!(simulate("3"), 0);
-    // What has no truth is somebody's own.
+    // A picture without a truth belongs to the user.
     std::fs::write(at.join("out/mine.png"), b"mine").unwrap();
     assert_eq!(simulate("2"), 0);
     let there = |name: &str| at.join("out").join(name).exists();
@@ -150,7 +150,8 @@ fn what_cannot_be_is_said_before_anything_is_written() {
     assert_eq!((code, stderr.as_str()), (2, "error: rockett: no such scene or file; did you mean rocket?\n"));
 }
 
-/// Radiances with the limb's half level at 30 km over the north pole and 20 km over the south pole all the year.
+/// Returns radiances for the whole year: the limb's half level is at 30 km over the north pole and 20 km over the south
+/// pole.
 fn radiances() -> String {
     let mut text = String::from("tangent_height_km,latitude_deg,radiance\n");
     for latitude in [-90.0, 90.0] {
@@ -186,7 +187,7 @@ fn radiances_of_ones_own() {
     let of = |i: usize| rows[i].as_array().unwrap()[1].as_float().unwrap();
     assert!((of(rows.len() - 1) - of(0) - 10.0).abs() < 0.01, "{rows:?}");
 
-    // The limb stands where the table has it.
+    // The limb height agrees with the table.
     let (code, _, stderr) = hzn(at, "2", &["run", "out", "-o", "out.csv"]);
     assert_eq!(code, 0, "{stderr}");
     let (code, _, stderr) = hzn(at, "1", &["evaluate", "out.csv", "--truth", "out/truth.csv", "-o", "e.json"]);
@@ -195,7 +196,7 @@ fn radiances_of_ones_own() {
     let rms_deg = known["evaluations"][0]["errors"]["rms_deg"].as_f64().unwrap();
     assert!(rms_deg < 0.05, "{rms_deg}");
 
-    // The folder holds all that its scene needs, wherever it is.
+    // The folder contains all files of its scene, so it can be moved.
     std::fs::rename(at.join("out"), at.join("moved")).unwrap();
     std::fs::remove_file(at.join("radiance.csv")).unwrap();
     let (code, _, stderr) = hzn(at, "2", &["simulate", "moved/scene.toml", "-o", "again", "-q"]);

@@ -1,4 +1,4 @@
-//! Videos, through ffmpeg: times, Ctrl-C, and files that break off.
+//! Videos, through ffmpeg: times, Ctrl-C, and truncated files.
 
 mod common;
 
@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use common::{Place, Ran, angle_deg, axes, cell, without_time};
 
-/// Whether the decoders of videos are on PATH; without them the test named `what` is passed over, but never in CI.
+/// Returns whether ffmpeg and ffprobe are on PATH. Without them the test `what` is skipped, but never in CI.
 fn decoder(what: &str) -> bool {
     let there = ["ffmpeg", "ffprobe"].iter().all(|tool| {
         let started = Command::new(tool).arg("-version").stdout(Stdio::null()).status();
@@ -19,13 +19,13 @@ fn decoder(what: &str) -> bool {
     there
 }
 
-/// Whether this ffmpeg can write what others have to be added to it for.
+/// Returns whether this ffmpeg has an encoder that is not in every build.
 fn encoder(name: &str) -> bool {
     let listed = Command::new("ffmpeg").args(["-v", "error", "-encoders"]).output().unwrap();
     String::from_utf8_lossy(&listed.stdout).split_whitespace().any(|word| word == name)
 }
 
-/// Makes a video: what stands before and after the pictures' name on ffmpeg's command line.
+/// Makes a video. `before` and `coding` are the arguments of ffmpeg before and after the name of the pictures.
 #[track_caller]
 fn make(place: &Place, before: &[&str], input: &str, coding: &[&str], name: &str) {
     let made = Command::new("ffmpeg")
@@ -55,7 +55,7 @@ fn videos_made_and_read_by_the_real_ffmpeg() {
     }
     let place = Place::with_pictures(6);
     let pictures = axes(&place, &["run", "in"]);
-    // Lossless, 10 bits of luma; lossy, 8 bits of limited range; lossless, without a luma plane.
+    // The videos are lossless with 10 bits of luma; lossy with 8 bits of limited range; lossless without a luma plane.
     for (name, coding, within_deg) in [
         ("deep.mkv", &["-c:v", "ffv1", "-pix_fmt", "yuv420p10le"][..], 0.01),
         ("lossy.mp4", &["-c:v", "mpeg4", "-q:v", "2", "-pix_fmt", "yuv420p"], 0.05),
@@ -70,12 +70,12 @@ fn videos_made_and_read_by_the_real_ffmpeg() {
             assert!(off < within_deg, "{name}: {off}");
         }
     }
-    // A file that only has the ending of a video.
+    // The file has only the ending of a video.
     place.write("text.mp4", b"this is no video");
     run(&place, "text.mp4").expect(2).says("ffprobe cannot read it");
 }
 
-/// These have data beside their frames, of which ffprobe speaks, too.
+/// These videos have data next to their frames, which ffprobe also lists.
 #[test]
 fn every_frame_has_its_own_time() {
     if !decoder("every_frame_has_its_own_time") {
@@ -85,7 +85,7 @@ fn every_frame_has_its_own_time() {
     let mut seen = 0;
     for (codec, name) in [("mpeg2video", "mpeg2.mkv"), ("libx264", "h264.mp4"), ("libx265", "h265.mp4")] {
         if encoder(codec) {
-            // MPEG-2 knows few rates.
+            // MPEG-2 allows only a few frame rates.
             let coding = ["-vf", "setpts=PTS+gt(N\\,4)/TB", "-fps_mode", "vfr", "-c:v", codec, "-pix_fmt", "yuv420p"];
             make(&place, &["-framerate", "25"], "in/%04d.png", &coding, name);
             let ran = run(&place, name).expect(0);
@@ -100,8 +100,8 @@ fn every_frame_has_its_own_time() {
     assert!(seen > 0);
 }
 
-/// `ffmpeg` and `ffprobe` that give frames of 320x240, written as shell scripts: what is tested is how they are called
-/// and read, not the decoding.
+/// Shell scripts in place of `ffmpeg` and `ffprobe` that give frames of 320x240. The tests check how the programs are
+/// called and read, not the decoding.
 #[cfg(unix)]
 struct Scripts {
     place: Place,
@@ -117,7 +117,7 @@ impl Scripts {
         std::fs::create_dir(place.path("bin")).unwrap();
         Self { place }
     }
-    /// What ffprobe does to list the frames, and what ffmpeg does after three of them.
+    /// Writes the scripts: `stamps` makes ffprobe list the frames, and `end` is what ffmpeg does after three frames.
     fn write(&self, stamps: &str, end: &str) {
         use std::os::unix::fs::PermissionsExt;
         let probe = format!(
@@ -156,11 +156,11 @@ fn frames_of_a_video_go_by_one_clock() {
         column(&ran, "time_s")
     };
     assert_eq!(times(&["0.04", "0.12", "0.13"]), ["0.04", "0.12", "0.13"]);
-    // One without a time, or of which nothing is said, has none; it is not counted.
+    // A frame without a time, or that is missing in the list, has no time; its number is not used instead.
     assert_eq!(times(&["0.04", "N/A", "0.13"]), ["0.04", "", "0.13"]);
     assert_eq!(times(&["N/A", "0.12", "0.13"]), ["", "0.12", "0.13"]);
     assert_eq!(times(&["0.04", "0.12"]), ["0.04", "0.12", ""]);
-    // No times at all.
+    // There are no times at all.
     assert_eq!(times(&["N/A", "N/A", "N/A"]), ["0.0", "1.0", "2.0"]);
     assert_eq!(times(&[]), ["0.0", "1.0", "2.0"]);
     scripts.with_path("in").expect(2).says("install ffmpeg");
@@ -182,7 +182,7 @@ fn how_ffmpeg_ends_is_told() {
     ran.says(told);
     ends("exit 69").expect(3).says("ffmpeg ended with code 69");
     ends("echo x").expect(3).says("(it ends in the middle of a frame)");
-    // As others would end it; what is written can be continued.
+    // Someone else ends ffmpeg; the results so far can be continued.
     ends("kill -9 $$").expect(1).says("ffmpeg was ended from outside after 3 frames");
     ends("exit 255").expect(1).says("ffmpeg was ended from outside after 3 frames");
     scripts.place.write("frames.gray", b"");
@@ -199,7 +199,7 @@ fn a_video_that_breaks_off_is_told() {
     }
     let place = Place::with_pictures(40);
     for (name, coding) in [
-        // ffmpeg says nothing of this one.
+        // ffmpeg reports nothing for this file.
         ("ffv1.avi", &["-c:v", "ffv1"][..]),
         ("colour.avi", &["-c:v", "rawvideo", "-pix_fmt", "bgr24"]),
         ("mpeg2.mkv", &["-c:v", "mpeg2video"]),
@@ -218,14 +218,14 @@ fn a_video_that_breaks_off_is_told() {
     }
 }
 
-/// Of these the container counts more frames than there are to be seen.
+/// The container counts more frames than are shown.
 #[test]
 fn frames_left_out_on_purpose_are_no_loss() {
     if !decoder("frames_left_out_on_purpose_are_no_loss") {
         return;
     }
     let place = Place::with_pictures(40);
-    // An edit list; empty frames, as others repeat.
+    // The first video has an edit list; the second has empty frames, which repeat the frame before.
     let from = ["-framerate", "25"];
     make(&place, &from, "in/%04d.png", &["-c:v", "mpeg4", "-g", "20"], "whole.mp4");
     make(&place, &["-ss", "1.0"], "whole.mp4", &["-c", "copy"], "late.mp4");
@@ -238,13 +238,14 @@ fn frames_left_out_on_purpose_are_no_loss() {
     }
 }
 
-/// As a terminal does, which sends it to all that was started.
+/// Sends the signal as a terminal does: to all processes that were started.
 #[cfg(unix)]
 #[test]
 fn a_video_interrupted_with_all_its_helpers_can_be_continued() {
     use std::os::unix::process::CommandExt;
     use std::time::{Duration, Instant};
-    // Sixty frames, for each of which ffprobe takes its time: most likely it is that which is waited for.
+    // There are sixty frames, and ffprobe is slow for each. Most likely the run waits for ffprobe when the signal
+    // comes.
     let scripts = Scripts::new();
     let stamps =
         "i=10; while [ $i -lt 70 ]; do echo best_effort_timestamp_time=0.$i; i=$((i+1)); /bin/sleep 0.02; done";
@@ -276,7 +277,7 @@ fn one_colour_of_a_video_and_its_rotation() {
     if !decoder("one_colour_of_a_video_and_its_rotation") {
         return;
     }
-    // Blue has the limb; red is bright all over, and heavier in the luma.
+    // The limb is in blue. Red and green are bright everywhere and have more weight in the luma.
     let place = Place::new();
     for i in 0..3 {
         let grey = common::limb(320, 240, f64::from(i));
@@ -299,14 +300,14 @@ fn one_colour_of_a_video_and_its_rotation() {
         }
         place.run(&["explain", name, "-s", "in/sensor.toml", "--index", "1"]).expect(0);
     }
-    // The luma says something else, or nothing.
+    // The luma gives another direction, or none.
     sensor("");
     let luma = run(&place, "yuv.mkv").expect(0);
     assert!(
         column(&luma, "status").iter().all(|s| s != "ok")
             || column(&luma, "axis_y")[0] != format!("{}", pictures[0][1])
     );
-    // To be shown turned: the container says so, and it is not done unasked.
+    // The container asks for a turn, which is not made without being asked for.
     make(&place, &[], "rgb.avi", &["-c:v", "mpeg4", "-q:v", "1"], "plain.mp4");
     let turned = |before: &[&str], coding: &[&str]| {
         let mut tool = Command::new("ffmpeg");
@@ -314,7 +315,7 @@ fn one_colour_of_a_video_and_its_rotation() {
         let made = tool.args(["-c", "copy"]).args(coding).arg(place.path("turned.mp4")).stderr(Stdio::null()).status();
         made.unwrap().success()
     };
-    // Counter-clockwise, since version 6; before, a tag that ends up counter-clockwise, too.
+    // The option of ffmpeg 6 counts counter-clockwise. In older versions the written tag also counts counter-clockwise.
     assert!(turned(&["-display_rotation", "-90"], &[]) || turned(&[], &["-metadata:s:v:0", "rotate=270"]));
     run(&place, "turned.mp4").expect(0).says("turned.mp4 says that it is to be shown turned by 90 degrees clockwise");
 }

@@ -1,12 +1,12 @@
-//! Why a run cannot begin, or ends early.
+//! The reasons why a run cannot begin, or ends early.
 
 use std::fmt;
 
 use hzn_calib::Problem;
 
-/// Why something cannot be done, in words that name the file or the key.
+/// An error of a run, in words that name the file or the key.
 ///
-/// It is displayed as one line, causes included; what a caller offers against it is told by [`Error::remedy`].
+/// It is displayed as one line that includes the causes. [`Error::remedy`] says what a caller can offer against it.
 #[derive(Debug)]
 pub struct Error {
     kind: Kind,
@@ -14,43 +14,43 @@ pub struct Error {
     remedy: Option<Remedy>,
 }
 
-/// Whose fault an error is.
+/// The source of an error: the input, or a failure during the run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// An input, a path or a configuration cannot be used. Nothing was done.
     Unusable,
-    /// Something failed on the way: a disk, a file that is broken.
+    /// Something failed during the run, for example a disk or a broken file.
     Failed,
 }
 
-/// What would help against an error. Each caller has its own way to offer it: an option, an argument, a button.
+/// A remedy against an error. Each caller offers it in its own form: an option, an argument, a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Remedy {
-    /// The file may be replaced.
+    /// The caller may replace the file.
     Replace,
-    /// The file may be replaced, or the run that wrote it continued.
+    /// The caller may replace the file, or continue the run that wrote it.
     ReplaceOrResume,
-    /// The run that left the file may be continued, or begun again.
+    /// The caller may continue the run that left the file, or start it again.
     ResumeOrRestart,
-    /// The run may be begun again.
+    /// The caller may start the run again.
     Restart,
-    /// The topic may be left out.
+    /// The caller may leave out the topic.
     NoTopic,
-    /// Files without a header can be read when their size and format are told.
+    /// The caller may give the size and format of files without a header.
     Headerless,
 }
 
 impl Error {
-    /// Whose fault it is.
+    /// Returns whether the input is unusable or something failed.
     pub fn kind(&self) -> Kind {
         self.kind
     }
-    /// What would help, where the caller can do something about it.
+    /// Returns the remedy, if the caller can do something against the error.
     pub fn remedy(&self) -> Option<Remedy> {
         self.remedy
     }
-    /// The causes.
+    /// Returns the error with its causes.
     pub fn into_cause(self) -> anyhow::Error {
         self.cause
     }
@@ -85,12 +85,12 @@ impl From<Problem> for Error {
     }
 }
 
-/// An input, a path or a configuration that cannot be used.
+/// Returns an error for an input, a path or a configuration that cannot be used.
 pub(crate) fn unusable(message: impl fmt::Display) -> Error {
     Error { kind: Kind::Unusable, cause: anyhow::anyhow!("{message}"), remedy: None }
 }
 
-/// Something that failed.
+/// Returns an error for something that failed.
 pub(crate) fn failed(message: impl fmt::Display) -> Error {
     Error { kind: Kind::Failed, cause: anyhow::anyhow!("{message}"), remedy: None }
 }

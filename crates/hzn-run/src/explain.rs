@@ -1,11 +1,11 @@
-//! What happened to a picture, in words and numbers for people.
+//! Explains in words and numbers what happened to a picture.
 
 use hzn_core::covariance::Term;
 use hzn_core::status::{Stage, Status};
 use hzn_core::verdict::Verdict;
 use hzn_core::{Report, Solution, gates};
 
-/// What a verdict means, with the limit that was not met.
+/// Returns the meaning of a verdict, with the limit that was not met.
 pub fn why(verdict: Verdict, s: &gates::Config) -> String {
     match verdict {
         Verdict::Chosen => "the answer".into(),
@@ -66,7 +66,7 @@ pub fn why(verdict: Verdict, s: &gates::Config) -> String {
     }
 }
 
-/// A source of error in words.
+/// Returns the name of a source of error in words.
 pub fn term(term: Term) -> &'static str {
     match term {
         Term::EdgeNoise => "edge noise",
@@ -81,7 +81,7 @@ pub fn term(term: Term) -> &'static str {
     }
 }
 
-/// What a status means of a picture in which no edge was fitted.
+/// Returns the meaning of a status for a picture in which no edge was fitted.
 pub fn without_edges(status: Status) -> &'static str {
     match status {
         Status::Ok => "the answer",
@@ -97,11 +97,11 @@ pub fn without_edges(status: Status) -> &'static str {
     }
 }
 
-/// Standard deviations of the axis along its two principal directions, the larger first, and the angle of that one from
-/// image x towards image y, in radians.
+/// Returns the standard deviations of the axis along its two principal directions, the larger first, and the angle of
+/// the larger one, measured from image x towards image y. All are in radians.
 pub fn principal(s: &Solution<f64>) -> ([f64; 2], f64) {
     let [x, y, z] = s.axis.xyz();
-    // Image x and y carried to the axis the short way, as for the rays.
+    // Image x and y are rotated to the axis by the shortest rotation, as for the rays.
     let q = 1.0 / (1.0 + z).max(1e-9);
     let b1 = [1.0 - x * x * q, -x * y * q, -x];
     let b2 = [-x * y * q, 1.0 - y * y * q, -y];
@@ -115,7 +115,7 @@ pub fn principal(s: &Solution<f64>) -> ([f64; 2], f64) {
     ([(half + root).max(0.0).sqrt(), (half - root).max(0.0).sqrt()], angle)
 }
 
-/// What to try when there is no answer.
+/// Returns advice for a picture without an answer.
 pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     let has = |v: Verdict| r.candidates.iter().any(|c| c.verdict == v);
     let mut tips: Vec<&str> = Vec::new();
@@ -186,7 +186,7 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     tips
 }
 
-/// `1 picture`, `2 pictures`.
+/// Returns a number with its noun: `1 picture`, `2 pictures`.
 pub fn counted(n: u64, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }

@@ -1,11 +1,12 @@
-//! The run over a sequence of pictures: from files to directions with covariances, in files that others can read.
+//! The run over a sequence of pictures: it turns files into directions with covariances, in files that other programs
+//! can read.
 //!
-//! A [`source`] hands out pictures in order, the [`engine`] takes them through the sensor on all cores, and a [`sink`]
-//! takes the results in order. [`results`] reads what a sink wrote. [`overlay`] draws what was found over a picture,
-//! and
-//! [`explain`] says in words what happened to it. [`scene`] reads the scenes that are simulated. The command line, the
-//! Python package and the viewer are built on this crate; it prints nothing, and its [`Error`] knows no exit code and
-//! no option.
+//! A [`source`] hands out pictures in order. The [`engine`] processes them with the sensor on all cores. A [`sink`]
+//! takes the results in order. [`results`] reads the files that a sink wrote. [`overlay`] draws the result over a
+//! picture, and [`explain`] describes in words what happened to it. [`scene`] reads the scenes for the simulator.
+//!
+//! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
+//! contains no exit code and no name of an option.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 

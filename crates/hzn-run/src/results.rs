@@ -1,4 +1,4 @@
-//! Results that were written before, read again.
+//! Reads results that an earlier run wrote.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -8,10 +8,10 @@ use hzn_mcap::{Contents, Reader, Row};
 use crate::error::{Error, failed, unusable};
 use crate::source::ending;
 
-/// Rows of results, and the sensor.toml that an MCAP holds.
+/// Reads all rows of results, and the sensor.toml if the file is an MCAP with one.
 ///
 /// # Errors
-/// No such file, none of `hzn run`, or a broken one.
+/// The file does not exist, is not a file of results of `hzn run`, or is broken.
 pub fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Error> {
     if !file.is_file() {
         return Err(unusable(format!("{}: no such file", file.display())));
@@ -27,14 +27,14 @@ pub fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Error> {
     }
 }
 
-/// Rows, one after the other.
+/// An iterator over the rows.
 pub type AllRows = Box<dyn Iterator<Item = Result<Row, Error>>>;
 
-/// Rows of a table of results: `kind` is its ending, `csv` or `jsonl`. What an unfinished one (`.part`) ends with in
-/// the middle of a row is left out.
+/// Reads the rows of a table of results. `kind` is the file's ending, `csv` or `jsonl`. If an unfinished file (`.part`)
+/// ends in the middle of a row, this incomplete row is left out.
 ///
 /// # Errors
-/// Another kind of file, or one that cannot be read; a row that is none of results.
+/// The file is of another kind or cannot be read, or a row is not a row of results.
 pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
     let name = file.display().to_string();
     let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
@@ -42,7 +42,7 @@ pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
         "csv" => {
             let reader = csv::Reader::from_path(file).map_err(failed)?;
             let why = |e: csv::Error| match e.kind() {
-                // The line stands before it already.
+                // The line number is already in the message.
                 csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
                 _ => e.to_string(),
             };

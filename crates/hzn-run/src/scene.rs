@@ -1,4 +1,4 @@
-//! Scenes by name or from a file.
+//! Scenes, by name or from a file.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,10 @@ use hzn_sim::{Scenario, ScenarioError};
 use crate::error::{Error, unusable};
 use crate::sink;
 
-/// Path and text of a scene: one of [`BUILTIN`], or a scene.toml.
+/// Returns the path and the text of a scene. `name` is one of [`BUILTIN`], or the path of a scene.toml.
 ///
 /// # Errors
-/// No such scene or file.
+/// There is no built-in scene and no file with this name, or the file cannot be read.
 pub fn source(name: &str) -> Result<(PathBuf, String), Error> {
     if let Some((_, _, text)) = BUILTIN.iter().find(|b| b.0 == name) {
         return Ok((PathBuf::from(name), (*text).to_owned()));
@@ -28,16 +28,17 @@ pub fn source(name: &str) -> Result<(PathBuf, String), Error> {
     Ok((path, text))
 }
 
-/// A scene that was checked, with the number of pictures and the seed instead of its own where they are given.
+/// Loads and checks a scene. `frames` (number of pictures) and `seed` replace the values of the scene if they are
+/// given.
 ///
 /// # Errors
-/// As [`source`] and [`parse`].
+/// The errors of [`source`] and of [`parse`].
 pub fn load(name: &str, frames: Option<u32>, seed: Option<u64>) -> Result<Scenario, Error> {
     let (path, text) = source(name)?;
     parse(&text, &path, frames, seed)
 }
 
-/// As [`load`], from the text of a scene.toml.
+/// Parses and checks the text of a scene.toml, as [`load`] does.
 ///
 /// # Errors
 /// The first key or value that is refused.
@@ -58,7 +59,7 @@ pub fn parse(text: &str, path: &Path, frames: Option<u32>, seed: Option<u64>) ->
     Ok(scenario)
 }
 
-/// A scene that is refused, by its name.
+/// Returns the error for a refused scene, with its name.
 pub fn refused(name: &str, error: &ScenarioError) -> Error {
     unusable(format!("{name}: {error}"))
 }

@@ -1,4 +1,4 @@
-//! `hzn completions`: for the shell.
+//! `hzn completions`: prints completions for a shell.
 
 use clap::CommandFactory;
 
@@ -27,7 +27,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         Shell::Zsh => clap_complete::Shell::Zsh,
         Shell::Fish => clap_complete::Shell::Fish,
     };
-    // Into memory first: the generator panics when stdout is closed early.
+    // The text goes to memory first, because the generator panics when stdout is closed early.
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut super::Cli::command(), "hzn", &mut text);
     std::io::Write::write_all(&mut std::io::stdout(), &text)?;

@@ -1,4 +1,4 @@
-//! `hzn demo`: a rendered flight with known truth, and a real photograph, end to end.
+//! `hzn demo`: processes a rendered flight with known truth, and a real photograph, from beginning to end.
 
 use hzn_run::explain;
 use std::path::{Path, PathBuf};
@@ -21,11 +21,11 @@ const ISS_CREDITS: &str = include_str!("../../assets/CREDITS.md");
 
 /// Render a rocket flight, find its limb, compare with the truth; then find the limb in a real photograph
 ///
-/// Everything stays in the folder: pictures, sensor.toml, frames.csv and truth.csv of the flight, the results as MCAP
-/// (for Foxglove) and CSV, pictures with overlay. It is a pattern for own data.
+/// All files stay in the folder: pictures, sensor.toml, frames.csv and truth.csv of the flight, the results as MCAP
+/// (for Foxglove) and CSV, and pictures with overlay. Use the folder as a pattern for your own data.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Folder that is made
+    /// The folder to create
     #[arg(default_value = "hzn-demo")]
     folder: PathBuf,
     /// Write into a folder that exists
@@ -106,14 +106,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// Pictures, sensor.toml, frames.csv, truth.csv. Gives the truth.
+/// Writes pictures, sensor.toml, frames.csv and truth.csv of the flight. Returns the truth.
 fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
     let config = toml::to_string(&flight.sensor).map_err(failed)?;
     let path = folder.join("sensor.toml");
     let text = format!("# The camera of a rendered rocket flight.\npreset = \"hzn\"\n\n{config}");
     std::fs::write(&path, text).map_err(|e| sink::cannot(&path, &e))?;
 
-    // Pictures are rendered on all cores already, one after the other.
+    // The pictures are rendered one after the other, because each already uses all cores.
     for frame in &flight.frames {
         let path = folder.join(&frame.file);
         frame.render().map_err(failed)?.save(&path).map_err(|e| sink::not_saved(&path, &e))?;
@@ -155,13 +155,13 @@ fn rows(path: &Path) -> Result<Vec<Row>, Stop> {
     reader.map(|frame| frame.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)
 }
 
-/// Draws `count` frames of a recording, evenly spread. Gives how many.
+/// Draws `count` pictures of a recording, evenly spread. Returns how many were drawn.
 fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
     let total = rows(recording)?.len();
     let mut drawn = 0;
     for (i, frame) in Reader::open(recording, Contents::All).map_err(failed)?.enumerate() {
         let frame = frame.map_err(failed)?;
-        // The n-th of `count` stands in the middle of its share.
+        // The n-th of `count` pictures is the first of its share.
         if drawn >= count || (i * count) / total.max(1) < drawn {
             continue;
         }
@@ -174,7 +174,7 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
     Ok(drawn)
 }
 
-/// Results beside the truth.
+/// Compares the results with the truth, in words and numbers.
 fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
     let answers: Vec<_> = rows.iter().map(hzn_run::sink::answer).collect();
     let cases = pair(&answers, truth, None).map_err(failed)?;

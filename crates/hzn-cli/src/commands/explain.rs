@@ -1,4 +1,4 @@
-//! `hzn explain`: one frame, stage by stage.
+//! `hzn explain`: explains the processing of one picture, stage by stage.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -15,19 +15,19 @@ use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::source::{self, Item, Picture, Source};
 use hzn_run::{explain, overlay, sink};
 
-/// Show what happens to one frame: what was kept, what was dropped, and why
+/// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A picture; or a folder, video or MCAP together with --index
     frame: PathBuf,
-    /// Number of the frame in a sequence, from 0
+    /// Number of the picture in a sequence, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     index: u64,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
     source: InputArgs,
-    /// Draw what was found over the picture, as PNG
+    /// Draw the result over the picture, into this PNG
     #[arg(long, value_name = "PNG")]
     overlay: Option<PathBuf>,
     /// Replace the PNG if it exists
@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     looked.explain(args, decoding)
 }
 
-/// Refuses an overlay that is no PNG, is the picture itself, or exists.
+/// Refuses an overlay that is not a PNG, is the picture itself, or exists.
 fn check_overlay(path: &Path, args: &Args) -> Result<(), Stop> {
     if source::ending(path) != "png" {
         return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
@@ -77,7 +77,7 @@ fn check_overlay(path: &Path, args: &Args) -> Result<(), Stop> {
     Ok(sink::refuse_existing(path, args.force)?)
 }
 
-/// The picture number `index` of a sequence, from 0.
+/// Returns picture number `index` of a sequence, counted from 0.
 fn item(source: &mut dyn Source, index: u64) -> Result<Item, Stop> {
     let mut item = None;
     for n in 0..=index {
@@ -89,7 +89,7 @@ fn item(source: &mut dyn Source, index: u64) -> Result<Item, Stop> {
     item.ok_or_else(|| usage("the sequence is empty"))
 }
 
-/// A picture, with what is known about it.
+/// A picture with its prior.
 struct Looked<'a> {
     name: &'a str,
     config: &'a Config,
@@ -104,7 +104,7 @@ impl Looked<'_> {
         let mut sensor = AnySensor::new(config, args.sensor.flight).map_err(usage)?;
         let half_angles = sensor.expected_half_angles_rad(data);
         let view = picture.view(config.input.channel).map_err(|e| usage(format!("input.channel: {e}")))?;
-        // Once to warm up: the first picture of a process pays for memory that is touched for the first time.
+        // The first pass warms up: the first picture of a process also pays for the first access to its memory.
         sensor.process(&view, data, None);
         let times = sensor.process(&view, data, None);
         let traces = Traces::new(config.each_body().len());
@@ -131,7 +131,7 @@ impl Looked<'_> {
             let explained =
                 Explained { name: file, config, body, levels, data, picture, trace, report: &report, half_angle };
             tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;
-            // Drawn where each row sees it.
+            // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
             let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
             drawing.add(sink::annotations(trace, report.solution.as_ref(), &camera));
             let status = report.status;
@@ -145,7 +145,7 @@ impl Looked<'_> {
     }
 }
 
-/// Everything that is known about the frame.
+/// Everything that is known about the picture and one body in it. The half-angle is in radians.
 struct Explained<'a> {
     name: &'a str,
     config: &'a Config,
@@ -193,7 +193,7 @@ impl Explained<'_> {
         format!("{}: {} x {} px, {channels} of {} bits{colours}", self.name, l.width, l.height, l.bits)
     }
 
-    /// Further looks, and a dark frame that was left out.
+    /// Prints the further looks, and the width of a dark border that was left out.
     fn looks(&self, line: &mut impl FnMut(&str, String)) {
         let again = self.trace.again();
         if !again.is_empty() {
@@ -222,7 +222,7 @@ impl Explained<'_> {
         line("candidates", format!("{} edges of at least {shortest} px{dropped}", c.candidates));
     }
 
-    /// The table of candidates, with the verdict of each.
+    /// Prints the table of candidates, with the verdict of each.
     fn candidates(&self, line: &mut impl FnMut(&str, String)) {
         let r = self.report;
         if r.candidates.is_empty() {
@@ -299,14 +299,15 @@ impl Explained<'_> {
         }
     }
 
-    /// What makes the answer's sigma, in degrees along the term's own worst direction.
+    /// Returns the sources of error of the answer with their sigmas, in degrees. Each sigma is along the worst
+    /// direction of its own term.
     fn budget(&self, candidate: u32) -> Vec<(&'static str, f64)> {
         let edges = self.trace.edges();
         let terms = edges.iter().find(|e| e.candidate == candidate).map_or(&[][..], |e| &e.budget_rad);
         terms.iter().filter(|(_, rad)| *rad > 0.0).map(|(term, rad)| (explain::term(*term), rad.to_degrees())).collect()
     }
 
-    /// What became of a rolling shutter.
+    /// Returns how the rolling shutter was treated; `None` without a rolling shutter.
     fn shutter(&self) -> Option<String> {
         let readout_s = self.config.camera.readout_s;
         let rate = self.data.and_then(|d| d.rate_rad_s);
@@ -368,7 +369,7 @@ impl Explained<'_> {
     }
 }
 
-/// What to try when there is no answer.
+/// Prints advice for a picture without an answer.
 fn advice(r: &Report<f64>, picture: &Picture, line: &mut impl FnMut(&str, String)) {
     let mut tips: Vec<String> = explain::tips(r).into_iter().map(str::to_owned).collect();
     tips.extend(picture.unused_bits());

@@ -1,4 +1,4 @@
-//! `hzn export`: results in another form.
+//! `hzn export`: writes results in another form.
 
 use hzn_run::explain;
 use std::path::{Path, PathBuf};
@@ -20,10 +20,10 @@ pub(super) struct Args {
     /// A table: .csv or .jsonl
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// The recorded pictures, into this folder
+    /// The folder for the recorded pictures
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
-    /// The recorded pictures with everything drawn over them, as PNG into this folder
+    /// The folder for the recorded pictures with everything drawn over them, as PNG
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
     /// Replace files that exist
@@ -117,7 +117,7 @@ fn decode(image: &hzn_mcap::EncodedImage, name: &str) -> Result<hzn_run::source:
     decoded.map(|(picture, _)| picture).map_err(|why| failed(format!("{name}: {why}")))
 }
 
-/// The picture's own name, with the ending that its bytes have.
+/// Returns the file name for a picture: its own name, with an ending that fits its bytes.
 fn picture_name(name: &str, ending: &str) -> String {
     let flat = name.replace(['/', '\\', ':'], "_");
     let same = |e: &str| e == ending || (ending == "jpg" && matches!(e, "jpeg" | "jpe"));

@@ -1,4 +1,4 @@
-//! `hzn info`: what is in a file.
+//! `hzn info`: describes the content of a file.
 
 use hzn_run::explain;
 use std::collections::BTreeMap;
@@ -12,10 +12,10 @@ use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
 use hzn_run::source::{self, ending, picture};
 
-/// Say what a file is, and what is in it
+/// Say what a file is, and what it contains
 ///
-/// Results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, frames.csv, truth.csv, imu.csv, gnss.csv,
-/// a picture.
+/// The file may be results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, frames.csv, truth.csv,
+/// imu.csv, gnss.csv, or a picture.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file
@@ -36,11 +36,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
-/// What it is, and what is missing of it.
+/// The description of a file, and what is missing in it.
 type Said = (String, Option<String>);
 
 fn recording(file: &Path) -> Result<Said, Stop> {
-    // Pictures too: whether they are whole is part of what is in the file.
+    // The pictures are read too, because the result says whether they are complete.
     let mut reader = Reader::open(file, Contents::All).map_err(failed)?;
     let mut summary = Summary::default();
     for frame in reader.by_ref() {
@@ -63,7 +63,7 @@ fn recording(file: &Path) -> Result<Said, Stop> {
         let c = sensor.config.camera;
         out.push_str(&format!("camera           {} x {} px, {}\n", c.width, c.height, c.model.name()));
     }
-    // A run that still goes on, or that --resume continues, is no damage.
+    // An unfinished file without broken parts is not damaged: its run still goes on, or --resume continues it.
     let unfinished = ending(file) == "part" && reader.broken_chunks() == 0;
     Ok((out, source::lost_of_recording(&reader, file, "counted").filter(|_| !unfinished)))
 }
@@ -72,7 +72,7 @@ fn unfinished(file: &Path) -> String {
     format!("unfinished       `hzn run --resume` continues it, `hzn recover {}` closes it\n", file.display())
 }
 
-/// A recording of another program: its pictures.
+/// Describes the pictures in a recording of another program.
 fn foreign(file: &Path) -> Result<Said, Stop> {
     let mut reader = hzn_mcap::ImageReader::open(file, None).map_err(failed)?;
     let (mut count, mut span) = (0u64, None::<(f64, f64)>);
@@ -149,7 +149,7 @@ fn truth(file: &Path) -> Result<String, Stop> {
     Ok(out)
 }
 
-/// A table of measurements over time: of `hzn simulate`'s instruments, or of something else.
+/// Describes a table of measurements over time, from the instruments of `hzn simulate` or from another program.
 fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
     let has = |name: &str| header.iter().position(|column| column == name);
     let mut out = what(match () {
@@ -178,7 +178,7 @@ fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
     Ok(out)
 }
 
-/// The first line: what the file is.
+/// Returns the first line: the kind of the file.
 fn what(kind: &str) -> String {
     format!("file             {kind}\n")
 }
@@ -189,7 +189,7 @@ fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
         return Ok(what("camera file") + &super::camera::describe(&hzn_core::Config::new(camera))?);
     }
     let text = std::fs::read_to_string(file).map_err(|e| failed(format!("{}: cannot be read: {e}", file.display())))?;
-    // What is wrong with the text is said by whoever reads it.
+    // The function that reads the text below reports its errors.
     let table = text.parse::<toml::Table>().unwrap_or_default();
     if table.contains_key("trajectory") && table.contains_key("capture") {
         return scene(&hzn_run::scene::parse(&text, file, None, None)?);
@@ -238,18 +238,18 @@ fn one_picture(file: &Path) -> Result<String, Stop> {
     Ok(out)
 }
 
-/// Statistics of rows, with memory for four numbers a row.
+/// Statistics of rows. They need memory for four numbers a row.
 #[derive(Debug, Default)]
 struct Summary {
     frames: u64,
-    /// Number of the frame of the last row: one of several bodies has a row a body.
+    /// Number of the last row's picture. A picture of several bodies has one row for each body.
     last: Option<u64>,
     time: Option<(f64, f64)>,
-    /// By name, in the order in which they come.
+    /// The bodies by name, in the order of their first rows.
     bodies: Vec<(String, BodySummary)>,
 }
 
-/// How one body was found.
+/// Results of one body.
 #[derive(Debug, Default)]
 struct BodySummary {
     statuses: BTreeMap<u8, u64>,
@@ -309,7 +309,8 @@ impl Summary {
     }
 }
 
-/// A number as three digits show it, whole from 100 on: what statistics over frames can claim.
+/// Formats a number with three significant digits, as a whole number from 100 on. Statistics over pictures are not more
+/// accurate.
 fn three_digits(x: f64) -> String {
     let before = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
     format!("{x:.*}", (2 - before).clamp(0, 9) as usize)

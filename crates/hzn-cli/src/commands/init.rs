@@ -1,4 +1,4 @@
-//! `hzn init`: a sensor.toml to start from.
+//! `hzn init`: writes a sensor.toml to start from.
 
 use std::path::PathBuf;
 
@@ -18,13 +18,13 @@ Examples:
 
 /// Write a sensor.toml to start from
 ///
-/// With pictures: for the camera that took them, from a field of view (--fov) or from the focal length in their EXIF.
-/// Its sigmas say how little that is; with an altitude it works at once. Without pictures: every key with its default
-/// and a comment, so that only the camera must be filled in.
+/// With pictures: the file is for the camera that took them. The focal length comes from a field of view (--fov) or
+/// from their EXIF. Its sigmas are large, because these values are rough; with an altitude the file works at once.
+/// Without pictures: the file has every key with its default and a comment, and only the camera must be filled in.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Pictures of the camera: files, a folder, a glob, a video, a recording
+    /// Pictures of the camera: files, a folder, a glob, a video, or a recording
     #[arg(value_name = "PICTURE")]
     pictures: Vec<PathBuf>,
     /// Field of view over the whole width, degrees
@@ -33,7 +33,7 @@ pub(super) struct Args {
     /// Kind of lens [default: pinhole, up to a field of view of 90 degrees]
     #[arg(long, requires = "pictures")]
     lens: Option<Lens>,
-    /// Altitude of all pictures above WGS-84, kilometres, where no frames.csv gives one
+    /// Altitude of all pictures above WGS-84, kilometres, if no frames.csv gives one
     #[arg(long, value_name = "KM", requires = "pictures")]
     altitude: Option<f64>,
     /// The file to write
@@ -44,12 +44,12 @@ pub(super) struct Args {
     force: bool,
 }
 
-/// How angles become radii.
+/// The projection of the lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Lens {
     /// Straight lines stay straight
     Pinhole,
-    /// Equidistant: the angle off axis grows evenly with the radius
+    /// Equidistant: the radius is proportional to the angle off axis
     Fisheye,
 }
 
@@ -104,7 +104,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// What the pictures and the command line say of the camera.
+/// Collects what the pictures and the command line say about the camera.
 fn known(args: &Args) -> Result<Known, Stop> {
     let mut source = source::open(&args.pictures, None, None)?;
     source.notes().iter().for_each(tell::warning);
@@ -120,7 +120,7 @@ fn known(args: &Args) -> Result<Known, Stop> {
     Ok(Known { size_px, fov_deg: args.fov, lens: args.lens.map(Model::from), exif, altitude_km: args.altitude })
 }
 
-/// The size that all pictures have.
+/// Returns the size of the pictures. Refuses pictures of different sizes.
 fn one_size(source: &dyn Source) -> Result<(u32, u32), Stop> {
     let mut sizes = source.sizes();
     let Some((first, size)) = sizes.next() else {

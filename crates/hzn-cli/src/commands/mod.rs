@@ -1,4 +1,4 @@
-//! The commands, one file each.
+//! The commands, one file for each.
 
 mod calibrate;
 mod camera;
@@ -21,10 +21,10 @@ use clap::{Parser, Subcommand};
 
 use crate::exit::Outcome;
 
-/// Finds the limb of a planet in pictures: the direction to the body, with its covariance.
+/// Find the limb of a planet in pictures, and measure the direction to the body with its covariance.
 ///
-/// Exit codes: 0 every frame was read and processed; 1 failed; 2 wrong usage or configuration; 3 finished, but some
-/// frames could not be read or had no altitude; 130 interrupted (the output is valid and can be continued with
+/// Exit codes: 0 every picture was read and processed; 1 failed; 2 wrong usage or configuration; 3 finished, but some
+/// pictures could not be read or had no altitude; 130 interrupted (the output is valid and can be continued with
 /// --resume).
 #[derive(Debug, Parser)]
 #[command(name = "hzn", version, max_term_width = 100)]
@@ -56,7 +56,7 @@ enum Command {
 /// Runs one command.
 ///
 /// # Errors
-/// What went wrong, with the exit code that belongs to it.
+/// The error, with its exit code.
 pub fn run(cli: Cli) -> Outcome {
     match cli.command {
         Command::Demo(args) => demo::run(&args),

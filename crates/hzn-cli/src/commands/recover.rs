@@ -1,4 +1,4 @@
-//! `hzn recover`: what a crash left, closed.
+//! `hzn recover`: closes a file that a crash left unfinished.
 
 use hzn_run::explain;
 use std::path::{Path, PathBuf};
@@ -10,13 +10,14 @@ use hzn_run::source;
 
 /// Close a file that a crash left unfinished
 ///
-/// What is whole in the file is kept: of a recording all batches of frames, of a table all rows. What was cut off is
-/// dropped: at most the frames of the last quarter of a second. To continue the run instead, use `hzn run --resume`.
+/// The complete parts of the file are kept: all complete batches of pictures of a recording, all complete rows of a
+/// table. The incomplete end is dropped: at most the pictures of the last quarter of a second. To continue the run
+/// instead, use `hzn run --resume`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The unfinished file, such as out.mcap.part
     file: PathBuf,
-    /// Name of the result; without it, the file's name without .part (or with .recovered, where there is none)
+    /// Name of the result; without it, the file's name without .part (or with .recovered, if it does not end in .part)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Replace an output that exists
@@ -58,15 +59,15 @@ pub(super) fn run(args: &Args) -> Outcome {
     let dropped = if lost > 0 { format!(", {lost} bytes of unfinished frames dropped") } else { String::new() };
     tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
     if unfinished && args.output.is_none() && file.exists() {
-        // Its frames are in the new file, and beside that it would look like another unfinished run.
+        // Its results are in the new file. Next to it, the old file would look like another unfinished run.
         std::fs::remove_file(file)?;
     }
     Ok(Exit::Done)
 }
 
-/// Rows kept, and bytes dropped.
+/// Recovers a recording. Returns the number of rows kept and of bytes dropped.
 fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> {
-    // The library never replaces a file; so the result is made beside it and then takes its name.
+    // The library never replaces a file. Therefore the result is written next to it and then renamed.
     let beside = path.with_extension("recovering.mcap");
     if beside.exists() {
         std::fs::remove_file(&beside)?;

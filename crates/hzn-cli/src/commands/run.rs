@@ -1,4 +1,4 @@
-//! `hzn run`: a sequence, from pictures to results.
+//! `hzn run`: processes a sequence of pictures and writes the results.
 
 use hzn_run::explain;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,8 @@ use hzn_run::source::{self, Source, ending};
 /// Process a sequence of pictures
 ///
 /// Pictures are PNG, JPEG, TIFF, PNM or BMP, in a folder, as a pattern, or one by one; or headerless (--raw); or a
-/// video (through ffmpeg on PATH); or an MCAP with an image topic. Those of a folder or pattern are taken in the order
-/// of their names, where numbers count by their value (img2 before img10). An MCAP of an earlier run is processed again
+/// video (through ffmpeg on PATH); or an MCAP with an image topic. The pictures of a folder or pattern are sorted by
+/// name, and numbers in names are compared by value (img2 before img10). An MCAP of an earlier run is processed again
 /// with its own sensor, names, times and positions. A picture that cannot be read becomes a row with status
 /// `unreadable`; the run goes on.
 #[derive(Debug, clap::Args)]
@@ -39,25 +39,26 @@ pub(super) struct Args {
     /// Replace an output that exists
     #[arg(long)]
     force: bool,
-    /// Continue an output after its last finished frame
+    /// Continue an output after its last finished picture
     #[arg(long, conflicts_with = "force", requires = "output")]
     resume: bool,
     /// Leave the pictures out of an MCAP
     #[arg(long)]
     no_images: bool,
-    /// Draw what was found over every picture, as PNG into this folder
+    /// Draw the result over every picture, as PNG into this folder
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
-    /// Threads; without it, all cores
+    /// Number of threads; without it, all cores
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// No progress and no summary
+    /// Print no progress and no summary
     #[arg(short, long)]
     quiet: bool,
 }
 
 impl Args {
-    /// A folder with its own sensor.toml into `output`, replacing it, without a word.
+    /// Returns the arguments to process a folder with its own sensor.toml into `output`. An existing output is
+    /// replaced, and no progress is printed.
     pub(super) fn quietly(folder: &Path, output: &Path) -> Self {
         Self {
             input: vec![folder.to_owned()],
@@ -84,7 +85,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     check_size(source.as_ref(), &sensor)?;
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
     need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
-    // Not for one picture of many, whose table names all the others.
+    // The check is made only for folders, because the table next to a single picture also lists all others.
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
         warn_of_missing(frames, &folder);
     }
@@ -92,7 +93,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         prepare_overlays(drawn, &folder, args.force || args.resume)?;
     }
     let path = args.output.as_deref();
-    // A recording holds pictures as they were processed.
+    // A recording stores the pictures as they were processed, that is, already turned.
     let recorded = match sensor.config.input.orient {
         Orient::AsStored => sensor.text.clone(),
         _ => source::with_key(&sensor.text, "orient", "as-stored"),
@@ -108,7 +109,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let total = source.total();
     if let Err(stop) = skip(source.as_mut(), &held, &plan, path) {
-        // The output keeps what it has, under its name.
+        // The output keeps its results, under its final name.
         output.finish()?;
         return Err(stop);
     }
@@ -151,7 +152,7 @@ fn check_arguments(args: &Args) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Makes the folder of the overlays; `may_hold`: it may hold files already.
+/// Makes the folder of the overlays. If `may_hold` is true, the folder may already contain files.
 fn prepare_overlays(drawn: &Path, pictures: &Path, may_hold: bool) -> Result<(), Stop> {
     std::fs::create_dir_all(drawn).map_err(|e| sink::cannot(drawn, &e))?;
     if sink::is_same(drawn, pictures) {
@@ -176,7 +177,7 @@ fn existing(args: &Args) -> Existing {
 
 fn plan(args: &Args, sensor: Sensor, frames: Option<Frames>) -> Plan {
     let trace = Output::wants_trace(args.output.as_deref());
-    // One picture after another, where the threshold or a gate comes from the previous one.
+    // If the threshold or a gate comes from the previous picture, pictures are processed one after another.
     let threads = if sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
     Plan {
         config: sensor.config,
@@ -192,7 +193,7 @@ fn plan(args: &Args, sensor: Sensor, frames: Option<Frames>) -> Plan {
     }
 }
 
-/// What is counted and told while the run goes on.
+/// Counts and messages while the run goes on.
 struct Watch {
     progress: Progress,
     quiet: bool,
@@ -229,7 +230,7 @@ impl Watch {
         self.progress.count(frame.found.iter().map(|f| f.status()));
     }
 
-    /// Tells the summary, the commonest refusal, and the command that explains it.
+    /// Prints the summary, the commonest refusal, and the command that explains it.
     fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, summary: &str, held: u64) {
         let before = match held {
             0 => String::new(),
@@ -260,7 +261,7 @@ fn tell_interruption(done: u64, total: Option<u64>, path: Option<&Path>) {
     tell::line(format_args!("interrupted after {done}{of} frames{next}"));
 }
 
-/// The command that explains a frame of this run, as it is to be typed.
+/// Returns the command that explains a picture of this run, ready to be typed.
 fn explain_command(args: &Args, source: &dyn Source, frame: u64) -> String {
     let mut words = vec!["hzn".to_owned(), "explain".to_owned()];
     match (source.path(frame), args.input.first()) {
@@ -291,8 +292,8 @@ pub(super) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, Into::into)
 }
 
-/// Passes over the frames that the output holds already, and sees that this run would have come to them: the last one,
-/// processed again, must give the row that is there.
+/// Skips the pictures that the output contains already, and checks that this run would give the same results. The last
+/// skipped picture is processed again and must give the row in the output.
 fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) -> Result<(), Stop> {
     let name = path.map(|p| p.display().to_string()).unwrap_or_default();
     let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
@@ -312,7 +313,7 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
         return other(format!("{what}; give the input that it was begun with"));
     }
     if plan.config.tracks() {
-        // It would come out differently without the pictures before it.
+        // Without the pictures before it, the last picture would give another result.
         return Ok(());
     }
     let mut sensor = AnySensor::new(&plan.config, plan.flight).map_err(usage)?;
@@ -340,10 +341,10 @@ fn warn_of_missing(frames: &Frames, folder: &Path) {
     }
 }
 
-/// Rows without a picture that are told one by one.
+/// Number of rows without a picture that are reported one by one.
 const MISSING_TOLD: usize = 3;
 
-/// Files that hold more pictures than the one that was processed.
+/// Counts files that contain more pictures than the one that was processed.
 #[derive(Default)]
 struct Several {
     files: u64,
@@ -368,7 +369,7 @@ impl Several {
     }
 }
 
-/// Frames of which something is not known, counted so that it is said once.
+/// Counts pictures with missing priors, so that each kind is reported once.
 #[derive(Default)]
 struct Gaps {
     frames: u64,

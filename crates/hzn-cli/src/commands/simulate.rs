@@ -1,4 +1,4 @@
-//! `hzn simulate`: pictures of a scene, with truth.
+//! `hzn simulate`: renders pictures of a scene, with truth.
 
 use hzn_run::explain;
 use std::path::{Path, PathBuf};
@@ -17,35 +17,35 @@ use crate::tell;
 use hzn_run::scene;
 use hzn_run::sink;
 
-/// Render a sequence of pictures with truth, and the sensor.toml that fits it
+/// Render a sequence of pictures with truth, and write a sensor.toml that fits it
 ///
-/// Writes pictures, frames.csv (what the sensor is told), truth.csv, imu.csv and gnss.csv where the scene has such
-/// instruments, scene.toml, and sensor.toml, whose limb height and noise model are measured on other pictures of the
-/// scene.
+/// Writes pictures, frames.csv (the prior of each picture), truth.csv, scene.toml and sensor.toml, and imu.csv and
+/// gnss.csv if the scene has such instruments. The limb height and noise model in sensor.toml are measured on other
+/// pictures of the scene.
 ///
 /// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble. `hzn simulate
-/// SCENE --show` prints one, to be changed and given as a file.
+/// SCENE --show` prints one; change it and give it as a file.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A built-in scene, or a scene.toml
     #[arg(value_name = "SCENE", required_unless_present = "list")]
     scene: Option<String>,
-    /// Folder that is made
+    /// The folder to create
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["show", "list"])]
     output: Option<PathBuf>,
-    /// Number of pictures, instead of the scene's
+    /// Number of pictures; replaces the scene's number
     #[arg(long, value_name = "N")]
     frames: Option<u32>,
-    /// Seed of everything random, instead of the scene's
+    /// Seed of all random numbers; replaces the scene's seed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Write into a folder that exists
     #[arg(long)]
     force: bool,
-    /// Render what is missing of a folder
+    /// Render only the pictures that are missing in the folder
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// No progress on stderr
+    /// Print no progress on stderr
     #[arg(short, long)]
     quiet: bool,
     /// Print the scene.toml and do nothing else
@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         let what = "exists already; choose another folder, --resume goes on, or --force writes into it";
         return Err(usage(format!("{}: {what}", folder.display())));
     }
-    // Everything that can be wrong with the scene is said before anything is written.
+    // All errors of the scene are reported before anything is written.
     let flight = scenario.flight().map_err(|e| scene::refused(name, &e))?;
     std::fs::create_dir_all(&folder).map_err(|e| sink::cannot(&folder, &e))?;
     if !args.resume {
@@ -112,8 +112,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(end)
 }
 
-/// The files that a scene names (maps, tables) under the names that they get in the folder, where the scene then finds
-/// them.
+/// Returns the files that a scene names (maps, tables), with their names in the folder. The scene is changed to these
+/// names.
 fn files(scenario: &mut Scenario, from: &Path) -> Result<Vec<(String, Vec<u8>)>, Stop> {
     let take = |(what, path): (&str, &mut PathBuf)| {
         let source = from.join(&*path);
@@ -130,7 +130,7 @@ fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
     std::fs::write(path, text).map_err(|e| sink::cannot(path, &e).into())
 }
 
-/// The text of the sensor.toml: what differs from the defaults, with a noise model that was measured.
+/// Returns the text of the sensor.toml: the values that differ from the defaults, with a measured noise model.
 fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Result<String, Stop> {
     if !quiet {
         tell::line(format_args!("measuring limb height and noise on other pictures of the scene ..."));
@@ -163,7 +163,7 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
     let defaults = toml::Table::try_from(hzn_core::Config::new(sensor.camera.clone())).map_err(failed)?;
     let several = table.get("bodies").is_some();
     for key in defaults.keys() {
-        // The camera is always said, and so is the one body.
+        // The camera is always written, and so is a single body.
         if key == "camera" || (key == "body" && !several) {
             continue;
         }
@@ -181,7 +181,7 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
     Ok(format!("# The sensor of the simulated scene {}.\n{how}preset = \"hzn\"\n\n{table}", scenario.name))
 }
 
-/// frames.csv, truth.csv, imu.csv, gnss.csv.
+/// Writes frames.csv, truth.csv, imu.csv and gnss.csv.
 fn tables(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {
     let table = |name: &str| csv::Writer::from_path(folder.join(name)).map_err(failed);
     let mut known = table("frames.csv")?;
@@ -209,7 +209,7 @@ fn tables(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Sto
     Ok(())
 }
 
-/// Renders what is missing.
+/// Renders the missing pictures.
 fn pictures(flight: &Flight, folder: &Path, args: &Args) -> Outcome {
     let missing: Vec<&FlightFrame> =
         flight.frames.iter().filter(|f| !(args.resume && folder.join(&f.file).exists())).collect();
@@ -238,7 +238,7 @@ fn pictures(flight: &Flight, folder: &Path, args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// One picture; its name appears when it is whole.
+/// Renders one picture. Its file gets its name when it is complete.
 fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
     let path = folder.join(&frame.file);
     let part = folder.join(format!(".part-{}", frame.file));

@@ -1,4 +1,4 @@
-//! `hzn telecommand`: commands for a flight computer, as the bytes of the line.
+//! `hzn telecommand`: writes commands for a flight computer, as the bytes that are sent to it.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use hzn_run::sink;
 ///   "read NAME [NAME]..."
 ///   "known ALTITUDE_KM [X_KM Y_KM Z_KM [RATE_X RATE_Y RATE_Z]]"   rates in rad/s; NaN: not known
 ///   "process-once", "dump-edges", "reset-counters"
-/// The bytes go to standard output unless -o is given. The format: book/reference/telemetry.md.
+/// The bytes go to standard output unless -o is given. book/reference/telemetry.md describes the format.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
 }
 
-/// The user data of a command: of `load` there may be several.
+/// Returns the user data of each packet of a command. At present every command has one packet.
 fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
     let bad = |what: &str| usage(format!("{command:?}: {what}"));
     let words: Vec<&str> = command.split_whitespace().collect();
@@ -170,8 +170,8 @@ fn parameter(word: &str) -> Result<u16, String> {
     })
 }
 
-/// A value that this parameter can have, as a number or by the name of a choice. Whether it goes together with the
-/// others is seen by the flight computer, which has them.
+/// Returns a value that this parameter can have, from a number or the name of a choice. The flight computer checks
+/// whether the value fits the other parameters, because only it has them.
 fn value(id: u16, word: &str) -> Result<f64, String> {
     let name = parameters::name(id).unwrap_or("?");
     let cannot = |what: String| Err(format!("{name} cannot be {word}: it is {what}"));
@@ -192,7 +192,8 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
         _ => None,
     };
     let within = |x: f64| limits.is_none_or(|(low, above, high)| x <= high && if above { x > low } else { x >= low });
-    // The corners of a mask are set one after another, and those before are not here.
+    // The corners of a mask are set one after another. The earlier corners are not known here, so a corner is not
+    // checked against them.
     let of_mask = name.starts_with("mask");
     let optional = !of_mask && taken(f64::NAN);
     match number {
@@ -211,13 +212,13 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
     cannot(format!("{kind}{range}{}", if optional { ", or NaN where it is left out" } else { "" }))
 }
 
-/// The choices of a parameter that flies: the words of sensor.toml, with their numbers.
+/// Returns the choices of a parameter on the flight computer: the words of sensor.toml with their numbers.
 fn choices(name: &str) -> Vec<(&'static str, f64)> {
     let choices = hzn_calib::keys::find(name).map_or(&[][..], |key| key.choices);
     choices.iter().filter_map(|choice| Some((choice.name, f64::from(choice.flight?)))).collect()
 }
 
-/// Every parameter of a sensor: one command, so that they are taken all or none.
+/// Returns one command with every parameter of a sensor, so that either all are accepted or none.
 fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     let sensor = hzn_calib::sensor::load(path)?;
     let parameters = Parameters::new(sensor.config);

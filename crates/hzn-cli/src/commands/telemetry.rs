@@ -1,4 +1,4 @@
-//! `hzn telemetry`: what a flight computer sent, decoded.
+//! `hzn telemetry`: decodes the telemetry of a flight computer.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -20,16 +20,16 @@ use hzn_run::sink::{self, Existing, RowFile, Target};
 
 /// Decode a flight computer's telemetry
 ///
-/// Answers become rows as `hzn run` writes them; events, acknowledged commands and parameters are printed. What is no
-/// whole packet is skipped and counted. The format: book/reference/telemetry.md.
+/// Answers become rows as `hzn run` writes them; events, acknowledged commands and parameters are printed. Bytes that
+/// are not a complete packet are skipped and counted. book/reference/telemetry.md describes the format.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The stream as it was received; - for standard input
     file: PathBuf,
-    /// The answers: .csv, .jsonl or .mcap
+    /// The file for the answers: .csv, .jsonl or .mcap
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// The housekeeping as a table: .csv
+    /// The file for the housekeeping, as a table: .csv
     #[arg(long, value_name = "FILE")]
     housekeeping: Option<PathBuf>,
     /// Replace outputs that exist
@@ -48,7 +48,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         match packet::scan(rest) {
             Scan::More { skip } => {
                 heard.skipped += rest.len() as u64;
-                // A packet that was begun and not ended, or noise.
+                // The rest is an incomplete packet, or noise.
                 heard.cut += u64::from(rest.len() > skip + packet::SYNC.len());
                 break;
             }
@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// Bytes of a packet beside its user data.
+/// Number of bytes of a packet without its user data.
 const OVERHEAD: usize = 20;
 
 fn read(path: &Path) -> Result<Vec<u8>, Stop> {
@@ -98,7 +98,7 @@ fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {
     Ok(table)
 }
 
-/// Where answers go.
+/// The output for answers.
 enum Sink {
     Rows(RowFile),
     Mcap(Box<hzn_mcap::Writer>),
@@ -128,14 +128,14 @@ impl Sink {
     }
 }
 
-/// Counts of a stream, and what waits for the next answer.
+/// Counts of a stream, and the log lines for the next answer.
 #[derive(Default)]
 struct Heard {
     packets: u64,
     answers: u64,
     cut: u64,
     skipped: u64,
-    /// Packets that were lost, by the gaps in the sequence counts.
+    /// Number of lost packets, from the gaps in the sequence counts.
     lost: u64,
     next: BTreeMap<u16, u16>,
     log: Vec<LogLine>,
@@ -150,7 +150,7 @@ impl Heard {
     ) -> Result<(), Stop> {
         self.packets += 1;
         if let Some(next) = self.next.insert(packet.apid, (packet.sequence + 1) & 0x3FFF) {
-            // A count of 0 is a computer that has started anew.
+            // A count of 0 means that the computer has restarted.
             if packet.sequence != next && packet.sequence != 0 {
                 self.lost += u64::from(packet.sequence.wrapping_sub(next) & 0x3FFF);
             }

@@ -5,9 +5,9 @@ use std::process::Command;
 
 use crate::exit::{Exit, Outcome, failed};
 
-/// See what the sensor saw, and tune it live
+/// Show what the sensor saw, and tune it live
 ///
-/// Starts `hzn-viewer`, which lies beside `hzn` or on PATH. Arguments are those of `hzn-viewer --help`.
+/// Starts `hzn-viewer`, which must be next to `hzn` or on PATH. Arguments are those of `hzn-viewer --help`.
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub(super) struct Args {
@@ -26,7 +26,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         ),
         _ => failed(format!("{} cannot be started: {e}", program.display())),
     })?;
-    // Why, it has said itself.
+    // The viewer has already printed the reason.
     Ok(match status.code() {
         Some(0) => Exit::Done,
         Some(2) => Exit::Usage,

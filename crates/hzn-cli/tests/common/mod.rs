@@ -1,4 +1,4 @@
-//! A folder with a few small pictures of a limb, and the command run on it.
+//! A folder with a few small pictures of a limb, and the command that runs on it.
 #![allow(dead_code, reason = "each test file takes what it needs")]
 #![allow(unreachable_pub, reason = "shared between test files")]
 
@@ -11,7 +11,7 @@ pub struct Place {
     dir: tempfile::TempDir,
 }
 
-/// What a run of the command gave.
+/// The result of a run of the command.
 pub struct Ran {
     pub code: i32,
     pub out: String,
@@ -22,10 +22,10 @@ pub const SENSOR: &str = "preset = \"hzn\"\n\n[camera]\nwidth = 320\nheight = 24
                           fy_px = 300.0\ncx_px = 159.5\ncy_px = 119.5\n\n[body]\nkind = \"earth-sphere\"\naltitude_km \
                           = 400.0\n";
 
-/// A smooth bright body below a limb; `shift` moves it, so that pictures differ.
+/// Returns a picture of a smooth bright body below its limb; `shift` moves it by 0.05 degrees per unit.
 pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {
     image::GrayImage::from_fn(width, height, |x, y| {
-        // The limb of a body with a half-angle of 70 degrees whose centre is 68 degrees below the axis.
+        // The body has a half-angle of 70 degrees, and its centre is 68 degrees below the optical axis.
         let (f, s) = (300.0f64, (68.0 + 0.05 * shift).to_radians());
         let (u, v) = ((f64::from(x) - 159.5) / f, (f64::from(y) - 119.5) / f);
         let cos = (v * s.sin() + s.cos()) / (1.0 + u * u + v * v).sqrt();
@@ -34,7 +34,7 @@ pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {
     })
 }
 
-/// The checksum of PNG.
+/// Returns the checksum of PNG.
 pub fn crc32(data: &[u8]) -> u32 {
     let step = |crc: u32, byte: &u8| {
         (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xedb8_8320 } else { c >> 1 })
@@ -43,7 +43,7 @@ pub fn crc32(data: &[u8]) -> u32 {
 }
 
 impl Place {
-    /// An empty folder with a sensor.toml.
+    /// Makes a folder with a sensor.toml and no pictures.
     pub fn new() -> Self {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join("in")).unwrap();
@@ -51,7 +51,7 @@ impl Place {
         place.write("in/sensor.toml", SENSOR.as_bytes());
         place
     }
-    /// With pictures 0000.png to (n-1).png.
+    /// Makes a folder with pictures 0000.png to (n-1).png.
     pub fn with_pictures(n: usize) -> Self {
         let place = Self::new();
         for i in 0..n {
@@ -73,7 +73,7 @@ impl Place {
     pub fn read(&self, name: &str) -> String {
         std::fs::read_to_string(self.path(name)).unwrap()
     }
-    /// The command, to be run in the folder.
+    /// Returns the command, which runs in the folder.
     pub fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("hzn"));
         command.current_dir(self.dir.path()).args(args);
@@ -82,14 +82,14 @@ impl Place {
     pub fn run(&self, args: &[&str]) -> Ran {
         Ran::from_output(&self.command(args).output().unwrap(), self.dir.path())
     }
-    /// The row of a picture in a CSV, as columns by name.
+    /// Returns the rows of a CSV file, as columns by name.
     pub fn rows(&self, name: &str) -> Vec<Vec<(String, String)>> {
         let text = self.read(name);
         rows(&text)
     }
 }
 
-/// Rows of a CSV text.
+/// Returns the rows of a CSV text.
 pub fn rows(text: &str) -> Vec<Vec<(String, String)>> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().unwrap().clone();
@@ -97,12 +97,12 @@ pub fn rows(text: &str) -> Vec<Vec<(String, String)>> {
     reader.records().map(|r| named(r.unwrap())).collect()
 }
 
-/// A cell of a row.
+/// Returns a cell of a row.
 pub fn cell<'a>(row: &'a [(String, String)], name: &str) -> &'a str {
     &row.iter().find(|(n, _)| n == name).unwrap().1
 }
 
-/// A table without the time that processing took.
+/// Returns the rows of a table without the processing time.
 pub fn without_time(text: &str) -> Vec<Vec<(String, String)>> {
     let mut rows = rows(text);
     rows.iter_mut().for_each(|r| r.retain(|(n, _)| n != "elapsed_us"));
@@ -126,7 +126,7 @@ impl Ran {
     }
 }
 
-/// The axis of each row; every frame must have been answered.
+/// Returns the axis of each row; every picture must be answered.
 #[track_caller]
 pub fn axes(place: &Place, args: &[&str]) -> Vec<[f64; 3]> {
     let rows = without_time(&place.run(args).expect(0).out);
@@ -139,7 +139,7 @@ pub fn axes(place: &Place, args: &[&str]) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// The angle between two directions.
+/// Returns the angle between two directions, in degrees.
 pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     let cross =
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]].map(|v| v * v).iter().sum();

@@ -1,4 +1,5 @@
-//! The run over a sequence: all cores, results in order, a bounded number of frames in memory.
+//! The run over a sequence: it uses all cores, returns results in order, and has a bounded number of pictures in
+//! memory.
 //!
 //! ```text
 //!   source ──► jobs ──► N threads (decode, process, draw) ──► results ──► put in order ──► sink
@@ -6,8 +7,8 @@
 //!      └───────────────────────── tickets (a fixed number) ◄───────────────────┘
 //! ```
 //!
-//! The source is read only while a ticket is free, and a ticket comes back when its frame is written: so memory does
-//! not grow with the sequence, however slow one frame or the disk is.
+//! The source is read only while a ticket is free. A ticket comes back when its picture is written. Therefore memory
+//! does not grow with the sequence, even if one picture or the disk is slow.
 
 mod sensor;
 pub mod trace;
@@ -28,72 +29,72 @@ pub use trace::{Trace, Traces, Watch};
 
 use crate::source::{Item, Source};
 
-/// What a run does with every frame.
+/// The settings of a run, for every picture.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// The sensor.
     pub config: Config,
-    /// Single precision and 2048 points, as on the flight computer.
+    /// Use single precision and 2048 points, as on the flight computer.
     pub flight: bool,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
-    /// What frames.csv knows, in place of what the source itself knows.
+    /// The content of frames.csv; it replaces the priors from the source itself.
     pub frames: Option<Frames>,
-    /// Frames a second, where nothing else gives a time.
+    /// Frames a second, for pictures without any other time.
     pub fps: f64,
     /// Collect what is to be drawn over the picture.
     pub trace: bool,
-    /// Hand over everything that the pipeline showed of itself.
+    /// Return the traces: everything that the pipeline showed of its work.
     pub keep_traces: bool,
     /// Hand the picture to the sink.
     pub keep_picture: bool,
-    /// Draw an overlay of every frame into this folder.
+    /// Draw an overlay of every picture into this folder.
     pub overlay: Option<std::path::PathBuf>,
-    /// The last answers of a run that this one goes on with, a body each.
+    /// The last answers of the run that this one continues, one for each body.
     pub last: Vec<Option<Answered>>,
 }
 
-/// One frame, finished.
+/// A processed picture.
 #[derive(Debug)]
 pub struct Finished {
     /// Place in the sequence, from 0.
     pub index: u64,
     /// Name of the picture.
     pub name: String,
-    /// Time in seconds, where it is known.
+    /// Time in seconds, if it is known.
     pub time_s: Option<f64>,
-    /// What frames.csv, or a recording of ours, says about this frame.
+    /// The prior of this picture from frames.csv or from a recording of ours.
     pub data: Option<FrameData>,
-    /// What came of every body, in order.
+    /// The outcome of each body, in the order of the configuration.
     pub found: Vec<BodyOutcome>,
-    /// What is drawn over the picture, when it was asked for.
+    /// The drawing over the picture, if the plan asks for it.
     pub drawing: hzn_mcap::Annotations,
-    /// The picture as PNG or JPEG, when it was asked for.
+    /// The picture as PNG or JPEG, if the plan asks for it.
     pub picture: Option<Vec<u8>>,
-    /// What the pipeline showed of itself, one record a body, when it was asked for.
+    /// What the pipeline showed of its work, one record for each body, if the plan asks for it.
     pub traces: Option<Traces>,
-    /// What to try, where nothing was found and the picture itself suggests something.
+    /// Advice, if nothing was found and the picture itself suggests a reason.
     pub tip: Option<String>,
-    /// Pictures in its file, of which the first was taken.
+    /// Number of pictures in the file; only the first was processed.
     pub pages: u32,
 }
 
-/// What came of one body in one frame.
+/// The outcome of one body in one picture.
 #[derive(Debug)]
 pub struct BodyOutcome {
-    /// The answer, or why there is none.
+    /// The report, or the reason why the picture was not processed.
     pub report: Result<Report<f64>, Unprocessed>,
-    /// Time of processing, decoding not included.
+    /// Time of processing, without decoding.
     pub elapsed: Duration,
 }
 
 impl BodyOutcome {
-    /// Outcome.
+    /// Returns the status.
     pub fn status(&self) -> Status {
         self.report.as_ref().map_or_else(|e| e.status, |r| r.status)
     }
 
-    /// Whether it was not looked for because the camera is not above the limb height.
+    /// Returns whether the body was not searched for because the camera is not above the limb height.
     pub fn is_below_limb(&self) -> bool {
         self.report.as_ref().is_err_and(|e| e.below_limb)
     }
@@ -105,14 +106,14 @@ impl From<Processed> for BodyOutcome {
     }
 }
 
-/// Why a picture was not processed.
+/// The reason why a picture was not processed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unprocessed {
     /// [`Status::Unreadable`] or [`Status::NoAltitude`].
     pub status: Status,
-    /// In words.
+    /// The reason in words.
     pub why: String,
-    /// The camera is not above the limb height.
+    /// True if the camera is not above the limb height.
     pub below_limb: bool,
 }
 
@@ -127,12 +128,12 @@ impl From<PriorError> for Unprocessed {
 }
 
 impl Finished {
-    /// Why the picture could not be read, if it could not.
+    /// Returns the reason why the picture could not be read, if it could not.
     pub fn unreadable(&self) -> Option<&str> {
         let errors = self.found.iter().filter_map(|f| f.report.as_ref().err());
         errors.filter(|e| e.status == Status::Unreadable).map(|e| e.why.as_str()).next()
     }
-    /// A picture that could not be read: so it is with every body.
+    /// Returns the result of a picture that could not be read. It is unreadable for every body.
     fn not_read(self, plan: &Plan, why: &str) -> Self {
         let why = Unprocessed { status: Status::Unreadable, why: why.to_owned(), below_limb: false };
         let none = || BodyOutcome { report: Err(why.clone()), elapsed: Duration::ZERO };
@@ -140,30 +141,30 @@ impl Finished {
     }
 }
 
-/// Where finished frames go, in order.
+/// The destination of processed pictures, in order.
 pub trait Sink {
-    /// Takes one frame; its picture and drawing may be moved out of it.
+    /// Takes one picture; its pixels and its drawing may be moved out of it.
     ///
     /// # Errors
     /// It could not be written; the run ends.
     fn write(&mut self, frame: &mut Finished) -> anyhow::Result<()>;
-    /// Makes everything written so far safe from a crash of this program.
+    /// Makes everything written so far safe against a crash of this program.
     ///
     /// # Errors
     /// As for `write`.
     fn flush(&mut self) -> anyhow::Result<()>;
 }
 
-/// How a run ended.
+/// The way in which a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
-    /// All frames are through.
+    /// All pictures are processed.
     Complete,
-    /// It was asked to stop; every frame that was begun is written.
+    /// The run was asked to stop; every picture that was begun is written.
     Interrupted,
 }
 
-/// At least this often, what is written is flushed.
+/// Longest time until written data are flushed.
 const FLUSH_EVERY: Duration = Duration::from_millis(200);
 
 struct Job {
@@ -171,10 +172,11 @@ struct Job {
     item: Item,
 }
 
-/// Runs the sequence from frame `first` on (frames before it have been skipped by the caller).
+/// Runs the sequence from picture `first` on. The caller has skipped the pictures before it.
 ///
 /// # Errors
-/// The sink cannot be written, the source breaks off, or an overlay cannot be written. Frames written before stay.
+/// The sink cannot be written, the source breaks off, or an overlay cannot be written. Pictures that were written
+/// before remain.
 pub fn run(
     plan: &Plan,
     source: &mut dyn Source,
@@ -191,7 +193,7 @@ pub fn run(
     for _ in 0..window {
         ticket_in.send(())?;
     }
-    // Set when the writer gives up, so that the source ends too.
+    // Set when the writer stops with an error, so that the source ends too.
     let give_up = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let stopped = || stop.load(Ordering::Relaxed) || give_up.load(Ordering::Relaxed);
@@ -232,12 +234,12 @@ pub fn run(
         if written.is_err() {
             give_up.store(true, Ordering::Relaxed);
         }
-        // The threads see that nobody listens any more.
+        // With the channels closed, the threads end.
         drop((result_out, ticket_in));
         let read = source_end.join().unwrap_or_else(|_| Err(anyhow::anyhow!("reading the input failed")));
         written?;
         if stop.load(Ordering::Relaxed) {
-            // What breaks off by the same Ctrl-C is no error then.
+            // After Ctrl-C an error of the source is expected, because the same signal can reach it.
             return Ok(End::Interrupted);
         }
         read?;
@@ -245,7 +247,7 @@ pub fn run(
     })
 }
 
-/// Processes one frame by itself, as [`run`] would.
+/// Processes a single picture, as [`run`] would.
 ///
 /// # Errors
 /// An overlay cannot be written.
@@ -271,7 +273,7 @@ fn write_in_order(
         match received {
             Ok(result) => {
                 let frame = result.inspect_err(|_| {
-                    // What is written so far must survive the error.
+                    // Data written so far must survive the error.
                     let _ = sink.flush();
                 })?;
                 waiting.insert(frame.index, frame);
@@ -280,7 +282,7 @@ fn write_in_order(
                     seen(&frame);
                     next += 1;
                     flush_at.get_or_insert_with(|| Instant::now() + FLUSH_EVERY);
-                    // The source may be gone already; it then needs no ticket.
+                    // The source may have ended already; it then needs no ticket.
                     let _ = tickets.try_send(());
                 }
             }
@@ -294,7 +296,7 @@ fn write_in_order(
     }
 }
 
-/// Decodes and processes one frame.
+/// Decodes and processes one picture.
 fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Finished> {
     let Job { index, mut item } = job;
     let time = item.time_source(plan.frames.as_ref());
@@ -331,8 +333,8 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
         finished.tip = picture.unused_bits();
     }
     if let Some(traces) = traces.as_ref().filter(|_| plan.trace || plan.overlay.is_some()) {
-        // Here and not in the one thread that writes, which would hold up all the others.
-        // Where each row sees it.
+        // The drawing is made here, because in the single writing thread it would delay all other threads. The camera
+        // includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
         let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
         let drawing = draw(&finished.found, traces, &camera);
         if let Some(folder) = &plan.overlay {
@@ -352,7 +354,7 @@ fn process(plan: &Plan, sensor: &mut AnySensor, job: Job) -> anyhow::Result<Fini
     Ok(finished)
 }
 
-/// What is drawn over the picture for all of its bodies.
+/// Returns the drawing over the picture for all of its bodies.
 fn draw(found: &[BodyOutcome], traces: &Traces, camera: &Camera<f64>) -> hzn_mcap::Annotations {
     let mut drawing = hzn_mcap::Annotations::default();
     for (found, trace) in found.iter().zip(&traces.each) {
@@ -362,7 +364,7 @@ fn draw(found: &[BodyOutcome], traces: &Traces, camera: &Camera<f64>) -> hzn_mca
     drawing
 }
 
-/// What became of the bodies, in words.
+/// Returns the statuses of the bodies in words.
 fn statuses(found: &[BodyOutcome], plan: &Plan) -> String {
     match found {
         [one] => one.status().name().to_owned(),
@@ -384,7 +386,7 @@ mod tests {
     use super::*;
     use crate::source::{Payload, Picture, TimeSource, picture::Samples};
 
-    /// Counts the frames that were handed out and not written yet.
+    /// A source that counts the pictures that were handed out but not yet written.
     struct Counted<'a> {
         left: u64,
         abroad: &'a AtomicU64,

@@ -1,4 +1,4 @@
-//! The sensor of the workstation or of the flight computer, behind one face that speaks f64.
+//! The sensor of the workstation or of the flight computer, behind one interface in f64.
 
 use std::time::Duration;
 
@@ -20,30 +20,31 @@ enum Kind {
     Flight(Box<FlightHorizon>),
 }
 
-/// A sensor of either precision.
+/// A sensor in single or double precision.
 pub struct AnySensor {
     kind: Kind,
     /// The lens in f64, for drawing.
     camera: Camera<f64>,
     bodies: Vec<body::Kind>,
-    /// The last answer of each body, and the time of the next picture, for `select.max_rate_deg_s`.
+    /// The last answer of each body, for `select.max_rate_deg_s`.
     last: Vec<Option<Answered>>,
+    /// The time of the next picture in seconds, for `select.max_rate_deg_s`.
     time_s: Option<f64>,
 }
 
-/// An answer to a picture before, for `select.max_rate_deg_s`.
+/// The answer to an earlier picture, for `select.max_rate_deg_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answered {
-    /// Its axis in the camera.
+    /// The limb axis, camera frame.
     pub axis: [f64; 3],
-    /// Its 1-sigma in radians.
+    /// Its larger standard deviation (1 sigma), in radians.
     pub sigma_rad: f64,
-    /// The time of its picture in seconds, by the sequence's clock.
+    /// The time of its picture in seconds, on the sequence's clock.
     pub time_s: f64,
 }
 
 impl Answered {
-    /// What a row of results says, where it has an answer and a time.
+    /// Returns the answer of a row of results, if the row has an answer and a time.
     pub fn of_row(row: &hzn_mcap::Row) -> Option<Self> {
         Some(Self {
             axis: [row.axis_x?, row.axis_y?, row.axis_z?],
@@ -58,10 +59,10 @@ impl Answered {
 }
 
 impl AnySensor {
-    /// Makes the sensor.
+    /// Makes the sensor; `flight` selects single precision and 2048 points.
     ///
     /// # Errors
-    /// The first field out of its limits.
+    /// The first field outside its limits.
     pub fn new(config: &Config, flight: bool) -> Result<Self, ConfigError> {
         let camera = Camera::try_new(&config.camera)?;
         let kind = if flight {
@@ -73,22 +74,22 @@ impl AnySensor {
         Ok(Self { kind, camera, last: vec![None; bodies.len()], time_s: None, bodies })
     }
 
-    /// Takes answers of another run for those of the pictures before, a body each; more are passed over.
+    /// Sets the last answer of each body, from another run. Answers beyond the number of bodies are ignored.
     pub fn remember(&mut self, answered: &[Option<Answered>]) {
         for (last, answered) in self.last.iter_mut().zip(answered) {
             *last = *answered;
         }
     }
 
-    /// Says when the next picture was taken; without it, its row's time counts.
+    /// Sets the time of the next picture, in seconds. Without it, the time of the picture's row counts.
     pub fn set_time(&mut self, time_s: Option<f64>) {
         self.time_s = time_s;
     }
 
-    /// Takes another configuration, from the next picture on. Refused, everything stays as it was.
+    /// Uses another configuration from the next picture on. If it is refused, nothing changes.
     ///
     /// # Errors
-    /// The first field out of its limits.
+    /// The first field outside its limits.
     pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
         let camera = Camera::try_new(&config.camera)?;
         match &mut self.kind {
@@ -101,13 +102,13 @@ impl AnySensor {
         Ok(())
     }
 
-    /// The lens.
+    /// Returns the lens.
     pub fn camera(&self) -> &Camera<f64> {
         &self.camera
     }
 
-    /// Half-angle in radians that is expected of each body in a frame; or why nothing can be expected: an altitude or
-    /// position that cannot be.
+    /// Returns the expected half-angle of each body in a picture, in radians. The entry is an error if no half-angle
+    /// can be expected, for example for an impossible altitude or position.
     pub fn expected_half_angles_rad(&self, data: Option<&FrameData>) -> Vec<Result<f64, PriorError>> {
         match &self.kind {
             Kind::Host(h) => half_angles(h, data),
@@ -115,8 +116,8 @@ impl AnySensor {
         }
     }
 
-    /// Processes one picture: a result for each body, in order. Of Sun and Moon the direction in ECEF is known too,
-    /// from the time and the position.
+    /// Processes one picture and returns one result for each body, in order. For Sun and Moon the result also has the
+    /// direction in ECEF, from the time and the position.
     pub fn process(
         &mut self,
         view: &ImageView<'_>,
@@ -129,7 +130,7 @@ impl AnySensor {
         }
     }
 
-    /// As [`Self::process`], of a kind of picture of the caller's own.
+    /// Processes a picture of the caller's own type, as [`Self::process`] does.
     pub fn process_pixels<P: Pixels>(
         &mut self,
         picture: &P,
@@ -142,14 +143,14 @@ impl AnySensor {
         }
     }
 
-    /// As [`Self::process`], with an observer of the caller's own.
+    /// Processes a picture as [`Self::process`] does, with the caller's own observer.
     pub fn process_watched<W: Watch>(
         &mut self,
         view: &ImageView<'_>,
         data: Option<&FrameData>,
         watch: &W,
     ) -> Vec<Processed> {
-        // Each kind of picture has its own compiled pipeline; behind the enum every pixel would cost a branch.
+        // Each kind of picture has its own compiled pipeline; with the enum, every pixel would cost a branch.
         match view {
             ImageView::Grey8(p) => self.watch(p, data, watch),
             ImageView::Grey16(p) => self.watch(p, data, watch),
@@ -180,7 +181,7 @@ impl AnySensor {
     }
 }
 
-/// Where Sun or Moon stand in ECEF, seen from the position at the time of the frame.
+/// Returns the direction of Sun or Moon in ECEF, seen from the position at the time of the picture.
 fn in_the_sky(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>> {
     let place = match body {
         body::Kind::Sun => ephemeris::sun(data.utc_s?),
@@ -190,10 +191,10 @@ fn in_the_sky(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>>
     UnitVec3::try_new(place.seen_from(data.position_km?.map(|km| km * 1e3)).direction)
 }
 
-/// What came of one body in one picture.
+/// The result of one body in one picture.
 #[derive(Debug)]
 pub struct Processed {
-    /// The report; or an altitude or position that cannot be.
+    /// The report, or the reason why nothing could be expected of this body.
     pub report: Result<Report<f64>, PriorError>,
     /// Time of processing.
     pub elapsed: Duration,
@@ -235,7 +236,7 @@ fn run<
     let reports = horizon.process_each_observed(picture, &known, watch);
     let times = watch.times();
     let mut done = reports.iter().zip(times);
-    // As many reports as bodies of which something could be expected.
+    // There is one report for each body with an expected half-angle.
     let result = |expected: Result<_, PriorError>| match expected {
         Err(why) => Some(Processed { report: Err(why), elapsed: Duration::ZERO }),
         Ok(_) => done.next().map(|(report, elapsed)| Processed { report: Ok(widen(report)), elapsed }),
@@ -243,7 +244,7 @@ fn run<
     expected.into_iter().filter_map(result).collect()
 }
 
-/// A report in f64.
+/// Converts a report to f64.
 fn widen<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
     Report {
         status: r.status,
@@ -296,12 +297,12 @@ fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
     })
 }
 
-/// Checks a sensor, and every row of frames.csv against it, before the first frame is processed. A row that leaves the
-/// altitude open, or gives one below the limb height, is not refused: its picture gets
-/// [`Status::NoAltitude`](hzn_core::status::Status::NoAltitude).
+/// Checks every row of frames.csv against the sensor, before the first picture is processed. A row without an altitude,
+/// or with one below the limb height, is not refused: its picture gets
+/// [`Status::NoAltitude`](hzn_core::status::Status::NoAltitude). If the sensor itself is refused, nothing is checked.
 ///
 /// # Errors
-/// The row, the picture and the column that cannot be.
+/// The row, the picture and the column with an impossible value.
 pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result<(), Problem> {
     let Some(frames) = frames else { return Ok(()) };
     let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };

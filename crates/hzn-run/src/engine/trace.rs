@@ -1,4 +1,4 @@
-//! Everything that the pipeline shows of itself while it works on one picture.
+//! Everything that the pipeline shows of its work on one picture.
 
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
@@ -15,25 +15,26 @@ use super::sensor::{widen_candidate, widen_solution};
 /// One candidate edge.
 #[derive(Debug, Clone, Default)]
 pub struct Edge {
-    /// Its number.
+    /// The number of the candidate.
     pub candidate: u32,
     /// Border pixels, every `stride`-th, in order.
     pub border: Vec<Pixel>,
-    /// Step between two of them along the edge.
+    /// Step between two listed border pixels along the edge, in border pixels.
     pub stride: u32,
     /// Sub-pixel points (u, v) in pixels.
     pub points: Vec<[f64; 2]>,
-    /// Weights of those points after the fit, 0 rejected; empty when there was no fit.
+    /// Weights of those points after the fit; 0 is an outlier. Empty if there was no fit.
     pub weights: Vec<f64>,
-    /// What became of it.
+    /// The outcome of the candidate.
     pub outcome: Option<Candidate<f64>>,
-    /// The larger 1-sigma of the axis that each source of error makes, radians; empty when there was no fit.
+    /// The larger standard deviation (1 sigma) of the axis from each source of error, in radians. Empty if there was no
+    /// fit.
     pub budget_rad: Vec<(Term, f64)>,
-    /// Its own fit, when there was one.
+    /// The fit of this candidate, if there was one.
     pub solution: Option<Solution<f64>>,
 }
 
-/// A record of one picture. Filled through [`Observer`], read when the picture is through.
+/// A record of the work on one body in one picture. It is filled through [`Observer`] and read after the picture.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
     edges: RefCell<Vec<Edge>>,
@@ -45,23 +46,24 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Candidates in the order in which they were followed.
+    /// Returns the candidates in the order in which they were followed.
     pub fn edges(&self) -> std::cell::Ref<'_, Vec<Edge>> {
         self.edges.borrow()
     }
-    /// Level in counts, with the mean and the number of pixels of the sample.
+    /// Returns the threshold in counts, with the mean (counts) and the number of pixels of the sample.
     pub fn level(&self) -> Option<(u16, f64, u32)> {
         self.level.get()
     }
-    /// Levels of further looks, after one without an answer, in counts.
+    /// Returns the thresholds of the further looks, in counts.
     pub fn again(&self) -> Vec<u16> {
         self.again.borrow().clone()
     }
-    /// Width of the dark frame around the picture that was left out, pixels; 0: there is none.
+    /// Returns the width of the dark border around the picture that was left out, in pixels; 0 means that there is
+    /// none.
     pub fn frame_px(&self) -> u16 {
         self.frame_px.get()
     }
-    /// Time spent in every stage.
+    /// Returns the time spent in every stage.
     pub fn times(&self) -> [(Stage, Duration); 8] {
         let times = self.times.get();
         std::array::from_fn(|i| (Stage::ALL[i], times[i]))
@@ -92,13 +94,13 @@ impl Trace {
     }
 }
 
-/// An observer, for either precision, that also takes the time.
+/// An observer for both precisions that also measures the time.
 pub trait Watch: Observer<f32> + Observer<f64> {
-    /// The time spent on each body, in their order.
+    /// Returns the time spent on each body, in their order.
     fn times(&self) -> Vec<Duration>;
 }
 
-/// The time spent on each body, and nothing else.
+/// An observer that measures only the time spent on each body.
 #[derive(Debug, Clone, Default)]
 pub struct Clock {
     since: Cell<Option<Instant>>,
@@ -123,14 +125,14 @@ impl<T> Observer<T> for Clock {
 /// Records of one picture, one for each body.
 #[derive(Debug, Default)]
 pub struct Traces {
-    /// In the order of the bodies.
+    /// The records in the order of the bodies.
     pub each: Vec<Trace>,
     clock: Clock,
     now: Cell<usize>,
 }
 
 impl Traces {
-    /// As many as there are bodies.
+    /// Makes empty records for this number of bodies.
     pub fn new(bodies: usize) -> Self {
         Self { each: vec![Trace::default(); bodies], ..Self::default() }
     }

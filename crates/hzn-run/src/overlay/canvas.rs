@@ -1,22 +1,22 @@
-//! Lines, points and a few letters on an RGB picture.
+//! Draws lines, points and simple letters on an RGB picture.
 
 use image::{Rgb, RgbImage};
 
-/// A colour.
+/// A colour: red, green, blue.
 pub(super) type Colour = [u8; 3];
 
-/// Draws with round pens; everything is clipped at the picture's border.
+/// An RGB picture to draw on, with round pens. Everything is clipped at the picture's border.
 pub(super) struct Canvas {
     pub(super) image: RgbImage,
 }
 
 impl Canvas {
-    /// A filled disc.
+    /// Draws a filled disc; centre and radius are in pixels.
     pub(super) fn disc(&mut self, [u, v]: [f64; 2], radius_px: f64, colour: Colour) {
         let (w, h) = (f64::from(self.image.width()), f64::from(self.image.height()));
         let (x0, x1) = ((u - radius_px).ceil().max(0.0), (u + radius_px).floor().min(w - 1.0));
         let (y0, y1) = ((v - radius_px).ceil().max(0.0), (v + radius_px).floor().min(h - 1.0));
-        // Written so that NaN draws nothing.
+        // This form of the condition draws nothing for NaN.
         if !(x0 <= x1 && y0 <= y1) {
             return;
         }
@@ -29,10 +29,10 @@ impl Canvas {
         }
     }
 
-    /// A straight line with round ends.
+    /// Draws a straight line with round ends; all lengths are in pixels.
     pub(super) fn line(&mut self, a: [f64; 2], b: [f64; 2], width_px: f64, colour: Colour) {
         let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-        // A line far outside would be stepped along for nothing; limbs are cut at the picture before.
+        // A line far outside the picture would cost many steps without effect; limbs are clipped to the picture before.
         if !(length <= 1e5) {
             return;
         }
@@ -44,14 +44,14 @@ impl Canvas {
         }
     }
 
-    /// A line through several points.
+    /// Draws a line through several points.
     pub(super) fn polyline(&mut self, points: &[[f64; 2]], width_px: f64, colour: Colour) {
         for pair in points.windows(2) {
             self.line(pair[0], pair[1], width_px, colour);
         }
     }
 
-    /// A filled rectangle that lets the picture shine through.
+    /// Darkens a rectangle; the picture remains visible in it.
     pub(super) fn shade(&mut self, x: u32, y: u32, width: u32, height: u32) {
         for y in y..(y + height).min(self.image.height()) {
             for x in x..(x + width).min(self.image.width()) {
@@ -61,7 +61,7 @@ impl Canvas {
         }
     }
 
-    /// Letters of 8 × 8 dots, each dot `scale` pixels wide.
+    /// Draws letters of 8 × 8 dots; each dot is `scale` pixels wide.
     pub(super) fn text(&mut self, x: u32, y: u32, text: &str, scale: u32, colour: Colour) {
         use font8x8::UnicodeFonts;
         for (i, letter) in text.chars().enumerate() {

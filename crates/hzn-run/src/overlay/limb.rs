@@ -1,13 +1,13 @@
-//! The limb of a cone in the picture.
+//! Draws the limb of a cone in the picture.
 
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
 
-/// Steps around the cone when it is searched for parts in view.
+/// Number of steps around the cone in the search for the parts in view.
 const STEPS: usize = 4096;
 
-/// The cone about `axis` (unit vector, camera frame) with this half-angle, as lines in pixels, broken where it leaves
-/// the picture or the image circle.
+/// Returns the limb of a cone as lines in pixels. The cone has the axis `axis` (unit vector, camera frame) and this
+/// half-angle. The lines are broken where the limb leaves the picture or the image circle.
 pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
     let (b1, b2) = basis(axis);
     let (sin, cos) = half_angle_rad.sin_cos();
@@ -16,10 +16,10 @@ pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<V
         let (s, c) = (step as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
         let ray = std::array::from_fn(|i| cos * axis[i] + sin * (c * b1[i] + s * b2[i]));
         let p = camera.project(&UnitVec3::try_new(ray)?)?;
-        // Half a pixel around the picture still shows a line's edge.
+        // Half a pixel around the picture is included, because the edge of a line is still visible there.
         ((-1.0..=w).contains(&p.u) && (-1.0..=h).contains(&p.v)).then_some([p.u, p.v])
     };
-    // Begin where the picture ends, so that a line which crosses the first step is not cut there.
+    // The loop starts outside the picture, so that a line across the first step is not cut there.
     let start = (0..STEPS).find(|&i| at(i).is_none()).unwrap_or(0);
     let mut out = Vec::new();
     let mut line = Vec::new();
@@ -36,9 +36,9 @@ pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<V
     out
 }
 
-/// Two unit vectors that span the plane across `axis`.
+/// Returns two unit vectors that span the plane perpendicular to `axis`.
 fn basis([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-    // The coordinate axis that is farthest from it gives the best conditioned product.
+    // The coordinate axis that is farthest from `axis` gives the best conditioned product.
     let helper = if x.abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -61,7 +61,8 @@ mod tests {
         assert_eq!(disc[0].first(), disc[0].last());
         let radius = |p: &[f64; 2]| (p[0] - 319.5).hypot(p[1] - 239.5);
         assert!(disc[0].iter().all(|p| (radius(p) - 500.0 * 0.1f64.tan()).abs() < 1e-9));
-        // Body 70 degrees wide, straight below the camera's horizon: one arc across the picture.
+        // The half-angle is about 70 degrees, and the body is straight below the camera's horizon: one arc crosses the
+        // picture.
         let down = 1.25f64;
         let arc = lines([0.0, down.sin(), down.cos()], 1.2, &camera);
         assert_eq!(arc.len(), 1, "{arc:?}");

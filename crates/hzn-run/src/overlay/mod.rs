@@ -14,7 +14,7 @@ use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
 
 const TRUTH: Colour = [230, 159, 0];
 
-/// Name of the overlay of a picture.
+/// Returns the file name of the overlay of a picture.
 pub fn file_name(name: &str) -> String {
     let flat = name.replace(['/', '\\', ':'], "_");
     if flat.to_lowercase().ends_with(".png") { flat } else { format!("{flat}.png") }
@@ -25,7 +25,7 @@ pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title:
     draw_beside(image, drawing, &[], title)
 }
 
-/// As [`draw_annotations`], with the true limb beside it.
+/// Draws annotations as [`draw_annotations`] does, and the true limb with them.
 pub fn draw_beside(
     image: RgbImage,
     drawing: &hzn_mcap::Annotations,
@@ -34,7 +34,7 @@ pub fn draw_beside(
 ) -> RgbImage {
     let mut canvas = Canvas { image };
     let (w, h) = (canvas.image.width(), canvas.image.height());
-    // Thick enough to be seen when the whole picture is looked at on a screen of some 1600 px.
+    // The pen is wide enough to be visible when the whole picture is shown on a screen of about 1600 px.
     let pen = (f64::from(w.max(h)) / 800.0).max(1.0);
     for edge in &drawing.edges {
         for p in edge {
@@ -47,7 +47,7 @@ pub fn draw_beside(
     for limb in true_limb {
         canvas.polyline(limb, pen * 1.2, TRUTH);
     }
-    // Points lie over the line and are narrower, so that both are seen.
+    // Points are drawn over the line and are narrower, so that both remain visible.
     for p in &drawing.rejected {
         canvas.disc(*p, pen * 1.6, REJECTED);
     }
@@ -83,7 +83,7 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, tit
     add(!drawing.axes.is_empty(), "axis".into(), AXIS);
     let widest = entries.iter().map(|(t, _)| t.len()).max().unwrap_or(0) as u32 * 8 * scale;
     let (box_w, box_h) = (widest + 4 * scale, entries.len() as u32 * line + 3 * scale);
-    // A legend that hides a small picture would help nobody.
+    // A legend that covers most of a small picture is left out.
     if box_w > w / 2 || box_h > h / 2 {
         return;
     }
@@ -98,15 +98,15 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, tit
 /// # Errors
 /// The file cannot be written.
 pub fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
-    // Through memory: the encoder would tell of a full disk in words of its own.
+    // The picture is encoded in memory first, because the encoder has its own words for a full disk.
     let bytes = png(image).map_err(|e| e.context(path.display().to_string()))?;
     std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::sink::advice(path, &e)))
 }
 
-/// A picture as the bytes of a PNG.
+/// Encodes a picture as PNG.
 ///
 /// # Errors
-/// It has no pixels.
+/// The picture has no pixels.
 pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut bytes = Vec::new();

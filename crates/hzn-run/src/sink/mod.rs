@@ -1,7 +1,7 @@
-//! Where results go: `.mcap`, `.csv`, `.jsonl` by the ending, or a CSV table on stdout.
+//! The outputs for results: `.mcap`, `.csv`, `.jsonl` by the ending, or a CSV table on stdout.
 //!
-//! A file is written as `NAME.part` and gets its name at the end, also after Ctrl-C, so that whatever has the name is
-//! whole. What a crash leaves is the `.part` file; [`open`] goes on with either.
+//! A file is written as `NAME.part` and gets its final name at the end, also after Ctrl-C. Therefore every file with
+//! the final name is complete. A crash leaves the `.part` file. [`open`] can continue either.
 
 mod record;
 mod text;
@@ -18,18 +18,18 @@ use crate::error::{Error, Remedy, failed, unusable};
 use crate::source::ending;
 use text::{Form, Text};
 
-/// How an output is treated that exists already.
+/// The treatment of an output that exists already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
-    /// It is refused.
+    /// Refuse the output.
     Refuse,
-    /// It is replaced.
+    /// Replace the output.
     Replace,
-    /// It is continued after its last finished frame.
+    /// Continue the output after its last finished picture.
     Resume,
 }
 
-/// An output that takes frames.
+/// An output that takes the results of pictures.
 pub struct Output {
     kind: Kind,
     path: Option<PathBuf>,
@@ -41,21 +41,21 @@ enum Kind {
     Text(Text),
 }
 
-/// Frames that an output holds already.
+/// The results that an output contains already.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Held {
-    /// How many.
+    /// Number of pictures.
     pub frames: u64,
-    /// Their rows: one for each body.
+    /// Number of rows; a picture has one for each body.
     pub rows: u64,
-    /// The last one's row.
+    /// The last row.
     pub last: Option<hzn_mcap::Row>,
     /// The last answer of each body.
     pub answered: Vec<Option<Answered>>,
 }
 
 impl Held {
-    /// Takes note of a frame's rows, one for each body.
+    /// Records the answers in a picture's rows, one row for each body.
     fn answers(&mut self, rows: &[hzn_mcap::Row]) {
         self.answered.resize(rows.len().max(self.answered.len()), None);
         for (answered, row) in self.answered.iter_mut().zip(rows) {
@@ -64,21 +64,21 @@ impl Held {
     }
 }
 
-/// Kinds of output, by ending.
+/// Kinds of output, selected by the ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
     /// A recording.
     Mcap,
     /// A table.
     Csv,
-    /// One JSON object a line.
+    /// A text file with one JSON object a line.
     Jsonl,
 }
 
-/// The kind of output that a file name asks for.
+/// Returns the kind of output for a file name.
 ///
 /// # Errors
-/// An ending that is not known.
+/// The ending is not known.
 pub fn target(path: &Path) -> Result<Target, Error> {
     match ending(path).as_str() {
         "mcap" => Ok(Target::Mcap),
@@ -88,7 +88,7 @@ pub fn target(path: &Path) -> Result<Target, Error> {
     }
 }
 
-/// Opens an output; without a path, CSV on stdout. Gives the frames that it holds already.
+/// Opens an output; without a path, CSV on stdout. Also returns the results that it contains already.
 ///
 /// # Errors
 /// It exists and must not, belongs to another sensor, or cannot be written.
@@ -109,7 +109,7 @@ pub fn open(
         Existing::Refuse => refuse(path, &part)?,
         Existing::Replace => {}
         Existing::Resume => {
-            // A run that was interrupted has given its file the name already.
+            // An interrupted run has already given its file the final name.
             if path.exists() && !part.exists() {
                 std::fs::rename(path, &part).map_err(|e| cannot(&part, &e))?;
                 let back = |stop| {
@@ -121,7 +121,7 @@ pub fn open(
                     .and_then(|(kind, held)| output(kind, held));
             }
             if path.exists() {
-                // Not left, but still being written.
+                // This fails if the unfinished file is still being written.
                 hzn_mcap::open_part(&part).map_err(|e| cannot(&part, &e))?;
                 let what = "exists beside what an unfinished run left; remove one of the two";
                 return Err(unusable(format!("{}: {what} ({})", path.display(), part.display())));
@@ -191,7 +191,7 @@ fn resume(path: &Path, part: &Path, target: Target, config: &Config, sensor_toml
     }
 }
 
-/// The last row of a recording, and the last answers of its bodies.
+/// Reads the last row of a recording, and the last answers of its bodies.
 fn last_frames(part: &Path) -> Held {
     let mut held = Held::default();
     let Ok(reader) = Reader::open(part, Contents::WithoutImages) else { return held };
@@ -208,7 +208,7 @@ fn last_frames(part: &Path) -> Held {
     held
 }
 
-/// As [`advice`] for the file of a run: what is finished stays in it.
+/// Returns the text of [`advice`] for the file of a run. If the disk is full, it adds that finished pictures are kept.
 pub(crate) fn advice_of_run(path: &Path, error: &std::io::Error) -> String {
     let what = advice(path, error);
     match error.kind() {
@@ -219,7 +219,7 @@ pub(crate) fn advice_of_run(path: &Path, error: &std::io::Error) -> String {
     }
 }
 
-/// Whether two paths lead to one file or folder that exists.
+/// Returns whether two paths lead to the same existing file or folder.
 pub fn is_same(a: &Path, b: &Path) -> bool {
     let b = if b.as_os_str().is_empty() { Path::new(".") } else { b };
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
@@ -228,7 +228,7 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
 /// Refuses a file that exists, unless it may be replaced.
 ///
 /// # Errors
-/// It exists and `force` is false.
+/// The file exists and `force` is false.
 pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
     if path.exists() && !force {
         return Err(unusable(format!("{}: exists already", path.display())).with(Remedy::Replace));
@@ -236,12 +236,12 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// A file that cannot be written, and what to do.
+/// Returns the error for a file that cannot be written, with advice.
 pub fn cannot(path: &Path, error: &std::io::Error) -> Error {
     failed(advice(path, error))
 }
 
-/// A picture that cannot be written, and what to do.
+/// Returns the error for a picture that cannot be written, with advice.
 pub fn not_saved(path: &Path, error: &image::ImageError) -> Error {
     let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
     while let Some(e) = cause {
@@ -253,7 +253,7 @@ pub fn not_saved(path: &Path, error: &image::ImageError) -> Error {
     failed(format!("{}: {error}", path.display()))
 }
 
-/// What a write error means, and what to do.
+/// Returns the meaning of a write error, with advice.
 pub fn advice(path: &Path, error: &std::io::Error) -> String {
     let name = path.display();
     match error.kind() {
@@ -271,17 +271,17 @@ pub fn advice(path: &Path, error: &std::io::Error) -> String {
         std::io::ErrorKind::NotADirectory => {
             format!("{name}: a part of this path is a file, not a folder; choose another folder for the output")
         }
-        // Of a folder that is to be made.
+        // This error comes from making a folder.
         std::io::ErrorKind::AlreadyExists => format!("{name}: is a file, not a folder; choose another name"),
         _ => format!("{name}: cannot be written: {error}"),
     }
 }
 
 impl Output {
-    /// Gives the file its name.
+    /// Closes the file and gives it its final name.
     ///
     /// # Errors
-    /// The disk.
+    /// The disk fails.
     pub fn finish(self) -> Result<(), Error> {
         match self.kind {
             Kind::Mcap(writer) => writer.finish().map(|_| ()).map_err(failed),
@@ -291,7 +291,7 @@ impl Output {
         }
     }
 
-    /// Leaves no file: what had the name before is as it was.
+    /// Removes the unfinished file. A file that already has the final name is not changed.
     pub fn discard(self) {
         drop(self.kind);
         if let Some(path) = self.path {
@@ -299,7 +299,7 @@ impl Output {
         }
     }
 
-    /// Do frames need their edges and points?
+    /// Returns whether the output at this path stores the edges and points of pictures.
     pub fn wants_trace(path: Option<&Path>) -> bool {
         path.is_some_and(|p| ending(p) == "mcap")
     }
@@ -324,7 +324,7 @@ impl Sink for Output {
     }
 }
 
-/// A table of rows that are at hand already.
+/// A table of rows that exist already, in contrast to the output of a run.
 pub struct RowFile {
     text: Text,
     path: PathBuf,
@@ -338,7 +338,7 @@ impl RowFile {
     pub fn create(path: &Path, existing: Existing) -> Result<Self, Error> {
         let part = part_path(path);
         if existing == Existing::Refuse {
-            // Which no --resume continues.
+            // --resume cannot continue this table, so the error offers only to replace it.
             refuse_existing(path, false)?;
             refuse(path, &part)?;
         }
@@ -354,26 +354,26 @@ impl RowFile {
     /// Appends a row.
     ///
     /// # Errors
-    /// The disk.
+    /// The disk fails.
     pub fn write(&mut self, row: &hzn_mcap::Row) -> anyhow::Result<()> {
         self.text.write(row).map_err(|e| anyhow::anyhow!(advice(&self.path, &e)))
     }
-    /// Leaves no file: what had the name before is as it was.
+    /// Removes the unfinished file. A file that already has the final name is not changed.
     pub fn discard(self) {
         drop(self.text);
         let _ = std::fs::remove_file(part_path(&self.path));
     }
-    /// Gives the file its name.
+    /// Closes the file and gives it its final name.
     ///
     /// # Errors
-    /// The disk.
+    /// The disk fails.
     pub fn finish(self) -> Result<(), Error> {
         let Self { text, path } = self;
         text.finish().map_err(|e| cannot(&path, &e))
     }
 }
 
-/// Keeps the whole rows of a table that was cut off. Gives their number and the bytes that were dropped.
+/// Keeps the complete rows of a truncated table. Returns their number and the number of bytes that were dropped.
 ///
 /// # Errors
 /// The file has other columns, or the disk fails.
@@ -386,7 +386,7 @@ pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result
     }
     let resumed = Text::resume(path, &part, form, None);
     if resumed.is_err() && file != part {
-        // Half a copy helps nobody.
+        // An incomplete copy is of no use.
         let _ = std::fs::remove_file(&part);
     }
     let (text, held) = resumed?;

@@ -1,4 +1,4 @@
-//! From a finished frame to the row and the record that files hold.
+//! Converts a processed picture to the rows and records of files.
 
 use hzn_calib::FrameData;
 use hzn_core::camera::Camera;
@@ -15,7 +15,8 @@ use hzn_sim::evaluate;
 use crate::engine::{BodyOutcome, Finished, Trace};
 use crate::overlay::limb;
 
-/// The altitude above a body, kilometres: that of the position, else as given; of Sun and Moon there is none.
+/// Returns the altitude above a body in kilometres: from the position if there is one, otherwise the given altitude.
+/// Sun and Moon have none.
 pub fn altitude_km(data: Option<&FrameData>, body: &body::Config) -> Option<f64> {
     if body.half_angle_is_free() {
         return None;
@@ -27,7 +28,7 @@ pub fn altitude_km(data: Option<&FrameData>, body: &body::Config) -> Option<f64>
     own.or(body.altitude_km)
 }
 
-/// The rows of a frame, one for each body.
+/// Returns the rows of a picture, one for each body.
 pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
     let row = |(body, found): (&body::Config, &BodyOutcome)| {
         let meta = RowMeta {
@@ -45,8 +46,8 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
     config.each_body().iter().zip(&frame.found).map(row).collect()
 }
 
-/// The records of a frame, one for each body. The picture and the drawing that the run collected are moved out of it,
-/// into the first.
+/// Returns the records of a picture, one for each body. The pixels and the drawing are moved out of the picture, into
+/// the first record.
 pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
     let mut records: Vec<FrameRecord> = rows(frame, config).into_iter().map(FrameRecord::new).collect();
     if let Some(first) = records.first_mut() {
@@ -72,20 +73,20 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
     records
 }
 
-/// A row as the evaluation takes it.
+/// Converts a row to an answer for the evaluation.
 pub fn answer(row: &Row) -> evaluate::Answer {
     let covariance =
         || -> Option<[f64; 6]> { Some([row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?]) };
     let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| evaluate::MeasuredDirection {
         axis,
-        // Without a covariance the error still counts, its honesty does not.
+        // Without a covariance the error still counts, but its covariance is not evaluated.
         covariance_rad2: covariance().unwrap_or_default(),
         half_angle_deg: row.half_angle_deg,
     });
     evaluate::Answer { file: row.file.clone(), body: row.body.clone(), status: row.status, found }
 }
 
-/// What a row of frames.csv says, in the form recordings keep it.
+/// Converts a row of frames.csv to the prior that recordings store.
 fn given(data: &FrameData) -> Given {
     Given {
         utc_s: data.utc_s,
@@ -98,7 +99,7 @@ fn given(data: &FrameData) -> Given {
     }
 }
 
-/// The row of frames.csv that a recording kept for a picture.
+/// Returns the row of frames.csv for a picture, from the prior that a recording stores.
 pub fn frame_data(row: &Row, given: &Given) -> FrameData {
     FrameData {
         file: row.file.clone(),
@@ -114,7 +115,8 @@ pub fn frame_data(row: &Row, given: &Given) -> FrameData {
     }
 }
 
-/// What is drawn over a picture.
+/// Returns the drawing for a picture: the edges, the points of the chosen edge, and the fitted limb. Coordinates are in
+/// pixels.
 pub fn annotations(trace: &Trace, solution: Option<&Solution<f64>>, camera: &Camera<f64>) -> Annotations {
     let mut out = Annotations::default();
     for edge in trace.edges().iter() {
@@ -131,7 +133,8 @@ pub fn annotations(trace: &Trace, solution: Option<&Solution<f64>>, camera: &Cam
     out
 }
 
-/// What is drawn of a cone that was fitted: its limb as lines, broken where it leaves the picture, and its axis.
+/// Returns the drawing for a fitted cone: its limb as lines, broken where it leaves the picture, and its axis.
+/// Coordinates are in pixels.
 pub fn fitted(axis: &UnitVec3<Cam, f64>, half_angle_rad: f64, camera: &Camera<f64>) -> Annotations {
     let inside = |p: &ImagePoint<f64>| {
         (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)

@@ -18,11 +18,11 @@ pub(crate) enum Form {
 pub(crate) struct Text {
     out: BufWriter<Box<dyn Write>>,
     form: Form,
-    /// `(path, part)`; none for stdout.
+    /// `(path, part)`: the final and the unfinished file; `None` for stdout.
     names: Option<(PathBuf, PathBuf)>,
 }
 
-/// How a row of JSON Lines begins.
+/// The beginning of each row of JSON Lines.
 const JSON_HEAD: &[u8] = b"{\"index\":";
 
 fn header() -> String {
@@ -50,8 +50,8 @@ impl Text {
         Ok(text)
     }
 
-    /// Goes on after the last frame that has all of its `bodies` rows, or as many as the first frame; without an
-    /// unfinished file, begins one.
+    /// Continues after the last picture that has all of its rows. This number is `bodies`, or that of the first
+    /// picture. Without an unfinished file, begins a new one.
     pub(crate) fn resume(path: &Path, part: &Path, form: Form, bodies: Option<usize>) -> io::Result<(Self, Held)> {
         if !part.exists() {
             return Ok((Self::create(path, part, form)?, Held::default()));
@@ -64,7 +64,7 @@ impl Text {
             drop(file);
             return Ok((Self::create(path, part, form)?, Held::default()));
         }
-        // What follows is a row, or a frame, that was cut off.
+        // The rest of the file is an incomplete row or picture.
         file.set_len(end as u64)?;
         file.seek(SeekFrom::End(0))?;
         Ok((Self::on(file, path, part, form), held))
@@ -86,7 +86,7 @@ impl Text {
         self.out.flush()
     }
 
-    /// An error of writing a run's results, and what to do.
+    /// Returns the error for a failed write of a run's results, with advice.
     pub(crate) fn told(&self, error: io::Error) -> anyhow::Error {
         match &self.names {
             Some((_, part)) => anyhow::anyhow!(advice_of_run(part, &error)),
@@ -104,15 +104,15 @@ impl Text {
     }
 }
 
-/// One row as a line of CSV.
+/// Returns one row as a line of CSV.
 pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
     writer.serialize(row)?;
     writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))
 }
 
-/// Whole frames of `bodies` rows each, and where they end. Where the number of bodies is not known, the first frame has
-/// them all.
+/// Returns the complete pictures of `bodies` rows each, and the offset of their end. If the number of bodies is
+/// unknown, it is the number of rows of the first picture.
 fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, usize)> {
     let bodies = match bodies {
         Some(bodies) => bodies,
@@ -142,7 +142,8 @@ fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, u
     Ok((held, end))
 }
 
-/// Gives every whole row and where it ends, until `visit` says to stop or a row is cut off.
+/// Calls `visit` with every complete row and the offset of its end. Stops if `visit` returns false or a row is
+/// incomplete.
 fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<()> {
     let other = || {
         let what = "has other columns than the results of this version";
@@ -158,7 +159,7 @@ fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool)
             to += line.len();
             let row = match serde_json::from_slice::<Row>(line) {
                 Ok(row) => row,
-                // A whole row that is none of ours.
+                // This is a complete row that is not one of ours.
                 Err(_) if begins => return other(),
                 Err(_) => break,
             };
@@ -175,7 +176,7 @@ fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool)
     let Some(rest) = bytes.strip_prefix(header.as_bytes()) else {
         return other();
     };
-    // A row may hold line breaks within quotes, so that only the reader knows where it ends.
+    // A row may contain line breaks within quotes, so only the reader knows where it ends.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(rest);
     let mut record = csv::StringRecord::new();
     while let Ok(true) = reader.read_record(&mut record) {

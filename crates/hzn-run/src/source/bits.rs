@@ -1,27 +1,28 @@
-//! How many bits of 16-bit words a camera uses, found once for a whole sequence.
+//! Finds how many bits of 16-bit words a camera uses, once for a whole sequence.
 //!
-//! A camera of 10, 12 or 14 bits often writes its counts into the lower bits of words. Full scale is then not 65535,
-//! and levels in fractions of it would be far too high. One picture does not tell: it may be dark. So pictures are
-//! taken evenly from the whole sequence, by their places and not by what comes first, and the answer holds for all of
-//! them.
+//! A camera with 10, 12 or 14 bits often writes its counts into the lower bits of words. Full scale is then not 65535,
+//! and thresholds given as fractions of 65535 would be far too high. One picture is not enough, because it may be dark.
+//! Therefore pictures are sampled evenly from the whole sequence, by their place in it, and the result holds for all
+//! pictures.
 
 use super::Source;
 
-/// Pictures that are looked at, and one more where one picture stands for its folder.
+/// Number of pictures that are examined. If the input is one picture, it is examined in addition to those of its
+/// folder.
 pub(super) const LOOKED_AT: usize = 16;
-/// So many pictures without words at the beginning: the sequence has none.
+/// If this many pictures at the beginning have no words, the sequence has none.
 const BYTES: usize = 3;
-/// Bits that cameras have.
+/// Numbers of bits that cameras have.
 const BITS: [u8; 5] = [8, 10, 12, 14, 16];
 
-/// Significant bits, as the samples of a sequence show them.
+/// Significant bits, determined from the samples of a sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FoundBits {
-    /// The fewest of 8, 10, 12, 14 and 16 that hold every sample that was looked at.
+    /// The smallest of 8, 10, 12, 14 and 16 bits that can represent every examined sample.
     pub bits: u8,
-    /// The largest of those samples.
+    /// The largest examined sample.
     pub most: u16,
-    /// Pictures that were looked at.
+    /// Number of pictures that were examined.
     pub pictures: usize,
 }
 
@@ -37,8 +38,8 @@ impl std::fmt::Display for FoundBits {
     }
 }
 
-/// Finds the significant bits of a sequence of words; `None` where its pictures are of bytes, or where the source
-/// knows.
+/// Finds the significant bits of a sequence of words. Returns `None` if the pictures have 8-bit samples, if all samples
+/// are 0, or if the source itself knows the bits.
 pub fn find_bits(source: &dyn Source) -> Option<FoundBits> {
     if source.bits().is_some() {
         return None;
@@ -52,11 +53,11 @@ pub fn find_bits(source: &dyn Source) -> Option<FoundBits> {
         }
     }
     let bits = BITS.into_iter().find(|bits| u32::from(most) >> bits == 0)?;
-    // Black pictures tell nothing.
+    // Black pictures contain no information about the bits.
     (most > 0).then_some(FoundBits { bits, most, pictures })
 }
 
-/// The text of a sensor.toml with a key of `[input]`; text that is no TOML stays as it is.
+/// Returns the text of a sensor.toml with this key set in `[input]`. Text that is not TOML is returned unchanged.
 pub fn with_key(text: &str, key: &str, value: impl Into<toml_edit::Value>) -> String {
     let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_owned() };
     let input = document.entry("input").or_insert_with(toml_edit::table);
@@ -66,7 +67,8 @@ pub fn with_key(text: &str, key: &str, value: impl Into<toml_edit::Value>) -> St
     document.to_string()
 }
 
-/// Places of the pictures to look at, evenly from a sequence of `count`, its first and last among them.
+/// Returns the places of the pictures to examine, evenly spread over a sequence of `count`, including its first and
+/// last.
 pub(super) fn places(count: usize) -> impl Iterator<Item = usize> {
     let n = count.min(LOOKED_AT);
     (0..n).map(move |i| if n > 1 { i * (count - 1) / (n - 1) } else { 0 })

@@ -1,9 +1,9 @@
-//! What a camera wrote into the picture: the time of exposure, and its lens.
+//! What a camera wrote into the picture's EXIF: the time of exposure, and its lens.
 
 use exif::{In, Tag, Value};
 use hzn_calib::start;
 
-/// `DateTimeOriginal` with its fraction, in seconds since 1970. EXIF rarely has a time zone: UTC is assumed.
+/// Returns `DateTimeOriginal` with its fraction, in seconds since 1970. EXIF rarely has a time zone: UTC is assumed.
 pub(super) fn time_s(block: Vec<u8>) -> Option<f64> {
     let exif = exif::Reader::new().read_raw(block).ok()?;
     let text = |tag: Tag| match &exif.get_field(tag, In::PRIMARY)?.value {
@@ -17,7 +17,7 @@ pub(super) fn time_s(block: Vec<u8>) -> Option<f64> {
     Some(whole + fraction)
 }
 
-/// The camera and its lens.
+/// Returns the camera and its lens.
 pub(super) fn lens(block: Vec<u8>) -> Option<start::Exif> {
     let exif = exif::Reader::new().read_raw(block).ok()?;
     let number = |tag: Tag| match &exif.get_field(tag, In::PRIMARY)?.value {
@@ -30,8 +30,8 @@ pub(super) fn lens(block: Vec<u8>) -> Option<start::Exif> {
         }
         _ => None,
     };
-    // Millimetres in the unit of the resolution: 2 inches, which is also what a missing one means; 3 centimetres; and
-    // what some programs write, 4 millimetres and 5 micrometres.
+    // The length in millimetres of the unit of the resolution: 2 is an inch, which is also the default without the tag;
+    // 3 is a centimetre. Some programs also write 4 (millimetre) and 5 (micrometre).
     let unit_mm = match number(Tag::FocalPlaneResolutionUnit).unwrap_or(2.0) as u32 {
         3 => 10.0,
         4 => 1.0,

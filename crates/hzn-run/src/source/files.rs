@@ -1,4 +1,4 @@
-//! Pictures that are files of their own: a folder, a glob, or a list.
+//! Pictures in separate files: a folder, a glob, or a list.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,31 +10,31 @@ use super::{Item, Payload, Raw, SIZES, Source, TimeSource, bits, ending, natural
 use crate::error::{Error, Remedy, unusable};
 use crate::explain;
 
-/// Endings of pictures that are read.
+/// Endings of the picture files that can be read.
 const PICTURES: &[&str] = &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp"];
-/// Endings of files that lie beside pictures and are none.
+/// Endings of files that often lie next to pictures but are not pictures.
 const COMPANIONS: &[&str] = &["csv", "toml", "txt", "md", "json", "jsonl", "yaml", "yml", "xml", "log", "mcap", "part"];
 
-/// Pictures of which it is looked up how they are to be shown.
+/// Number of pictures whose orientation is read.
 const TURNED: usize = 4;
 
 pub(super) struct Files {
     paths: Vec<PathBuf>,
-    /// Files that were handed out.
+    /// Number of files that were handed out.
     given: usize,
     folder: PathBuf,
     raw: Option<Raw>,
     time: TimeSource,
-    /// Names are given with their folder, because the files lie in several.
+    /// Names include the folder, because the files lie in several folders.
     with_folder: bool,
     left_out: LeftOut,
-    /// Two that the shell put the other way round than they count.
+    /// Two pictures whose order in the list differs from the order of their numbers.
     out_of_order: Option<[String; 2]>,
-    /// One pattern is all that was given.
+    /// The input is a single pattern.
     is_pattern: bool,
 }
 
-/// Files and other things that were left out, counted by what they are and by their ending.
+/// Files and other things that were left out, counted by kind and ending.
 type LeftOut = BTreeMap<(Kind, String), usize>;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,7 +46,8 @@ enum Kind {
 }
 
 impl Kind {
-    /// What cannot be looked at is a picture that cannot be read, such as a link into an archive that is not mounted.
+    /// A path without metadata counts as a file: it is a picture that cannot be read, such as a link into an archive
+    /// that is not mounted.
     fn from_path(path: &Path) -> Self {
         match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => Self::Folder,
@@ -56,7 +57,7 @@ impl Kind {
     }
 }
 
-/// Leaves out what is no file.
+/// Removes everything that is not a file, and counts it in `left_out`.
 fn only_files(paths: &mut Vec<PathBuf>, left_out: &mut LeftOut) {
     paths.retain(|p| {
         let kind = Kind::from_path(p);
@@ -89,7 +90,7 @@ impl Files {
                     )));
                 }
                 if raw.is_none() && COMPANIONS.contains(&ending(input).as_str()) {
-                    // `hzn run flight/*`, written out by the shell.
+                    // The shell expands `hzn run flight/*` to a list that contains these files.
                     if inputs.len() == 1 {
                         return Err(unusable(format!("{text}: is no picture (PNG, JPEG, TIFF, PNM, BMP)")));
                     }
@@ -135,8 +136,8 @@ impl Files {
     }
 }
 
-/// The first two names that stand in the order of their bytes, as a shell lists them, where their numbers say the
-/// opposite. Only where all names stand in that order: any other was chosen by someone.
+/// Returns the first two names in byte order, as a shell lists them, whose numbers have the opposite order. Returns
+/// `None` unless all names are in byte order: the user chose any other order.
 fn out_of_order(paths: &[PathBuf]) -> Option<[String; 2]> {
     let pairs = || paths.windows(2).filter_map(|w| w.first().zip(w.last()));
     if !pairs().all(|(a, b)| a.as_os_str() <= b.as_os_str()) {
@@ -146,7 +147,7 @@ fn out_of_order(paths: &[PathBuf]) -> Option<[String; 2]> {
     Some([a, b].map(|p| p.file_name().unwrap_or_default().to_string_lossy().into_owned()))
 }
 
-/// Whether the camera wrote the time into the pictures: the first that can be read speaks for all.
+/// Returns whether the camera wrote the time into the pictures. The first readable picture decides for all.
 fn tell_their_time(paths: &[PathBuf]) -> bool {
     paths.iter().take(SIZES).find_map(|p| picture::exif_of(p)).flatten().is_some()
 }
@@ -166,7 +167,7 @@ fn in_folder(folder: &Path, raw: bool, left_out: &mut LeftOut) -> Result<Vec<Pat
         take
     });
     only_files(&mut paths, left_out);
-    // By name, so that the order does not depend on the file system.
+    // The paths are sorted by name, so that the order does not depend on the file system.
     paths.sort_by(|a, b| natural::compare(a, b));
     Ok(paths)
 }
@@ -186,7 +187,7 @@ impl Files {
         }
     }
 
-    /// The pictures of the same kind in the folder of one of them, in order.
+    /// Returns the pictures with the same ending in the folder of `one`, in order.
     fn alike_in_folder(&self, one: &Path) -> Vec<PathBuf> {
         let folder = Some(&self.folder).filter(|f| !f.as_os_str().is_empty()).map_or(Path::new("."), |f| f);
         let paths = in_folder(folder, self.raw.is_some(), &mut LeftOut::new()).unwrap_or_default();
@@ -206,7 +207,7 @@ impl Source for Files {
         Some(self.paths.len() as u64)
     }
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
-        // Evenly from the whole sequence: its beginning may be of another camera.
+        // The pictures are spread evenly over the whole sequence, because its beginning may be of another camera.
         let step = self.paths.len().div_ceil(SIZES).max(1);
         let size = |path: &PathBuf| match self.raw {
             Some(raw) => Some(raw.size()),
@@ -215,7 +216,7 @@ impl Source for Files {
         Box::new(self.paths.iter().step_by(step).filter_map(move |p| Some((self.name(p), size(p)?))))
     }
     fn path(&self, frame: u64) -> Option<PathBuf> {
-        // By itself it would have another name in frames.csv.
+        // With a pattern over several folders, the picture alone would have another name than in frames.csv.
         let one = self.paths.get(usize::try_from(frame).ok()?)?;
         (!self.with_folder || !self.is_pattern).then(|| one.clone())
     }
@@ -223,7 +224,7 @@ impl Source for Files {
         self.folder.clone()
     }
     fn bits(&self) -> Option<u8> {
-        // mono16 has room for any number.
+        // Words of mono16 can have any number of significant bits.
         self.raw.filter(|raw| raw.format != raw::Format::Words(16)).map(|raw| raw.bits())
     }
     fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
@@ -231,7 +232,7 @@ impl Source for Files {
             let path = |i: usize| self.paths.get(i).cloned();
             return Box::new(bits::places(self.paths.len()).filter_map(move |i| Some(self.payload(path(i)?))));
         };
-        // One picture of a sequence must come out as in the sequence.
+        // A single picture of a sequence must give the same result as in the sequence.
         let others = self.alike_in_folder(one);
         let size = picture::size_of(one);
         let alike = move |path: &PathBuf| path != one && (self.raw.is_some() || picture::size_of(path) == size);
@@ -247,7 +248,7 @@ impl Source for Files {
             let turn = picture::orientation_of(path).filter(|turn| *turn != Orientation::NoTransforms)?;
             Some((self.name(path), turn::in_words(turn)))
         };
-        // A camera writes it into all of them; each is read as a whole.
+        // A camera writes the orientation into all pictures. Only a few are examined, because each is read as a whole.
         let step = self.paths.len().div_ceil(TURNED).max(1);
         self.paths.iter().step_by(step).find_map(turned)
     }

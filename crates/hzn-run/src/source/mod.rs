@@ -1,6 +1,6 @@
-//! Where pictures come from: folders, globs, single files, headerless raw, video, MCAP.
+//! The sources of pictures: folders, globs, single files, headerless files, video, MCAP.
 //!
-//! A [`Source`] hands out [`Item`]s in the sequence's order without decoding them; decoding is left to the threads.
+//! A [`Source`] hands out [`Item`]s in the sequence's order without decoding them. The threads decode them.
 
 mod bits;
 mod exif;
@@ -28,35 +28,36 @@ pub use rerun::lost as lost_of_recording;
 
 use crate::error::{Error, Remedy, unusable};
 
-/// One frame before it is decoded.
+/// One picture before it is decoded.
 #[derive(Debug)]
 pub struct Item {
-    /// Its name in results and in frames.csv.
+    /// The name of the picture in results and in frames.csv.
     pub name: String,
-    /// Where its time comes from, unless [`Self::time_source`] knows better.
+    /// The origin of its time, unless [`Self::time_source`] returns another one.
     pub time: TimeSource,
-    /// What the source itself knows about it, as a row of frames.csv: a recording of ours, what it was recorded with.
+    /// The prior from the source itself, as a row of frames.csv. A recording of ours has one: the prior of its first
+    /// run.
     pub data: Option<FrameData>,
     /// The picture.
     pub payload: Payload,
 }
 
-/// Where the time of a picture comes from. All pictures of a sequence go by one clock: times from two would be counted
-/// from different instants.
+/// The origin of a picture's time. All pictures of a sequence use one clock, because times of two clocks can have
+/// different zero points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeSource {
-    /// frames.csv, or what a recording of ours says.
+    /// frames.csv, or a recording of ours.
     Table,
-    /// The container (video, MCAP): seconds, where it has some for this picture.
+    /// The container (video, MCAP): time in seconds, if it has one for this picture.
     Container(Option<f64>),
-    /// What the camera wrote into the picture.
+    /// The EXIF time that the camera wrote into the picture.
     Exif,
-    /// The picture's number, at so many frames a second.
+    /// The picture's number, divided by the number of frames a second.
     Count,
 }
 
 impl TimeSource {
-    /// Seconds, where they are known. `exif` is what the camera wrote into the picture.
+    /// Returns the time in seconds, if it is known. `exif` returns the time that the camera wrote into the picture.
     pub fn time_s(
         self,
         data: Option<&FrameData>,
@@ -73,83 +74,86 @@ impl TimeSource {
     }
 }
 
-/// Pictures whose headers [`Source::sizes`] reads at most.
+/// Largest number of pictures whose headers [`Source::sizes`] reads.
 const SIZES: usize = 32;
 
-/// A picture on its way to a thread.
+/// A picture on its way from the source to a thread.
 #[derive(Debug)]
 pub enum Payload {
     /// A picture file.
     File(PathBuf),
     /// A headerless file.
     RawFile(PathBuf, Raw),
-    /// A file's contents, from a container.
+    /// The contents of a picture file, from a container.
     Encoded(Vec<u8>),
-    /// Decoded already.
+    /// A picture that is decoded already.
     Decoded(Picture),
-    /// Lost on the way: the reason.
+    /// A picture that was lost, with the reason.
     Broken(String),
 }
 
-/// Frames in order.
+/// A sequence of pictures in order.
 pub trait Source: Send {
-    /// The next frame; `None` at the end. An error ends the sequence.
+    /// Returns the next picture; `None` at the end. An error ends the sequence.
     fn next(&mut self) -> Option<anyhow::Result<Item>>;
-    /// Number of frames, when it is known before.
+    /// Returns the number of pictures, if it is known before.
     fn total(&self) -> Option<u64>;
-    /// Names and sizes (width, height in pixels) of some of the pictures, from their headers alone; those that cannot
-    /// be read are left out.
+    /// Returns names and sizes (width, height in pixels) of some of the pictures, from their headers alone. Pictures
+    /// with unreadable headers are left out.
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_>;
-    /// The file of a frame that can be had by itself, with what lies beside it.
+    /// Returns the file of a picture, if this file can be processed alone with the sensor.toml and frames.csv next to
+    /// it.
     fn path(&self, _frame: u64) -> Option<PathBuf> {
         None
     }
-    /// Folder in which frames.csv and sensor.toml may lie.
+    /// Returns the folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
-    /// Text of the sensor.toml that the pictures were recorded with; a source that has one also knows what frames.csv
-    /// said ([`Item::data`]).
+    /// Returns the text of the sensor.toml that the pictures were recorded with. A source that has one also knows the
+    /// content of frames.csv ([`Item::data`]).
     fn sensor_toml(&self) -> Option<&str> {
         None
     }
-    /// Significant bits of a sample, when they are known before.
+    /// Returns the significant bits of a sample, if they are known before.
     fn bits(&self) -> Option<u8> {
         None
     }
-    /// Pictures from the whole sequence, a few, for what only their samples tell ([`find_bits`]). By their places
-    /// alone, so that the same sequence gives the same ones.
+    /// Returns a few pictures from the whole sequence, for properties that only the samples show ([`find_bits`]). The
+    /// choice depends only on their places, so the same sequence gives the same pictures.
     fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
         Box::new(std::iter::empty())
     }
-    /// The first picture that is to be shown turned, and how, as the camera wrote into it.
+    /// Returns the name of the first picture that is to be shown turned, and the turn in words, as its camera recorded
+    /// it.
     fn to_be_turned(&self) -> Option<(String, &'static str)> {
         None
     }
-    /// Colours are asked for, which a source may have to be told before it reads.
+    /// Announces that a colour channel is wanted. Some sources must know this before they read.
     ///
     /// # Errors
-    /// The source has none.
+    /// The source has no colours.
     fn want_channel(&mut self, _channel: Channel) -> Result<(), Error> {
         Ok(())
     }
-    /// Things that the user should know, such as files left out.
+    /// Returns notes for the user, for example about files that were left out.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
-    /// After the last frame: what could not be handed out.
+    /// Returns what could not be handed out, after the last picture.
     fn lost(&self) -> Option<String> {
         None
     }
 }
 
 impl Item {
-    /// What is known about it: a frames.csv takes the place of what the source knows.
+    /// Returns the prior of the picture. A frames.csv replaces the prior from the source.
     pub fn known(&mut self, frames: Option<&Frames>) -> Option<FrameData> {
         match frames {
             Some(frames) => frames.get(&self.name).cloned(),
             None => self.data.take(),
         }
     }
-    /// The clock it goes by: a frames.csv with times, or what the source knows, takes the place of every other.
+    /// Returns the origin of the picture's time. A frames.csv with times, or the source's own data, replaces every
+    /// other.
     pub fn time_source(&self, frames: Option<&Frames>) -> TimeSource {
         let timed = frames.map_or(self.data.is_some(), Frames::has_times);
         if timed { TimeSource::Table } else { self.time }
@@ -157,15 +161,15 @@ impl Item {
 }
 
 impl Payload {
-    /// The picture, decoded, and the file's own bytes where they are PNG or JPEG and can be kept as they are. A sensor
-    /// says which size it must have, how many bits, and how it is turned.
+    /// Decodes the picture. With a sensor, the picture must have the sensor's size, and gets the sensor's number of
+    /// bits and turn. Also returns the file's own bytes, if they are PNG or JPEG and can be kept unchanged.
     ///
     /// # Errors
-    /// Why it cannot be read, for the record of the frame.
+    /// The reason why the picture cannot be read, for its result.
     pub fn decode(self, sensor: Option<&Config>) -> Result<(Picture, Option<Vec<u8>>), String> {
         let Some(sensor) = sensor else { return self.decode_as_it_is(None) };
         let own = (u32::from(sensor.camera.width), u32::from(sensor.camera.height));
-        // Each picture says itself how it is turned, so that its size is known only then.
+        // With EXIF, each picture has its own turn, so the stored size is known only after decoding.
         let stored = match sensor.input.orient {
             Orient::Exif => None,
             Orient::Rotate90 | Orient::Rotate270 => Some((own.1, own.0)),
@@ -178,7 +182,7 @@ impl Payload {
         Ok((picture, original.filter(|_| !turned)))
     }
 
-    /// The largest sample of a picture of 16-bit words; `None` of any other, and of one that cannot be read.
+    /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.
     fn largest_word(self) -> Option<u16> {
         match &self {
             Self::File(path) if !picture::has_words(std::fs::File::open(path).ok()?) => return None,
@@ -210,10 +214,10 @@ impl Payload {
     }
 }
 
-/// Opens whatever the arguments name. `topic` chooses among the topics of an MCAP.
+/// Opens the inputs, whatever kind they are. `topic` selects one of the topics of an MCAP.
 ///
 /// # Errors
-/// Nothing there, nothing that is known, or a mixture that has no order.
+/// An input does not exist, is of an unknown kind, or the mixture of inputs has no order.
 pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result<Box<dyn Source>, Error> {
     if let [one] = inputs
         && raw.is_none()
@@ -231,7 +235,8 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
     Ok(Box::new(files::Files::open(inputs, raw)?))
 }
 
-/// One of our own is processed again as it was recorded; of any other, and of a further topic, there are the pictures.
+/// Opens a recording. A recording of ours is processed again as it was recorded. Of any other recording, and of another
+/// topic, only the pictures are used.
 fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, Error> {
     if topic.is_none_or(|topic| topic == hzn_mcap::IMAGE_TOPIC)
         && let Some(ours) = rerun::Rerun::open(path)?
@@ -241,23 +246,26 @@ fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, E
     Ok(Box::new(recording::Recording::open(path, topic)?))
 }
 
-/// When the camera exposed a picture file, by its EXIF, seconds since 1970.
+/// Returns the EXIF time of exposure of a picture file, in seconds since 1970.
 pub fn exif_time_s(path: &Path) -> Option<f64> {
     picture::exif_of(path).flatten()
 }
 
-/// What the camera wrote of its lens into a picture file's EXIF.
+/// Returns the lens data from a picture file's EXIF.
 pub fn exif_lens(path: &Path) -> Option<hzn_calib::start::Exif> {
     picture::lens_of(path)
 }
 
-/// The picture of a recorded message.
+/// Returns the picture of a recorded message.
 pub fn recorded(image: hzn_mcap::EncodedImage) -> Payload {
     recording::payload(image)
 }
 
-/// A file that a command reads: it must be there. Gives the ending of its kind, and whether it is what an unfinished
-/// run left: such a file has the ending of its kind before `.part`.
+/// Checks that an input file exists. Returns the ending of its kind, and whether an unfinished run left it. An
+/// unfinished file has the ending of its kind before `.part`.
+///
+/// # Errors
+/// The file does not exist, or is a folder.
 pub fn existing(file: &Path) -> Result<(String, bool), Error> {
     if !file.is_file() {
         let what = if file.is_dir() { "is a folder; a file is expected here" } else { "no such file" };
@@ -267,7 +275,7 @@ pub fn existing(file: &Path) -> Result<(String, bool), Error> {
     Ok((if unfinished { ending(&file.with_extension("")) } else { ending(file) }, unfinished))
 }
 
-/// The file's ending in small letters.
+/// Returns the file's ending in lower case, without the dot.
 pub fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }

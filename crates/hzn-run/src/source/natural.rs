@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 use std::path::Path;
 
-/// Compares two paths part by part. Numbers in names count by their value; everything else, and numbers that differ
-/// only in their leading zeros, by their bytes.
+/// Compares two paths part by part. Numbers in names are compared by value. Everything else is compared by bytes, and
+/// so are numbers that differ only in their leading zeros.
 pub(super) fn compare(a: &Path, b: &Path) -> Ordering {
     let parts = |p: &Path| p.components().map(|c| c.as_os_str().as_encoded_bytes().to_vec()).collect::<Vec<_>>();
     let (a, b) = (parts(a), parts(b));
@@ -34,7 +34,7 @@ fn compare_names(a: &[u8], b: &[u8]) -> Ordering {
     left.len().cmp(&right.len()).then(a.cmp(b))
 }
 
-/// The digits at the beginning without leading zeros, of which `rest` is then freed.
+/// Returns the digits at the beginning without leading zeros, and removes all these digits from `rest`.
 fn take_number<'a>(rest: &mut &'a [u8]) -> &'a [u8] {
     let end = rest.iter().position(|c| !c.is_ascii_digit()).unwrap_or(rest.len());
     let (digits, after) = rest.split_at(end);
@@ -59,12 +59,12 @@ mod tests {
             sorted(vec!["t-12.5.png", "t-2.50.png", "t-2.5.png", "t-2.png"]),
             "t-2.5.png t-2.50.png t-2.png t-12.5.png"
         );
-        // Longer than any integer of a machine.
+        // These numbers do not fit into any integer type.
         assert_eq!(
             sorted(vec!["100000000000000000000001", "99999999999999999999999"]),
             "99999999999999999999999 100000000000000000000001"
         );
-        // A total order: equal only to itself.
+        // The order is total: a name is equal only to itself.
         let names = ["", "0", "00", "a", "a0", "a00b", "a0b", "1a", "01a"];
         for (i, a) in names.iter().enumerate() {
             for (j, b) in names.iter().enumerate() {

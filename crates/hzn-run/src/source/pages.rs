@@ -1,12 +1,11 @@
-//! How many pictures one picture file holds: pages of a TIFF, frames of an animated PNG, pictures of a PNM one after
-//! another.
+//! Counts the pictures in one picture file: pages of a TIFF, frames of an animated PNG, consecutive pictures of a PNM.
 
 use image::ImageFormat;
 
-/// A file cannot lead its reader on for longer.
+/// Largest number of pictures that is counted, so that a malicious file cannot cause an endless loop.
 const MOST: u32 = 100_000;
 
-/// Number of pictures, 1 where the format has only one or the file is broken.
+/// Returns the number of pictures; 1 if the format has only one or the file is broken.
 pub(super) fn count(bytes: &[u8], format: ImageFormat) -> u32 {
     let pages = match format {
         ImageFormat::Tiff => tiff(bytes),
@@ -17,7 +16,7 @@ pub(super) fn count(bytes: &[u8], format: ImageFormat) -> u32 {
     pages.unwrap_or(1).max(1)
 }
 
-/// Pages of a TIFF, without the smaller copies and masks of one.
+/// Counts the pages of a TIFF, without smaller copies and masks.
 fn tiff(bytes: &[u8]) -> Option<u32> {
     let big_endian = bytes.starts_with(b"MM");
     let number = |at: u64, len: usize| -> Option<u64> {
@@ -26,7 +25,7 @@ fn tiff(bytes: &[u8]) -> Option<u32> {
         let shifted = |n: u64, byte: &u8| n << 8 | u64::from(*byte);
         Some(if big_endian { digits.iter().fold(0, shifted) } else { digits.iter().rev().fold(0, shifted) })
     };
-    // TIFF, or BigTIFF with longer numbers.
+    // The file is a TIFF, or a BigTIFF with longer numbers.
     let (first, count_len, entry_len, offset_len) = match number(2, 2)? {
         42 => (number(4, 4)?, 2, 12, 4),
         43 => (number(8, 8)?, 8, 20, 8),
@@ -42,9 +41,9 @@ fn tiff(bytes: &[u8]) -> Option<u32> {
         let entry = |i: u64| start + i * entry_len;
         let value_at = |i: u64| entry(i) + if entry_len == 12 { 8 } else { 12 };
         let is_part = (0..entries).any(|i| match number(entry(i), 2) {
-            // NewSubfileType: bit 0 a smaller copy, bit 2 a mask.
+            // In NewSubfileType, bit 0 marks a smaller copy and bit 2 a mask.
             Some(254) => number(value_at(i), 4).is_some_and(|kind| kind & 0b101 != 0),
-            // SubfileType: 2 a smaller copy.
+            // In SubfileType, 2 marks a smaller copy.
             Some(255) => number(value_at(i), 2) == Some(2),
             _ => false,
         });
@@ -55,7 +54,7 @@ fn tiff(bytes: &[u8]) -> Option<u32> {
     Some(pages)
 }
 
-/// Frames of an animated PNG.
+/// Counts the frames of an animated PNG.
 fn animation(bytes: &[u8]) -> Option<u32> {
     let mut rest = bytes.get(8..)?;
     loop {
@@ -65,13 +64,13 @@ fn animation(bytes: &[u8]) -> Option<u32> {
         match kind {
             b"acTL" => return Some(u32::from_be_bytes(*after.first_chunk::<4>()?).min(MOST)),
             b"IDAT" => return None,
-            // Its data and their checksum.
+            // The chunk's data and checksum are skipped.
             _ => rest = after.get(length.checked_add(4)?..)?,
         }
     }
 }
 
-/// Pictures of a binary PGM or PPM, which may follow one another in a file.
+/// Counts the pictures of a binary PGM or PPM, which may follow one another in a file.
 fn portable(bytes: &[u8]) -> Option<u32> {
     let (mut rest, mut pictures) = (bytes, 0);
     while pictures < MOST {
@@ -82,7 +81,7 @@ fn portable(bytes: &[u8]) -> Option<u32> {
         };
         let mut at = 2;
         let mut next = || {
-            // White space and comments come before a number, one white space after the last.
+            // White space and comments precede a number. A single white space follows the last number.
             while let Some(c) = rest.get(at) {
                 match c {
                     b'#' => at += rest.get(at..)?.iter().position(|c| *c == b'\n')?,
@@ -110,7 +109,7 @@ mod tests {
 
     #[test]
     fn pages_are_counted() {
-        // Two pages and, between them, a smaller copy of the first; each directory has one entry.
+        // The file has two pages and, between them, a smaller copy of the first; each directory has one entry.
         let page = |tag: u16, value: u32, next: u32| {
             let entry =
                 [&tag.to_le_bytes()[..], &4u16.to_le_bytes(), &1u32.to_le_bytes(), &value.to_le_bytes()].concat();
@@ -118,7 +117,7 @@ mod tests {
         };
         let tiff = [b"II*\0\x08\0\0\0".to_vec(), page(256, 9, 26), page(254, 1, 44), page(254, 2, 0)].concat();
         assert_eq!(count(&tiff, ImageFormat::Tiff), 2);
-        // A circle ends.
+        // The directories form a circle; the count ends nevertheless.
         let circle = [b"II*\0\x08\0\0\0".to_vec(), page(256, 9, 8)].concat();
         assert_eq!(count(&circle, ImageFormat::Tiff), MOST);
         assert_eq!(count(&tiff[..20], ImageFormat::Tiff), 1);

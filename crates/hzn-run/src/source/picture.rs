@@ -1,4 +1,4 @@
-//! A decoded picture, and the reading of picture files with limits.
+//! Decoded pictures, and the reading of picture files with limits.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -15,7 +15,7 @@ pub const MAX_SIDE_PX: u32 = 20_000;
 /// Largest decoded picture, in bytes.
 pub const MAX_BYTES: u64 = 512 << 20;
 
-/// So many upper bits are not left unused by chance.
+/// If at least this many upper bits are unused, this is not by chance.
 const UNUSED_BITS: u32 = 2;
 
 /// Samples of a picture, packed.
@@ -34,24 +34,24 @@ pub struct Picture {
     pub samples: Samples,
     /// Their arrangement.
     pub layout: Layout,
-    /// Time of exposure from EXIF, seconds since 1970 (EXIF has no time zone: taken as UTC).
+    /// Time of exposure from EXIF, in seconds since 1970. EXIF has no time zone: UTC is assumed.
     pub exif_time_s: Option<f64>,
-    /// How the camera says that it is to be turned to be shown.
+    /// The turn that is needed to show the picture upright, as the camera recorded it.
     pub orientation: Orientation,
-    /// Pictures in its file, of which it is the first.
+    /// Number of pictures in the file; this is the first of them.
     pub pages: u32,
 }
 
 impl Picture {
-    /// A picture that is no file.
+    /// Makes a picture that does not come from a file.
     pub fn new(samples: Samples, layout: Layout) -> Self {
         Self { samples, layout, exif_time_s: None, orientation: Orientation::NoTransforms, pages: 1 }
     }
 
-    /// With as many bits as a sensor says, and turned as it says.
+    /// Returns the picture with the number of bits and the turn that the sensor's `[input]` sets.
     ///
     /// # Errors
-    /// A sample that has more.
+    /// A sample has more bits.
     pub fn told(mut self, input: &Input) -> Result<Self, String> {
         if let (Some(most), Some(bits)) = (self.largest_word(), input.bits) {
             if u32::from(most) >> bits > 0 {
@@ -67,17 +67,17 @@ impl Picture {
         Ok(turn::turned(self, turn))
     }
 
-    /// Whether [`Self::told`] turns it.
+    /// Returns whether [`Self::told`] turns the picture.
     pub fn is_turned(&self, input: &Input) -> bool {
         turn::needed(input.orient, self.orientation) != Orientation::NoTransforms
     }
 
-    /// How the camera says that it is to be shown, in words, where that is not as it is stored.
+    /// Returns in words how the picture is to be turned for display, if the camera recorded a turn.
     pub fn to_be_turned(&self) -> Option<&'static str> {
         (self.orientation != Orientation::NoTransforms).then(|| turn::in_words(self.orientation))
     }
 
-    /// The largest sample of a picture of words, transparency aside.
+    /// Returns the largest sample of a picture of words, without the transparency channel.
     pub fn largest_word(&self) -> Option<u16> {
         let Samples::Words(words) = &self.samples else { return None };
         let channels = usize::from(self.layout.channels.max(1));
@@ -85,16 +85,17 @@ impl Picture {
         words.chunks_exact(channels).flat_map(|pixel| pixel.iter().take(bright)).copied().max()
     }
 
-    /// What to try when nothing is found and the upper bits of all words are unused, of which nobody has told.
+    /// Returns advice for a picture without an answer whose upper bits are all unused, if the number of bits is not
+    /// known.
     pub fn unused_bits(&self) -> Option<String> {
         let most = self.largest_word()?;
         if self.layout.bits == 16 { unused_bits(most) } else { None }
     }
 
-    /// The picture for the pipeline.
+    /// Returns a view of the picture for the pipeline.
     ///
     /// # Errors
-    /// A channel that the picture does not have.
+    /// The picture does not have this channel.
     pub fn view(&self, channel: Channel) -> Result<ImageView<'_>, ImageError> {
         match &self.samples {
             Samples::Bytes(data) => ImageView::from_bytes(data, self.layout, channel),
@@ -102,7 +103,7 @@ impl Picture {
         }
     }
 
-    /// The picture as 8-bit RGB, for drawing on. Pictures of more than 8 bits are scaled down.
+    /// Returns the picture as 8-bit RGB, to draw on. Pictures of more than 8 bits are scaled down.
     pub fn to_rgb(&self) -> image::RgbImage {
         let (w, h, n) = (self.layout.width, self.layout.height, usize::from(self.layout.channels));
         let shift = self.layout.bits.saturating_sub(8);
@@ -116,10 +117,10 @@ impl Picture {
         })
     }
 
-    /// The picture as PNG bytes, grey or colour, 8 or 16 bits. Words of 9 to 15 bits keep their counts.
+    /// Returns the picture as PNG bytes, grey or colour, 8 or 16 bits. Words of 9 to 15 bits keep their counts.
     ///
     /// # Errors
-    /// What the encoder says.
+    /// The message of the encoder.
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
         use image::ExtendedColorType as C;
         use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -149,7 +150,7 @@ impl Picture {
     }
 }
 
-/// What to try where samples of 16 bits reach no more than `most`, and nobody has told how many bits they have.
+/// Returns advice if samples of 16 bits reach no more than `most`, and the number of bits is not known.
 pub fn unused_bits(most: u16) -> Option<String> {
     let bits = (16 - most.leading_zeros()).max(8);
     (bits + UNUSED_BITS <= 16).then(|| {
@@ -160,34 +161,34 @@ pub fn unused_bits(most: u16) -> Option<String> {
     })
 }
 
-/// The kind of picture that these bytes are, by their first few.
+/// Returns the format of picture data, from their first bytes.
 pub fn format_of(bytes: &[u8]) -> Option<ImageFormat> {
     image::guess_format(bytes).ok()
 }
 
-/// Width and height in pixels that a picture file's header gives.
+/// Returns width and height in pixels from the header of a picture file.
 pub(super) fn size_of(path: &Path) -> Option<(u32, u32)> {
     size_in(std::io::BufReader::new(std::fs::File::open(path).ok()?))
 }
 
-/// When the camera exposed, if it wrote that into the file; `None` for a file whose header cannot be read.
+/// Returns the time of exposure, if the camera wrote it into the file. `None` if the header cannot be read.
 pub(super) fn exif_of(path: &Path) -> Option<Option<f64>> {
     let mut decoder = ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?;
     Some(decoder.exif_metadata().ok().flatten().and_then(super::exif::time_s))
 }
 
-/// What the camera wrote of its lens into the file; `None` for a file whose header cannot be read, or without EXIF.
+/// Returns the lens data from the file's EXIF. `None` if the header cannot be read or there is no EXIF.
 pub(super) fn lens_of(path: &Path) -> Option<hzn_calib::start::Exif> {
     let mut decoder = ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?;
     decoder.exif_metadata().ok().flatten().and_then(super::exif::lens)
 }
 
-/// How the camera says that a picture is to be turned to be shown.
+/// Returns the turn that is needed to show a picture upright, as the camera recorded it.
 pub(super) fn orientation_of(path: &Path) -> Option<Orientation> {
     ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?.orientation().ok()
 }
 
-/// Whether its samples are words, by its header.
+/// Returns whether the samples are words, from the header.
 pub(super) fn has_words(contents: impl std::io::Read + std::io::Seek) -> bool {
     let reader = ImageReader::new(std::io::BufReader::new(contents)).with_guessed_format();
     reader.ok().and_then(|reader| reader.into_decoder().ok()).is_some_and(|decoder| {
@@ -196,8 +197,8 @@ pub(super) fn has_words(contents: impl std::io::Read + std::io::Seek) -> bool {
     })
 }
 
-/// Whether its header says which sample is white, so that it is scaled to all 16 bits when it is decoded: a PNM of
-/// less.
+/// Returns whether the header gives a white value below 65535, as a PNM can. The decoder then scales the samples to all
+/// 16 bits.
 pub(super) fn tells_its_scale(path: &Path) -> bool {
     use image::codecs::pnm::PnmDecoder;
     let Ok(file) = std::fs::File::open(path) else { return false };
@@ -205,7 +206,7 @@ pub(super) fn tells_its_scale(path: &Path) -> bool {
     decoder.is_ok_and(|d| d.into_inner().1.maximal_sample() < u32::from(u16::MAX))
 }
 
-/// As [`size_of`], from the file's contents.
+/// Returns width and height as [`size_of`] does, from the file's contents.
 pub(super) fn size_in(contents: impl std::io::BufRead + std::io::Seek) -> Option<(u32, u32)> {
     ImageReader::new(contents).with_guessed_format().ok()?.into_dimensions().ok()
 }
@@ -213,7 +214,7 @@ pub(super) fn size_in(contents: impl std::io::BufRead + std::io::Seek) -> Option
 /// Reads a whole file, unless it is far too large for a picture.
 ///
 /// # Errors
-/// Why it cannot be read, for the record of the frame.
+/// The reason why it cannot be read, for the picture's result.
 pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
     let told = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => match std::fs::read_link(path) {
@@ -237,11 +238,12 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
     if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
 }
 
-/// Decodes PNG, JPEG, TIFF, PNM or BMP. Palettes become colour, CMYK becomes RGB, of several pictures in one file the
-/// first is taken. `expected` is the camera's size: another one is refused before anything large is decoded.
+/// Decodes PNG, JPEG, TIFF, PNM or BMP. Palettes become colour, and CMYK becomes RGB. If a file contains several
+/// pictures, the first is decoded. `expected` is the camera's size in pixels: a picture of another size is refused
+/// before anything large is decoded.
 ///
 /// # Errors
-/// Why it cannot be decoded, for the record of the frame.
+/// The reason why it cannot be decoded, for the picture's result.
 pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
     let mut limits = image::Limits::no_limits();
@@ -281,7 +283,7 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
     Ok(Picture { exif_time_s, orientation, pages: pages::count(bytes, format), ..Picture::new(samples, layout) })
 }
 
-/// Refuses sizes that are not the camera's, zero, or beyond all limits.
+/// Refuses sizes that are zero, above the limit, or not the camera's size.
 pub(crate) fn check_size(width: u32, height: u32, expected: Option<(u32, u32)>) -> Result<(), String> {
     if width == 0 || height == 0 {
         return Err(format!("picture of {width}x{height} has no pixels"));
@@ -298,8 +300,8 @@ pub(crate) fn check_size(width: u32, height: u32, expected: Option<(u32, u32)>) 
     }
 }
 
-/// JPEG decoders fill what is missing with grey, which would pass for a picture. A scan that began (FF DA) must be
-/// followed by an end (FF D9); neither stands within entropy-coded data.
+/// Returns whether a JPEG is truncated. JPEG decoders fill missing parts with grey, which would pass as a picture. A
+/// scan that began (FF DA) must be followed by an end (FF D9). Neither marker occurs within entropy-coded data.
 fn jpeg_is_cut(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|w| *w == [0xff, marker]);
     match (last(0xda), last(0xd9)) {

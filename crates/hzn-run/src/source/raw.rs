@@ -7,7 +7,7 @@ use hzn_core::image::Layout;
 
 use super::picture::{Picture, Samples};
 
-/// How samples lie in the file.
+/// Arrangement of the samples in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// One byte a pixel.
@@ -18,8 +18,8 @@ pub enum Format {
     Mono10p,
     /// 2 pixels in 3 bytes, least significant bits first (PFNC Mono12p).
     Mono12p,
-    /// Bayer mosaic, one byte a photosite, any order of colours: each 2×2 cell becomes one pixel, its mean. The
-    /// picture, and with it the calibration, has half the mosaic's width and height.
+    /// Bayer mosaic, one byte a photosite, any order of colours. Each 2×2 cell becomes one pixel with its mean. The
+    /// picture has half the mosaic's width and height, and so must the calibration.
     Bayer8,
 }
 
@@ -57,7 +57,7 @@ impl FromStr for Raw {
         };
         let names = || FORMATS.iter().map(|(n, _)| *n);
         let Some((_, format)) = FORMATS.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)) else {
-            // A number of bits without a format of its own has room in the next larger one.
+            // A number of bits without a format has room in the next larger format.
             let bits = name.strip_prefix("mono").and_then(|n| n.parse::<u8>().ok()).filter(|n| (9..16).contains(n));
             let hint = match bits {
                 Some(bits) => format!("; did you mean mono16, with bits = {bits} in [input] of sensor.toml?"),
@@ -80,7 +80,7 @@ impl fmt::Display for Raw {
 }
 
 impl Raw {
-    /// Bytes of one picture.
+    /// Returns the number of bytes of one picture.
     pub fn bytes(&self) -> usize {
         let pixels = self.width as usize * self.height as usize;
         match self.format {
@@ -91,7 +91,7 @@ impl Raw {
         }
     }
 
-    /// Significant bits of a sample.
+    /// Returns the significant bits of a sample.
     pub fn bits(&self) -> u8 {
         match self.format {
             Format::Mono8 | Format::Bayer8 => 8,
@@ -101,7 +101,7 @@ impl Raw {
         }
     }
 
-    /// Width and height of the decoded picture in pixels.
+    /// Returns width and height of the decoded picture in pixels.
     pub fn size(&self) -> (u32, u32) {
         let cell = if self.format == Format::Bayer8 { 2 } else { 1 };
         (self.width / cell, self.height / cell)
@@ -121,10 +121,10 @@ impl Raw {
         format!("{length} bytes, but a picture of {self} has {one}: {left}{hint}")
     }
 
-    /// The picture in these bytes, of which there must be exactly as many as it has.
+    /// Decodes a picture from exactly as many bytes as it has.
     ///
     /// # Errors
-    /// Another number of bytes.
+    /// The number of bytes is different.
     pub fn decode(&self, data: &[u8]) -> Result<Picture, String> {
         if data.len() != self.bytes() {
             return Err(self.wrong_length(data.len()));
@@ -133,7 +133,7 @@ impl Raw {
         let samples = match self.format {
             Format::Mono8 => Samples::Bytes(data.to_vec()),
             Format::Words(bits) => {
-                // Bits above the significant ones are noise of the transport.
+                // The bits above the significant ones are noise of the transport.
                 let mask = u16::MAX >> (16 - bits);
                 Samples::Words(data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]) & mask).collect())
             }
@@ -160,7 +160,7 @@ impl Raw {
     }
 }
 
-/// Samples of `bits` bits, packed without gaps, least significant bit first.
+/// Unpacks samples of `bits` bits that lie without gaps, least significant bit first.
 fn unpack(data: &[u8], bits: u32, count: usize) -> Vec<u16> {
     let mut out = Vec::with_capacity(count);
     let (mut held, mut have) = (0u32, 0u32);
@@ -192,9 +192,9 @@ mod tests {
         assert_eq!(words("2x1:mono8", &[1, 2]), [1, 2]);
         assert_eq!(words("2x1:mono12", &[0x34, 0xf2, 0xff, 0x0f]), [0x234, 0xfff]);
         assert_eq!(words("2x1:mono16", &[0x34, 0x12, 0xff, 0xff]), [0x1234, 0xffff]);
-        // 0x321 and 0xcba in three bytes: 21 a3 cb.
+        // 0x321 and 0xcba in three bytes are 21 a3 cb.
         assert_eq!(words("2x1:mono12p", &[0x21, 0xa3, 0xcb]), [0x321, 0xcba]);
-        // 1, 2, 3, 1023: 01 08 30 c0 ff.
+        // 1, 2, 3, 1023 in five bytes are 01 08 30 c0 ff.
         assert_eq!(words("4x1:mono10p", &[0x01, 0x08, 0x30, 0xc0, 0xff]), [1, 2, 3, 1023]);
         assert_eq!(words("4x2:bayer8", &[10, 20, 1, 1, 30, 40, 1, 2]), [25, 1]);
     }

@@ -9,16 +9,16 @@ use super::picture::{self, Picture, Samples};
 use super::{Item, Payload, SIZES, Source, TimeSource};
 use crate::error::{Error, unusable};
 
-/// A recording does not say how many pictures it has: of its beginning every so many are looked at for
-/// [`Source::samples`].
+/// Step between the pictures of [`Source::samples`]. A recording does not say how many pictures it has, so the samples
+/// come from its beginning.
 pub(super) const SAMPLE_EVERY: usize = 16;
 
-/// Frames of one topic. They are named after the recording: `flight.mcap#000012`.
+/// Pictures of one topic. They are named after the recording: `flight.mcap#000012`.
 pub(super) struct Recording {
     reader: ImageReader,
     path: PathBuf,
     name: String,
-    /// Read ahead, so that a recording without pictures is refused at once.
+    /// The first picture. It is read early, so that a recording without pictures is refused at once.
     first: Option<Item>,
     index: u64,
 }
@@ -70,7 +70,7 @@ impl Recording {
     }
 }
 
-/// Its width and height, where that can be told without decoding it.
+/// Returns width and height in pixels, if they are known without decoding.
 pub(super) fn size_of(image: &EncodedImage) -> Option<(u32, u32)> {
     match image.format {
         ImageFormat::Png | ImageFormat::Jpeg => picture::size_in(std::io::Cursor::new(&image.bytes)),
@@ -81,7 +81,7 @@ pub(super) fn size_of(image: &EncodedImage) -> Option<(u32, u32)> {
     }
 }
 
-/// The picture of a message.
+/// Returns the picture of a message.
 pub(crate) fn payload(image: EncodedImage) -> Payload {
     let EncodedImage { format, bytes } = image;
     let raw = |samples, width, height, channels, bits| {

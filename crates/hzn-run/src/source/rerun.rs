@@ -1,4 +1,4 @@
-//! A recording of `hzn run`, to be processed again: its pictures with all that was known about them.
+//! A recording of `hzn run` that is processed again: its pictures with everything that was known about them.
 
 use std::path::{Path, PathBuf};
 
@@ -10,16 +10,16 @@ use super::{Item, Payload, SIZES, Source, TimeSource};
 use crate::error::{Error, unusable};
 use crate::sink;
 
-/// Frames as they were recorded: names, times, what was given, and the sensor.
+/// Pictures as they were recorded: with their names, times, priors, and the sensor.
 pub(super) struct Rerun {
     reader: Reader,
     path: PathBuf,
-    /// Number of the last frame: one of several bodies has a record a body.
+    /// Number of the last picture. A picture of several bodies has one record for each body.
     last: Option<u64>,
 }
 
 impl Rerun {
-    /// `None` for a recording of another program.
+    /// Opens a recording. Returns `None` for a recording of another program.
     pub(super) fn open(path: &Path) -> Result<Option<Self>, Error> {
         let reader = open(path).map_err(unusable)?;
         if reader.sensor_toml().is_none() {
@@ -47,11 +47,12 @@ fn open(path: &Path) -> Result<Reader, hzn_mcap::Error> {
 enum Holds {
     Pictures,
     Results,
-    /// Nothing that is whole.
+    /// The file contains nothing that is complete.
     LostPictures,
 }
 
-/// Pictures come before the results, so that little is read of a recording that has them.
+/// Says what a recording contains. Pictures come before the results, so only little of a recording with pictures is
+/// read.
 fn holds(path: &Path) -> Result<Holds, hzn_mcap::Error> {
     let mut index = Index::open(path)?;
     let mut any = false;
@@ -104,7 +105,7 @@ impl Source for Rerun {
     }
 }
 
-/// What is missing of a recording that was read to its end, and what was `done` with the rest.
+/// Describes what is missing in a recording that was read to its end. `done` says what was done with the rest.
 pub fn lost(reader: &Reader, path: &Path, done: &str) -> Option<String> {
     let name = path.display();
     match reader.broken_chunks() {

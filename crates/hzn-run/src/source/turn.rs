@@ -1,4 +1,4 @@
-//! Turning a picture, as `input.orient` or its EXIF says.
+//! Turns a picture, as `input.orient` or its EXIF says.
 
 use hzn_core::config::Orient;
 use hzn_core::image::Layout;
@@ -6,7 +6,7 @@ use image::metadata::Orientation;
 
 use super::picture::{Picture, Samples};
 
-/// How a picture with this EXIF orientation is turned.
+/// Returns the turn that a picture with this EXIF orientation needs.
 pub(super) fn needed(orient: Orient, exif: Orientation) -> Orientation {
     match orient {
         Orient::Exif => exif,
@@ -17,13 +17,13 @@ pub(super) fn needed(orient: Orient, exif: Orientation) -> Orientation {
     }
 }
 
-/// Whether width and height change places.
+/// Returns whether the turn exchanges width and height.
 pub(super) fn swaps_sides(turn: Orientation) -> bool {
     use Orientation as O;
     matches!(turn, O::Rotate90 | O::Rotate270 | O::Rotate90FlipH | O::Rotate270FlipH)
 }
 
-/// In words, for a message.
+/// Returns the turn in words, for a message.
 pub(super) fn in_words(turn: Orientation) -> &'static str {
     match turn {
         Orientation::NoTransforms => "as it is",
@@ -35,7 +35,7 @@ pub(super) fn in_words(turn: Orientation) -> &'static str {
     }
 }
 
-/// The picture turned.
+/// Returns the turned picture.
 pub(super) fn turned(picture: Picture, turn: Orientation) -> Picture {
     if turn == Orientation::NoTransforms {
         return picture;
@@ -56,7 +56,7 @@ fn rearrange<S: Copy>(data: &[S], from: Layout, to: Layout, turn: Orientation) -
     let mut out = Vec::with_capacity(data.len());
     for y in 0..to.height as usize {
         for x in 0..to.width as usize {
-            // Where the pixel comes from.
+            // The position of this pixel in the stored picture.
             let (column, row) = match turn {
                 O::NoTransforms => (x, y),
                 O::Rotate90 => (y, h - 1 - x),

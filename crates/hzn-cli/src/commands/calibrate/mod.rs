@@ -1,4 +1,4 @@
-//! `hzn calibrate`: numbers of a sensor.toml from pictures.
+//! `hzn calibrate`: measures values of a sensor.toml on pictures.
 
 mod noise;
 mod page;
@@ -6,7 +6,7 @@ mod text;
 
 use crate::exit::Outcome;
 
-/// Measure what a sensor.toml says, from pictures
+/// Measure values of a sensor.toml on pictures
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(subcommand)]

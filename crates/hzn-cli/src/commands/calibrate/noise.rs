@@ -1,4 +1,4 @@
-//! `hzn calibrate noise`: limb height and edge noise from the pictures of a flight.
+//! `hzn calibrate noise`: measures limb height and edge noise on the pictures of a flight.
 
 use hzn_run::explain;
 use std::path::PathBuf;
@@ -21,12 +21,12 @@ use hzn_run::source::ending;
 
 /// Measure limb height and edge noise on the pictures of a flight
 ///
-/// The flight needs an altitude or a position for each picture (frames.csv, --altitude-km, body.altitude_km), and no
-/// truth. Each picture's limb tells how high it stands, because the altitude tells how large it should look; the
-/// residuals along it tell the edge noise. The report goes to stdout. `-o sensor.toml` writes the keys, with comments,
-/// into a copy of the sensor.toml; `-o report.html` writes plots of both. Nothing is written when the flight does not
-/// tell enough (fewer than 12 answered pictures, too small a field of view), or when its pictures contradict each
-/// other: then the exit code is 1 and the message has the measured number.
+/// The flight needs an altitude or a position for each picture (frames.csv, --altitude-km, body.altitude_km), but no
+/// truth. The altitude gives the expected size of the limb, so the measured size gives the limb height. The residuals
+/// along the limb give the edge noise. The report goes to stdout. `-o sensor.toml` writes the keys, with comments, into
+/// a copy of the sensor.toml; `-o report.html` writes plots of both. No sensor.toml is written if the flight is not
+/// sufficient (fewer than 12 answered pictures, too small a field of view), or if its pictures contradict each other.
+/// Then the exit code is 1 and the message has the measured number.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A folder, a pattern in quotes, pictures, a video, or an MCAP
@@ -42,15 +42,15 @@ pub(super) struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
-    /// Threads; without it, all cores
+    /// Number of threads; without it, all cores
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// No progress on stderr
+    /// Print no progress on stderr
     #[arg(short, long)]
     quiet: bool,
 }
 
-/// Pictures leave nothing behind but their sightings.
+/// A sink that stores nothing; only the sightings of the pictures are kept.
 struct Nowhere;
 
 impl Sink for Nowhere {
@@ -136,7 +136,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// What a picture says of the limb's height, where it was answered.
+/// Measures the limb height of one picture, if it was answered.
 fn sighting(frame: &Finished, camera: &Camera<f64>, body: &body::Config) -> Option<Sighting> {
     let report = frame.found.first()?.report.as_ref().ok()?;
     let solution = report.solution.as_ref()?;

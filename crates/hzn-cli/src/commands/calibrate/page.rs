@@ -27,7 +27,7 @@ pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str) -> an
     ))
 }
 
-/// The limb height of each picture with its errors.
+/// Plots the limb height of each picture with its errors.
 fn heights(calibration: &Calibration) -> Chart {
     let each = || calibration.pictures.iter().enumerate().map(|(i, p)| (i as f64, p));
     let dots = |counts: bool| each().filter(move |(_, p)| p.counts == counts).map(|(x, p)| (x, p.km));
@@ -42,7 +42,7 @@ fn heights(calibration: &Calibration) -> Chart {
     chart
 }
 
-/// How alike residuals are along the edge.
+/// Plots the correlation of the residuals along the edge.
 fn correlation(calibration: &Calibration) -> Chart {
     let e = calibration.edge;
     let last = calibration.correlation.last().map_or(1.0, |p| p.0);

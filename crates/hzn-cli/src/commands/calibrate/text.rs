@@ -4,12 +4,12 @@ use hzn_calib::noise::Calibration;
 
 use hzn_run::explain::counted;
 
-/// The report.
+/// Returns the report.
 pub(super) fn of(calibration: &Calibration, pictures: u64) -> String {
     lines(calibration, pictures).iter().map(|(name, value)| format!("{name:<14} {value}\n")).collect()
 }
 
-/// Its lines: name and value.
+/// Returns the lines of the report: name and value.
 pub(super) fn lines(calibration: &Calibration, pictures: u64) -> Vec<(&'static str, String)> {
     let (h, e) = (&calibration.height, &calibration.edge);
     let apart: Vec<&str> = calibration.pictures.iter().filter(|p| !p.counts).map(|p| p.name.as_str()).collect();

@@ -1,4 +1,4 @@
-//! `hzn camera convert`: a calibration in another tool's form.
+//! `hzn camera convert`: converts a calibration into the form of another tool.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -13,7 +13,7 @@ use hzn_run::source::ending;
 
 /// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, or the coefficients of Braun & Barf
 ///
-/// The kind of the input is found out by itself; numbers keep their last bit. Examples:
+/// The form of the input is detected; numbers keep their last bit. Examples:
 ///
 ///   hzn camera convert camchain.yaml --camera cam1 -o sensor.toml
 ///
@@ -25,17 +25,17 @@ pub(super) struct Args {
     /// A sensor.toml, or a camera file of Kalibr, OpenCV or EuRoC (.yaml)
     #[arg(required_unless_present = "braun_barf")]
     file: Option<PathBuf>,
-    /// Which camera of a Kalibr camchain; without it, the first
+    /// Name of the camera in a Kalibr camchain; without it, the first
     #[arg(long, value_name = "NAME", requires = "file")]
     camera: Option<String>,
     /// Instead of a file: r = k1 t + k2 t^3 + k3 t^5 + k4 t^7 + k5 t^9 in pixels (Braun & Barf 2022, eq. 13)
     #[arg(long, value_name = "K1,...,K5", allow_hyphen_values = true, conflicts_with = "file")]
     #[arg(requires_all = ["size", "centre"])]
     braun_barf: Option<Numbers<5>>,
-    /// Size of the picture in pixels, beside --braun-barf
+    /// Size of the picture in pixels, for --braun-barf
     #[arg(long, value_name = "WIDTHxHEIGHT", requires = "braun_barf")]
     size: Option<Size>,
-    /// Principal point in pixels, pixel centres at integers, beside --braun-barf
+    /// Principal point in pixels, pixel centres at integers, for --braun-barf
     #[arg(long, value_name = "U,V", allow_hyphen_values = true, requires = "braun_barf")]
     centre: Option<Numbers<2>>,
     /// Form of the result; without it, sensor
@@ -51,13 +51,13 @@ pub(super) struct Args {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum To {
-    /// [camera] of a sensor.toml
+    /// The [camera] section of a sensor.toml
     Sensor,
-    /// A camchain with one camera
+    /// A Kalibr camchain with one camera
     Kalibr,
     /// OpenCV's YAML
     Opencv,
-    /// A sensor.yaml
+    /// A sensor.yaml of EuRoC
     Euroc,
 }
 
@@ -88,7 +88,7 @@ impl FromStr for Size {
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let camera = read(args)?;
-    // A lens that hzn refuses is no good in another form either.
+    // A lens that hzn refuses is of no use in another form either.
     Camera::<f64>::try_new(&camera).map_err(|e| usage(format!("{}: {e}", source(args))))?;
     let to = args.to.unwrap_or(To::Sensor);
     let format = match to {
@@ -130,7 +130,7 @@ fn read(args: &Args) -> Result<camera::Config, Stop> {
     }
 }
 
-/// What the calibration came from, for messages.
+/// Returns the origin of the calibration, for messages.
 fn source(args: &Args) -> String {
     match &args.file {
         Some(file) => file.display().to_string(),

@@ -1,4 +1,4 @@
-//! `hzn camera`: what a calibration means, and the same in another tool's form.
+//! `hzn camera`: describes a calibration, or converts it into the form of another tool.
 
 mod convert;
 
@@ -14,7 +14,7 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
 use hzn_run::source::ending;
 
-/// Look at a camera calibration, or convert it
+/// Show a camera calibration, or convert it
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(subcommand)]
@@ -23,7 +23,7 @@ pub(super) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Print lens table, field of view, image circle, and the size in which the limb is expected
+    /// Print lens table, field of view, image circle, and the expected size of the limb
     Show {
         /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC or ROS (.yaml)
         file: PathBuf,
@@ -55,7 +55,7 @@ fn load(file: &Path) -> Result<Config, Stop> {
     }
 }
 
-/// The calibration in words and numbers.
+/// Returns the calibration in words and numbers.
 pub(super) fn describe(config: &Config) -> Result<String, Stop> {
     let c = &config.camera;
     let camera = Camera::<f64>::try_new(c).map_err(usage)?;
@@ -113,7 +113,7 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
     Ok(out)
 }
 
-/// Distance from the principal point of a ray this far off axis, along x, pixels.
+/// Returns the distance in pixels from the principal point to a ray that is `theta` radians off axis, along x.
 fn radius_px(camera: &Camera<f64>, theta: f64) -> f64 {
     let (sin, cos) = theta.min(camera.theta_max_rad() * (1.0 - 1e-12)).sin_cos();
     let centre = camera.principal_point();
@@ -121,10 +121,10 @@ fn radius_px(camera: &Camera<f64>, theta: f64) -> f64 {
     point.map_or(f64::NAN, |p| (p.u - centre.u).hypot(p.v - centre.v))
 }
 
-/// A hair within the picture's outer corner: without an image circle the lens ends at the farthest one.
+/// Slightly inside the picture's outer corner, in pixels: without an image circle the lens ends at the farthest corner.
 const SIDE_PX: f64 = -0.5 + 1e-6;
 
-/// How far off axis the picture shows anything, radians: the image circle, or the farthest corner.
+/// Returns the largest angle off axis that the picture shows, in radians: the image circle, or the farthest corner.
 fn end_rad(c: &camera::Config, camera: &Camera<f64>) -> f64 {
     let (right, bottom) = (f64::from(c.width) - 1.0 - SIDE_PX, f64::from(c.height) - 1.0 - SIDE_PX);
     let corners = [(SIDE_PX, SIDE_PX), (right, SIDE_PX), (SIDE_PX, bottom), (right, bottom)];
@@ -166,7 +166,8 @@ fn limb_size(half_angle: f64, camera: &Camera<f64>, c: &camera::Config) -> Strin
     )
 }
 
-/// Where the lens stops being monotone: dr/dθ = 0 for radial lenses (for brown-conrady without its tangential part).
+/// Returns the angle off axis in degrees where the lens stops being monotone: dr/dθ = 0 for radial lenses (for
+/// brown-conrady without its tangential part). Returns `None` if the lens is monotone everywhere.
 fn monotone_limit_deg(c: &camera::Config) -> Option<f64> {
     let k = |i: usize| c.coefficient(i);
     let slope: Box<dyn Fn(f64) -> f64> = match c.model {

@@ -1,4 +1,4 @@
-//! `hzn evaluate`: results against the truth.
+//! `hzn evaluate`: compares results with the truth.
 
 mod page;
 pub(super) mod text;
@@ -17,25 +17,25 @@ use crate::tell;
 use hzn_run::sink;
 use hzn_run::source::ending;
 
-/// Compare results with the truth: shares, errors, honesty of the covariance
+/// Compare results with the truth: shares of answers, errors, and whether the covariance is right
 ///
-/// Every picture counts: one that was not answered as missed, one that was answered without a limb in view as false.
-/// The report goes to stdout; -o writes it as JSON with every frame, or as one HTML page with plots and the worst
-/// frames. Angles are in degrees.
+/// Every picture counts. A picture with a limb in view but without an answer is missed; an answer without a limb in
+/// view is false. The report goes to stdout; -o writes it as JSON with every picture, or as one HTML page with plots
+/// and the worst pictures. Angles are in degrees.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// What `hzn run` wrote: .mcap, .csv or .jsonl
+    /// The output of `hzn run`: .mcap, .csv or .jsonl
     results: PathBuf,
     /// The truth.csv of the sequence, or its folder
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// The sensor.toml, for the length of limb in view; without it, the one in the MCAP or beside the truth
+    /// The sensor.toml, for the length of limb in view; without it, the one in the MCAP or next to the truth
     #[arg(short, long, value_name = "FILE")]
     sensor: Option<PathBuf>,
     /// Also write the report: .json or .html; may be given twice
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
-    /// How many of the worst frames are listed and drawn
+    /// Number of the worst pictures that are listed and drawn
     #[arg(long, value_name = "N", default_value_t = 6)]
     worst: usize,
     /// Replace files that exist
@@ -43,7 +43,7 @@ pub(super) struct Args {
     force: bool,
 }
 
-/// Everything that a report says.
+/// The content of a report.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     results: String,
@@ -97,14 +97,14 @@ fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result
     let beside = folder.join("sensor.toml");
     Ok(match (given, recorded) {
         (Some(path), _) => Some(hzn_calib::sensor::load(path)?.config),
-        // A recorded one may name a camera file that is not here.
+        // A recorded sensor.toml may name a camera file that is not here.
         (None, Some(text)) => hzn_calib::sensor::parse(text, Path::new("sensor.toml")).ok().map(|s| s.config),
         (None, None) if beside.exists() => Some(hzn_calib::sensor::load(&beside)?.config),
         (None, None) => None,
     })
 }
 
-/// Two sequences may have the same names: other times give them away.
+/// Warns if the times differ: two sequences may have the same file names.
 fn warn_of_other_times(rows: &[Row], truth: &[Truth]) {
     let time = |file: &str| truth.iter().find(|t| file.ends_with(t.file.as_str())).map(|t| t.time_s);
     let apart = |row: &Row| Some((row.time_s?, time(&row.file)?)).filter(|(here, there)| (here - there).abs() > 1e-3);

@@ -60,7 +60,7 @@ pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
     Ok(format!("<!doctype html><html lang=\"en\"><head>{head}</head><body>{body}</body></html>\n"))
 }
 
-/// What can be drawn of one body.
+/// Returns the charts of one body.
 fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
     let cases: Vec<(&Case, Miss)> =
         frames.iter().filter(|c| c.body == e.body && c.limb).filter_map(|c| Some((c, c.miss?))).collect();
@@ -96,7 +96,7 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
     out
 }
 
-/// The share of answers with an error up to so much.
+/// Plots the share of answers whose error is at most the value on the x axis.
 fn distribution(cases: &[(&Case, Miss)]) -> Chart {
     let mut errors: Vec<f64> = cases.iter().map(|(_, m)| m.angle_deg).collect();
     errors.sort_by(f64::total_cmp);
@@ -105,12 +105,13 @@ fn distribution(cases: &[(&Case, Miss)]) -> Chart {
     Chart::new("Share of the answers up to an error", "error [deg]", "share").with(Series::new("", Style::Line, steps))
 }
 
-/// How far out answers are in sigma, against how far out they should be: on the diagonal when sigma is right.
+/// Plots the distance of answers from the truth in sigma against the expected distance. The points lie on the diagonal
+/// if sigma is right.
 fn calibration(cases: &[(&Case, Miss)]) -> Option<Chart> {
     let mut distances: Vec<f64> = cases.iter().filter_map(|(_, m)| Some(m.nees?.sqrt())).collect();
     distances.sort_by(f64::total_cmp);
     let n = distances.len() as f64;
-    // The quantile of a distance in two dimensions: 1 − exp(−k²/2) = p.
+    // This is the quantile of a distance in two dimensions: 1 − exp(−k²/2) = p.
     let points: Vec<(f64, f64)> =
         distances.iter().enumerate().map(|(i, &d)| ((-2.0 * (1.0 - (i as f64 + 0.5) / n).ln()).sqrt(), d)).collect();
     let far = points.last()?.0;

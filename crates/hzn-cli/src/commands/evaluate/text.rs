@@ -26,7 +26,7 @@ pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
     out
 }
 
-/// The numbers of one body with their names.
+/// Returns the numbers of one body with their names.
 pub(in crate::commands) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
     let mut out = Vec::new();
     let mut line = |name, value| out.push((name, value));
@@ -85,7 +85,7 @@ pub(in crate::commands) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> 
     out
 }
 
-/// What the mean says.
+/// Returns the meaning of the mean NEES in words.
 pub(super) fn verdict(h: &Honesty) -> &'static str {
     match h {
         h if h.is_within_interval() => "honest",
@@ -101,7 +101,7 @@ fn nees(h: &Honesty) -> String {
 /// Columns of a group's table.
 pub(super) const COLUMNS: [&str; 7] = ["frames", "answered", "RMS deg", "median", "95 %", "worst", "NEES (95 %)"];
 
-/// The cells of a group: the range, then those of [`COLUMNS`].
+/// Returns the rows of a group: the range, then the cells of [`COLUMNS`].
 pub(super) fn cells(group: &Group) -> Vec<(String, [String; 7])> {
     let none = || "-".to_owned();
     let row = |r: &hzn_sim::evaluate::GroupRow| {
@@ -140,7 +140,7 @@ fn table(group: &Group) -> String {
     out
 }
 
-/// One of the worst frames in a line.
+/// Describes one of the worst pictures in a line.
 pub(super) fn worst_line(case: &Case) -> String {
     let what = match (&case.miss, case.limb) {
         (Some(m), true) => {
@@ -155,7 +155,7 @@ pub(super) fn worst_line(case: &Case) -> String {
     format!("{} ({}): {what}; {place}", case.file, case.body)
 }
 
-/// An angle: four digits behind the point, more where it is small.
+/// Formats an angle in degrees with four decimals; from 1e-7 to below 1e-3, with an exponent and two digits.
 pub(super) fn deg(x: f64) -> String {
     if (1e-7..1e-3).contains(&x.abs()) { format!("{x:.1e}") } else { format!("{x:.4}") }
 }
@@ -165,6 +165,6 @@ fn percent(share: f64) -> String {
 }
 
 fn short(x: f64) -> String {
-    // Ranges are multiples of a step that binary numbers do not hold.
+    // Ranges are multiples of a step that is not exact in binary; rounding removes the surplus digits.
     format!("{}", (x * 1e9).round() / 1e9)
 }

@@ -1,4 +1,4 @@
-//! The worst frames, and pictures of them.
+//! Selects and draws the worst pictures.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -14,10 +14,10 @@ use crate::exit::{Stop, failed};
 use hzn_run::overlay::{self, limb};
 use hzn_run::source::{Payload, ending};
 
-/// Wide enough to see a pixel's error on a page, small enough to be sent.
+/// Width of the drawn pictures: large enough to show an error of a pixel, small enough for a file that is sent.
 const WIDTH_PX: u32 = 960;
 
-/// The worst first: answered without a limb, not answered, then by error.
+/// Returns the worst cases first: answers without a limb in view, then missed pictures, then answers by their error.
 pub(super) fn of(cases: &[Case], count: usize) -> Vec<&Case> {
     let badness = |c: &&Case| match (&c.miss, c.limb) {
         (Some(_), false) => 2e3,
@@ -26,21 +26,22 @@ pub(super) fn of(cases: &[Case], count: usize) -> Vec<&Case> {
         (None, false) => -1.0,
     };
     let mut sorted: Vec<&Case> = cases.iter().filter(|c| badness(c) >= 0.0).collect();
-    // Stable: equally bad ones stay in the order of the sequence.
+    // The sort is stable: equally bad cases stay in the order of the sequence.
     sorted.sort_by(|a, b| badness(b).total_cmp(&badness(a)));
     sorted.truncate(count);
     sorted
 }
 
-/// A worst frame for the page.
+/// One of the worst pictures, for the page.
 pub(super) struct Drawn {
-    /// What is wrong with it.
+    /// The error of the picture in words.
     pub(super) caption: String,
-    /// JPEG, where the picture is at hand.
+    /// The drawing as JPEG, if the picture is available.
     pub(super) jpeg: Option<Vec<u8>>,
 }
 
-/// Draws frames with what was found and what is true. Pictures come from the recording, else from beside the truth.
+/// Draws pictures with the result and the true limb. Pictures come from the recording, otherwise from the truth's
+/// folder.
 pub(super) fn draw(
     worst: &[&Case],
     results: &Path,

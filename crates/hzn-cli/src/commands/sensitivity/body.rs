@@ -1,9 +1,9 @@
-//! Bodies by name or radius.
+//! Bodies, by name or radius.
 
 use hzn_core::body::{self, MOON_RADIUS_KM, SUN_RADIUS_KM};
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 
-/// A sphere with the limb height that is taken where none is given.
+/// A sphere, with the limb height that is used if none is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Body {
     pub(super) radius_km: f64,
@@ -11,10 +11,10 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// The mean Earth with the visible limb at 10 km.
+    /// The mean Earth, with the visible limb at 10 km.
     pub(super) const EARTH: Self = Self { radius_km: EARTH_MEAN_RADIUS_M / 1e3, limb_height_km: 10.0 };
 
-    /// The body of a sensor.toml, as a sphere.
+    /// Returns the body of a sensor.toml, as a sphere.
     pub(super) fn from_config(body: &body::Config) -> Self {
         Self { radius_km: body.mean_radius_km(), limb_height_km: body.limb_height_km }
     }

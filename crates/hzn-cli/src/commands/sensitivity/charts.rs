@@ -1,4 +1,4 @@
-//! Which conic is seen from where, and what a sphere for the Earth costs.
+//! Charts: which conic is visible from which altitude, and the error of treating the Earth as a sphere.
 
 use hzn_sim::sensitivity::chart::{Vertical, Visibility};
 
@@ -8,7 +8,7 @@ use super::{Args, Finished};
 use crate::exit::{Stop, usage};
 use crate::plot::{Chart, Series, Style};
 
-/// Fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
+/// Computes fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
 pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
     let body = match args.body.as_slice() {
         [] => Body::EARTH,
@@ -51,7 +51,8 @@ pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
     Ok(Finished { table, chart, notes: Vec::new() })
 }
 
-/// Angles by latitude and altitude (Braun & Barf 2022, figure 8, and beside it what is left with the limb axis).
+/// Computes angles by latitude and altitude (Braun & Barf 2022, figure 8, and the angle that remains with the limb
+/// axis).
 pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
     if !args.body.is_empty() {
         return Err(usage("--body: this is about the Earth (WGS-84)"));

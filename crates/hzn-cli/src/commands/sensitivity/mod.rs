@@ -1,4 +1,4 @@
-//! `hzn sensitivity`: what a camera can reach, before it is bought.
+//! `hzn sensitivity`: computes the accuracy of a camera before it is bought.
 
 mod body;
 mod charts;
@@ -19,16 +19,17 @@ use hzn_run::source::ending;
 use sweep::Values;
 use table::Table;
 
-/// Say how well a camera would do, without rendering: sigma of the direction by field of view, altitude, resolution
+/// Compute how accurate a camera would be, without rendering: sigma of the direction by field of view, altitude,
+/// resolution
 ///
 /// A value may be a number (94.4), a list (60,90,120) or a range (60:150 or 60:150:10); the table has a row for every
-/// combination. The limb is that of a sphere; its points are a pixel apart, with errors that are alike along the edge.
-/// Sigmas are 1 sigma in degrees: pitch in the plane of optical axis and body, roll across it; `free` fits the
-/// half-angle, `fused` also uses altitude and limb height by their sigmas (what `hzn run` does), `known` takes them as
+/// combination. The limb is that of a sphere. Its points are a pixel apart, with errors that are correlated along the
+/// edge. Sigmas are 1 sigma in degrees: pitch in the plane of optical axis and body, roll across it. `free` fits the
+/// half-angle, `fused` also uses altitude and limb height with their sigmas (as `hzn run` does), `known` treats them as
 /// exact.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Sigmas; or the field of view from which on each kind of limb is seen; or what a sphere for the Earth costs
+    /// Sigmas; or the field of view that shows each kind of limb; or the error of treating the Earth as a sphere
     #[arg(value_enum, default_value_t = What::Sigma)]
     what: What,
     /// Field of view across the width, degrees
@@ -40,7 +41,7 @@ pub(super) struct Args {
     /// Width and height of the picture, pixels
     #[arg(long, value_name = "WxH", default_value = "1920x1080", conflicts_with = "sensor")]
     size: Size,
-    /// Rows of the picture instead, with the width to scale: resolutions of one sensor area
+    /// Rows of the picture; replaces the height, and the width is scaled: resolutions of one sensor area
     #[arg(long, value_name = "PX", conflicts_with = "sensor")]
     rows: Option<Values>,
     /// The lens
@@ -70,7 +71,7 @@ pub(super) struct Args {
     /// 1-sigma of an edge point, pixels [default: 1]
     #[arg(long, value_name = "PX")]
     sigma_px: Option<f64>,
-    /// Length along the edge over which errors stay alike, pixels [default: 300]
+    /// Correlation length of the errors along the edge, pixels [default: 300]
     #[arg(long, value_name = "PX")]
     correlation_px: Option<f64>,
     /// Also write the table (.csv) or a plot over the first range (.svg); may be given twice
@@ -85,7 +86,7 @@ pub(super) struct Args {
 enum What {
     /// Sigma of the direction
     Sigma,
-    /// Fields of view from which on an ellipse, a hyperbola, the whole disc is seen, by altitude
+    /// Smallest fields of view that show an ellipse, a hyperbola, or the whole disc, by altitude
     Visibility,
     /// Angles between centre, geodetic vertical and limb axis of WGS-84, by latitude and altitude
     SphericalEarth,
@@ -99,7 +100,7 @@ enum Lens {
     Equidistant,
 }
 
-/// Columns and rows.
+/// Columns and rows of the picture, in pixels.
 #[derive(Debug, Clone, Copy)]
 struct Size {
     width: u16,
@@ -147,7 +148,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// What one of the subjects comes to.
+/// The result of one subject.
 struct Finished {
     table: Table,
     chart: Option<Chart>,
@@ -156,14 +157,14 @@ struct Finished {
 
 /// One quantity with its values.
 struct Axis {
-    /// Its column.
+    /// Name of its column.
     column: &'static str,
-    /// As the plot names it.
+    /// Name of the quantity in the plot.
     label: &'static str,
     values: Vec<f64>,
 }
 
-/// The design at one place of the grid.
+/// The grid of all designs: one design for each combination of the axes' values.
 struct Grid<'a> {
     args: &'a Args,
     sensor: Option<hzn_core::Config>,
@@ -236,7 +237,7 @@ impl<'a> Grid<'a> {
             true => Ok(x),
             false => Err(usage(format!("--{name}: {x} is refused: must be 0 or more"))),
         };
-        // Of a body that the sensor.toml does not speak of, its limb height says nothing.
+        // With --body, the limb height of the sensor.toml is not used, because it belongs to another body.
         let limb_height = own.filter(|_| args.body.is_empty()).map_or(body.limb_height_km, |(b, _)| b.limb_height_km);
         let sigma_px = args.sigma_px.or(own.map(|(_, c)| c.sigma_px)).unwrap_or(1.0);
         if !(sigma_px > 0.0) {
@@ -266,7 +267,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// A lens with this field of view across the width.
+/// Returns a camera with this lens and this field of view across the width, in degrees.
 fn lens(lens: Lens, size: Size, fov_deg: f64, rows: Option<f64>) -> Result<camera::Config, Stop> {
     let (width, height) = match rows {
         None => (size.width, size.height),
@@ -288,13 +289,13 @@ fn lens(lens: Lens, size: Size, fov_deg: f64, rows: Option<f64>) -> Result<camer
     }
     let half = (fov_deg / 2.0).to_radians();
     let f_px = f64::from(width) / 2.0 / if lens == Lens::Pinhole { half.tan() } else { half };
-    // Beyond 175° off axis the corners of an equidistant picture hold nothing.
+    // More than 175° off axis, the corners of an equidistant picture are empty.
     let corner_deg = f64::from(width).hypot(f64::from(height)).to_degrees() / (2.0 * f_px);
     let theta_max_deg = (lens == Lens::Equidistant && corner_deg > 175.0).then_some(175.0);
     Ok(camera::Config { theta_max_deg, ..camera::Config::ideal(model, width, height, f_px) })
 }
 
-/// Every combination of the values of the axes, the last axis fastest.
+/// Returns every combination of the values of the axes; the last axis varies fastest.
 fn combinations(axes: &[Axis]) -> Vec<Vec<f64>> {
     axes.iter().fold(vec![Vec::new()], |places, axis| {
         let with = |place: Vec<f64>| axis.values.iter().map(move |v| [place.as_slice(), &[*v]].concat()).collect();
@@ -304,7 +305,7 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<f64>> {
 
 type Pick = fn(&Sigmas) -> Option<f64>;
 
-/// Columns of the result: name in files, head of the text (empty: only in files), value.
+/// Columns of the result: name in files, head in the text (empty: only in files), value.
 const COLUMNS: [(&str, &str, Pick); 11] = [
     ("half_angle_deg", "half-angle", |s| Some(s.half_angle_deg)),
     ("limb_px", "limb px", |s| Some(s.limb_px)),
@@ -361,7 +362,7 @@ fn sigma(args: &Args) -> Result<Finished, Stop> {
     Ok(Finished { table, chart, notes })
 }
 
-/// Sigmas over the first quantity that varies; every combination of the others has its own lines.
+/// Plots sigmas over the first quantity that varies. Every combination of the others has its own lines.
 fn chart(grid: &Grid<'_>, results: &[(Vec<f64>, Option<Sigmas>)], x: usize, others: &[usize]) -> Chart {
     let mut chart = Chart::new("Sigma of the direction by design (1 sigma)", grid.axes[x].label, "deg");
     let name = |place: &[f64]| -> String {
@@ -371,7 +372,7 @@ fn chart(grid: &Grid<'_>, results: &[(Vec<f64>, Option<Sigmas>)], x: usize, othe
     names.dedup();
     names.sort();
     names.dedup();
-    // With several lines a quantity, roll and the paper's limits would fill the plot.
+    // With several lines for each quantity, roll and the pitch with free or known half-angle would fill the plot.
     let lines: &[(&str, Pick)] = if others.is_empty() {
         &[
             ("pitch, half-angle free", |s| Some(s.free.pitch_deg)),

@@ -2,9 +2,9 @@
 
 use std::str::FromStr;
 
-/// About so many values a range has when no step is given.
+/// Approximate number of values of a range without a step.
 const STEPS: f64 = 15.0;
-/// More are a slip of the finger.
+/// Largest number of values of a range; more are a typing error.
 const MOST: usize = 10_000;
 
 /// The values of one quantity.
@@ -40,17 +40,17 @@ fn range(from: f64, to: f64, step: Option<f64>) -> Result<Vec<f64>, String> {
     if !(step > 0.0 && count < MOST as f64) {
         return Err(format!("{from}:{to}:{step}: the step must be above 0 and give fewer than {MOST} values"));
     }
-    // Written with as many digits as the step needs, so that 0.1 does not become 0.30000000000000004.
+    // Values are rounded to nine decimals, so that 0.1 does not become 0.30000000000000004.
     let tidy = |x: f64| (x * 1e9).round() / 1e9;
     let mut values: Vec<f64> = (0..=count as usize).map(|i| tidy(from + i as f64 * step)).collect();
-    // The end belongs to the range, also where no step leads there.
+    // The end belongs to the range, even if no step reaches it.
     if values.last().is_some_and(|last| to - last > 1e-6 * step) {
         values.push(to);
     }
     Ok(values)
 }
 
-/// The next of 1, 2, 5, 10 … times a power of ten.
+/// Returns the smallest value of at least `at_least` among 1, 2 and 5 times a power of ten.
 fn nice(at_least: f64) -> f64 {
     let decade = 10f64.powf(at_least.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|s| *s >= at_least * (1.0 - 1e-9)).unwrap_or(10.0 * decade)

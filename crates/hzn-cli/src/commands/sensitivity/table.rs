@@ -14,7 +14,7 @@ struct Column {
 }
 
 impl Table {
-    /// Adds a column: its name in files, its head in the text (empty: only in files), its cells.
+    /// Adds a column: its name in files, its head in the text (empty: only in files), and its cells.
     pub(super) fn column(&mut self, name: &str, head: &str, cells: impl Iterator<Item = Option<f64>>) {
         self.columns.push(Column { name: name.into(), head: head.into(), cells: cells.collect() });
     }
@@ -23,7 +23,7 @@ impl Table {
         self.columns.iter().map(|c| c.cells.len()).max().unwrap_or(0)
     }
 
-    /// Every column, an empty cell where there is no value.
+    /// Returns every column as CSV, with an empty cell for a missing value.
     pub(super) fn csv(&self) -> Vec<u8> {
         let mut out = self.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(",") + "\n";
         for row in 0..self.rows() {
@@ -33,7 +33,7 @@ impl Table {
         out.into_bytes()
     }
 
-    /// The columns with a head, to about four digits; `-` where there is no value.
+    /// Returns the columns with a head as text, to about four digits, with `-` for a missing value.
     pub(super) fn text(&self) -> String {
         let shown: Vec<Vec<String>> = self
             .columns
@@ -56,7 +56,7 @@ impl Table {
     }
 }
 
-/// About four digits.
+/// Formats a number with about four digits.
 fn number(x: f64) -> String {
     match x.abs() {
         0.0 => "0".into(),

@@ -1,12 +1,12 @@
-//! Videos, through `ffmpeg` and `ffprobe` on PATH.
+//! Videos, read through `ffmpeg` and `ffprobe` on PATH.
 //!
-//! Brightness is the luma plane as it stands in the stream (`extractplanes=y`): converting to grey would stretch
-//! limited range. Where one colour is wanted (`input.channel`), ffmpeg converts to RGB of full range. Pixels are taken
-//! as they are stored, whatever the container says about turning them. Times are every frame's own, from ffprobe, which
-//! runs alongside; a constant rate is never assumed.
+//! Brightness is the luma plane as it is stored in the stream (`extractplanes=y`), because a conversion to grey would
+//! stretch limited range. If one colour is wanted (`input.channel`), ffmpeg converts to RGB of full range. Pixels are
+//! taken as they are stored, whatever turn the container asks for. Each frame has its own time, from ffprobe, which
+//! runs in parallel; a constant rate is never assumed.
 //!
-//! That the end is missing is known by what ffmpeg says and by the sizes in an AVI. A y4m, or a stream such as MPEG-TS
-//! that was cut between two frames, does not tell.
+//! A missing end is detected by the messages of ffmpeg and by the sizes in an AVI. It is not detected for a y4m, or for
+//! a stream such as MPEG-TS that was cut between two frames.
 
 mod riff;
 mod times;
@@ -30,7 +30,7 @@ pub(super) const ENDINGS: &[&str] = &[
     "mp4", "m4v", "mov", "avi", "mkv", "webm", "mpg", "mpeg", "ts", "mts", "m2ts", "wmv", "flv", "y4m", "mjpeg", "mj2",
 ];
 
-/// What ffmpeg ends with when a signal stops it.
+/// Exit code of ffmpeg when a signal stops it.
 const STOPPED: i32 = 255;
 
 pub(super) struct Video {
@@ -38,16 +38,16 @@ pub(super) struct Video {
     stem: String,
     width: u32,
     height: u32,
-    /// Samples a pixel: luma alone, or three colours.
+    /// Number of samples of a pixel: 1 (luma) or 3 (colours).
     channels: u8,
     /// Significant bits of a sample.
     bits: u8,
     pix_fmt: String,
-    /// How the container says that it is to be shown.
+    /// The turn that the container asks for when the video is shown.
     turned: Option<&'static str>,
     frames: Running,
     pixels: Pixels,
-    /// What ffmpeg says, while it runs.
+    /// The thread that reads the messages of ffmpeg while it runs.
     said: Option<JoinHandle<Said>>,
     times: Times,
     index: u64,
@@ -86,7 +86,7 @@ impl Video {
         let (bits, arguments) = luma(pix_fmt);
         let (frames, pixels, said) = start(path, &arguments)?;
         let degrees = |key: &str| entry(key).and_then(|deg| deg.trim().parse::<f64>().ok());
-        // The tag, of older files, counts clockwise.
+        // The tag of older files counts clockwise, so its sign is inverted.
         let turned = degrees("rotation").or(degrees("TAG:rotate").map(|deg| -deg)).and_then(turned);
         Ok(Self {
             path: path.to_owned(),
@@ -108,8 +108,8 @@ impl Video {
         })
     }
 
-    /// Nothing more comes. What is missing at the end of a video, or was lost in it, is told by [`Source::lost`]; a
-    /// video of which nothing came, and an ffmpeg that was ended from outside, are errors.
+    /// Ends the video. [`Source::lost`] describes what is missing at the end of a video or was lost in it. If no frame
+    /// could be decoded, or ffmpeg was ended from outside, this is an error.
     fn end(&mut self, rest: usize) -> Option<anyhow::Result<Item>> {
         self.ended = true;
         let name = self.path.display();
@@ -135,11 +135,11 @@ impl Video {
     }
 }
 
-/// The bits of a stream's luma, and what asks ffmpeg for it.
+/// Returns the bits of a stream's luma, and the arguments that make ffmpeg write it.
 fn luma(pix_fmt: &str) -> (u8, Vec<String>) {
     let bits = bits_of(pix_fmt);
     let out_format = if bits == 8 { "gray".to_owned() } else { format!("gray{bits}le") };
-    // Colour planes have no luma plane to extract.
+    // RGB and palette formats have no luma plane to extract.
     let filter = if ["rgb", "bgr", "gbr", "pal"].iter().any(|p| pix_fmt.contains(p)) {
         "format=gray"
     } else {
@@ -148,7 +148,7 @@ fn luma(pix_fmt: &str) -> (u8, Vec<String>) {
     (bits, ["-vf", filter, "-pix_fmt", &out_format].map(str::to_owned).to_vec())
 }
 
-/// The bits of a stream's colours as they are handed out, and what asks ffmpeg for them.
+/// Returns the bits of the colours that are handed out, and the arguments that make ffmpeg write them.
 fn colours(pix_fmt: &str) -> (u8, Vec<String>) {
     let (bits, out_format) = if bits_of(pix_fmt) == 8 { (8, "rgb24") } else { (16, "rgb48le") };
     (bits, ["-pix_fmt", out_format].map(str::to_owned).to_vec())
@@ -160,7 +160,7 @@ fn bits_of(pix_fmt: &str) -> u8 {
     deep.iter().find(|(n, _)| named(n)).map_or(8, |(_, bits)| *bits)
 }
 
-/// What a container's rotation means, in words; `None` for none.
+/// Returns a container's rotation in words; `None` if there is none.
 fn turned(counter_clockwise_deg: f64) -> Option<&'static str> {
     match (counter_clockwise_deg / 90.0).round().rem_euclid(4.0) as u8 {
         1 => Some("turned by 90 degrees counter-clockwise"),
@@ -192,7 +192,7 @@ impl Source for Video {
         self.turned.map(|how| (self.stem.clone(), how))
     }
     fn want_channel(&mut self, channel: Channel) -> Result<(), Error> {
-        // A picture without colours has its luma in each of them.
+        // A grey video has no colours: its luma is the value of each colour.
         if channel == Channel::Mean || self.channels == 3 || self.pix_fmt.starts_with("gray") {
             return Ok(());
         }

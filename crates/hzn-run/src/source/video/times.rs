@@ -1,4 +1,4 @@
-//! The times of a video's frames, from ffprobe, which runs beside ffmpeg.
+//! The times of a video's frames, from ffprobe, which runs in parallel with ffmpeg.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
@@ -9,12 +9,12 @@ use super::tool::{Running, tool};
 use crate::error::Error;
 use crate::source::TimeSource;
 
-/// A container in which so many frames have no time at the beginning has none at all.
+/// If this many frames at the beginning of a container have no time, the container has no times.
 const TIMELESS: usize = 32;
 
 pub(super) struct Times {
     lines: BufReader<Box<dyn Read + Send>>,
-    /// Read before, to know whether the container has times.
+    /// Times that were read early, to find out whether the container has times.
     ahead: VecDeque<Option<f64>>,
     in_container: bool,
     _probe: Running,
@@ -33,7 +33,7 @@ impl Times {
                 "default=nw=1",
             ])
             .arg(path)
-            // ffmpeg says the same.
+            // ffmpeg reports the same errors.
             .stderr(Stdio::null());
         let (probe, lines) = Running::start("ffprobe", &mut command)?;
         let lines = BufReader::new(Box::new(lines) as Box<dyn Read + Send>);
@@ -46,7 +46,7 @@ impl Times {
         Ok(times)
     }
 
-    /// Of the next frame.
+    /// Returns the origin of the next frame's time.
     pub(super) fn next(&mut self) -> TimeSource {
         if !self.in_container {
             return TimeSource::Count;
@@ -55,8 +55,8 @@ impl Times {
     }
 }
 
-/// The time of the next frame that ffprobe lists, which may have none; `None` at the end of the list. Whatever else it
-/// says of a frame is passed over.
+/// Returns the time of the next frame that ffprobe lists; a frame may have none. Returns `None` at the end of the list.
+/// All other lines are ignored.
 fn next_time_s(lines: &mut impl BufRead) -> Option<Option<f64>> {
     let mut line = String::new();
     while lines.read_line(&mut line).ok()? > 0 {

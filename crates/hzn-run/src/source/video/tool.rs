@@ -1,4 +1,4 @@
-//! The programs that read videos, as children of ours.
+//! The programs that read videos, as child processes.
 
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -6,11 +6,12 @@ use std::thread::JoinHandle;
 
 use crate::error::{Error, failed, unusable};
 
-/// What ffmpeg calls errors and what loses nothing: frames at the same time, and what some cameras write into JPEG.
+/// Messages that ffmpeg calls errors but that lose nothing: frames with equal times, and special data of some cameras
+/// in JPEG.
 const HARMLESS: &[&str] = &["non monotonically increasing dts", "unable to decode APP fields"];
 
-/// A program that says nothing but errors. The Ctrl-C of a terminal goes to us alone, who still want the frames that
-/// were begun.
+/// Makes the command for a program that prints nothing but errors. It runs in its own process group, so Ctrl-C in a
+/// terminal stops only our process, which still needs the frames that were begun.
 pub(super) fn tool(name: &str) -> Command {
     let mut command = Command::new(name);
     command.args(["-v", "repeat+error"]).stdin(Stdio::null());
@@ -19,7 +20,7 @@ pub(super) fn tool(name: &str) -> Command {
     command
 }
 
-/// Why a program cannot be started.
+/// Returns the error for a program that cannot be started.
 pub(super) fn absent(tool: &str, error: &std::io::Error) -> Error {
     match error.kind() {
         ErrorKind::NotFound => unusable(format!(
@@ -29,11 +30,12 @@ pub(super) fn absent(tool: &str, error: &std::io::Error) -> Error {
     }
 }
 
-/// A program at work. It ends with us: killed when this is dropped, by its closed pipe when we are killed.
+/// A running program. It ends with our process: dropping this value kills it, and if we are killed, its closed pipe
+/// ends it.
 pub(super) struct Running(Child);
 
 impl Running {
-    /// Starts it; also gives what it writes to stdout.
+    /// Starts the program. Also returns the reader of its stdout.
     pub(super) fn start(name: &str, command: &mut Command) -> Result<(Self, impl Read + Send + use<>), Error> {
         let mut child = command.stdout(Stdio::piped()).spawn().map_err(|e| absent(name, &e))?;
         let out = child.stdout.take();
@@ -41,7 +43,7 @@ impl Running {
         Ok((running, out.ok_or_else(|| failed(format!("{name} gives no output")))?))
     }
 
-    /// Listens to what it writes to stderr, which must be a pipe.
+    /// Starts a thread that reads the program's stderr, which must be a pipe.
     pub(super) fn listen(&mut self) -> JoinHandle<Said> {
         let errors = self.0.stderr.take();
         std::thread::spawn(move || errors.map(|e| Said::read(BufReader::new(e))).unwrap_or_default())
@@ -59,7 +61,7 @@ impl Drop for Running {
     }
 }
 
-/// Errors that a program told of.
+/// Errors that a program printed.
 #[derive(Default)]
 pub(super) struct Said {
     count: u64,
@@ -72,7 +74,7 @@ impl Said {
         let mut line = Vec::new();
         while errors.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
             let text = String::from_utf8_lossy(&line);
-            // Without who says it: `[h264 @ 0x55d0a0] `.
+            // The prefix with the name of the part, such as `[h264 @ 0x55d0a0] `, is removed.
             let text = text.trim();
             let text = text.strip_prefix('[').and_then(|t| t.split_once("] ")).map_or(text, |(_, what)| what);
             if !text.is_empty() && !HARMLESS.iter().any(|h| text.contains(h)) {
@@ -84,7 +86,7 @@ impl Said {
         said
     }
 
-    /// The last of them, and how many there were.
+    /// Returns the last error, and the number of errors if there are several.
     pub(super) fn summary(&self) -> Option<String> {
         match self.count {
             0 => None,
