@@ -23,9 +23,11 @@ use hzn_core::camera::{Config, Model};
 pub use read::{load, parse};
 pub use write::{Format, Unfit, write};
 
-/// Returns the lens of Braun & Barf 2022, (13): the distance from the centre in pixels is r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷
-/// + κ₅θ⁹, with θ in radians. With f = κ₁ and kⱼ = κⱼ₊₁/κ₁ this lens is `kannala-brandt`. `size_px` is width and
-/// height, `centre_px` is the principal point. The result is `None` if κ₁ is not finite or not above 0.
+/// Returns the lens of Braun & Barf 2022, (13), with the distance from the centre in pixels
+/// r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹ and θ in radians.
+///
+/// With f = κ₁ and kⱼ = κⱼ₊₁/κ₁ this lens is `kannala-brandt`. `size_px` is width and height, `centre_px` is the
+/// principal point. The result is `None` if κ₁ is not finite or not above 0.
 pub fn from_braun_barf(kappa_px: [f64; 5], size_px: [u16; 2], centre_px: [f64; 2]) -> Option<Config> {
     let [f, higher @ ..] = kappa_px;
     let mut config = Config::ideal(Model::KannalaBrandt, size_px[0], size_px[1], f);
