@@ -223,7 +223,7 @@ pub fn load(path: &Path) -> Result<Frames, Problem> {
 /// Reads a frames.csv as [`load`] does, but from text; `path` is only used in messages.
 ///
 /// # Errors
-/// The same as of [`load`].
+/// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
     // Spreadsheet programs write a byte-order mark first.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);

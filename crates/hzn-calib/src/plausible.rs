@@ -11,7 +11,7 @@ use hzn_core::pixel::ImagePoint;
 /// A value that looks wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Doubt {
-    /// The key of sensor.toml, such as `camera.fx_px`.
+    /// The key of sensor.toml, for example `camera.fx_px`.
     pub key: &'static str,
     /// Index of the body in `[[bodies]]`, from 0; `None` if there is only a `[body]`.
     pub body: Option<u8>,
@@ -34,7 +34,7 @@ const SQUARE: f64 = 0.2;
 const WIDEST_PINHOLE_DEG: f64 = 150.0;
 /// Largest usual field of view of a fisheye lens, in degrees.
 const WIDEST_FISHEYE_DEG: f64 = 250.0;
-/// Smallest usual field of view, in degrees. Telescopes have less and no limb in view.
+/// Smallest usual field of view, in degrees. Telescopes have a smaller one, and no limb in view.
 const NARROWEST_DEG: f64 = 0.5;
 /// Largest usual tangential coefficient. It comes from a small tilt of the lens.
 const TANGENTIAL: f64 = 0.05;
@@ -212,8 +212,8 @@ fn coefficients(c: &camera::Config) -> Option<Doubt> {
     }
 }
 
-/// Returns the message for five coefficients where a fisheye lens has four: they are those of Braun & Barf 2022, (13),
-/// and the message has hzn's coefficients for them.
+/// Returns the message for a fisheye lens with five coefficients instead of four. They are those of Braun & Barf 2022,
+/// (13); the message has hzn's coefficients for the same lens.
 pub(crate) fn five_coefficients(c: &camera::Config) -> Option<String> {
     let [first, higher @ ..] = c.k.as_slice() else { return None };
     if c.model != Model::KannalaBrandt || higher.len() != 4 || higher.last() == Some(&0.0) {

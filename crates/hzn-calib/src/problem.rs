@@ -1,4 +1,4 @@
-//! An error in a file, with the place and the fix.
+//! An error in a file, with its place and a remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub struct Problem {
     pub column: Option<usize>,
     /// The field, for example `[reject] threshold_px` or `altitude_km`.
     pub field: Option<String>,
-    /// What is wrong and what to do.
+    /// The error and a remedy.
     pub what: String,
 }
 

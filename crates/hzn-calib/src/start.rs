@@ -4,8 +4,8 @@
 //! Unknown properties of the lens are written as sigmas, so that the covariance of the answers includes them:
 //!
 //! - **Scale.** Makers state the focal length of a series lens, and thus its field of view, to ± 5 %. With a uniform
-//!   distribution in this range 1-sigma is 5 %/√3. EXIF has the nominal focal length, for a zoom lens in steps, without
-//!   the change by focusing: ± 10 %. The 35 mm equivalent is also rounded to a millimetre.
+//!   distribution in this range 1-sigma is 5 %/√3. EXIF has the nominal focal length: ± 10 %. A zoom lens gives it in
+//!   steps, and it does not include the change by focusing. The 35 mm equivalent is also rounded to a millimetre.
 //! - **Shape.** The ideal lens (pinhole or equidistant) is exact at the picture's edges, where the field of view is
 //!   stated; in the middle the real lens differs. An equisolid lens, 2 sin (θ/2), lies θ²/24 below the equidistant
 //!   lens. A pinhole lens with one eighth of the equidistant lens's barrel distortion, θ²/3, differs by the same
@@ -62,8 +62,8 @@ pub struct Known {
     pub size_px: [u32; 2],
     /// Stated field of view over the whole width, in degrees.
     pub fov_deg: Option<f64>,
-    /// [`Model::Pinhole`] or [`Model::Equidistant`]. If it is missing, a pinhole is assumed up to a field of view of 90
-    /// degrees.
+    /// [`Model::Pinhole`] or [`Model::Equidistant`]. If it is missing, a pinhole is assumed. A stated field of view
+    /// above 90 degrees requires it.
     pub lens: Option<Model>,
     /// EXIF data of a picture.
     pub exif: Exif,

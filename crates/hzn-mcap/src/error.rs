@@ -112,7 +112,7 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
     }
 }
 
-/// Converts an error of writing to `path`, by its remedy.
+/// Converts an error of writing to `path` to the variant with its remedy.
 pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
     match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {

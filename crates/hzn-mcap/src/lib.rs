@@ -20,8 +20,8 @@
 //! chunks without compression, because they are already compressed. All other data are compressed with zstd. A batch
 //! has the frames of one [`FLUSH_INTERVAL`], or 8 MiB of pictures, or 1 MiB of other data; a crash can lose at most one
 //! batch. Each batch is written with its pictures first. A frame is finished when the chunk with its report is complete
-//! in the file, so a frame with a report is always complete. One chunk per frame would cost almost nothing compared
-//! with the pictures. Without pictures it would need ten times the space, and a longer summary. Every chunk, the data
+//! in the file, so a frame with a report is always complete. One chunk per frame would need a longer summary. It
+//! would need little space compared with the pictures, but without pictures ten times the space. Every chunk, the data
 //! and the summary have CRCs. The `sequence` of a message is the index of its frame.
 //!
 //! | topic | schema | encoding |

@@ -31,7 +31,7 @@ pub fn open_part(part: &Path) -> io::Result<File> {
 /// Opens an unfinished file as [`open_part`] does, and empties it.
 ///
 /// # Errors
-/// The same as of [`open_part`].
+/// The errors are those of [`open_part`].
 pub fn create_part(part: &Path) -> io::Result<File> {
     let file = open_part(part)?;
     // The length of a device cannot be changed.

@@ -48,7 +48,7 @@ pub fn recover(input: impl AsRef<Path>, output: impl AsRef<Path>) -> Result<Reco
 /// bytes read so far and the size of `input`; it returns `false` to stop.
 ///
 /// # Errors
-/// The same as of [`recover`], and [`Error::Stopped`].
+/// The errors are those of [`recover`], and [`Error::Stopped`].
 pub fn recover_while(
     input: impl AsRef<Path>,
     output: impl AsRef<Path>,

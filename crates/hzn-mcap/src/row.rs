@@ -56,7 +56,7 @@ macro_rules! columns {
     };
 }
 
-/// Types of a cell.
+/// The type of a cell.
 trait Cell {
     /// Type of the cell in JSON.
     const JSON: &'static str;
@@ -108,8 +108,8 @@ columns! {
         body: String,
         /// Outcome, by its name, for example `no-limb`.
         status: Status as "status_name",
-        /// Unit vector to the body in the camera frame, x; only with the status `ok`, like the columns up to `rms_px`
-        /// (except `altitude_km`), `inliers`, `roll_deg` and `pitch_deg`.
+        /// Unit vector to the body in the camera frame, x; only with the status `ok`. This also holds for the columns
+        /// up to `rms_px` (except `altitude_km`), `inliers`, `roll_deg` and `pitch_deg`.
         axis_x: Option<f64>,
         /// Unit vector to the body in the camera frame, y.
         axis_y: Option<f64>,

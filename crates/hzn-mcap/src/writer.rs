@@ -104,7 +104,8 @@ impl Writer {
     /// [`FLUSH_INTERVAL`].
     ///
     /// # Errors
-    /// The disk is full or broken. After that every call fails; the finished frames are safe in the `.part` file.
+    /// The picture is too large for a record, or the disk is full or broken. After an error of the disk every call
+    /// fails; the finished frames are safe in the `.part` file.
     pub fn write(&mut self, frame: &FrameRecord) -> Result<(), Error> {
         self.write_bodies(core::slice::from_ref(frame))
     }
@@ -113,7 +114,7 @@ impl Writer {
     /// or none.
     ///
     /// # Errors
-    /// The same as of [`Self::write`].
+    /// The errors are those of [`Self::write`].
     pub fn write_bodies(&mut self, records: &[FrameRecord]) -> Result<(), Error> {
         let several = records.len() > 1;
         let caption = |record: &FrameRecord| {
@@ -196,7 +197,7 @@ impl Writer {
     /// coming.
     ///
     /// # Errors
-    /// The same as of [`Self::write`].
+    /// The errors are those of [`Self::write`].
     pub fn flush_if_due(&mut self) -> Result<(), Error> {
         match self.waiting_since {
             Some(since) if since.elapsed() >= FLUSH_INTERVAL => self.flush(),
@@ -207,7 +208,7 @@ impl Writer {
     /// Finishes every frame written so far.
     ///
     /// # Errors
-    /// The same as of [`Self::write`].
+    /// The errors are those of [`Self::write`].
     pub fn flush(&mut self) -> Result<(), Error> {
         let Some(mut container) = self.container.take() else {
             return Err(Error::AfterFailure { path: self.part.clone() });
@@ -238,7 +239,7 @@ impl Writer {
     /// Closes the recording and renames it to its final name.
     ///
     /// # Errors
-    /// The same as of [`Self::write`]; the `.part` file stays.
+    /// The errors are those of [`Self::write`]; the `.part` file stays.
     pub fn finish(mut self) -> Result<PathBuf, Error> {
         self.flush()?;
         let Some(container) = self.container.take() else {

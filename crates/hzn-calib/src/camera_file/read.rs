@@ -20,7 +20,7 @@ pub fn load(path: &Path, name: Option<&str>) -> Result<Config, Problem> {
 /// Reads a camera file as [`load`] does, but from text; `path` is only used in messages.
 ///
 /// # Errors
-/// The same as of [`load`].
+/// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Problem> {
     // OpenCV writes `%YAML:1.0`, which is not a valid YAML directive.
     let body = match text.split_once('\n') {
@@ -264,7 +264,7 @@ impl File<'_> {
     }
 }
 
-/// The lenses under the names of other tools.
+/// A lens in the terms of other tools.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Lens {
     /// No distortion.
@@ -308,8 +308,8 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
     value.as_array()?.iter().map(number).collect()
 }
 
-/// Reads a number. YAML 1.1 writers may omit the decimal point in `1e-05`, which a stricter reader takes for a text;
-/// the text is accepted too.
+/// Reads a number. YAML 1.1 writers may omit the decimal point, as in `1e-05`. A stricter reader takes this for a text,
+/// so a text with a number is accepted too.
 fn number(value: &Value) -> Option<f64> {
     value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
 }

@@ -17,7 +17,7 @@ pub enum Format {
     Euroc,
 }
 
-/// Error: a format cannot express the lens.
+/// Error of a lens that the format cannot express.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unfit {
     /// The part of the lens that the format cannot express.

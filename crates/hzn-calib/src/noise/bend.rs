@@ -1,16 +1,16 @@
 //! A bend of the edge that all pictures of a flight have in common.
 //!
-//! The visible limb differs from a cone by tenths of a pixel: it is higher where the Sun is higher, and haze is
-//! brighter on one side. The fit absorbs the parts of this shape that a cone can follow: a shift, a tilt, and a bend,
-//! which it takes for another half-angle. Edge noise averages out over many pictures. A common shape does not, and the
-//! scatter between pictures does not show it. The rest of the shape is visible in the mean of the residuals over all
-//! pictures, as the next shapes along the edge (Legendre polynomials of the degrees 3 to 5, each of RMS 1). The bend is
-//! assumed to be as strong as the strongest of these.
+//! The visible limb differs from a cone by about a tenth of a pixel: it is higher where the Sun is higher, and a veil
+//! of light is brighter on one side. The fit absorbs the parts of this shape that a cone can follow: a shift, a tilt,
+//! and a bend, which it takes for another half-angle. Edge noise averages out over many pictures. A common shape does
+//! not, and the scatter between pictures does not show it. The rest of the shape is visible in the mean of the
+//! residuals over all pictures, as the next shapes along the edge (Legendre polynomials of the degrees 3 to 5, each of
+//! RMS 1). The bend is assumed to be as strong as the strongest of these.
 
 use super::cone::Cone;
 use super::sighting::Sighting;
 
-/// Number of shapes that are fitted to the mean residuals.
+/// Number of shapes that are examined in the mean residuals.
 pub(super) const SHAPES: usize = 3;
 
 /// Returns the Legendre polynomials of the degrees 3 to 5 at x from −1 to 1, scaled to an RMS of 1.

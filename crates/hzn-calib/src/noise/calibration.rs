@@ -11,7 +11,7 @@ use super::latitude::{Profile, profile};
 use super::refusal::Refusal;
 use super::sighting::Sighting;
 
-/// Smallest number of pictures with an answer. Fewer pictures determine the scatter less accurately than to a quarter.
+/// Smallest number of pictures with an answer. With fewer pictures the scatter is not known to a quarter.
 pub const LEAST_PICTURES: usize = 12;
 /// Largest 1-sigma of the limb height from the pictures' own errors, in kilometres: half of the sigma that a sensor
 /// assumes for an unmeasured limb.
@@ -19,11 +19,11 @@ pub(super) const MOST_SIGMA_KM: f64 = 3.5;
 /// Floor of the common shift of an edge, in pixels: the default of `covariance.sigma_px`. Blur and threshold move the
 /// middle of an edge by fractions of a pixel, even if the edge is smooth.
 const LEAST_SHIFT_PX: f64 = 0.1;
-/// Largest mean square of the residuals over their variances without an alarm.
+/// An alarm is raised if the mean square of the residuals over their variances is larger.
 const ALARM: f64 = 2.0;
-/// A picture whose limb height is more sigmas from the median of all is taken to have another edge.
+/// A picture is excluded if its limb height is more than this many sigmas from the median of all: it has another edge.
 const APART: f64 = 6.0;
-/// Largest fraction of pictures with another edge. With more of them the calibration is refused.
+/// Largest fraction of excluded pictures. With more of them the calibration is refused.
 const MOST_APART: f64 = 0.2;
 /// Limb height and 1-sigma of the sensor during the calibration, in kilometres: wide enough for any limb.
 const WIDE_KM: [f64; 2] = [15.0, 30.0];

@@ -2,8 +2,8 @@
 //!
 //! The state is the unit axis e and c = cos α. With the slope g = |∂(s·e)/∂(u, v)| of a ray s, the distance from the
 //! limb is r = (c + o − s·e)/g in pixels. Here o is the offset of cos α by azimuth if the attitude is known, else 0.
-//! With the tangent basis B at e and the weighted mean m of Bᵀs, the rows are h = [Bᵀs − m, −1]/g, and (Σ w h hᵀ) δ = Σ
-//! w r h. The change of c is a·δ with a = (m, 1).
+//! With the tangent basis B at e and the weighted mean m of Bᵀs, the rows are h = [Bᵀs − m, −1]/g, and
+//! (Σ w h hᵀ) δ = Σ w r h. The change of c is a·δ with a = (m, 1).
 
 use hzn_core::Prior;
 use hzn_core::camera::Camera;
@@ -163,8 +163,8 @@ impl Cone {
         self.to_cos.dot(&(self.inverse * sum))
     }
 
-    /// Returns the weights of the points in the fitted cos α: its change if cos α of the limb grows by 1 at this point
-    /// alone. The shares of all points sum to 1.
+    /// Returns the share of each point in the fitted cos α: the change of the fitted value if cos α of the limb grows
+    /// by 1 at this point alone. The shares of all points sum to 1.
     pub(super) fn shares(&self) -> Vec<f64> {
         let a = self.inverse * self.to_cos;
         self.rows.iter().map(|r| -r.weight * a.dot(&r.h) / r.slope).collect()

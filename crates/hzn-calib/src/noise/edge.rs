@@ -2,9 +2,9 @@
 //!
 //! The residuals are r = H δ + ε, with ε a Gauss-Markov process that has a white part: V = σ²[(1 − ν) e^(−Δs/L) + ν I].
 //! With the three fitted parameters integrated out, −2 ln of the likelihood is (n − 3) ln(q/(n − 3)) + ln|V/σ²| +
-//! ln|HᵀV⁻¹H|, q = rᵀV⁻¹r after the fit; σ² = q/(n − 3). A Kalman filter along the points whitens r and the columns of
-//! H in one pass. The likelihood of one picture is flat in L. Therefore the variance of the fit is averaged over (L,
-//! ν), with a prior for L: a quarter of the arc, within a factor of two.
+//! ln|HᵀV⁻¹H|, with q = rᵀV⁻¹r after the fit and σ² = q/(n − 3). A Kalman filter along the points whitens r and the
+//! columns of H in one pass. The likelihood of one picture is flat in L. Therefore the variance of the fit is averaged
+//! over (L, ν), with a prior for L: a quarter of the arc, within a factor of two.
 
 use nalgebra::{Matrix3, Vector3};
 

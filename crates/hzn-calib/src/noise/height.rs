@@ -1,8 +1,8 @@
 //! Estimates one limb height from many measurements, with the scatter that their errors do not explain.
 //!
 //! The model is d_i = A_i h + η_i + ε_i, with known variances s_i² of ε and an unknown variance τ² of η. The restricted
-//! likelihood is maximal where Σ ln(s_i² + τ²) + ln|AᵀWA| + Σ w_i (d_i − A_i ĥ)² is minimal over τ, with w = 1/(s² +
-//! τ²).
+//! likelihood is maximal where Σ ln(s_i² + τ²) + ln|AᵀWA| + Σ w_i (d_i − A_i ĥ)² is minimal over τ, with
+//! w = 1/(s² + τ²).
 
 use nalgebra::{DMatrix, DVector};
 

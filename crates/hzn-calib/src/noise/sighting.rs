@@ -1,8 +1,8 @@
 //! The limb height that one picture measures.
 //!
-//! With the camera at the height H above the ground of radius R, a limb of the height d has the half-angle sin α = (R +
-//! d)/(R + H). A free half-angle therefore measures d = d₀ + (R + H)(sin α̂ − sin α₀), with the expected values (d₀,
-//! α₀) and ∂d/∂cos α = −(R + H) cot α.
+//! With the camera at the height H above the ground of radius R, a limb of the height d has the half-angle
+//! sin α = (R + d)/(R + H). A free half-angle therefore measures d = d₀ + (R + H)(sin α̂ − sin α₀), with the expected
+//! values (d₀, α₀) and ∂d/∂cos α = −(R + H) cot α.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::Camera;
@@ -15,8 +15,8 @@ use super::cone::{Azimuth, Cone, basis};
 use super::edge::{self, Scores};
 use super::lag::Lags;
 
-/// Attitudes with a larger sigma are not used, because they do not show which part of the limb is visible; radians (30
-/// degrees).
+/// Attitudes with a larger sigma, in radians (30 degrees), are not used: they do not show which part of the limb is
+/// visible.
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude without a sigma, radians (5 degrees); the sensor uses the same value.
 const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
@@ -35,11 +35,11 @@ pub struct Sighting {
     /// 1-sigma of the limb height from edge noise (and from the unknown direction of north), in kilometres.
     pub sigma_km: f64,
     /// 1-sigma of the limb height from the unknown local radius, in kilometres; pictures from one latitude have it in
-    /// common. It is 0 for a sphere, and with a known position.
+    /// common. It is 0 for a sphere and for a known position.
     pub radius_sigma_km: f64,
     /// Change of the limb height if all points move across the limb by one pixel, in kilometres. In a wide picture it
-    /// is larger than a pixel at the limb, because pixels away from the middle are finer and the shift looks like a
-    /// bend.
+    /// is larger than the size of a pixel at the limb. Pixels away from the middle are finer, so the shift looks like
+    /// a bend.
     pub km_per_px: f64,
     /// Change of the limb height by a bend of the whole edge with an RMS of one pixel, in kilometres.
     pub km_per_bend_px: f64,

@@ -1,8 +1,8 @@
 //! The MCAP container as bytes.
 //!
-//! Recordings are not written by a general writer, for two reasons. Pictures are in separate chunks without compression
-//! while all other data are compressed. A resumed or recovered file copies whole chunks without changes. The layout is
-//! that of the MCAP specification; the tests read it back with independent readers.
+//! Recordings are written here and not by a general writer, for two reasons. Pictures are in separate chunks without
+//! compression while all other data are compressed. A resumed or recovered file copies whole chunks without changes.
+//! The layout is that of the MCAP specification; the tests read it back with independent readers.
 
 mod chunk;
 mod op;
