@@ -1,5 +1,5 @@
-//! Writes what is derived from the keys of sensor.toml: the table of the documentation, the commented template, the
-//! JSON schema. `cargo xtask keys` calls it with the root of the repository.
+//! Writes the files that are derived from the keys of sensor.toml: the table of the documentation, the commented
+//! template and the JSON schema. `cargo xtask keys` calls it with the root of the repository.
 
 use std::path::Path;
 use std::{env, fs};

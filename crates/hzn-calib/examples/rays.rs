@@ -1,7 +1,7 @@
-//! Writes where pixels look and where that is seen: `cargo run -p hzn-calib --example rays -- sensor.toml`.
+//! Writes the rays of pixels and their projections: `cargo run -p hzn-calib --example rays -- sensor.toml`.
 //!
-//! Columns: a pixel's centre, its unit ray in the camera's axes, and the ray put back into the picture; one pixel in 16
-//! along both axes, without those outside the image circle.
+//! The columns are a pixel's centre (px), its unit ray in the camera frame, and the projection of that ray (px). The
+//! grid has one pixel in 16 along both axes; pixels outside the image circle are left out.
 
 use std::path::Path;
 

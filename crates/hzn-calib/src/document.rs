@@ -1,5 +1,5 @@
-//! A TOML file of another kind, read with the care of a sensor.toml: lines in errors, suggestions for misspelt names,
-//! and a `[camera]` that may come from another tool's `file`.
+//! Reads other TOML files with the same checks as a sensor.toml. Errors have line numbers, misspelt names get
+//! suggestions, and `[camera]` may come from the `file` of another tool.
 
 use std::path::Path;
 
@@ -10,11 +10,11 @@ use crate::Problem;
 use crate::located::{meaning, places, syntax, too_long};
 use crate::sensor::{camera_from_file, fill};
 
-/// Reads `text` as a `T`. `path` is named in messages, and a camera `file` is looked for beside it. `check` says what
-/// is wrong with a value that can be read: the key, as `[section] key`, and the rule.
+/// Reads `text` as a `T`. `path` is used in messages, and the path of a camera `file` is relative to its folder.
+/// `check` tests the value after it has been read. It returns the key, as `[section] key`, and the rule that is broken.
 ///
 /// # Errors
-/// The first thing wrong with the text.
+/// The first error in the text.
 pub fn parse<T: DeserializeOwned>(
     text: &str,
     path: &Path,
@@ -31,14 +31,14 @@ pub fn parse<T: DeserializeOwned>(
         && let Ok(camera) = DeTable::parse(&camera)
         && let Some(DeValue::Table(own)) = table.get_mut().get_mut("camera").map(toml::Spanned::get_mut)
     {
-        // What stands beside `file` stays.
+        // The keys next to `file` are kept.
         fill(own, camera.into_inner());
     }
     let value = T::deserialize(toml::Deserializer::from(table)).map_err(|e| meaning(&e, text, path, &places, &[]))?;
     check(&value).map_err(|(field, what)| {
         let problem = Problem::new(path, what).in_field(field.clone());
         let parts: Vec<&str> = field.split(|c: char| "[]. ".contains(c)).filter(|part| !part.is_empty()).collect();
-        // The key itself, or the section that it is missing from.
+        // The place of the key, or of the section that lacks it.
         let place = (1..=parts.len()).rev().find_map(|n| places.iter().find(|p| p.path == parts[..n]));
         match place {
             Some(place) => problem.at_offset(text, place.key.start),

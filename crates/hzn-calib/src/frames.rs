@@ -1,18 +1,18 @@
-//! `frames.csv`: what is known about every picture besides the picture itself.
+//! `frames.csv`: what is known about every picture before it is processed.
 //!
-//! Columns are found by name; all but `file` are optional, and an empty cell is a value that is not known.
+//! Columns are found by name. Only `file` is required; an empty cell is an unknown value.
 //!
 //! | column | meaning |
 //! |---|---|
 //! | `file` | name of the picture in the folder |
 //! | `time_s` | time in seconds, any epoch |
-//! | `utc` | the same as ISO 8601; it gives the time where `time_s` is empty |
+//! | `utc` | the same as ISO 8601; it is used if `time_s` is empty |
 //! | `altitude_km` | geodetic above WGS-84 for `earth`, else above the radius |
-//! | `x_km`, `y_km`, `z_km` | position in ECEF; beats the altitude |
+//! | `x_km`, `y_km`, `z_km` | position in ECEF; it overrides the altitude |
 //! | `qw`, `qx`, `qy`, `qz` | prior attitude, camera to ECEF |
-//! | `attitude_sigma_deg` | 1σ of that attitude, 5 where it is empty; above 30 the attitude is not used |
-//! | `sun_x`, `sun_y`, `sun_z` | direction to the Sun in the camera |
-//! | `rate_x`, `rate_y`, `rate_z` | rate of rotation of the camera in its own axes, rad/s; for a rolling shutter |
+//! | `attitude_sigma_deg` | 1σ of that attitude, 5 if it is empty; above 30 the attitude is not used |
+//! | `sun_x`, `sun_y`, `sun_z` | direction to the Sun in the camera frame |
+//! | `rate_x`, `rate_y`, `rate_z` | rate of rotation of the camera in the camera frame, rad/s; for a rolling shutter |
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ use hzn_core::{Config, Prior};
 use crate::nearest::nearest;
 use crate::{Problem, plausible, time};
 
-/// Columns that have a meaning.
+/// Names of the columns that are read.
 pub const COLUMNS: &[&str] = &[
     "file",
     "time_s",
@@ -48,18 +48,18 @@ pub const COLUMNS: &[&str] = &[
     "rate_z",
 ];
 
-/// One row.
+/// One row: the prior of one picture.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameData {
     /// Name of the picture.
     pub file: String,
     /// Line of the row in the file, from 1.
     pub line: usize,
-    /// Time in seconds: `time_s`, else `utc` since 1970.
+    /// Time in seconds: `time_s`, or `utc` since 1970 if `time_s` is empty.
     pub time_s: Option<f64>,
-    /// UTC in seconds since 1970.
+    /// `utc` in seconds since 1970.
     pub utc_s: Option<f64>,
-    /// Altitude in kilometres.
+    /// Altitude in kilometres: geodetic above WGS-84 for `earth`, else above the radius.
     pub altitude_km: Option<f64>,
     /// Position in ECEF, kilometres.
     pub position_km: Option<[f64; 3]>,
@@ -67,14 +67,15 @@ pub struct FrameData {
     pub camera_to_ecef_wxyz: Option<[f64; 4]>,
     /// 1-sigma of that attitude in degrees.
     pub attitude_sigma_deg: Option<f64>,
-    /// Direction to the Sun in the camera.
+    /// Direction to the Sun in the camera frame.
     pub sun_camera: Option<[f64; 3]>,
-    /// The camera's rate of rotation in its own axes, rad/s.
+    /// Rate of rotation of the camera in the camera frame, rad/s.
     pub rate_rad_s: Option<[f64; 3]>,
 }
 
 impl FrameData {
-    /// The same for the pipeline, in metres. `altitude_km` of the row beats `default_altitude_km`.
+    /// Converts the row to a prior of the pipeline, in metres and radians. `altitude_km` of the row overrides
+    /// `default_altitude_km`.
     pub fn to_frame<T: Real>(&self, default_altitude_km: Option<f64>) -> Prior<T> {
         Prior {
             altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::from_f64(km * 1e3)),
@@ -89,8 +90,9 @@ impl FrameData {
     }
 }
 
-/// Altitude in kilometres of a position (ECEF, kilometres): above WGS-84 for `earth`, else above the radius. `None` for
-/// Sun and Moon, whose distance a position about the Earth does not give.
+/// Returns the altitude in kilometres of a position (ECEF, kilometres): above WGS-84 for `earth`, else above the
+/// radius. The result is `None` for Sun and Moon, because a position relative to the Earth does not give their
+/// distance.
 pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Option<f64> {
     match kind {
         Kind::Earth => Some(geodetic(position_km.map(|km| km * 1e3), WGS84_A_M, WGS84_B_M).0 / 1e3),
@@ -99,9 +101,9 @@ pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Opti
     }
 }
 
-/// No camera of a limb is farther, in radii of its body: about twice the Moon's distance from the Earth.
+/// Largest plausible distance of a camera, in radii of the body: about twice the Moon's distance from the Earth.
 const FARTHEST_RADII: f64 = 120.0;
-/// Nothing rises or sinks as fast, in kilometres a second: what flies by the Earth does so at 11 to 20.
+/// Largest plausible rate of the altitude, in km/s. Objects that fly by the Earth reach 11 to 20 km/s.
 const FASTEST_KM_S: f64 = 30.0;
 
 /// A frames.csv that was read.
@@ -111,26 +113,26 @@ pub struct Frames {
     pub path: PathBuf,
     /// Rows in the file's order.
     pub rows: Vec<FrameData>,
-    /// What looks odd but stops nothing.
+    /// Warnings, which do not stop the run.
     pub warnings: Vec<Problem>,
     by_file: HashMap<String, usize>,
 }
 
 impl Frames {
-    /// What is known about the picture of this name.
+    /// Returns the row of the picture with this name.
     pub fn get(&self, file: &str) -> Option<&FrameData> {
         self.by_file.get(file).and_then(|&i| self.rows.get(i))
     }
 
-    /// Does it give any picture a time? It is then the one clock of the sequence.
+    /// Returns whether any picture has a time. The file is then the only clock of the sequence.
     pub fn has_times(&self) -> bool {
         self.rows.iter().any(|row| row.time_s.is_some())
     }
 
-    /// As [`Self::check_altitudes`], for every body of a sensor; each warning once.
+    /// Runs [`Self::check_altitudes`] for every body of a sensor. A warning is returned only once.
     pub fn check_sensor(&self, config: &Config) -> Vec<Problem> {
         let bodies = config.each_body();
-        // Altitudes are those above the Earth where Sun or Moon are looked for beside it.
+        // If Sun or Moon are sought together with the Earth, the altitudes are those above the Earth.
         let only_free = bodies.iter().all(|b| b.half_angle_is_free());
         let mut warnings: Vec<Problem> = Vec::new();
         for body in bodies.iter().filter(|b| only_free || !b.half_angle_is_free()) {
@@ -143,8 +145,8 @@ impl Frames {
         warnings
     }
 
-    /// Warnings for values that can be but look wrong: altitude and position of a row that differ by more than 0.1 km,
-    /// heights and positions that must be in metres, altitudes that are not used.
+    /// Returns warnings for values that are possible but look wrong: altitude and position of a row that differ by more
+    /// than 0.1 km, altitudes and positions that are probably in metres, and altitudes that are not used.
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
         let odd = |row: &FrameData| {
             let own = altitude_at_km(row.position_km?, kind, radius_km)?;
@@ -167,7 +169,7 @@ impl Frames {
         warnings
     }
 
-    /// One warning where altitudes, or their change from row to row, are those of metres.
+    /// Returns one warning if altitudes, or their change from row to row, are probably in metres.
     fn suspect_metres(&self, kind: Kind, radius_km: f64) -> Option<Problem> {
         if plausible::unused_altitude(kind).is_some() {
             return None;
@@ -186,7 +188,7 @@ impl Frames {
         Some(self.problem(row, what))
     }
 
-    /// A row that hzn-core refused, with the value that was given.
+    /// Returns the problem with a row that hzn-core refused, with the refused value.
     pub fn refused(&self, row: &FrameData, error: PriorError) -> Problem {
         let given = match error {
             PriorError::Altitude => row.altitude_km.map(|h| format!("{h}")),
@@ -199,7 +201,7 @@ impl Frames {
         self.problem(row, format!("{error}{given}"))
     }
 
-    /// A problem with one row, naming it and its picture.
+    /// Returns a problem with one row. It names the line and the picture.
     pub fn problem(&self, row: &FrameData, what: impl std::fmt::Display) -> Problem {
         Problem::new(&self.path, format!("{what}")).at_line(row.line).in_field(row.file.clone())
     }
@@ -208,8 +210,8 @@ impl Frames {
 /// Reads a frames.csv.
 ///
 /// # Errors
-/// A file that cannot be read, a missing `file` column, a cell that is no finite number, a vector given in part, a
-/// picture named twice.
+/// The file cannot be read, the column `file` is missing, a cell is not a finite number, a vector is incomplete, or a
+/// picture has two rows.
 pub fn load(path: &Path) -> Result<Frames, Problem> {
     let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Problem::new(path, "no such file"),
@@ -218,12 +220,12 @@ pub fn load(path: &Path) -> Result<Frames, Problem> {
     parse(&text, path)
 }
 
-/// As [`load`], from text; `path` is named in messages.
+/// Reads a frames.csv as [`load`] does, but from text; `path` is only used in messages.
 ///
 /// # Errors
-/// As [`load`].
+/// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
-    // Spreadsheets put a byte-order mark first.
+    // Spreadsheet programs write a byte-order mark first.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| broken(&e, path))?.clone();
@@ -412,7 +414,7 @@ mod tests {
         assert!(
             read("file,sun_x,sun_y,sun_z\na,0,0,0\n").unwrap_err().contains("sun_x, sun_y, sun_z: has no direction")
         );
-        // As spreadsheets of other countries write it.
+        // Spreadsheet programs of some countries write semicolons and decimal commas.
         assert!(
             read("file;altitude_km\r\na;1,5\r\n").unwrap_err().ends_with("separated by commas here, not by semicolons")
         );
@@ -438,7 +440,7 @@ mod tests {
             let all = read(text).unwrap().check_altitudes(kind, 6371.0);
             all.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
-        // A balloon: no height is too large, but the ascent is too fast.
+        // A balloon: no altitude is too large, but the ascent is too fast.
         let balloon = "file,time_s,altitude_km\na,0,300\nb,60,600\nc,120,3900\n";
         let told = odd(balloon, Kind::Earth);
         assert_eq!(told.len(), 1);

@@ -1,4 +1,4 @@
-//! Descriptions of a horizon sensor as they stand on disk.
+//! Reads and writes the files that describe a horizon sensor.
 //!
 //! | file | read by | gives |
 //! |---|---|---|
@@ -6,13 +6,13 @@
 //! | Kalibr camchain, OpenCV YAML, EuRoC `sensor.yaml` | [`camera_file::load`] | [`hzn_core::camera::Config`] |
 //! | `frames.csv` | [`frames::load`] | time, altitude, position, attitude of every picture |
 //!
-//! [`document`] reads TOML files of other crates, such as scene.toml, in the same way.
+//! [`document`] reads TOML files of other crates with the same checks, for example scene.toml.
 //!
 //! [`start`] writes a sensor.toml for a camera that nobody calibrated.
 //!
-//! Whatever is wrong with a file comes back as a [`Problem`]: which file, which line, which field, what was expected
-//! and, for a misspelt name, the nearest valid one. [`template`] writes a commented sensor.toml to start from; [`keys`]
-//! is what every key of it means. [`noise`] measures limb height and noise on the pictures of a flight.
+//! Every error is a [`Problem`]: it names the file, the line, the field and what was expected. For a misspelt name it
+//! suggests the nearest valid one. [`template`] is a commented sensor.toml to start from; [`keys`] describes every key.
+//! [`noise`] measures limb height and noise on the pictures of a flight.
 
 pub mod camera_file;
 pub mod document;

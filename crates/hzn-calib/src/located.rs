@@ -1,4 +1,4 @@
-//! Where things stand in a TOML file, and errors that say so in the file's own words.
+//! Places of keys in a TOML file, and errors that name these places in the terms of the file.
 
 use std::ops::Range;
 use std::path::Path;
@@ -12,12 +12,12 @@ use crate::Problem;
 use crate::keys::{self, Limits};
 use crate::nearest::suggestion;
 
-/// A key, or a list within a list, with where it stands: the dotted path, the key's bytes, the value's bytes.
+/// A key, or a list within a list, with its place: the dotted path, the bytes of the key and the bytes of the value.
 pub(crate) struct Place {
     pub(crate) path: Vec<String>,
     pub(crate) key: Range<usize>,
     value: Range<usize>,
-    /// What a list holds, 0 for what is none.
+    /// Number of items of a list; 0 for other values.
     items: usize,
 }
 
@@ -27,9 +27,9 @@ impl Place {
     }
 }
 
-/// `reject.threshold_px` as it is found in the file: `[reject] threshold_px`; of the second of several tables
-/// `[[bodies]] 2 radius_km`; the third of several lists `[mask] polygons_px 3`, and the second in that `polygons_px
-/// 3.2`.
+/// Formats `reject.threshold_px` as it is in the file: `[reject] threshold_px`. A key of the second of several tables
+/// is `[[bodies]] 2 radius_km`. The third of several lists is `[mask] polygons_px 3`, and the second list in it is
+/// `[mask] polygons_px 3.2`.
 fn field_name(path: &[String]) -> String {
     let nth = |place: &String| place.parse::<usize>().ok().map(|n| n + 1);
     let key = |rest: &[String]| {
@@ -47,7 +47,7 @@ fn field_name(path: &[String]) -> String {
     }
 }
 
-/// Every key of the file, those of inner tables too, and the lists within lists.
+/// Returns every key of the file, including those of inner tables, and the lists within lists.
 pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<Place>) {
         for (key, value) in table {
@@ -78,14 +78,14 @@ pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
     out
 }
 
-/// The first list that holds more than a sensor has room for: serde would tell of some without their number, and take
-/// the first values of others.
+/// Refuses the first list that is longer than the sensor's limit. serde alone would refuse some lists without their
+/// length, and would read only the first values of others.
 pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), Problem> {
     const ROWS: &str = "limb_height_by_latitude_km";
     for place in places {
         let parts: Vec<&str> = place.path.iter().map(String::as_str).collect();
         let (most, what) = match parts[..] {
-            // Those of `brown-conrady`.
+            // The limit is that of `brown-conrady`.
             ["camera", "k"] => (5, "numbers"),
             ["mount", "q_body_from_camera_wxyz"] => (4, "numbers"),
             ["mask", "polygons_px"] => (MAX_POLYGONS, "polygons"),
@@ -105,13 +105,13 @@ pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), 
     Ok(())
 }
 
-/// The innermost key whose name or value holds the byte `offset`.
+/// Returns the innermost key whose name or value contains the byte `offset`.
 fn place_of(places: &[Place], offset: usize) -> Option<&Place> {
     let holds = |p: &&Place| p.key.contains(&offset) || p.value.contains(&offset);
     places.iter().filter(holds).max_by_key(|p| p.path.len())
 }
 
-/// What is no TOML.
+/// Converts an error of the TOML syntax.
 pub(crate) fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
     let problem = Problem::new(path, format!("not valid TOML: {}", error.message().replace('\n', "; ")));
     match error.span() {
@@ -120,7 +120,7 @@ pub(crate) fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Proble
     }
 }
 
-/// serde's error, said in the file's own words. `taken` are keys of the top that serde does not know of.
+/// Translates serde's error into the terms of the file. `taken` are top-level keys that serde does not know.
 pub(crate) fn meaning(
     error: &toml::de::Error,
     text: &str,
@@ -131,12 +131,12 @@ pub(crate) fn meaning(
     let message = error.message();
     let offset = error.span().map(|s| s.start);
     let place = match error.span() {
-        // The table that lacks it, which may be the file as a whole.
+        // The place is the table that lacks the field, which may be the whole file.
         Some(span) if message.starts_with("missing field") => places.iter().find(|p| p.value == span),
         _ => offset.and_then(|o| place_of(places, o)),
     };
     let attach = |p: Problem| match offset {
-        // An error of the table as a whole, such as a missing section, has the first byte for its place.
+        // An error of the whole table, for example a missing section, points to the first byte. Its place is not shown.
         Some(o) if place.is_some() => p.at_offset(text, o),
         _ => p,
     };
@@ -179,7 +179,7 @@ pub(crate) fn meaning(
     attach(problem)
 }
 
-/// What is wrong with the value of a key that takes whole numbers, with that key's own limits. `None` for other keys.
+/// Returns the message for a wrong value of a whole-number key, with the limits of that key; `None` for other keys.
 fn whole_number(message: &str, place: Option<&Place>) -> Option<String> {
     let (given, expected) = message.split_once(", expected ")?;
     let most = match expected {
@@ -200,10 +200,10 @@ fn whole_number(message: &str, place: Option<&Place>) -> Option<String> {
     })
 }
 
-/// A value that hzn-core refused, with the place where it was given.
+/// Converts an error of hzn-core, with the place of the value.
 pub(crate) fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Place]) -> Problem {
     let what = match error.limit {
-        // A value that is missing.
+        // The value is missing.
         rule @ (Limit::Rule(_) | Limit::Feature { .. }) if error.value.is_nan() => rule.to_string(),
         rule if error.value.is_nan() => format!("nan is refused: {rule}"),
         rule => format!("{} is refused: {rule}", error.value),
@@ -211,16 +211,17 @@ pub(crate) fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Pl
     at_key(error.field, error.body, what, text, path, places)
 }
 
-/// A problem with a key as hzn-core names it, such as `camera.fx_px`, and of which of several bodies it is.
+/// Returns a problem with a key in hzn-core's notation, for example `camera.fx_px`. `body` is the index in
+/// `[[bodies]]`.
 pub(crate) fn at_key(key: &str, body: Option<u8>, what: String, text: &str, path: &Path, places: &[Place]) -> Problem {
     let mut parts: Vec<String> = key.split('.').map(str::to_owned).collect();
     if let Some(which) = body {
-        // Core says `body.` for the body's own keys, and no more for its level and its edge errors.
+        // hzn-core writes `body.` before the body's own keys, but not before its threshold and its edge errors.
         parts.retain(|p| p != "body");
         parts.splice(0..0, ["bodies".to_owned(), which.to_string()]);
     }
     let problem = Problem::new(path, what).in_field(field_name(&parts));
-    // The field itself, or the section that it is missing from.
+    // The place of the field, or of the section that lacks it.
     let place = (1..=parts.len()).rev().find_map(|n| places.iter().find(|p| p.path == parts[..n]));
     match place {
         Some(place) => problem.at_offset(text, place.key.start),

@@ -1,18 +1,18 @@
-//! The name that was probably meant.
+//! Finds the valid name that a misspelt name probably means.
 
-/// The candidate nearest to `name`, when one is near enough to be what was meant.
+/// Returns the candidate nearest to `name`; `None` if none is near enough to be a misspelling of it.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name = name.to_lowercase();
     let scored = candidates.into_iter().map(|c| {
         let typo = strsim::damerau_levenshtein(&name, c);
-        // `threshold` for `threshold_px`: the unit left out is as near as a slip of the finger.
+        // `threshold` for `threshold_px`: a missing unit counts as one typing error.
         let cut = name.len() >= 3 && (c.starts_with(&name) || name.starts_with(c));
         (if cut { typo.min(1) } else { typo }, c)
     });
     scored.min_by_key(|(distance, _)| *distance).filter(|(distance, c)| *distance <= 1 + c.len() / 4).map(|(_, c)| c)
 }
 
-/// `; did you mean x?`, or the list of what is valid.
+/// Returns `; did you mean x?`, or the list of valid names.
 pub(crate) fn suggestion(name: &str, valid: &[&str]) -> String {
     match (nearest(name, valid.iter().copied()), valid) {
         (_, []) => String::new(),

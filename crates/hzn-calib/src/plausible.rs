@@ -1,20 +1,21 @@
-//! Values that can be, and that nobody means: swapped, in another unit, or in another order.
+//! Finds values that are possible but probably a mistake: swapped, in another unit, or in another order.
 //!
-//! Each is only a warning, as an odd camera may exist. What cannot be is refused by hzn-core's own checks.
+//! Each of them is only a warning, because an unusual camera may exist. The checks of hzn-core refuse impossible
+//! values.
 
 use hzn_core::Config;
 use hzn_core::body;
 use hzn_core::camera::{self, Camera, Model};
 use hzn_core::pixel::ImagePoint;
 
-/// What is odd about a value.
+/// A value that looks wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Doubt {
-    /// The key of sensor.toml, such as `camera.fx_px`.
+    /// The key of sensor.toml, for example `camera.fx_px`.
     pub key: &'static str,
-    /// Which of several `[[bodies]]` it belongs to, from 0.
+    /// Index of the body in `[[bodies]]`, from 0; `None` if there is only a `[body]`.
     pub body: Option<u8>,
-    /// In words, with what it may have been meant to be.
+    /// The warning, with the value that was probably meant.
     pub what: String,
 }
 
@@ -24,26 +25,26 @@ impl Doubt {
     }
 }
 
-/// The principal point of a camera lies within this part of the picture's side from its middle, unless the picture was
-/// cut.
+/// Largest usual distance of the principal point from the picture's middle, as a fraction of the side. A cropped
+/// picture may exceed it.
 const OFF_CENTRE: f64 = 0.2;
-/// Focal lengths along x and y differ by no more than this part: pixels are square.
+/// Largest usual relative difference between the focal lengths along x and y, because pixels are square.
 const SQUARE: f64 = 0.2;
-/// Pinhole lenses show no more from side to side, in degrees.
+/// Largest usual field of view of a pinhole lens from side to side, in degrees.
 const WIDEST_PINHOLE_DEG: f64 = 150.0;
-/// Fisheye lenses show no more, in degrees.
+/// Largest usual field of view of a fisheye lens, in degrees.
 const WIDEST_FISHEYE_DEG: f64 = 250.0;
-/// Telescopes show less than this, in degrees, and have no limb in view.
+/// Smallest usual field of view, in degrees. Telescopes have a smaller one, and no limb in view.
 const NARROWEST_DEG: f64 = 0.5;
-/// Tangential coefficients come from a lens that sits askew, by little.
+/// Largest usual tangential coefficient. It comes from a small tilt of the lens.
 const TANGENTIAL: f64 = 0.05;
-/// From farther than this many radii a body is a disc of less than 3 degrees, and from farther than geostationary orbit
-/// pictures of the Earth are rare.
+/// Largest usual altitude, in radii of the body. From farther away a body is a disc of less than 3 degrees, and
+/// pictures of the Earth from beyond geostationary orbit are rare.
 const FAR_RADII: f64 = 40.0;
-/// Farther than geostationary orbit: kilometres above the Earth.
+/// Largest usual altitude above the Earth, in kilometres: just beyond geostationary orbit.
 pub(crate) const FAR_KM: f64 = 40_000.0;
 
-/// Everything odd about a sensor.
+/// Returns every value of a sensor that looks wrong.
 pub fn doubts(config: &Config) -> Vec<Doubt> {
     let mut doubts = of_camera(&config.camera);
     if let Some(mount) = &config.mount
@@ -60,7 +61,7 @@ pub fn doubts(config: &Config) -> Vec<Doubt> {
     doubts
 }
 
-/// Beyond which altitude in kilometres metres are suspected.
+/// Returns the altitude in kilometres above which it is probably in metres.
 pub(crate) fn far_km(body: body::Kind, radius_km: f64) -> f64 {
     match body {
         body::Kind::Earth | body::Kind::EarthSphere => FAR_KM,
@@ -79,7 +80,8 @@ fn of_body(body: &body::Config) -> Option<Doubt> {
     })
 }
 
-/// What is said where an altitude is given for the Sun or the Moon, whose cone does not follow from it.
+/// Returns the warning for an altitude of the Sun or the Moon, whose half-angle does not depend on it. The result is
+/// `None` for other bodies.
 pub fn unused_altitude(body: body::Kind) -> Option<String> {
     match body {
         body::Kind::Moon => Some(format!(
@@ -120,7 +122,7 @@ fn centre(c: &camera::Config) -> Option<Doubt> {
     } else if off(c.cy_px, c.cx_px) <= OFF_CENTRE / 2.0 {
         ": are cx_px and cy_px, or width and height, swapped?".to_owned()
     } else {
-        // The middle of a picture of another size.
+        // The centre may be the middle of a picture of another size.
         let [a, b] = [(c.cx_px + 0.5) / w * 2.0, (c.cy_px + 0.5) / h * 2.0];
         if a > 0.0 && b > 0.0 && (a / b - 1.0).abs() < 0.2 {
             let [w, h] = [w * a, h * b].map(f64::round);
@@ -162,14 +164,15 @@ fn focal(c: &camera::Config) -> Option<Doubt> {
     })
 }
 
-/// How far off axis the middle of the picture's farther side is, degrees.
+/// Returns the half-width of the field of view: the mean angle off axis of the middles of the picture's left and right
+/// sides, in degrees.
 fn half_width_deg(c: &camera::Config) -> Option<f64> {
-    // Beyond a half turn there are no rays.
+    // Beyond 180 degrees there are no rays.
     let linear = linear_half_width_deg(c);
     if linear > 180.0 {
         return Some(linear);
     }
-    // The whole lens, whatever its image circle.
+    // The whole lens counts, without the limit of its image circle.
     let free = camera::Config { theta_max_deg: None, ..c.clone() };
     let camera = Camera::<f64>::try_new(&free).or_else(|_| Camera::try_new(c)).ok()?;
     let side = |u: f64| camera.unproject(ImagePoint { u, v: c.cy_px });
@@ -179,12 +182,12 @@ fn half_width_deg(c: &camera::Config) -> Option<f64> {
     });
     match (left, right) {
         (Some(a), Some(b)) => Some((a + b) / 2.0),
-        // Without a ray it is beyond what the lens shows.
+        // If a side has no ray, it is beyond the range of the lens.
         _ => Some(linear),
     }
 }
 
-/// As [`half_width_deg`], of a lens without coefficients.
+/// Returns the same as [`half_width_deg`], for a lens without coefficients.
 fn linear_half_width_deg(c: &camera::Config) -> f64 {
     let half = f64::from(c.width) / 2.0 / c.fx_px;
     if c.model.is_planar() { half.atan().to_degrees() } else { half.to_degrees() }
@@ -209,7 +212,8 @@ fn coefficients(c: &camera::Config) -> Option<Doubt> {
     }
 }
 
-/// Five coefficients where a fisheye lens has four: those of Braun & Barf 2022, (13), and what hzn calls them.
+/// Returns the message for a fisheye lens with five coefficients instead of four. They are those of Braun & Barf 2022,
+/// (13); the message has hzn's coefficients for the same lens.
 pub(crate) fn five_coefficients(c: &camera::Config) -> Option<String> {
     let [first, higher @ ..] = c.k.as_slice() else { return None };
     if c.model != Model::KannalaBrandt || higher.len() != 4 || higher.last() == Some(&0.0) {
@@ -257,7 +261,7 @@ mod tests {
         assert!(hd([1200.0, 675.0], [960.0, 540.0]).contains("fy_px = 675 make pixels that are not square"));
         assert!(hd([8.0; 2], [960.0, 540.0]).contains("field of view of 179 degrees: is it in millimetres?"));
         assert!(hd([500_000.0; 2], [960.0, 540.0]).contains("field of view of 0.22 degrees"));
-        // HORACE's, a telescope's for the Moon, and a fisheye's with its image circle.
+        // HORACE's camera, a telescope for the Moon, and a fisheye lens with its image circle.
         assert_eq!(told(&camera(Model::Pinhole, [1024, 768], [2133.0; 2], [511.5, 383.5], &[])), "");
         assert_eq!(told(&camera(Model::Pinhole, [2048, 1944], [9200.0; 2], [1023.5, 971.5], &[])), "");
         let fisheye =

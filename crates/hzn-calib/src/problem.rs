@@ -1,47 +1,47 @@
-//! One thing that is wrong with a file, said so that it can be put right.
+//! An error in a file, with its place and a remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What is wrong, and where. Displayed as `sensor.toml:14: [reject] threshold_pxx: unknown key; did you mean …`.
+/// An error and its place. It is displayed as `sensor.toml:14: [reject] threshold_pxx: unknown key; did you mean …`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problem {
     /// The file.
     pub path: PathBuf,
     /// Line, from 1.
     pub line: Option<usize>,
-    /// Column in characters, from 1; only where the line alone does not say it.
+    /// Column in characters, from 1; set only if the line alone does not show the place.
     pub column: Option<usize>,
-    /// The field, such as `[reject] threshold_px` or `altitude_km`.
+    /// The field, for example `[reject] threshold_px` or `altitude_km`.
     pub field: Option<String>,
-    /// What is wrong and what to do.
+    /// The error and a remedy.
     pub what: String,
 }
 
 impl Problem {
-    /// A problem with the file as a whole.
+    /// Creates a problem with the file as a whole.
     pub fn new(path: &Path, what: impl Into<String>) -> Self {
         Self { path: path.to_owned(), line: None, column: None, field: None, what: what.into() }
     }
-    /// The same problem at this line (from 1).
+    /// Returns the same problem at this line (from 1).
     #[must_use]
     pub fn at_line(mut self, line: usize) -> Self {
         self.line = Some(line);
         self
     }
-    /// The same problem at a byte offset of `text`.
+    /// Returns the same problem at the line of a byte offset of `text`.
     #[must_use]
     pub fn at_offset(self, text: &str, offset: usize) -> Self {
         self.at_line(line_column(text, offset).0)
     }
-    /// The same problem at a byte offset of `text`, with the column.
+    /// Returns the same problem at the line and column of a byte offset of `text`.
     #[must_use]
     pub fn at_exactly(mut self, text: &str, offset: usize) -> Self {
         let (line, column) = line_column(text, offset);
         (self.line, self.column) = (Some(line), Some(column));
         self
     }
-    /// The same problem in this field.
+    /// Returns the same problem in this field.
     #[must_use]
     pub fn in_field(mut self, field: impl Into<String>) -> Self {
         self.field = Some(field.into());
@@ -67,7 +67,7 @@ impl fmt::Display for Problem {
 
 impl std::error::Error for Problem {}
 
-/// Line and column in characters, both from 1, of a byte offset.
+/// Returns line and column, both from 1, of a byte offset. Columns count characters.
 fn line_column(text: &str, offset: usize) -> (usize, usize) {
     let before: String = text.bytes().take(offset).map(char::from).collect();
     let line = before.matches('\n').count() + 1;

@@ -1,8 +1,8 @@
 //! `sensor.toml`: one file that describes a sensor.
 //!
-//! The structure is [`hzn_core::Config`] with two keys more: `preset` at the top, and `file` in `[camera]`, which
-//! takes the calibration from another tool's file (see [`crate::camera_file`]; its path is relative to the
-//! sensor.toml, and `camera = "cam1"` beside it picks one of several).
+//! The structure is [`hzn_core::Config`] with two more keys: `preset` at the top, and `file` in `[camera]`. `file`
+//! takes the calibration from another tool's file (see [`crate::camera_file`]). Its path is relative to the
+//! sensor.toml. `camera = "cam1"` next to it selects one of several cameras.
 
 use std::ops::Range;
 use std::path::Path;
@@ -21,18 +21,18 @@ use crate::{Problem, camera_file, plausible};
 /// A sensor.toml that was read and checked.
 #[derive(Debug, Clone)]
 pub struct Sensor {
-    /// What it says.
+    /// The configuration.
     pub config: Config,
-    /// The file's text as it stands on disk, to be kept beside results.
+    /// The text of the file as it is on disk, to be stored with the results.
     pub text: String,
-    /// Values that can be but look wrong, such as a swapped width and height.
+    /// Warnings about values that are possible but look wrong, for example a swapped width and height.
     pub warnings: Vec<Problem>,
 }
 
-/// Reads and checks a sensor.toml, lens included.
+/// Reads and checks a sensor.toml, including its lens.
 ///
 /// # Errors
-/// The first thing wrong with it.
+/// The first error in the file.
 pub fn load(path: &Path) -> Result<Sensor, Problem> {
     let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => {
@@ -44,13 +44,14 @@ pub fn load(path: &Path) -> Result<Sensor, Problem> {
     parse(&text, path)
 }
 
-/// As [`load`], from text. `path` is named in messages, and a camera `file` is looked for beside it.
+/// Reads a sensor.toml as [`load`] does, but from text. `path` is used in messages, and the path of a camera `file` is
+/// relative to its folder.
 ///
 /// # Errors
-/// The first thing wrong with the text.
+/// The first error in the text.
 pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     let mut table = DeTable::parse(text).map_err(|e| syntax(&e, text, path))?;
-    // Places of every key, for errors found after the text is gone.
+    // The place of every key, for errors that are found after the table is consumed.
     let places = places(table.get_ref());
     let preset = match take(table.get_mut(), "preset") {
         None => Preset::default(),
@@ -72,8 +73,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     too_long(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
-        // `Config` wants a camera; this one stands in until the file's own is put in below. What stands beside `file`
-        // stays.
+        // `Config` requires a camera. This one is a placeholder; the camera of the file replaces it below. The keys
+        // next to `file` are kept.
         let stand_in = DeTable::parse("width = 2\nheight = 2\nfx_px = 1.0\nfy_px = 1.0\ncx_px = 0.0\ncy_px = 0.0\n");
         if let (Ok(stand_in), Some(DeValue::Table(own))) =
             (stand_in, table.get_mut().get_mut("camera").map(toml::Spanned::get_mut))
@@ -100,7 +101,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     Ok(Sensor { config, text: text.to_owned(), warnings })
 }
 
-/// The preset of that name, or what is wrong with it.
+/// Returns the preset of that name, or the reason why it cannot be used.
 fn preset_named(name: &str) -> Result<Preset, String> {
     let preset = Preset::named(name).ok_or_else(|| {
         let names: Vec<&str> = Preset::ALL.iter().map(|p| p.name()).collect();
@@ -110,7 +111,7 @@ fn preset_named(name: &str) -> Result<Preset, String> {
     Ok(preset)
 }
 
-/// A preset as the text of a sensor.toml without camera.
+/// Writes a preset as the text of a sensor.toml without camera.
 fn starting_values(preset: Preset) -> String {
     let mut table =
         match toml::Table::try_from(Config::preset(preset, camera::Config::ideal(Model::Pinhole, 2, 2, 1.0))) {
@@ -121,7 +122,7 @@ fn starting_values(preset: Preset) -> String {
     table.to_string()
 }
 
-/// Puts in from `values` what `table` does not have. Nothing put in has a place in the file.
+/// Adds to `table` the entries of `values` that it does not have. The added entries have no place in the file.
 pub(crate) fn fill<'i>(table: &mut DeTable<'i>, values: DeTable<'i>) {
     for (key, value) in values {
         match (table.get_mut(key.get_ref().as_ref()), value.into_inner()) {
@@ -145,10 +146,10 @@ pub(crate) fn fill<'i>(table: &mut DeTable<'i>, values: DeTable<'i>) {
     }
 }
 
-/// Everything that `Horizon::new` would refuse.
+/// Checks everything that `Horizon::new` checks.
 ///
 /// # Errors
-/// The first field out of its limits.
+/// The first field that is out of its limits.
 pub fn check(config: &Config) -> Result<(), ConfigError> {
     config.check()?;
     Camera::<f64>::try_new(&config.camera).map(|_| ())
@@ -161,10 +162,10 @@ fn take<'i>(table: &mut DeTable<'i>, name: &str) -> Option<(DeValue<'i>, Range<u
     })
 }
 
-/// What camera files do not say.
+/// The keys of `[camera]` that camera files do not have. They may be next to `file`.
 const BESIDE_FILE: [&str; 4] = ["focal_sigma_percent", "centre_sigma_px", "covariance", "readout_s"];
 
-/// The calibration that `file` in `[camera]` names, taken out of the table; `None` when it names none.
+/// Takes `file` and its options out of the `[camera]` table and loads the calibration; `None` if there is no `file`.
 pub(crate) fn camera_from_file(
     table: &mut DeTable<'_>,
     text: &str,
@@ -331,7 +332,7 @@ mod tests {
             camera("fx_px = 500.0", "fx_px = nan"),
             "s.toml:5: [camera] fx_px: nan is refused: must be a finite number"
         );
-        // A value that is missing has no number to be told.
+        // A missing value has no number that the message could show.
         assert_eq!(
             error("[body]\nkind = \"sphere\"\naltitude_km = 9\n"),
             "sensor.toml:9: [body] radius_km: a sphere needs its radius in km"
@@ -360,7 +361,7 @@ mod tests {
         assert!(moon.starts_with("s.toml:11: [body] altitude_km: is not used: kind = \"moon\""), "{moon}");
         let two = "[[bodies]]\naltitude_km = 400\n[[bodies]]\nkind = \"sphere\"\nradius_km = 1\naltitude_km = 100\n";
         assert!(warned(format!("{CAMERA}{two}")).starts_with("s.toml:14: [[bodies]] 2 altitude_km: 100 km is farther"));
-        // The preset moon gives none.
+        // The preset `moon` gives no warning.
         assert_eq!(warned(format!("preset = \"moon\"\n{CAMERA}")), "");
         let five = CAMERA.replace("pinhole", "kannala-brandt") + "k = [1.0, -0.055, 0.011, -0.0035, 0.0002]\n";
         let message = parse(&five, Path::new("s.toml")).unwrap_err().to_string();
@@ -417,7 +418,7 @@ mod tests {
             error(&format!("[[bodies]]\nkind = \"sun\"\n[[bodies]]\n{rows}")),
             "sensor.toml:12: [[bodies]] 2 limb_height_by_latitude_km: 17 rows, at most 16 can be given"
         );
-        // Of these serde would take the first numbers and forget the others.
+        // serde alone would read the first numbers of these lists and ignore the others.
         for (text, what) in [
             (
                 "[mount]\nq_body_from_camera_wxyz = [1, 0, 0, 0, 0]\n",
@@ -432,7 +433,7 @@ mod tests {
         ] {
             assert_eq!(error(text), format!("sensor.toml:10: {what} can be given"));
         }
-        // What is just full is taken.
+        // Lists of exactly the maximum length are accepted.
         assert!(parse(&format!("{CAMERA}k = {}\n", list("0.0", 5)), Path::new("s.toml")).is_ok());
         let full = format!("{CAMERA}[mask]\npolygons_px = {}\n", list(&polygon(16), 8));
         assert!(parse(&full, Path::new("s.toml")).is_ok());

@@ -1,94 +1,97 @@
-//! A sensor.toml for a camera that nobody calibrated: from the size of its pictures and either a stated field of view
-//! or what the camera wrote into EXIF.
+//! Writes a sensor.toml for a camera without a calibration. It needs the size of the pictures and either a stated field
+//! of view or the EXIF data of a picture.
 //!
-//! What is not known is written as a sigma, so that the answers are as uncertain as the lens:
+//! Unknown properties of the lens are written as sigmas, so that the covariance of the answers includes them:
 //!
-//! - **Scale.** Makers state the focal length of a series lens, and so its field of view, to ± 5 %: evenly within that,
-//!   1-sigma is 5 %/√3. EXIF holds the nominal focal length, of a zoom in steps and without the change by focusing: ±
-//!   10 %. The 35 mm equivalent is rounded to a millimetre, too.
-//! - **Shape.** The ideal lens (pinhole or equidistant) holds at the picture's edges, where the field of view is
-//!   stated; in the middle the real one differs. An equisolid lens, 2 sin (θ/2), lies θ²/24 below the equidistant one;
-//!   a pinhole lens with an eighth of the equidistant lens's barrel distortion, θ²/3, differs by as much.
-//! - **Centre.** Published calibrations put the principal point this far from the picture's centre, in percent of the
-//!   width (x, y): EuRoC 1.1, 1.2; TUM RGB-D fr1 0.1, 2.5; KITTI odometry 1.0, 0.2. Their root mean square is 1.3 %;
-//!   1.5 % is written. A picture that was cropped on one side is not covered.
+//! - **Scale.** Makers state the focal length of a series lens, and thus its field of view, to ± 5 %. With a uniform
+//!   distribution in this range 1-sigma is 5 %/√3. EXIF has the nominal focal length: ± 10 %. A zoom lens gives it in
+//!   steps, and it does not include the change by focusing. The 35 mm equivalent is also rounded to a millimetre.
+//! - **Shape.** The ideal lens (pinhole or equidistant) is exact at the picture's edges, where the field of view is
+//!   stated; in the middle the real lens differs. An equisolid lens, 2 sin (θ/2), lies θ²/24 below the equidistant
+//!   lens. A pinhole lens with one eighth of the equidistant lens's barrel distortion, θ²/3, differs by the same
+//!   amount.
+//! - **Centre.** In published calibrations the distance of the principal point from the picture's centre is, in percent
+//!   of the width (x, y): EuRoC 1.1, 1.2; TUM RGB-D fr1 0.1, 2.5; KITTI odometry 1.0, 0.2. Their root mean square is
+//!   1.3 %; 1.5 % is written. A picture that is cropped on one side is not covered.
 //!
-//! No data base of sensor sizes is asked: LensFun's is kept up, but under a licence that this project cannot take over
-//! (CC BY-SA; its crate LGPL), and openMVG's has stood still since 2019. Cameras that write a focal length mostly write
-//! the pitch of their pixels or the 35 mm equivalent with it.
+//! No database of sensor sizes is used. LensFun's is maintained, but this project cannot adopt its licence (CC BY-SA;
+//! its crate LGPL). openMVG's has not changed since 2019. Cameras that write a focal length mostly also write the pitch
+//! of their pixels or the 35 mm equivalent.
 
 use core::fmt::Write as _;
 
 use hzn_core::camera::Model;
 
-/// Of the focal length of a series lens, percent, 1-sigma: evenly within ± 5 %.
+/// 1-sigma of a series lens's focal length, in percent: uniform within ± 5 %.
 const STATED_PERCENT: f64 = 5.0 / SQRT_3;
-/// Of the focal length in EXIF: evenly within ± 10 %.
+/// 1-sigma of the focal length in EXIF, in percent: uniform within ± 10 %.
 const EXIF_PERCENT: f64 = 10.0 / SQRT_3;
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
-/// Of the principal point, as a part of the width.
+/// 1-sigma of the principal point, as a fraction of the width.
 const CENTRE_PART: f64 = 0.015;
-/// Of an altitude that was said once for all pictures, as a part of it: orbits are not round.
+/// 1-sigma of an altitude that is given once for all pictures, as a fraction of it. Orbits are not circular.
 const ALTITUDE_PART: f64 = 0.02;
-/// Sides of the 35 mm film, millimetres.
+/// Sides of the 35 mm film, in millimetres.
 const FILM_MM: [f64; 2] = [36.0, 24.0];
-/// Above this width nobody's lens is a pinhole unless it is said, degrees.
+/// Largest stated field of view, in degrees, for which a pinhole is assumed if the lens is not given.
 const PINHOLE_UNSAID_DEG: f64 = 90.0;
 
-/// What the picture's EXIF says of the lens; every field may be missing.
+/// EXIF data of a picture about the lens; every field may be missing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Exif {
     /// Maker's name of the camera.
     pub camera: Option<String>,
-    /// `FocalLength`, millimetres.
+    /// `FocalLength`, in millimetres.
     pub focal_mm: Option<f64>,
-    /// `FocalLengthIn35mmFilm`, millimetres.
+    /// `FocalLengthIn35mmFilm`, in millimetres.
     pub focal_35mm_mm: Option<f64>,
-    /// `FocalPlaneXResolution` in its unit: pixels a millimetre on the sensor.
+    /// `FocalPlaneXResolution`, converted to pixels per millimetre on the sensor.
     pub plane_px_per_mm: Option<f64>,
-    /// `PixelXDimension`: columns of the picture as the camera wrote it; another width was scaled since.
+    /// `PixelXDimension`: columns of the picture as the camera wrote it. A picture with another width was scaled later.
     pub columns: Option<f64>,
-    /// `DigitalZoomRatio`, where the camera enlarged its picture.
+    /// `DigitalZoomRatio`, if the camera enlarged its picture.
     pub digital_zoom: Option<f64>,
     /// Whether a viewer turns the picture by 90 degrees (`Orientation` 5 to 8).
     pub turned: bool,
 }
 
-/// What is known of a camera.
+/// Known properties of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Known {
     /// Columns and rows of its pictures.
     pub size_px: [u32; 2],
-    /// Stated field of view over the whole width, degrees.
+    /// Stated field of view over the whole width, in degrees.
     pub fov_deg: Option<f64>,
-    /// [`Model::Pinhole`] or [`Model::Equidistant`]; left out: a pinhole, where the field of view allows it.
+    /// [`Model::Pinhole`] or [`Model::Equidistant`]. If it is missing, a pinhole is assumed. A stated field of view
+    /// above 90 degrees requires it.
     pub lens: Option<Model>,
-    /// What a picture says.
+    /// EXIF data of a picture.
     pub exif: Exif,
-    /// Altitude of all pictures, kilometres.
+    /// Altitude of all pictures, in kilometres.
     pub altitude_km: Option<f64>,
 }
 
-/// A sensor.toml to start from.
+/// A sensor.toml to start from, with its main values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
-    /// The file's text.
+    /// Text of the file.
     pub text: String,
-    /// Its lens.
+    /// Lens model.
     pub lens: Model,
-    /// Its focal length, pixels.
+    /// Focal length, in pixels.
     pub focal_px: f64,
-    /// Field of view over the whole width, degrees.
+    /// Field of view over the whole width, in degrees.
     pub fov_deg: f64,
-    /// 1-sigma of the focal length, percent.
+    /// 1-sigma of the focal length, in percent.
     pub focal_sigma_percent: f64,
-    /// 1-sigma of the principal point, pixels.
+    /// 1-sigma of the principal point, in pixels.
     pub centre_sigma_px: f64,
-    /// What the user should look at.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Focal length in pixels of an ideal lens that sees `fov_deg` over `width` pixels; `None` where it cannot.
+/// Returns the focal length in pixels of an ideal lens that sees `fov_deg` over `width` pixels. The result is `None` if
+/// the lens cannot have this field of view: not above 0, above 300 degrees, or from 180 degrees on for a pinhole.
 pub fn focal_px(lens: Model, width: f64, fov_deg: f64) -> Option<f64> {
     let half = (0.5 * fov_deg).to_radians();
     let radius = match lens {
@@ -99,14 +102,14 @@ pub fn focal_px(lens: Model, width: f64, fov_deg: f64) -> Option<f64> {
     (radius > 0.0 && fov_deg <= 300.0).then(|| 0.5 * width / radius)
 }
 
-/// Field of view in degrees over `width` pixels.
+/// Returns the field of view in degrees over `width` pixels.
 fn fov_deg(lens: Model, width: f64, focal_px: f64) -> f64 {
     let radius = 0.5 * width / focal_px;
     let half = if lens == Model::Pinhole { radius.atan() } else { radius };
     2.0 * half.to_degrees()
 }
 
-/// A focal length in pixels with its 1-sigma in percent, and where it comes from.
+/// A focal length in pixels with its 1-sigma in percent and its source.
 #[derive(Debug, Clone, PartialEq)]
 struct Focal {
     px: f64,
@@ -115,7 +118,7 @@ struct Focal {
 }
 
 impl Exif {
-    /// What EXIF says of the focal length of a picture of this size.
+    /// Returns the focal length from EXIF for a picture of this size (pixels).
     fn focal(&self, [width, height]: [f64; 2]) -> Option<Focal> {
         let sound = |x: Option<f64>| x.filter(|x| x.is_finite() && *x > 0.0);
         if let (Some(mm), Some(px_per_mm)) = (sound(self.focal_mm), sound(self.plane_px_per_mm)) {
@@ -123,8 +126,7 @@ impl Exif {
                 sound(self.columns).map_or(1.0, |columns| width / columns) * sound(self.digital_zoom).unwrap_or(1.0);
             let px = mm * px_per_mm * scale;
             let pitch_um = 1e3 / (px_per_mm * scale);
-            // Some programs write nonsense there: no sensor has pixels of less than half a micrometre or more than 0.1
-            // mm.
+            // Some programs write wrong values there. No sensor has pixels below half a micrometre or above 0.1 mm.
             if (0.5..100.0).contains(&pitch_um) {
                 return Some(Focal {
                     px,
@@ -134,7 +136,8 @@ impl Exif {
             }
         }
         let mm = sound(self.focal_35mm_mm)?;
-        // The equivalent compares diagonals; a picture wider than the film was cropped in height, and keeps its width.
+        // The 35 mm equivalent compares diagonals. A picture wider than the film is cropped in height and keeps its
+        // width.
         let [film_width, film_height] = FILM_MM;
         let px = if width * film_height > height * film_width {
             mm * width / film_width
@@ -146,10 +149,11 @@ impl Exif {
     }
 }
 
-/// Writes a sensor.toml that works at once, with what nobody measured as a sigma.
+/// Writes a sensor.toml that works at once. Values that are not measured have a sigma.
 ///
 /// # Errors
-/// Nothing gives a focal length; a field of view that the lens cannot have; a width at which the lens must be said.
+/// There is no focal length, the lens cannot have the field of view, or the field of view is so wide that the lens must
+/// be given.
 pub fn sensor_toml(known: &Known) -> Result<Start, String> {
     let [width, height] = known.size_px.map(f64::from);
     if let Some(fov) = known.fov_deg.filter(|f| !(*f > 0.1 && *f <= 300.0)) {
@@ -187,10 +191,10 @@ pub fn sensor_toml(known: &Known) -> Result<Start, String> {
     Ok(Start { text, ..start })
 }
 
-/// The focal length that counts, with warnings, and what the other says of it.
+/// The chosen focal length, warnings, and a note about the other focal length.
 type Chosen = (Focal, Vec<String>, Option<String>);
 
-/// A stated field of view counts for more than EXIF, which is compared with it.
+/// Chooses the focal length: a stated field of view overrides EXIF, which is only compared with it.
 fn choose(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: f64) -> Result<Chosen, String> {
     match (stated, exif) {
         (Some(stated), Some(exif)) => {
@@ -306,7 +310,7 @@ mod tests {
         Known { size_px: [4928, 2768], fov_deg, lens, exif, altitude_km: Some(418.0) }
     }
 
-    /// The ISS's Nikon D4 of 20 November 2020.
+    /// The Nikon D4 on the ISS, 20 November 2020.
     fn d4() -> Exif {
         Exif {
             camera: Some("NIKON D4".into()),
@@ -324,7 +328,7 @@ mod tests {
             let start = sensor_toml(&known(Some(fov), Some(lens), Exif::default())).unwrap();
             let config = crate::sensor::parse(&start.text, Path::new("s.toml")).unwrap().config;
             let camera = hzn_core::camera::Camera::<f64>::try_new(&config.camera).unwrap();
-            // The middle of the right edge, half a pixel beyond the last centre.
+            // The middle of the right edge, half a pixel beyond the centre of the last column.
             let edge = camera.unproject(hzn_core::pixel::ImagePoint { u: 4927.5, v: 1383.5 }).unwrap();
             let off_axis = edge.xyz()[0].atan2(edge.xyz()[2]).to_degrees();
             assert!((off_axis - 0.5 * fov).abs() < 0.01, "{} {off_axis}", start.text);
@@ -338,18 +342,18 @@ mod tests {
     fn exif_gives_the_nominal_focal_length_by_either_way() {
         let start = sensor_toml(&known(None, None, d4())).unwrap();
         assert!((start.focal_px - 7666.0).abs() < 1.0, "{}", start.focal_px);
-        // The limb says 7100 px: within two sigmas.
+        // The limb gives 7100 px, which is within two sigmas.
         assert!((start.focal_px / 7100.0 - 1.0) < 0.02 * start.focal_sigma_percent, "{start:?}");
         let film = sensor_toml(&known(None, None, Exif { plane_px_per_mm: None, ..d4() })).unwrap();
         assert!((film.focal_px - 7666.0).abs() < 1.0, "{}", film.focal_px);
         assert!(film.focal_sigma_percent >= start.focal_sigma_percent);
-        // A third of the size: the columns that the camera wrote tell so.
+        // A third of the size: the number of columns in EXIF shows the scale.
         let small = Known { size_px: [1600, 899], ..known(None, None, d4()) };
         assert!((sensor_toml(&small).unwrap().focal_px - 7666.0 * 1600.0 / 4928.0).abs() < 1.0);
-        // Nonsense: pixels of 10 nm.
+        // A wrong EXIF value: pixels of 10 nm.
         let odd = Exif { plane_px_per_mm: Some(1e5), ..d4() };
         assert!((sensor_toml(&known(None, None, odd)).unwrap().focal_px - 7666.0).abs() < 1.0);
-        // A telephone: 4:3, compared by the diagonal.
+        // A telephone: its 4:3 picture is compared by the diagonal.
         let phone = Exif { focal_35mm_mm: Some(26.0), ..Exif::default() };
         let phone = sensor_toml(&Known { size_px: [4000, 3000], ..known(None, None, phone) }).unwrap();
         assert!((phone.focal_px - 26.0 * 5000.0 / 43.267).abs() < 1.0, "{}", phone.focal_px);
@@ -363,7 +367,7 @@ mod tests {
         assert!(agreed.warnings.is_empty() && agreed.text.contains("beside it EXIF"), "{}", agreed.text);
         assert!((agreed.fov_deg - 37.0).abs() < 1e-9);
         assert!(both(60.0).warnings[0].contains("contradicts"));
-        // What is stated counts for more.
+        // The stated value overrides EXIF.
         assert!(agreed.focal_sigma_percent < sensor_toml(&known(None, None, d4())).unwrap().focal_sigma_percent);
     }
 

@@ -1,6 +1,6 @@
-//! A commented sensor.toml to start from, as [`crate::keys::template`] makes it.
+//! A commented sensor.toml to start from. [`crate::keys::template`] writes it.
 
-/// The file that `hzn init` writes. It loads as it stands, and every value outside of `[camera]` is the default.
+/// The file that `hzn init` writes. It loads without changes, and every value outside of `[camera]` is the default.
 pub const SENSOR_TOML: &str = include_str!("template.toml");
 
 #[cfg(test)]
@@ -12,14 +12,14 @@ mod tests {
     #[test]
     fn loads_and_equals_the_defaults() {
         let mut config = crate::sensor::parse(super::SENSOR_TOML, Path::new("template.toml")).unwrap().config;
-        // An altitude has no default, but without one no picture can be processed.
+        // An altitude has no default, but no picture can be processed without one.
         assert_eq!(config.body.altitude_km.take(), Some(400.0));
         assert_eq!(config, Config::new(config.camera.clone()));
     }
 
     #[test]
     fn every_key_is_there() {
-        // The template names tables of their own in words.
+        // The template describes these two tables in words.
         let in_words = ["body.binarize", "body.covariance"];
         for key in crate::keys::all().filter(|k| !in_words.contains(&k.path)) {
             let there = |l: &str| l.trim_start_matches("# ").starts_with(&format!("{} =", key.name()));
@@ -37,7 +37,7 @@ mod tests {
                 .replace(*line, &line[2..])
                 .replace("# [mount]", if line.contains("q_body") { "[mount]" } else { "" });
             if let Err(e) = crate::sensor::parse(&text, Path::new("template.toml")) {
-                // Refused for what it says is fine here; not for a name that does not exist.
+                // The value may be refused. The name must exist.
                 assert!(!e.what.contains("unknown"), "{e}");
             }
         }

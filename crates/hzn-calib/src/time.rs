@@ -1,12 +1,12 @@
-//! UTC times as they are written in files.
+//! Reads the UTC times in files.
 
 use jiff::civil::Time;
 use jiff::fmt::temporal::Pieces;
 use jiff::tz::Offset;
 
-/// Seconds since 1970-01-01T00:00:00 UTC of an ISO 8601 time such as `2020-11-20T08:30:00.25Z`. The `Z` may be left
-/// out, a blank may stand for the `T`, and the time of day may end after the minutes or be missing. `None` when it is
-/// no such time, or one with an offset from UTC.
+/// Converts an ISO 8601 time, for example `2020-11-20T08:30:00.25Z`, to seconds since 1970-01-01T00:00:00 UTC. The `Z`
+/// may be omitted, and a space may replace the `T`. The time of day may end after the minutes or be missing; it is then
+/// midnight. The result is `None` if the text is not a valid time, or has an offset from UTC or a time zone.
 pub fn unix_seconds(text: &str) -> Option<f64> {
     let pieces = Pieces::parse(text.trim()).ok()?;
     let utc = pieces.to_numeric_offset().is_none_or(|offset| offset == Offset::UTC);

@@ -1,9 +1,9 @@
-//! The little of ROS 2's CDR that two kinds of picture need.
+//! The part of ROS 2's CDR encoding that the two picture messages need.
 
 use crate::frame::EncodedImage;
 use crate::messages::{compressed_format, raw_format};
 
-/// Reads CDR fields in either byte order; alignment counts from after the four bytes of encapsulation.
+/// Reads CDR fields in either byte order. Alignment is counted from the end of the four encapsulation bytes.
 #[derive(Debug)]
 struct Cdr<'a> {
     data: &'a [u8],
@@ -34,7 +34,7 @@ impl<'a> Cdr<'a> {
         let bytes = *self.bytes(4)?.first_chunk::<4>()?;
         Some(if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
     }
-    /// Length, bytes, and a zero that counts.
+    /// Reads a text: the length, then the bytes. The length includes a final zero byte.
     fn text(&mut self) -> Option<&'a str> {
         let n = self.u32()? as usize;
         let bytes = self.bytes(n)?;
@@ -44,7 +44,7 @@ impl<'a> Cdr<'a> {
         let n = self.u32()? as usize;
         self.bytes(n)
     }
-    /// std_msgs/Header: the time in seconds.
+    /// Reads a std_msgs/Header and returns its time in seconds.
     fn header(&mut self) -> Option<f64> {
         let (s, ns) = (self.u32()? as i32, self.u32()?);
         self.text()?;
@@ -52,7 +52,8 @@ impl<'a> Cdr<'a> {
     }
 }
 
-/// A picture and its header's time in seconds from `sensor_msgs/msg/Image` or `sensor_msgs/msg/CompressedImage`.
+/// Reads a picture and the time of its header, in seconds, from `sensor_msgs/msg/Image` or
+/// `sensor_msgs/msg/CompressedImage`.
 pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Result<(EncodedImage, f64), String> {
     let short = || "the message ends too early".to_owned();
     let mut c = Cdr::try_new(message).ok_or_else(|| "unknown CDR encapsulation".to_owned())?;

@@ -1,4 +1,4 @@
-//! What is drawn over a picture, as Foxglove's image annotations and back.
+//! Conversion of the annotations of a picture to Foxglove's image annotations and back.
 
 use foxglove::messages::points_annotation::Type;
 use foxglove::messages::{Color, ImageAnnotations, KeyValuePair, Point2, PointsAnnotation, TextAnnotation};
@@ -11,16 +11,16 @@ use crate::messages::stamp;
 use crate::palette;
 use crate::row::Row;
 
-/// Foxglove counts pixels from the corner of the top-left pixel, hzn from its centre.
+/// Foxglove's pixel coordinates begin at the corner of the top-left pixel, those of hzn at its centre.
 const CENTRE_TO_CORNER_PX: f64 = 0.5;
 
-/// What an annotation's lines and points mean, written as its metadata `kind`, and how they look.
+/// Meaning and look of an annotation's lines and points. The metadata `kind` has the meaning.
 #[derive(Debug, Clone, Copy)]
 struct Style {
     kind: &'static str,
     shape: Type,
     color: [u8; 3],
-    /// In pens. Of points half of their width.
+    /// Line width in pens; for points half of their width.
     thickness: f64,
 }
 const AXIS: Style = Style { kind: "axis", shape: Type::LineList, color: palette::AXIS, thickness: 1.25 };
@@ -30,16 +30,18 @@ const REJECTED: Style = Style { kind: "rejected", shape: Type::Points, color: pa
 const INLIER: Style = Style { kind: "inlier", shape: Type::Points, color: palette::INLIER, thickness: 0.5 };
 /// Half the length of the cross at the axis, in pens.
 const CROSS: f64 = 9.0;
-/// Height of the letters, and from a line to the next, in pens.
+/// Height of the letters, in pens.
 const LETTERS: f64 = 12.0;
+/// Distance from one line of text to the next, in pens.
 const LINE: f64 = 14.0;
 
-/// The width of a line that is seen when the whole picture fills a part of a screen, in pixels of the picture.
+/// Returns the width of a pen, in pixels of the picture: a line that is visible if the whole picture is shown on a part
+/// of a screen.
 pub(crate) fn pen_px(camera: Option<&camera::Config>) -> f64 {
     camera.map_or(1.0, |c| f64::from(c.width.max(c.height)) / 800.0)
 }
 
-/// The answer to a picture in a line of text.
+/// Describes the answer to a picture in one line of text.
 pub(crate) fn caption(row: &Row) -> String {
     let mut text = row.status.name().to_owned();
     if row.status == Status::Ok {
@@ -58,8 +60,8 @@ pub(crate) fn caption(row: &Row) -> String {
     text
 }
 
-/// Lines, points, and the captions of the bodies from the top left corner. What comes first lies on top among lines;
-/// points lie over all of them.
+/// Draws lines, points, and the captions of the bodies from the top left corner. An earlier line is above a later one;
+/// points are above all lines. `pen_px` is the width of a pen in pixels of the picture.
 pub(crate) fn annotations(a: &Annotations, captions: &[String], pen_px: f64, ns: u64) -> ImageAnnotations {
     let mut points = Vec::new();
     let mut draw = |style: Style, xy: &[[f64; 2]]| {
@@ -107,7 +109,7 @@ fn rgb(color: [u8; 3]) -> Color {
     Color { r, g, b, a: 1.0 }
 }
 
-/// Lines and points of a message of ours.
+/// Reads the lines and points of a message of hzn.
 pub(crate) fn parse(data: &[u8]) -> Result<Annotations, prost::DecodeError> {
     let message = ImageAnnotations::decode(data)?;
     let mut a = Annotations::default();
@@ -120,7 +122,7 @@ pub(crate) fn parse(data: &[u8]) -> Result<Annotations, prost::DecodeError> {
             "limb" => a.limb.push(xy),
             "inlier" => a.inliers.append(&mut xy),
             "rejected" => a.rejected.append(&mut xy),
-            // The ends of an arm are as far to the left as to the right.
+            // The centre of the cross is midway between the ends of an arm.
             "axis" => {
                 if let [[x0, y], [x1, _], ..] = xy[..] {
                     a.axes.push([(x0 + x1) / 2.0, y]);
@@ -139,7 +141,7 @@ mod tests {
 
     #[test]
     fn foxglove_counts_from_the_corner() {
-        // The centre of the top-left pixel is (0, 0) here and (0.5, 0.5) there.
+        // The centre of the top-left pixel is (0, 0) in hzn and (0.5, 0.5) in Foxglove.
         let a = Annotations {
             edges: vec![vec![[0.0, 0.0], [1.0, 2.25]]],
             inliers: vec![[10.0, 20.0]],

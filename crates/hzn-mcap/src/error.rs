@@ -1,18 +1,18 @@
-//! What can go wrong with a recording, and what to do about it.
+//! Errors of recordings, with remedies.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why a recording could not be written or read. Each message ends with what to do.
+/// Why a recording could not be written or read. The message names a remedy if there is one.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The output is there already and `force` was not given.
+    /// The output already exists and `force` is not set.
     #[error("{} exists: choose another name, or replace it", path.display())]
     Exists {
         /// The output that exists.
         path: PathBuf,
     },
-    /// An unfinished run's file stands beside the output.
+    /// The file of an unfinished run exists next to the output.
     #[error("{} is left from an unfinished run: continue it, or start over", path.display())]
     Unfinished {
         /// The unfinished file.
@@ -35,7 +35,7 @@ pub enum Error {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
     /// Another error of the system while writing.
@@ -43,7 +43,7 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
     /// The file cannot be opened or read.
@@ -51,21 +51,21 @@ pub enum Error {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The file does not begin as an MCAP does.
+    /// The file does not begin with the magic bytes of an MCAP.
     #[error("{} is not an MCAP file: it does not begin with the MCAP magic bytes", path.display())]
     NotMcap {
         /// The file.
         path: PathBuf,
     },
-    /// The MCAP holds something that cannot be decoded.
+    /// The MCAP contains data that cannot be decoded.
     #[error("{} cannot be decoded: {detail}", path.display())]
     Decode {
         /// The file.
         path: PathBuf,
-        /// What and where.
+        /// The data, their place and the reason.
         detail: String,
     },
     /// The unfinished run was made with another sensor.toml.
@@ -76,7 +76,7 @@ pub enum Error {
         /// The unfinished file.
         path: PathBuf,
     },
-    /// The file to go on with is none that we began.
+    /// The unfinished file was not written by hzn, so it cannot be continued.
     #[error("{} is no recording of hzn: choose another name for the output", path.display())]
     Foreign {
         /// The file.
@@ -90,10 +90,10 @@ pub enum Error {
         /// Largest size in bytes.
         limit: u64,
     },
-    /// Recovering was stopped by whoever began it.
+    /// The caller stopped the recovery.
     #[error("recovering {} was stopped: nothing was written", path.display())]
     Stopped {
-        /// The recording that was to be recovered.
+        /// The recording that should be recovered.
         path: PathBuf,
     },
     /// An earlier write failed; the recording takes no further frames.
@@ -104,7 +104,7 @@ pub enum Error {
     },
 }
 
-/// Names the folder of `path`; the current one when it has none.
+/// Returns the folder of `path`; the current folder if `path` has none.
 pub(crate) fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
@@ -112,7 +112,7 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
     }
 }
 
-/// Sorts an error of writing to `path` by what the user can do about it.
+/// Converts an error of writing to `path` to the variant with its remedy.
 pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
     match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {

@@ -1,4 +1,4 @@
-//! Everything that a recording keeps about one frame.
+//! All data of one frame in a recording.
 
 use hzn_core::Report;
 use hzn_core::real::Real;
@@ -11,22 +11,22 @@ use crate::row::Row;
 pub struct FrameRecord {
     /// The result.
     pub row: Row,
-    /// The edges that were looked at.
+    /// The edges that were examined.
     pub candidates: Vec<CandidateEdge>,
-    /// The picture; `None` leaves it out.
+    /// The picture; `None` if it is not recorded.
     pub image: Option<EncodedImage>,
-    /// What is drawn over the picture.
+    /// The drawing over the picture.
     pub annotations: Annotations,
-    /// Attitude of the camera, when it is known.
+    /// Attitude of the camera, if it is known.
     pub attitude: Option<Attitude>,
-    /// What was known about the picture beforehand; with it the same answer can be worked out again.
+    /// The prior of the picture. With it the same answer can be computed again.
     pub given: Given,
     /// Messages about this frame.
     pub log: Vec<LogLine>,
 }
 
 impl FrameRecord {
-    /// A frame with its result alone.
+    /// Creates a frame that has only its result.
     pub fn new(row: Row) -> Self {
         Self {
             row,
@@ -40,24 +40,24 @@ impl FrameRecord {
     }
 }
 
-/// One candidate edge of a report, in the form files hold it.
+/// One candidate edge of a report, as files have it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CandidateEdge {
-    /// Border pixels of the edge.
+    /// Number of border pixels of the edge.
     pub length_px: u32,
-    /// Sub-pixel points taken from it.
+    /// Number of sub-pixel edge points of the edge.
     pub points: u32,
-    /// Points that fit the limb.
+    /// Number of inliers.
     pub inliers: u32,
     /// Weighted RMS distance of the inliers from the fitted limb, pixels; `None` without a fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rms_px: Option<f64>,
-    /// What became of it, by its name such as `short-arc`.
+    /// Verdict by its name, for example `short-arc`.
     pub verdict: String,
 }
 
 impl CandidateEdge {
-    /// The candidates of a report, in order.
+    /// Returns the candidates of a report, in order.
     pub fn from_report<T: Real>(report: &Report<T>) -> Vec<Self> {
         let edge = |c: &hzn_core::report::Candidate<T>| Self {
             length_px: c.length_px,
@@ -70,39 +70,40 @@ impl CandidateEdge {
     }
 }
 
-/// A picture in the bytes it came in.
+/// A picture as encoded bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EncodedImage {
-    /// How the bytes are to be read.
+    /// Format of the bytes.
     pub format: ImageFormat,
     /// The bytes: a whole file for PNG and JPEG, rows without padding for raw pictures.
     pub bytes: Vec<u8>,
 }
 
-/// How the bytes of a picture are to be read.
+/// Format of the bytes of a picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ImageFormat {
     /// A PNG file.
     Png,
     /// A JPEG file.
     Jpeg,
-    /// Another compressed format by its lower-case name, such as `webp`; read from foreign recordings.
+    /// Another compressed format by its lower-case name, for example `webp`. It comes only from recordings of other
+    /// writers.
     Other(String),
-    /// One byte a pixel.
+    /// One byte per pixel.
     Mono8 {
         /// Columns.
         width: u32,
         /// Rows.
         height: u32,
     },
-    /// Two bytes a pixel, the low one first.
+    /// Two bytes per pixel, the low byte first.
     Mono16 {
         /// Columns.
         width: u32,
         /// Rows.
         height: u32,
     },
-    /// Three bytes a pixel: red, green, blue.
+    /// Three bytes per pixel: red, green, blue.
     Rgb8 {
         /// Columns.
         width: u32,
@@ -111,24 +112,24 @@ pub enum ImageFormat {
     },
 }
 
-/// What is drawn over a picture. Points are `[x, y]` in pixels with **pixel centres at integers**, as everywhere in
-/// hzn; the writer moves them by the half pixel that Foxglove counts from the corner, the reader moves them back.
+/// The drawing over a picture. Points are `[x, y]` in pixels with **pixel centres at integers**, as everywhere in hzn.
+/// The writer adds the half pixel of Foxglove's convention, which counts from the corner; the reader subtracts it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Annotations {
     /// Candidate edges, one line each.
     pub edges: Vec<Vec<[f64; 2]>>,
-    /// Edge points that carry the answer.
+    /// Inliers: edge points that the answer is fitted to.
     pub inliers: Vec<[f64; 2]>,
     /// Edge points that were rejected.
     pub rejected: Vec<[f64; 2]>,
-    /// The fitted limb: one line for each part of it that the picture shows.
+    /// The fitted limb: one line for each of its visible parts.
     pub limb: Vec<Vec<[f64; 2]>>,
-    /// Where the axis of each body meets the picture; drawn as crosses.
+    /// Points where the axis of each body meets the picture; they are drawn as crosses.
     pub axes: Vec<[f64; 2]>,
 }
 
 impl Annotations {
-    /// Draws what `other` draws, too.
+    /// Adds the lines and points of `other`.
     pub fn add(&mut self, other: Self) {
         self.edges.extend(other.edges);
         self.inliers.extend(other.inliers);
@@ -136,22 +137,22 @@ impl Annotations {
         self.limb.extend(other.limb);
         self.axes.extend(other.axes);
     }
-    /// Is there nothing to draw?
+    /// Returns whether there is nothing to draw.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 }
 
-/// Attitude and place of the camera in ECEF.
+/// Attitude and position of the camera in ECEF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attitude {
-    /// Quaternion, scalar first, that takes camera coordinates to ECEF.
+    /// Quaternion from the camera frame to ECEF, scalar first.
     pub q_ecef_from_camera_wxyz: [f64; 4],
-    /// Position of the camera in ECEF, metres; zeros when it is unknown.
+    /// Position of the camera in ECEF, metres; zeros if it is unknown.
     pub position_m: [f64; 3],
 }
 
-/// What was known about a picture before it was looked at: the columns of frames.csv, in numbers.
+/// The prior of a picture: the columns of frames.csv as numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Given {
@@ -173,27 +174,27 @@ pub struct Given {
     /// Direction to the Sun in the camera frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun_camera: Option<[f64; 3]>,
-    /// Rate of rotation of the camera in its own axes, rad/s.
+    /// Rate of rotation of the camera in the camera frame, rad/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_rad_s: Option<[f64; 3]>,
 }
 
-/// How much a message matters.
+/// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LogLevel {
-    /// For the record.
+    /// Information.
     Info,
-    /// Something the user should look at.
+    /// A problem that the user should examine.
     Warning,
-    /// Something was lost.
+    /// A loss of data.
     Error,
 }
 
 /// A message about a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogLine {
-    /// How much it matters.
+    /// Severity.
     pub level: LogLevel,
-    /// The message.
+    /// Text.
     pub message: String,
 }

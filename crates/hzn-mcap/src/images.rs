@@ -1,4 +1,4 @@
-//! Pictures out of anybody's MCAP, as an input.
+//! Reads pictures from MCAP files of any writer, as an input.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -17,17 +17,17 @@ use crate::messages;
 /// One picture of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputImage {
-    /// Time in seconds: that of the message's header for ROS 2, else the log time.
+    /// Time in seconds: of the message's header for ROS 2, else the log time.
     pub time_s: f64,
-    /// The picture, or why it cannot be read.
+    /// The picture, or the reason why it cannot be read.
     pub image: Result<EncodedImage, String>,
 }
 
-/// Gives the pictures of one topic of an MCAP in file order, with the memory of a chunk.
+/// Iterates over the pictures of one topic of an MCAP in file order. It needs the memory of one chunk.
 ///
-/// Understood are `foxglove.CompressedImage` and `foxglove.RawImage` in protobuf, and ROS 2's `sensor_msgs/msg/Image`
-/// and `sensor_msgs/msg/CompressedImage` in CDR; chunks uncompressed or in zstd. A file that was cut off gives what is
-/// whole.
+/// It reads `foxglove.CompressedImage` and `foxglove.RawImage` in protobuf, and ROS 2's `sensor_msgs/msg/Image` and
+/// `sensor_msgs/msg/CompressedImage` in CDR. Chunks may be uncompressed or compressed with zstd. A file that was cut
+/// off gives all complete pictures.
 pub struct ImageReader {
     messages: mcap::io::MessageReader<BufReader<File>>,
     path: PathBuf,
@@ -44,7 +44,7 @@ impl std::fmt::Debug for ImageReader {
 }
 
 impl ImageReader {
-    /// Opens an MCAP. Without a `topic`, the topic of the first picture is taken.
+    /// Opens an MCAP. Without a `topic`, the topic of the first picture is used.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -65,26 +65,27 @@ impl ImageReader {
         })
     }
 
-    /// After the last picture: why the recording ended before its end, cut off or damaged; `None` of a whole one.
+    /// Returns why the recording ended early (cut off or damaged); `None` for a complete one. Valid after the last
+    /// picture.
     pub fn broken(&self) -> Option<&str> {
         self.broken.as_deref()
     }
 
-    /// The topic that is read, once it is known.
+    /// Returns the topic that is read; `None` if it is not known yet.
     pub fn topic(&self) -> Option<&str> {
         self.topic.as_deref()
     }
 
-    /// Topics with pictures that were passed over so far.
+    /// Returns the topics with pictures that were skipped so far.
     pub fn other_topics(&self) -> impl Iterator<Item = &str> {
         self.others.iter().map(String::as_str)
     }
 }
 
-/// What befell a recording of which the end is missing.
+/// Reason for a recording whose end is missing.
 const CUT_OFF: &str = "was cut off";
 
-/// Whether the file ends as a recording that was closed.
+/// Returns whether the file ends like a closed recording.
 fn ends_as_mcap(path: &Path) -> bool {
     let last = || -> std::io::Result<[u8; 8]> {
         let mut file = File::open(path)?;
@@ -96,7 +97,7 @@ fn ends_as_mcap(path: &Path) -> bool {
     last().is_ok_and(|last| last == *mcap::MAGIC)
 }
 
-/// Which decoder a channel's pictures need; `None` for other messages.
+/// Returns the decoder for a channel's pictures; `None` for other messages.
 pub(crate) fn decoder(schema: &str, encoding: &str) -> Option<fn(&str, &[u8]) -> Decoded> {
     match (schema, encoding) {
         ("foxglove.CompressedImage" | "foxglove.RawImage", "protobuf") => {
@@ -108,6 +109,7 @@ pub(crate) fn decoder(schema: &str, encoding: &str) -> Option<fn(&str, &[u8]) ->
         _ => None,
     }
 }
+/// A decoded picture with its time in seconds, if the message has one; or the reason why it cannot be decoded.
 pub(crate) type Decoded = Result<(EncodedImage, Option<f64>), String>;
 
 impl Iterator for ImageReader {
@@ -117,7 +119,7 @@ impl Iterator for ImageReader {
         while !self.done {
             let Some(message) = self.messages.next() else {
                 self.done = true;
-                // Cut off between two records.
+                // The file may be cut off between two records.
                 self.broken = (!ends_as_mcap(&self.path)).then(|| CUT_OFF.to_owned());
                 return None;
             };
@@ -125,7 +127,7 @@ impl Iterator for ImageReader {
                 Ok(message) => message,
                 Err(e) => {
                     self.done = true;
-                    // What was whole has been given.
+                    // All complete pictures were returned before.
                     self.broken = match e {
                         McapError::BadMagic => return Some(Err(Error::NotMcap { path: self.path.clone() })),
                         McapError::UnexpectedEof | McapError::UnexpectedEoc => Some(CUT_OFF.to_owned()),

@@ -1,4 +1,4 @@
-//! Where pictures and reports stand in a recording, so that any one of them can be shown at once.
+//! An index of the pictures and reports in a recording, so that any picture can be shown at once.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,42 +14,42 @@ use crate::row::Row;
 use crate::topics::Topic;
 use crate::writer::SENSOR_TOML;
 
-/// Where one picture stands.
+/// The place of one picture in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
     /// Offset of the chunk's record in the file; `None` for a message outside of chunks.
     chunk: Option<u64>,
     /// Offset of the message's record: in the file, or in the uncompressed records of a compressed chunk.
     message: u64,
-    /// Its channel.
+    /// Channel of the message.
     channel: u16,
-    /// Its log time in nanoseconds.
+    /// Log time in nanoseconds.
     log_time_ns: u64,
-    /// Its sequence number.
+    /// Sequence number.
     sequence: u32,
 }
 
 impl Place {
-    /// Sequence number of the message: in our own recordings the frame's index.
+    /// Returns the sequence number of the message; in recordings of hzn it is the index of the frame.
     pub fn sequence(&self) -> u32 {
         self.sequence
     }
-    /// Log time in seconds.
+    /// Returns the log time in seconds.
     pub fn log_time_s(&self) -> f64 {
         self.log_time_ns as f64 * 1e-9
     }
 }
 
-/// What an index tells, in the order of the file.
+/// An entry of the index. Entries are in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum IndexEntry {
-    /// A picture, which has not been read.
+    /// A picture, which is not read yet.
     Picture(Place),
     /// The result of one picture and body.
     Report(Box<Row>, Vec<CandidateEdge>, Given),
 }
 
-/// A channel with pictures, by its schema and encoding.
+/// A channel with pictures: its topic, schema and encoding.
 #[derive(Debug, Clone)]
 struct Kind {
     topic: String,
@@ -57,9 +57,9 @@ struct Kind {
     encoding: String,
 }
 
-/// Goes through a recording of ours, or anybody's with pictures that [`crate::ImageReader`] understands, without
-/// reading the pictures that stand uncompressed. Pictures are those of the first topic that has some. A file that was
-/// cut off tells everything that is whole; [`Index::is_complete`] says so afterwards.
+/// Goes through a recording without reading its uncompressed pictures. The recording may be one of hzn, or one of any
+/// writer with pictures that [`crate::ImageReader`] can read. Only pictures of the first topic with pictures are found.
+/// In a file that was cut off everything complete is found; [`Index::is_complete`] then returns `false`.
 #[derive(Debug)]
 pub struct Index {
     file: BufReader<File>,
@@ -74,10 +74,10 @@ pub struct Index {
 }
 
 impl Index {
-    /// Opens a recording and reads what stands before its first message.
+    /// Opens a recording and reads the records before its first message.
     ///
     /// # Errors
-    /// The file cannot be read or is no MCAP.
+    /// The file cannot be read or is not an MCAP.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref().to_path_buf();
         let read = |source| Error::Read { path: path.clone(), source };
@@ -108,29 +108,29 @@ impl Index {
         Ok(index)
     }
 
-    /// Text of the attached sensor.toml, where it stands before the first message, as in our own recordings.
+    /// Returns the text of the attached sensor.toml if it is before the first message, as in recordings of hzn.
     pub fn sensor_toml(&self) -> Option<&str> {
         self.sensor_toml.as_deref()
     }
-    /// At the end: was the recording closed properly?
+    /// Returns whether the recording was closed properly; valid at the end.
     pub fn is_complete(&self) -> bool {
         self.complete
     }
-    /// Chunks whose contents were damaged, so far.
+    /// Returns the number of chunks with damaged contents so far.
     pub fn broken_chunks(&self) -> u64 {
         self.broken_chunks
     }
 
-    /// Are there results in it, as far as it is known by now?
+    /// Returns whether a channel with reports was found so far.
     pub fn has_reports(&self) -> bool {
         self.reports.is_some()
     }
-    /// Number of channels with pictures that are known by now.
+    /// Returns the number of channels with pictures that were found so far.
     pub fn channels(&self) -> usize {
         self.pictures.len()
     }
 
-    /// What the next part of the file holds, which may be nothing; `None` at the end.
+    /// Returns the entries of the next part of the file, which may be empty; `None` at the end.
     ///
     /// # Errors
     /// The file cannot be read, or a report cannot be decoded.
@@ -190,7 +190,7 @@ impl Index {
             }
             return Ok(Ok(true));
         }
-        // Plain records: their heads alone are read.
+        // The records are not compressed: only their heads are read.
         let end = start + 9 + length;
         let mut at = start + 9 + 40;
         let whole = self.file.get_ref().metadata()?.len() >= end;
@@ -261,7 +261,7 @@ impl Index {
         Ok(())
     }
 
-    /// A reader for the pictures found so far and those to come on the same channels.
+    /// Creates a reader for the pictures found so far and for later ones on the same channels.
     ///
     /// # Errors
     /// The file cannot be opened again.
@@ -270,7 +270,7 @@ impl Index {
         Ok(Pictures { file, path: self.path.clone(), kinds: self.pictures.clone() })
     }
 
-    /// A record outside of chunks, or one that a chunk declares.
+    /// Reads a record outside of chunks, or one that a chunk declares.
     fn outside(&mut self, op: u8, content: &[u8]) {
         let mut f = Fields(content);
         match op {
@@ -302,7 +302,7 @@ impl Index {
         }
     }
 
-    /// Kind and length of the record at `position`.
+    /// Reads kind and length of the record at `position`.
     fn head(&mut self) -> io::Result<Option<(u8, u64)>> {
         let mut head = [0; 9];
         if !fill(&mut self.file, &mut head)? {
@@ -313,17 +313,17 @@ impl Index {
         Ok((op != 0 && length <= MAX_RECORD_BYTES).then_some((op, length)))
     }
 
-    /// The content of the record whose head was read; `None` where the file ends.
+    /// Reads the content of the record after its head; `None` if the file ends before.
     fn content(&mut self, length: u64) -> io::Result<Option<Vec<u8>>> {
         let mut content = Vec::new();
-        // No memory is set aside for a length that a broken file only claims to have.
+        // The stated length may be wrong in a broken file, so no memory is reserved for it.
         (&mut self.file).take(length).read_to_end(&mut content)?;
         self.position += 9 + length;
         Ok((content.len() as u64 == length).then_some(content))
     }
 }
 
-/// The next record of uncompressed records: its offset, kind and content.
+/// Returns the next of some uncompressed records: its offset, kind and content.
 fn next_record<'a>(rest: &mut Fields<'a>, size: usize) -> Option<(u64, u8, &'a [u8])> {
     let offset = (size - rest.0.len()) as u64;
     let (op, length) = (rest.u8()?, rest.u64()?);
@@ -338,7 +338,7 @@ fn fill(file: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
     }
 }
 
-/// Reads pictures of a recording, in any order.
+/// Reads pictures of a recording in any order.
 #[derive(Debug)]
 pub struct Pictures {
     file: File,
@@ -347,10 +347,11 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// The picture at a place.
+    /// Reads the picture at a place.
     ///
     /// # Errors
-    /// The file cannot be read. A picture that is there and cannot be decoded is no error: it says so itself.
+    /// The file cannot be read. A picture that cannot be decoded is no error of this function: `image` then has the
+    /// reason.
     pub fn read(&mut self, place: &Place) -> Result<InputImage, Error> {
         let read = |source| Error::Read { path: self.path.clone(), source };
         let message = match place.chunk {
@@ -390,7 +391,8 @@ fn record_at(file: &mut File, at: u64) -> io::Result<Option<Record>> {
     Ok((content.len() as u64 == length).then_some(Record { op, content }))
 }
 
-/// Content of the message at an offset of the file, or of the uncompressed records of the compressed chunk at `chunk`.
+/// Returns the content of a message. `message` is its offset in the file, or in the uncompressed records of the chunk
+/// at `chunk` if that is compressed.
 fn message_in_chunk(file: &mut File, chunk: u64, message: u64) -> io::Result<Option<Vec<u8>>> {
     file.seek(SeekFrom::Start(chunk + 9 + 28))?;
     let mut length = [0; 4];

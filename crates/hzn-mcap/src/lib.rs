@@ -6,21 +6,23 @@
 //!               CSV, JSON Lines      └── Reader ◄── resume ◄─────┴── recover
 //! ```
 //!
-//! - [`Row`] is the flat result of one picture and body, the same in CSV, JSON Lines and MCAP.
-//! - [`FrameRecord`] adds what only an MCAP holds: the picture, drawn edges, attitude, messages.
-//! - [`Writer`] writes a `.part` file that survives the end of the program at any moment and gets its name at the end.
-//! - [`Reader`] gives the frames back, from broken files too; [`recover`] closes one, [`resume`] goes on with one.
-//! - [`ImageReader`] takes pictures out of anybody's MCAP, as an input.
-//! - [`Index`] tells where everything stands without reading pictures, [`Pictures`] then reads any one of them.
+//! - [`Row`] is the flat result of one picture and body. It is the same in CSV, JSON Lines and MCAP.
+//! - [`FrameRecord`] adds the data that only an MCAP has: the picture, drawn edges, attitude, messages.
+//! - [`Writer`] writes a `.part` file, which stays readable if the program ends at any moment. It is renamed at the
+//!   end.
+//! - [`Reader`] reads the frames, also from broken files; [`recover`] closes a broken file, [`resume`] continues it.
+//! - [`ImageReader`] reads pictures from MCAP files of any writer, as an input.
+//! - [`Index`] finds pictures and reports without reading the pictures; [`Pictures`] then reads any one of them.
 //!
 //! # The file
 //!
-//! First the attachment `sensor.toml` and the metadata `hzn`, then chunks. Pictures stand uncompressed in chunks of
-//! their own, because they are compressed already; everything else is compressed with zstd. A batch is written
-//! pictures first, so a frame whose report is there is there as a whole: a frame counts as finished when the chunk with
-//! its report is whole in the file. A batch is what came within [`FLUSH_INTERVAL`], or 8 MiB of pictures: that much a
-//! crash can cost. A chunk for each frame would cost nothing beside pictures, but ten times the room without them, and
-//! a longer summary. Every chunk, the data and the summary carry CRCs. Message `sequence` is the frame's index.
+//! A file begins with the attachment `sensor.toml` and the metadata `hzn`; then come chunks. Pictures are in separate
+//! chunks without compression, because they are already compressed. All other data are compressed with zstd. A batch
+//! has the frames of one [`FLUSH_INTERVAL`], or 8 MiB of pictures, or 1 MiB of other data; a crash can lose at most one
+//! batch. Each batch is written with its pictures first. A frame is finished when the chunk with its report is complete
+//! in the file, so a frame with a report is always complete. One chunk per frame would need a longer summary. It
+//! would need little space compared with the pictures, but without pictures ten times the space. Every chunk, the data
+//! and the summary have CRCs. The `sequence` of a message is the index of its frame.
 //!
 //! | topic | schema | encoding |
 //! |---|---|---|
@@ -62,6 +64,6 @@ pub use row::{Row, RowMeta, roll_pitch_deg};
 pub use topics::{IMAGE_TOPIC, report_schema};
 pub use writer::{FLUSH_INTERVAL, Options, Writer};
 
-/// A layout of Foxglove's panels for our topics, to be imported there: the picture with what was found, plots over
-/// time, status, log, the report and the axis.
+/// A layout of Foxglove's panels for the topics of hzn, for import in Foxglove: the picture with its annotations, plots
+/// over time, status, log, the report and the axis.
 pub const LAYOUT: &str = include_str!("../foxglove-layout.json");

@@ -1,5 +1,5 @@
-//! Frames to Foxglove's messages and back. What is drawn over a picture: `drawing`. No other module knows Foxglove's
-//! conventions.
+//! Conversion of frames to Foxglove's messages and back; `drawing` converts the annotations. No other module depends on
+//! Foxglove's conventions.
 
 use foxglove::messages::{
     CameraCalibration, CompressedImage, FrameTransform, Log, Pose, PoseInFrame, Quaternion, RawImage, Timestamp,
@@ -13,16 +13,16 @@ use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, Im
 use crate::row::Row;
 use crate::topics::Topic;
 
-/// The coordinate frame of everything the camera sees.
+/// Name of the camera frame.
 const CAMERA: &str = "camera";
-/// The frame that the camera's attitude is given in.
+/// Name of the frame of the camera's attitude.
 const ECEF: &str = "ecef";
 
-/// Log time in nanoseconds. Times before 0 and after the year 2106 are not representable in Foxglove's messages: they
-/// are held at the limit; the row keeps the exact one.
+/// Converts a time in seconds to a log time in nanoseconds. Foxglove's messages cannot represent times before 0 and
+/// after the year 2106. These times are clamped to the limit, and NaN becomes 0; the row keeps the exact time.
 pub(crate) fn time_ns(time_s: f64) -> u64 {
     const MAX_S: f64 = u32::MAX as f64;
-    // A cast of NaN gives 0.
+    // The cast converts NaN to 0.
     (time_s.clamp(0.0, MAX_S) * 1e9).round() as u64
 }
 
@@ -30,12 +30,12 @@ pub(crate) fn stamp(ns: u64) -> Option<Timestamp> {
     Timestamp::new_checked(u32::try_from(ns / 1_000_000_000).ok()?, (ns % 1_000_000_000) as u32)
 }
 
-/// Appends a message to a buffer that grows, which cannot fail.
+/// Appends a message to a buffer. This cannot fail, because the buffer grows.
 pub(crate) fn append<M: Message>(message: &M, buffer: &mut Vec<u8>) {
     message.encode_raw(buffer);
 }
 
-/// The JSON of `/hzn/report`: the row without its empty cells, the candidates, and what was known beforehand.
+/// Writes the JSON of `/hzn/report`: the row without its empty cells, the candidates, and the prior of the picture.
 pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     let mut map = match serde_json::to_value(&frame.row) {
         Ok(Value::Object(map)) => map,
@@ -49,7 +49,7 @@ pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     serde_json::to_vec(&map).unwrap_or_default()
 }
 
-/// The row and candidates of a report, and what was known beforehand.
+/// Reads a report: the row, the candidates, and the prior of the picture.
 pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, Given), serde_json::Error> {
     let mut value: Value = serde_json::from_slice(data)?;
     let mut part = |key: &str| value.as_object_mut().and_then(|map| map.remove(key));
@@ -58,8 +58,8 @@ pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, Give
     Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?, given))
 }
 
-/// Appends a picture as a message. The bytes are copied once, straight into the buffer: pictures are nearly all of a
-/// recording.
+/// Appends a picture as a message. The bytes are copied only once, directly into the buffer, because pictures are
+/// almost all of a recording.
 pub(crate) fn image(image: &EncodedImage, ns: u64, buffer: &mut Vec<u8>) {
     /// Field numbers of `data` in `foxglove.CompressedImage` and `foxglove.RawImage`.
     const COMPRESSED_DATA: u32 = 2;
@@ -101,7 +101,7 @@ pub(crate) fn image(image: &EncodedImage, ns: u64, buffer: &mut Vec<u8>) {
     buffer.extend_from_slice(&image.bytes);
 }
 
-/// The topic that a picture of this format goes to.
+/// Returns the topic for pictures of this format.
 pub(crate) fn image_topic(format: &ImageFormat) -> Topic {
     match format {
         ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Other(_) => Topic::Image,
@@ -109,7 +109,7 @@ pub(crate) fn image_topic(format: &ImageFormat) -> Topic {
     }
 }
 
-/// The format that a compressed picture's name stands for. ROS writes `rgb8; jpeg compressed bgr8` and the like.
+/// Returns the format for the format name of a compressed picture. ROS writes names like `rgb8; jpeg compressed bgr8`.
 pub(crate) fn compressed_format(name: &str) -> ImageFormat {
     let name = name.to_ascii_lowercase();
     if name.contains("png") {
@@ -121,7 +121,8 @@ pub(crate) fn compressed_format(name: &str) -> ImageFormat {
     }
 }
 
-/// A raw picture of anybody's with rows of `step` bytes, in one of our formats; an error names what is not supported.
+/// Converts a raw picture of any writer, with rows of `step` bytes (0: without padding), to one of the formats of hzn.
+/// An error names what is not supported.
 pub(crate) fn raw_format(
     width: u32,
     height: u32,
@@ -159,7 +160,7 @@ pub(crate) fn raw_format(
     Ok(EncodedImage { format, bytes })
 }
 
-/// A picture out of a protobuf message with this schema.
+/// Reads a picture from a protobuf message with this schema.
 pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Result<EncodedImage, String> {
     match schema {
         "foxglove.CompressedImage" => {
@@ -174,9 +175,10 @@ pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Result<EncodedImage, Str
     }
 }
 
-/// The axis as a pose at the camera whose x points along it.
+/// Returns the axis (camera frame) as a pose at the camera whose x axis points along it.
 pub(crate) fn axis([x, y, z]: [f64; 3], ns: u64) -> PoseInFrame {
-    // The short way from +x to the axis: (1 + x, +x × axis), normalised; half a turn about z when they are opposite.
+    // The shortest rotation from +x to the axis is (1 + x, +x × axis), normalised; half a turn about z if they are
+    // opposite.
     let n = ((1.0 + x).powi(2) + y * y + z * z).sqrt();
     let orientation = if n > 1e-9 {
         Quaternion { w: (1.0 + x) / n, x: 0.0, y: -z / n, z: y / n }
@@ -206,7 +208,7 @@ pub(crate) fn parse_transform(data: &[u8]) -> Result<Option<Attitude>, prost::De
         .map(|(q, t)| Attitude { q_ecef_from_camera_wxyz: [q.w, q.x, q.y, q.z], position_m: [t.x, t.y, t.z] }))
 }
 
-/// A log line. Its message begins with the picture's name: the panel does not show `file`.
+/// Returns a log line. The message begins with the picture's name, because the log panel does not show `file`.
 pub(crate) fn log(line: &LogLine, file: &str, ns: u64) -> Log {
     let level = match line.level {
         LogLevel::Info => Level::Info,
@@ -234,10 +236,10 @@ pub(crate) fn parse_log(data: &[u8]) -> Result<LogLine, prost::DecodeError> {
     Ok(LogLine { level, message: own.map(str::to_owned).unwrap_or(m.message) })
 }
 
-/// The calibration. Its principal point keeps hzn's pixel centres at integers, as ROS has them.
+/// Returns the calibration. Its principal point uses hzn's convention, which ROS also has: pixel centres at integers.
 pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
     let (model, coefficients) = match c.model {
-        // Foxglove has no name for them: a viewer of others draws without distortion.
+        // Foxglove has no name for these models, so other viewers draw without distortion.
         camera::Model::DoubleSphere | camera::Model::Eucm => ("", 0),
         planar if planar.is_planar() => ("plumb_bob", 5),
         _ => ("kannala_brandt", 4),

@@ -1,4 +1,4 @@
-//! Frames out of a recording, one batch at a time, from whole and broken files.
+//! Reads frames from a recording, one batch at a time, also from broken files.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
@@ -13,18 +13,18 @@ use crate::messages;
 use crate::topics::Topic;
 use crate::writer::SENSOR_TOML;
 
-/// How much of each frame is read.
+/// The parts of each frame that are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Contents {
     /// Everything.
     #[default]
     All,
-    /// Everything but the pictures, which are passed over without being read.
+    /// Everything except the pictures, which are skipped without being read.
     WithoutImages,
 }
 
-/// Gives the frames of a recording in the order in which they were written. Memory is that of one batch of frames.
-/// A file that was cut off gives every finished frame; [`Reader::is_complete`] tells afterwards.
+/// Iterates over the frames of a recording in the order in which they were written. It needs the memory of one batch of
+/// frames. A file that was cut off gives every finished frame; [`Reader::is_complete`] then returns `false`.
 #[derive(Debug)]
 pub struct Reader {
     scanner: Scanner<BufReader<File>>,
@@ -33,7 +33,7 @@ pub struct Reader {
     metadata: BTreeMap<String, String>,
     /// The first record after the head of the file.
     peeked: Option<Record>,
-    /// Channel ids by number, since a foreign writer's may differ from ours.
+    /// Topics by channel id, because the ids of other writers may differ.
     topics: BTreeMap<u16, Topic>,
     schemas: BTreeMap<u16, String>,
     images: Parts<EncodedImage>,
@@ -43,7 +43,7 @@ pub struct Reader {
     done: bool,
 }
 
-/// Parts of frames by their sequence number, in the order they came.
+/// Parts of frames by their sequence number, in the order of the file.
 type Parts<T> = BTreeMap<u32, VecDeque<T>>;
 
 fn take<T>(parts: &mut Parts<T>, sequence: u32) -> Option<T> {
@@ -59,7 +59,7 @@ impl Reader {
     /// Opens a recording and reads its sensor.toml.
     ///
     /// # Errors
-    /// The file cannot be read or is no MCAP.
+    /// The file cannot be read or is not an MCAP.
     pub fn open(path: impl AsRef<Path>, contents: Contents) -> Result<Self, Error> {
         let path = path.as_ref();
         let read = |source| Error::Read { path: path.to_path_buf(), source };
@@ -93,24 +93,24 @@ impl Reader {
         Ok(reader)
     }
 
-    /// Text of the attached sensor.toml.
+    /// Returns the text of the attached sensor.toml.
     pub fn sensor_toml(&self) -> Option<&str> {
         self.sensor_toml.as_deref()
     }
-    /// The metadata `hzn`: versions and settings of the run.
+    /// Returns the metadata `hzn`: versions and settings of the run.
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
     }
-    /// After the last frame: was the recording closed properly?
+    /// Returns whether the recording was closed properly; valid after the last frame.
     pub fn is_complete(&self) -> bool {
         self.complete
     }
-    /// Chunks whose contents were damaged, so far; their frames are missing.
+    /// Returns the number of chunks with damaged contents so far; their frames are missing.
     pub fn broken_chunks(&self) -> u64 {
         self.broken_chunks
     }
 
-    /// A record outside of chunks.
+    /// Reads a record outside of chunks.
     fn outside(&mut self, record: &Record) {
         let mut f = Fields(&record.content);
         match record.op {
@@ -141,7 +141,7 @@ impl Reader {
         }
     }
 
-    /// Takes a chunk's messages apart into frames.
+    /// Assembles frames from the messages of a chunk.
     fn chunk(&mut self, record: &Record) -> Result<(), Error> {
         let Some((chunk, plain)) = Chunk::parse(record) else {
             self.broken_chunks += 1;
@@ -194,7 +194,7 @@ impl Reader {
             }
         }
         if chunk.compression == "zstd" {
-            // Pictures of a batch come before its reports: what is left now belongs to no frame.
+            // Pictures of a batch come before its reports, so the remaining pictures belong to no frame.
             self.images.clear();
         }
         Ok(())
@@ -241,7 +241,7 @@ impl Iterator for Reader {
     }
 }
 
-/// Is this the report of a frame? For those who only count.
+/// Counts the reports in the uncompressed records of a chunk; `channel` is the channel of the reports.
 pub(crate) fn reports(plain: &[u8], channel: u16) -> u64 {
     Chunk::messages(plain).filter(|m: &Message<'_>| m.channel == channel).count() as u64
 }

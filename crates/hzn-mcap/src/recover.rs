@@ -1,4 +1,4 @@
-//! Closing and continuing recordings that were cut off.
+//! Closes and continues recordings that were cut off.
 
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter, Read};
@@ -11,43 +11,44 @@ use crate::reader::{Contents, Reader, reports};
 use crate::topics::Topic;
 use crate::writer::{LIBRARY, Options, Writer, open, refuse_existing};
 
-/// What [`recover`] found.
+/// Result of [`recover`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Recovered {
-    /// Records kept, one a frame and body. For a recording without `/hzn/report`, 0.
+    /// Number of records that are kept, one per frame and body; 0 for a recording without `/hzn/report`.
     pub frames: u64,
-    /// The file had been closed properly.
+    /// Whether the file had been closed properly.
     pub was_complete: bool,
-    /// Chunks left out because their contents were damaged.
+    /// Number of chunks that are left out because their contents are damaged.
     pub broken_chunks: u64,
-    /// Bytes at the end of the file that were no whole record, or pictures without a result.
+    /// Number of bytes at the end of the file that are not kept: an incomplete record, or pictures without a result.
     pub dropped_bytes: u64,
 }
 
-/// A recording that goes on.
+/// A recording that is continued.
 #[derive(Debug)]
 pub struct Resumed {
-    /// Records (one a frame and body) that are finished: go on with the next one.
+    /// Number of finished records (one per frame and body). Continue with the next one.
     pub frames: u64,
-    /// Index of the last finished frame, from its row; `None` without frames.
+    /// Index of the last finished frame, from its row; `None` if there are no frames.
     pub last_index: Option<u64>,
-    /// Takes the further frames.
+    /// The writer for the further frames.
     pub writer: Writer,
 }
 
-/// Closes a broken recording: copies every finished frame (see the crate's documentation) of `input` to `output`, which
-/// must not exist.
+/// Closes a broken recording: copies every finished frame (see the crate's documentation) from `input` to `output`,
+/// which must not exist.
 ///
 /// # Errors
-/// `input` cannot be read or is no MCAP; `output` exists or cannot be written.
+/// `input` cannot be read or is not an MCAP; `output` exists or cannot be written.
 pub fn recover(input: impl AsRef<Path>, output: impl AsRef<Path>) -> Result<Recovered, Error> {
     recover_while(input, output, |_, _| true)
 }
 
-/// As [`recover`], as long as it is wanted: `wanted` is told how many bytes of how many are through, again and again.
+/// Recovers a recording as [`recover`] does, until the caller stops it. `wanted` is called for every record with the
+/// bytes read so far and the size of `input`; it returns `false` to stop.
 ///
 /// # Errors
-/// As [`recover`]; it is not wanted any more.
+/// The errors are those of [`recover`], and [`Error::Stopped`].
 pub fn recover_while(
     input: impl AsRef<Path>,
     output: impl AsRef<Path>,
@@ -63,18 +64,18 @@ pub fn recover_while(
         Ok(found)
     });
     if closed.is_err() {
-        // The input is untouched: half a copy of it helps nobody.
+        // The input is unchanged, and an incomplete copy of it is useless.
         let _ = fs::remove_file(&part);
     }
     closed
 }
 
-/// Goes on with the unfinished recording of `path`: its finished frames are copied into a new `.part` file, which
-/// then takes the place of the old one. Without an unfinished recording, a new one is begun.
+/// Continues the unfinished recording of `path`. Its finished frames are copied into a new `.part` file, which then
+/// replaces the old one. If there is no unfinished recording, a new one begins.
 ///
 /// # Errors
-/// The output exists already (`options.force` replaces it at the end); the unfinished recording was made with another
-/// sensor.toml; or the disk fails.
+/// The output already exists (with `options.force` it is replaced at the end), the unfinished recording has another
+/// sensor.toml, or the disk fails.
 pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Error> {
     let path = path.as_ref();
     let part = part_path(path);
@@ -88,11 +89,11 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     if !part.exists() {
         return fresh();
     }
-    // Until its frames are in the new file, it is nobody else's.
+    // The old file stays locked until its frames are in the new file.
     let held = open_part(&part).map_err(|e| while_writing(&part, e))?;
     match origin(&held).map_err(|source| Error::Read { path: part.clone(), source })? {
         Origin::Ours => {}
-        // Nothing is lost.
+        // The file has no frames yet, so nothing is lost.
         Origin::Cut => {
             drop(held);
             return fresh();
@@ -101,7 +102,7 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     }
     let mut reader = Reader::open(&part, Contents::WithoutImages)?;
     match reader.sensor_toml() {
-        // Cut off before it was out.
+        // The file was cut off before the sensor.toml was written.
         None => {
             drop(held);
             return fresh();
@@ -116,7 +117,7 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     let mut copy_path = part.as_os_str().to_owned();
     copy_path.push(".new");
     let copy_path = PathBuf::from(copy_path);
-    // Errors name the old file: it is the one that has everything until the new one takes its place.
+    // Errors name the old file, because it has all frames until the new one replaces it.
     let failed = |e| while_writing(&part, e);
     let copied = open(&copy_path).map_err(failed).and_then(|mut out| {
         let found = copy(&part, &mut out, &part, &mut |_, _| true)?;
@@ -131,10 +132,10 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     Ok(Resumed { frames: found.frames, last_index, writer: Writer::on(out, path, &part, options) })
 }
 
-/// Who began a file.
+/// The program that began a file.
 enum Origin {
     Ours,
-    /// Cut off before that can be told: there is nothing in it yet.
+    /// The file was cut off before this is known; it has no content yet.
     Cut,
     Other,
 }
@@ -148,7 +149,7 @@ fn origin(mut file: &File) -> std::io::Result<Origin> {
         None if MAGIC.starts_with(&beginning) => Origin::Cut,
         Some(magic) if magic == MAGIC => match (fields.u8(), fields.u64(), fields.text(), fields.text()) {
             (Some(Op::HEADER), _, _, Some(library)) if library.starts_with(LIBRARY) => Origin::Ours,
-            // A header of ours is shorter than what was read.
+            // A header of hzn is shorter than 64 bytes, so a shorter file may be cut off within it.
             (.., None) if beginning.len() < 64 => Origin::Cut,
             _ => Origin::Other,
         },
@@ -156,7 +157,7 @@ fn origin(mut file: &File) -> std::io::Result<Origin> {
     })
 }
 
-/// Copies the whole records of `input` up to the last finished frame.
+/// Copies the complete records of `input` up to the last finished frame.
 fn copy(
     input: &Path,
     out: &mut Container<BufWriter<File>>,
@@ -193,7 +194,7 @@ fn copy(
                     }
                     let frames = report_channel.map_or(0, |id| reports(&plain, id));
                     if report_channel.is_some() && frames == 0 {
-                        // Pictures wait for the results that belong to them.
+                        // Pictures wait for their reports.
                         waiting.push(chunk);
                         continue;
                     }
@@ -204,7 +205,7 @@ fn copy(
                 }
                 None => found.broken_chunks += 1,
             },
-            // Written anew.
+            // The message indexes are written again.
             Op::MESSAGE_INDEX => {}
             op => {
                 if op == Op::CHANNEL {
@@ -224,7 +225,7 @@ fn copy(
     Ok(found)
 }
 
-/// The id of a channel record if it is that of the reports.
+/// Returns the id of a channel record if its topic is that of the reports.
 fn report_id(content: &[u8]) -> Option<u16> {
     let mut f = Fields(content);
     let (id, _schema, topic) = (f.u16()?, f.u16()?, f.text()?);

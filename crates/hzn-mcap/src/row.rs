@@ -1,4 +1,4 @@
-//! The flat result: one row a picture and body, the same in CSV, JSON Lines and MCAP.
+//! The flat result: one row per picture and body, the same in CSV, JSON Lines and MCAP.
 
 use hzn_core::frames::{Body, UnitVec3};
 use hzn_core::real::Real;
@@ -6,23 +6,23 @@ use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
 use serde::{Deserialize, Serialize};
 
-/// What is known about a picture before it is processed.
+/// The data of a picture before it is processed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RowMeta {
     /// Place in the sequence, from 0.
     pub index: u64,
-    /// Name of the picture as it was given.
+    /// Name of the picture as the user gave it.
     pub file: String,
-    /// Time of the picture in seconds, of the sequence's own epoch; `None` where it is not known.
+    /// Time of the picture in seconds, in the sequence's own epoch; `None` if it is unknown.
     pub time_s: Option<f64>,
     /// Name of the body; see [`Kind::name`](hzn_core::body::Kind::name).
     pub body: String,
-    /// Altitude of the position, or else the one given with the picture or by sensor.toml, kilometres.
+    /// Altitude of the position, else the altitude from the picture's prior or from sensor.toml, in kilometres.
     pub altitude_km: Option<f64>,
 }
 
-/// The columns of the results: structure, names, JSON schema and empty row from one line a column. A column `as` a
-/// module is written and read by that module.
+/// The columns of the results. Structure, names, JSON schema and empty row come from one entry per column. A column
+/// `as` a module is written and read by that module.
 macro_rules! columns {
     (
         $(#[doc = $about:literal])+
@@ -41,14 +41,14 @@ macro_rules! columns {
         }
 
         impl Row {
-            /// The names of the columns in order.
+            /// Names of the columns, in order.
             pub const COLUMNS: [&'static str; [$(stringify!($name)),+].len()] = [$(stringify!($name)),+];
 
-            /// (name, JSON type, whether it is always there, meaning) of every column.
+            /// Every column: (name, JSON type, whether every row has a value, meaning).
             pub(crate) const CELLS: &'static [(&'static str, &'static str, bool, &'static str)] =
                 &[$((stringify!($name), <$ty as Cell>::JSON, <$ty as Cell>::ALWAYS, concat!($($doc),+))),+];
 
-            /// A row whose cells are empty.
+            /// Creates a row with empty cells.
             fn blank() -> Self {
                 Self { $($name: Cell::blank(),)+ }
             }
@@ -58,9 +58,9 @@ macro_rules! columns {
 
 /// The type of a cell.
 trait Cell {
-    /// Its type in JSON.
+    /// Type of the cell in JSON.
     const JSON: &'static str;
-    /// A row always has it.
+    /// Whether every row has a value in this cell.
     const ALWAYS: bool = true;
     fn blank() -> Self;
 }
@@ -95,20 +95,21 @@ impl<T: Cell> Cell for Option<T> {
 columns! {
     /// The result of one picture and body. The fields are the columns, in order; an empty cell is `None`.
     ///
-    /// With the `csv` crate a row is written by `serialize` and read by `deserialize`; with `serde_json` one row is one
+    /// With the `csv` crate, `serialize` writes a row and `deserialize` reads it; with `serde_json` one row is one
     /// line. Angles of the vehicle follow [`roll_pitch_deg`].
     pub struct Row {
         /// Place in the sequence, from 0.
         index: u64,
         /// Name of the picture.
         file: String,
-        /// Time in seconds, where it is known.
+        /// Time in seconds, if it is known.
         time_s: Option<f64>,
         /// Name of the body: `earth`, `earth-sphere`, `sun`, `moon`, `sphere`.
         body: String,
-        /// Outcome, by its name such as `no-limb`.
+        /// Outcome, by its name, for example `no-limb`.
         status: Status as "status_name",
-        /// Unit vector to the body in the camera frame, x; only beside `ok`, like all that follows up to `inliers`.
+        /// Unit vector to the body in the camera frame, x; only with the status `ok`. This also holds for the columns
+        /// up to `rms_px` (except `altitude_km`), `inliers`, `roll_deg` and `pitch_deg`.
         axis_x: Option<f64>,
         /// Unit vector to the body in the camera frame, y.
         axis_y: Option<f64>,
@@ -126,47 +127,48 @@ columns! {
         cov_yz: Option<f64>,
         /// Covariance of the axis, zz, rad².
         cov_zz: Option<f64>,
-        /// The larger of the axis' two standard deviations, degrees.
+        /// Larger of the axis's two standard deviations, degrees.
         sigma_max_deg: Option<f64>,
-        /// The same direction in ECEF, x; when the position is known.
+        /// The same direction in ECEF, x; only if the position is known.
         axis_e_x: Option<f64>,
         /// The same direction in ECEF, y.
         axis_e_y: Option<f64>,
         /// The same direction in ECEF, z.
         axis_e_z: Option<f64>,
-        /// Half-angle of the half-angle-free fit, degrees.
+        /// Half-angle of the fit with a free half-angle, degrees.
         half_angle_deg: Option<f64>,
-        /// The altitude of the position, or else the one that was given, kilometres; beside every status.
+        /// Altitude of the position, else the given altitude, kilometres; with every status.
         altitude_km: Option<f64>,
-        /// The altitude that follows from the half-angle-free fit, kilometres.
+        /// Altitude from the fit with a free half-angle, kilometres.
         altitude_est_km: Option<f64>,
-        /// Its standard deviation, kilometres.
+        /// Standard deviation of that altitude, kilometres.
         altitude_est_sigma_km: Option<f64>,
         /// Weighted RMS distance of the inliers from the fitted limb, pixels.
         rms_px: Option<f64>,
-        /// Sub-pixel edge points that were measured.
+        /// Number of sub-pixel edge points that were measured.
         edge_points: Option<u32>,
-        /// Edge points that carry the answer.
+        /// Number of inliers: edge points that the answer is fitted to.
         inliers: Option<u32>,
-        /// Edges that were candidates.
+        /// Number of edges that were examined as candidates.
         candidates: Option<u32>,
-        /// Border pixels dropped because a list was full.
+        /// Number of border pixels that were dropped because a list was full.
         dropped: Option<u32>,
-        /// Level between dark and lit in the picture's own counts.
+        /// Threshold between dark and lit, in the picture's counts.
         level: Option<u16>,
-        /// Roll of the vehicle, degrees; with a mounting.
+        /// Roll of the vehicle, degrees; only with a mounting.
         roll_deg: Option<f64>,
-        /// Pitch of the vehicle, degrees; with a mounting.
+        /// Pitch of the vehicle, degrees; only with a mounting.
         pitch_deg: Option<f64>,
-        /// Time that the processing took, microseconds, decoding not included.
+        /// Processing time, microseconds, without decoding.
         elapsed_us: Option<f64>,
-        /// Why there is no answer, in words; empty beside `ok`.
+        /// Why there is no answer, in words; empty with the status `ok`.
         detail: String,
     }
 }
 
 impl Row {
-    /// The row of a processed picture. `elapsed_us` is the time `process` took in microseconds, if it was measured.
+    /// Creates the row of a processed picture. `elapsed_us` is the run time of `process` in microseconds, if it was
+    /// measured.
     pub fn from_report<T: Real>(meta: &RowMeta, report: &Report<T>, elapsed_us: Option<f64>) -> Self {
         let c = &report.counters;
         let mut row = Self {
@@ -184,7 +186,7 @@ impl Row {
         row
     }
 
-    /// The row of a picture that was not processed, such as one that could not be read.
+    /// Creates the row of a picture that was not processed, for example because it could not be read.
     pub fn unprocessed(meta: &RowMeta, status: Status, reason: impl Into<String>) -> Self {
         Self { detail: reason.into(), ..Self::empty(meta, status) }
     }
@@ -224,28 +226,28 @@ impl Row {
         }
     }
 
-    /// The axis in the camera frame, when there is one.
+    /// Returns the axis (camera frame); `None` if there is no answer.
     pub fn axis(&self) -> Option<[f64; 3]> {
         Some([self.axis_x?, self.axis_y?, self.axis_z?])
     }
 }
 
-/// Roll and pitch of the vehicle in degrees from the direction to the body in the vehicle's frame.
+/// Returns roll and pitch of the vehicle, in degrees, from the direction to the body in the vehicle's frame.
 ///
-/// The vehicle's axes are x forward, y right, z down: with the body along +z both are 0. Positive roll puts the right
-/// side (+y) down, −180 to 180; positive pitch puts the nose (+x) up, −90 to 90. In the order yaw, pitch, roll the
-/// direction is (−sin p, sin r cos p, cos r cos p).
+/// The vehicle's axes are x forward, y right, z down. If the body is along +z, both angles are 0. Positive roll puts
+/// the right side (+y) down, −180 to 180. Positive pitch puts the nose (+x) up, −90 to 90. In the order yaw, pitch,
+/// roll the direction is (−sin p, sin r cos p, cos r cos p).
 pub fn roll_pitch_deg<T: Real>(to_body: &UnitVec3<Body, T>) -> [f64; 2] {
     let [x, y, z] = to_body.xyz().map(Real::to_f64);
     [y.atan2(z).to_degrees(), (-x).atan2(y.hypot(z)).to_degrees()]
 }
 
-/// A number that a table can hold.
+/// Returns the number if it is finite, because a table has no other numbers.
 fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }
 
-/// Where it ended, what became of each candidate, and how often the picture was looked at, if more than once.
+/// Describes the last stage, the verdict of each candidate, and the number of looks if there was more than one.
 fn detail<T: Real>(report: &Report<T>) -> String {
     let mut text = format!("ended at {}", report.stage.name());
     if report.counters.looks > 1 {
@@ -258,7 +260,7 @@ fn detail<T: Real>(report: &Report<T>) -> String {
     text
 }
 
-/// A status by its name.
+/// Writes and reads a status by its name.
 mod status_name {
     use hzn_core::status::Status;
     use serde::{Deserialize, Deserializer, Serializer, de};
@@ -349,7 +351,7 @@ mod tests {
     fn roll_and_pitch_have_the_signs_they_are_documented_with() {
         let at = |x: f64, y: f64, z: f64| roll_pitch_deg(&UnitVec3::<Body, f64>::try_new([x, y, z]).unwrap());
         assert_eq!(at(0.0, 0.0, 1.0), [0.0, -0.0]);
-        // Right side down: the body is seen to the right. Nose up: it is seen behind.
+        // With the right side down, the body is to the right. With the nose up, it is behind.
         assert!((at(0.0, 1.0, 1.0)[0] - 45.0).abs() < 1e-12);
         assert!((at(-1.0, 0.0, 1.0)[1] - 45.0).abs() < 1e-12);
         assert!((at(0.0, 0.0, -1.0)[0].abs() - 180.0).abs() < 1e-12);

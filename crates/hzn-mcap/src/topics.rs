@@ -1,4 +1,4 @@
-//! Topics, their schemas and the numbers they have in our files.
+//! Topics, their schemas, and their numbers in recordings of hzn.
 
 use foxglove::Encode;
 use foxglove::messages::{
@@ -9,10 +9,11 @@ use serde_json::{Map, Value, json};
 
 use crate::row::Row;
 
-/// What a message on `/hzn/report` holds besides the columns of a row.
+/// Schema of the fields on `/hzn/report` that are not columns of a row.
 const FURTHER: &str = include_str!("../schema/further.json");
 
-/// JSON Schema of the messages on `/hzn/report`, named `hzn.Report`. Cells that are empty in a table are left out.
+/// Returns the JSON Schema of the messages on `/hzn/report`, named `hzn.Report`. Fields that are empty cells in a table
+/// are left out of a message.
 pub fn report_schema() -> serde_json::Value {
     let mut properties: Map<String, Value> = serde_json::from_str(FURTHER).unwrap_or_default();
     for (name, json_type, _, doc) in Row::CELLS {
@@ -33,10 +34,10 @@ pub fn report_schema() -> serde_json::Value {
     })
 }
 
-/// The topic of the pictures in our recordings.
+/// The topic of the pictures in recordings of hzn.
 pub const IMAGE_TOPIC: &str = "/camera/image";
 
-/// A topic; its number is both its channel's and its schema's id.
+/// A topic; its number is the id of its channel and of its schema.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u16)]
 pub(crate) enum Topic {
@@ -76,7 +77,7 @@ impl Topic {
             Self::Log => "/log",
         }
     }
-    /// Name, encoding and bytes of the schema, and the messages' encoding.
+    /// Returns name, encoding and bytes of the schema, and the encoding of the messages.
     pub(crate) fn schema(self) -> (String, String, Vec<u8>, &'static str) {
         fn of<M: Encode>() -> (String, String, Vec<u8>, &'static str) {
             M::get_schema().map_or_else(Default::default, |s| (s.name, s.encoding, s.data.into_owned(), "protobuf"))

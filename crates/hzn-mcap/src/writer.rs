@@ -1,4 +1,4 @@
-//! Writes a recording that survives the end of the program at any moment.
+//! Writes a recording that stays readable if the program ends at any moment.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -17,32 +17,33 @@ use crate::messages;
 use crate::part::{create_part, part_path};
 use crate::topics::Topic;
 
-/// Longest time that a frame waits to be finished while frames keep coming.
+/// Longest time from a frame until it is finished, as long as further frames come.
 pub const FLUSH_INTERVAL: Duration = Duration::from_millis(250);
-/// A batch is written early when its pictures or its other data are this large, bytes.
+/// Size of the pictures, in bytes, at which a batch is written early.
 const BATCH_IMAGE_BYTES: usize = 8 << 20;
+/// Size of the other data, in bytes, at which a batch is written early.
 const BATCH_DATA_BYTES: usize = 1 << 20;
-/// The calibration is repeated when this much of the recording's time has passed, nanoseconds.
+/// The calibration is repeated after this much of the recording's time, in nanoseconds.
 const CALIBRATION_EVERY_NS: u64 = 1_000_000_000;
 
-/// What a recording is made with.
+/// Settings of a recording.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// Text of the sensor.toml, attached first.
     pub sensor_toml: String,
-    /// Further versions and settings for the metadata `hzn`, such as the program's version.
+    /// Further versions and settings for the metadata `hzn`, for example the program's version.
     pub metadata: BTreeMap<String, String>,
     /// The calibration for `/camera/calibration`.
     pub camera: Option<camera::Config>,
-    /// Replace an output, or the remains of a run, that is there already.
+    /// Whether an existing output, or the remains of a run, may be replaced.
     pub force: bool,
 }
 
-/// A recording that is being written. Dropped without [`Writer::finish`] it leaves its `.part` file with every frame
-/// written so far, for [`resume`](crate::resume) or [`recover`](crate::recover).
+/// A recording that is being written. If it is dropped without [`Writer::finish`], its `.part` file stays with every
+/// frame written so far, for [`resume`](crate::resume) or [`recover`](crate::recover).
 #[derive(Debug)]
 pub struct Writer {
-    /// `None` once finished or failed.
+    /// `None` after the end or after a failure.
     container: Option<Container<BufWriter<File>>>,
     path: PathBuf,
     part: PathBuf,
@@ -57,10 +58,10 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Begins a recording that will be called `path`.
+    /// Begins a recording with the final name `path`.
     ///
     /// # Errors
-    /// The output or the remains of a run exist and `options.force` is not set; the folder cannot be written to.
+    /// The output or the remains of a run exist and `options.force` is not set, or the folder cannot be written to.
     pub fn create(path: impl AsRef<Path>, options: &Options) -> Result<Self, Error> {
         let path = path.as_ref();
         let part = part_path(path);
@@ -89,28 +90,31 @@ impl Writer {
         }
     }
 
-    /// The unfinished file.
+    /// Returns the path of the unfinished file.
     pub fn part(&self) -> &Path {
         &self.part
     }
 
-    /// Records written through this writer: one a frame and body.
+    /// Returns the number of records that this writer wrote: one per frame and body.
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// Appends a frame. It is finished once flushed: at the latest by the first call after [`FLUSH_INTERVAL`].
+    /// Appends a frame. The frame is finished when it is flushed: at the latest by the first call after
+    /// [`FLUSH_INTERVAL`].
     ///
     /// # Errors
-    /// The disk is full or broken; after that every call fails, and the finished frames are safe in the `.part` file.
+    /// The picture is too large for a record, or the disk is full or broken. After an error of the disk every call
+    /// fails; the finished frames are safe in the `.part` file.
     pub fn write(&mut self, frame: &FrameRecord) -> Result<(), Error> {
         self.write_bodies(core::slice::from_ref(frame))
     }
 
-    /// As [`Self::write`], a frame with a record for each of several bodies: either all of them are finished or none.
+    /// Appends a frame as [`Self::write`] does, with one record for each body. Either all of its records are finished
+    /// or none.
     ///
     /// # Errors
-    /// As [`Self::write`].
+    /// The errors are those of [`Self::write`].
     pub fn write_bodies(&mut self, records: &[FrameRecord]) -> Result<(), Error> {
         let several = records.len() > 1;
         let caption = |record: &FrameRecord| {
@@ -119,7 +123,7 @@ impl Writer {
         };
         let captions: Vec<String> = records.iter().map(caption).collect();
         for (i, record) in records.iter().enumerate() {
-            // Picture and drawing stand in the first.
+            // Only the first record has the picture and the drawing.
             self.push(record, if i == 0 { &captions } else { &[] })?;
         }
         self.waiting_since.get_or_insert_with(Instant::now);
@@ -136,7 +140,7 @@ impl Writer {
             return Err(Error::TooLarge { bytes, limit: MAX_RECORD_BYTES - BATCH_IMAGE_BYTES as u64 });
         }
         let pen_px = drawing::pen_px(self.camera.as_ref());
-        // A frame without a time stays where it is in the sequence.
+        // A frame without a time gets the time of the frame before it.
         let ns = frame.row.time_s.map_or(self.last_ns, messages::time_ns);
         self.last_ns = ns;
         let sequence = frame.row.index as u32;
@@ -169,7 +173,8 @@ impl Writer {
         }
         let unprocessed = matches!(frame.row.status, Status::Unreadable | Status::NoAltitude);
         if frame.image.is_some() || !frame.annotations.is_empty() || (unprocessed && !captions.is_empty()) {
-            // Also without anything to draw: the last frame's picture and lines would stay as if they were this one's.
+            // This is written even if there is nothing to draw. Otherwise the last frame's lines would stay on this
+            // frame.
             let drawing = drawing::annotations(&frame.annotations, captions, pen_px, ns);
             push(Topic::Annotations, &mut |b| messages::append(&drawing, b))?;
         }
@@ -182,17 +187,17 @@ impl Writer {
         for line in &frame.log {
             push(Topic::Log, &mut |b| messages::append(&messages::log(line, &frame.row.file, ns), b))?;
         }
-        // The report comes last: where it is, the frame is whole.
+        // The report comes last: a frame with a report is complete.
         push(Topic::Report, &mut |b| b.extend_from_slice(&messages::report(frame)))?;
         self.frames += 1;
         Ok(())
     }
 
-    /// Finishes the waiting frames when they have waited for [`FLUSH_INTERVAL`]; for loops in which frames may fail
-    /// to come.
+    /// Finishes the waiting frames if they have waited for [`FLUSH_INTERVAL`]. It is for loops in which frames may stop
+    /// coming.
     ///
     /// # Errors
-    /// As [`Self::write`].
+    /// The errors are those of [`Self::write`].
     pub fn flush_if_due(&mut self) -> Result<(), Error> {
         match self.waiting_since {
             Some(since) if since.elapsed() >= FLUSH_INTERVAL => self.flush(),
@@ -203,14 +208,14 @@ impl Writer {
     /// Finishes every frame written so far.
     ///
     /// # Errors
-    /// As [`Self::write`].
+    /// The errors are those of [`Self::write`].
     pub fn flush(&mut self) -> Result<(), Error> {
         let Some(mut container) = self.container.take() else {
             return Err(Error::AfterFailure { path: self.part.clone() });
         };
         let (images, data) = (&mut self.images, &mut self.data);
         let mut write = || -> std::io::Result<()> {
-            // Pictures first: a frame with a report is a whole frame.
+            // Pictures come first: a frame with a report is complete.
             if !images.is_empty() {
                 let chunk = images.take(false)?;
                 container.chunk(&chunk)?;
@@ -231,10 +236,10 @@ impl Writer {
         }
     }
 
-    /// Closes the recording and gives it its name.
+    /// Closes the recording and renames it to its final name.
     ///
     /// # Errors
-    /// As [`Self::write`]; the `.part` file stays.
+    /// The errors are those of [`Self::write`]; the `.part` file stays.
     pub fn finish(mut self) -> Result<PathBuf, Error> {
         self.flush()?;
         let Some(container) = self.container.take() else {
@@ -250,7 +255,7 @@ impl Writer {
 impl Drop for Writer {
     fn drop(&mut self) {
         if self.container.is_some() {
-            // Nobody is left to hear of an error; what was flushed before is safe.
+            // No caller can receive an error here; the data flushed before are safe.
             let _ = self.flush();
         }
     }
@@ -260,10 +265,10 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     if path.exists() { Err(Error::Exists { path: path.to_path_buf() }) } else { Ok(()) }
 }
 
-/// What our recordings name as the library that wrote them, before its version.
+/// Name of the library in the header of recordings of hzn, before its version.
 pub(crate) const LIBRARY: &str = "hzn";
 
-/// Opens a file for a container, empty.
+/// Opens an empty file for a container.
 pub(crate) fn open(part: &Path) -> std::io::Result<Container<BufWriter<File>>> {
     let file = create_part(part)?;
     Container::try_new(BufWriter::with_capacity(1 << 16, file), &format!("{LIBRARY} {}", env!("CARGO_PKG_VERSION")))
@@ -279,5 +284,5 @@ fn begin(part: &Path, options: &Options) -> std::io::Result<Container<BufWriter<
     Ok(container)
 }
 
-/// Name of the attachment.
+/// Name of the attachment with the sensor.toml.
 pub(crate) const SENSOR_TOML: &str = "sensor.toml";

@@ -1,4 +1,4 @@
-//! Recordings from the first byte to the last: written, read back, cut off anywhere, closed and continued.
+//! Tests of recordings: written, read back, cut off anywhere, closed and continued.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,7 +22,7 @@ fn options() -> Options {
     }
 }
 
-/// Frame `i`, different in every part from the others; every third without an answer, every fourth without picture.
+/// Returns frame `i`. Frames differ in most parts; every third has no answer, every fourth has no picture.
 fn frame(i: u64) -> FrameRecord {
     let f = i as f64;
     let meta = RowMeta {
@@ -50,7 +50,7 @@ fn frame(i: u64) -> FrameRecord {
         }],
         image: (i % 4 != 1).then(|| EncodedImage {
             format: ImageFormat::Png,
-            // Bytes that do not compress, as a picture's do not.
+            // The bytes do not compress, like those of a picture.
             bytes: (0..2000u64).map(|k| ((k * k * 2_654_435_761 + i * 40_503) >> 13) as u8).collect(),
         }),
         annotations: Annotations {
@@ -107,7 +107,7 @@ fn an_independent_reader_agrees() {
     let stats = summary.stats.as_ref().unwrap();
     assert_eq!((stats.attachment_count, stats.metadata_count, stats.chunk_count), (1, 1, 6));
     assert_eq!((stats.message_start_time, stats.message_end_time), (100_000_000_000, 101_100_000_000));
-    // The stream checks every CRC; the index must lead to the same messages.
+    // The stream checks every CRC. The index must lead to the same messages.
     let stream: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
     assert_eq!(stream.len() as u64, stats.message_count);
     let mut indexed = 0;
@@ -120,7 +120,7 @@ fn an_independent_reader_agrees() {
         }
     }
     assert_eq!(indexed, stream.len());
-    // Pictures are alone in chunks without compression.
+    // Chunks without compression have only pictures.
     for chunk in &summary.chunk_indexes {
         let topics: Vec<_> =
             summary.stream_chunk(&bytes, chunk).unwrap().map(|m| m.unwrap().channel.topic.clone()).collect();
@@ -148,7 +148,7 @@ fn the_schema_names_every_column() {
     assert_eq!(named.len(), Row::COLUMNS.len() + 2);
 }
 
-/// What a kill leaves: the file cut at any byte. Every frame whose batch was flushed before the cut must come back.
+/// A killed program leaves a file that may end at any byte. Every frame whose batch was flushed before must be found.
 #[test]
 fn a_file_cut_anywhere_keeps_its_finished_frames() {
     let dir = tempfile::tempdir().unwrap();
@@ -169,7 +169,7 @@ fn a_file_cut_anywhere_keeps_its_finished_frames() {
         let expect = finished.iter().rev().find(|(size, _)| *size <= n as u64).map_or(0, |(_, frames)| *frames);
         match recover(&cut, &out) {
             Ok(found) => {
-                // Where only the message indexes of a batch are cut, its frames are there as well.
+                // If only the message indexes of a batch are cut off, its frames are found too.
                 assert!(found.frames == expect || found.frames == expect + 3, "cut at {n}");
                 assert_eq!(found.broken_chunks, 0, "cut at {n}");
                 let frames = read(&out);
@@ -212,7 +212,7 @@ fn a_resumed_run_equals_an_uninterrupted_one() {
         assert_eq!(read(&path), read(&whole));
         fs::remove_file(&path).unwrap();
     }
-    // With another sensor the results would not belong together.
+    // Results of different sensors do not belong together.
     drop(Writer::create(&path, &options()).unwrap());
     let other = Options { sensor_toml: "preset = \"moon\"\n".into(), ..options() };
     assert!(matches!(resume(&path, &other), Err(Error::OtherSensor { .. })));
@@ -264,7 +264,7 @@ fn errors_name_the_place_and_the_way_out() {
     assert!(matches!(ImageReader::open(&text, None).unwrap().next(), Some(Err(Error::NotMcap { .. }))));
 }
 
-/// A full disk, as the system plays it.
+/// A full disk, simulated by the system's `/dev/full`.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_said_and_nothing_else_happens() {
@@ -332,7 +332,7 @@ fn frames_are_finished_within_the_interval() {
     assert_eq!(read(writer.part()).len(), 1);
 }
 
-/// Everything that an index finds, and whether the file was closed.
+/// Returns everything that an index finds, and the index.
 fn index(path: &Path) -> (Vec<Place>, Vec<(Row, Given)>, Index) {
     let (mut pictures, mut rows) = (vec![], vec![]);
     let mut index = Index::open(path).unwrap();
@@ -359,7 +359,7 @@ fn any_picture_is_found_by_its_place() {
     assert_eq!(found.sensor_toml(), Some(SENSOR));
     assert_eq!(rows, (0..11).map(frame).map(|f| (f.row, f.given)).collect::<Vec<_>>());
     let mut reader = found.pictures().unwrap();
-    // Backwards: any order will do.
+    // Backwards, because any order must work.
     for place in pictures.iter().rev() {
         let expect = frame(place.sequence().into());
         let image = reader.read(place).unwrap();
@@ -393,7 +393,7 @@ fn a_cut_recording_is_indexed_as_far_as_it_goes() {
     assert!(matches!(Index::open(&cut), Err(Error::NotMcap { .. })));
 }
 
-/// Other writers compress pictures together with everything else.
+/// Other writers compress pictures together with all other data.
 #[test]
 fn pictures_in_compressed_chunks_are_found_too() {
     let dir = tempfile::tempdir().unwrap();

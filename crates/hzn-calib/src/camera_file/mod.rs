@@ -10,9 +10,10 @@
 //! | ROS | the same with `distortion_model`: `plumb_bob`, `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
 //! | ROS | the same with `distortion_model`: `equidistant`, `fisheye` | `kannala-brandt` |
 //!
-//! A file without either word that holds four coefficients may be both: it is refused, unless its name says `fisheye`.
+//! A file with four coefficients and without either word is ambiguous. It is refused, unless its file name contains
+//! `fisheye`.
 //!
-//! [`load`] reads, [`write()`] writes; [`from_braun_barf`] takes the five coefficients of that paper.
+//! [`load`] reads a file, [`write()`] writes one; [`from_braun_barf`] converts the five coefficients of that paper.
 
 mod read;
 mod write;
@@ -22,9 +23,11 @@ use hzn_core::camera::{Config, Model};
 pub use read::{load, parse};
 pub use write::{Format, Unfit, write};
 
-/// The lens of Braun & Barf 2022, (13): the distance from the centre in pixels is
-/// r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹. With f = κ₁ and kⱼ = κⱼ₊₁/κ₁ it is `kannala-brandt`. `size_px` is width and
-/// height, `centre_px` the principal point. `None` when κ₁ is not above 0.
+/// Returns the lens of Braun & Barf 2022, (13), with the distance from the centre in pixels
+/// r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹ and θ in radians.
+///
+/// With f = κ₁ and kⱼ = κⱼ₊₁/κ₁ this lens is `kannala-brandt`. `size_px` is width and height, `centre_px` is the
+/// principal point. The result is `None` if κ₁ is not finite or not above 0.
 pub fn from_braun_barf(kappa_px: [f64; 5], size_px: [u16; 2], centre_px: [f64; 2]) -> Option<Config> {
     let [f, higher @ ..] = kappa_px;
     let mut config = Config::ideal(Model::KannalaBrandt, size_px[0], size_px[1], f);

@@ -1,4 +1,4 @@
-//! What other tools write.
+//! Reads the calibration files of other tools.
 
 use std::path::Path;
 
@@ -8,28 +8,28 @@ use serde_json::Value;
 use crate::Problem;
 use crate::nearest::suggestion;
 
-/// Reads a camera file. `name` picks one camera of a camchain, such as `cam1`; without it the first is taken.
+/// Reads a camera file. `name` selects one camera of a camchain, for example `cam1`; without it the first is used.
 ///
 /// # Errors
-/// A file that cannot be read, is no known format, or has a lens that hzn does not have.
+/// The file cannot be read, has an unknown format, or has a lens that hzn does not have.
 pub fn load(path: &Path, name: Option<&str>) -> Result<Config, Problem> {
     let text = std::fs::read_to_string(path).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
     parse(&text, path, name)
 }
 
-/// As [`load`], from text; `path` is named in messages.
+/// Reads a camera file as [`load`] does, but from text; `path` is only used in messages.
 ///
 /// # Errors
-/// As [`load`].
+/// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Problem> {
-    // OpenCV writes `%YAML:1.0`, which is not the directive's right form.
+    // OpenCV writes `%YAML:1.0`, which is not a valid YAML directive.
     let body = match text.split_once('\n') {
         Some((first, rest)) if first.starts_with("%YAML:") => format!("#\n{rest}"),
         _ => text.to_owned(),
     };
-    // The tag says nothing that its mapping does not.
+    // The tag adds nothing to its mapping.
     let body = body.replace("!!opencv-matrix", "");
-    // `ros2 topic echo` ends every message like this.
+    // `ros2 topic echo` ends every message with this line.
     let body = body.trim_end().strip_suffix("\n---").unwrap_or(&body);
     let value: Value = serde_saphyr::from_str(body).map_err(|e| {
         let location = e.location();
@@ -125,7 +125,7 @@ impl File<'_> {
         self.camera(model, [width, height], [fx, fy, cx, cy], &given)
     }
 
-    /// OpenCV's own files, and ROS's camera_info as its calibrator writes it or as its topic shows it.
+    /// Reads OpenCV's files, and ROS's camera_info as its calibrator writes it or as its topic shows it.
     fn opencv(&self, top: &Value) -> Result<Config, Problem> {
         let either = |names: &[&'static str]| {
             let found = names.iter().find_map(|name| top.get(*name).map(|value| (*name, value)));
@@ -163,7 +163,7 @@ impl File<'_> {
         self.camera(model, size, [fx, fy, cx, cy], &given)
     }
 
-    /// fx, fy, cx, cy of a camera matrix.
+    /// Returns fx, fy, cx, cy of a camera matrix, in pixels.
     fn intrinsics(&self, value: &Value, key: &str) -> Result<[f64; 4], Problem> {
         let Some(Ok([fx, skew, cx, below, fy, cy, last @ ..])) = matrix(value).map(<[f64; 9]>::try_from) else {
             return Err(self.problem(key, "a 3x3 matrix is expected"));
@@ -183,7 +183,7 @@ impl File<'_> {
         Ok([fx, fy, cx, cy])
     }
 
-    /// The coefficients, which must be one list; none where the file has none.
+    /// Returns the coefficients, which must be a single row or column. The result is `None` if the file has none.
     fn coefficients(&self, value: Option<&Value>, field: &str) -> Result<Option<Vec<f64>>, Problem> {
         let Some(value) = value.filter(|v| !v.is_null()) else { return Ok(None) };
         let Some(values) = matrix(value) else {
@@ -204,7 +204,7 @@ impl File<'_> {
         Ok(Some(values))
     }
 
-    /// The lens that a file's own word says; `None` where it says none.
+    /// Returns the lens that `distortion_model` names; `None` if the word is missing or empty.
     fn stated_lens(&self, word: Option<&Value>, field: &str) -> Result<Option<Lens>, Problem> {
         let Some(word) = word.and_then(Value::as_str).map(str::trim).filter(|word| !word.is_empty()) else {
             return Ok(None);
@@ -217,7 +217,7 @@ impl File<'_> {
         })
     }
 
-    /// What hzn calls the lens; its coefficients must be as many as it has.
+    /// Returns hzn's model for the lens. The number of coefficients must fit that model.
     fn model(&self, lens: Lens, given: &Coefficients) -> Result<Model, Problem> {
         let wrong = |what: String| Err(self.problem(&given.field, what));
         let count = given.values.as_ref().map(Vec::len);
@@ -264,22 +264,22 @@ impl File<'_> {
     }
 }
 
-/// A lens as other tools call it.
+/// A lens in the terms of other tools.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Lens {
-    /// Without distortion.
+    /// No distortion.
     None,
-    /// k1 to k4 of the angle off axis.
+    /// k1 to k4, coefficients of the angle off axis.
     Fisheye,
-    /// k1, k2, p1, p2 as Kalibr writes them, which never leaves them out.
+    /// k1, k2, p1, p2. Kalibr always writes them.
     Radtan,
-    /// k1, k2, p1, p2, k3; OpenCV writes none for a lens without distortion.
+    /// k1, k2, p1, p2, k3. OpenCV writes no coefficients for a lens without distortion.
     PlumbBob,
-    /// Three more in the denominator, which hzn's lens does not have.
+    /// Three more coefficients in the denominator, which hzn's lens does not have.
     Rational,
 }
 
-/// What the files call them.
+/// The names of the lenses in the files.
 const LENSES: &[(&str, Lens)] = &[
     ("equidistant", Lens::Fisheye),
     ("fisheye", Lens::Fisheye),
@@ -291,14 +291,14 @@ const LENSES: &[(&str, Lens)] = &[
     ("none", Lens::None),
 ];
 
-/// Coefficients of a lens, and the field that holds them.
+/// Coefficients of a lens, and the field that they come from.
 struct Coefficients {
     values: Option<Vec<f64>>,
     field: String,
 }
 
 impl Coefficients {
-    /// How many there are up to the last that is not 0.
+    /// Returns the number of coefficients up to the last one that is not 0.
     fn meant(&self) -> usize {
         self.values.iter().flatten().enumerate().filter(|(_, k)| **k != 0.0).map(|(i, _)| i + 1).max().unwrap_or(0)
     }
@@ -308,12 +308,13 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
     value.as_array()?.iter().map(number).collect()
 }
 
-/// A number, also where YAML 1.1 writers leave the point out of `1e-05` and a stricter reader sees a text.
+/// Reads a number. YAML 1.1 writers may omit the decimal point, as in `1e-05`. A stricter reader takes this for a text,
+/// so a text with a number is accepted too.
 fn number(value: &Value) -> Option<f64> {
     value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
 }
 
-/// An OpenCV matrix (its `data`), a list, or a list of rows, flattened.
+/// Reads an OpenCV matrix (its `data`), a list, or a list of rows, and flattens it.
 fn matrix(value: &Value) -> Option<Vec<f64>> {
     let list = value.get("data").unwrap_or(value).as_array()?;
     let mut out = Vec::new();
@@ -403,7 +404,7 @@ mod tests {
 
     #[test]
     fn ros_camera_info() {
-        // As the calibrator of ROS writes it.
+        // ROS's calibrator writes the file in this form.
         let written = |model: &str, k: &str, cols: usize| {
             format!(
                 "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
@@ -419,7 +420,7 @@ mod tests {
         assert_eq!(read(&written("plumb_bob", &format!("{four}, 0.1"), 5)).unwrap().model, Model::BrownConrady);
         assert_eq!(read(&written("plumb_bob", "0, 0, 0, 0, 0", 5)).unwrap().model, Model::Pinhole);
         let eight = |last: &str| read(&written("rational_polynomial", &format!("{four}, 0.1, 0, 0, {last}"), 8));
-        // Without its denominator it is the same lens.
+        // With a denominator of 1 it is the same lens.
         assert_eq!(eight("0").unwrap().k.as_slice(), [-0.05, 0.01, -0.0035, 0.0002, 0.1]);
         let error = |text: String| read(&text).unwrap_err();
         assert_eq!(
@@ -434,7 +435,7 @@ mod tests {
                                                        rational_polynomial, none"
         );
         assert!(error(written("plumbob", four, 4)).contains("did you mean plumb_bob?"));
-        // The shape of D.
+        // The shape of D is checked.
         assert_eq!(
             error(written("equidistant", &format!("{four}, 0.1"), 5)),
             "cam.yaml: distortion_coefficients: 5 coefficients, but a fisheye lens has four, k1 to k4; is it another \
@@ -446,7 +447,7 @@ mod tests {
         assert!(error(written("rational_polynomial", four, 4)).contains("is it plumb_bob?"));
         assert!(error(written("plumb_bob", four, 5)).contains("has 4 numbers, but rows and cols say 1 x 5"));
         assert!(error(written("plumb_bob", "\"a\"", 1)).contains("a list of numbers is expected"));
-        // As `ros2 topic echo` shows it, and ROS 1.
+        // `ros2 topic echo` and ROS 1 show the message in this form.
         let echoed = "header:\n  frame_id: cam\nheight: 480\nwidth: 640\ndistortion_model: equidistant\nd:\n- -0.05\n- \
                       0.01\n\
                       - -0.0035\n- 0.0002\nk:\n- 300.0\n- 0.0\n- 319.5\n- 0.0\n- 301.0\n- 239.5\n- 0.0\n- 0.0\n- 1.0\n\
@@ -469,7 +470,7 @@ mod tests {
         let turned =
             text.replace("[[300, 0, 320], [0, 300, 240], [0, 0, 1]]", "[[300, 0, 0], [0, 300, 0], [320, 240, 1]]");
         assert!(read(&turned).unwrap_err().contains("it is transposed, as MATLAB keeps it"));
-        // Coefficients under another name would be a lens without distortion.
+        // Coefficients under an unknown name would otherwise give a lens without distortion.
         let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  resolution: [640, \
                      480]\n  distortion_model: radtan\n  distortion_coefs: [0.01, 0.0, 0.0, 0.0]\n";
         assert_eq!(read(chain).unwrap_err(), "cam.yaml: cam0.distortion_coeffs: missing: this lens has k1, k2, p1, p2");

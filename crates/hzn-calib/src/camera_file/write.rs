@@ -1,10 +1,10 @@
-//! Calibrations as other tools read them.
+//! Writes calibrations in the formats of other tools.
 
 use std::fmt::{self, Write};
 
 use hzn_core::camera::{Config, Model};
 
-/// Whose file.
+/// A format of calibration files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// `[camera]` of a sensor.toml.
@@ -13,14 +13,14 @@ pub enum Format {
     Kalibr,
     /// OpenCV's YAML, as its calibration sample writes it.
     OpenCv,
-    /// A EuRoC `sensor.yaml`, without the camera's place on its vehicle.
+    /// A EuRoC `sensor.yaml`, without the camera's pose on its vehicle.
     Euroc,
 }
 
-/// A lens that a format cannot hold.
+/// Error of a lens that the format cannot express.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unfit {
-    /// What it is that cannot be held.
+    /// The part of the lens that the format cannot express.
     pub what: &'static str,
     /// The format.
     pub format: Format,
@@ -45,10 +45,10 @@ impl fmt::Display for Unfit {
 
 impl std::error::Error for Unfit {}
 
-/// A calibration as text. `theta_max_deg` stands in a sensor.toml only.
+/// Writes a calibration as text. Only a sensor.toml has `theta_max_deg`; the other formats omit it.
 ///
 /// # Errors
-/// A lens that the format does not have.
+/// The format does not have the lens.
 pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
     match format {
         Format::Sensor => Ok(sensor(camera)),
@@ -127,7 +127,7 @@ fn opencv(c: &Config) -> Result<String, Unfit> {
     ))
 }
 
-/// Only Kalibr writes the projections with coefficients of their own.
+/// Refuses the lenses that only Kalibr can express: the projections with coefficients of their own.
 fn refuse_own_projection(c: &Config, format: Format) -> Result<(), Unfit> {
     match c.model {
         Model::DoubleSphere => Err(Unfit { what: "the double sphere lens", format }),
@@ -140,7 +140,7 @@ fn intrinsics(c: &Config) -> [f64; 4] {
     [c.fx_px, c.fy_px, c.cx_px, c.cy_px]
 }
 
-/// The four coefficients that Kalibr and EuRoC know.
+/// Returns the four coefficients that Kalibr and EuRoC have.
 fn four(c: &Config, format: Format) -> Result<Vec<f64>, Unfit> {
     refuse_own_projection(c, format)?;
     if c.model == Model::BrownConrady && c.coefficient(4) != 0.0 {
@@ -156,7 +156,8 @@ fn list(numbers: &[f64]) -> String {
     format!("[{}]", numbers.iter().map(|&x| number(x)).collect::<Vec<_>>().join(", "))
 }
 
-/// A number that comes back to the last bit. YAML 1.1 and OpenCV take `1e-5` for a word: it needs its point.
+/// Formats a number so that it is read back to the last bit. YAML 1.1 and OpenCV read `1e-5` as a word, so a decimal
+/// point is added.
 fn number(x: f64) -> String {
     let text = format!("{x:?}");
     match text.split_once('e') {
@@ -195,7 +196,7 @@ mod tests {
                 let k = |c: &Config| [0, 1, 2, 3, 4].map(|i| c.coefficient(i));
                 assert_eq!((k(&back), intrinsics(&back)), (k(&camera), intrinsics(&camera)), "{text}");
                 assert_eq!((back.width, back.height), (1920, 1080));
-                // A lens without distortion may come back as one with distortion 0.
+                // A lens without distortion may come back as one whose coefficients are 0.
                 assert!(back.model == camera.model || k(&camera) == [0.0; 5], "{text}");
             }
             let camera = Config { theta_max_deg: Some(54.0), ..camera };

@@ -1,6 +1,6 @@
-//! The keys of sensor.toml: those of hzn-core, and the few that concern only the file.
+//! The keys of sensor.toml: those of hzn-core, and those that exist only in the file.
 //!
-//! Documents are written from them: the [table](table::markdown) of the documentation, the commented
+//! Three documents are generated from the keys: the [table](table::markdown) of the documentation, the commented
 //! [template](template::text), and the [JSON schema](schema::json) for editors. `cargo xtask keys` writes all three.
 
 pub mod schema;
@@ -10,7 +10,7 @@ pub mod template;
 use hzn_core::Preset;
 pub use hzn_core::keys::{Choice, Form, Key, Limits, Table, Value};
 
-/// The starting values, which stand above all sections.
+/// The key for the starting values, which is above all sections.
 const PRESET: Key = Key {
     path: "preset",
     doc: "Starting values; keys that are written in the file count instead of them.\n",
@@ -50,7 +50,7 @@ const CAMERA_FILE: [Key; 2] = [
     },
 ];
 
-/// The sections in the order of the documents: `[mount]` comes after `[camera]`.
+/// Returns the sections in the order of the documents: `[mount]` comes after `[camera]`.
 pub fn sections() -> impl Iterator<Item = &'static Table> {
     let is_first = |table: &&Table| table.name == "camera";
     let is_mount = |table: &&Table| table.name == "mount";
@@ -59,28 +59,29 @@ pub fn sections() -> impl Iterator<Item = &'static Table> {
     all.iter().filter(is_first).chain(all.iter().filter(is_mount)).chain(rest)
 }
 
-/// Every key, in the order of the documents.
+/// Returns every key, in the order of the documents.
 pub fn all() -> impl Iterator<Item = &'static Key> {
     let of = |table: &'static Table| table.keys.iter().chain(extra(table.name));
     core::iter::once(&PRESET).chain(sections().flat_map(of))
 }
 
-/// The keys of a section that only the file has.
+/// Returns the keys of a section that exist only in the file.
 fn extra(section: &str) -> &'static [Key] {
     if section == "camera" { &CAMERA_FILE } else { &[] }
 }
 
-/// The keys of one section, in order; `""` is the top of the file.
+/// Returns the keys of one section, in order; `""` is the top of the file.
 pub fn in_section(section: &str) -> impl Iterator<Item = &'static Key> {
     all().filter(move |key| key.section() == section)
 }
 
-/// The key of a path such as `reject.threshold_px`.
+/// Returns the key of a path, for example `reject.threshold_px`; `None` if there is no such key.
 pub fn find(path: &str) -> Option<&'static Key> {
     all().find(|key| key.path == path)
 }
 
-/// The key of a path in parts, such as `reject`, `threshold_px`; that of one of several bodies has its number within.
+/// Returns the key of a path in parts, for example `reject`, `threshold_px`. For `[[bodies]]` the path contains the
+/// number of the body.
 pub(crate) fn find_parts(path: &[String]) -> Option<&'static Key> {
     let names: Vec<&str> = path.iter().map(String::as_str).filter(|part| part.parse::<usize>().is_err()).collect();
     let section = match names[..] {
@@ -92,7 +93,7 @@ pub(crate) fn find_parts(path: &[String]) -> Option<&'static Key> {
     in_section(section).find(|key| names.last() == Some(&key.name()))
 }
 
-/// The values that a key takes, in words: `above 0 to 1000`, `one of a, b`, or its rule.
+/// Describes the allowed values of a key: `above 0 to 1000`, a list of the choices, or the key's rule.
 pub fn limits_in_words(key: &Key) -> String {
     match key.limits {
         Limits::Number { low, above, high } => {
@@ -109,12 +110,12 @@ pub fn limits_in_words(key: &Key) -> String {
     }
 }
 
-/// A number without a useless `.0`; large ones as powers of ten.
+/// Formats a number without a trailing `.0`; whole millions are written as powers of ten.
 fn short(x: f64) -> String {
     if x.abs() >= 1e6 && x.abs() % 1e6 == 0.0 { format!("{x:e}") } else { x.to_string() }.replace('-', "−")
 }
 
-/// The defaults as TOML, by section.
+/// Returns the defaults as TOML, by section.
 fn defaults() -> toml::Table {
     use hzn_core::camera::{Config, Model};
     let config = hzn_core::Config::new(Config::ideal(Model::default(), 2, 2, 1.0));
@@ -124,7 +125,7 @@ fn defaults() -> toml::Table {
     table
 }
 
-/// A key's default as TOML; `None` where it has none.
+/// Returns the default of a key as TOML; `None` if it has no default.
 fn default_of(key: &Key, defaults: &toml::Table) -> Option<String> {
     let value = defaults.get(key.section())?.get(key.name())?;
     Some(value.to_string())

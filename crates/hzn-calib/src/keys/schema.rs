@@ -1,11 +1,11 @@
-//! The JSON schema of sensor.toml, with which an editor completes keys and marks wrong values.
+//! The JSON schema of sensor.toml. An editor uses it to complete keys and to mark wrong values.
 
 use serde_json::{Map, Value, json};
 
 use super::table::about;
 use super::{Form, Key, Limits, PRESET, Table, default_of, defaults, extra, sections};
 
-/// The schema, in the draft of 2020-12.
+/// Returns the schema, in the draft 2020-12.
 pub fn json() -> Value {
     let defaults = defaults();
     let mut properties = Map::from_iter([("preset".to_owned(), property(&PRESET, &defaults))]);
@@ -64,7 +64,7 @@ fn property(key: &Key, defaults: &toml::Table) -> Value {
         Form::Numbers => json!({"type": "array", "items": {"type": "number"}}),
         Form::Rows => json!({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
         Form::Polygons => json!({"type": "array", "items": {"type": "array", "items": {"type": "array"}}}),
-        // A body's own section; the covariance of a camera has rows and columns of its own.
+        // A body has the same sections as the whole file. The covariance of a camera is a table with rows and columns.
         _ if key.section() == "body" => json!({"$ref": format!("#/properties/{}", key.name())}),
         _ => json!({"type": "object"}),
     };

@@ -2,10 +2,10 @@
 
 use super::{Key, Table, default_of, defaults, extra, limits_in_words, sections};
 
-/// The lines between which the table stands.
+/// The lines that enclose the table on its page.
 const MARKS: [&str; 2] = ["<!-- keys: `cargo xtask keys` writes this table -->\n", "<!-- end of keys -->\n"];
 
-/// A page with the table as it is now between its marks; `None` for a page without marks.
+/// Returns a page with the current table between its marks; `None` if the page has no marks.
 pub fn inserted(page: &str) -> Option<String> {
     let [begin, end] = MARKS;
     let (before, rest) = page.split_once(begin)?;
@@ -13,7 +13,7 @@ pub fn inserted(page: &str) -> Option<String> {
     Some(format!("{before}{begin}\n{}\n{end}{after}", markdown()))
 }
 
-/// The table as Markdown.
+/// Writes the table as Markdown.
 pub fn markdown() -> String {
     let defaults = defaults();
     let mut out = String::from("| key | meaning | values | default | in flight |\n|---|---|---|---|---|\n");
@@ -27,7 +27,7 @@ pub fn markdown() -> String {
     out
 }
 
-/// What a section is for: its text without its own name.
+/// Returns the purpose of a section: its text without its name.
 pub(super) fn about(table: &Table) -> String {
     let text = table.doc.split("\n\n").next().unwrap_or_default();
     let text = text.split_once("sensor.toml").map_or(text, |(_, rest)| rest);

@@ -3,10 +3,10 @@
 use super::table::about;
 use super::{Key, Limits, default_of, defaults, extra, limits_in_words, sections, wrapped};
 
-/// Columns of a comment.
+/// Length of a comment line, in characters.
 const WIDTH: usize = 118;
 
-/// The text of the template. It loads as it stands, and every value outside of `[camera]` is the default.
+/// Returns the text of the template. It loads without changes, and every value outside of `[camera]` is the default.
 pub fn text() -> String {
     let defaults = defaults();
     let mut out = comment(
@@ -18,7 +18,7 @@ pub fn text() -> String {
     for table in sections() {
         out.push('\n');
         out += &comment(&about(table));
-        // A vehicle without a mounting has no such section.
+        // `[mount]` is commented out, because it is optional and has no default.
         out += &format!("{}[{}]\n", if table.name == "mount" { "# " } else { "" }, table.name);
         for key in table.keys.iter().chain(extra(table.name)) {
             out += &entry(key, &defaults);
@@ -37,10 +37,10 @@ fn comment(text: &str) -> String {
     wrapped(text, WIDTH).iter().map(|line| format!("# {line}\n")).collect()
 }
 
-/// A key with its meaning and its values above it. A key without a default is commented out.
+/// Writes a key with its meaning and its values above it. A key without a default is commented out.
 fn entry(key: &Key, defaults: &toml::Table) -> String {
     let (name, sentence) = (key.name(), key.sentence());
-    // A table is written below its own heading; a reader finds its keys there.
+    // The keys of a table are below its heading.
     if key.example.is_none() && default_of(key, defaults).is_none() {
         return comment(&format!("[{}]: {sentence}", key.path));
     }
@@ -59,7 +59,7 @@ fn entry(key: &Key, defaults: &toml::Table) -> String {
     comment(&about) + &live
 }
 
-/// A key that the template gives a value although it has no default: the camera, the altitude, the preset.
+/// Returns whether the template sets a key that has no default: the camera, the altitude and the preset.
 fn is_live(key: &Key) -> bool {
     let of_camera = key.section() == "camera" && key.unset.is_none();
     of_camera || matches!(key.path, "camera.model" | "body.altitude_km") || key.path == "preset"

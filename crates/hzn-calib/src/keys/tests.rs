@@ -5,7 +5,7 @@ use super::*;
 const CAMERA: &str = "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 500.0\nfy_px = 500\ncx_px = \
     319.5\ncy_px = 239.5\n";
 
-/// What sensor.toml says to a value; `None` when it is taken.
+/// Returns the error of sensor.toml for a value; `None` if the value is accepted.
 fn refused(key: &Key, value: &str) -> Option<String> {
     let text = match key.section() {
         "" => format!("{} = {value}\n{CAMERA}", key.name()),
@@ -21,9 +21,9 @@ fn refused(key: &Key, value: &str) -> Option<String> {
 #[test]
 fn every_key_exists() {
     assert!(all().count() > 100);
-    // This key counts next to `file` only.
+    // This key is valid only next to `file`.
     for key in all().filter(|k| k.path != "camera.camera") {
-        // No key takes this value: the file is refused for it, and not for the key's name.
+        // No key accepts this value. The error must be about the value and not about the key's name.
         let why = refused(key, "[[[]]]").unwrap_or_default();
         assert!(!why.contains("unknown section") && !why.contains("unknown key"), "{}: {why}", key.path);
     }

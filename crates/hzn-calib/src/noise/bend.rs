@@ -1,19 +1,19 @@
-//! A bend that all pictures of a flight share.
+//! A bend of the edge that all pictures of a flight have in common.
 //!
-//! The visible limb is no cone to the last tenth of a pixel: it stands higher where the Sun is higher, a veil is
-//! brighter towards one side. Of such a shape the fit takes up what a cone can follow: a shift, a tilt, and a bend,
-//! which it reads as another half-angle. Edge noise averages out over many pictures; a shape that they share does not,
-//! and no scatter between them shows it. What is left of it does show: the residuals' mean over all pictures, as the
-//! next shapes along the edge (Legendre polynomials of the degrees 3 to 5, each of RMS 1). The bend is taken to be as
-//! strong as the strongest of those.
+//! The visible limb differs from a cone by about a tenth of a pixel: it is higher where the Sun is higher, and a veil
+//! of light is brighter on one side. The fit absorbs the parts of this shape that a cone can follow: a shift, a tilt,
+//! and a bend, which it takes for another half-angle. Edge noise averages out over many pictures. A common shape does
+//! not, and the scatter between pictures does not show it. The rest of the shape is visible in the mean of the
+//! residuals over all pictures, as the next shapes along the edge (Legendre polynomials of the degrees 3 to 5, each of
+//! RMS 1). The bend is assumed to be as strong as the strongest of these.
 
 use super::cone::Cone;
 use super::sighting::Sighting;
 
-/// Shapes of the mean residuals that are looked at.
+/// Number of shapes that are examined in the mean residuals.
 pub(super) const SHAPES: usize = 3;
 
-/// Legendre polynomials of the degrees 3 to 5 at x from −1 to 1, scaled to an RMS of 1.
+/// Returns the Legendre polynomials of the degrees 3 to 5 at x from −1 to 1, scaled to an RMS of 1.
 fn next_shapes(x: f64) -> [f64; SHAPES] {
     let x2 = x * x;
     [
@@ -23,12 +23,12 @@ fn next_shapes(x: f64) -> [f64; SHAPES] {
     ]
 }
 
-/// The one of degree 2.
+/// Returns the Legendre polynomial of degree 2 at x from −1 to 1, scaled to an RMS of 1.
 pub(super) fn bend(x: f64) -> f64 {
     5.0f64.sqrt() * 0.5 * (3.0 * x * x - 1.0)
 }
 
-/// How much of each next shape the residuals hold, pixels.
+/// Returns the amplitude of each next shape in the residuals, in pixels.
 pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
     let mut sums = [0.0; SHAPES];
     for row in &cone.rows {
@@ -39,8 +39,8 @@ pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
     sums
 }
 
-/// RMS in pixels of the bend that all edges may share: as strong as the strongest of the next shapes in the mean of
-/// their residuals, or as its error.
+/// Returns the RMS in pixels of the bend that all edges may have in common: the amplitude of the strongest next shape
+/// in the mean of their residuals, or its standard error if that is larger.
 pub(super) fn common_px(sightings: &[&Sighting]) -> f64 {
     let n = sightings.len().max(1) as f64;
     let of = |k: usize| {

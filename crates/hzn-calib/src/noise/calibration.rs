@@ -1,4 +1,4 @@
-//! All pictures of a flight together.
+//! Combines all pictures of a flight.
 
 use hzn_core::Config;
 use hzn_core::body::{self, Kind};
@@ -11,27 +11,28 @@ use super::latitude::{Profile, profile};
 use super::refusal::Refusal;
 use super::sighting::Sighting;
 
-/// So many pictures with an answer are needed: the scatter of fewer is not known to a quarter.
+/// Smallest number of pictures with an answer. With fewer pictures the scatter is not known to a quarter.
 pub const LEAST_PICTURES: usize = 12;
-/// The limb height must come out better than this from the pictures' own errors, kilometres: half of the sigma that a
-/// sensor assumes of a limb nobody measured.
+/// Largest 1-sigma of the limb height from the pictures' own errors, in kilometres: half of the sigma that a sensor
+/// assumes for an unmeasured limb.
 pub(super) const MOST_SIGMA_KM: f64 = 3.5;
-/// Blur and level move the middle of an edge by parts of a pixel however smooth it is: less than the default of
-/// `covariance.sigma_px` is not believed, pixels.
+/// Floor of the common shift of an edge, in pixels: the default of `covariance.sigma_px`. Blur and threshold move the
+/// middle of an edge by fractions of a pixel, even if the edge is smooth.
 const LEAST_SHIFT_PX: f64 = 0.1;
-/// A mean square of the residuals over their variances above this is an alarm.
+/// An alarm is raised if the mean square of the residuals over their variances is larger.
 const ALARM: f64 = 2.0;
-/// A picture so many sigma from the middle of all has another edge.
+/// A picture is excluded if its limb height is more than this many sigmas from the median of all: it has another edge.
 const APART: f64 = 6.0;
-/// More pictures that are apart than this part are no exceptions.
+/// Largest fraction of excluded pictures. With more of them the calibration is refused.
 const MOST_APART: f64 = 0.2;
-/// The limb height that a sensor looks with while it is calibrated, and its 1-sigma: wide enough for any limb.
+/// Limb height and 1-sigma of the sensor during the calibration, in kilometres: wide enough for any limb.
 const WIDE_KM: [f64; 2] = [15.0, 30.0];
-/// Any direction counts then, however uncertain, degrees.
+/// Largest sigma of a direction during the calibration, in degrees: every direction counts.
 const ANY_SIGMA_DEG: f64 = 90.0;
 
-/// The sensor as it looks at the pictures that calibrate it: the limb's height is wide open. It looks for one body, the
-/// first whose half-angle tells a height; `None` when there is none.
+/// Returns the configuration for the pictures of a calibration: the sensor with a very wide prior of the limb height.
+/// It looks for one body, the first whose half-angle depends on the limb height. The result is `None` if there is no
+/// such body.
 pub fn looks_with(sensor: &Config) -> Option<Config> {
     let which = sensor.each_body().iter().position(|b| !b.half_angle_is_free())?;
     let mut wide = sensor.clone();
@@ -43,85 +44,85 @@ pub fn looks_with(sensor: &Config) -> Option<Config> {
     Some(wide)
 }
 
-/// A limb height in kilometres with its sigma, and what that is made of.
+/// A limb height with its sigma and the parts of the sigma, in kilometres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Height {
-    /// The height; of rows by latitude their mean over what was seen.
+    /// Height; with rows by latitude it is their mean over the visible limb.
     pub km: f64,
-    /// The 1-sigma to tell a sensor: the root of the squares of the five that follow.
+    /// 1-sigma for the sensor: the root sum of squares of the five parts that follow.
     pub sigma_km: f64,
-    /// From edge noise, over all pictures.
+    /// Part from edge noise, over all pictures.
     pub statistical_km: f64,
-    /// Scatter from picture to picture beyond edge noise.
+    /// Part from the scatter between pictures that edge noise does not explain.
     pub scatter_km: f64,
-    /// A shift of all edges by the residuals' RMS, and 0.1 pixels at least: level and blur do that, alike in every
-    /// picture.
+    /// Part from a shift of all edges by the residuals' RMS, or by 0.1 px if that is larger. Threshold and blur cause
+    /// it, and it is the same in every picture.
     pub shift_km: f64,
-    /// A bend that all edges share, which the fit reads as another height: as strong as the next shapes along the edge
-    /// that the residuals show in the mean.
+    /// Part from a bend that all edges have in common, which the fit takes for another height. It is assumed to be as
+    /// strong as the next shapes along the edge in the mean of the residuals.
     pub bend_km: f64,
-    /// The local radius, where no position tells it.
+    /// Part from the local radius if no position is known.
     pub radius_km: f64,
-    /// Rows of (geodetic latitude in degrees, height, 1-sigma from edge noise and scatter); empty when one height
-    /// explains all pictures as well.
+    /// Rows of (geodetic latitude in degrees, height, 1-sigma from edge noise and scatter); empty if one height
+    /// explains all pictures equally well.
     pub by_latitude: Vec<[f64; 3]>,
 }
 
 /// Edge noise of all pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge {
-    /// 1-sigma of an edge point, pixels: the RMS of the residuals.
+    /// 1-sigma of an edge point, in pixels: the RMS of the residuals.
     pub sigma_px: f64,
-    /// Length over which errors of this sigma stay alike, pixels: a process of one exponential then says of a fit what
-    /// the pictures' own models say of it.
+    /// Correlation length of the errors, in pixels. An exponential process with this sigma and this length gives a fit
+    /// the same variance as the noise models of the pictures.
     pub correlation_px: f64,
-    /// L of the likeliest model of all pictures together, pixels.
+    /// Length L of the most likely model of all pictures together, in pixels.
     pub length_px: f64,
-    /// ν of it, the white part of the variance.
+    /// White part ν of the variance in that model.
     pub white: f64,
-    /// 1-sigma of what shifts all points of an edge alike, pixels: as large as the residuals' RMS, and 0.1 at least.
+    /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the residuals, at least 0.1.
     pub bias_px: f64,
 }
 
-/// What the flight says about the focal length. It is told, never applied.
+/// The focal length that the flight measures. It is reported but never applied.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Focal {
-    /// By how much the focal length is longer than the sensor.toml says, percent.
+    /// Difference from the focal length of the sensor.toml, in percent; positive if the measured one is longer.
     pub percent: f64,
-    /// Its 1-sigma, percent, with the limb height unknown.
+    /// 1-sigma of the difference, in percent, with the limb height unknown.
     pub sigma_percent: f64,
-    /// Limb height that 0.1 % of focal length makes, kilometres, on average.
+    /// Mean change of the limb height for 0.1 % of focal length, in kilometres.
     pub km_per_permille: f64,
 }
 
 /// One picture in the calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Its name.
+    /// Name of the picture.
     pub name: String,
-    /// The limb height that it measures, kilometres.
+    /// Limb height that it measures, in kilometres.
     pub km: f64,
-    /// 1-sigma from edge noise.
+    /// 1-sigma from edge noise, in kilometres.
     pub sigma_km: f64,
-    /// What the calibration says of the limb that it saw.
+    /// Limb height that the calibration gives for the visible limb, in kilometres.
     pub explained_km: f64,
-    /// Whether it counts: it is not apart from the others.
+    /// Whether the picture counts, because its height agrees with the others.
     pub counts: bool,
 }
 
 /// Limb height and noise of a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// Which body.
+    /// The body.
     pub body: Kind,
-    /// Its limb.
+    /// Its limb height.
     pub height: Height,
     /// Edge noise.
     pub edge: Edge,
-    /// Mean square of the pictures' heights about the fitted ones over their variances, without the scatter: about 1
-    /// when edge noise explains them.
+    /// Mean square of the pictures' heights about the fitted heights over their variances, without the scatter. It is
+    /// about 1 if edge noise explains the heights.
     pub chi2: f64,
-    /// What the flight says about the focal length; `None` where the pictures do not tell it from the limb height.
+    /// The focal length; `None` if the pictures cannot separate it from the limb height.
     pub focal: Option<Focal>,
     /// The pictures, in order.
     pub pictures: Vec<Picture>,
@@ -130,10 +131,10 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Of the sightings of a flight; `body` is what the sensor looks for.
+    /// Combines the sightings of a flight; `body` is the body that the sensor looks for.
     ///
     /// # Errors
-    /// What they do not tell.
+    /// The flight does not determine limb height and noise: see [`Refusal`].
     pub fn new(body: &body::Config, sightings: &[Sighting]) -> Result<Self, Refusal> {
         let few = |answered: usize| Refusal::TooFew { answered, least: LEAST_PICTURES };
         if sightings.len() < LEAST_PICTURES {
@@ -169,12 +170,12 @@ impl Calibration {
         })
     }
 
-    /// That the pictures do not agree with each other.
+    /// Returns the alarm if the pictures do not agree with each other.
     pub fn alarm(&self) -> Option<Refusal> {
         (self.chi2 > ALARM).then_some(Refusal::Alarm { chi2: self.chi2, most: ALARM })
     }
 
-    /// Writes the numbers into a sensor that looks for the body, as [`super::into_sensor_toml`] does into its file.
+    /// Writes the values into a sensor that looks for the body, as [`super::into_sensor_toml`] does for the file.
     pub fn apply(&self, sensor: &mut Config) {
         let several = !sensor.bodies.is_empty();
         let noise = hzn_core::covariance::Config {
@@ -186,7 +187,7 @@ impl Calibration {
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
         body.limb_height_km = digits(self.height.km);
         body.limb_height_sigma_km = digits(self.height.sigma_km);
-        // The measured height is already that of clipped limbs.
+        // The measured height already includes the effect of clipped limbs.
         body.clipped_height_km = 0.0;
         body.limb_height_by_latitude_km =
             self.height.by_latitude.iter().map(|[deg, km, _]| [*deg, digits(*km)]).collect();
@@ -198,12 +199,12 @@ impl Calibration {
     }
 }
 
-/// As many digits as are written.
+/// Rounds to the three decimals that are written.
 pub(super) fn digits(x: f64) -> f64 {
     (x * 1e3).round() / 1e3
 }
 
-/// The sightings without those that are apart from all others.
+/// Returns the sightings without those whose height disagrees with all others.
 fn together(all: &[Sighting]) -> Vec<&Sighting> {
     let middle_km = median(all.iter().map(|s| s.limb_height_km));
     let usual_km = 1.4826 * median(all.iter().map(|s| (s.limb_height_km - middle_km).abs()));
@@ -214,7 +215,7 @@ fn together(all: &[Sighting]) -> Vec<&Sighting> {
 fn height(profile: &Profile, sightings: &[&Sighting]) -> Height {
     let Solved { h, covariance, scatter2, .. } = &profile.solved;
     let (n, parameters) = (sightings.len() as f64, h.len());
-    // What all pictures saw together.
+    // The mean weights of the parameters over all pictures.
     let mut seen = vec![0.0; parameters];
     for s in sightings {
         seen.iter_mut().zip(profile.parts(s)).for_each(|(sum, part)| *sum += part / n);
@@ -245,7 +246,7 @@ fn height(profile: &Profile, sightings: &[&Sighting]) -> Height {
     }
 }
 
-/// Sigma and length; and the likeliest (L, ν) of all pictures together, each with its own σ.
+/// Computes sigma and length, and the most likely (L, ν) of all pictures together, each picture with its own σ.
 fn edge(sightings: &[&Sighting]) -> Edge {
     let n = sightings.len() as f64;
     let unlikely = |i: usize, j: usize| sightings.iter().map(|s| s.scores[i][j].unlikely).sum::<f64>();
@@ -261,7 +262,7 @@ fn edge(sightings: &[&Sighting]) -> Edge {
     }
 }
 
-/// d_i = A_i h − D_i ε: ε beside the heights, with the scatter that was found.
+/// Fits d_i = A_i h − D_i ε: the relative focal length error ε together with the heights and the scatter.
 fn focal(profile: &Profile, sightings: &[&Sighting]) -> Option<Focal> {
     use super::height::{Measured, solve};
     let measured: Vec<Measured> = sightings
@@ -279,7 +280,7 @@ fn focal(profile: &Profile, sightings: &[&Sighting]) -> Option<Focal> {
     sigma_percent.is_finite().then_some(Focal { percent: solved.h[place], sigma_percent, km_per_permille: mean * 1e-3 })
 }
 
-/// The middle value.
+/// Returns the median; for an even number of values it is the upper of the two middle values.
 pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);

@@ -1,9 +1,9 @@
-//! The cone through the edge points of one picture, its half-angle free.
+//! The cone through the edge points of one picture, with a free half-angle.
 //!
-//! State: unit axis e and c = cos α. With the slope g = |∂(s·e)/∂(u, v)| of a ray s the distance from the limb is
-//! r = (c + o − s·e)/g in pixels, o being the offset of cos α by azimuth where an attitude tells it. With the tangent
-//! basis B at e and the weighted mean m of Bᵀs the rows are h = [Bᵀs − m, −1]/g, and (Σ w h hᵀ) δ = Σ w r h; the change
-//! of c is a·δ with a = (m, 1).
+//! The state is the unit axis e and c = cos α. With the slope g = |∂(s·e)/∂(u, v)| of a ray s, the distance from the
+//! limb is r = (c + o − s·e)/g in pixels. Here o is the offset of cos α by azimuth if the attitude is known, else 0.
+//! With the tangent basis B at e and the weighted mean m of Bᵀs, the rows are h = [Bᵀs − m, −1]/g, and
+//! (Σ w h hᵀ) δ = Σ w r h. The change of c is a·δ with a = (m, 1).
 
 use hzn_core::Prior;
 use hzn_core::camera::Camera;
@@ -12,64 +12,65 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use nalgebra::{Matrix3, Vector3};
 
-/// Iterations of the fit; it starts at the pipeline's own answer.
+/// Largest number of iterations of the fit, which starts at the pipeline's answer.
 const ITERATIONS: usize = 8;
-/// Fewer points fit any cone.
+/// Smallest number of points. Fewer points agree with almost any cone.
 const LEAST_POINTS: usize = 24;
 
-/// One edge point that carries the answer.
+/// An edge point with a weight.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     ray: Vector3<f64>,
-    /// Derivative of the ray by (u, v), as its two columns.
+    /// Derivatives of the ray by u and by v.
     by: [Vector3<f64>; 2],
-    /// From the principal point, pixels.
+    /// Offset from the principal point, in pixels.
     off_px: [f64; 2],
     weight: f64,
-    /// To the next of them along the edge, pixels; 0 for the last.
+    /// Distance to the next of these points along the edge, in pixels; 0 for the last.
     step_px: f64,
 }
 
-/// A point's row at the cone.
+/// Row of the normal equations for one point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     /// h, per pixel.
     pub(super) h: Vector3<f64>,
-    /// Distance from the limb, pixels.
+    /// Distance r from the limb, in pixels.
     pub(super) r_px: f64,
-    /// g, per pixel.
+    /// Slope g, per pixel.
     pub(super) slope: f64,
-    /// The fit's weight, 0 to 1.
+    /// Weight of the fit, 0 to 1.
     pub(super) weight: f64,
-    /// To the next point along the edge, pixels.
+    /// Distance to the next point along the edge, in pixels.
     pub(super) step_px: f64,
-    /// Place along the edge, from −1 at its beginning to 1 at its end.
+    /// Position along the edge, from −1 at its beginning to 1 at its end.
     pub(super) along: f64,
-    /// Azimuth about the axis from its tangent basis, radians.
+    /// Azimuth about the axis in the tangent basis, in radians.
     pub(super) azimuth_rad: f64,
-    /// By how much r grows for a focal length that is longer by its own size, pixels.
+    /// Change of r per relative change of the focal length, in pixels.
     pub(super) by_focal_px: f64,
 }
 
 /// A fitted cone.
 #[derive(Debug, Clone)]
 pub(super) struct Cone {
-    /// cos of the (mean) half-angle.
+    /// Cosine of the (mean) half-angle.
     pub(super) cos: f64,
     pub(super) rows: Vec<Row>,
     /// Rays of the rows.
     pub(super) rays: Vec<Vector3<f64>>,
     /// Inverse of Σ w h hᵀ, px².
     pub(super) inverse: Matrix3<f64>,
-    /// a: what the change of c is of δ.
+    /// a: the change of c is a·δ.
     pub(super) to_cos: Vector3<f64>,
     /// Σ w.
     pub(super) weight: f64,
 }
 
 impl Cone {
-    /// Fits the cone to weighted points (pixels), from the pipeline's axis and cos α on. `azimuth`: the offset of cos α
-    /// of a limb that is no circle. `None` when the points do not determine it.
+    /// Fits the cone to weighted points (pixels). The fit starts at the pipeline's axis (camera frame) and cos α.
+    /// `azimuth` is the offset of cos α for a limb that is not a circle. The result is `None` if the points do not
+    /// determine the cone.
     pub(super) fn fit(
         camera: &Camera<f64>,
         points: &[([f64; 2], f64)],
@@ -140,37 +141,37 @@ impl Cone {
         })
     }
 
-    /// Weighted RMS distance of the points from the limb, pixels.
+    /// Returns the weighted RMS distance of the points from the limb, in pixels.
     pub(super) fn rms_px(&self) -> f64 {
         (self.rows.iter().map(|r| r.weight * r.r_px * r.r_px).sum::<f64>() / self.weight).sqrt()
     }
 
-    /// Length of edge that the points cover, pixels.
+    /// Returns the length of the edge that the points cover, in pixels.
     pub(super) fn arc_px(&self) -> f64 {
         self.rows.iter().map(|r| r.step_px).sum()
     }
 
-    /// Weighted RMS of the slope: change of cos α a pixel.
+    /// Returns the change of cos α per pixel: the root of the weighted harmonic mean of the squared slopes.
     pub(super) fn cos_per_px(&self) -> f64 {
         let inverse_squares: f64 = self.rows.iter().map(|r| r.weight / (r.slope * r.slope)).sum();
         (self.weight / inverse_squares.max(1e-300)).sqrt()
     }
 
-    /// By how much the fitted cos α grows when every r grows by `signal` (pixels).
+    /// Returns the change of the fitted cos α if every r grows by `signal` (pixels).
     pub(super) fn cos_by(&self, signal: impl Fn(&Row) -> f64) -> f64 {
         let sum: Vector3<f64> = self.rows.iter().map(|r| r.h * (r.weight * signal(r))).sum();
         self.to_cos.dot(&(self.inverse * sum))
     }
 
-    /// The fitted cos α as a weighted mean: by how much it grows when cos α of the limb grows by 1 at this point alone.
-    /// The shares of all points sum to 1.
+    /// Returns the share of each point in the fitted cos α: the change of the fitted value if cos α of the limb grows
+    /// by 1 at this point alone. The shares of all points sum to 1.
     pub(super) fn shares(&self) -> Vec<f64> {
         let a = self.inverse * self.to_cos;
         self.rows.iter().map(|r| -r.weight * a.dot(&r.h) / r.slope).collect()
     }
 
-    /// Variance of the fitted cos α when errors along the limb are a Gauss-Markov process of `sigma_px` and length
-    /// `correlation_px` of which the part `white` is independent from point to point.
+    /// Returns the variance of the fitted cos α if the errors along the limb are a Gauss-Markov process with `sigma_px`
+    /// and the length `correlation_px`. The fraction `white` of its variance is independent from point to point.
     pub(super) fn variance_of_cos(&self, sigma_px: f64, correlation_px: f64, white: f64) -> f64 {
         let a = self.inverse * self.to_cos;
         let (mut own, mut pairs, mut carried) = (0.0, 0.0, 0.0);
@@ -184,12 +185,12 @@ impl Cone {
     }
 }
 
-/// exp(−step/length); 0 for white errors.
+/// Returns exp(−step/length); 0 for white errors, which have length 0.
 pub(super) fn decay(step_px: f64, length_px: f64) -> f64 {
     if length_px > 0.0 { (-step_px / length_px).exp() } else { 0.0 }
 }
 
-/// The points with a weight and a ray, each with the way to the next.
+/// Returns the points that have a weight and a ray, each with the distance to the next.
 fn places(camera: &Camera<f64>, points: &[([f64; 2], f64)]) -> Vec<Place> {
     let centre = camera.principal_point();
     let kept = points.iter().filter(|(_, weight)| *weight > 0.0);
@@ -210,13 +211,14 @@ fn places(camera: &Camera<f64>, points: &[([f64; 2], f64)]) -> Vec<Place> {
     places.into_iter().map(|p| p.1).collect()
 }
 
-/// Two unit vectors across `e` and each other.
+/// Returns two unit vectors that are perpendicular to `e` and to each other.
 pub(super) fn basis(e: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
     (b1, e.cross(&b1))
 }
 
-/// cos α by azimuth about the axis, of an ellipsoid whose north is known in the camera: as the pipeline has it.
+/// The cosine of the half-angle by azimuth about the axis, for an ellipsoid whose north is known in the camera frame.
+/// The pipeline has the same model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Azimuth {
     east: Vector3<f64>,
@@ -226,7 +228,7 @@ pub(super) struct Azimuth {
 }
 
 impl Azimuth {
-    /// Of the limb cone seen by a camera with this attitude; `None` without one.
+    /// Creates the offsets for a limb cone from the camera's attitude; `None` without an attitude.
     pub(super) fn new(cone: &LimbCone<f64>, frame: &Prior<f64>) -> Option<Self> {
         let east: UnitVec3<_, f64> = frame.cam_to_ecef?.inverse().apply(&cone.east);
         Some(Self {

@@ -1,47 +1,47 @@
 //! Edge noise of one picture from the residuals along its limb, by restricted maximum likelihood.
 //!
-//! The residuals are r = H δ + ε with ε a Gauss-Markov process of which a part is white: V = σ²[(1 − ν) e^(−Δs/L) + ν
-//! I]. With the three fitted parameters integrated out, −2 ln of the likelihood is (n − 3) ln(q/(n − 3)) + ln|V/σ²| +
-//! ln|HᵀV⁻¹H|, q = rᵀV⁻¹r after the fit; σ² = q/(n − 3). A Kalman filter along the points whitens r and the columns of
-//! H in one pass. The likelihood of one picture is flat in L: so the variance of the fit is averaged over (L, ν), with
-//! L about a quarter of the arc within a factor of two.
+//! The residuals are r = H δ + ε, with ε a Gauss-Markov process that has a white part: V = σ²[(1 − ν) e^(−Δs/L) + ν I].
+//! With the three fitted parameters integrated out, −2 ln of the likelihood is (n − 3) ln(q/(n − 3)) + ln|V/σ²| +
+//! ln|HᵀV⁻¹H|, with q = rᵀV⁻¹r after the fit and σ² = q/(n − 3). A Kalman filter along the points whitens r and the
+//! columns of H in one pass. The likelihood of one picture is flat in L. Therefore the variance of the fit is averaged
+//! over (L, ν), with a prior for L: a quarter of the arc, within a factor of two.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::cone::{Cone, Row, decay};
 
-/// Lengths that are tried, pixels.
+/// Lengths L that are tried, in pixels.
 pub(super) const LENGTHS_PX: [f64; 10] = [2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1280.0];
-/// White parts that are tried.
+/// White parts ν that are tried.
 pub(super) const WHITE: [f64; 7] = [0.0, 0.25, 0.5, 0.7, 0.85, 0.95, 0.99];
-/// The length is likely about this part of the arc ...
+/// Centre of the prior of the length, as a fraction of the arc.
 const LIKELY_ARC: f64 = 0.25;
-/// ... within so much in its logarithm.
+/// 1-sigma of that prior, in the natural logarithm of the length.
 const LIKELY_WITHIN: f64 = 0.7;
-/// Lengths between a pixel and the likely one that are tried for the equivalent one.
+/// Number of steps from one pixel to the prior's centre in the search for the equivalent length.
 const EQUIVALENT_STEPS: u32 = 40;
-/// Part of the arc over which a sensor takes errors for alike where it measures them in each picture.
+/// Correlation length of a sensor that measures the edge noise in each picture, as a fraction of the arc.
 const SENSOR_ARC: f64 = 1.0 / 12.0;
-/// Points that the fit weighs less are passed over: at half weight they lie about 2.7 sigma off.
+/// Points with a smaller weight are skipped: at half weight they are about 2.7 sigma off.
 const LEAST_WEIGHT: f64 = 0.5;
-/// No edge is better than this, pixels.
+/// Floor of the sigma of an edge point, in pixels.
 pub(super) const LEAST_PX: f64 = 0.03;
-/// A variance larger than so many mean squares of the residuals is not in them.
+/// Largest variance of a model, in mean squares of the residuals. The residuals do not support a larger one.
 const MOST_VARIANCE: f64 = 4.0;
 
-/// What one model of the noise says of one picture.
+/// The result of one noise model for one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Score {
-    /// −2 ln of the restricted likelihood, but for a constant.
+    /// −2 ln of the restricted likelihood, up to a constant.
     pub(super) unlikely: f64,
     /// σ², px².
     pub(super) variance_px2: f64,
 }
 
-/// Every model of the grid on one picture, white parts within lengths.
+/// The scores of every model of the grid for one picture, indexed by length and then by white part.
 pub(super) type Scores = [[Score; WHITE.len()]; LENGTHS_PX.len()];
 
-/// The scores of a picture's residuals; `None` where they are too few or all zero.
+/// Returns the scores of a picture's residuals; `None` if there are too few or all are zero.
 pub(super) fn scores(cone: &Cone) -> Option<Scores> {
     let mut scores = [[Score { unlikely: f64::INFINITY, variance_px2: f64::NAN }; WHITE.len()]; LENGTHS_PX.len()];
     for (scores, length) in scores.iter_mut().zip(LENGTHS_PX) {
@@ -53,10 +53,11 @@ pub(super) fn scores(cone: &Cone) -> Option<Scores> {
     Some(scores)
 }
 
-/// One model on one picture.
+/// Returns the score of one model for one picture.
 fn score_of(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
     let freedom = rows.iter().filter(|r| r.weight >= LEAST_WEIGHT).count() as f64 - 3.0;
-    // Of r and of the three columns: what is expected of the next point's correlated part; its variance.
+    // The Kalman filter's prediction of the correlated part at the next point, for r and the three columns of H, and
+    // the variance of that prediction in units of σ².
     let (mut ahead, mut spread) = ([0.0f64; 4], 1.0 - white);
     let (mut log_det, mut rr) = (0.0, 0.0);
     let (mut hr, mut hh) = (Vector3::zeros(), Matrix3::zeros());
@@ -88,8 +89,8 @@ fn score_of(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
     Some(Score { unlikely: freedom * (q / freedom).ln() + log_det + log_det_h, variance_px2: q / freedom })
 }
 
-/// The shortest length over which errors of one exponential with `sigma_px` would have to be alike to make the fitted
-/// cos α as uncertain as `variance` says, pixels; where none does, the length that comes nearest.
+/// Returns the shortest correlation length, in pixels, at which an exponential process with `sigma_px` gives the fitted
+/// cos α at least this `variance`. If no length does, the result is the length with the largest variance.
 pub(super) fn equivalent_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
     let most_px = LIKELY_ARC * cone.arc_px();
     let mut nearest = (0.0, 0.0);
@@ -106,9 +107,10 @@ pub(super) fn equivalent_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
     nearest.0
 }
 
-/// Variance of the fitted cos α: averaged over the models by their likelihood, and not below that of residuals which
-/// are alike over a twelfth of the arc, as the sensor takes them by default. A light that changes along the limb moves
-/// its height smoothly; the fit takes such an error for curvature, so that residuals do not show it.
+/// Returns the variance of the fitted cos α, averaged over the models by their likelihood. Its floor is the variance
+/// for a correlation length of a twelfth of the arc, which is the sensor's default. The floor is needed because a
+/// brightness that changes along the limb shifts the limb smoothly. The fit takes this error for curvature, so the
+/// residuals do not show it.
 pub(super) fn variance_of_cos(cone: &Cone, scores: &Scores) -> f64 {
     let (arc, mean_square) = (cone.arc_px(), cone.rms_px().powi(2));
     let prior = |length: f64| {

@@ -1,40 +1,42 @@
-//! One limb height from many measurements of it, with the scatter that their own errors do not explain.
+//! Estimates one limb height from many measurements, with the scatter that their errors do not explain.
 //!
-//! d_i = A_i h + η_i + ε_i with known variances s_i² of ε and an unknown variance τ² of η. Restricted likelihood:
-//! minimise Σ ln(s_i² + τ²) + ln|AᵀWA| + Σ w_i (d_i − A_i ĥ)² over τ, with w = 1/(s² + τ²).
+//! The model is d_i = A_i h + η_i + ε_i, with known variances s_i² of ε and an unknown variance τ² of η. The restricted
+//! likelihood is maximal where Σ ln(s_i² + τ²) + ln|AᵀWA| + Σ w_i (d_i − A_i ĥ)² is minimal over τ, with
+//! w = 1/(s² + τ²).
 
 use nalgebra::{DMatrix, DVector};
 
 /// A measured height.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Measured {
-    /// The height, kilometres.
+    /// Measured height, in kilometres.
     pub(super) km: f64,
-    /// Its variance from edge noise alone, km².
+    /// Variance of the height from edge noise alone, in km².
     pub(super) variance_km2: f64,
-    /// What it is of the parameters: their mean's weights.
+    /// Row A_i: the weights of the parameters in this height.
     pub(super) of: Vec<f64>,
 }
 
-/// The parameters with their covariance.
+/// The fitted parameters with their covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Solved {
-    /// Parameters.
+    /// Parameters h.
     pub(super) h: DVector<f64>,
-    /// Their covariance (with the scatter).
+    /// Covariance of the parameters, including the scatter.
     pub(super) covariance: DMatrix<f64>,
-    /// Variance of the scatter τ², the parameters' unit squared.
+    /// Variance τ² of the scatter, in the parameters' unit squared.
     pub(super) scatter2: f64,
-    /// −2 ln of the likelihood (not restricted) there, to compare models with other parameters.
+    /// −2 ln of the (not restricted) likelihood at the solution, for the comparison of models with different
+    /// parameters.
     pub(super) unlikely: f64,
-    /// Mean square of the residuals over their own variances, without the scatter: χ² a degree of freedom.
+    /// Mean square of the residuals over their own variances, without the scatter: χ² per degree of freedom.
     pub(super) chi2: f64,
 }
 
-/// Places at which τ is tried in a decade of it.
+/// Number of values of τ that are tried per decade.
 const STEPS: i32 = 8;
 
-/// Fits the parameters. `None` when the measurements do not determine them.
+/// Fits the parameters. The result is `None` if the measurements do not determine them.
 pub(super) fn solve(all: &[Measured]) -> Option<Solved> {
     let parameters = all.first()?.of.len();
     let freedom = all.len().checked_sub(parameters).filter(|n| *n > 0)? as f64;
@@ -54,7 +56,7 @@ pub(super) fn solve(all: &[Measured]) -> Option<Solved> {
     })
 }
 
-/// A few halvings of the step about the best τ².
+/// Refines the best τ² by 12 halvings of its logarithmic step.
 fn refined((mut least, mut at): (f64, f64), scored: &dyn Fn(f64) -> Option<(f64, f64)>) -> f64 {
     let mut factor = 10f64.powf(2.0 / f64::from(STEPS));
     for _ in 0..12 {
@@ -116,7 +118,7 @@ mod tests {
 
     #[test]
     fn scatter_is_found_where_errors_do_not_explain_it() {
-        // ±3 about 20, with errors of 0.1: nothing but scatter.
+        // ±3 about 20, with errors of 0.1: almost pure scatter.
         let values: Vec<(f64, f64)> = (0..40).map(|i| (if i % 2 == 0 { 17.0 } else { 23.0 }, 0.1)).collect();
         let found = solve(&measured(&values)).unwrap();
         assert!((found.scatter2.sqrt() - 3.0).abs() < 0.1, "{found:?}");

@@ -1,13 +1,13 @@
-//! Correlation of residuals along the edge, for a picture to look at: what is written does not come from it.
+//! Correlation of the residuals along the edge. It is only plotted; no value of the calibration comes from it.
 
 use super::cone::Cone;
 
-/// Width of a class of distances, pixels.
+/// Width of a class of distances, in pixels.
 const WIDTH_PX: f64 = 8.0;
-/// Classes; the first holds each point with itself.
+/// Number of classes. The first has the products of each point with itself.
 const CLASSES: usize = 60;
 
-/// Sums of products of residuals by their distance along the edge.
+/// Sums of products of residuals, by their distance along the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Lags {
     sums: [f64; CLASSES],
@@ -32,12 +32,12 @@ impl Lags {
     }
 }
 
-/// Correlation of all pictures' residuals by distance: (pixels, correlation).
+/// Returns the correlation of all pictures' residuals by distance: (pixels, correlation).
 pub(super) fn correlation<'a>(all: impl Iterator<Item = &'a Lags>) -> Vec<(f64, f64)> {
     let mut total = Lags { sums: [0.0; CLASSES], counts: [0.0; CLASSES] };
     for lags in all {
         let Some(own) = lags.counts.first().filter(|n| **n > 0.0).map(|n| lags.sums[0] / n) else { continue };
-        // Each picture in units of its own mean square.
+        // Each picture is scaled by its mean square residual.
         for class in 0..CLASSES {
             total.sums[class] += lags.sums[class] / own.max(1e-12);
             total.counts[class] += lags.counts[class];

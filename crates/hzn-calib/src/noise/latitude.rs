@@ -1,9 +1,9 @@
-//! Limb height by latitude: the rows that the pictures ask for.
+//! Limb height by latitude, with as many rows as the pictures determine.
 //!
-//! A picture sees a mean over its part of the limb. With hat functions between rows of latitude, that mean is linear in
-//! the rows' heights: d_i = Σ_k a_ik h_k, a_ik the mean of hat k over what the picture saw. More rows are taken only
-//! when they pay for themselves (Bayes' information criterion: ln n a row) and when every row is known better than rows
-//! differ.
+//! A picture measures a mean over its part of the limb. With hat functions between rows of latitude, this mean is
+//! linear in the heights of the rows: d_i = Σ_k a_ik h_k, where a_ik is the mean of hat k over the visible limb. More
+//! rows are used only if they reduce Bayes' information criterion (ln n per row) and every row is determined better
+//! than the rows differ.
 
 use super::calibration::MOST_SIGMA_KM;
 use super::height::{Measured, Solved, solve};
@@ -11,33 +11,34 @@ use super::sighting::Sighting;
 
 /// Numbers of rows that are tried.
 const ROWS: [usize; 3] = [2, 3, 5];
-/// A row must make up this much more of some picture's limb than of another's.
+/// A row's share of the limb must differ by at least this much between two of the pictures.
 const LEAST_SPREAD: f64 = 0.5;
-/// Part of what was seen that may lie beyond the first and the last row, at each end.
+/// Fraction of the visible limb that may lie beyond the first and beyond the last row.
 const BEYOND: f64 = 0.02;
 
-/// A limb height with what was fitted.
+/// A limb height with its fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Profile {
-    /// Latitudes of the rows in degrees, rising; empty for one height everywhere.
+    /// Latitudes of the rows in degrees, rising; empty if one height holds everywhere.
     pub(super) latitudes_deg: Vec<f64>,
     pub(super) solved: Solved,
 }
 
 impl Profile {
-    /// The height that a picture is explained by, kilometres.
+    /// Returns the fitted limb height for a picture, in kilometres.
     pub(super) fn explains_km(&self, sighting: &Sighting) -> f64 {
         let of = self.parts(sighting);
         of.iter().zip(self.solved.h.iter()).map(|(a, h)| a * h).sum()
     }
 
-    /// What of a picture's height each parameter is.
+    /// Returns the weight of each parameter in a picture's height.
     pub(super) fn parts(&self, sighting: &Sighting) -> Vec<f64> {
         parts(&self.latitudes_deg, sighting)
     }
 }
 
-/// One height, or as many rows as the pictures tell apart. `None` when they do not even tell one height.
+/// Fits one height, or the number of rows that the pictures can distinguish. The result is `None` if they do not even
+/// determine one height.
 pub(super) fn profile(sightings: &[&Sighting]) -> Option<Profile> {
     let with = |latitudes_deg: Vec<f64>| {
         let measured: Vec<Measured> = sightings
@@ -63,8 +64,9 @@ pub(super) fn profile(sightings: &[&Sighting]) -> Option<Profile> {
     Some(best.filter(|p| pays(p) < pays(&one)).unwrap_or(one))
 }
 
-/// Whether every row is known better than the rows differ (a third of their range) and than a default is, and some
-/// pictures see more of it than others by half of their limb: what all pictures see alike is no matter of latitude.
+/// Returns whether the pictures can distinguish the rows. Each row's 1-sigma must be below a third of the range of the
+/// heights and below [`MOST_SIGMA_KM`]. Each row's share of the limb must differ by half of the limb or more between
+/// two of the pictures, because a share that is equal in all pictures says nothing about latitude.
 fn are_told_apart(profile: &Profile, sightings: &[&Sighting]) -> bool {
     let h = &profile.solved.h;
     let range = h.max() - h.min();
@@ -78,7 +80,7 @@ fn are_told_apart(profile: &Profile, sightings: &[&Sighting]) -> bool {
     profile.solved.covariance.diagonal().iter().all(known) && (0..h.len()).all(|row| spread(row) >= LEAST_SPREAD)
 }
 
-/// First and last latitude worth a row, degrees.
+/// Returns the latitudes of the first and the last row, in degrees; `None` if a picture has no latitudes.
 fn span_deg(sightings: &[&Sighting]) -> Option<[f64; 2]> {
     let mut seen: Vec<(f64, f64)> =
         sightings.iter().flat_map(|s| s.latitudes.iter().map(|(deg, share)| (*deg, share.abs()))).collect();
@@ -97,7 +99,7 @@ fn span_deg(sightings: &[&Sighting]) -> Option<[f64; 2]> {
     Some([below(BEYOND)?.0, below(1.0 - BEYOND)?.0])
 }
 
-/// Means of the hat functions over what a picture saw.
+/// Returns the means of the hat functions over the limb that a picture sees.
 fn parts(latitudes_deg: &[f64], sighting: &Sighting) -> Vec<f64> {
     if latitudes_deg.is_empty() {
         return vec![1.0];
@@ -111,7 +113,7 @@ fn parts(latitudes_deg: &[f64], sighting: &Sighting) -> Vec<f64> {
     parts
 }
 
-/// The hat functions at one latitude: linear between rows, constant beyond them.
+/// Returns the hat functions at one latitude: linear between rows, constant beyond them.
 fn hats(rows: &[f64], deg: f64) -> impl Iterator<Item = f64> + '_ {
     let at = |k: usize| rows.get(k).copied();
     (0..rows.len()).map(move |k| {

@@ -1,9 +1,10 @@
-//! Limb height and noise from the pictures of a flight themselves, without truth: `hzn calibrate noise`.
+//! Limb height and noise from the pictures of a flight, without truth: `hzn calibrate noise`.
 //!
-//! Each picture's half-angle-free fit measures the height of the limb ([`Sighting`]), with an error that its own
-//! residuals tell. [`Calibration::new`] joins them: the height by restricted maximum likelihood with the scatter
-//! between pictures, by latitude where the flight spans it; the edge noise of all pictures together. It refuses what
-//! the pictures do not tell.
+//! For each picture the fit with a free half-angle measures the height of the limb ([`Sighting`]). The residuals of the
+//! picture give the error of this height. [`Calibration::new`] combines the pictures. It estimates the height by
+//! restricted maximum likelihood (REML), with the scatter between pictures, and by latitude if the flight covers enough
+//! latitudes. It also estimates the edge noise of all pictures together. It refuses a flight that does not determine
+//! these values.
 //!
 //! ```text
 //! points, weights ─► Cone (half-angle free) ─► residuals ─► REML of (σ, L, ν) ─► σ of the height ─┐

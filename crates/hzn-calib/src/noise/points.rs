@@ -1,4 +1,4 @@
-//! The edge points of a picture's candidates, as the pipeline shows them.
+//! The edge points of a picture's candidates, as the pipeline reports them.
 
 use std::cell::RefCell;
 
@@ -6,17 +6,18 @@ use hzn_core::Observer;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::real::Real;
 
-/// Edge points with their weights, in their order along the edge: (u, v) in pixels, and 0 (rejected) to 1.
+/// Edge points with their weights, in their order along the edge: (u, v) in pixels, and the weight. A weight of 0 is a
+/// rejected point, 1 is the largest.
 pub type Weighted = Vec<([f64; 2], f64)>;
 
-/// An observer that keeps the edge points of every candidate with the weights that the fit gave them.
+/// An observer that stores the edge points of every candidate with the weights of the fit.
 #[derive(Debug, Default)]
 pub struct Points {
     candidates: RefCell<Vec<Weighted>>,
 }
 
 impl Points {
-    /// The points of a candidate; none for a number that was not seen.
+    /// Returns the points of a candidate; the list is empty if the candidate is unknown.
     pub fn of_candidate(&self, candidate: u32) -> Weighted {
         self.candidates.borrow().get(candidate as usize).cloned().unwrap_or_default()
     }

@@ -1,38 +1,38 @@
-//! Why a flight does not tell limb height and noise.
+//! Reasons why a flight does not determine limb height and noise.
 
 use std::fmt;
 
-/// What the pictures do not tell. Displayed with the number that was measured, its limit, and what to do.
+/// Why a calibration is refused. It is displayed with the measured number, its limit, and a remedy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refusal {
-    /// Too few pictures were answered.
+    /// Too few pictures have an answer.
     TooFew {
-        /// Answered, with an altitude.
+        /// Number of pictures with an answer and an altitude.
         answered: usize,
-        /// As many are needed.
+        /// Smallest number of such pictures.
         least: usize,
     },
     /// The limb heights of the pictures have too large errors: the field of view or the arcs are too small.
     TooVague {
-        /// 1-sigma that the flight gives, kilometres.
+        /// 1-sigma of the limb height from the flight, in kilometres.
         sigma_km: f64,
-        /// It must be below this.
+        /// Largest 1-sigma, in kilometres.
         most_km: f64,
-        /// How many pictures it has.
+        /// Number of pictures.
         pictures: usize,
     },
-    /// Too many pictures measure a limb height that has nothing to do with that of the others.
+    /// Too many pictures measure a limb height that disagrees with the others.
     Apart {
-        /// So many.
+        /// Number of pictures that disagree.
         apart: usize,
-        /// Of so many.
+        /// Number of all pictures.
         pictures: usize,
     },
     /// The pictures' limb heights scatter more than their errors allow.
     Alarm {
         /// Mean square of the residuals over their variances; 1 is ideal.
         chi2: f64,
-        /// It must not be above this.
+        /// Largest value that is consistent.
         most: f64,
     },
 }

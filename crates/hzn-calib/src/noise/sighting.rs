@@ -1,8 +1,8 @@
-//! One picture's own measurement of the limb's height.
+//! The limb height that one picture measures.
 //!
-//! With the camera at the height H above the ground of radius R, a limb of the height d has the half-angle sin α =
-//! (R + d)/(R + H). So a half-angle that is fitted freely measures d = d₀ + (R + H)(sin α̂ − sin α₀) beside the
-//! expected (d₀, α₀), with ∂d/∂cos α = −(R + H) cot α.
+//! With the camera at the height H above the ground of radius R, a limb of the height d has the half-angle
+//! sin α = (R + d)/(R + H). A free half-angle therefore measures d = d₀ + (R + H)(sin α̂ − sin α₀), with the expected
+//! values (d₀, α₀) and ∂d/∂cos α = −(R + H) cot α.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::Camera;
@@ -15,68 +15,71 @@ use super::cone::{Azimuth, Cone, basis};
 use super::edge::{self, Scores};
 use super::lag::Lags;
 
-/// An attitude that is known no better does not tell which part of the limb is seen, radians (30 degrees).
+/// Attitudes with a larger sigma, in radians (30 degrees), are not used: they do not show which part of the limb is
+/// visible.
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
-/// 1-sigma of an attitude that comes without one, radians (5 degrees), as for the sensor.
+/// 1-sigma of an attitude without a sigma, radians (5 degrees); the sensor uses the same value.
 const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
-/// Places on the limb at which latitudes are looked up where the visible part is not known.
+/// Number of points on the limb at which latitudes are computed if the visible part is unknown.
 const RING: usize = 24;
-/// Latitudes, uniformly from pole to pole, of which one without a position may be the camera's.
+/// Number of latitudes, evenly from pole to pole, over which an unknown position is averaged.
 const LATITUDES: usize = 19;
 
-/// What one picture says about limb height and noise.
+/// Limb height and noise of one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
     /// Name of the picture.
     pub name: String,
-    /// Limb height that the half-angle-free fit asks for, kilometres.
+    /// Limb height from the fit with a free half-angle, in kilometres.
     pub limb_height_km: f64,
-    /// 1-sigma of it from edge noise (and the unknown direction of north), kilometres.
+    /// 1-sigma of the limb height from edge noise (and from the unknown direction of north), in kilometres.
     pub sigma_km: f64,
-    /// 1-sigma of it from the unknown local radius, kilometres: common to pictures from one latitude. 0 with a
-    /// position.
+    /// 1-sigma of the limb height from the unknown local radius, in kilometres; pictures from one latitude have it in
+    /// common. It is 0 for a sphere and for a known position.
     pub radius_sigma_km: f64,
-    /// Limb height that one pixel across the limb makes when all points move by it, kilometres: in a wide picture more
-    /// than its size at the limb, as pixels away from the middle are finer and the shift looks like a bend.
+    /// Change of the limb height if all points move across the limb by one pixel, in kilometres. In a wide picture it
+    /// is larger than the size of a pixel at the limb. Pixels away from the middle are finer, so the shift looks like
+    /// a bend.
     pub km_per_px: f64,
-    /// Limb height that a bend of the whole edge makes whose RMS is one pixel, kilometres.
+    /// Change of the limb height by a bend of the whole edge with an RMS of one pixel, in kilometres.
     pub km_per_bend_px: f64,
-    /// Growth of the limb height, kilometres, for a focal length that is longer by its own size.
+    /// Change of the limb height per relative change of the focal length, in kilometres.
     pub km_per_focal: f64,
-    /// Weighted RMS distance of the edge points from the limb, pixels.
+    /// Weighted RMS distance of the edge points from the limb, in pixels.
     pub rms_px: f64,
-    /// Length of edge that the points cover, pixels.
+    /// Length of the edge that the points cover, in pixels.
     pub arc_px: f64,
-    /// Length over which edge errors of this RMS would have to be alike for `sigma_km`, pixels.
+    /// Correlation length, in pixels, at which edge errors of this RMS explain the edge noise part of `sigma_km`.
     pub correlation_px: f64,
-    /// Geodetic latitudes in degrees of the limb that it saw, with the share of the height each has; empty without a
-    /// position.
+    /// Geodetic latitudes of the visible limb in degrees, each with its share of the height; empty without a position.
     pub latitudes: Vec<(f64, f64)>,
-    /// How much of each next shape the residuals hold, pixels.
+    /// Amplitude of each next shape in the residuals, in pixels.
     pub(super) shapes_px: [f64; SHAPES],
-    /// Models of edge noise on the residuals.
+    /// Scores of the edge noise models for the residuals.
     pub(super) scores: Scores,
     /// Products of residuals by their distance along the edge.
     pub(super) lags: Lags,
 }
 
-/// What is known of the camera's place and the body: distances in metres.
+/// The camera's position relative to the body; distances in metres.
 struct Place {
-    /// R + H of the sphere that stands for the body.
+    /// R + H of the sphere that replaces the body.
     distance_m: f64,
     sin_expected: f64,
     limb_m: f64,
     cone: Option<LimbCone<f64>>,
     position_m: Option<[f64; 3]>,
-    /// 1-sigma, in metres of limb height, of the radius; and half the difference of the half-angles' cosines.
+    /// 1-sigma of the limb height from the unknown radius, in metres.
     radius_sigma_m: f64,
+    /// Half the difference of the cosines of the half-angles along the meridian and east.
     uneven_cos: f64,
 }
 
 impl Sighting {
-    /// Of a picture's answer: `points` are the answer's edge points with their weights, `body` is what the sensor was
-    /// told of the body, `frame` what it knew of the picture. `None` for Sun and Moon, whose half-angle says nothing
-    /// about a height, without an altitude, and where the points do not determine a cone.
+    /// Measures the limb height from a picture's answer. `points` are the answer's edge points (pixels) with their
+    /// weights, `body` is the sensor's configuration of the body, and `frame` is the prior of the picture. The result
+    /// is `None` for Sun and Moon, whose half-angle does not depend on a height. It is also `None` without an altitude,
+    /// and if the points do not determine a cone.
     pub fn measure(
         name: &str,
         camera: &Camera<f64>,
@@ -102,7 +105,7 @@ impl Sighting {
         let height_m = place.limb_m + place.distance_m * (sin - place.sin_expected);
         let by_cos_m = -place.distance_m * cone.cos / sin;
         let scores = edge::scores(&cone)?;
-        // Where north is not known the limb's second harmonic is anything.
+        // If north is unknown, the full second harmonic of the limb is an error; with an attitude only a part of it is.
         let left = if azimuth.is_some() { (2.0 * attitude_sigma).min(1.0) } else { 1.0 };
         let uneven = left * place.uneven_cos;
         let harmonic = |of: fn(f64) -> f64| cone.cos_by(|row| of(2.0 * row.azimuth_rad) / row.slope);
@@ -128,11 +131,11 @@ impl Sighting {
     }
 }
 
-/// What a picture's limb height is made of: the rays of its edge points (camera frame), each with its share of the
-/// height. The shares sum to 1; on a short arc, where the height comes from the curvature, those of the ends and of the
-/// middle have opposite signs and large values, so that a height which varies along the limb is seen enlarged.
-/// Arguments as of
-/// [`Sighting::measure`], without an attitude; `camera` is the one that turns, where rows have times of their own.
+/// Returns the rays of the edge points (camera frame), each with its share of the picture's limb height. The shares sum
+/// to 1. On a short arc the height comes from the curvature. The shares of the ends and of the middle are then large
+/// and have opposite signs, so that a height which varies along the limb has an enlarged effect. The arguments are
+/// those of [`Sighting::measure`], without an attitude; for a rolling shutter, `camera` must be the turning one
+/// (`Camera::turning`).
 pub fn shares(
     camera: &Camera<f64>,
     points: &[([f64; 2], f64)],
@@ -172,7 +175,8 @@ impl Place {
             (Kind::EarthSphere | Kind::Sphere, Some([x, y, z])) => sphere(x.hypot(y).hypot(z)),
             (Kind::Earth, None) => {
                 let place = sphere(radius_m + given?);
-                // The same at any latitude: the mean square of what its radius and its shape change.
+                // The latitude is unknown: the mean squares of the effects of radius and shape are taken over all
+                // latitudes.
                 let (mut radius2, mut uneven2) = (0.0, 0.0);
                 for k in 0..LATITUDES {
                     let latitude = core::f64::consts::PI * (k as f64 / (LATITUDES - 1) as f64 - 0.5);
@@ -194,17 +198,19 @@ fn raised(position_m: [f64; 3], limb_m: f64) -> Option<LimbCone<f64>> {
     LimbCone::try_new(position_m, WGS84_A_M + limb_m, WGS84_B_M + limb_m)
 }
 
-/// Amplitude of the second harmonic of cos α.
+/// Returns the amplitude of the second harmonic of cos α.
 fn uneven_cos(cone: &LimbCone<f64>) -> f64 {
     let (east, meridian) = cone.half_angles_rad();
     0.5 * (meridian.cos() - east.cos())
 }
 
-/// Latitudes of the limb with their shares: of the points themselves where an attitude tells, else of the whole ring.
+/// Returns latitudes of the limb, in degrees, with their shares: those of the points if the attitude is known, else
+/// those of the whole ring.
 fn latitudes(place: &Place, cone: &Cone, frame: &Prior<f64>, attitude_sigma_rad: f64) -> Vec<(f64, f64)> {
     let (Some(position), Some(limb)) = (place.position_m, &place.cone) else { return Vec::new() };
     let camera = Vector3::from(position);
-    // The point of a ray that is nearest to the centre: its latitude is that of the limb to the flattening.
+    // The point of a ray that is nearest to the Earth's centre. Apart from the flattening, its latitude is that of the
+    // limb.
     let latitude = |ray: Vector3<f64>| {
         let p = camera - ray * camera.dot(&ray);
         geodetic([p.x, p.y, p.z], WGS84_A_M, WGS84_B_M).1.to_degrees()

@@ -1,4 +1,4 @@
-//! Flights of edge points whose limb height and noise are known.
+//! Tests with flights of edge points whose limb height and noise are known.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera, Model};
@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::{Calibration, Refusal, Sighting, Weighted, cone, edge, into_sensor_toml};
 
-/// A generator of normal numbers that is the same everywhere.
+/// A generator of normal random numbers that gives the same sequence on every machine.
 struct Draws(u64);
 
 impl Draws {
@@ -22,7 +22,7 @@ impl Draws {
     }
 }
 
-/// Edge noise: its sigma and length in pixels, and its white part.
+/// Edge noise: its sigma and correlation length in pixels, and its white part.
 #[derive(Clone, Copy)]
 struct Noise(f64, f64, f64);
 
@@ -34,8 +34,8 @@ fn earth() -> body::Config {
     body::Config { kind: Kind::EarthSphere, limb_height_km: 15.0, limb_height_sigma_km: 30.0, ..Default::default() }
 }
 
-/// Edge points of the limb whose cone is (axis, cos α by ray) in the picture of a camera that looks at it, with noise
-/// across the limb; the axis lies `below` the optical axis, towards the `down` direction in the picture.
+/// Returns edge points of a limb in the picture of `camera`, with noise across the limb. The limb is a cone with the
+/// axis `axis` (camera frame); `cos` gives cos α by the direction from the axis.
 fn limb(
     camera: &Camera<f64>,
     axis: Vector3<f64>,
@@ -64,7 +64,7 @@ fn limb(
         let rho = (-step / length).exp();
         correlated = rho * correlated + (1.0 - rho * rho).sqrt() * draws.normal();
         let off = sigma * ((1.0 - white).sqrt() * correlated + white.sqrt() * draws.normal());
-        // Along the gradient of s·e in the picture.
+        // The noise is along the gradient of s·e in the picture.
         let j = camera.ray(p).unwrap().jacobian();
         let g = [0, 1].map(|i| (0..3).map(|r| j[r][i] * axis[r]).sum::<f64>());
         let norm = g[0].hypot(g[1]);
@@ -90,7 +90,8 @@ fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64> {
     }
 }
 
-/// Sightings of a limb at `limb_km` from 200 km with `fov_deg`, `scatter_km` of scatter between pictures.
+/// Returns sightings of a limb at `limb_km` from 180 km altitude on, with `fov_deg`. `scatter_km` is the scatter
+/// between pictures.
 fn flight(count: usize, fov_deg: f64, limb_km: f64, scatter_km: f64, noise: Noise, seed: u64) -> Vec<Sighting> {
     let config = camera(fov_deg);
     let camera = Camera::try_new(&config).unwrap();
@@ -104,7 +105,7 @@ fn flight(count: usize, fov_deg: f64, limb_km: f64, scatter_km: f64, noise: Nois
         let axis = Vector3::new(0.3 * below.sin(), 0.954 * below.sin(), below.cos()).normalize();
         let points = limb(&camera, axis, &|_| alpha.cos(), noise, &mut draws);
         let frame = Prior { altitude_m: Some(altitude_km * 1e3), ..Prior::default() };
-        // From a start that is not the end.
+        // The start differs from the solution.
         Sighting::measure("p", &camera, &earth(), &frame, &points, &solution(axis, alpha + 1e-3))
     });
     each.collect()
@@ -127,7 +128,7 @@ fn height_scatter_and_noise_are_found_within_their_errors() {
     assert!((4.0..11.0).contains(&h.scatter_km), "{h:?}");
     assert!((0.25..0.35).contains(&c.edge.sigma_px), "{:?}", c.edge);
     assert!((10.0..=80.0).contains(&c.edge.length_px) && (0.25..=0.7).contains(&c.edge.white), "{:?}", c.edge);
-    // (1 − ν) L and more, as the length is not known from one picture.
+    // (1 − ν) L or more, because one picture does not determine the length.
     assert!((15.0..=200.0).contains(&c.edge.correlation_px), "{:?}", c.edge);
     assert!(c.correlation.first().is_some_and(|p| (p.1 - 1.0).abs() < 1e-9));
 }
@@ -136,7 +137,7 @@ fn height_scatter_and_noise_are_found_within_their_errors() {
 fn heights_are_as_far_off_as_their_sigmas_say() {
     let sightings = flight(60, 90.0, 18.7, 0.0, Noise(0.2, 20.0, 0.7), 3);
     let c = Calibration::new(&earth(), &sightings).unwrap();
-    // Averaged over lengths up to the arc, sigma is on the careful side.
+    // Sigma is conservative, because it is averaged over lengths up to the arc.
     assert!((0.02..1.3).contains(&c.chi2), "{}", c.chi2);
     assert!(c.alarm().is_none());
 }
@@ -153,16 +154,16 @@ fn what_pictures_do_not_tell_is_refused_with_the_number() {
     let few = Calibration::new(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();
     assert_eq!(few, Refusal::TooFew { answered: 11, least: 12 });
     assert!(few.to_string().starts_with("11 pictures were answered, but at least 12 are needed"), "{few}");
-    // Sigma grows with the inverse square of the field.
+    // Sigma grows with the inverse square of the field of view.
     let narrow = Calibration::new(&earth(), &flight(24, 15.0, 18.7, 0.0, noise, 6)).unwrap_err();
     assert!(matches!(narrow, Refusal::TooVague { sigma_km, .. } if sigma_km > 3.5), "{narrow:?}");
-    // Half of them on other edges.
+    // A third of the pictures has other edges.
     let mut mixed = flight(16, 90.0, 18.7, 0.0, noise, 7);
     mixed.iter_mut().skip(11).for_each(|s| s.limb_height_km += 90.0);
     assert_eq!(Calibration::new(&earth(), &mixed).unwrap_err(), Refusal::Apart { apart: 5, pictures: 16 });
 }
 
-/// A limb by latitude, seen all round by a camera that looks straight down from a polar orbit.
+/// A limb whose height depends on latitude. The camera looks straight down from a polar orbit and sees the whole limb.
 #[test]
 fn a_flight_over_all_latitudes_gives_rows() {
     let config = camera(140.0);
@@ -175,7 +176,7 @@ fn a_flight_over_all_latitudes_gives_rows() {
             let latitude = (-80.0 + 160.0 * k as f64 / 23.0f64).to_radians();
             let position = from_geodetic(latitude, 0.3, 600e3, WGS84_A_M, WGS84_B_M);
             let frame = Prior { position_m: Some(position), ..Prior::default() };
-            // The mean height of the ring, as the whole limb is seen.
+            // The mean height of the ring, because the whole limb is visible.
             let limb_m = height_km(latitude.to_degrees()) * 1e3 * 0.91 + 25e3 * 0.09;
             let cone = LimbCone::try_new(position, WGS84_A_M + limb_m, WGS84_B_M + limb_m)?;
             let axis = Vector3::new(0.05, 0.02, 1.0).normalize();
@@ -195,7 +196,7 @@ fn a_flight_over_all_latitudes_gives_rows() {
     assert_eq!(sensor.body.limb_height_by_latitude_km.len(), c.height.by_latitude.len());
 }
 
-/// Heights that drift with time are not taken for a matter of latitude where all pictures see the same latitudes.
+/// Heights that drift with time must not become rows by latitude if all pictures see the same latitudes.
 #[test]
 fn a_flight_at_one_latitude_gives_no_rows() {
     let config = camera(90.0);
@@ -290,7 +291,7 @@ fn the_keys_are_written_and_all_other_text_stays() {
     let mut applied = crate::sensor::parse(SENSOR, std::path::Path::new("sensor.toml")).unwrap().config;
     c.apply(&mut applied);
     assert_eq!(read, applied);
-    // Once more: its own comments are replaced, not repeated.
+    // A second calibration replaces the comments of the first and does not repeat them.
     let again = into_sensor_toml(text, &c, "flight").unwrap();
     assert_eq!(again.text, *text);
 }

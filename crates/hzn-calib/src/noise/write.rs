@@ -1,11 +1,11 @@
-//! A calibration into the text of a sensor.toml: its keys with comments, all other text as it was.
+//! Writes a calibration into the text of a sensor.toml: only the calibrated keys change, and each gets a comment.
 
 use hzn_core::body::Kind;
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
 use super::calibration::{Calibration, digits};
 
-/// Comments that a calibration wrote begin so; the next one replaces them.
+/// Comments of a calibration begin with this mark; the next calibration replaces them.
 const MARK: &str = "# calibrated:";
 
 /// The text of a sensor.toml after a calibration.
@@ -13,11 +13,11 @@ const MARK: &str = "# calibrated:";
 pub struct Written {
     /// The whole text.
     pub text: String,
-    /// Keys that were written, as `[body] limb_height_km = 18.9`.
+    /// Keys that were written, in the form `[body] limb_height_km = 18.9`.
     pub keys: Vec<String>,
 }
 
-/// A key, its value, and why it is so.
+/// A key, its value, and the comment about its source.
 struct Line {
     key: &'static str,
     value: Value,
@@ -27,7 +27,8 @@ struct Line {
 /// Writes limb height and noise into the text of a sensor.toml. `source` names the pictures, for the comments.
 ///
 /// # Errors
-/// The text is no TOML, or has something else in the place of a section.
+/// The text is not valid TOML, something other than a section has the name of a section, or `[[bodies]]` does not have
+/// the body.
 pub fn into_sensor_toml(text: &str, calibration: &Calibration, source: &str) -> Result<Written, String> {
     let mut document: DocumentMut = text.parse().map_err(|e| format!("is no TOML: {e}"))?;
     let mut keys = Vec::new();
@@ -50,14 +51,14 @@ pub fn into_sensor_toml(text: &str, calibration: &Calibration, source: &str) -> 
 
 fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
     let item = document.entry(name).or_insert_with(|| Item::Table(Table::new()));
-    // An inline table has no room for comments.
+    // An inline table cannot have comments.
     if let Item::Value(Value::InlineTable(table)) = item {
         *item = Item::Table(table.clone().into_table());
     }
     item.as_table_like_mut().ok_or(format!("{name} is no section"))
 }
 
-/// The one of several bodies that was calibrated.
+/// Returns the calibrated body in `[[bodies]]`.
 fn body_of(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike, String> {
     let name = kind.name();
     let is_it = |table: &Table| table.get("kind").map_or("earth", |k| k.as_str().unwrap_or_default()) == name;
@@ -66,9 +67,9 @@ fn body_of(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike,
     bodies.iter_mut().find(|t| is_it(t)).map(|t| t as &mut dyn TableLike).ok_or(format!("no [[bodies]] of kind {name}"))
 }
 
-/// What of the text a calibration takes away.
+/// Removes the text that a calibration makes invalid.
 trait RemoveRows {
-    /// Rows by latitude, which would beat the one height that was measured.
+    /// Removes rows by latitude if one height was measured, because they would override it.
     fn remove_rows(&mut self, calibration: &Calibration);
 }
 
@@ -138,7 +139,7 @@ fn put_all(table: &mut dyn TableLike, lines: Vec<Line>, section: &str, keys: &mu
     for Line { key, mut value, why } in lines {
         keys.push(format!("{section} {key} = {}", value.to_string().trim()));
         match table.get_mut(key) {
-            // In its place, so that comments before and after stay.
+            // The value is replaced in place, so that the comments before and after it stay.
             Some(old) => {
                 if let Some(old) = old.as_value() {
                     *value.decor_mut() = old.decor().clone();

@@ -1,4 +1,4 @@
-//! Chunks: messages gathered, compressed or not, checked by a CRC.
+//! Chunks: groups of messages, compressed or not, with a CRC.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -6,7 +6,7 @@ use std::io::Read;
 use super::op::{Fields, Op, Put};
 use super::{MAX_RECORD_BYTES, Record};
 
-/// Compression level: the fastest that is worth it; the data are small beside the pictures.
+/// Compression level: the fastest useful one. The data are small compared with the pictures.
 const ZSTD_LEVEL: i32 = 1;
 
 /// One message of a chunk.
@@ -26,21 +26,21 @@ impl<'a> Message<'a> {
     }
 }
 
-/// Messages on their way into one chunk.
+/// Collects messages for one chunk.
 #[derive(Debug, Default)]
 pub(crate) struct ChunkBuilder {
     bytes: Vec<u8>,
 }
 
 impl ChunkBuilder {
-    /// Bytes gathered so far.
+    /// Returns the number of bytes collected so far.
     pub(crate) fn len(&self) -> usize {
         self.bytes.len()
     }
     pub(crate) fn is_empty(&self) -> bool {
         self.bytes.is_empty()
     }
-    /// Appends a message whose data `fill` appends.
+    /// Appends a message; `fill` appends its data.
     pub(crate) fn push(&mut self, channel: u16, sequence: u32, time_ns: u64, fill: impl FnOnce(&mut Vec<u8>)) {
         let start = self.bytes.len();
         self.bytes.u8(Op::MESSAGE).u64(0).u16(channel).u32(sequence).u64(time_ns).u64(time_ns);
@@ -50,14 +50,14 @@ impl ChunkBuilder {
             field.copy_from_slice(&length.to_le_bytes());
         }
     }
-    /// Gives the memory of a written chunk back for the next one.
+    /// Reuses the memory of a written chunk for the next one.
     pub(crate) fn recycle(&mut self, chunk: Chunk) {
         if self.bytes.is_empty() && self.bytes.capacity() < chunk.records.capacity() {
             self.bytes = chunk.records;
             self.bytes.clear();
         }
     }
-    /// Takes the chunk out and begins a new one.
+    /// Returns the chunk and begins a new one.
     pub(crate) fn take(&mut self, compress: bool) -> std::io::Result<Chunk> {
         let plain = std::mem::take(&mut self.bytes);
         let crc = crc32fast::hash(&plain);
@@ -69,19 +69,19 @@ impl ChunkBuilder {
     }
 }
 
-/// Where each channel's messages stand in the uncompressed chunk.
+/// Places of each channel's messages in the uncompressed chunk.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Index {
     /// First and last log time in nanoseconds; `None` without messages.
     pub(crate) times_ns: Option<(u64, u64)>,
-    /// Per channel: log time in nanoseconds and offset.
+    /// Per channel: log time in nanoseconds and offset in bytes.
     pub(crate) channels: BTreeMap<u16, Vec<(u64, u64)>>,
-    /// Schema and channel records that stand in the chunk: number, id, content.
+    /// Schema and channel records in the chunk: number, id, content.
     pub(crate) declared: Vec<(u8, u16, Vec<u8>)>,
 }
 
 impl Index {
-    /// Reads through the records of an uncompressed chunk; `None` when they do not hold together.
+    /// Reads the records of an uncompressed chunk; `None` if they are not valid.
     fn read(plain: &[u8]) -> Option<Self> {
         let mut index = Self::default();
         let mut rest = Fields(plain);
@@ -104,13 +104,13 @@ impl Index {
     }
 }
 
-/// A chunk as it stands in the file, with what its index needs.
+/// A chunk as it is in the file, with the data for its index.
 #[derive(Debug)]
 pub(crate) struct Chunk {
     pub(crate) compression: String,
     /// Size of the uncompressed records in bytes.
     pub(crate) size: u64,
-    /// CRC-32 of the uncompressed records; 0 where the writer left it out.
+    /// CRC-32 of the uncompressed records; 0 if the writer left it out.
     pub(crate) crc: u32,
     /// The records as stored.
     pub(crate) records: Vec<u8>,
@@ -118,8 +118,8 @@ pub(crate) struct Chunk {
 }
 
 impl Chunk {
-    /// Takes a chunk record apart, checks its CRC and reads through its records. With it come the uncompressed
-    /// records; `None` when anything does not hold.
+    /// Parses a chunk record, checks its CRC and reads its records. It returns the chunk and its uncompressed records;
+    /// `None` if anything is not valid.
     pub(crate) fn parse(record: &Record) -> Option<(Self, Vec<u8>)> {
         let mut f = Fields(&record.content);
         let (_first, _last, size, crc) = (f.u64()?, f.u64()?, f.u64()?, f.u32()?);
@@ -133,7 +133,7 @@ impl Chunk {
             "" => records.clone(),
             "zstd" => {
                 let mut plain = Vec::new();
-                // One byte more than promised shows a chunk that lies, without filling the memory.
+                // One byte more than the stated size reveals a wrong size without filling the memory.
                 zstd::Decoder::new(records.as_slice()).ok()?.take(size + 1).read_to_end(&mut plain).ok()?;
                 plain
             }
@@ -146,7 +146,7 @@ impl Chunk {
         Some((Self { compression, size, crc, records, index }, plain))
     }
 
-    /// The messages of uncompressed records, in order.
+    /// Iterates over the messages of uncompressed records, in order.
     pub(crate) fn messages(plain: &[u8]) -> impl Iterator<Item = Message<'_>> {
         let mut rest = Fields(plain);
         std::iter::from_fn(move || {

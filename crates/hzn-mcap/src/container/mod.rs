@@ -1,8 +1,8 @@
-//! The MCAP container, as bytes.
+//! The MCAP container as bytes.
 //!
-//! Recordings are written here and not by a general writer for two reasons: pictures stand uncompressed in chunks of
-//! their own while everything else is compressed, and a resumed or recovered file takes over whole chunks as they
-//! are. The layout is the MCAP specification's; the tests read it back with independent readers.
+//! Recordings are written here and not by a general writer, for two reasons. Pictures are in separate chunks without
+//! compression while all other data are compressed. A resumed or recovered file copies whole chunks without changes.
+//! The layout is that of the MCAP specification; the tests read it back with independent readers.
 
 mod chunk;
 mod op;
@@ -16,5 +16,5 @@ pub(crate) use write::Container;
 
 /// The first and last bytes of every MCAP.
 pub(crate) const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', 0x30, b'\r', b'\n'];
-/// Largest record that is read or written, bytes: a broken length must not fill the memory.
+/// Largest record that is read or written, in bytes. A wrong length in a broken file must not exhaust the memory.
 pub(crate) const MAX_RECORD_BYTES: u64 = 1 << 30;

@@ -1,4 +1,4 @@
-//! Record numbers, and fields to and from little-endian bytes.
+//! Numbers of records, and fields to and from little-endian bytes.
 
 use std::collections::BTreeMap;
 
@@ -30,9 +30,9 @@ pub(crate) trait Put {
     fn u16(&mut self, x: u16) -> &mut Self;
     fn u32(&mut self, x: u32) -> &mut Self;
     fn u64(&mut self, x: u64) -> &mut Self;
-    /// A length of four bytes, then the bytes.
+    /// Appends a text: a length of four bytes, then the bytes.
     fn text(&mut self, x: &str) -> &mut Self;
-    /// A byte length, then keys and values.
+    /// Appends a table: its length in bytes, then keys and values.
     fn map(&mut self, x: &BTreeMap<String, String>) -> &mut Self;
 }
 
@@ -67,7 +67,7 @@ impl Put for Vec<u8> {
     }
 }
 
-/// Takes fields off the front of a record; `None` where it ends too early.
+/// Reads fields from the front of a record; `None` if it ends too early.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 
@@ -108,9 +108,9 @@ impl<'a> Fields<'a> {
         }
         Some(map)
     }
-    /// The data of an attachment, where it is the one of that name.
+    /// Returns the data of an attachment if it has this name.
     pub(crate) fn attached(mut self, name: &str) -> Option<&'a [u8]> {
-        // Two times come first.
+        // An attachment begins with two times.
         self.bytes(16)?;
         let is = self.text()? == name;
         let (_media, size) = (self.text()?, self.u64()?);

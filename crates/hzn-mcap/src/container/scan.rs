@@ -1,19 +1,19 @@
-//! Records one after the other, from a file that may end anywhere.
+//! Reads records one after the other from a file that may end anywhere.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
 use super::op::{Fields, Op};
 use super::{MAGIC, MAX_RECORD_BYTES};
 
-/// One record as it stands in the file.
+/// One record as it is in the file.
 #[derive(Debug)]
 pub(crate) struct Record {
     pub(crate) op: u8,
     pub(crate) content: Vec<u8>,
 }
 
-/// Reads records in file order with the memory of one record. It ends, without an error, where the file ends or
-/// stops making sense: [`Scanner::position`] then tells how much of it was whole.
+/// Reads records in file order with the memory of one record. It ends without an error where the file ends or is not
+/// valid any more. [`Scanner::position`] then returns the size of the valid part.
 #[derive(Debug)]
 pub(crate) struct Scanner<R> {
     source: R,
@@ -22,7 +22,7 @@ pub(crate) struct Scanner<R> {
 }
 
 impl<R: Read + Seek> Scanner<R> {
-    /// Checks the magic bytes; `None` when they are not there.
+    /// Checks the magic bytes; `None` if they are missing.
     pub(crate) fn try_new(mut source: R) -> io::Result<Option<Self>> {
         let mut magic = [0; MAGIC.len()];
         match source.read_exact(&mut magic) {
@@ -33,17 +33,17 @@ impl<R: Read + Seek> Scanner<R> {
         Ok((magic == MAGIC).then_some(Self { source, position: MAGIC.len() as u64, skip_plain_chunks: false }))
     }
 
-    /// Passes over uncompressed chunks, which hold the pictures, without reading them.
+    /// Skips uncompressed chunks, which have the pictures, without reading them.
     pub(crate) fn skip_plain_chunks(&mut self, skip: bool) {
         self.skip_plain_chunks = skip;
     }
 
-    /// Bytes of the file up to the end of the last whole record.
+    /// Returns the size of the file up to the end of the last complete record, in bytes.
     pub(crate) fn position(&self) -> u64 {
         self.position
     }
 
-    /// The next record; `None` at the end of what is whole.
+    /// Reads the next record; `None` at the end of the valid part.
     pub(crate) fn next(&mut self) -> io::Result<Option<Record>> {
         loop {
             let mut head = [0; 9];
@@ -52,7 +52,8 @@ impl<R: Read + Seek> Scanner<R> {
             }
             let mut f = Fields(&head);
             let (Some(op), Some(length)) = (f.u8(), f.u64()) else { return Ok(None) };
-            // 0 is no record; 0x89 begins the magic bytes of the end, but is also a number for private records.
+            // 0 is not a record. 0x89 is the first magic byte at the end of a file, but also a valid number of private
+            // records.
             if op == 0 || length > MAX_RECORD_BYTES {
                 return Ok(None);
             }
@@ -71,7 +72,7 @@ impl<R: Read + Seek> Scanner<R> {
                 content.extend_from_slice(&start);
             }
             let rest = length - content.len() as u64;
-            // No memory is set aside for a length that a broken file only claims to have.
+            // The stated length may be wrong in a broken file, so no memory is reserved for it.
             (&mut self.source).take(rest).read_to_end(&mut content)?;
             if content.len() as u64 != length {
                 return Ok(None);

@@ -1,4 +1,4 @@
-//! Appends records, never seeks, and knows at any time how to close the file.
+//! Writes an MCAP: it only appends records, and can close the file at any time.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -76,7 +76,7 @@ impl<W: Write> Container<W> {
         self.record(Op::ATTACHMENT, content)
     }
 
-    /// Appends a named table of texts.
+    /// Appends metadata: a named table of texts.
     pub(crate) fn metadata(&mut self, name: &str, map: &BTreeMap<String, String>) -> io::Result<()> {
         let mut content = Vec::new();
         content.text(name).map(map);
@@ -86,26 +86,26 @@ impl<W: Write> Container<W> {
         self.record(Op::METADATA, &content)
     }
 
-    /// Is this channel declared?
+    /// Returns whether this channel is declared.
     pub(crate) fn has_channel(&self, id: u16) -> bool {
         self.channels.contains_key(&id)
     }
 
-    /// Declares a schema, once; ids from 1.
+    /// Declares a schema if it is not declared yet; ids begin at 1.
     pub(crate) fn schema(&mut self, id: u16, name: &str, encoding: &str, data: &[u8]) -> io::Result<()> {
         let mut content = Vec::with_capacity(data.len() + 64);
         content.u16(id).text(name).text(encoding).u32(data.len() as u32).extend_from_slice(data);
         self.declare(Op::SCHEMA, id, content)
     }
 
-    /// Declares a channel, once.
+    /// Declares a channel if it is not declared yet.
     pub(crate) fn channel(&mut self, id: u16, schema: u16, topic: &str, encoding: &str) -> io::Result<()> {
         let mut content = Vec::new();
         content.u16(id).u16(schema).text(topic).text(encoding).map(&BTreeMap::new());
         self.declare(Op::CHANNEL, id, content)
     }
 
-    /// Appends a schema or channel record that is not there yet.
+    /// Appends a schema or channel record if it is not there yet.
     fn declare(&mut self, op: u8, id: u16, content: Vec<u8>) -> io::Result<()> {
         let known = if op == Op::SCHEMA { &mut self.schemas } else { &mut self.channels };
         if known.insert(id, content.clone()).is_some() {
@@ -117,7 +117,7 @@ impl<W: Write> Container<W> {
     /// Appends a chunk and its message indexes.
     pub(crate) fn chunk(&mut self, chunk: &Chunk) -> io::Result<()> {
         let Some((first, last)) = chunk.index.times_ns else {
-            // Without messages only its declarations are worth keeping.
+            // Only the declarations of a chunk without messages are kept.
             return chunk
                 .index
                 .declared
@@ -165,8 +165,8 @@ impl<W: Write> Container<W> {
         Ok(())
     }
 
-    /// Takes over a record of another file that stands outside of chunks; kinds that belong to a file's end are
-    /// left out, because [`Self::finish`] writes its own.
+    /// Copies a record of another file that is outside of chunks. Records of a file's end are left out, because
+    /// [`Self::finish`] writes them.
     pub(crate) fn copy(&mut self, record: &Record) -> io::Result<()> {
         use super::Fields;
         let mut f = Fields(&record.content);
@@ -202,7 +202,7 @@ impl<W: Write> Container<W> {
         }
     }
 
-    /// Hands everything to the system: what was appended so far survives the end of this program.
+    /// Passes all data to the operating system: they stay in the file if the program ends.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
@@ -240,7 +240,7 @@ impl<W: Write> Container<W> {
         for offset in &offsets {
             self.record(Op::SUMMARY_OFFSET, offset)?;
         }
-        // The summary's CRC takes in the footer up to the CRC itself.
+        // The summary's CRC includes the footer up to the CRC itself.
         let mut footer = Vec::new();
         footer.u8(Op::FOOTER).u64(20).u64(summary_start).u64(offsets_start);
         self.put(&footer)?;
