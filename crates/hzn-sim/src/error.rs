@@ -1,8 +1,8 @@
-//! Why a scene cannot be rendered.
+//! The reasons why a scene cannot be rendered.
 
 use hzn_core::error::ConfigError;
 
-/// Why a scene cannot be rendered.
+/// The reason why a scene cannot be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// The camera or another part of the sensor's configuration is out of its limits.
