@@ -51,6 +51,7 @@ pub struct Fit {
 
 /// Step from one seed of the measured pictures to the next. The first seed is one step above the scenario's seed.
 const OTHER_SEED: u64 = 7919;
+/// Number of other seeds that are measured.
 const SEEDS: u64 = 16;
 /// Default number of pictures on which a [`Fit`] is measured.
 pub const MEASURED: u32 = 32;
