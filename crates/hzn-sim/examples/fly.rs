@@ -1,5 +1,5 @@
-//! Flies the built-in flights through the sensor and prints each answer with its error: `fly [rocket|payload|leo]
-//! [width] [count] [seed] [sigma of a prior attitude in degrees]`.
+//! Flies the built-in flights through the sensor and prints each answer with its error:
+//! `fly [rocket|payload|leo] [width] [count] [seed] [sigma of a prior attitude in degrees]`.
 
 use hzn_core::{HostHorizon, camera::Config};
 use hzn_sim::flight::{leo_infrared, rocket};

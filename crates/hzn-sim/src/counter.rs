@@ -100,7 +100,7 @@ mod tests {
             }
         }
         let n = n as f64;
-        // Four standard errors of each moment.
+        // The limits are four standard errors of each moment.
         assert!((sum / n).abs() < 4.0 / n.sqrt());
         assert!((square / n - 1.0).abs() < 4.0 * (2.0 / n).sqrt());
         assert!((fourth / n - 3.0).abs() < 4.0 * (96.0 / n).sqrt());

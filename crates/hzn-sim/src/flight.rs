@@ -256,9 +256,9 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     Flight { name: "rocket".into(), sensor, frames }
 }
 
-/// Returns a flight of an infrared Earth sensor in low orbit at 600 km. The lens is equidistant with 384×288 pixels, 92
-/// px/rad, to 90° off axis. The Earth is a uniform disc with its limb at 25 km; the blur is 1 px, the noise 2 %, with
-/// 16 bits. Over the flight the optical axis swings from straight down to 120° off nadir.
+/// Returns a flight of an infrared Earth sensor in low orbit at 600 km. The lens is equidistant with 384×288 pixels and
+/// 92 px/rad, to 90° off axis. The Earth is a uniform disc with its limb at 25 km; the blur is 1 px, the noise 2 %,
+/// with 16 bits. Over the flight the optical axis swings from straight down to 120° off nadir.
 pub fn leo_infrared(count: usize, seed: u64) -> Flight {
     let camera =
         camera::Config { theta_max_deg: Some(90.0), ..camera::Config::ideal(Model::Equidistant, 384, 288, 92.0) };

@@ -114,8 +114,8 @@ impl View {
         self.y + sight.sigma * (sight.m.max(0.0) / sight.s2)
     }
 
-    /// Returns the height in metres of the ray's closest approach above the globe, negative for a hit. The height is
-    /// exact to first order in the flattening times the height, and zero exactly at the limb.
+    /// Returns the height in metres of the ray's closest approach above the globe, negative for a hit. Its error is of
+    /// first order in the flattening times the height, and zero at the limb.
     #[inline(always)]
     pub(crate) fn tangent_height_m(&self, sight: &RayHit) -> f64 {
         let k = (1.0 + sight.miss).max(0.0).sqrt();

@@ -76,8 +76,8 @@ const FIRST_KM: f64 = -30.0;
 const STEP_KM: f64 = 2.0;
 
 impl Infrared {
-    /// Returns the season as an angle in degrees, from the day of the year of a UTC time (seconds since 1970): 0 on 15
-    /// July.
+    /// Returns the season as an angle in degrees, from the day of the year of a UTC time (seconds since 1970): 0 on
+    /// 15 July.
     pub fn season_deg(unix_s: f64) -> f64 {
         // 15 July is 195 days after 1 January, and a year has 365.2425 days.
         ((unix_s / 86_400.0 - 195.0) / 365.2425).rem_euclid(1.0) * 360.0

@@ -5,13 +5,13 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`scene`] | what is in front of the camera |
-//! | [`pose`] | where the camera is and where it looks |
-//! | [`globe`] | the body as an ellipsoid, and what a ray meets on it |
+//! | [`scene`] | the camera and the world in front of it |
+//! | [`pose`] | position and attitude of the camera |
+//! | [`globe`] | the body as an ellipsoid, and its intersection with a ray |
 //! | [`texture`] | clouds |
 //! | [`visible`] | the Earth in sunlight: ground, clouds, air, Sun, Moon |
 //! | [`infrared`] | the Earth at 15 µm |
-//! | [`radiance`] | a user's table for it |
+//! | [`radiance`] | a user's table of infrared radiances |
 //! | [`optics`] | fall-off and stray light |
 //! | [`motion`] | rotation during a picture |
 //! | [`foreground`] | structure of the vehicle in the picture |
@@ -25,10 +25,10 @@
 //! | [`scenario`] | a whole sequence in one description: scene.toml |
 //! | [`trajectory`] | rocket, orbit, table; attitude; inertial sensors and satellite navigation receiver |
 //! | [`utc`] | dates and seconds |
-//! | [`evaluate`] | answers compared with the truth: how many, how accurate, how honest |
+//! | [`evaluate`] | answers compared with the truth: their number, accuracy and covariances |
 //! | [`sensitivity`] | covariances by design, without rendering |
 //! | [`painted`] | uniform discs that are painted very fast |
-//! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
+//! | [`flight`] | built-in sequences of scenes, with the sensor that takes them |
 
 pub mod artefact;
 mod counter;

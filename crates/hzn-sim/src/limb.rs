@@ -86,7 +86,7 @@ impl LimbCircle {
     /// Returns the unit direction (ECEF) of the limb at an azimuth about its axis: 0 is east, π/2 is axis × east.
     pub fn ray_ecef(&self, azimuth_rad: f64) -> [f64; 3] {
         let (sin, cos) = libm::sincos(azimuth_rad);
-        // The cone's half-angle at this azimuth is exactly cot² α = cot² α_E cos² φ + cot² α_M sin² φ.
+        // The half-angle α at this azimuth follows exactly from cot² α = cot² α_E cos² φ + cot² α_M sin² φ.
         let cot = (self.cot2_east * cos * cos + self.cot2_meridian * sin * sin).sqrt();
         (self.axis * cot + self.east * cos + self.third * sin).normalize().into()
     }

@@ -1,4 +1,4 @@
-//! A uniform disc in a uniform sky, computed directly from its cone: no world, no noise, thousands of pictures per
+//! A uniform disc in a uniform sky, computed directly from its cone: no world, no noise, thousands of pictures a
 //! minute.
 //!
 //! These pictures are for campaigns about the search alone. If one is refused, only the sensor can be the reason.

@@ -1,4 +1,4 @@
-//! Where the camera is and where it looks.
+//! Position and attitude of the camera.
 
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic, geodetic};
 use hzn_core::frames::{Cam, Ecef, Rotation};

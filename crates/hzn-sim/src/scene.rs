@@ -91,8 +91,8 @@ pub enum Profile {
     /// A step at the limb height.
     #[default]
     Sharp,
-    /// Brightness is constant up to a saturation height, above it exp(−height/scale). The saturation height is `scale`
-    /// · ln 2 below the limb height, so half brightness is at the limb height.
+    /// Brightness is constant up to a saturation height, above it exp(−height/scale). The saturation height is
+    /// `scale` · ln 2 below the limb height, so half brightness is at the limb height.
     Exponential {
         /// Height over which the brightness falls by e, kilometres.
         scale_km: f64,

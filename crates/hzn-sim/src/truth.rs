@@ -82,7 +82,7 @@ pub struct TruthError {
     pub line: Option<u64>,
     /// The column.
     pub column: Option<String>,
-    /// What is wrong and what to do.
+    /// Description of the error, and how to correct it.
     pub what: String,
 }
 

@@ -107,7 +107,7 @@ fn fused_is_between_known_and_free() {
 
 #[test]
 fn what_cannot_be_seen_or_flown_is_said() {
-    // The limb of a low body is beyond the lower border of a narrow level picture.
+    // At 3000 km the limb is beyond the lower border of a narrow level picture.
     assert_eq!(Design { altitude_km: 3000.0, ..design(30.0) }.sigmas().unwrap(), None);
     let inside = Design { limb_height_km: 300.0, ..design(94.4) }.sigmas().unwrap_err();
     assert!(inside.to_string().contains("at 200 km is not above the limb at 300 km"));

@@ -1,4 +1,5 @@
-//! Answers of the sensor compared with the truth: how many, how accurate, how honest.
+//! Answers of the sensor compared with the truth: how many there are, how accurate they are, and whether their
+//! covariances are right.
 //!
 //! ```text
 //!   answers ─┐

@@ -61,8 +61,8 @@ pub struct Errors {
 /// half-angle of the half-angle-free fit, and the centre is the direction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Horace {
-    /// Share of the pictures with a limb whose answer has the radius right within 10 %, and the centre right within 10
-    /// % of the radius. It is NaN if there are no pictures with a limb.
+    /// Share of the pictures with a limb whose answer has the radius right within 10 %, and the centre right within
+    /// 10 % of the radius. It is NaN if there are no pictures with a limb.
     pub success: f64,
     /// Share of the pictures with a limb that are not a success. HORACE's goal was below 10 %.
     pub false_negatives: f64,
@@ -86,7 +86,7 @@ pub struct Group {
 pub struct GroupRow {
     /// The range: the lower limit is included, the upper limit is not.
     pub range: [f64; 2],
-    /// Pictures with a limb in view.
+    /// Number of pictures with a limb in view.
     pub with_limb: usize,
     /// Number of answered pictures with a limb in view.
     pub answered: usize,

@@ -19,8 +19,8 @@ fn truth(file: &str, limb: u8) -> Truth {
     }
 }
 
-/// The answer is off by a turn of `x_deg` about x and of `z_deg` about z. Its sigmas are 0.1° (about x) and 0.2° (about
-/// z).
+/// The answer is off by a turn of `x_deg` about x and of `z_deg` about z. Its sigmas are 0.1° (about x) and 0.2°
+/// (about z).
 fn answer(file: &str, x_deg: f64, z_deg: f64) -> Answer {
     let (x, z) = (x_deg.to_radians(), z_deg.to_radians());
     // The truth is the answer turned by (x, 0, z). To first order, answer = (0, 1, 0) − (x, 0, z) × (0, 1, 0).

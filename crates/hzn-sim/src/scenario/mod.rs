@@ -65,7 +65,7 @@ pub const BUILTIN: [(&str, &str, &str); 8] = [
 pub struct Scenario {
     /// Short name; the names of the pictures begin with it.
     pub name: String,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     #[serde(default = "one")]
     pub seed: u64,
     /// UTC of time 0, as a TOML date and time. It sets the positions of Sun and Moon, and the season.
@@ -210,7 +210,7 @@ impl Default for Known {
 pub struct ScenarioError {
     /// The key, for example `[capture] frames`.
     pub field: String,
-    /// What is wrong and what to do.
+    /// Description of the error, and how to correct it.
     pub what: String,
 }
 

@@ -292,7 +292,7 @@ impl Edge {
         let truth = scene.truth_of(kind, "", 0.0).ok()?;
         let axis: UnitVec3<_, f64> = truth.axis()?;
         let disc = matches!(kind, Kind::Sun | Kind::Moon);
-        // In the scene, the limb at this latitude is higher than the average by this amount.
+        // `higher_km` is the height of the scene's limb at a latitude above the mean limb.
         let levels = match &scene.world {
             World::Infrared(world) => Some((world.half_levels(), world.mean_half_level_km())),
             World::Plain | World::Visible(_) => None,

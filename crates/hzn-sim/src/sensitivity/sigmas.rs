@@ -1,9 +1,9 @@
 //! The covariance of a direction from limb points whose errors are correlated along the edge.
 //!
-//! Errors of the points along u and v are independent Gauss-Markov processes with variance R and correlation ρ =
-//! exp(−Δs/L). A point enters the normal equations N with a row q, and its error moves the residual by gᵀ(δu, δv). With
-//! b = q gᵀ the covariance is N⁻¹ (R X) N⁻¹, X = Σ (b bᵀ + b aᵀ + a bᵀ). The sum a runs along the edge: a ← ρ (a + b).
-//! This implementation is independent of hzn-core, and a test compares both.
+//! Errors of the points along u and v are independent Gauss-Markov processes with variance R and correlation
+//! ρ = exp(−Δs/L). A point enters the normal equations N with a row q, and its error moves the residual by gᵀ(δu, δv).
+//! With b = q gᵀ the covariance is N⁻¹ (R X) N⁻¹, X = Σ (b bᵀ + b aᵀ + a bᵀ). The sum a runs along the edge:
+//! a ← ρ (a + b). This implementation is independent of hzn-core, and a test compares both.
 
 use hzn_core::camera::{Camera, Model};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
@@ -29,8 +29,8 @@ pub struct Sigmas {
     pub limb_px: f64,
     /// Sigmas with a fitted half-angle.
     pub free: Tilt,
-    /// Sigmas with the half-angle fused with that from altitude and limb height, by their sigmas. `hzn run` reports
-    /// these.
+    /// Sigmas with the fitted half-angle fused with the half-angle from altitude and limb height, by their sigmas. `hzn
+    /// run` reports these.
     pub fused: Tilt,
     /// Sigmas with an exactly known half-angle.
     pub known: Tilt,

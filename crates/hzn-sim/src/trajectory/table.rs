@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Point;
 
-/// Rows of a CSV file with the columns `time_s, x_km, y_km, z_km` (ECEF). For `attitude = "table"` it also has `qw, qx,
-/// qy, qz` (camera to ECEF). Between rows, positions follow a smooth cubic and attitudes the shortest turn.
+/// Rows of a CSV file with the columns `time_s, x_km, y_km, z_km` (ECEF). For `attitude = "table"` it also has
+/// `qw, qx, qy, qz` (camera to ECEF). Between rows, positions follow a smooth cubic and attitudes the shortest turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
