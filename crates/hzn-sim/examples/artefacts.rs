@@ -1,12 +1,13 @@
-//! Artefacts one by one: which are taken for a limb, with what error and by which edges, and their pictures.
+//! Examines artefacts one by one: which ones are answered as a limb, with which error and by which edges, and their
+//! pictures.
 //!
 //! ```sh
 //! cargo run --release -p hzn-sim --example artefacts -- --kind ring,disc --count 200 --threshold 1 --list
 //! cargo run --release -p hzn-sim --example artefacts -- --kind ring --first 17 --count 1 --png pictures
 //! ```
-//! The line of a false answer: kind, seed, size and lens of the camera, error and sigma in degrees, RMS in pixels,
-//! inliers of points, arc in pixels, and every edge as `verdict:points`. A picture has the chosen edge's inliers in
-//! green, its other points in yellow, the fitted limb in red.
+//! The line of a false answer has: kind, seed, threshold, size and lens of the camera, status, error and sigma in
+//! degrees, RMS in pixels, inliers of points, arc in pixels, half-angle in degrees, and every edge as `verdict:points`.
+//! A picture shows the chosen edge's inliers in green, its other points in yellow, and the fitted limb in red.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -26,40 +27,41 @@ use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, look};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 
-/// Looks at artefacts one by one.
+/// Examines artefacts one by one.
 #[derive(Debug, Parser)]
 struct Args {
     /// Kinds, separated by commas; without it, all
     #[arg(long, value_delimiter = ',')]
     kind: Vec<String>,
-    /// Pictures of each kind
+    /// Number of pictures of each kind
     #[arg(long, default_value_t = 100)]
     count: u64,
-    /// The first seed
+    /// First seed
     #[arg(long, default_value_t = 0)]
     first: u64,
     /// `reject.threshold_px`, several separated by commas; without it, the default
     #[arg(long, value_delimiter = ',')]
     threshold: Vec<f64>,
-    /// Tell an attitude that is wrong by this much, degrees (1σ)
+    /// Give a prior attitude with this error, degrees (1σ)
     #[arg(long)]
     attitude: Option<f64>,
-    /// Limbs next to artefacts instead of artefacts alone; listed are limbs that are lost or answered falsely
+    /// Show limbs next to artefacts instead of artefacts alone; the list then has limbs that are lost or answered
+    /// falsely
     #[arg(long)]
     limb: bool,
-    /// With `--limb`: without the artefact
+    /// With `--limb`: leave out the artefact
     #[arg(long)]
     clean: bool,
-    /// A line a false answer
+    /// Print a line for each false answer
     #[arg(long)]
     list: bool,
-    /// A line every picture
+    /// Print a line for each picture
     #[arg(long)]
     all: bool,
-    /// Write the pictures of what is listed here, with the fitted limb
+    /// Write the listed pictures into this folder, with the fitted limb
     #[arg(long)]
     png: Option<PathBuf>,
-    /// Sets a key of sensor.toml, as `select.max_half_angle_sigma=3`; may be given several times
+    /// Set a key of sensor.toml, for example `select.max_half_angle_sigma=3`; may be given several times
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -181,7 +183,7 @@ fn one(
     Ok(out)
 }
 
-/// The configuration with keys set as in sensor.toml.
+/// Returns the configuration with keys set as in sensor.toml.
 fn set(config: &Config, keys: &[String]) -> anyhow::Result<Config> {
     if keys.is_empty() {
         return Ok(config.clone());

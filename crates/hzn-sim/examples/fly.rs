@@ -1,4 +1,4 @@
-//! Flies the built-in flights through the sensor and prints each answer beside the truth:
+//! Flies the built-in flights through the sensor and prints each answer with its error:
 //! `fly [rocket|payload|leo] [width] [count] [seed] [sigma of a prior attitude in degrees]`.
 
 use hzn_core::{HostHorizon, camera::Config};
@@ -34,7 +34,7 @@ fn main() {
         let axis = truth.axis().expect("the truth has an axis");
         let error_deg = solution.axis.angle_rad(&axis).to_degrees();
         let sigma_deg = solution.covariance.sigma_max_rad().to_degrees();
-        // Two degrees of freedom: the pseudo-inverse by adding the square of the null direction.
+        // The covariance has rank 2. The square of the null direction is added, which gives the pseudo-inverse.
         let [p, e] = [solution.covariance.rows(), [solution.axis.xyz(); 3]];
         let e = e[0];
         let scale = p[0][0] + p[1][1] + p[2][2];

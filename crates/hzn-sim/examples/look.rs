@@ -1,5 +1,5 @@
-//! Writes pictures of a built-in scene to look at, runs the sensor over them and prints each answer beside the truth:
-//! `look SCENE [pictures] [folder] [fit]`; with `fit` the noise model is measured first.
+//! Writes pictures of a built-in scene, runs the sensor over them and prints each answer with its error:
+//! `look SCENE [pictures] [folder] [fit]`. With `fit` the noise model is measured first.
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -1,33 +1,33 @@
-//! Random numbers by counting: the value at an index is a hash of (seed, stream, index), so that any pixel can be
-//! drawn alone, in any order, on any number of threads.
+//! Random numbers by index: each value is a hash of (seed, stream, index). Each pixel can therefore be drawn alone, in
+//! any order and on any number of threads.
 //!
 //! The hash is the finaliser of SplitMix64 (Steele, Lea, Flood 2014), applied twice so that neighbouring seeds and
 //! neighbouring indices are unrelated.
 
-/// What the numbers are for; different uses of one seed must not share their numbers.
+/// The purpose of the numbers. Different uses of one seed must not share their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stream {
-    /// Noise of the detector, one number a pixel.
+    /// Noise of the detector, one number per pixel.
     Detector = 1,
-    /// Which pixels are hot.
+    /// The choice of hot pixels.
     HotPixels,
-    /// Where the stars stand.
+    /// Positions of the stars.
     Stars,
     /// Errors of limb points along u.
     EdgeU,
     /// Errors of limb points along v.
     EdgeV,
-    /// The error of an attitude that is told to the sensor.
+    /// Error of the attitude that the sensor gets as a prior.
     AttitudePrior,
     /// Offset of every pixel.
     FixedPattern,
     /// Gain of every pixel.
     GainPattern,
-    /// How the vehicle turns.
+    /// Drift of the vehicle's rotation.
     Drift,
     /// Errors of gyroscopes and accelerometers.
     Imu,
-    /// Errors of a satellite receiver.
+    /// Errors of a satellite navigation receiver.
     Gnss,
     /// Artefacts in the picture.
     Artefact,
@@ -41,7 +41,7 @@ pub(crate) struct Counter {
     key: u64,
 }
 
-/// Finaliser of SplitMix64: a bijection of 64 bits in which each output bit depends on every input bit.
+/// Finaliser of SplitMix64: a bijection of 64 bits. Each output bit depends on every input bit.
 #[inline(always)]
 fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -53,28 +53,29 @@ impl Counter {
     pub(crate) fn new(seed: u64, stream: Stream) -> Self {
         Self { key: mix(seed ^ (stream as u64).wrapping_mul(0xD1B5_4A32_D192_ED03)) }
     }
-    /// 64 random bits.
+    /// Returns 64 random bits.
     #[inline(always)]
     pub(crate) fn bits(&self, index: u64) -> u64 {
         mix(self.key.wrapping_add(index.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
-    /// Uniform in 0…1, the ends excluded.
+    /// Returns a uniform number between 0 and 1, without the ends.
     #[inline(always)]
     pub(crate) fn uniform(&self, index: u64) -> f64 {
         ((self.bits(index) >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
     }
-    /// Two independent normal numbers (mean 0, variance 1) by Box and Muller's method.
+    /// Returns two independent normal numbers (mean 0, variance 1) by the method of Box and Muller.
     #[inline(always)]
     pub(crate) fn normal_pair(&self, index: u64) -> [f32; 2] {
         let bits = self.bits(index);
-        // 32 bits for the radius reach 6.7 sigma, which no picture distinguishes from infinity.
+        // With 32 bits the radius reaches 6.7 sigma at most. No picture shows a difference from an unlimited
+        // distribution.
         let radius_u = ((bits >> 32) as f32 + 0.5) * (1.0 / 4_294_967_296.0);
         let turn = (bits as u32 >> 8) as f32 * (1.0 / 16_777_216.0);
         let radius = (-2.0 * libm::logf(radius_u.min(1.0))).sqrt();
         let (sin, cos) = libm::sincosf(turn * core::f32::consts::TAU);
         [radius * cos, radius * sin]
     }
-    /// One normal number (mean 0, variance 1).
+    /// Returns one normal number (mean 0, variance 1).
     pub(crate) fn normal(&self, index: u64) -> f64 {
         f64::from(self.normal_pair(index)[0])
     }
@@ -99,7 +100,7 @@ mod tests {
             }
         }
         let n = n as f64;
-        // Four standard errors of each moment.
+        // The limits are four standard errors of each moment.
         assert!((sum / n).abs() < 4.0 / n.sqrt());
         assert!((square / n - 1.0).abs() < 4.0 * (2.0 / n).sqrt());
         assert!((fourth / n - 3.0).abs() < 4.0 * (96.0 / n).sqrt());

@@ -1,4 +1,4 @@
-//! From light to numbers: the optics' blur, noise, quantisation.
+//! The step from light to numbers: blur of the optics, noise, quantisation.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -6,45 +6,45 @@ use serde::{Deserialize, Serialize};
 use crate::counter::{Counter, Stream};
 use crate::picture::{Picture, Samples};
 
-/// The detector and the blur of the optics before it.
+/// The detector, and the blur of the optics in front of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Detector {
-    /// Standard deviation of the Gaussian point spread function in pixels; 0 is none.
+    /// Standard deviation of the Gaussian point spread function in pixels; 0 means no blur.
     pub psf_sigma_px: f64,
-    /// Standard deviation of the noise that does not depend on the light, fraction of full scale.
+    /// Standard deviation of the noise that does not depend on the light, as a fraction of full scale.
     pub read_noise: f64,
-    /// Electrons at full scale, for shot noise of √electrons; none without it.
+    /// Electrons at full scale; the shot noise is √electrons. Without a value there is no shot noise.
     pub full_well_electrons: Option<f64>,
-    /// Share of pixels that are hot, and show anything up to full scale in every picture.
+    /// Share of hot pixels. A hot pixel shows at least its own random value, up to full scale, in every picture.
     pub hot_pixels: f64,
-    /// Which pixels are hot, and the fixed patterns.
+    /// Seed of the hot pixels and of the fixed patterns.
     pub hot_pixel_seed: u64,
-    /// Standard deviation of the pixels' own offsets, the same in every picture, fraction of full scale.
+    /// Standard deviation of the pixels' offsets, as a fraction of full scale. They are the same in every picture.
     pub offset_pattern: f64,
-    /// Standard deviation of the pixels' own gains over 1.
+    /// Standard deviation of the pixels' gains around 1.
     pub gain_pattern: f64,
-    /// From light to brightness. Shot noise comes before it, everything else after.
+    /// Curve from light to brightness. Pixel gains and shot noise come before it, everything else after it.
     pub tone: Tone,
-    /// Three samples a pixel, red, green, blue, instead of their mean. In a world that is grey they are equal but for
-    /// their noise.
+    /// True for three samples per pixel (red, green, blue), false for their mean. In a grey world the three differ only
+    /// by their noise.
     pub colour: bool,
-    /// Bits of a sample, 8 to 16.
+    /// Bits per sample, 8 to 16.
     pub bits: u8,
 }
 
-/// How light becomes brightness.
+/// Curve from light to brightness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tone {
-    /// In proportion.
+    /// Brightness is proportional to light.
     #[default]
     Linear,
-    /// As pictures for the eye: the curve of sRGB, which lifts what is dark.
+    /// The curve of sRGB, as in pictures for the eye; it lifts dark values.
     Srgb,
 }
 
-/// The curve of sRGB and its slope in steps of light, as powers are slow.
+/// Table of the sRGB curve and its slope in steps of light, because powers are slow to compute.
 struct Curve(Vec<[f32; 2]>);
 
 impl Curve {
@@ -58,7 +58,7 @@ impl Curve {
         Self((0..=Self::STEPS).map(|i| [at(i), (at(i + 1) - at(i)) * Self::STEPS as f32]).collect())
     }
 
-    /// Brightness and its slope.
+    /// Returns the brightness and its slope.
     #[inline(always)]
     fn at(&self, light: f32) -> [f32; 2] {
         let x = light.clamp(0.0, 1.0) * Self::STEPS as f32;
@@ -84,19 +84,19 @@ impl Default for Detector {
     }
 }
 
-/// Light on the detector: fractions of full scale, row by row.
+/// Light on the detector as fractions of full scale, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plane {
     pub(crate) width: usize,
     pub(crate) data: Vec<f32>,
 }
 
-/// One side of the Gaussian's weights, the centre first; the whole sums to one.
+/// Returns one side of the Gaussian's weights, the centre first. The weights of both sides sum to one.
 fn kernel(sigma: f64) -> Vec<f32> {
     if !(sigma > 0.0) {
         return vec![1.0];
     }
-    // Beyond four sigma there is less than 1e-4 of the light.
+    // Less than 1e-4 of the light is beyond four sigma.
     let reach = (4.0 * sigma).ceil().min(200.0) as usize;
     let weights: Vec<f64> = (0..=reach).map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma))).collect();
     let sum: f64 = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
@@ -108,7 +108,7 @@ impl Plane {
         self.data.len() / self.width
     }
 
-    /// Blurred by a Gaussian; beyond the border the picture goes on with its outermost pixels.
+    /// Blurs the plane by a Gaussian. Beyond the border the outermost pixels are repeated.
     pub(crate) fn blurred(mut self, sigma_px: f64) -> Self {
         let k = kernel(sigma_px);
         let reach = k.len() - 1;
@@ -150,7 +150,7 @@ impl Plane {
 }
 
 impl Detector {
-    /// Noise, hot pixels and quantisation of one plane, or of three for colours.
+    /// Adds noise and hot pixels to one plane, or to three planes for colours, and quantises them.
     pub(crate) fn expose(&self, light: &[Plane], seed: u64) -> Picture {
         let bits = self.bits.clamp(8, 16);
         let (width, height) = light.first().map_or((0, 0), |p| (p.width as u16, p.height() as u16));
@@ -165,7 +165,7 @@ impl Detector {
     fn samples<S: Send + Copy + Default>(&self, light: &[Plane], seed: u64, bits: u8, to: fn(u32) -> S) -> Vec<S> {
         let mut planes = light.iter().enumerate().map(|(channel, light)| {
             let mut data = vec![S::default(); light.data.len()];
-            // Colours have noise of their own.
+            // Each colour has separate noise.
             self.fill(light, seed.wrapping_add((channel as u64) << 40), channel, bits, &mut data, to);
             data
         });
@@ -196,7 +196,7 @@ impl Detector {
         let noisy = read2 > 0.0 || shot > 0.0;
         let (tone, curve) = (self.tone, Curve::srgb());
         out.par_chunks_mut(w).zip(light.data.par_chunks(w)).enumerate().for_each(|(y, (out, light))| {
-            // Pixels share a draw in pairs; an odd width leaves half a draw unused.
+            // Two neighbouring pixels share one draw. At an odd width, half of a row's last draw is unused.
             let first = (y * w.div_ceil(2)) as u64;
             for (pair, (out, light)) in out.chunks_mut(2).zip(light.chunks(2)).enumerate() {
                 let index = first + pair as u64;
@@ -206,9 +206,9 @@ impl Detector {
                 for (i, (out, &light)) in out.iter_mut().zip(light).enumerate() {
                     let light = light * (1.0 + gain * gains[i]);
                     let mut v = match tone {
-                        // One draw serves both kinds: their variances add.
+                        // One draw covers read noise and shot noise, because their variances add.
                         Tone::Linear => light + normal[i] * (read2 + shot * light.max(0.0)).sqrt(),
-                        // Shot noise through the curve, to first order, keeps one draw enough.
+                        // The shot noise passes through the curve to first order, so one draw is enough.
                         Tone::Srgb => {
                             let [bright, slope] = curve.at(light);
                             bright + normal[i] * (read2 + shot * light.clamp(0.0, 1.0) * slope * slope).sqrt()
@@ -259,7 +259,7 @@ mod tests {
             (data.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / n).sqrt() / 65535.0
         };
         assert!((sigma(d, 0.5) / 0.02 - 1.0).abs() < 0.02);
-        // √(0.02² + 0.5/1000)
+        // The sigma is √(0.02² + 0.5/1000).
         let shot = Detector { full_well_electrons: Some(1000.0), ..d };
         assert!((sigma(shot, 0.5) / 0.03 - 1.0).abs() < 0.02);
     }

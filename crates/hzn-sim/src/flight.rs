@@ -1,4 +1,4 @@
-//! Built-in flights: sequences of scenes with the sensor that took them.
+//! Built-in flights: sequences of scenes, and the sensor that takes them.
 
 use core::f64::consts::{FRAC_PI_2, TAU};
 
@@ -22,9 +22,9 @@ use crate::truth::Truth;
 pub struct Flight {
     /// Short name, usable in file names.
     pub name: String,
-    /// What the sensor is told.
+    /// Configuration of the sensor.
     pub sensor: hzn_core::Config,
-    /// The pictures in the order of time.
+    /// Pictures in the order of time.
     pub frames: Vec<FlightFrame>,
 }
 
@@ -33,17 +33,17 @@ pub struct Flight {
 pub struct FlightFrame {
     /// Name of the picture's file.
     pub file: String,
-    /// Time since the first picture in seconds.
+    /// Time from the first picture in seconds.
     pub time_s: f64,
-    /// UTC as ISO 8601, where there is a date.
+    /// UTC as ISO 8601; `None` if the flight has no date.
     pub utc: Option<String>,
-    /// What is seen.
+    /// Scene of the picture.
     pub scene: Scene,
-    /// Quality of the JPEG file that it is kept as, 1 to 100; `None`: without loss.
+    /// Quality of the JPEG file of the picture, 1 to 100; `None` for a lossless file.
     pub jpeg_quality: Option<u8>,
 }
 
-/// A row of frames.csv: what is told about one picture. The fields are the file's columns, in this order.
+/// A row of frames.csv: the prior of one picture. The fields are the file's columns, in this order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameRow {
     /// Name of the picture's file.
@@ -54,7 +54,7 @@ pub struct FrameRow {
     pub utc: Option<String>,
     /// Altitude in kilometres, geodetic for `earth`.
     pub altitude_km: f64,
-    /// Position in ECEF, kilometres.
+    /// First component of the position in ECEF, kilometres.
     pub x_km: f64,
     /// Second component of the position.
     pub y_km: f64,
@@ -70,21 +70,21 @@ pub struct FrameRow {
     pub qz: Option<f64>,
     /// 1-sigma of the prior attitude about each axis, degrees.
     pub attitude_sigma_deg: Option<f64>,
-    /// Rate of rotation of the camera in its own axes, rad/s; of a camera with a rolling shutter.
+    /// Rate of the camera about its first axis, rad/s; only for a rolling shutter.
     pub rate_x: Option<f64>,
-    /// About its second axis.
+    /// Rate of the camera about its second axis.
     pub rate_y: Option<f64>,
-    /// About its third axis.
+    /// Rate of the camera about its third axis.
     pub rate_z: Option<f64>,
 }
 
 impl FlightFrame {
-    /// Rate of rotation of a camera whose rows are exposed one after the other.
+    /// Returns the rate of the camera if it has a rolling shutter.
     fn rate_rad_s(&self) -> Option<[f64; 3]> {
         self.scene.motion.filter(|motion| motion.readout_s != 0.0).map(|motion| motion.rate_radps)
     }
 
-    /// What frames.csv says about the picture: time and position, no attitude.
+    /// Returns the row of frames.csv for the picture: time and position, no attitude.
     pub fn row(&self) -> FrameRow {
         let [x_km, y_km, z_km] = self.scene.pose.position_m.map(|m| m * 1e-3);
         let altitude_km = Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m) * 1e-3;
@@ -107,10 +107,10 @@ impl FlightFrame {
             rate_z: rate.map(|[_, _, z]| z),
         }
     }
-    /// The picture as who reads its file has it: with the losses of JPEG where it is kept as such.
+    /// Renders the picture as a reader of its file gets it, with the losses of JPEG if it is a JPEG file.
     ///
     /// # Errors
-    /// As [`Scene::render`].
+    /// Fails like [`Scene::render`]; also if the picture cannot be encoded as JPEG.
     pub fn render(&self) -> Result<Picture, SceneError> {
         let picture = self.scene.render()?;
         match self.jpeg_quality {
@@ -118,14 +118,14 @@ impl FlightFrame {
             None => Ok(picture),
         }
     }
-    /// The truth.
+    /// Returns the truth about the picture.
     ///
     /// # Errors
-    /// As [`Scene::truth`].
+    /// Fails like [`Scene::truth`].
     pub fn truth(&self) -> Result<Truth, SceneError> {
         self.scene.truth(&self.file, self.time_s)
     }
-    /// What a navigation system would tell the sensor: the position, no attitude.
+    /// Returns the prior that a navigation system would give the sensor: the position, no attitude.
     pub fn known(&self) -> hzn_core::Prior<f64> {
         hzn_core::Prior {
             altitude_m: Some(Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m)),
@@ -134,7 +134,8 @@ impl FlightFrame {
             ..hzn_core::Prior::default()
         }
     }
-    /// As [`FlightFrame::known`], with an attitude that is wrong by `sigma_rad` (1-sigma, about each axis).
+    /// Returns [`FlightFrame::known`] with an attitude that has a random error of `sigma_rad` (1-sigma, about each
+    /// axis).
     pub fn known_with_attitude(&self, sigma_rad: f64) -> hzn_core::Prior<f64> {
         let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
         let error_rad = [0, 1, 2].map(|i| sigma_rad * draws.normal(i));
@@ -147,8 +148,8 @@ impl FlightFrame {
 }
 
 impl Flight {
-    /// The same flight with a limb height that depends on latitude: rows of (geodetic latitude in degrees, height in
-    /// kilometres). The sensor's configuration is left as it is.
+    /// Returns the same flight with a limb height that depends on latitude, as rows of (geodetic latitude in degrees,
+    /// height in kilometres). The sensor's configuration does not change.
     #[must_use]
     pub fn with_limb_height_by_latitude_km(mut self, rows: &[[f64; 2]]) -> Self {
         for frame in &mut self.frames {
@@ -157,8 +158,8 @@ impl Flight {
         self
     }
 
-    /// The same flight with part of the vehicle at the right of every picture, in front of sky and Earth, and
-    /// the sensor's mask around it.
+    /// Returns the same flight with a part of the vehicle at the right of every picture, in front of sky and Earth. The
+    /// sensor's mask covers the part.
     #[must_use]
     pub fn with_payload(mut self) -> Self {
         let (w, h) = (f64::from(self.sensor.camera.width), f64::from(self.sensor.camera.height));
@@ -168,7 +169,7 @@ impl Flight {
         for frame in &mut self.frames {
             frame.scene.foreground.push(Foreground { polygon_px: part(0.0).to_vec(), brightness: 0.45 });
         }
-        // Four pixels more than the part itself, as its edge is blurred.
+        // The mask is four pixels wider than the part, because the edge of the part is blurred.
         let mut polygon = region::Polygon::new();
         let fits = polygon.extend_from_slice(&part(4.0)).is_ok();
         debug_assert!(fits, "four corners are fewer than sixteen");
@@ -178,21 +179,22 @@ impl Flight {
     }
 }
 
-/// Seed of a picture's noise.
+/// Returns the seed of a picture's noise.
 fn seed_of(seed: u64, index: usize) -> u64 {
     seed.wrapping_mul(1_000_003).wrapping_add(index as u64)
 }
 
-/// Index, and its place in the flight from 0 to 1.
+/// Returns each index with its position in the flight, from 0 to 1.
 fn places(count: usize) -> impl Iterator<Item = (usize, f64)> {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count).map(move |i| (i, i as f64 / last))
 }
 
-/// A wide-angle lens (94° across) for a picture of `width` by `height` pixels; the one of a 1920×1080 camera, scaled.
+/// Returns a wide-angle lens (94° across) for a picture of `width` by `height` pixels: the lens of a 1920×1080 camera,
+/// scaled.
 pub fn rocket_camera(width: u16, height: u16) -> camera::Config {
     let s = f64::from(width) / 1920.0;
-    // Pixel centres are at integers: the corner is at −½.
+    // Pixel centres are at integers, so the corner is at −½.
     let scaled = |c: f64| (c + 0.5) * s - 0.5;
     let middle = (f64::from(height) - 1080.0 * s) / 2.0;
     camera::Config {
@@ -207,8 +209,9 @@ pub fn rocket_camera(width: u16, height: u16) -> camera::Config {
     }
 }
 
-/// A sounding rocket above northern Scandinavia: 70 km up to 240 km and down again in 380 s, slowly tumbling, over
-/// clouds and dark sea, the limb a bright band with an exponential profile; PSF 0.9 px, noise 2 %, 8 bits.
+/// Returns a flight of a sounding rocket above northern Scandinavia. It climbs from 70 km to 240 km and descends again
+/// in 380 s, slowly tumbling, over clouds and dark sea. The limb is a bright band with an exponential profile. The PSF
+/// is 0.9 px, the noise 2 %, with 8 bits.
 pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     let camera = rocket_camera(width, height);
     let mut sensor = hzn_core::Config::new(camera.clone());
@@ -218,8 +221,8 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
         limb_height_sigma_km: 1.0,
         ..body::Config::default()
     };
-    // Chosen so that errors are as large as they are said to be: squared errors over their covariance are 1.5 to 2.7
-    // (two degrees of freedom) on pictures 960 to 1920 pixels wide. Clouds seen through the band correlate them.
+    // The values make the errors as large as their covariance: squared errors over their covariance are 1.5 to 2.7 (two
+    // degrees of freedom) on pictures 960 to 1920 pixels wide. Clouds seen through the band correlate the errors.
     sensor.covariance = covariance::Config::told(0.1, 30.0);
     let half_s = 190.0;
     let frames = places(count)
@@ -229,7 +232,7 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
             let altitude_km = 240.0 - 170.0 * to_apogee * to_apogee;
             let look = Look {
                 azimuth_rad: 0.6 + 1.3 * place * TAU,
-                // The limb is 7° to 16° below the horizontal; half the picture's height is 25°.
+                // The limb is 7° to 16° below the horizontal, and half the picture's height is 25°.
                 depression_rad: (14.0 + 12.0 * libm::sin(1.7 * place * TAU)).to_radians(),
                 roll_rad: 0.2 + 1.5 * place * TAU,
             };
@@ -253,21 +256,21 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     Flight { name: "rocket".into(), sensor, frames }
 }
 
-/// An infrared Earth sensor in low orbit: 384×288, equidistant with 92 px/rad to 90° off axis, 600 km, a uniform disc
-/// with its limb at 25 km, blur 1 px, noise 2 %, 16 bits. Over the flight the optical axis swings from straight down
-/// to 120° off nadir.
+/// Returns a flight of an infrared Earth sensor in low orbit at 600 km. The lens is equidistant with 384×288 pixels and
+/// 92 px/rad, to 90° off axis. The Earth is a uniform disc with its limb at 25 km; the blur is 1 px, the noise 2 %,
+/// with 16 bits. Over the flight the optical axis swings from straight down to 120° off nadir.
 pub fn leo_infrared(count: usize, seed: u64) -> Flight {
     let camera =
         camera::Config { theta_max_deg: Some(90.0), ..camera::Config::ideal(Model::Equidistant, 384, 288, 92.0) };
     let mut sensor = hzn_core::Config::new(camera.clone());
     sensor.body =
         body::Config { limb_height_km: 25.0, limb_height_sigma_km: 1.0, altitude_sigma_km: 0.1, ..sensor.body };
-    // Noise and little else: errors of neighbouring points are unrelated beyond the blur.
+    // Noise dominates, so errors of neighbouring points are unrelated beyond the blur.
     sensor.covariance = covariance::Config::told(0.07, 5.0);
     let frames = places(count)
         .map(|(index, place)| {
             let time_s = 5800.0 * place;
-            // A polar orbit, twice through all latitudes.
+            // The orbit is polar and passes all latitudes twice.
             let (lat_deg, lon_deg) = (80.0 * libm::sin(TAU * place), 10.0 + 24.0 * place);
             let look = Look::off_nadir(120f64.to_radians() * place, 1.1 + 5.0 * place, FRAC_PI_2 * 3.0 * place);
             let scene = Scene {

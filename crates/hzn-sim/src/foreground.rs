@@ -2,26 +2,26 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A polygon of uniform brightness in front of everything.
+/// A polygon of uniform brightness in front of the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Foreground {
-    /// Corners (x, y) in pixels; the last is joined to the first.
+    /// Corners (x, y) in pixels; the last corner is joined to the first.
     pub polygon_px: Vec<[f64; 2]>,
-    /// Brightness, fraction of full scale.
+    /// Brightness as a fraction of full scale.
     pub brightness: f64,
 }
 
-/// Sub-rows a pixel row is cut into; along a row coverage is exact.
+/// Number of sub-rows in a pixel row. Along a row the coverage is exact.
 const SUB_ROWS: u32 = 8;
 
 impl Foreground {
-    /// Whether a point in pixels lies inside (even-odd rule).
+    /// Returns true if a point in pixels is inside the polygon (even-odd rule).
     pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
         self.crossings(y).iter().filter(|&&c| c <= x).count() % 2 == 1
     }
 
-    /// Where the outline crosses the row `y`, sorted.
+    /// Returns the sorted x positions at which the outline crosses the row `y`.
     fn crossings(&self, y: f64) -> Vec<f64> {
         let corners = &self.polygon_px;
         let mut xs: Vec<f64> = corners

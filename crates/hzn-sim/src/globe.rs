@@ -1,4 +1,4 @@
-//! The body as an ellipsoid of revolution, and what one ray meets on it.
+//! The body as an ellipsoid of revolution, and its intersection with a ray.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
@@ -17,7 +17,7 @@ pub struct Globe {
 }
 
 impl Globe {
-    /// The body of a sensor's configuration: WGS-84 for `earth`, else its sphere.
+    /// Returns the body of a sensor's configuration: WGS-84 for `earth`, otherwise its sphere.
     pub fn new(body: &body::Config) -> Self {
         match body.kind {
             Kind::Earth => Self { a_m: WGS84_A_M, b_m: WGS84_B_M },
@@ -27,44 +27,45 @@ impl Globe {
             }
         }
     }
-    /// Both semi-axes longer by `height_m`.
+    /// Returns the globe with both semi-axes longer by `height_m`.
     pub fn raised(&self, height_m: f64) -> Self {
         Self { a_m: self.a_m + height_m, b_m: self.b_m + height_m }
     }
-    /// Height of a position in metres above the surface, along its normal.
+    /// Returns the height of a position above the surface in metres, along the surface normal.
     pub fn altitude_m(&self, position_m: [f64; 3]) -> f64 {
         geodetic(position_m, self.a_m, self.b_m).0
     }
 }
 
-/// A globe as one camera sees it. All lengths are divided by the semi-axes, so that the globe is the unit sphere.
+/// A globe as seen by one camera. All lengths are divided by the semi-axes, so the globe is the unit sphere.
 #[derive(Debug, Clone)]
 pub(crate) struct View {
-    /// Camera to scaled ECEF: diag(1/a, 1/a, 1/b) times the rotation.
+    /// Matrix from the camera frame to scaled ECEF: diag(1/a, 1/a, 1/b) times the rotation.
     cam_to_scaled: Matrix3<f64>,
-    /// Position, scaled.
+    /// Position in scaled ECEF.
     y: Vector3<f64>,
-    /// |y|² − 1, formed so that little is lost close to the surface.
+    /// |y|² − 1, in a form that loses little precision close to the surface.
     outside: f64,
     /// 1/a, 1/a, 1/b in 1/m.
     inverse_axes: Vector3<f64>,
 }
 
-/// What one ray meets.
+/// A ray and its closest approach to the globe.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RayHit {
-    /// The ray in scaled ECEF; not of unit length.
+    /// The ray's direction in scaled ECEF; not of unit length.
     sigma: Vector3<f64>,
-    /// −y·σ: positive when the ray goes towards the body.
+    /// −y·σ; it is positive if the ray goes towards the body.
     m: f64,
     /// |σ|².
     s2: f64,
-    /// Square of the closest approach to the centre, less one: the limb is its zero, negative is a hit.
+    /// Square of the closest approach to the centre minus 1, in scaled ECEF. It is zero at the limb and negative for a
+    /// hit.
     pub(crate) miss: f64,
 }
 
 impl View {
-    /// `None` when the position is not outside the globe.
+    /// Returns `None` if the position is not outside the globe.
     pub(crate) fn try_new(globe: Globe, pose: &Pose) -> Option<Self> {
         let Globe { a_m: a, b_m: b } = globe;
         let [x, y, z] = pose.position_m;
@@ -76,29 +77,29 @@ impl View {
         ok.then(|| Self { cam_to_scaled, y: Vector3::new(x / a, y / a, z / b), outside, inverse_axes })
     }
 
-    /// Away from the body's centre, ECEF, roughly up.
+    /// Returns the unit direction away from the body's centre (scaled ECEF), roughly up.
     pub(crate) fn up(&self) -> Vector3<f64> {
         self.y.normalize()
     }
 
-    /// What the ray with direction `s` (camera frame, unit length) meets.
+    /// Intersects the globe with the ray of direction `s` (camera frame, unit length).
     #[inline(always)]
     pub(crate) fn look(&self, s: [f64; 3]) -> RayHit {
         let sigma = self.cam_to_scaled * Vector3::from(s);
         let m = -self.y.dot(&sigma);
         let s2 = sigma.norm_squared();
-        // A ray that leads away is nearest to the body where it starts.
+        // A ray that leads away from the body is nearest to it at the camera.
         let along = if m > 0.0 { m * m / s2 } else { 0.0 };
         RayHit { sigma, m, s2, miss: self.outside - along }
     }
 
-    /// How fast [`RayHit::miss`] grows with the angle off the limb, 1/rad.
+    /// Returns the derivative of [`RayHit::miss`] by the angle from the limb, in 1/rad.
     pub(crate) fn miss_per_rad(&self) -> f64 {
-        // Closest approach = |y| sin γ for the angle γ to the centre; at the limb it is one.
+        // The closest approach is |y| sin γ for the angle γ to the centre; at the limb it is one.
         2.0 * self.outside.sqrt()
     }
 
-    /// The point the ray meets, on the unit sphere: where it enters, or the foot of its closest approach.
+    /// Returns the point of the ray on the unit sphere: its entry, or the foot of its closest approach.
     #[inline(always)]
     pub(crate) fn point(&self, sight: &RayHit) -> Vector3<f64> {
         let under = -sight.miss * sight.s2;
@@ -113,15 +114,15 @@ impl View {
         self.y + sight.sigma * (sight.m.max(0.0) / sight.s2)
     }
 
-    /// Height of the ray's closest approach above the globe in metres, negative for a hit, to first order in the
-    /// flattening times the height, and zero exactly at the limb.
+    /// Returns the height in metres of the ray's closest approach above the globe, negative for a hit. Its error is of
+    /// first order in the flattening times the height, and zero at the limb.
     #[inline(always)]
     pub(crate) fn tangent_height_m(&self, sight: &RayHit) -> f64 {
         let k = (1.0 + sight.miss).max(0.0).sqrt();
         sight.miss / (1.0 + k) * self.metres_a_unit(sight)
     }
 
-    /// Metres along the normal for a change of the closest approach by one, close to the limb.
+    /// Returns the metres along the normal per unit of the closest approach, close to the limb.
     fn metres_a_unit(&self, sight: &RayHit) -> f64 {
         let q = self.closest(sight);
         let n2 = q.norm_squared();
@@ -131,9 +132,10 @@ impl View {
         (n2 / q.component_mul(&self.inverse_axes).norm_squared()).sqrt()
     }
 
-    /// Derivative of the tangent height by (u, v) in metres a pixel; `jacobian` is the ray's, rows x, y, z.
+    /// Returns the derivative of the tangent height by (u, v) in metres per pixel. `jacobian` is the derivative of the
+    /// ray, with rows x, y, z.
     pub(crate) fn tangent_height_gradient(&self, sight: &RayHit, jacobian: &[[f64; 2]; 3]) -> [f64; 2] {
-        // miss = outside − m²/s2 with dm = −y·dσ and ds2 = 2 σ·dσ.
+        // The terms follow from miss = outside − m²/s2 with dm = −y·dσ and ds2 = 2 σ·dσ.
         let r = sight.m / sight.s2;
         let by_sigma = self.y * (2.0 * r) + sight.sigma * (2.0 * r * r);
         let by_ray = self.cam_to_scaled.transpose() * by_sigma;
@@ -142,25 +144,25 @@ impl View {
         [0, 1].map(|c| scale * (by_ray.x * jacobian[0][c] + by_ray.y * jacobian[1][c] + by_ray.z * jacobian[2][c]))
     }
 
-    /// Direction of the ray in ECEF, unit.
+    /// Returns the direction of the ray in ECEF, a unit vector.
     pub(crate) fn direction(&self, sight: &RayHit) -> Vector3<f64> {
         sight.sigma.component_div(&self.inverse_axes)
     }
 
-    /// A direction given in ECEF (unit) as the camera sees it.
+    /// Converts a direction from ECEF (unit) to the camera frame.
     pub(crate) fn to_camera(&self, ecef: Vector3<f64>) -> Option<UnitVec3<Cam, f64>> {
-        // The rotation is orthogonal: its inverse is its transpose.
+        // The rotation is orthogonal, so its inverse is its transpose.
         UnitVec3::try_new((self.cam_to_scaled.transpose() * ecef.component_div(&self.inverse_axes)).into())
     }
 
-    /// The outward normal (ECEF, unit) at a point of the unit sphere.
+    /// Returns the outward normal (ECEF, unit) at a point of the unit sphere.
     #[inline(always)]
     pub(crate) fn normal(&self, point: &Vector3<f64>) -> Vector3<f64> {
         point.component_mul(&self.inverse_axes).normalize()
     }
 
-    /// Distance to a point of the unit sphere in metres, and the cosine of the angle under which the ray meets the
-    /// surface there.
+    /// Returns the distance to a point of the unit sphere in metres, and the cosine of the angle at which the ray meets
+    /// the surface there.
     #[inline(always)]
     pub(crate) fn range_m_and_incidence(&self, sight: &RayHit, point: &Vector3<f64>) -> (f64, f64) {
         let scaled = (point - self.y).norm();
@@ -201,7 +203,7 @@ mod tests {
             let sight = view.look([angle.sin(), 0.0, angle.cos()]);
             assert!((view.tangent_height_m(&sight) - (2000.0 * angle.sin() - 1000.0)).abs() < 1e-9);
         }
-        // A ray that leads away is at its nearest where it starts.
+        // A ray that leads away from the body is nearest to it at the camera.
         assert!((view.tangent_height_m(&view.look([0.0, 0.0, -1.0])) - 1000.0).abs() < 1e-9);
         assert!((view.point(&view.look([0.0, 0.0, 1.0])) + Vector3::z()).norm() < 1e-12);
     }
@@ -212,14 +214,14 @@ mod tests {
             serde_json::from_str(include_str!("../tests/data/limb_ellipsoid.json")).unwrap();
         let three = |v: &serde_json::Value| core::array::from_fn::<f64, 3, _>(|i| v[i].as_f64().unwrap());
         for case in golden["cases"].as_array().unwrap() {
-            // The semi-axes of the file include the atmosphere.
+            // The semi-axes in the file include the atmosphere.
             let globe = Globe { a_m: case["a_m"].as_f64().unwrap(), b_m: case["b_m"].as_f64().unwrap() };
             let rows: [[f64; 3]; 3] = core::array::from_fn(|i| three(&case["R_ec"][i]));
             let axes = core::array::from_fn(|c| rows.map(|row| row[c]));
             let view = View::try_new(globe, &Pose::from_axes(three(&case["r_ecef_m"]), axes)).unwrap();
             for ray in case["rays_c"].as_array().unwrap() {
                 let sight = view.look(three(ray));
-                // As an angle off the limb.
+                // The miss is checked as an angle from the limb.
                 assert!((sight.miss / view.miss_per_rad()).abs() < 1e-9, "{} {:e}", case["id"], sight.miss);
                 assert!(view.tangent_height_m(&sight).abs() < 0.01);
             }

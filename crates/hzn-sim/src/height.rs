@@ -2,12 +2,12 @@
 
 use crate::scene::Scene;
 
-/// Limb height by latitude, prepared.
+/// Limb height by latitude, as a sorted table.
 #[derive(Debug, Clone)]
 pub(crate) struct LimbHeight {
-    /// Height where it does not depend on latitude, and what the scene's globe is raised by, metres.
+    /// Limb height of the scene's body, metres. It applies if there is no table, and the scene's globe is raised by it.
     pub(crate) reference_m: f64,
-    /// (latitude in radians, height in metres), rising in latitude.
+    /// (latitude in radians, height in metres), in rising order of latitude.
     table: Vec<(f64, f64)>,
 }
 
@@ -19,7 +19,7 @@ impl LimbHeight {
         Self { reference_m: scene.body.limb_height_km * 1e3, table }
     }
 
-    /// Height in metres at a geodetic latitude; constant beyond the ends of the table.
+    /// Returns the height in metres at a geodetic latitude; it is constant beyond the ends of the table.
     pub(crate) fn at_m(&self, lat_rad: f64) -> f64 {
         let after = self.table.partition_point(|row| row.0 < lat_rad);
         match (after.checked_sub(1).and_then(|i| self.table.get(i)), self.table.get(after)) {
@@ -33,7 +33,7 @@ impl LimbHeight {
         !self.table.is_empty()
     }
 
-    /// Largest distance from the reference height in metres.
+    /// Returns the largest distance of the table's heights from the reference height, in metres.
     pub(crate) fn largest_departure_m(&self) -> f64 {
         self.table.iter().fold(0.0, |m, row| (row.1 - self.reference_m).abs().max(m))
     }

@@ -1,9 +1,9 @@
-//! The Earth in the infrared, around the carbon dioxide band at 15 µm, after section 3.2 of Wang et al. 2022: radiance
-//! by tangent height, latitude and season, interpolated in a table.
+//! The Earth in the infrared, around the carbon dioxide band at 15 µm, after section 3.2 of Wang et al. 2022. The
+//! radiance by tangent height, latitude and season is interpolated in a table.
 //!
-//! The curves of their source are not printed. Ours are analytic: a level of the disc that is a little higher over
-//! warm ground, and a limb that falls off as a logistic curve, whose half level lies at 25 km on average, higher over
-//! the summer hemisphere and lower over the winter one. A user's own come from a file ([`Radiance`]).
+//! The curves of their source are not printed, so hzn has analytic ones. The disc is a little brighter over warm
+//! ground. The limb falls off as a logistic curve; its half level is at 25 km on average, higher over the summer
+//! hemisphere and lower over the winter one. Users can read their own curves from a file ([`Radiance`]).
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -17,32 +17,33 @@ use hzn_core::pixel::ImagePoint;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What an infrared camera sees.
+/// The world that an infrared camera sees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Infrared {
-    /// Season as an angle in degrees: 0 northern midsummer, 90 autumn, 180 midwinter. In a scene.toml it follows from
-    /// `utc` where it is left out.
+    /// Season as an angle in degrees: 0 is northern midsummer, 90 autumn, 180 midwinter. Without it, a scene.toml takes
+    /// the season from `utc`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub season_deg: Option<f64>,
-    /// Brightness of the disc, fraction of full scale.
+    /// Brightness of the disc as a fraction of full scale.
     pub brightness: f64,
-    /// By how much of itself the disc is brighter over the equator and darker over the poles.
+    /// Relative increase of the disc's brightness over the equator, and its relative decrease over the poles.
     pub by_latitude: f64,
-    /// Tangent height of half the disc's brightness on average, kilometres.
+    /// Mean tangent height at which half of the disc's brightness is left, kilometres.
     pub half_level_km: f64,
-    /// How much higher that is over the pole in midsummer, kilometres; linear in latitude, and as much lower over the
+    /// Increase of that height over the pole in midsummer, kilometres. It is linear in latitude, and negative over the
     /// other pole.
     pub half_level_season_km: f64,
-    /// Height over which the limb's odds fall by e, kilometres, above 0.
+    /// Scale of the logistic curve, kilometres, above 0. Over this height the limb's odds (remaining over missing
+    /// brightness) fall by e.
     pub scale_km: f64,
-    /// Cold clouds; `brightness` is what a thick one has of the disc's.
+    /// Cold clouds. Their `brightness` is the brightness of a thick cloud as a fraction of the disc's brightness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clouds: Option<Clouds>,
     /// Brightness of space.
     pub space: f64,
-    /// A table of radiances in place of the curves that the five keys after the season describe: a CSV file, see
-    /// [`Radiance::parse`]. The path is relative to the scene.toml.
+    /// CSV file with a table of radiances, see [`Radiance::parse`]. The table replaces the curves that the five keys
+    /// after the season describe. The path is relative to the scene.toml.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<PathBuf>,
     /// The table, read by [`Infrared::read_table`].
@@ -67,30 +68,31 @@ impl Default for Infrared {
     }
 }
 
-/// Latitudes of the table's rows, degrees.
+/// Number of latitudes in the table; they are 15° apart from −90°.
 const LATITUDES: usize = 13;
-/// Tangent heights of the table's columns, kilometres: 2 km apart from −30 km.
+/// Number of tangent heights in the table; they are 2 km apart from −30 km.
 const HEIGHTS: usize = 81;
 const FIRST_KM: f64 = -30.0;
 const STEP_KM: f64 = 2.0;
 
 impl Infrared {
-    /// Season as an angle by the day of the year of a UTC time (seconds since 1970): 0 on 15 July.
+    /// Returns the season as an angle in degrees, from the day of the year of a UTC time (seconds since 1970): 0 on
+    /// 15 July.
     pub fn season_deg(unix_s: f64) -> f64 {
-        // 196 days after 1 January; a year of 365.2425 days.
+        // 15 July is 195 days after 1 January, and a year has 365.2425 days.
         ((unix_s / 86_400.0 - 195.0) / 365.2425).rem_euclid(1.0) * 360.0
     }
 
-    /// The same with the season of a UTC time (seconds since 1970), where it is left out.
+    /// Returns the same world; if it has no season, with the season of a UTC time (seconds since 1970).
     #[must_use]
     pub fn in_season(&self, unix_s: f64) -> Self {
         Self { season_deg: self.season_deg.or(Some(Self::season_deg(unix_s))), ..self.clone() }
     }
 
-    /// Reads the table, if one is named; `folder` is where the path starts.
+    /// Reads the table, if one is named; its path is relative to `folder`.
     ///
     /// # Errors
-    /// It cannot be read, or something is wrong with it; also a value for the curves in its place.
+    /// Fails if the table cannot be read or is invalid, and if a key of the replaced curves is set.
     pub fn read_table(&mut self, folder: &Path) -> Result<(), String> {
         let Some(table) = &self.table else { return Ok(()) };
         let own = Self::default();
@@ -111,7 +113,7 @@ impl Infrared {
         Ok(())
     }
 
-    /// The radiances of the season.
+    /// Returns the radiances of the season.
     fn grid(&self) -> Grid {
         if let Some(radiance) = &self.radiance {
             return radiance.in_season(self.season_deg.unwrap_or(0.0));
@@ -121,7 +123,7 @@ impl Infrared {
         Grid::of(heights_km, latitudes_deg, |height_km, latitude_deg| self.curve(height_km, latitude_deg))
     }
 
-    /// Half level in kilometres on average over the globe.
+    /// Returns the mean half level over the globe, in kilometres.
     pub fn mean_half_level_km(&self) -> f64 {
         match &self.radiance {
             Some(_) => {
@@ -132,24 +134,25 @@ impl Infrared {
         }
     }
 
-    /// Half level in kilometres at a geodetic latitude.
+    /// Returns the half level in kilometres at a geodetic latitude in degrees.
     pub fn half_level_at_km(&self, latitude_deg: f64) -> f64 {
         self.half_levels()(latitude_deg)
     }
 
-    /// The same for many latitudes.
+    /// Returns a function from geodetic latitude (degrees) to the half level (kilometres), for many latitudes.
     pub(crate) fn half_levels(&self) -> impl Fn(f64) -> f64 {
         let grid = self.radiance.is_some().then(|| self.grid());
         let (mean_km, season_km) = (self.half_level_km, self.half_level_season_km);
         let season = libm::cos(self.season_deg.unwrap_or(0.0).to_radians());
         move |latitude_deg| match &grid {
-            // Between the latitudes and seasons of a table that has one everywhere there is one too.
+            // A table that has a half level at all its latitudes and seasons also has one between them.
             Some(grid) => grid.half_level_km(latitude_deg).unwrap_or(0.0),
             None => mean_km + season_km * season * latitude_deg / 90.0,
         }
     }
 
-    /// The half level as rows of (geodetic latitude in degrees, kilometres): what a sensor may be told.
+    /// Returns the half level as rows of (geodetic latitude in degrees, kilometres), for the sensor's configuration.
+    /// The list is empty if the half level is the same everywhere.
     pub fn half_level_by_latitude_km(&self) -> Vec<[f64; 2]> {
         let half_level_km = self.half_levels();
         let latitudes_deg: &[f64] = match &self.radiance {
@@ -161,14 +164,15 @@ impl Infrared {
         if flat { Vec::new() } else { rows }
     }
 
-    /// Radiance at a tangent height and a geodetic latitude, fraction of full scale, without space and clouds.
+    /// Returns the radiance at a tangent height and a geodetic latitude as a fraction of full scale, without space and
+    /// clouds.
     fn curve(&self, height_km: f64, latitude_deg: f64) -> f64 {
         let disc = self.brightness * (1.0 + self.by_latitude * libm::cos(2.0 * latitude_deg.to_radians()));
         disc / (1.0 + libm::exp((height_km - self.half_level_at_km(latitude_deg)) / self.scale_km))
     }
 }
 
-/// [`Infrared`] from one camera.
+/// [`Infrared`], prepared for one camera.
 #[derive(Debug, Clone)]
 pub(crate) struct Warmth {
     camera: Camera<f64>,
@@ -182,7 +186,7 @@ pub(crate) struct Warmth {
     near: f64,
 }
 
-/// Rays a side of a pixel across the limb.
+/// Number of rays along each side of a pixel at the limb.
 const SAMPLES: i32 = 9;
 
 impl Warmth {
@@ -234,7 +238,7 @@ impl Warmth {
         }
     }
 
-    /// What stands where a ray meets or passes the globe.
+    /// Returns latitude and cloud where a ray meets or passes the globe.
     fn under(&self, sight: &RayHit, drawn: &mut Drawn) -> Under<'_> {
         let point = self.view.point(sight);
         let latitude_deg = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
@@ -244,7 +248,7 @@ impl Warmth {
         {
             let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
             let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(0.02)) as f32;
-            // Clouds drown in the stratosphere's own light towards the limb.
+            // Towards the limb, the light of the stratosphere hides the clouds.
             let seen = (2.0 * cos * cos).min(1.0) as f32;
             cloud = clouds.at(&point, footprint_km, drawn).map(|(cover, bright)| (cover * seen, bright * self.disc));
         }
@@ -252,16 +256,16 @@ impl Warmth {
     }
 }
 
-/// What stands under a ray.
+/// Latitude and cloud under a ray.
 struct Under<'a> {
     warmth: &'a Warmth,
     latitude_deg: f64,
-    /// A cloud's weight and light.
+    /// Weight and light of a cloud; `None` under a clear sky.
     cloud: Option<(f32, f32)>,
 }
 
 impl Under<'_> {
-    /// Brightness of a ray whose tangent height is taken to be this.
+    /// Returns the brightness of a ray with this tangent height in metres.
     fn at(&self, height_m: f64) -> f32 {
         let clear = self.warmth.table.at(height_m * 1e-3, self.latitude_deg);
         let light = self.cloud.map_or(clear, |(weight, cloud)| clear + weight * (cloud - clear));
@@ -283,7 +287,7 @@ mod tests {
             let deep = july.curve(-1e3, lat);
             assert!((july.curve(july.half_level_at_km(lat), lat) / deep - 0.5).abs() < 1e-12);
         }
-        // 2021-07-15 and 2022-01-14.
+        // The two dates are 2021-07-15 and 2022-01-14.
         assert!(Infrared::season_deg(1_626_307_200.0) < 2.0);
         assert!((Infrared::season_deg(1_642_118_400.0) - 180.0).abs() < 2.0);
     }

@@ -1,34 +1,34 @@
 //! Scenes with exact truth for the horizon sensor.
 //!
-//! A [`Scene`] holds everything one picture depends on. From it follow the rendered [`Picture`] (through the same
-//! lens models as the sensor's own), the [`Truth`], and edge points on the limb without rendering.
+//! A [`Scene`] holds everything that one picture depends on. The rendered [`Picture`] and the [`Truth`] follow from it,
+//! and so do edge points on the limb without rendering. The picture uses the same lens models as the sensor.
 //!
-//! | module | idea |
+//! | module | content |
 //! |---|---|
-//! | [`scene`] | what is in front of the camera |
-//! | [`pose`] | where the camera is and where it looks |
-//! | [`globe`] | the body as an ellipsoid, and what a ray meets on it |
+//! | [`scene`] | the camera and the world in front of it |
+//! | [`pose`] | position and attitude of the camera |
+//! | [`globe`] | the body as an ellipsoid, and its intersection with a ray |
 //! | [`texture`] | clouds |
 //! | [`visible`] | the Earth in sunlight: ground, clouds, air, Sun, Moon |
 //! | [`infrared`] | the Earth at 15 µm |
-//! | [`radiance`] | a user's table for it |
+//! | [`radiance`] | a user's table of infrared radiances |
 //! | [`optics`] | fall-off and stray light |
 //! | [`motion`] | rotation during a picture |
 //! | [`foreground`] | structure of the vehicle in the picture |
 //! | [`artefact`] | pictures with flares, windows, panels or ground instead of a limb |
-//! | `height` | the limb's height by latitude |
-//! | `render` | light on every pixel |
+//! | `height` | height of the limb by latitude |
+//! | `render` | the light on every pixel |
 //! | [`detector`] | blur, noise, quantisation |
-//! | [`picture`] | the result, and its file |
-//! | [`limb`] | the limb as a line in the picture, edge points on it |
-//! | [`truth`] | what is true of a scene |
+//! | [`picture`] | the rendered picture, and its file |
+//! | [`limb`] | the limb as a line in the picture, and edge points on it |
+//! | [`truth`] | the truth about a scene |
 //! | [`scenario`] | a whole sequence in one description: scene.toml |
-//! | [`trajectory`] | rocket, orbit, table; attitude; inertial sensors and satellite receiver |
+//! | [`trajectory`] | rocket, orbit, table; attitude; inertial sensors and satellite navigation receiver |
 //! | [`utc`] | dates and seconds |
-//! | [`evaluate`] | answers beside their truth: how many, how good, how honest |
+//! | [`evaluate`] | answers compared with the truth: their number, accuracy and covariances |
 //! | [`sensitivity`] | covariances by design, without rendering |
-//! | [`painted`] | even discs, painted in no time |
-//! | [`flight`] | built-in sequences of scenes, with the sensor that took them |
+//! | [`painted`] | uniform discs that are painted very fast |
+//! | [`flight`] | built-in sequences of scenes, with the sensor that takes them |
 
 pub mod artefact;
 mod counter;

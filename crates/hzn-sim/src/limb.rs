@@ -1,4 +1,4 @@
-//! The limb as a line in the picture: where it is, which of it can be seen, and edge points on it without rendering.
+//! The limb as a line in the picture: its position, its visible segments, and edge points on it without rendering.
 
 use hzn_core::camera::Camera;
 use hzn_core::ellipsoid::LimbCone;
@@ -11,18 +11,18 @@ use crate::globe::{Globe, View};
 use crate::painter::Painter;
 use crate::scene::Scene;
 
-/// Errors of edge points along u and v, independent of each other, in pixels.
+/// Errors of edge points in pixels. Errors along u and along v are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum EdgeNoise {
-    /// Points exactly on the limb.
+    /// All points are exactly on the limb.
     #[default]
     None,
-    /// Every point has its own error.
+    /// All points have independent errors.
     White {
         /// Standard deviation along u and along v in pixels.
         sigma_px: f64,
     },
-    /// A Gauss-Markov process along each piece of limb: correlation exp(−arc/`correlation_px`).
+    /// Errors are a Gauss-Markov process along each segment of limb, with correlation exp(−arc/`correlation_px`).
     GaussMarkov {
         /// Variance along u and along v in px²; the R of the covariance model.
         variance_px2: f64,
@@ -32,8 +32,8 @@ pub enum EdgeNoise {
 }
 
 impl Scene {
-    /// Tangent heights above the ellipsoid, kilometres, of rays in the camera frame, as the camera stands at the middle
-    /// of the exposure; empty for a camera inside the body.
+    /// Returns the tangent heights above the ellipsoid in kilometres, for rays in the camera frame. The camera has its
+    /// pose at the middle of the exposure. For a camera inside the body the list is empty.
     pub fn tangent_heights_km(&self, rays: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
         let Some(view) = View::try_new(Globe::new(&self.body), &self.pose) else { return Vec::new() };
         rays.into_iter().map(|ray| view.tangent_height_m(&view.look(ray)) * 1e-3).collect()
@@ -43,19 +43,19 @@ impl Scene {
 /// A point of the visible limb.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimbPoint {
-    /// Where it is seen, with its error.
+    /// Measured position in the picture, with its error.
     pub point: ImagePoint<f64>,
-    /// Where it is.
+    /// Exact position in the picture.
     pub exact: ImagePoint<f64>,
-    /// Azimuth about the limb axis in radians, 0 = east of the position, π/2 = the direction axis × east.
+    /// Azimuth about the limb axis in radians: 0 is east of the position, π/2 is the direction axis × east.
     pub azimuth_rad: f64,
-    /// Which uninterrupted piece of limb, from 0.
+    /// Number of the uninterrupted segment of limb, from 0.
     pub piece: usize,
-    /// Arc length in pixels from the start of its piece.
+    /// Arc length in pixels from the start of the segment.
     pub arc_px: f64,
 }
 
-/// The exact limb of a scene, before a lens.
+/// The exact limb of a scene, without a lens.
 #[derive(Debug, Clone, Copy)]
 pub struct LimbCircle {
     axis: Vector3<f64>,
@@ -66,11 +66,11 @@ pub struct LimbCircle {
 }
 
 impl LimbCircle {
-    /// The limb of the scene's body, raised by its limb height. Where that depends on latitude this is the limb at
-    /// `body.limb_height_km`.
+    /// Returns the limb of the scene's body, raised by its limb height. If the limb height depends on latitude, this is
+    /// the limb at `body.limb_height_km`.
     ///
     /// # Errors
-    /// The position is not outside.
+    /// Fails if the camera is not outside the body and its limb height.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
         Self::at_height(scene, scene.body.limb_height_km * 1e3)
     }
@@ -83,25 +83,25 @@ impl LimbCircle {
         Ok(Self { axis, east, third: axis.cross(&east), cot2_east, cot2_meridian })
     }
 
-    /// Unit direction (ECEF) of the limb at an azimuth about its axis: 0 = east, π/2 = axis × east.
+    /// Returns the unit direction (ECEF) of the limb at an azimuth about its axis: 0 is east, π/2 is axis × east.
     pub fn ray_ecef(&self, azimuth_rad: f64) -> [f64; 3] {
         let (sin, cos) = libm::sincos(azimuth_rad);
-        // The cone's half-angle at this azimuth, exactly: cot² α = cot² α_E cos² φ + cot² α_M sin² φ.
+        // The half-angle α at this azimuth follows exactly from cot² α = cot² α_E cos² φ + cot² α_M sin² φ.
         let cot = (self.cot2_east * cos * cos + self.cot2_meridian * sin * sin).sqrt();
         (self.axis * cot + self.east * cos + self.third * sin).normalize().into()
     }
 
-    /// Azimuth in radians, −π to π, of a direction (ECEF) about the axis.
+    /// Returns the azimuth of a direction (ECEF) about the axis, in radians from −π to π.
     pub fn azimuth_rad(&self, direction_ecef: [f64; 3]) -> f64 {
         let d = Vector3::from(direction_ecef);
         libm::atan2(d.dot(&self.third), d.dot(&self.east))
     }
 }
 
-/// One piece of limb that is seen without interruption.
+/// An uninterrupted visible segment of the limb.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Piece {
-    /// (azimuth in radians, arc length from the piece's start in pixels), both rising.
+    /// (azimuth in radians, arc length from the start of the segment in pixels), both rising.
     stations: Vec<(f64, f64)>,
 }
 
@@ -109,7 +109,7 @@ impl Piece {
     pub(crate) fn length_px(&self) -> f64 {
         self.stations.last().map_or(0.0, |s| s.1)
     }
-    /// Azimuth at an arc length.
+    /// Returns the azimuth at an arc length.
     fn azimuth_at(&self, arc_px: f64) -> f64 {
         let i = self.stations.partition_point(|s| s.1 < arc_px).clamp(1, self.stations.len() - 1);
         let ((a0, s0), (a1, s1)) = (self.stations[i - 1], self.stations[i]);
@@ -131,12 +131,12 @@ impl<'a> Walk<'a> {
         Ok(Self { scene, camera, circle: LimbCircle::new(scene)?, painter: Painter::try_new(scene)? })
     }
 
-    /// The ray (ECEF, unit) of the limb at this azimuth.
+    /// Returns the ray (ECEF, unit) of the limb at an azimuth.
     fn ray(&self, azimuth_rad: f64) -> [f64; 3] {
         let mut ray = self.circle.ray_ecef(azimuth_rad);
         if !self.scene.limb_height_by_latitude_km.is_empty() {
-            // The tangent point moves by a few kilometres with the limb's height, and its height with that by metres:
-            // three rounds leave nothing.
+            // The limb height moves the tangent point by a few kilometres, and this changes the limb height by metres.
+            // Three rounds converge.
             for _ in 0..3 {
                 let Ok(circle) = LimbCircle::at_height(self.scene, self.painter.limb_height_m(ray)) else { break };
                 ray = circle.ray_ecef(azimuth_rad);
@@ -145,12 +145,13 @@ impl<'a> Walk<'a> {
         ray
     }
 
-    /// Where the limb at this azimuth is in the plane of the picture, if the lens reaches there.
+    /// Returns the position of the limb at an azimuth in the plane of the picture; `None` if the lens does not reach
+    /// there.
     fn project(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
         self.camera.project(&self.painter.to_camera(self.ray(azimuth_rad))?)
     }
 
-    /// Whether it is in the picture, lit, and not behind the vehicle.
+    /// Returns true if the point is in the picture, lit, and not behind the vehicle.
     fn is_seen(&self, azimuth_rad: f64, p: ImagePoint<f64>) -> bool {
         let (w, h) = (f64::from(self.camera.width()), f64::from(self.camera.height()));
         let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
@@ -163,16 +164,16 @@ impl<'a> Walk<'a> {
         self.project(azimuth_rad).filter(|p| self.is_seen(azimuth_rad, *p))
     }
 
-    /// The visible pieces, ends located to better than a hundredth of a pixel. What is shorter than the step in azimuth
-    /// (a turn over four times width plus height) may be missed.
+    /// Returns the visible segments, with their ends located to better than a hundredth of a pixel. A segment shorter
+    /// than the step in azimuth, 2π/(4·(width + height)), may be missed.
     pub(crate) fn pieces(&self) -> Vec<Piece> {
-        // About two steps a pixel where the limb is a circle around the optical axis; the arc length is summed over
-        // chords, so longer steps elsewhere do no harm.
+        // A limb that is a circle around the optical axis gets about two steps per pixel. Elsewhere the steps may be
+        // longer, because the arc length is summed over chords.
         let steps = 4 * (usize::from(self.camera.width()) + usize::from(self.camera.height()));
         let at = |i: usize| core::f64::consts::TAU * i as f64 / steps as f64;
         let seen: Vec<Option<ImagePoint<f64>>> = (0..steps).map(|i| self.seen(at(i))).collect();
-        // Begin where nothing is seen, so that no piece is cut at azimuth zero; a limb seen all around has no such
-        // place and is one piece of a whole turn.
+        // The loop starts at an invisible azimuth, so that it cuts no segment at azimuth zero. A limb without an
+        // invisible azimuth is one segment of a full turn.
         let Some(start) = seen.iter().position(Option::is_none) else {
             return vec![self.piece((0..=steps).map(at).collect())];
         };
@@ -193,7 +194,7 @@ impl<'a> Walk<'a> {
         pieces
     }
 
-    /// The last azimuth that is seen between one that is and one that is not.
+    /// Returns the last visible azimuth between a visible and an invisible one.
     fn end(&self, mut seen: f64, mut unseen: f64) -> f64 {
         for _ in 0..24 {
             let mid = 0.5 * (seen + unseen);
@@ -216,11 +217,11 @@ impl<'a> Walk<'a> {
 }
 
 impl Scene {
-    /// `count` points evenly spaced along the visible limb: in the picture, lit, not behind the vehicle. Fewer come
-    /// back only when none is visible. The scene's seed chooses the errors.
+    /// Returns `count` points evenly spaced along the visible limb: in the picture, lit, not behind the vehicle. If no
+    /// limb is visible, the list is empty. The scene's seed determines the errors.
     ///
     /// # Errors
-    /// A camera, position or light that cannot be.
+    /// Fails if the camera, the position or the light is invalid.
     pub fn limb_points(&self, count: usize, noise: EdgeNoise) -> Result<Vec<LimbPoint>, SceneError> {
         let walk = Walk::try_new(self)?;
         let pieces = walk.pieces();
@@ -234,7 +235,7 @@ impl Scene {
         let mut before = 0.0;
         let mut number = 0;
         for (index, piece) in pieces.iter().enumerate() {
-            // Points stand in the middle of `count` equal shares of the whole length.
+            // The points are in the middle of `count` equal parts of the whole length.
             while number < count && (number as f64 + 0.5) * spacing <= before + piece.length_px() {
                 let arc_px = (number as f64 + 0.5) * spacing - before;
                 let azimuth_rad = piece.azimuth_at(arc_px);
@@ -250,10 +251,10 @@ impl Scene {
         Ok(points)
     }
 
-    /// Length in pixels of the limb that is in the picture, lit, and not behind the vehicle.
+    /// Returns the length in pixels of the limb that is in the picture, lit, and not behind the vehicle.
     ///
     /// # Errors
-    /// A camera, position or light that cannot be.
+    /// Fails if the camera, the position or the light is invalid.
     pub fn visible_limb_px(&self) -> Result<f64, SceneError> {
         Ok(Walk::try_new(self)?.pieces().iter().map(Piece::length_px).sum())
     }
@@ -265,7 +266,7 @@ struct Errors {
     u: Counter,
     v: Counter,
     index: u64,
-    /// Piece, arc length and error of the point before.
+    /// Segment, arc length and error of the point before.
     last: Option<(usize, f64, [f64; 2])>,
 }
 

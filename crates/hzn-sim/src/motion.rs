@@ -4,21 +4,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::pose::Pose;
 
-/// How the camera turns during one picture, whose pose is that at the middle of the middle row's exposure.
+/// Rotation of the camera during one picture. The pose of the picture is the pose at the middle of the middle row's
+/// exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// Rate of the camera against ECEF in its own axes, rad/s.
+    /// Rate of the camera relative to ECEF, in the camera frame, rad/s.
     pub rate_radps: [f64; 3],
-    /// How long a row is exposed, seconds.
+    /// Exposure time of a row, seconds.
     pub exposure_s: f64,
-    /// From the first row's exposure to the last one's, seconds; 0 is a global shutter.
+    /// Time from the first row's exposure to the last row's exposure, seconds; 0 is a global shutter.
     pub readout_s: f64,
 }
 
-/// Pixels between two of the poses that make up a blurred picture.
+/// Distance in pixels between two of the poses that a blurred picture is averaged over.
 const STEP_PX: f64 = 1.2;
-/// And how many there are at most.
+/// Largest number of these poses.
 const MOST: usize = 48;
 
 impl Motion {
@@ -26,18 +27,18 @@ impl Motion {
         self.rate_radps.iter().map(|x| x * x).sum::<f64>().sqrt()
     }
 
-    /// Whether anything moves by more than a fiftieth of a pixel.
+    /// Returns true if the rotation during the picture is more than 0.02 px.
     pub(crate) fn matters(&self, pixel_rad: f64) -> bool {
         self.rate() * (self.exposure_s.abs() + self.readout_s.abs()) > 0.02 * pixel_rad
     }
 
-    /// Seconds after the picture's own time of the middle of a row's exposure.
+    /// Returns the time of the middle of a row's exposure, in seconds after the time of the picture.
     pub(crate) fn row_s(&self, row: f64, rows: usize) -> f64 {
         let last = rows.saturating_sub(1).max(1) as f64;
         self.readout_s * (row / last - 0.5)
     }
 
-    /// The poses that a row's light comes from, all of the same weight.
+    /// Returns the poses that the light of a row comes from. All have the same weight.
     pub(crate) fn poses(&self, pose: &Pose, row: f64, rows: usize, pixel_rad: f64) -> Vec<Pose> {
         let blur_px = self.rate() * self.exposure_s / pixel_rad;
         let count = ((blur_px / STEP_PX).ceil() as usize).clamp(1, MOST);
@@ -61,7 +62,7 @@ mod tests {
         let pose = Pose { position_m: [7e6, 0.0, 0.0], cam_to_ecef_wxyz: [1.0, 0.0, 0.0, 0.0] };
         let about_z = |p: &Pose| 2.0 * libm::asin(p.cam_to_ecef_wxyz[3]);
         let top = motion.poses(&pose, 0.0, 101, 1e-3);
-        // 20 mrad at 1 mrad a pixel.
+        // The blur is 20 mrad at 1 mrad per pixel.
         assert_eq!(top.len(), 17);
         let mean = top.iter().map(about_z).sum::<f64>() / 17.0;
         assert!((mean + 0.1).abs() < 1e-9, "{mean}");

@@ -1,6 +1,7 @@
-//! An even disc in an even sky, straight from its cone: no world, no noise, thousands a minute.
+//! A uniform disc in a uniform sky, computed directly from its cone: no world, no noise, thousands of pictures a
+//! minute.
 //!
-//! For campaigns about the search alone: what such a picture is refused for is nobody's fault but the sensor's.
+//! These pictures are for campaigns about the search alone. If one is refused, only the sensor can be the reason.
 
 use hzn_core::camera::{self, Camera};
 use hzn_core::frames::UnitVec3;
@@ -15,12 +16,12 @@ pub struct Canvas {
     rays: Vec<Option<[f64; 3]>>,
 }
 
-/// A disc.
+/// A uniform disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Even {
-    /// Direction of its centre in the camera, unit length.
+    /// Direction of its centre in the camera frame, unit length.
     pub axis: [f64; 3],
-    /// Half-angle, radians.
+    /// Half-angle of the disc, radians.
     pub half_angle_rad: f64,
     /// Brightness of the disc, counts.
     pub lit: f64,
@@ -31,7 +32,7 @@ pub struct Even {
 }
 
 impl Canvas {
-    /// Works out the rays.
+    /// Computes the rays.
     pub fn new(camera: Camera<f64>) -> Self {
         let (w, h) = (camera.width(), camera.height());
         let place = |i: u32| ImagePoint { u: f64::from(i % u32::from(w)), v: f64::from(i / u32::from(w)) };
@@ -39,12 +40,12 @@ impl Canvas {
         Self { camera, rays }
     }
 
-    /// The lens.
+    /// Returns the lens.
     pub fn camera(&self) -> &Camera<f64> {
         &self.camera
     }
 
-    /// The picture of a disc, 8 bits, row by row; what the lens does not see is sky.
+    /// Paints the picture of a disc, 8 bits, row by row. Pixels that the lens does not see are sky.
     pub fn paint(&self, disc: &Even) -> Vec<u8> {
         let width = usize::from(self.camera.width());
         let cos = disc.half_angle_rad.cos();
@@ -55,7 +56,7 @@ impl Canvas {
         (0..self.rays.len())
             .map(|i| {
                 let part = along(i).map_or(0.0, |here| {
-                    // How the cosine changes from pixel to pixel, so that the edge is measured in pixels.
+                    // The change of the cosine from pixel to pixel gives the edge width in pixels.
                     let change = |step: usize| {
                         let (before, after) = (i.checked_sub(step).and_then(along), along(i + step));
                         match (before, after) {
@@ -73,8 +74,8 @@ impl Canvas {
             .collect()
     }
 
-    /// The part of the disc's outline in the picture and in the lens's view, 0 to 1, `margin_px` from their ends: of
-    /// 360 places.
+    /// Returns the share of the disc's outline that is in the picture and in the lens's view, 0 to 1. The share is
+    /// counted at 360 points, `margin_px` inside the borders.
     pub fn outline_in_view(&self, disc: &Even, margin_px: f64) -> f64 {
         let Some(axis) = UnitVec3::<hzn_core::frames::Cam, f64>::try_new(disc.axis) else { return 0.0 };
         let e = nalgebra::Vector3::from(axis.xyz());
@@ -95,19 +96,19 @@ impl Canvas {
     }
 }
 
-/// A lens with an image circle, and discs under it, each as from an altitude above the Earth.
+/// A lens with an image circle, and discs in its view. Each disc is the Earth from some altitude.
 #[derive(Debug, Clone)]
 pub struct UnderCircle {
-    /// The lens, equidistant to 60 to 90 degrees.
+    /// The lens: equidistant, with an image circle at 60 to 90 degrees.
     pub lens: camera::Config,
-    /// The same with its rays.
+    /// The same lens with its rays.
     pub canvas: Canvas,
-    /// Discs of which half of the outline or more is in view, with the altitude in kilometres.
+    /// Discs with at least half of the outline in view, each with its altitude in kilometres.
     pub discs: Vec<(Even, f64)>,
 }
 
 impl UnderCircle {
-    /// Circle number `number` with `count` discs. The same numbers give the same discs.
+    /// Makes circle number `number` with `count` discs. The same numbers give the same discs.
     ///
     /// # Panics
     /// Never: the lenses are valid.
@@ -124,7 +125,7 @@ impl UnderCircle {
         let discs = (0..)
             .map(|n| {
                 let of = |k: u64| draw(1 + 8 * n + k);
-                // 1500 to 19 000 km.
+                // The altitude is 1500 km to 19 000 km.
                 let altitude_km = 1500.0 * 10f64.powf(1.1 * of(0));
                 let half_angle_rad = (EARTH_KM / (EARTH_KM + altitude_km)).asin();
                 let (turn, off) = (core::f64::consts::TAU * of(1), of(2) * (theta_max_rad - 0.3 * half_angle_rad));
@@ -139,9 +140,10 @@ impl UnderCircle {
     }
 }
 
-/// Mean radius of the Earth.
+/// Mean radius of the Earth, kilometres.
 const EARTH_KM: f64 = 6371.0;
-/// What is nearer to the image circle than this counts as out of view: the sensor leaves three pixels out.
+/// Distance from the image circle in pixels within which an outline counts as out of view; the sensor leaves out three
+/// pixels.
 const RIM_PX: f64 = 4.0;
 
 #[cfg(test)]
@@ -155,7 +157,7 @@ mod tests {
         let canvas = Canvas::new(Camera::try_new(&config).unwrap());
         let disc = Even { axis: [0.0, 0.0, 1.0], half_angle_rad: 0.4, lit: 200.0, dark: 0.0, edge_px: 1.0 };
         let picture = canvas.paint(&disc);
-        // 40 px of radius: its area, and the same on both sides of the centre.
+        // The radius is 40 px. The area must fit, and both sides of the centre must be the same.
         let area = picture.iter().map(|&p| f64::from(p)).sum::<f64>() / 200.0;
         assert!((area - std::f64::consts::PI * 1600.0).abs() < 5.0, "{area}");
         assert!((0..80).all(|y| (0..200).all(|x| picture[y * 200 + x].abs_diff(picture[(159 - y) * 200 + x]) <= 1)));

@@ -1,7 +1,7 @@
-//! The plain world: a body with clouds and a bright band, lit or not, before a sky with stars.
+//! The plain world: a body with clouds and a bright band, lit or not, in front of a sky with stars.
 //!
-//! One ray is followed a pixel. Where the limb passes through the pixel or close by, brightness is averaged
-//! over the pixel with the tangent height taken as linear across it; a sharp limb's share of the pixel is exact.
+//! Each pixel follows one ray. If the limb passes through the pixel or close to it, the brightness is averaged over the
+//! pixel, with a linear tangent height across it. For a sharp limb the body's share of the pixel is exact.
 
 mod edge;
 mod lamp;
@@ -24,30 +24,30 @@ use crate::visible::air::Prepared;
 use edge::Edge;
 use lamp::Lamp;
 
-/// Pixels this close to the limb are averaged.
+/// Distance from the limb in pixels within which pixels are averaged.
 const NEAR_PX: f64 = 3.0;
-/// Every how many pixels of a row a ray is asked of the lens, away from the limb.
+/// Step in pixels along a row between the rays that the lens computes, away from the limb.
 const STRIDE: usize = 8;
 
-/// A scene, prepared for asking pixel by pixel.
+/// A scene, prepared for rendering pixel by pixel.
 #[derive(Debug, Clone)]
 pub(crate) struct Painter {
-    /// The lens, beyond its image circle too where it can be.
+    /// The lens, also beyond its image circle if possible.
     camera: Camera<f64>,
     globe: Globe,
     view: View,
     edge: Edge,
     lamp: Lamp,
-    /// The air of a visible world, whose limb goes on to shine beyond the terminator.
+    /// The air of a visible world. Its limb still shines beyond the terminator.
     air: Option<Prepared>,
     surface: f32,
     clouds: Option<CloudField>,
     band: Option<Band>,
     sky: f32,
-    /// Larger of the two angles a pixel in the middle covers, radians.
+    /// Larger of the two angles that a pixel in the middle covers, radians.
     pixel_rad: f64,
     height: LimbHeight,
-    /// [`RayHit::miss`] of pixels that may have the limb within [`NEAR_PX`].
+    /// Largest absolute [`RayHit::miss`] of pixels that may have the limb within [`NEAR_PX`].
     near: f64,
     radius_km: f32,
 }
@@ -62,13 +62,13 @@ impl Painter {
         let pixel_rad = 1.0 / fx.min(fy);
         let reach_px = match scene.profile {
             Profile::Sharp => NEAR_PX,
-            // Steep profiles have all their light within a few pixels, and all of them need averaging.
+            // A steep profile has all its light within a few pixels, and all of them need averaging.
             Profile::Exponential { .. } => 2.0 * NEAR_PX,
         };
         Ok(Self {
-            // Off the axis a pixel can cover more than in the middle.
+            // Off the axis a pixel can cover a larger angle than in the middle.
             near: 2.0 * reach_px * pixel_rad * view.miss_per_rad()
-                // To first order: twice the height in units of the radius.
+                // To first order, the miss is twice the height in units of the radius.
                 + 2.2 * height.largest_departure_m() / globe.b_m,
             edge: Edge::new(scene.profile),
             lamp: Lamp::try_new(scene, globe)?,
@@ -89,18 +89,18 @@ impl Painter {
         })
     }
 
-    /// A direction given in ECEF (unit) as the camera sees it.
+    /// Converts a unit direction from ECEF to the camera frame.
     pub(crate) fn to_camera(&self, ecef: [f64; 3]) -> Option<UnitVec3<Cam, f64>> {
         self.view.to_camera(ecef.into())
     }
 
-    /// Height of the limb in metres at the latitude where this ray (ECEF, unit) meets or passes the body.
+    /// Returns the limb height in metres at the latitude where this ray (ECEF, unit) meets or passes the body.
     pub(crate) fn limb_height_m(&self, ecef: [f64; 3]) -> f64 {
         let lat = |cam: UnitVec3<Cam, f64>| self.latitude_rad(&self.view.look(cam.xyz()));
         self.height.at_m(self.to_camera(ecef).map_or(0.0, lat))
     }
 
-    /// How much light falls where this ray (ECEF, unit) meets or passes the body, 0 to 1.
+    /// Returns the share of light that falls where this ray (ECEF, unit) meets or passes the body, 0 to 1.
     pub(crate) fn lit(&self, ecef: [f64; 3]) -> f32 {
         self.to_camera(ecef).map_or(0.0, |cam| {
             let sight = self.view.look(cam.xyz());
@@ -115,16 +115,16 @@ impl Painter {
         })
     }
 
-    /// The same from another attitude.
+    /// Returns the same scene from another pose.
     pub(crate) fn turned(&self, pose: &Pose) -> Self {
         let view = View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone());
         Self { view, ..self.clone() }
     }
 
-    /// One row of pixels.
+    /// Renders one row of pixels.
     ///
-    /// Away from the limb a ray interpolated between every [`STRIDE`]th one is good to a hundredth of a pixel, which
-    /// no cloud shows; close to it every pixel gets its own.
+    /// Away from the limb, rays are interpolated between every [`STRIDE`]th one. They are accurate to a hundredth of a
+    /// pixel, which is enough for clouds. Close to the limb every pixel has an exact ray.
     pub(crate) fn row(&self, v: f64, row: &mut [f32]) {
         let ray = |x: usize| self.camera.ray(ImagePoint { u: x as f64, v }).map(|r| Vector3::from(r.direction().xyz()));
         let mut next = ray(0);
@@ -144,7 +144,7 @@ impl Painter {
         }
     }
 
-    /// A pixel whose ray is about `s`.
+    /// Renders a pixel whose ray is approximately `s`.
     #[inline(always)]
     fn roughly(&self, s: [f64; 3], x: usize, v: f64, drawn: &mut Drawn) -> f32 {
         let sight = self.view.look(s);
@@ -155,16 +155,16 @@ impl Painter {
         self.blend(cover, &sight, drawn)
     }
 
-    /// A pixel with its own ray, averaged over its area.
+    /// Renders a pixel with its exact ray, averaged over the pixel's area.
     fn exactly(&self, x: usize, v: f64, drawn: &mut Drawn) -> f32 {
-        // Where the lens sees nothing is sky, so that no dark rim is blurred inward.
+        // Pixels that the lens does not see are sky, so that no dark rim is blurred inward.
         let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { return self.sky };
         let sight = self.view.look(ray.direction().xyz());
         let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
         self.blend(self.edge.mean(self.above_limb_m(&sight), gradient), &sight, drawn)
     }
 
-    /// Tangent height of a ray above the limb height at its latitude, metres.
+    /// Returns the tangent height of a ray above the limb height at its latitude, metres.
     #[inline(always)]
     fn above_limb_m(&self, sight: &RayHit) -> f64 {
         let above_reference = self.view.tangent_height_m(sight);
@@ -174,12 +174,12 @@ impl Painter {
         above_reference + self.height.reference_m - self.height.at_m(self.latitude_rad(sight))
     }
 
-    /// Geodetic latitude of the point that a ray meets or passes, radians.
+    /// Returns the geodetic latitude of the point that a ray meets or passes, radians.
     fn latitude_rad(&self, sight: &RayHit) -> f64 {
         libm::asin(self.view.normal(&self.view.point(sight)).z.clamp(-1.0, 1.0))
     }
 
-    /// Sky and body, the body with weight `cover`.
+    /// Blends sky and body; the body has the weight `cover`.
     #[inline(always)]
     fn blend(&self, cover: f32, sight: &RayHit, drawn: &mut Drawn) -> f32 {
         if cover <= 1e-4 {
@@ -188,7 +188,7 @@ impl Painter {
         self.sky + cover * (self.body(sight, drawn) - self.sky)
     }
 
-    /// Brightness of the body where the ray meets or passes it.
+    /// Returns the brightness of the body where the ray meets or passes it.
     fn body(&self, sight: &RayHit, drawn: &mut Drawn) -> f32 {
         let point = self.view.point(sight);
         let lit = self.lamp.at(&self.view, sight, &point);
@@ -212,7 +212,7 @@ impl Painter {
         self.sky + lit * (bright - self.sky)
     }
 
-    /// Adds the stars that are neither behind the body nor outside the picture, each spread over four pixels.
+    /// Adds the stars that are in the picture and not behind the body, each spread over four pixels.
     pub(crate) fn draw_stars(&self, sky: &Sky, width: usize, data: &mut [f32]) {
         let draws = Counter::new(sky.seed, Stream::Stars);
         for i in 0..u64::from(sky.stars) {
@@ -223,7 +223,7 @@ impl Painter {
             let Some(cam) = self.view.to_camera(Vector3::new(r * cos, r * sin, z)) else { continue };
             let Some(p) = self.camera.project(&cam) else { continue };
             let seen = 1.0 - self.edge.at(self.above_limb_m(&self.view.look(cam.xyz())));
-            // Evenly distributed in magnitude over five magnitudes.
+            // The stars are evenly distributed over five magnitudes.
             let light = sky.star_brightness as f32 * libm::exp(-4.6 * c) as f32 * seen;
             let (x, y) = (p.u.floor(), p.v.floor());
             let (fx, fy) = ((p.u - x) as f32, (p.v - y) as f32);

@@ -10,9 +10,9 @@ use hzn_core::image::{Channel, ImageView, Layout};
 /// Samples of a picture, row by row without padding.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Samples {
-    /// One byte a pixel.
+    /// One byte per sample.
     Bytes(Vec<u8>),
-    /// One 16-bit word a pixel; the value is not shifted up, so that 12 bits reach 4095.
+    /// One 16-bit word per sample. The value is not shifted up, so 12 bits reach 4095.
     Words(Vec<u16>),
 }
 
@@ -21,34 +21,35 @@ pub enum Samples {
 pub struct Picture {
     pub(crate) width: u16,
     pub(crate) height: u16,
-    /// Samples a pixel: 1, or 3 for red, green, blue.
+    /// Samples per pixel: 1, or 3 for red, green, blue.
     pub(crate) channels: u8,
     pub(crate) bits: u8,
     pub(crate) samples: Samples,
 }
 
 impl Picture {
-    /// Columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> u16 {
         self.width
     }
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> u16 {
         self.height
     }
-    /// Samples a pixel: 1 is grey, 3 is red, green, blue.
+    /// Returns the samples per pixel: 1 is grey, 3 is red, green, blue.
     pub fn channels(&self) -> u8 {
         self.channels
     }
-    /// Significant bits of a sample, 8 to 16.
+    /// Returns the significant bits of a sample, 8 to 16.
     pub fn bits(&self) -> u8 {
         self.bits
     }
-    /// The samples.
+    /// Returns the samples.
     pub fn samples(&self) -> &Samples {
         &self.samples
     }
-    /// Value at column `x`, row `y`, of colours the mean; 0 outside the picture.
+    /// Returns the value at column `x`, row `y`; in a colour picture the mean of the colours. Outside the picture it is
+    /// 0.
     pub fn at(&self, x: u16, y: u16) -> u16 {
         if x >= self.width || y >= self.height {
             return 0;
@@ -62,7 +63,7 @@ impl Picture {
         (sum / u32::from(self.channels)) as u16
     }
 
-    /// The picture as hzn-core reads it.
+    /// Returns the picture in the form that hzn-core reads.
     pub fn view(&self) -> ImageView<'_> {
         let layout = Layout::packed(self.width.into(), self.height.into(), self.channels, self.bits);
         match &self.samples {
@@ -72,11 +73,11 @@ impl Picture {
         .expect("a rendered picture is as large as it says")
     }
 
-    /// Writes the picture: 8 bits as 8, more as 16, over which samples of 10 and 12 bits are spread, as readers know of
-    /// no other full scale. The format follows the ending of the name.
+    /// Writes the picture; the ending of the name sets the format. A picture with 8 bits is written with 8 bits, others
+    /// with 16. Samples of 10 and 12 bits are spread over 16 bits, because readers know no other full scale.
     ///
     /// # Errors
-    /// The file cannot be written, or its ending is not that of a format with this many bits.
+    /// Fails if the file cannot be written, or if the format of the ending does not have this many bits.
     pub fn save(&self, path: &Path) -> Result<(), image::ImageError> {
         let (w, h) = (self.width.into(), self.height.into());
         let grey = self.channels == 1;
@@ -86,7 +87,7 @@ impl Picture {
                 image::save_buffer(path, data, w, h, colour)
             }
             Samples::Words(data) => {
-                // The upper bits come again below, so that full scale stays full scale.
+                // The upper bits are repeated below, so full scale stays full scale.
                 let spread =
                     |v: u16| ((u32::from(v) << (16 - self.bits)) | (u32::from(v) >> (2 * self.bits - 16))) as u16;
                 let bytes: Vec<u8> = data.iter().flat_map(|&v| spread(v).to_ne_bytes()).collect();
@@ -96,10 +97,10 @@ impl Picture {
         }
     }
 
-    /// The picture as a JPEG file of this quality, 1 to 100. More than 8 bits are cut to 8.
+    /// Encodes the picture as a JPEG file of this quality, 1 to 100. Samples with more than 8 bits are cut to 8.
     ///
     /// # Errors
-    /// The encoder refuses it.
+    /// Fails if the encoder refuses the picture.
     pub fn jpeg(&self, quality: u8) -> Result<Vec<u8>, image::ImageError> {
         let mut file = Vec::new();
         let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, quality.clamp(1, 100));
@@ -112,10 +113,10 @@ impl Picture {
         Ok(file)
     }
 
-    /// The picture as it comes back from such a file.
+    /// Returns the picture as it is read back from a JPEG file of this quality.
     ///
     /// # Errors
-    /// As [`Picture::jpeg`].
+    /// Fails like [`Picture::jpeg`].
     pub fn through_jpeg(&self, quality: u8) -> Result<Self, image::ImageError> {
         let read = image::load_from_memory_with_format(&self.jpeg(quality)?, image::ImageFormat::Jpeg)?;
         let data = if self.channels == 1 { read.into_luma8().into_raw() } else { read.into_rgb8().into_raw() };

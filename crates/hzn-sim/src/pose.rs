@@ -1,4 +1,4 @@
-//! Where the camera is and where it looks.
+//! Position and attitude of the camera.
 
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic, geodetic};
 use hzn_core::frames::{Cam, Ecef, Rotation};
@@ -9,37 +9,39 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
-    /// Position in metres: ECEF for the Earth, else in the body's own frame with the origin at its centre.
+    /// Position in metres: in ECEF for the Earth, otherwise in the body's own frame with the origin at its centre.
     pub position_m: [f64; 3],
-    /// Quaternion, scalar first, that takes camera coordinates to ECEF coordinates.
+    /// Quaternion, scalar first, that converts camera coordinates to ECEF coordinates.
     pub cam_to_ecef_wxyz: [f64; 4],
 }
 
-/// Where a camera looks, said with respect to the geodetic vertical of its position.
+/// Direction in which a camera looks, relative to the geodetic vertical at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Look {
-    /// Direction of the optical axis over ground in radians, 0 = north, π/2 = east.
+    /// Azimuth of the optical axis in radians: 0 is north, π/2 is east.
     pub azimuth_rad: f64,
     /// Angle of the optical axis below the local horizontal in radians; π/2 looks straight down.
     pub depression_rad: f64,
-    /// Turn about the optical axis in radians; 0 has the picture's x axis horizontal and the ground below, a positive
-    /// value turns the camera clockwise as seen from behind it, so that the scene turns anticlockwise in the picture.
+    /// Turn about the optical axis in radians. At 0 the picture's x axis is horizontal and the ground is below. A
+    /// positive value turns the camera clockwise as seen from behind it, so the scene turns anticlockwise in the
+    /// picture.
     pub roll_rad: f64,
 }
 
 impl Look {
-    /// A camera that looks `off_nadir_rad` away from straight down: 0 is down, π/2 level.
+    /// Returns the look of a camera whose axis is `off_nadir_rad` away from straight down: 0 is down, π/2 is level.
     pub fn off_nadir(off_nadir_rad: f64, azimuth_rad: f64, roll_rad: f64) -> Self {
         Self { azimuth_rad, depression_rad: core::f64::consts::FRAC_PI_2 - off_nadir_rad, roll_rad }
     }
 }
 
-/// ECEF position in metres above WGS-84, from latitude, longitude (degrees) and altitude (kilometres).
+/// Returns the ECEF position in metres from geodetic latitude and longitude (degrees) and altitude above WGS-84
+/// (kilometres).
 pub fn position_m(lat_deg: f64, lon_deg: f64, altitude_km: f64) -> [f64; 3] {
     from_geodetic(lat_deg.to_radians(), lon_deg.to_radians(), altitude_km * 1e3, WGS84_A_M, WGS84_B_M)
 }
 
-/// Unit vectors east, north and up (geodetic) at a position in ECEF metres.
+/// Returns the unit vectors east, north and up (geodetic) in ECEF, for a position in ECEF metres.
 fn east_north_up([x, y, z]: [f64; 3]) -> [Vector3<f64>; 3] {
     let (_, lat) = geodetic([x, y, z], WGS84_A_M, WGS84_B_M);
     let (sl, cl) = libm::sincos(lat);
@@ -48,22 +50,22 @@ fn east_north_up([x, y, z]: [f64; 3]) -> [Vector3<f64>; 3] {
 }
 
 impl Pose {
-    /// A camera at `position_m` (ECEF) that looks as told.
+    /// Returns the pose of a camera at `position_m` (ECEF) that looks along `look`.
     pub fn looking(position_m: [f64; 3], look: Look) -> Self {
         let [east, north, up] = east_north_up(position_m);
         let (sa, ca) = libm::sincos(look.azimuth_rad);
         let (sd, cd) = libm::sincos(look.depression_rad);
         let (sr, cr) = libm::sincos(look.roll_rad);
         let forward = (east * sa + north * ca) * cd - up * sd;
-        // Horizontal by construction, also where the camera looks straight up or down.
+        // It is horizontal by construction, also if the camera looks straight up or down.
         let right = east * ca - north * sa;
         let down = forward.cross(&right);
         let axes = [right * cr + down * sr, down * cr - right * sr, forward];
         Self::from_axes(position_m, axes.map(Into::into))
     }
 
-    /// A camera at `position_m` whose own axes x, y, z point along these three directions of ECEF. They must be
-    /// orthogonal, right-handed and of unit length.
+    /// Returns the pose of a camera at `position_m` whose axes x, y, z point along these three ECEF directions. The
+    /// directions must be orthogonal, right-handed and of unit length.
     pub fn from_axes(position_m: [f64; 3], axes_ecef: [[f64; 3]; 3]) -> Self {
         let columns = axes_ecef.map(Vector3::from);
         let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&columns));
@@ -71,14 +73,14 @@ impl Pose {
         Self { position_m, cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k] }
     }
 
-    /// The attitude as a typed rotation; `None` when the quaternion has no length or is not finite.
+    /// Returns the attitude as a typed rotation; `None` if the quaternion has no length or is not finite.
     pub fn cam_to_ecef(&self) -> Option<Rotation<Cam, Ecef, f64>> {
-        // The field's name states the direction: camera to ECEF.
+        // The name of the field states the direction: camera to ECEF.
         Rotation::assume_from_quaternion(self.cam_to_ecef_wxyz)
     }
 
-    /// Rotated about the camera's own axes by the rotation vector `error_rad` (camera frame, radians): the attitude
-    /// that a navigation system with this error would report.
+    /// Returns the pose rotated about the camera's own axes by the rotation vector `error_rad` (camera frame, radians).
+    /// A navigation system with this error would report the returned attitude.
     pub fn disturbed(&self, error_rad: [f64; 3]) -> Self {
         let [w, x, y, z] = self.cam_to_ecef_wxyz;
         let q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
@@ -86,13 +88,13 @@ impl Pose {
         Self { cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k], ..*self }
     }
 
-    /// The quaternion at unit length, scalar first.
+    /// Returns the quaternion at unit length, scalar first.
     pub(crate) fn unit_quaternion_wxyz(&self) -> [f64; 4] {
         let n = self.cam_to_ecef_wxyz.iter().map(|x| x * x).sum::<f64>().sqrt();
         self.cam_to_ecef_wxyz.map(|x| x / n)
     }
 
-    /// Matrix that takes camera coordinates to ECEF coordinates.
+    /// Returns the matrix that converts camera coordinates to ECEF coordinates.
     pub(crate) fn matrix(&self) -> Matrix3<f64> {
         let [w, x, y, z] = self.cam_to_ecef_wxyz;
         *UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z)).to_rotation_matrix().matrix()
@@ -112,7 +114,7 @@ mod tests {
     fn level_camera_to_the_east_at_the_equator() {
         let p = position_m(0.0, 0.0, 100.0);
         let pose = Pose::looking(p, Look { azimuth_rad: core::f64::consts::FRAC_PI_2, ..Look::default() });
-        // At (0°, 0°): east is y, north is z, up is x.
+        // At (0°, 0°), east is y, north is z and up is x.
         assert!((axis(&pose, [0.0, 0.0, 1.0]) - Vector3::y()).norm() < 1e-12);
         assert!((axis(&pose, [1.0, 0.0, 0.0]) + Vector3::z()).norm() < 1e-12);
         assert!((axis(&pose, [0.0, 1.0, 0.0]) + Vector3::x()).norm() < 1e-12);
@@ -127,7 +129,7 @@ mod tests {
         assert!((axis(&pose, [0.0, 0.0, 1.0]).dot(&up) + libm::sin(0.35)).abs() < 1e-12);
         let same = Look::off_nadir(core::f64::consts::FRAC_PI_2 - 0.35, 1.0, 2.0);
         assert!((same.depression_rad - look.depression_rad).abs() < 1e-15);
-        // Straight down is no special case.
+        // Straight down needs no special case.
         let down = Pose::looking(p, Look::off_nadir(0.0, 0.3, 0.0));
         assert!((axis(&down, [0.0, 0.0, 1.0]) + up).norm() < 1e-12);
         assert!(

@@ -2,16 +2,16 @@
 
 use serde::Deserialize;
 
-/// Values at heights and latitudes; between them linear, beyond them constant.
+/// Values at heights and latitudes. They are linear between the entries and constant beyond them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Grid {
     heights_km: Vec<f64>,
     latitudes_deg: Vec<f64>,
-    /// Latitude by latitude.
+    /// Values of one latitude after the other.
     values: Vec<f32>,
 }
 
-/// A place between the entries of a rising list: the entry before, and how far it is to the next, 0 to 1.
+/// Returns the entry before a value in a rising list, and the position between this entry and the next one, 0 to 1.
 fn place(list: &[f64], x: f64) -> (usize, f32) {
     let i = list.partition_point(|v| *v <= x).clamp(1, list.len().max(2) - 1) - 1;
     match (list.get(i), list.get(i + 1)) {
@@ -21,13 +21,13 @@ fn place(list: &[f64], x: f64) -> (usize, f32) {
 }
 
 impl Grid {
-    /// `value` is given a height in kilometres and a latitude in degrees.
+    /// Makes a grid; `value` gets a height in kilometres and a latitude in degrees.
     pub(crate) fn of(heights_km: Vec<f64>, latitudes_deg: Vec<f64>, value: impl Fn(f64, f64) -> f64) -> Self {
         let values = latitudes_deg.iter().flat_map(|lat| heights_km.iter().map(|h| value(*h, *lat) as f32)).collect();
         Self { heights_km, latitudes_deg, values }
     }
 
-    /// The value at a height and a latitude.
+    /// Returns the value at a height and a latitude.
     pub(crate) fn at(&self, height_km: f64, latitude_deg: f64) -> f32 {
         let ((i, fr), (k, fc)) = (place(&self.latitudes_deg, latitude_deg), place(&self.heights_km, height_km));
         let cell = |i: usize, k: usize| {
@@ -38,14 +38,14 @@ impl Grid {
         along(i) + fr * (along(i + 1) - along(i))
     }
 
-    /// The value at the lowest height on average over the globe.
+    /// Returns the mean over the globe of the value at the lowest height.
     pub(crate) fn deepest(&self) -> f32 {
         let lowest = self.heights_km.first().copied().unwrap_or(0.0);
         mean_over_globe(|lat| f64::from(self.at(lowest, lat))) as f32
     }
 
-    /// The outermost height, in kilometres, at which half of the value at the lowest height is left; `None` when there
-    /// is more than that everywhere.
+    /// Returns the outermost height in kilometres at which half of the value at the lowest height is left. Returns
+    /// `None` if more than half is left at the largest height.
     pub(crate) fn half_level_km(&self, latitude_deg: f64) -> Option<f64> {
         let lowest = self.heights_km.first()?;
         let half = 0.5 * self.at(*lowest, latitude_deg);
@@ -56,19 +56,19 @@ impl Grid {
     }
 }
 
-/// Mean of what depends on latitude in degrees over a sphere.
+/// Returns the mean over a sphere of a value that depends on latitude in degrees.
 pub(crate) fn mean_over_globe(value: impl Fn(f64) -> f64) -> f64 {
     const BELTS: u32 = 90;
-    // Belts of equal area.
+    // All belts have the same area.
     let sum: f64 =
         (0..BELTS).map(|i| value(libm::asin((2.0 * f64::from(i) + 1.0) / f64::from(BELTS) - 1.0).to_degrees())).sum();
     sum / f64::from(BELTS)
 }
 
-/// A radiance table: one grid of heights and latitudes a season.
+/// A radiance table: one grid of heights and latitudes for each season.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radiance {
-    /// Season in degrees, rising from 0 to below 360, and the grid then.
+    /// Season in degrees, rising from 0 to below 360, and the grid of this season.
     seasons: Vec<(f64, Grid)>,
 }
 
@@ -82,15 +82,15 @@ struct Row {
 }
 
 impl Radiance {
-    /// From CSV with the columns `tangent_height_km, latitude_deg, radiance` and, where it depends on the season,
-    /// `season_deg`; rows in any order, one for each height at each latitude in each season.
+    /// Reads CSV with the columns `tangent_height_km, latitude_deg, radiance` and, if it depends on the season,
+    /// `season_deg`. The rows can be in any order, one for each height at each latitude in each season.
     ///
     /// # Errors
-    /// The first line that is wrong, a place of the table without a row, or a limb that the table does not reach.
+    /// Fails for the first invalid line, for a missing row, and for a table that ends below the limb.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut reader =
             csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
-        // The reader knows the line of a row only while it stands there.
+        // The reader knows the line of a row only while it is at this row.
         let heads = reader.headers().map_err(|e| e.to_string())?.clone();
         let mut rows: Vec<(u64, Row)> = Vec::new();
         for record in reader.records() {
@@ -170,7 +170,7 @@ impl Radiance {
         Ok(table)
     }
 
-    /// The grid in a season: between two linear, around the year.
+    /// Returns the grid of a season in degrees. It is linear between two seasons, around the year too.
     pub(crate) fn in_season(&self, season_deg: f64) -> Grid {
         let season = season_deg.rem_euclid(360.0);
         let next = self.seasons.partition_point(|s| s.0 <= season);
@@ -187,7 +187,7 @@ impl Radiance {
 mod tests {
     use super::*;
 
-    /// Two latitudes in two seasons, the half level where `half` says.
+    /// Returns a table with two latitudes in two seasons; `half` gives the half level.
     fn text(half: impl Fn(f64, f64) -> f64) -> String {
         let mut text = String::from("# ours\nseason_deg, latitude_deg, tangent_height_km, radiance\n");
         for (season, lat) in [(0.0, -90.0), (0.0, 90.0), (180.0, -90.0), (180.0, 90.0)] {
@@ -209,7 +209,7 @@ mod tests {
         assert!((july.half_level_km(-90.0).unwrap() - 20.0).abs() < 1e-5);
         assert!((table.in_season(180.0).half_level_km(90.0).unwrap() - 20.0).abs() < 1e-5);
         assert!((july.at(27.5, 90.0) - 0.6).abs() < 1e-6 && (july.at(27.5, -90.0) - 0.0).abs() < 1e-6);
-        // Half way in latitude, half way in season, on both sides of the year, and beyond the ends.
+        // The checks are half-way in latitude, half-way in season on both sides of the year, and beyond the ends.
         assert!((july.at(27.5, 0.0) - 0.3).abs() < 1e-6);
         for season in [90.0, 270.0, -90.0] {
             assert!((table.in_season(season).at(27.5, 90.0) - 0.3).abs() < 1e-6);

@@ -1,7 +1,7 @@
-//! The picture of a scene.
+//! The rendering of a scene.
 //!
-//! What a world of every kind looks like is told by its painter, row by row; here the rows become light on a detector:
-//! motion, what stands in view, stray light, fall-off, the image circle, exposure.
+//! The painter of each world paints it row by row. This module turns the rows into light on a detector: motion, vehicle
+//! parts in view, stray light, fall-off, image circle, exposure.
 
 use hzn_core::camera::{self, Camera};
 use nalgebra::Vector3;
@@ -21,10 +21,10 @@ use crate::visible::discs::Canvas;
 use crate::visible::shade::Shader;
 
 impl Scene {
-    /// The picture.
+    /// Renders the picture.
     ///
     /// # Errors
-    /// A camera that [`Camera::try_new`] refuses, or a position that is not outside the body.
+    /// Fails if [`Camera::try_new`] refuses the camera, or if the position is not outside the body.
     pub fn render(&self) -> Result<Picture, SceneError> {
         let camera = Camera::<f64>::try_new(&self.camera)?;
         let mut light = self.light()?;
@@ -36,7 +36,7 @@ impl Scene {
         Ok(self.detector.expose(&light, self.seed))
     }
 
-    /// Light on every pixel before blur and exposure: one plane, or three for colours.
+    /// Returns the light on every pixel before blur and exposure: one plane, or three for colours.
     pub(crate) fn light(&self) -> Result<Vec<Plane>, SceneError> {
         let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
         let camera = beyond_circle(&self.camera)?;
@@ -92,7 +92,7 @@ impl Scene {
         {
             self.glare(world, &mut planes)?;
         }
-        // A grey camera sees the mean of the colours; a coloured one of a grey world, three times the same.
+        // A grey camera sees the mean of the colours. A colour camera sees a grey world as three equal planes.
         if self.detector.colour {
             while planes.len() < 3 {
                 planes.extend(planes.first().cloned());
@@ -104,7 +104,7 @@ impl Scene {
         Ok(planes)
     }
 
-    /// The shader of a visible world from the scene's own pose.
+    /// Returns the shader of a visible world for the scene's own pose.
     fn shader(&self, world: &Visible, camera: Camera<f64>) -> Result<Shader, SceneError> {
         let up = Vector3::from(self.pose.position_m);
         let sun = match self.light {
@@ -115,7 +115,7 @@ impl Scene {
         Shader::try_new(world, camera, Globe::new(&self.body), &self.pose, sun).ok_or(SceneError::Pose)
     }
 
-    /// Earth, sky, and what stands in it.
+    /// Renders the Earth and the sky with stars, Moon and Sun.
     fn visible(&self, world: &Visible, camera: Camera<f64>, motion: Option<&Motion>) -> Result<Vec<Plane>, SceneError> {
         let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
         let (fx, fy) = camera.focal_px();
@@ -129,7 +129,7 @@ impl Scene {
                 poses.iter().for_each(|p| shader.turned(p).row(y as f64, 1.0 / poses.len() as f32, row));
             }
         });
-        // Points and discs of the sky: from the poses of the middle row.
+        // Stars, Moon and Sun use the poses of the middle row.
         let poses =
             motion.map_or_else(|| vec![self.pose], |m| m.poses(&self.pose, 0.5 * (h as f64 - 1.0), h, pixel_rad));
         let weight = 1.0 / poses.len() as f32;
@@ -147,7 +147,7 @@ impl Scene {
         Ok((0..3).map(|c| Plane { width: w, data: pixels.iter().map(|p| p[c]).collect() }).collect())
     }
 
-    /// Stray light of the Sun, which no part of the vehicle hides but one in front of the Sun itself.
+    /// Adds the stray light of the Sun. A part of the vehicle hides it only if it is in front of the Sun itself.
     fn glare(&self, world: &Visible, planes: &mut [Plane]) -> Result<(), SceneError> {
         if self.optics == Optics::default() {
             return Ok(());
@@ -163,7 +163,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Fall-off towards the corners, and the exposure.
+    /// Applies the fall-off towards the corners, and the exposure.
     fn expose(&self, plane: &mut Plane, camera: &Camera<f64>) {
         let (exposure, lost) = (self.exposure as f32, self.optics.vignetting as f32);
         if exposure == 1.0 && lost == 0.0 {
@@ -185,15 +185,15 @@ impl Scene {
     }
 }
 
-/// The lens without its image circle, or with a wider one, as far as it stays monotone: the scene goes on beyond the
-/// circle, so that the blur takes light from there, as a stop close to the detector would have it.
+/// Returns the lens without its image circle, or with a wider one, as far as it stays monotone. The scene continues
+/// beyond the circle, so the blur takes light from there, as with a stop close to the detector.
 pub(crate) fn beyond_circle(config: &camera::Config) -> Result<Camera<f64>, SceneError> {
     let with = |theta_max_deg| Camera::try_new(&camera::Config { theta_max_deg, ..config.clone() });
     let wider = config.theta_max_deg.map(|deg| deg + 3.0);
     with(None).or_else(|_| with(wider)).or_else(|_| with(config.theta_max_deg)).map_err(SceneError::from)
 }
 
-/// No light reaches what is beyond the image circle.
+/// Removes all light beyond the image circle.
 pub(crate) fn through_circle(mut light: Plane, camera: &Camera<f64>) -> Plane {
     if let Some((c, a, b)) = camera.image_circle_px() {
         let w = light.width;

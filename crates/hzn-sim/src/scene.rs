@@ -1,4 +1,4 @@
-//! What is in front of the camera, and the camera itself.
+//! The camera and the world in front of it.
 
 use hzn_core::{body, camera};
 use serde::{Deserialize, Serialize};
@@ -12,37 +12,38 @@ use crate::pose::Pose;
 use crate::texture::Clouds;
 use crate::visible::Visible;
 
-/// One picture's worth of world: everything the renderer and the truth need. Brightness is a fraction of full scale.
+/// All inputs of one picture, for the renderer and for the truth. Brightness is a fraction of full scale.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// The lens and the size of the picture.
     pub camera: camera::Config,
-    /// Where the camera is.
+    /// Position and attitude of the camera.
     pub pose: Pose,
-    /// The body. Its `limb_height_km` is where the rendered edge stands at half brightness.
+    /// The body. Its `limb_height_km` is the height at which the rendered limb has half of its brightness.
     #[serde(default)]
     pub body: body::Config,
-    /// Rows of (geodetic latitude in degrees, limb height in kilometres) where the limb height depends on the latitude
-    /// of the tangent point; in between it is linear. Empty: `body.limb_height_km` everywhere.
+    /// Rows of (geodetic latitude in degrees, limb height in kilometres), for a limb height that depends on the
+    /// latitude of the tangent point. Between rows it is linear. Without rows, `body.limb_height_km` applies
+    /// everywhere.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub limb_height_by_latitude_km: Vec<[f64; 2]>,
-    /// What kind of world it is; the next four belong to the plain one, `light` to the visible one too.
+    /// Kind of world. `profile`, `disc`, `light` and `sky` belong to the plain world, `light` also to the visible one.
     #[serde(default)]
     pub world: World,
-    /// How brightness falls off outside the limb.
+    /// Fall-off of the brightness outside the limb.
     #[serde(default)]
     pub profile: Profile,
-    /// What is seen inside the limb.
+    /// Brightness inside the limb.
     #[serde(default)]
     pub disc: Disc,
-    /// Which part of the body is lit.
+    /// Lit part of the body.
     #[serde(default)]
     pub light: Light,
-    /// What is seen outside.
+    /// Sky outside the limb.
     #[serde(default)]
     pub sky: Sky,
-    /// Position of the Moon in ECEF, metres, where there is one.
+    /// Position of the Moon in ECEF, metres; `None` without a Moon.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moon_ecef_m: Option<[f64; 3]>,
     /// Structure of the vehicle in front of everything.
@@ -51,13 +52,13 @@ pub struct Scene {
     /// Imperfections of the lens.
     #[serde(default)]
     pub optics: Optics,
-    /// Rotation during the picture; none: it is taken at once.
+    /// Rotation during the picture; `None` for an instantaneous picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
-    /// What light is multiplied by to become fractions of full scale; what exceeds 1 is lost.
+    /// Factor from light to fractions of full scale; light above 1 is clipped.
     #[serde(default = "one")]
     pub exposure: f64,
-    /// From light to numbers.
+    /// Detector, which turns light into numbers.
     #[serde(default)]
     pub detector: Detector,
     /// Seed of the noise. The same scene and seed give the same picture on any number of threads.
@@ -69,12 +70,12 @@ fn one() -> f64 {
     1.0
 }
 
-/// What kind of world is in front of the camera.
+/// Kind of world in front of the camera.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum World {
-    /// A body of uniform brightness under clouds and a band, as `profile`, `disc`, `light` and `sky` say: for tests and
-    /// tables, where everything but one thing should stay the same.
+    /// A body of uniform brightness with clouds and a band, described by `profile`, `disc`, `light` and `sky`. It is
+    /// meant for tests and tables in which only one quantity changes.
     #[default]
     Plain,
     /// The Earth in sunlight.
@@ -83,22 +84,22 @@ pub enum World {
     Infrared(Infrared),
 }
 
-/// The limb's profile, outward.
+/// Brightness profile outside the limb.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Profile {
     /// A step at the limb height.
     #[default]
     Sharp,
-    /// Constant up to a saturation height, above it exp(−height/scale). The saturation height is `scale` · ln 2 below
-    /// the limb height, so that half brightness is at the limb height.
+    /// Brightness is constant up to a saturation height, above it exp(−height/scale). The saturation height is
+    /// `scale` · ln 2 below the limb height, so half brightness is at the limb height.
     Exponential {
-        /// Height over which brightness falls by e, kilometres.
+        /// Height over which the brightness falls by e, kilometres.
         scale_km: f64,
     },
 }
 
-/// What is seen inside the limb.
+/// Surface, clouds and band inside the limb.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Disc {
@@ -122,48 +123,49 @@ impl Default for Disc {
 pub struct Band {
     /// Brightness of the band.
     pub brightness: f64,
-    /// How far the band reaches inward from the limb, in kilometres of tangent height.
+    /// Depth of the band inward from the limb, in kilometres of tangent height.
     pub depth_km: f64,
-    /// Over how many kilometres of tangent height its inner edge fades, centred on `depth_km`; 0 is a step.
+    /// Width over which the inner edge of the band fades, in kilometres of tangent height, centred on `depth_km`; 0 is
+    /// a step.
     pub fade_km: f64,
 }
 
-/// Which part of the body is lit; the rest is as dark as the sky.
+/// Lit part of the body; the rest is as dark as the sky.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Light {
-    /// All of it.
+    /// The whole body is lit.
     #[default]
     Full,
-    /// The side towards the Sun, with a terminator.
+    /// The side towards the Sun is lit, with a terminator.
     Sun {
-        /// Direction to the Sun in ECEF; need not have unit length.
+        /// Direction to the Sun in ECEF; it need not have unit length.
         direction: [f64; 3],
         /// Width of the twilight zone in radians of solar elevation, centred on the terminator.
         twilight_rad: f64,
     },
-    /// A range of azimuth about the limb axis.
+    /// A range of azimuth about the limb axis is lit.
     Sector {
-        /// Middle of the lit range in radians: 0 = east of the position, π/2 = the direction axis × east.
+        /// Middle of the lit range in radians: 0 is east of the position, π/2 is the direction axis × east.
         centre_rad: f64,
-        /// Half the lit range in radians; π lights all.
+        /// Half-width of the lit range in radians; π lights the whole body.
         half_width_rad: f64,
         /// Width of the transition in radians, centred on the ends of the range.
         fade_rad: f64,
     },
 }
 
-/// What is seen outside the limb.
+/// The sky outside the limb.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sky {
-    /// Brightness.
+    /// Brightness of the sky.
     pub brightness: f64,
     /// Number of stars over the whole sphere.
     pub stars: u32,
-    /// Light of the brightest star, in full scales of one pixel; the faintest has a hundredth of it.
+    /// Light of the brightest star, in full scales of one pixel; the faintest star has a hundredth of it.
     pub star_brightness: f64,
-    /// Which stars.
+    /// Seed of the stars; another seed gives other stars.
     pub seed: u64,
 }
 
@@ -174,8 +176,8 @@ impl Default for Sky {
 }
 
 impl Scene {
-    /// A uniformly bright Earth with a sharp limb at the default height, 17 km, in a dark sky, seen by a detector
-    /// without noise.
+    /// Returns a uniformly bright Earth with a sharp limb at the default height, 17 km, in a dark sky. The detector has
+    /// no noise.
     pub fn new(camera: camera::Config, pose: Pose) -> Self {
         Self {
             camera,

@@ -1,4 +1,4 @@
-//! Clouds: fractal value noise over the globe, cut at a threshold, so that the edges are many and sharp.
+//! Clouds: fractal value noise over the globe, cut at a threshold. They have many sharp edges.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Clouds {
-    /// Share of the ground under clouds, 0 to 1, roughly.
+    /// Approximate share of the ground under clouds, 0 to 1.
     pub cover: f64,
     /// Size of the largest cloud fields in kilometres.
     pub largest_km: f64,
-    /// Size of the smallest detail in kilometres; each halving from `largest_km` costs one more octave.
+    /// Size of the smallest detail in kilometres. Each halving from `largest_km` costs one more octave.
     pub smallest_km: f64,
     /// Softness of a cloud's edge, 0 (a step) to 1 (veils).
     pub softness: f64,
     /// Brightness of the thickest clouds, fraction of full scale.
     pub brightness: f64,
-    /// Which clouds.
+    /// Seed of the clouds; another seed gives other clouds.
     pub seed: u64,
 }
 
@@ -27,7 +27,7 @@ impl Default for Clouds {
     }
 }
 
-/// Octaves computed at once.
+/// Number of octaves that are computed at once.
 const LANES: usize = 4;
 type Lanes<T> = [T; LANES];
 
@@ -37,21 +37,23 @@ struct Fractal {
     fours: Vec<Octaves>,
 }
 
-/// Neighbouring octaves, from the larger to the smaller; those beyond the last one have size 0.
+/// A group of neighbouring octaves, from the larger to the smaller. Octaves beyond the last one have size 0.
 #[derive(Debug, Clone, Copy, Default)]
 struct Octaves {
     size_km: Lanes<f32>,
-    /// Cells across the unit sphere's radius.
+    /// Number of cells across the unit sphere's radius.
     frequency: Lanes<f32>,
     amplitude: Lanes<f32>,
     salt: Lanes<u32>,
 }
 
-/// What was drawn for the last point, an entry for every [`Octaves`]: the next one is most often in the same cells.
+/// Random values that were drawn for the last point, one entry per [`Octaves`]. The next point is usually in the same
+/// cells.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Drawn(Vec<Cells>);
 
-/// The cells of one [`Octaves`], by axis, and the random values at their corners: x counts fastest, z slowest.
+/// The cells of one [`Octaves`], by axis, and the random values at their corners. The corner index counts x fastest and
+/// z slowest.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cells {
     drawn: bool,
@@ -60,12 +62,12 @@ struct Cells {
 }
 
 impl Fractal {
-    /// Octaves from the largest to the smallest size, each half as large and `rough` times as strong as the one before;
-    /// all together with the standard deviation of one over `unit`.
+    /// Makes octaves from the largest to the smallest size. Each octave has half the size and `rough` times the
+    /// amplitude of the octave before. The root of the sum of their squared amplitudes is 1/`unit`.
     fn new([largest_km, smallest_km]: [f64; 2], rough: f32, unit: f32, radius_m: f64, seed: u64, salt: u32) -> Self {
         let count = (1 + libm::log2((largest_km / smallest_km).max(1.0)).round() as usize).min(16);
         let amplitude = |i: usize| rough.powi(i as i32);
-        // Octaves add as squares.
+        // The variances of the octaves add up.
         let root = (0..count).map(|i| amplitude(i) * amplitude(i)).sum::<f32>().sqrt();
         let mut fours = vec![Octaves::default(); count.div_ceil(LANES)];
         for i in 0..count {
@@ -79,13 +81,13 @@ impl Fractal {
         Self { fours }
     }
 
-    /// Amplitudes from the largest octave on.
+    /// Returns the amplitudes, from the largest octave on.
     fn amplitudes(&self) -> impl DoubleEndedIterator<Item = f32> {
         self.fours.iter().flat_map(|four| four.amplitude)
     }
 
-    /// Gives `each` the octaves' shares at a point, by number, until it has enough or they are finer than
-    /// `footprint_km`.
+    /// Calls `each` with the number and the value of one octave after the other at a point. It stops when `each`
+    /// returns false, or when the octaves are finer than `footprint_km`.
     #[inline(always)]
     fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn, mut each: impl FnMut(usize, f32) -> bool) {
         let p = [point.x as f32, point.y as f32, point.z as f32];
@@ -108,18 +110,19 @@ impl Fractal {
 }
 
 impl Octaves {
-    /// Random values at the corners of cubic lattices, blended smoothly: 0 to 1.
+    /// Returns the random values at the corners of cubic lattices, blended smoothly: 0 to 1.
     #[inline(always)]
     fn noise(&self, p: [f32; 3], cells: &mut Cells) -> Lanes<f32> {
         let x: [Lanes<f32>; 3] = p.map(|p| self.frequency.map(|f| p * f));
         let floor = x.map(|x| {
-            // Truncation corrected below zero: half the cost of the library's floor on targets without its instruction.
+            // The truncation is corrected below zero. It costs half as much as the library's floor on targets without a
+            // floor instruction.
             x.map(|x| {
                 let t = x as i32;
                 t - i32::from((t as f32) > x)
             })
         });
-        // In lanes; comparing arrays would call the library.
+        // The comparison works in lanes, because a comparison of arrays would call the library.
         let changed = floor.iter().flatten().zip(cells.floor.iter().flatten()).fold(0, |all, (a, b)| all | (a ^ b));
         if changed != 0 || !cells.drawn {
             cells.draw(floor, &self.salt);
@@ -136,7 +139,7 @@ impl Octaves {
 }
 
 impl Cells {
-    /// Draws the corners of the cells that have changed.
+    /// Draws the corners of the cells that changed.
     #[inline(never)]
     fn draw(&mut self, floor: [Lanes<i32>; 3], salt: &Lanes<u32>) {
         for (i, &salt) in salt.iter().enumerate() {
@@ -153,14 +156,14 @@ impl Cells {
     }
 }
 
-/// Standard deviation of value noise in 3-D, about.
+/// Approximate standard deviation of value noise in 3-D.
 const SIGMA: f64 = 0.17;
 
-/// [`Clouds`], prepared.
+/// [`Clouds`], prepared for rendering.
 #[derive(Debug, Clone)]
 pub(crate) struct CloudField {
     fractal: Fractal,
-    /// The most each octave and all finer ones can add.
+    /// Largest sum that each octave and all finer ones can add.
     rest: Vec<f32>,
     threshold: f32,
     edge: f32,
@@ -170,7 +173,7 @@ pub(crate) struct CloudField {
 impl CloudField {
     pub(crate) fn new(clouds: &Clouds, radius_m: f64) -> Self {
         let sizes_km = [clouds.largest_km, clouds.smallest_km].map(|km| km.max(1e-3));
-        // Slightly rougher than 1/2 an octave: clouds have detail.
+        // Amplitudes fall more slowly than by 1/2 per octave, because clouds have much detail.
         let fractal = Fractal::new(sizes_km, 0.7, 1.0, radius_m, clouds.seed, 0x5EED);
         let mut rest: Vec<f32> = fractal
             .amplitudes()
@@ -181,7 +184,7 @@ impl CloudField {
             })
             .collect();
         rest.reverse();
-        // Inverse of the logistic curve that stands for the distribution function.
+        // A logistic curve approximates the distribution function; this is its inverse.
         let cover = clouds.cover.clamp(0.001, 0.999);
         let threshold = SIGMA / 1.7 * libm::log((1.0 - cover) / cover);
         Self {
@@ -193,8 +196,8 @@ impl CloudField {
         }
     }
 
-    /// Brightness at a point of the unit sphere over a ground of brightness `ground`; `footprint_km` is what one
-    /// pixel covers: finer detail is left out, as it would only flicker.
+    /// Returns the brightness at a point of the unit sphere over ground of brightness `ground`. `footprint_km` is the
+    /// size of a pixel on the ground. Finer detail is left out, because it would only flicker.
     pub(crate) fn over(&self, ground: f32, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> f32 {
         match self.at(point, footprint_km, drawn) {
             Some((cover, bright)) => ground + cover * (bright - ground),
@@ -202,7 +205,7 @@ impl CloudField {
         }
     }
 
-    /// How much of the ground is hidden, 0 to 1, and how bright the cloud is there; `None` under a clear sky.
+    /// Returns the hidden share of the ground, 0 to 1, and the brightness of the cloud there; `None` under a clear sky.
     pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> Option<(f32, f32)> {
         let (mut sum, mut fine, mut clear) = (0.0f32, 0.0f32, false);
         self.fractal.at(point, footprint_km, drawn, |i, share| {
@@ -217,23 +220,24 @@ impl CloudField {
             return None;
         }
         let cover = smoothstep(((sum - self.threshold) / self.edge).clamp(-1.0, 1.0) * 0.5 + 0.5);
-        // Thick clouds are brighter than their rims, and not smooth.
+        // Thick clouds are brighter than their rims, and they are not smooth.
         let thick = (0.8 + (sum - self.threshold) * 0.6 + fine * 0.5).clamp(0.5, 1.0);
         Some((cover, self.brightness * thick))
     }
 }
 
-/// Fractal noise on the unit sphere: about 0 on average, with a standard deviation of 1.
+/// Fractal noise on the unit sphere, with a mean of about 0 and a standard deviation of about 1.
 #[derive(Debug, Clone)]
 pub(crate) struct Relief(Fractal);
 
 impl Relief {
-    /// `detail_km` from the largest to the smallest size; `rough` is the amplitude of an octave over the one before.
+    /// Makes noise with detail from the largest to the smallest size, `detail_km`. `rough` is the amplitude of an
+    /// octave divided by the amplitude of the octave before.
     pub(crate) fn new(detail_km: [f64; 2], rough: f32, radius_m: f64, seed: u64) -> Self {
         Self(Fractal::new(detail_km, rough, SIGMA as f32, radius_m, seed, 0x6E0D))
     }
 
-    /// The value at a point, without what is finer than `footprint_km`.
+    /// Returns the value at a point, without detail finer than `footprint_km`.
     #[inline]
     pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> f32 {
         let mut sum = 0.0;
@@ -272,7 +276,7 @@ mod tests {
             let n = 20_000;
             let lit = (0..n)
                 .filter(|&i| {
-                    // A spiral over the sphere.
+                    // The points lie on a spiral over the sphere.
                     let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(n);
                     let (s, c) = libm::sincos(f64::from(i) * 2.399_963);
                     let r = (1.0 - z * z).sqrt();

@@ -1,4 +1,4 @@
-//! What is true of a scene: a row of truth.csv, and the file.
+//! The truth about a scene: a row of truth.csv, and the file.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use crate::error::SceneError;
 use crate::globe::{Globe, View};
 use crate::scene::{Light, Scene};
 
-/// Visible pixels of limb from which a picture counts as showing one.
+/// Smallest length of visible limb with which a picture counts as showing a limb, in pixels.
 pub const LIMB_IN_VIEW_PX: f64 = 50.0;
 
 /// The truth about one picture; the fields are the columns of truth.csv, in their order.
@@ -28,29 +28,31 @@ pub struct Truth {
     pub body: String,
     /// 1 when at least 50 px of lit limb are in view and not behind the vehicle, else 0.
     pub limb: u8,
-    /// Limb axis (for spheres the centre) in the camera frame, unit vector.
+    /// Limb axis in the camera frame, first component of the unit vector. For spheres it is the direction to the
+    /// centre.
     pub axis_x: f64,
     /// Second component of the axis.
     pub axis_y: f64,
     /// Third component of the axis.
     pub axis_z: f64,
-    /// Half-angle of the limb's cone in degrees; for an ellipsoid its cot² is the mean of the two principal ones.
+    /// Half-angle of the limb's cone in degrees. For an ellipsoid, its cot² is the mean of the cot² of the two
+    /// principal half-angles.
     pub half_angle_deg: f64,
     /// Altitude of the camera above the surface in kilometres (geodetic for `earth`).
     pub altitude_km: f64,
-    /// Direction to the Sun in the camera frame, unit vector; empty when the scene has none.
+    /// Direction to the Sun in the camera frame, first component of the unit vector; empty if the scene has no Sun.
     pub sun_x: Option<f64>,
     /// Second component of the direction to the Sun.
     pub sun_y: Option<f64>,
     /// Third component of the direction to the Sun.
     pub sun_z: Option<f64>,
-    /// Direction to the Moon in the camera frame, unit vector; empty when the scene has none.
+    /// Direction to the Moon in the camera frame, first component of the unit vector; empty if the scene has no Moon.
     pub moon_x: Option<f64>,
     /// Second component of the direction to the Moon.
     pub moon_y: Option<f64>,
     /// Third component of the direction to the Moon.
     pub moon_z: Option<f64>,
-    /// Attitude as a quaternion from camera to ECEF, scalar part.
+    /// Attitude as a quaternion from camera to ECEF: scalar part.
     pub qw: f64,
     /// First vector component of the attitude.
     pub qx: f64,
@@ -61,26 +63,26 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// The limb axis in the camera frame; `None` when the row holds no direction.
+    /// Returns the limb axis in the camera frame; `None` if the row holds no direction.
     pub fn axis(&self) -> Option<UnitVec3<Cam, f64>> {
         UnitVec3::try_new([self.axis_x, self.axis_y, self.axis_z])
     }
-    /// Whether the picture shows enough limb to be answered.
+    /// Returns true if the picture shows enough limb for an answer.
     pub fn has_limb(&self) -> bool {
         self.limb != 0
     }
 }
 
-/// Why a truth.csv cannot be used. Displayed as `truth.csv:3: axis_x: …`.
+/// The reason why a truth.csv cannot be used, displayed as `truth.csv:3: axis_x: …`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TruthError {
     /// The file.
     pub path: PathBuf,
-    /// Line, from 1.
+    /// Line number, from 1.
     pub line: Option<u64>,
     /// The column.
     pub column: Option<String>,
-    /// What is wrong and what to do.
+    /// Description of the error, and how to correct it.
     pub what: String,
 }
 
@@ -99,11 +101,12 @@ impl core::fmt::Display for TruthError {
 
 impl core::error::Error for TruthError {}
 
-/// Reads a truth.csv. Columns are found by name; those of Sun and Moon may be missing, others stand for nothing.
+/// Reads a truth.csv. Columns are found by name. The columns of Sun and Moon may be missing; unknown columns are
+/// ignored.
 ///
 /// # Errors
-/// A file that cannot be read, a column that is missing, a cell that is no finite number, an axis or a quaternion
-/// that has not unit length, a half-angle that is none, a file without rows.
+/// Fails if the file cannot be read or has no rows, if a column is missing, or if a cell is not a finite number. Also
+/// fails if an axis or a quaternion does not have unit length, or if a half-angle is not above 0° and below 90°.
 pub fn load(path: &Path) -> Result<Vec<Truth>, TruthError> {
     let text = std::fs::read_to_string(path).map_err(|e| {
         let what = match e.kind() {
@@ -115,10 +118,10 @@ pub fn load(path: &Path) -> Result<Vec<Truth>, TruthError> {
     parse(&text, path)
 }
 
-/// As [`load`], from text; `path` is named in messages.
+/// Parses the text of a truth.csv, like [`load`]; messages name `path`.
 ///
 /// # Errors
-/// As [`load`].
+/// Fails like [`load`].
 pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
     let wrong = |line: Option<u64>, column: Option<&str>, what: String| TruthError {
         path: path.to_owned(),
@@ -126,7 +129,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
         column: column.map(str::to_owned),
         what,
     };
-    // Spreadsheets put a byte-order mark first.
+    // Spreadsheets begin the file with a byte-order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| wrong(Some(1), None, format!("not valid CSV: {e}")))?.clone();
@@ -203,10 +206,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
 }
 
 impl Scene {
-    /// The truth of the scene, for a picture's name and time.
+    /// Returns the truth of the scene, for the name and time of a picture.
     ///
     /// # Errors
-    /// A camera, position or light that cannot be.
+    /// Fails if the camera, the position or the light is invalid.
     pub fn truth(&self, file: &str, time_s: f64) -> Result<Truth, SceneError> {
         let globe = Globe::new(&self.body);
         let raised = globe.raised(self.body.limb_height_km * 1e3);
@@ -248,11 +251,11 @@ impl Scene {
         })
     }
 
-    /// The truth about Sun or Moon in a scene whose camera flies around the Earth; for every other kind, as
+    /// Returns the truth about Sun or Moon in a scene whose camera flies around the Earth. For every other kind it is
     /// [`Scene::truth`].
     ///
     /// # Errors
-    /// As [`Scene::truth`]; and a scene without that body.
+    /// Fails like [`Scene::truth`], and if the scene does not have the body.
     pub fn truth_of(&self, kind: Kind, file: &str, time_s: f64) -> Result<Truth, SceneError> {
         let truth = self.truth(file, time_s)?;
         let Some(disc) = self.disc_of(kind)? else { return Ok(truth) };
@@ -271,10 +274,11 @@ impl Scene {
         })
     }
 
-    /// Pixels of limb that are in the picture, lit and not hidden: of the Earth, or of Sun or Moon beside it.
+    /// Returns the length in pixels of the limb that is in the picture, lit and not hidden. `kind` selects the scene's
+    /// own body, or Sun or Moon next to it.
     ///
     /// # Errors
-    /// As [`Scene::truth_of`].
+    /// Fails like [`Scene::truth_of`].
     pub fn visible_px(&self, kind: Kind) -> Result<f64, SceneError> {
         let Some(disc) = self.disc_of(kind)? else { return self.visible_limb_px() };
         let camera = Camera::<f64>::try_new(&self.camera)?;
@@ -314,7 +318,7 @@ impl Scene {
         Ok(seen_px)
     }
 
-    /// Sun or Moon as a disc of the sky; `None` for other bodies, and where the scene's own body is that one.
+    /// Returns Sun or Moon as a disc in the sky; `None` for other kinds, and if `kind` is the scene's own body.
     fn disc_of(&self, kind: Kind) -> Result<Option<SkyDisc>, SceneError> {
         if self.body.kind == kind {
             return Ok(None);
@@ -337,7 +341,7 @@ impl Scene {
     }
 }
 
-/// A far body as seen from the camera.
+/// A distant body as the camera sees it.
 struct SkyDisc {
     direction: [f64; 3],
     distance_m: f64,
@@ -390,7 +394,7 @@ mod tests {
         let t = scene(Look::off_nadir(0.0, 0.0, 0.0)).truth("a.png", 1.5).unwrap();
         assert!((t.axis_z - 1.0).abs() < 1e-12 && (t.altitude_km - 200.0).abs() < 1e-6);
         assert_eq!((t.limb, t.body.as_str(), t.file.as_str(), t.time_s), (0, "earth", "a.png", 1.5));
-        // sin α = (R + 17 km)/(R + 200 km) with a radius between the two of the ellipsoid's curvature.
+        // sin α = (R + 17 km)/(R + 200 km). The radius R lies between the two radii of curvature of the ellipsoid.
         let alpha = |r: f64| ((r + 17.0) / (r + 200.0)).asin().to_degrees();
         assert!(t.half_angle_deg > alpha(6330.0) && t.half_angle_deg < alpha(6380.0));
     }
@@ -399,7 +403,7 @@ mod tests {
     fn level_camera_sees_the_limb_and_the_axis_below() {
         let t = scene(Look { depression_rad: 0.2, ..Look::default() }).truth("", 0.0).unwrap();
         assert!(t.has_limb() && t.axis_y > 0.97 && t.axis_z > 0.19 && t.sun_x.is_none());
-        // Looking up, there is none.
+        // A camera that looks up sees no limb.
         assert!(!scene(Look { depression_rad: -0.8, ..Look::default() }).truth("", 0.0).unwrap().has_limb());
     }
 

@@ -1,4 +1,4 @@
-//! The limb, exact and rendered, against an independent library and against each other.
+//! The exact and the rendered limb, compared with an independent library and with each other.
 
 use hzn_core::camera::{Config, Model};
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M};
@@ -46,7 +46,8 @@ fn circle_and_truth_equal_spice() {
     }
 }
 
-/// Where the limb crosses whole rows (or columns, `transposed`), steeply and well inside the picture: (along, at).
+/// Returns the crossings of the limb with whole rows (or columns if `transposed`) as (row, position). Only steep
+/// crossings well inside the picture count.
 fn crossings(points: &[LimbPoint], transposed: bool, width: f64, height: f64) -> Vec<(u16, f64)> {
     let swap = |p: &LimbPoint| if transposed { (p.exact.v, p.exact.u) } else { (p.exact.u, p.exact.v) };
     let (width, height) = if transposed { (height, width) } else { (width, height) };
@@ -64,7 +65,7 @@ fn crossings(points: &[LimbPoint], transposed: bool, width: f64, height: f64) ->
     found
 }
 
-/// Where brightness crosses `level` within three pixels of `near` along a row (or column).
+/// Returns the position at which the brightness crosses `level` along a row (or column), within three pixels of `near`.
 fn half_level(picture: &Picture, transposed: bool, row: u16, near: f64, level: f64) -> f64 {
     let at = |x: i32| f64::from(if transposed { picture.at(row, x as u16) } else { picture.at(x as u16, row) }) - level;
     let middle = near.floor() as i32;
@@ -75,7 +76,8 @@ fn half_level(picture: &Picture, transposed: bool, row: u16, near: f64, level: f
         .expect("the edge is where the limb is")
 }
 
-/// Largest and mean signed distance between the rendered half level and the exact limb, and how many were compared.
+/// Returns the largest and the mean signed distance between the rendered half level and the exact limb, and the number
+/// of compared points.
 fn compare(scene: &Scene, share: f64) -> (f64, f64, usize) {
     let picture = scene.render().unwrap();
     let points = scene.limb_points(8000, EdgeNoise::None).unwrap();
@@ -124,9 +126,9 @@ fn rendered_edge_follows_a_height_that_depends_on_latitude() {
     scene.body.limb_height_km = 25.0;
     scene.limb_height_by_latitude_km = vec![[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
     let (worst, mean, count) = compare(&scene, 0.5);
-    // As much as a uniform height gives: 0.005 px of it is the blur of an edge with a radius of 200 px.
+    // The error is the same as for a uniform height; the blur of an edge with a radius of 200 px causes 0.005 px of it.
     assert!(count > 500 && worst < 0.025 && mean.abs() < 0.002, "{worst} {mean} {count}");
-    // Which a uniform height would not be.
+    // A uniform height gives other limb points.
     let uniform = Scene { limb_height_by_latitude_km: Vec::new(), ..scene.clone() };
     let far = |s: &Scene| s.limb_points(8, EdgeNoise::None).unwrap();
     let shift = far(&scene)
@@ -139,7 +141,7 @@ fn rendered_edge_follows_a_height_that_depends_on_latitude() {
 
 #[test]
 fn rendered_edge_is_on_the_limb_of_a_small_disc() {
-    // A Moon of 100 pixels across.
+    // The Moon has a diameter of 100 pixels.
     let mut scene = clean(
         camera(Model::Pinhole, &[]),
         Pose { position_m: [0.0, 0.0, -14.1e6], cam_to_ecef_wxyz: [1.0, 0.02, -0.03, 0.4] },
@@ -155,7 +157,7 @@ fn rendered_edge_is_on_the_limb_of_a_small_disc() {
 fn exponential_profile_is_at_half_brightness_at_the_limb_height() {
     let pose = Pose::looking(position_m(-20.0, 100.0, 150.0), Look { depression_rad: 0.25, ..Look::default() });
     let mut scene = clean(camera(Model::KannalaBrandt, &[]), pose);
-    // A profile of many pixels, so that the blur does not move it.
+    // The profile covers many pixels, so the blur does not move it.
     scene.profile = Profile::Exponential { scale_km: 40.0 };
     scene.body.limb_height_km = 30.0;
     scene.detector.psf_sigma_px = 0.3;

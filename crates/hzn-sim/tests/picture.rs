@@ -1,4 +1,4 @@
-//! What a rendered picture promises: determinism, masks, circle, noise, light.
+//! Properties of a rendered picture: determinism, masks, circle, noise, light.
 
 use hzn_core::camera::{Config, Model};
 use hzn_core::image::Pixels;
@@ -12,7 +12,7 @@ fn scene() -> Scene {
     Scene::new(camera, Pose::looking(position_m(45.0, 10.0, 240.0), look))
 }
 
-/// Mean and standard deviation over a rectangle, fractions of full scale.
+/// Returns mean and standard deviation over a rectangle, as fractions of full scale.
 fn statistics(p: &Picture, columns: std::ops::Range<u16>, rows: std::ops::Range<u16>) -> (f64, f64) {
     let full = f64::from(p.view().full_scale());
     let values: Vec<f64> =
@@ -76,7 +76,7 @@ fn vehicle_hides_scene_and_limb() {
 fn nothing_reaches_beyond_the_image_circle() {
     let mut s = scene();
     s.sky.brightness = 0.3;
-    // 30° at 200 px/rad: 104.72 px.
+    // 30° at 200 px/rad is 104.72 px.
     s.camera.theta_max_deg = Some(30.0);
     let p = s.render().unwrap();
     for (x, y) in (0..320u16).flat_map(|x| (0..240u16).map(move |y| (x, y))) {
@@ -94,7 +94,7 @@ fn band_is_bright_and_ends_where_it_should() {
     let p = s.render().unwrap();
     let column: Vec<u16> = (0..240).map(|y| p.at(160, y)).collect();
     let bright = column.iter().filter(|&&v| v > 128).count();
-    // 30 km seen tangentially from 240 km at about 1720 km: 17.4 mrad, 3.5 px.
+    // A depth of 30 km, seen tangentially from 240 km at a distance of about 1720 km, is 17.4 mrad or 3.5 px.
     assert!((3..=4).contains(&bright), "{bright}");
     assert_eq!((column[0], column[239]), (5, 51));
 }
@@ -109,7 +109,7 @@ fn light_falls_where_the_sun_is() {
     let lit = s.limb_points(100, EdgeNoise::None).unwrap();
     assert!(lit.iter().all(|l| (l.azimuth_rad - middle).abs() < 0.3 + 1e-9));
     assert!(s.visible_limb_px().unwrap() < scene().visible_limb_px().unwrap());
-    // The Sun straight below the Earth lights nothing of what is seen.
+    // The Sun is straight below the Earth and lights nothing in view.
     let night = s.pose.position_m.map(|x| -x);
     s.light = Light::Sun { direction: night, twilight_rad: 0.02 };
     let p = s.render().unwrap();

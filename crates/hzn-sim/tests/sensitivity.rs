@@ -1,4 +1,4 @@
-//! Covariances by design against the reference tables, and against what the sensor itself reports.
+//! Covariances by design, compared with the reference tables and with the covariances of the sensor.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
@@ -7,7 +7,7 @@ use hzn_sim::pose::position_m;
 use hzn_sim::sensitivity::{Design, Sigmas, reference};
 use hzn_sim::{Look, Pose, Scene};
 
-/// 1920×1080, pinhole, level, 200 km, R = 1 px², L = 300 px.
+/// Returns a level pinhole camera of 1920×1080 pixels at 200 km, with R = 1 px², L = 300 px.
 fn design(horizontal_fov_deg: f64) -> Design {
     pinhole(1920, 1080, 960.0 / (horizontal_fov_deg / 2.0).to_radians().tan())
 }
@@ -31,14 +31,14 @@ fn sigmas(design: &Design) -> Sigmas {
     design.sigmas().unwrap().unwrap()
 }
 
-/// Within 2 %, of 3 sigma.
+/// Checks that three sigma agree within 2 %.
 #[track_caller]
 fn near(sigma_deg: f64, expected_3_sigma_deg: f64) {
     let ratio = 3.0 * sigma_deg / expected_3_sigma_deg;
     assert!((ratio - 1.0).abs() < 0.02, "{} {expected_3_sigma_deg}", 3.0 * sigma_deg);
 }
 
-/// Section 8 of the mathematics: roll, pitch (Braun & Barf 33), pitch with α known, overbound (37).
+/// Checks a row of section 8 of the mathematics: roll, pitch (Braun & Barf 33), pitch with a known α, overbound (37).
 #[track_caller]
 fn row(design: &Design, [roll, pitch, known, bound]: [f64; 4]) {
     let s = sigmas(design);
@@ -68,7 +68,7 @@ fn fields_of_view_and_their_optimum() {
     };
     assert!((best(&design) - 116.0).abs() <= 1.0);
     let square = |fov: f64| pinhole(1080, 1080, 540.0 / (fov / 2.0).to_radians().tan());
-    // Around it the curve is flat: from 108 to 115 degrees it changes by less than 0.3 %.
+    // Near the optimum the curve is flat: from 108 to 115 degrees it changes by less than 0.3 %.
     assert!((best(&square) / 110.0 - 1.0).abs() < 0.02);
 }
 
@@ -100,14 +100,14 @@ fn fused_is_between_known_and_free() {
             assert!((s.fused.pitch_deg / s.free.pitch_deg - 1.0).abs() < 1e-6);
         }
     }
-    // A rolled camera is as good, but about other axes of the picture.
+    // A rolled camera has the same accuracy, but about other axes of the picture.
     let (level, rolled) = (sigmas(&design(94.4)), sigmas(&Design { roll_deg: 180.0, ..design(94.4) }));
     assert!((level.free.pitch_deg / rolled.free.pitch_deg - 1.0).abs() < 1e-3);
 }
 
 #[test]
 fn what_cannot_be_seen_or_flown_is_said() {
-    // The limb of a low body is beyond the lower border of a narrow level picture.
+    // At 3000 km the limb is beyond the lower border of a narrow level picture.
     assert_eq!(Design { altitude_km: 3000.0, ..design(30.0) }.sigmas().unwrap(), None);
     let inside = Design { limb_height_km: 300.0, ..design(94.4) }.sigmas().unwrap_err();
     assert!(inside.to_string().contains("at 200 km is not above the limb at 300 km"));
@@ -116,7 +116,7 @@ fn what_cannot_be_seen_or_flown_is_said() {
     assert!(d.sigmas().unwrap_err().to_string().contains("fx_px"));
 }
 
-/// What a design promises is what the sensor reports on a picture without noise.
+/// The design predicts the covariance that the sensor reports for a picture without noise.
 #[test]
 fn the_sensor_reports_what_the_design_says() {
     for (model, f_px, depression_deg) in [(Model::Pinhole, 500.0, 10.0), (Model::Equidistant, 420.0, 20.0)] {
@@ -144,7 +144,8 @@ fn the_sensor_reports_what_the_design_says() {
             sigma_px: 1.0,
             correlation_px: 100.0,
         });
-        // At the equator the geodetic vertical points to the centre; the radius there is made the sphere's.
+        // At the equator the geodetic vertical points to the centre. The scale makes the radius there equal to the
+        // sphere's.
         let [x, y, z] = position_m(0.0, 0.0, 0.0);
         let scale = (config.body.mean_radius_km() + 200.0) * 1e3 / x;
         let look = Look { depression_rad: depression_deg.to_radians(), ..Look::default() };

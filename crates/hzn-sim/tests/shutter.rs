@@ -1,4 +1,4 @@
-//! A rolling shutter in a camera that turns by some degrees while it reads a picture out.
+//! Tests of a rolling shutter in a camera that turns by some degrees while it reads out a picture.
 
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::UnitVec3;
@@ -7,10 +7,10 @@ use hzn_sim::pose::position_m;
 use hzn_sim::{Look, Motion, Pose, Scene};
 
 const READOUT_S: f64 = 0.03;
-/// 5° over the picture.
+/// The camera turns by 5° during the picture.
 const RATE_RADPS: f64 = 5.0 * core::f64::consts::PI / 180.0 / READOUT_S;
 
-/// The answer's error in degrees and the same in sigmas, with the rate given or not.
+/// Returns the answer's error in degrees and in sigmas, with or without the rate in the prior.
 fn error(scene: &Scene, told: bool) -> Option<[f64; 2]> {
     let mut config = Config::new(scene.camera.clone());
     config.body = scene.body.clone();

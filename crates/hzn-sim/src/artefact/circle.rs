@@ -1,26 +1,27 @@
-//! Rings and discs: circles of the picture.
+//! Rings and discs: circles in the picture.
 
 use super::dice::Dice;
 use super::shape::{Canvas, Shape, Spot, step};
 
-/// A circle of the picture, filled or as a ring.
+/// A circle in the picture, filled or as a ring.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Circle {
     middle: [f32; 2],
     radius: f32,
-    /// Width of a ring in pixels; `None` is a disc.
+    /// Width of a ring in pixels; `None` for a disc.
     width: Option<f32>,
-    /// Blur of the outer edge and of a ring's inner one, pixels.
+    /// Blur of the outer edge, and of the inner edge of a ring, pixels.
     soft: [f32; 2],
     light: f32,
-    /// Light at a disc's edge over that in its middle, less one.
+    /// Ratio of a disc's light at the edge to its light in the middle, minus one.
     rim: f32,
-    /// Share of the light that changes once around, and the direction where it is least.
+    /// Share of the light that varies with direction.
     uneven: f32,
+    /// Direction in which the light is least, a unit vector.
     faint: [f32; 2],
 }
 
-/// A circle of this radius in pixels whose edge passes through a place inside the picture.
+/// Returns the middle of a circle with this radius in pixels whose edge passes through a point inside the picture.
 fn through(dice: &mut Dice, canvas: &Canvas, radius: f64) -> [f32; 2] {
     let (x, y) = (dice.between(0.08, 0.92) * canvas.width, dice.between(0.08, 0.92) * canvas.height);
     let (sin, cos) = libm::sincos(dice.turn());
@@ -28,8 +29,8 @@ fn through(dice: &mut Dice, canvas: &Canvas, radius: f64) -> [f32; 2] {
 }
 
 impl Circle {
-    /// A ring: radius 0.15 to 3 diagonals, 4 to 60 px wide, blurred by 0.5 to 6 px on each side on its own, light 0.1
-    /// to 1, fading by up to 90 % towards one side.
+    /// Draws a ring with a radius of 0.15 to 3 diagonals and a width of 4 to 60 px. Each side is blurred by 0.5 to 6 px
+    /// separately. The light is 0.1 to 1 and fades by up to 90 % towards one side.
     pub(super) fn ring(dice: &mut Dice, canvas: &Canvas) -> Self {
         let radius = dice.between_log(0.15, 3.0) * canvas.diagonal;
         let middle = through(dice, canvas, radius);
@@ -46,13 +47,13 @@ impl Circle {
         }
     }
 
-    /// A ghost disc: radius 0.1 to 3 diagonals, blurred by 0.5 to 6 px, light 0.1 to 1, its rim up to twice as bright
-    /// as its middle or down to half, fading by up to 70 % towards one side.
+    /// Draws a ghost disc with a radius of 0.1 to 3 diagonals, blurred by 0.5 to 6 px, with a light of 0.1 to 1. Its
+    /// rim has half to twice the brightness of its middle. The light fades by up to 70 % towards one side.
     pub(super) fn disc(dice: &mut Dice, canvas: &Canvas) -> Self {
         Self::ghost(dice, canvas, 0.1, 3.0)
     }
 
-    /// As [`Circle::disc`], with a radius of 1 to 12 diagonals.
+    /// Draws a disc like [`Circle::disc`], with a radius of 1 to 12 diagonals.
     pub(super) fn far_disc(dice: &mut Dice, canvas: &Canvas) -> Self {
         Self::ghost(dice, canvas, 1.0, 12.0)
     }
@@ -63,7 +64,7 @@ impl Circle {
         Self::filled(dice, middle, radius, (0.1, 1.0))
     }
 
-    /// A disc at a place.
+    /// Draws a disc around `middle`.
     pub(super) fn filled(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
         let (sin, cos) = libm::sincos(dice.turn());
         Self {
@@ -78,7 +79,7 @@ impl Circle {
         }
     }
 
-    /// A ring at a place.
+    /// Draws a ring around `middle`.
     pub(super) fn drawn_around(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
         Self {
             width: Some(dice.between_log(3.0, 30.0) as f32),
@@ -87,7 +88,7 @@ impl Circle {
         }
     }
 
-    /// Middle and radius in pixels.
+    /// Returns the middle and the radius in pixels.
     pub(super) fn place(&self) -> ([f64; 2], f64) {
         (self.middle.map(f64::from), f64::from(self.radius))
     }
@@ -96,7 +97,7 @@ impl Circle {
 impl Shape for Circle {
     fn at(&self, x: f32, y: f32) -> Spot {
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
-        // Written so that large radii keep their digits in single precision.
+        // This form keeps the digits of large radii in single precision.
         let radius = self.radius;
         let distance = (dx * dx + dy * dy).sqrt();
         let inside = radius - distance;

@@ -8,24 +8,26 @@ use crate::counter::{Counter, Stream};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clouds {
     hash: Counter,
-    /// Largest clouds, pixels; their stretch along one direction.
+    /// Size of the largest clouds, pixels.
     scale: f32,
+    /// Stretch of the clouds along one direction.
     stretch: f32,
     along: [f32; 2],
-    /// Noise above this is cloud, with an edge this wide in units of the noise.
+    /// Threshold of the noise; noise above it is cloud.
     level: f32,
+    /// Width of a cloud's edge in units of the noise.
     edge: f32,
     ground: f32,
     cloud: f32,
     octaves: u32,
-    /// A front: beyond a circle of the picture clouds end. Middle, radius, how far noise moves it, blur; pixels.
+    /// A front: the clouds end beyond a circle in the picture. Middle, radius, shift by the noise, blur; all in pixels.
     front: Option<([f32; 2], f32, f32, f32)>,
 }
 
 impl Clouds {
-    /// Clouds of 0.05 to 1.5 diagonals in 3 to 6 octaves, stretched up to four times, covering 10 to 90 %, over ground
-    /// of 0.01 to 0.25, as bright as 0.25 to 1. Every third has a front: beyond a curve with a radius of 0.3 to 10
-    /// diagonals, ragged by 3 to 60 px and blurred by 0.7 to 20 px, there are no clouds.
+    /// Draws clouds of 0.05 to 1.5 diagonals in 3 to 6 octaves, stretched up to four times. They cover 10 to 90 % of a
+    /// ground of 0.01 to 0.25, with a brightness of 0.25 to 1. Every third has a front: beyond a curve with a radius of
+    /// 0.3 to 10 diagonals, ragged by 3 to 60 px and blurred by 0.7 to 20 px, there are no clouds.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas, seed: u64) -> Self {
         let (sin, cos) = libm::sincos(dice.turn());
         let front = dice.chance(0.33).then(|| {
@@ -50,7 +52,7 @@ impl Clouds {
         }
     }
 
-    /// Value noise, 0 to 1.
+    /// Returns value noise, 0 to 1.
     fn noise(&self, x: f32, y: f32) -> f32 {
         let (mut sum, mut weight, mut total, mut scale) = (0.0, 1.0, 0.0, 1.0 / self.scale);
         for octave in 0..self.octaves {
@@ -83,7 +85,7 @@ impl Shape for Clouds {
             let (dx, dy) = (x - middle[0], y - middle[1]);
             thick *= step(radius - (dx * dx + dy * dy).sqrt() + ragged * (noise - 0.5) * 4.0, soft);
         }
-        // Thick clouds are brighter, and not even.
+        // Thick clouds are brighter and not uniform.
         let bright = self.cloud * (0.7 + 0.6 * (noise - self.level).max(0.0)).min(1.0);
         Spot { light: self.ground + thick * (bright - self.ground).max(0.0), cover: 1.0 }
     }

@@ -3,29 +3,31 @@
 use super::dice::Dice;
 use super::shape::{Canvas, Shape, Spot};
 
-/// Light that falls off around a place.
+/// Light that falls off around a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Glare {
     middle: [f32; 2],
-    /// Distance at which it has fallen to half, pixels.
+    /// Distance at which the light falls to half, pixels.
     scale: f32,
-    /// How much wider it is in one direction, and that direction.
+    /// Ratio of length to width of the glare.
     stretch: f32,
+    /// Unit vector along the length.
     axis: [f32; 2],
-    /// Falls with the distance to this power.
+    /// Power of the distance with which the light falls.
     power: f32,
     light: f32,
-    /// Spikes around it, and their share of the light.
+    /// Number of spikes around the point.
     spikes: f32,
+    /// Share of the light in the spikes.
     spiky: f32,
-    /// Light of a linear slope over the whole picture, per pixel.
+    /// Light of a linear slope over the picture, per pixel.
     slope: [f32; 2],
 }
 
 impl Glare {
-    /// Around a place up to half a diagonal outside the picture: half light at 0.01 to 0.5 diagonals, falling with the
-    /// power 1 to 4, up to three times as long as wide, light 0.3 to 4 (what exceeds 1 saturates), for two in five with
-    /// 4 to 16 spikes, and a slope of up to 0.3 across the picture.
+    /// Draws glare around a point up to half a diagonal outside the picture. The light falls to half at 0.01 to 0.5
+    /// diagonals, with the power 1 to 4. The glare is up to three times as long as wide, with a light of 0.3 to 4
+    /// (above 1 it saturates). Two in five have 4 to 16 spikes. A slope adds up to 0.3 across the picture.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let out = 0.5 * canvas.diagonal * dice.between(0.0, 1.0) * f64::from(dice.count(0, 1));
         let middle = [dice.between(-out, canvas.width + out) as f32, dice.between(-out, canvas.height + out) as f32];
@@ -44,7 +46,7 @@ impl Glare {
         }
     }
 
-    /// A saturated source of light with a small halo.
+    /// Draws a saturated source of light with a small halo.
     pub(super) fn source(dice: &mut Dice, canvas: &Canvas, middle: [f32; 2]) -> Self {
         let scale = dice.between_log(0.005, 0.06) * canvas.diagonal;
         let light = dice.between_log(1.0, 6.0);

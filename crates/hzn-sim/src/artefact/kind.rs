@@ -1,21 +1,21 @@
-//! Which artefacts there are.
+//! The list of artefacts.
 
-/// What a picture shows.
+/// An artefact that a picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
-    /// A flare ring: bright along a circle of the picture, dark on both sides.
+    /// A flare ring: bright along a circle in the picture, dark on both sides.
     Ring,
-    /// A ghost: a disc of the picture, larger than a tenth of it.
+    /// A ghost: a disc in the picture with a radius of at least a tenth of the diagonal.
     Disc,
     /// The image of an iris with 5 to 9 corners, its blades straight or slightly curved.
     Polygon,
     /// A soft curved streak, or the edge of a veil.
     Streak,
-    /// The edge of a ghost whose middle lies far outside the picture, through fisheye lenses.
+    /// The edge of a ghost whose middle is far outside the picture, through fisheye lenses.
     FarDisc,
-    /// Several ghosts on a line through the principal point, with the source of light in or beside the picture.
+    /// Several ghosts on a line through the principal point, with the source of light in the picture or next to it.
     Chain,
-    /// Stray light around a source in or beside the picture.
+    /// Stray light around a source in the picture or next to it.
     Glare,
     /// Straight parts of the vehicle.
     Panel,
@@ -32,7 +32,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them. Pictures depend on a kind's place here.
+    /// All kinds. The pictures of a kind depend on its position in this list.
     pub const ALL: &[Self] = &[
         Self::Ring,
         Self::Disc,
@@ -49,7 +49,7 @@ impl Kind {
         Self::Vignetted,
     ];
 
-    /// Name in tables and on command lines.
+    /// Returns the name in tables and on command lines.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ring => "ring",
@@ -68,17 +68,17 @@ impl Kind {
         }
     }
 
-    /// The kind of this name.
+    /// Returns the kind with this name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|k| k.name() == name)
     }
 
-    /// Whether its edges are those of discs, which can have the very half-angle that is expected.
+    /// Returns true if the kind has edges of discs, which can have exactly the expected half-angle.
     pub const fn is_disc(self) -> bool {
         matches!(self, Self::Disc | Self::FarDisc | Self::Chain | Self::Vignetted)
     }
 
-    /// Whether the camera looks down on the body, from too near for its limb to be in view.
+    /// Returns true if the camera looks down on the body from too near to have its limb in view.
     pub const fn is_ground(self) -> bool {
         matches!(self, Self::Clouds | Self::Lights)
     }

@@ -1,11 +1,11 @@
-//! The cameras that are drawn.
+//! The cameras of the trials.
 
 use hzn_core::camera::{Camera, Config, Model};
 
 use super::dice::Dice;
 use super::kind::Kind;
 
-/// Sizes of pictures with how often they come, columns and rows.
+/// Weights and sizes of the pictures (columns, rows).
 const SIZES: [(f64, (u16, u16)); 7] = [
     (4.0, (480, 360)),
     (4.0, (640, 480)),
@@ -16,9 +16,9 @@ const SIZES: [(f64, (u16, u16)); 7] = [
     (1.0, (752, 480)),
 ];
 
-/// A camera for a kind: 27° to 110° wide through a pinhole, to 140° through an equidistant lens, 60° to 150° through
-/// one of Kannala and Brandt's; the principal point up to 2 % of the width beside the middle. A kind that needs a
-/// fisheye gets no pinhole, the Moon sometimes a tele lens of 4° to 27°, and what looks down nothing wider than 75°.
+/// Draws a camera for a kind. A pinhole is 27° to 110° wide, an equidistant lens 27° to 140°, a Kannala-Brandt lens 60°
+/// to 150°. The principal point is up to 2 % of the width off the middle. A kind that needs a fisheye gets no pinhole.
+/// The Moon sometimes gets a tele lens of 4° to 27°. A kind of ground gets at most 75°.
 pub(super) fn draw(dice: &mut Dice, kind: Kind) -> Config {
     let (width, height) = dice.pick(&SIZES).unwrap_or((640, 480));
     let pinhole = if kind == Kind::FarDisc { 0.0 } else { 4.0 };
@@ -48,7 +48,7 @@ pub(super) fn draw(dice: &mut Dice, kind: Kind) -> Config {
         camera.theta_max_deg = Some((0.5 * degrees * dice.between(0.9, 1.15)).min(88.0));
     }
     if Camera::<f64>::try_new(&camera).is_err() {
-        // The polynomial is not monotone to the corner: the image circle ends before.
+        // The polynomial is not monotone to the corner, so the image circle ends before it.
         camera.theta_max_deg = Some(70.0);
     }
     camera

@@ -1,19 +1,19 @@
-//! Night: cities, roads, lightning.
+//! Lights at night: cities, roads, lightning.
 
 use super::dice::Dice;
 use super::shape::{Canvas, Shape, Spot};
 use crate::detector::Plane;
 
-/// Spots of light.
+/// A set of spots of light.
 #[derive(Debug, Clone)]
 pub(super) struct Lights {
-    /// Place, standard deviation in pixels, light.
+    /// Position, standard deviation in pixels, light.
     spots: Vec<([f32; 2], f32, f32)>,
 }
 
 impl Lights {
-    /// 1 to 12 cities of 10 to 120 lamps each, up to 3 roads with lamps every 2 to 15 px along a bent line, up to 3
-    /// clouds lit by lightning with 10 to 150 px; lamps 0.5 to 2.5 px large, light 0.05 to 2.
+    /// Draws 1 to 12 cities with 10 to 120 lamps each, up to 3 roads with lamps every 2 to 15 px along a bent line, and
+    /// up to 3 clouds lit by lightning, of 10 to 150 px. Lamps are 0.5 to 2.5 px large, with a light of 0.05 to 2.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let mut spots = Vec::new();
         let place = |dice: &mut Dice| [dice.between(0.0, canvas.width), dice.between(0.0, canvas.height)];
@@ -52,7 +52,7 @@ impl Lights {
         Self { spots }
     }
 
-    /// Up to 60 stars, 0.5 to 0.9 px large, light 0.02 to 1.
+    /// Draws up to 60 stars, 0.5 to 0.9 px large, with a light of 0.02 to 1.
     pub(super) fn stars(dice: &mut Dice, canvas: &Canvas) -> Self {
         let star = |dice: &mut Dice| {
             let (x, y) = (dice.between(0.0, canvas.width), dice.between(0.0, canvas.height));
@@ -74,7 +74,7 @@ impl Shape for Lights {
     fn paint(&self, plane: &mut Plane) {
         let (w, h) = (plane.width as i32, plane.height() as i32);
         for &(p, size, light) in &self.spots {
-            // Beyond four sigma there is nothing.
+            // The light beyond four sigma is left out.
             let range = |c: f32, most: i32| {
                 let (low, high) = ((c - 4.0 * size).floor() as i32, (c + 4.0 * size).ceil() as i32);
                 low.clamp(0, most)..(high + 1).clamp(0, most)

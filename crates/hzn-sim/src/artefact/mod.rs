@@ -1,19 +1,19 @@
-//! Pictures that show something else than a limb: what lenses, windows, vehicles and the sky do to a dark picture.
+//! Pictures that show something other than a limb: effects of lenses, windows, vehicles and the sky on a dark picture.
 //!
-//! A [`Trial`] is one picture with its truth, drawn by kind and seed. A flare is a figure of the picture: its rings,
-//! discs and polygons are circles and polygons on the detector, whatever the lens. A limb is a circle on the sphere of
-//! directions. Through many lenses the two look alike to the eye, so a sensor must measure which it sees.
+//! A [`Trial`] is one picture with its truth, drawn by kind and seed. A flare is a figure on the detector: its rings,
+//! discs and polygons are circles and polygons there for every lens. A limb is a circle on the sphere of directions.
+//! Through many lenses both look alike to the eye, so a sensor must measure which one it sees.
 //!
-//! | file | idea |
+//! | file | content |
 //! |---|---|
-//! | `kind` | which artefacts there are |
-//! | `lens` | the cameras that are drawn |
-//! | `shape` | light and cover of a figure at a place of the picture |
-//! | `solid` | things in space as a lens shows them: panels and windows |
+//! | `kind` | the list of artefacts |
+//! | `lens` | the cameras of the trials |
+//! | `shape` | light and cover of a figure at a point of the picture |
+//! | `solid` | objects in space as a lens shows them: panels and windows |
 //! | `circle`, `polygon`, `streak`, `glare`, `panel`, `window`, `moon`, `clouds` and more | one figure each |
 //! | `recipe` | the figures of a kind |
 //! | `trial` | a picture with its truth: without a limb, or with one and the artefact next to it |
-//! | `outcome` | what a sensor says of a trial, and whether that is false |
+//! | `outcome` | a sensor's result for a trial, and whether it is false |
 //! | `dice` | random numbers in sequence |
 //!
 //! Lengths of figures are drawn in units of the picture's diagonal, edges and widths in pixels, light in fractions of

@@ -3,7 +3,7 @@
 use super::dice::Dice;
 use super::shape::{Canvas, Shape, Spot, step};
 
-/// Its half-angle, radians.
+/// Half-angle of the Moon, radians.
 const HALF_ANGLE_RAD: f64 = 0.00452;
 
 /// A lit sphere with its halo.
@@ -11,19 +11,20 @@ const HALF_ANGLE_RAD: f64 = 0.00452;
 pub(super) struct Moon {
     middle: [f32; 2],
     radius: f32,
-    /// Direction of the light in the picture, and the cosine of its elongation: 1 is full.
+    /// Direction of the light in the picture.
     sun: [f32; 2],
+    /// Cosine of the elongation of the light: 1 is full.
     full: f32,
     soft: f32,
     light: f32,
     halo: f32,
-    /// Maria: how much darker spots are.
+    /// Relative darkness of the maria.
     spots: f32,
 }
 
 impl Moon {
-    /// Anywhere in the picture or cut by its border, any phase, bloomed by up to 1.5 times its radius, blurred by 0.5
-    /// to 2.5 px, light 0.3 to 3, halo up to a fifth.
+    /// Draws a Moon anywhere in the picture, or cut by its border, with any phase. Its radius is up to 2.5 times the
+    /// true one because of bloom. The blur is 0.5 to 2.5 px, the light 0.3 to 3, the halo up to a fifth.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let bloom = if dice.chance(0.5) { dice.between(1.0, 2.5) } else { 1.0 };
         let radius = HALF_ANGLE_RAD * canvas.focal_px * bloom;
@@ -56,7 +57,7 @@ impl Shape for Moon {
         let across = (dx * self.sun[0] + dy * self.sun[1]) / self.radius.max(0.5);
         let side = (1.0 - self.full * self.full).max(0.0).sqrt();
         let lit = (across * side + up * self.full).max(0.0);
-        // Lommel and Seeliger: a full Moon is even.
+        // This is the law of Lommel and Seeliger: a full Moon is uniform.
         let light = self.light * 2.0 * lit / (lit + up).max(1e-3);
         let (a, b) = (dx / self.radius * 4.1, dy / self.radius * 3.7);
         let spots = 1.0 - self.spots * (0.5 + 0.5 * libm::sinf(a + 1.3) * libm::cosf(b - 0.4));

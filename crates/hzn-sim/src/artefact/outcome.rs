@@ -1,4 +1,4 @@
-//! What a sensor says of a trial, and whether that is false.
+//! A sensor's result for a trial, and whether it is false.
 
 use hzn_core::body::Expected;
 use hzn_core::status::Status;
@@ -11,56 +11,56 @@ use crate::evaluate::{self, Miss};
 use crate::globe::Globe;
 use crate::picture::Picture;
 
-/// An answer on a limb that is farther off than this is false whatever it claims, degrees.
+/// Error in degrees above which an answer on a limb is false, for every covariance.
 pub const GROSS_DEG: f64 = 2.0;
-/// An answer that is farther off than this many of its sigmas is false.
+/// Error in sigmas of the answer above which it is false.
 pub const FALSE_SIGMAS: f64 = 5.0;
 
-/// What is told about a picture besides the position.
+/// Prior of a picture besides the position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PriorKnowledge {
-    /// Error of the attitude, 1σ about each axis in degrees; `None`: no attitude is told.
+    /// Error of the attitude, 1σ about each axis in degrees; `None` for a prior without attitude.
     pub attitude_sigma_deg: Option<f64>,
 }
 
-/// An answer.
+/// An answer, compared with the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
-    /// How far off it is.
+    /// Error of the answer.
     pub miss: Miss,
-    /// Direction in the camera.
+    /// Unit direction in the camera frame.
     pub axis: [f64; 3],
     /// Half-angle of the answer, radians.
     pub half_angle_rad: f64,
     /// RMS of the inliers, pixels.
     pub rms_px: f64,
-    /// Inliers.
+    /// Number of inliers.
     pub inliers: u32,
-    /// Length of edge that they cover, pixels.
+    /// Length of the edge that the inliers cover, pixels.
     pub arc_px: f64,
 }
 
-/// What a sensor said of a trial.
+/// A sensor's result for a trial.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// The status.
+    /// Status of the picture.
     pub status: Status,
-    /// The answer, with status `ok`.
+    /// The answer, if the status is `ok`.
     pub found: Option<Detection>,
-    /// What became of each edge that was looked at.
+    /// The candidates with their verdicts.
     pub candidates: Vec<Candidate<f64>>,
-    /// Whether one of the picture's discs has the expected half-angle within three of its sigmas.
+    /// True if one of the picture's discs has the expected half-angle within three of its sigmas.
     pub matching_disc: bool,
-    /// Whether there was a limb to be found.
+    /// True if a limb is in the picture.
     pub limb: bool,
 }
 
 impl Outcome {
-    /// Whether an answer was given that is not the limb's: there is none, or it is more than 5σ or 2° away.
+    /// Returns true for a false answer: there is no limb, or the answer is more than 5σ or 2° away from it.
     pub fn is_false(&self) -> bool {
         self.found.is_some_and(|f| !self.limb || !is_right(&f.miss))
     }
-    /// Whether the limb in the picture was answered.
+    /// Returns true if the limb in the picture was answered correctly.
     pub fn is_right(&self) -> bool {
         self.limb && self.found.is_some_and(|f| is_right(&f.miss))
     }
@@ -71,10 +71,10 @@ fn is_right(miss: &Miss) -> bool {
     miss.angle_deg <= GROSS_DEG && sigmas2 <= FALSE_SIGMAS * FALSE_SIGMAS
 }
 
-/// Looks at the picture of a trial with a sensor of this configuration.
+/// Processes the picture of a trial with a sensor of this configuration.
 ///
 /// # Errors
-/// A configuration that is refused, or a position that cannot be.
+/// Fails if the configuration is refused, or if the position is invalid.
 pub fn look(
     horizon: &mut HostHorizon,
     config: &Config,
@@ -112,7 +112,7 @@ pub fn look(
     })
 }
 
-/// The told sigma of the half-angle: sin α = (R + d)/(R + H), so cos α dα = (dd − sin α dH)/(R + H).
+/// Returns the sigma of the prior half-angle: sin α = (R + d)/(R + H), so cos α dα = (dd − sin α dH)/(R + H).
 fn half_angle_sigma_rad(trial: &Trial, config: &Config, expected: &Expected<f64>) -> f64 {
     let (sin, cos) = libm::sincos(expected.half_angle_rad());
     let globe = Globe::new(&config.body);

@@ -4,23 +4,24 @@ use super::dice::Dice;
 use super::shape::{Canvas, Spot, step};
 use super::solid::Solid;
 
-/// What lies within one to four straight sides.
+/// A convex area with one to four straight sides.
 #[derive(Debug, Clone)]
 pub(super) struct Panel {
     /// Normals (outward, unit) and offsets in pixels.
     sides: Vec<([f32; 2], f32)>,
     soft: f32,
     light: f32,
-    /// Light changes by this much a pixel.
+    /// Change of the light per pixel.
     slope: [f32; 2],
-    /// Grid of cells: spacing in pixels and depth; spacing 0 for none.
+    /// Spacing of a grid of cells in pixels; 0 for none.
     cells: f32,
+    /// Share of the light that is lost on the lines of the grid.
     depth: f32,
 }
 
 impl Panel {
-    /// One to four sides with edges through the picture, blurred by 0.4 to 8 px; light 0.1 to 1 with a slope of up to
-    /// 0.3 a diagonal; one in three has a grid of cells every 12 to 80 px.
+    /// Draws one to four sides with edges through the picture, blurred by 0.4 to 8 px. The light is 0.1 to 1, with a
+    /// slope of up to 0.3 per diagonal. One in three has a grid of cells every 12 to 80 px.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let (x, y) = (dice.between(0.1, 0.9) * canvas.width, dice.between(0.1, 0.9) * canvas.height);
         let first = dice.turn();

@@ -5,26 +5,28 @@ use core::f64::consts::{PI, TAU};
 use super::dice::Dice;
 use super::shape::{Canvas, Shape, Spot, step};
 
-/// A regular polygon of the picture.
+/// A regular polygon in the picture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Polygon {
     middle: [f32; 2],
     /// Distance of a side from the middle, pixels.
     apothem: f32,
-    /// Angle of a sector, and where the first one's side lies.
+    /// Angle of a sector, radians.
     sector: f32,
+    /// Direction of the first side from the middle, radians.
     first: f32,
-    /// Radius of a side's curve in pixels; infinite when it is straight.
+    /// Radius of curvature of a side in pixels; infinite for straight sides.
     blade: f32,
     soft: f32,
     light: f32,
-    /// A second, fainter copy of another size, as multiple of the apothem; 0 for none.
+    /// Size of a second, fainter copy as a multiple of the apothem; 0 for none.
     echo: f32,
 }
 
 impl Polygon {
-    /// 5 to 9 corners; apothem 0.1 to 3 diagonals; sides straight or, for one in two, curved with 2 to 10 times the
-    /// apothem; blurred by 0.5 to 5 px; light 0.1 to 1; one in five with an echo of another size.
+    /// Draws a polygon with 5 to 9 corners. The apothem is 0.1 to 3 diagonals. Sides are straight or, for one in two,
+    /// curved with 2 to 10 times the apothem. They are blurred by 0.5 to 5 px. The light is 0.1 to 1; one in five has
+    /// an echo of another size.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let apothem = dice.between_log(0.1, 3.0) * canvas.diagonal;
         let (x, y) = (dice.between(0.08, 0.92) * canvas.width, dice.between(0.08, 0.92) * canvas.height);
@@ -32,7 +34,7 @@ impl Polygon {
         Self::placed(dice, [(x + apothem * cos) as f32, (y + apothem * sin) as f32], apothem, (0.1, 1.0))
     }
 
-    /// At a place.
+    /// Draws a polygon around `middle`.
     pub(super) fn placed(dice: &mut Dice, middle: [f32; 2], apothem_px: f64, light: (f64, f64)) -> Self {
         let corners = f64::from(dice.count(5, 9));
         Self {
@@ -47,7 +49,8 @@ impl Polygon {
         }
     }
 
-    /// How far within a side that is `scale` times as far out, pixels; sides curve less than the circle around.
+    /// Returns the distance in pixels inside a side that is `scale` times as far out. Sides curve less than the circle
+    /// around them.
     fn inside(&self, along: f32, across: f32, scale: f32) -> f32 {
         let apothem = self.apothem * scale;
         if self.blade.is_finite() {

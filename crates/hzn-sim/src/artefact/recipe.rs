@@ -1,4 +1,4 @@
-//! The figures of a kind.
+//! The figures of each kind of artefact.
 
 use hzn_core::camera;
 
@@ -26,7 +26,7 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    /// Whether a place in pixels is lit or covered.
+    /// Returns true if a point in pixels is lit or covered.
     pub(super) fn is_bright(&self, x: f64, y: f64) -> bool {
         self.shapes.iter().map(|s| s.at(x as f32, y as f32)).any(|s| s.light > 0.05 || s.cover > 0.5)
     }
@@ -44,7 +44,7 @@ impl Figures {
     }
 }
 
-/// Draws the figures of a kind: one, or for one in four two of the flares; chains have three to eight.
+/// Draws the figures of a kind: one figure, or two for one in four of the flares. A chain has three to eight figures.
 pub(super) fn draw(
     kind: Kind,
     seed: u64,
@@ -74,8 +74,8 @@ pub(super) fn draw(
     Ok(out)
 }
 
-/// Three to eight discs, rings and polygons of 0.01 to 0.6 diagonals on the line from a source of light through the
-/// principal point, as the surfaces of a lens reflect it; light 0.03 to 0.6 each.
+/// Draws three to eight discs, rings and polygons of 0.01 to 0.6 diagonals, like reflections of the surfaces of a lens.
+/// They are on the line from a source of light through the principal point, with a light of 0.03 to 0.6 each.
 fn chain(out: &mut Figures, dice: &mut Dice, canvas: &Canvas) {
     let source = [dice.between(-0.4, 1.4) * canvas.width, dice.between(-0.4, 1.4) * canvas.height];
     let [cx, cy] = canvas.centre;

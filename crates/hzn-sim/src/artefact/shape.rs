@@ -1,34 +1,35 @@
-//! Light and cover of a figure at a place of the picture.
+//! Light and cover of a figure at a point of the picture.
 
 use crate::detector::Plane;
 
-/// What a figure does to a pixel: of the light behind it 1 − `cover` is left, and `light` is added.
+/// Effect of a figure on a pixel: 1 − `cover` of the light behind it is left, and `light` is added.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Spot {
     pub(super) light: f32,
     pub(super) cover: f32,
 }
 
-/// The picture that figures are drawn for.
+/// The picture for which figures are drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Canvas {
-    /// Columns and rows.
+    /// Number of columns.
     pub(super) width: f64,
+    /// Number of rows.
     pub(super) height: f64,
     /// Diagonal in pixels, the unit of lengths.
     pub(super) diagonal: f64,
-    /// Principal point.
+    /// Principal point, pixels.
     pub(super) centre: [f64; 2],
-    /// Pixels a radian in the middle.
+    /// Pixels per radian in the middle.
     pub(super) focal_px: f64,
 }
 
 /// A figure in the picture.
 pub(super) trait Shape: Send + Sync {
-    /// At a place in pixels.
+    /// Returns the spot at a point in pixels.
     fn at(&self, x: f32, y: f32) -> Spot;
 
-    /// Onto a picture.
+    /// Paints the figure onto a picture.
     fn paint(&self, plane: &mut Plane) {
         let width = plane.width;
         for (y, row) in plane.data.chunks_mut(width).enumerate() {
@@ -40,10 +41,10 @@ pub(super) trait Shape: Send + Sync {
     }
 }
 
-/// An edge blurred to a Gaussian's standard deviation `soft`: 0 where `inside` is far below 0, 1 far above.
+/// Returns an edge blurred to a Gaussian of standard deviation `soft`: 0 far outside (`inside` below 0), 1 far inside.
 #[inline(always)]
 pub(super) fn step(inside: f32, soft: f32) -> f32 {
-    // Within 0.02 of the Gaussian's integral, and exactly 0 and 1 from 2.2 sigma on.
+    // The value is within 0.02 of the Gaussian's integral, and exactly 0 and 1 from 2.2 sigma on.
     let t = (0.5 + inside / (4.4 * soft)).clamp(0.0, 1.0);
     t * t * t * (t * (6.0 * t - 15.0) + 10.0)
 }

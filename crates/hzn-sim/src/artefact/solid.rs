@@ -1,4 +1,4 @@
-//! Things that stand in space in front of the camera: what is straight there is a great circle for the lens.
+//! Objects in space in front of the camera. Their straight edges are great circles for the lens.
 
 use hzn_core::camera::{self, Camera};
 use hzn_core::pixel::ImagePoint;
@@ -7,13 +7,13 @@ use super::shape::{Shape, Spot};
 use crate::detector::Plane;
 use crate::error::SceneError;
 
-/// A thing drawn for a pinhole with the lens's focal length and principal point.
+/// An object drawn for a pinhole camera with the lens's focal length and principal point.
 pub(super) trait Solid: Send + Sync {
-    /// At a place of the pinhole's picture, where `scale` of its pixels are one of the lens's.
+    /// Returns the spot at a point of the pinhole picture. `scale` is the number of its pixels per pixel of the lens.
     fn seen(&self, x: f32, y: f32, scale: f32) -> Spot;
 }
 
-/// A thing as a lens shows it.
+/// An object as a lens shows it.
 #[derive(Debug, Clone)]
 pub(super) struct Standing<S> {
     solid: S,
@@ -22,9 +22,11 @@ pub(super) struct Standing<S> {
     centre: [f64; 2],
 }
 
-/// Every how many pixels of a row a ray is asked of the lens: between, it is interpolated to a twentieth of a pixel.
+/// Step in pixels along a row between the rays that the lens computes. Between them rays are interpolated, accurate to
+/// a twentieth of a pixel.
 const STRIDE: usize = 8;
-/// Directions farther off the axis than this cosine count as this far: a pinhole sees no farther.
+/// Smallest cosine of the angle off the axis. Directions farther off the axis count as this angle, because a pinhole
+/// sees no farther.
 const LEAST_COS: f64 = 0.03;
 
 impl<S: Solid> Standing<S> {
@@ -38,7 +40,7 @@ impl<S: Solid> Standing<S> {
         self.lens.unproject(ImagePoint { u, v }).map(|s| s.xyz())
     }
 
-    /// Along a ray that is seen at a place of the picture.
+    /// Returns the spot along a ray that is seen at the point (u, v) of the picture.
     fn along(&self, [sx, sy, sz]: [f64; 3], u: f64, v: f64) -> Spot {
         let z = sz.max(LEAST_COS);
         let (x, y) = (self.focal[0] * sx / z, self.focal[1] * sy / z);

@@ -9,24 +9,26 @@ pub(super) struct Streak {
     origin: [f32; 2],
     /// Unit vector along the curve at its origin.
     along: [f32; 2],
-    /// Second and third coefficient of the curve, per pixel and per pixel².
+    /// Second-order coefficient of the curve, per pixel.
     bend: f32,
+    /// Third-order coefficient of the curve, per pixel².
     twist: f32,
-    /// Blur of the lower and upper edge, and the width between, pixels.
+    /// Blur of the lower and the upper edge, pixels.
     soft: [f32; 2],
+    /// Width between the edges, pixels.
     width: f32,
-    /// Of a veil: length over which it fades away from its one sharp edge, pixels.
+    /// For a veil, the length over which it fades away from its one sharp edge, pixels.
     fade: Option<f32>,
-    /// Half the length over which it is bright, pixels.
+    /// Half of the bright length, pixels.
     reach: f32,
     light: f32,
 }
 
 impl Streak {
-    /// A curve with a radius of 0.3 to 15 diagonals, for one in two with a third-order part that changes it by up to a
-    /// half over the picture. A streak is 6 to 120 px wide, its edges blurred by 1 to 15 px each on its own; every
-    /// third is a veil, blurred by 0.7 to 5 px on one side and fading over 20 to 300 px on the other. Light 0.1 to 1,
-    /// along 0.2 to 2 diagonals.
+    /// Draws a curve with a radius of 0.3 to 15 diagonals. One in two has a third-order part that changes the curvature
+    /// by up to a half over the picture. A streak is 6 to 120 px wide, and each edge is blurred by 1 to 15 px
+    /// separately. Every third is a veil, blurred by 0.7 to 5 px on one side and fading over 20 to 300 px on the other.
+    /// The light is 0.1 to 1, over a length of 0.2 to 2 diagonals.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let diagonal = canvas.diagonal;
         let (x, y) = (dice.between(0.15, 0.85) * canvas.width, dice.between(0.15, 0.85) * canvas.height);
@@ -55,7 +57,7 @@ impl Shape for Streak {
         let (dx, dy) = (x - self.origin[0], y - self.origin[1]);
         let s = dx * self.along[0] + dy * self.along[1];
         let t = dy * self.along[0] - dx * self.along[1];
-        // A curve of this bend is left where it is steep.
+        // A strongly bent curve ends where it is steep.
         if (s * self.bend).abs() > 0.35 || s.abs() > 1.6 * self.reach {
             let slope = 2.0 * s * self.bend + 3.0 * s * s * self.twist;
             if slope.abs() > 2.5 || s.abs() > 1.6 * self.reach {

@@ -26,14 +26,14 @@ use crate::scene::{Disc, Profile, Scene, Sky};
 use crate::texture::Clouds;
 use crate::truth::Truth;
 
-/// What is drawn for a trial, each with random numbers of its own.
+/// Parts of a trial. Each part has independent random numbers.
 #[derive(Clone, Copy)]
 enum Part {
     Lens = 1,
     Place,
     Detector,
     Attitude,
-    /// The first of as many as are tried.
+    /// Figures of the first attempt; later attempts follow.
     Figures = 16,
 }
 
@@ -47,32 +47,34 @@ impl Part {
     }
 }
 
-/// How far a limb stays out of a picture that must not show it, degrees.
+/// Smallest angle between the picture and the limb if no limb may be in view, degrees.
 const MARGIN_DEG: f64 = 3.0;
-/// Figures tried until one leaves the limb alone.
+/// Largest number of attempts to find figures that do not disturb the limb.
 const TRIES: u64 = 60;
-/// Light of a figure at the limb from which it disturbs it, and the share of the limb that may be disturbed.
+/// Light of a figure at the limb above which the figure disturbs it.
 const DISTURBED: f32 = 0.03;
+/// Largest share of the limb that may be disturbed.
 const SHARE: f64 = 0.1;
-/// Places a side at which it is looked at where an artefact is bright.
+/// Number of grid points per side at which the brightness of an artefact is checked.
 const GRID: u32 = 24;
-/// Places along the limb where that is looked at, and pixels around them.
+/// Number of points along the limb at which disturbance is checked.
 const PLACES: usize = 120;
+/// Distance from these points at which disturbance is checked too, pixels.
 const AROUND_PX: f32 = 12.0;
 
-/// One picture of an artefact, with everything that is true of it.
+/// One picture of an artefact, with its truth.
 pub struct Trial {
-    /// What it shows.
+    /// The artefact in the picture.
     pub kind: Kind,
-    /// Its seed. Equal kinds and seeds give equal pictures on any number of threads.
+    /// Seed of the picture. Equal kinds and seeds give equal pictures on any number of threads.
     pub seed: u64,
-    /// The lens, position, body, limb and detector; where [`Trial::limb`] is false the body is not drawn.
+    /// Lens, position, body, limb and detector. If [`Trial::limb`] is false, the body is not drawn.
     pub scene: Scene,
-    /// Whether a limb is in the picture.
+    /// True if a limb is in the picture.
     pub limb: bool,
-    /// What is true of it.
+    /// The truth about the picture.
     pub truth: Truth,
-    /// Half-angles in radians of the cones that fit the discs of the picture best, of those with edge in view.
+    /// Half-angles in radians of the cones that fit the discs of the picture best, for discs with their edge in view.
     pub disc_half_angles_rad: Vec<f64>,
     figures: Figures,
     stars: Option<Lights>,
@@ -85,11 +87,11 @@ impl core::fmt::Debug for Trial {
 }
 
 impl Trial {
-    /// The artefact alone, from 60 to 600 km: the camera looks away from the body, so that its limb stays at least 3°
-    /// outside the picture, or for kinds of ground down onto it.
+    /// Makes a picture of the artefact alone, from an altitude of 60 to 600 km. The camera looks away from the body, so
+    /// its limb stays at least 3° outside the picture. For kinds of ground it looks down onto the body.
     ///
     /// # Errors
-    /// A scene that cannot be, which would be a mistake of the ranges.
+    /// Fails if the scene is invalid; this would be an error in the ranges.
     pub fn without_limb(kind: Kind, seed: u64) -> Result<Self, SceneError> {
         let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
         let dice = &mut Part::Place.dice(kind, seed);
@@ -113,12 +115,13 @@ impl Trial {
         Self::drawn(kind, seed, scene, false, figures, stars)
     }
 
-    /// A clean limb with the artefact next to it: the body is lit all along, the limb crosses the picture over at least
-    /// half its width, and the artefact is in view, leaves at least 90 % of the limb alone and half of the sky dark.
-    /// Kinds of ground become the texture inside the limb. `None` where no such picture was found for this seed.
+    /// Makes a picture of a clean limb with the artefact next to it. The whole limb is lit, and it crosses the picture
+    /// over at least half of its width. The artefact is in view, leaves at least 90 % of the limb undisturbed and at
+    /// least half of the sky dark. Kinds of ground become the texture inside the limb. Returns `None` if this seed
+    /// gives no suitable picture.
     ///
     /// # Errors
-    /// As [`Trial::without_limb`].
+    /// Fails like [`Trial::without_limb`].
     pub fn beside_limb(kind: Kind, seed: u64) -> Result<Option<Self>, SceneError> {
         let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
         let dice = &mut Part::Place.dice(kind, seed);
@@ -127,7 +130,7 @@ impl Trial {
         let cone = cone(position, limb_height_km)?;
         let lens = Camera::<f64>::try_new(&camera)?;
         let (w, h) = (f64::from(camera.width), f64::from(camera.height));
-        // Through a place well inside the picture, in any direction.
+        // The limb passes through a point well inside the picture, in any direction.
         let (u, v) = (dice.between(0.25, 0.75) * w, dice.between(0.25, 0.75) * h);
         let Some(ray) = lens.unproject(ImagePoint { u, v }) else { return Ok(None) };
         let axis = aside(Vector3::from(ray.xyz()), cone.mean_half_angle_rad(), dice.turn());
@@ -200,16 +203,16 @@ impl Trial {
         Ok(Self { kind, seed, scene, limb, truth, disc_half_angles_rad, figures, stars })
     }
 
-    /// The same without the artefact.
+    /// Returns the same trial without the artefact.
     #[must_use]
     pub fn cleaned(self) -> Self {
         Self { figures: Figures::default(), stars: None, disc_half_angles_rad: Vec::new(), ..self }
     }
 
-    /// The picture, 8 bits.
+    /// Renders the picture, 8 bits.
     ///
     /// # Errors
-    /// As [`Scene::render`].
+    /// Fails like [`Scene::render`].
     pub fn render(&self) -> Result<Picture, SceneError> {
         let lens = Camera::<f64>::try_new(&self.scene.camera)?;
         let (w, h) = (usize::from(self.scene.camera.width), usize::from(self.scene.camera.height));
@@ -227,8 +230,8 @@ impl Trial {
         Ok(self.scene.detector.expose(&[plane], self.scene.seed))
     }
 
-    /// What a navigation system would tell: the position; with `attitude_sigma_deg` an attitude too, which is wrong by
-    /// as much about each axis (1σ).
+    /// Returns the prior that a navigation system would give: the position. With `attitude_sigma_deg` it also has an
+    /// attitude with this error (1σ) about each axis.
     pub fn known(&self, attitude_sigma_deg: Option<f64>) -> Prior<f64> {
         let pose = &self.scene.pose;
         let dice = &mut Part::Attitude.dice(self.kind, self.seed);
@@ -243,19 +246,20 @@ impl Trial {
     }
 }
 
-/// Anywhere over the Earth, 60 to 600 km high, lower ones as often as higher ones by ratio.
+/// Returns a position anywhere over the Earth, in ECEF metres, at 60 to 600 km. The altitude is uniform in its
+/// logarithm.
 fn place(dice: &mut Dice) -> [f64; 3] {
     let lat_deg = libm::asin(dice.between(-1.0, 1.0)).to_degrees();
     position_m(lat_deg, dice.between(-180.0, 180.0), dice.between_log(60.0, 600.0))
 }
 
-/// The limb's cone for a limb height in kilometres.
+/// Returns the limb's cone for a limb height in kilometres.
 fn cone(position_m: [f64; 3], limb_height_km: f64) -> Result<LimbCone<f64>, SceneError> {
     let globe = Globe::new(&hzn_core::body::Config::default()).raised(limb_height_km * 1e3);
     LimbCone::try_new(position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)
 }
 
-/// The largest angle off axis in a picture, radians.
+/// Returns the largest angle off the axis in a picture, radians.
 fn farthest_rad(camera: &camera::Config) -> Result<f64, SceneError> {
     let lens = Camera::<f64>::try_new(camera)?;
     let (w, h) = (f64::from(camera.width) - 1.0, f64::from(camera.height) - 1.0);
@@ -270,7 +274,7 @@ fn canvas_of(camera: &camera::Config) -> Canvas {
     Canvas { width, height, diagonal, centre: [camera.cx_px, camera.cy_px], focal_px: camera.fx_px }
 }
 
-/// Detector, sky and noise: blur 0.5 to 1.4 px, noise 0.2 to 2.5 % of full scale, sky up to 6 % bright.
+/// Sets detector, sky and noise: blur 0.5 to 1.4 px, noise 0.2 to 2.5 % of full scale, sky brightness up to 6 %.
 fn finish(scene: &mut Scene, kind: Kind, seed: u64) {
     let dice = &mut Part::Detector.dice(kind, seed);
     let full_well = dice.chance(0.5).then(|| dice.between_log(1e3, 3e4));
@@ -284,20 +288,20 @@ fn finish(scene: &mut Scene, kind: Kind, seed: u64) {
     scene.seed = seed.wrapping_mul(977).wrapping_add(kind as u64);
 }
 
-/// A unit vector at an angle from another, in a direction about it.
+/// Returns a unit vector at an angle from another one, in a direction about it.
 fn aside(from: Vector3<f64>, angle_rad: f64, turn_rad: f64) -> Vector3<f64> {
     let [a, b] = across(from);
     let (sin, cos) = libm::sincos(turn_rad);
     from * libm::cos(angle_rad) + (a * cos + b * sin) * libm::sin(angle_rad)
 }
 
-/// Two unit vectors across a third, right-handed with it.
+/// Returns two unit vectors perpendicular to a third one, right-handed with it.
 fn across(e: Vector3<f64>) -> [Vector3<f64>; 2] {
     let a = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
     [a, e.cross(&a)]
 }
 
-/// A camera whose `axis` (camera frame) points along `to` (ECEF), turned about it.
+/// Returns a camera whose `axis` (camera frame) points along `to` (ECEF), turned about it.
 fn pointing(position_m: [f64; 3], axis: Vector3<f64>, to: Vector3<f64>, turn_rad: f64) -> Pose {
     let frame = |e: Vector3<f64>, turn: f64| {
         let [a, b] = across(e);
@@ -308,7 +312,7 @@ fn pointing(position_m: [f64; 3], axis: Vector3<f64>, to: Vector3<f64>, turn_rad
     Pose::from_axes(position_m, [0, 1, 2].map(|i| cam_to_ecef.column(i).into_owned().into()))
 }
 
-/// Half-angles of the cones that fit discs of the picture (middle and radius in pixels).
+/// Returns the half-angles of the cones that fit discs of the picture (middle and radius in pixels).
 fn half_angles_rad(lens: &Camera<f64>, discs: &[([f64; 2], f64)]) -> Vec<f64> {
     let (w, h) = (f64::from(lens.width()), f64::from(lens.height()));
     let half_angle = |&(middle, radius): &([f64; 2], f64)| {
@@ -324,12 +328,12 @@ fn half_angles_rad(lens: &Camera<f64>, discs: &[([f64; 2], f64)]) -> Vec<f64> {
         if rays.len() < 12 {
             return None;
         }
-        // The plane through the rays' ends: its normal has the least spread.
+        // The plane through the ends of the rays has a normal with the least spread.
         let mean = rays.iter().sum::<Vector3<f64>>() / rays.len() as f64;
         let spread: Matrix3<f64> = rays.iter().map(|r| (r - mean) * (r - mean).transpose()).sum();
         let eigen = spread.symmetric_eigen();
         let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        // The axis is on the side where the disc is lit.
+        // The axis is on the side of the lit disc.
         let towards = |r: &Vector3<f64>| {
             let p = lens.project(&UnitVec3::try_new((r + normal * 0.01).into())?)?;
             let at = |p: ImagePoint<f64>| libm::hypot(p.u - middle[0], p.v - middle[1]);

@@ -1,24 +1,26 @@
-//! Ghosts that a rim of the lens cuts off.
+//! Ghosts that are cut off by a rim of the lens.
 
 use super::circle::Circle;
 use super::dice::Dice;
 use super::shape::{Canvas, Shape, Spot, step};
 
-/// What two circles of the picture have in common, or an ellipse: a ghost far off the axis.
+/// The intersection of two circles in the picture, or an ellipse: a ghost far off the axis.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vignetted {
     disc: Circle,
-    /// Middle, radius and blur of the rim that cuts it, pixels.
+    /// Middle, radius and blur of the rim that cuts the disc, pixels.
     rim: ([f32; 2], f32, f32),
-    /// Middle of the disc, and how much it is stretched along a direction.
+    /// Middle of the disc, pixels.
     middle: [f32; 2],
+    /// Unit vector of the stretch.
     along: [f32; 2],
+    /// Stretch of the disc along this vector.
     stretch: f32,
 }
 
 impl Vignetted {
-    /// A disc as [`Circle::disc`] draws it, stretched by 0.9 to 1.1 for one in two; cut by a rim of 0.7 to 1.5 times
-    /// its radius, whose middle is 0.2 to 1.2 radii away, blurred by 0.5 to 6 px.
+    /// Draws a disc like [`Circle::disc`], stretched by 0.9 to 1.1 for one in two. It is cut by a rim of 0.7 to 1.5
+    /// times its radius, whose middle is 0.2 to 1.2 radii away, blurred by 0.5 to 6 px.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let disc = Circle::disc(dice, canvas);
         let (middle, radius) = disc.place();
@@ -35,7 +37,7 @@ impl Vignetted {
         }
     }
 
-    /// Middles and radii in pixels of the two circles.
+    /// Returns the middles and radii of the two circles in pixels.
     pub(super) fn circles(&self) -> [([f64; 2], f64); 2] {
         let (middle, radius, _) = self.rim;
         [self.disc.place(), (middle.map(f64::from), f64::from(radius))]

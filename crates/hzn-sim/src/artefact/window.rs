@@ -4,7 +4,7 @@ use super::dice::Dice;
 use super::shape::{Canvas, Spot, step};
 use super::solid::Solid;
 
-/// A frame that covers what lies outside a rectangle with round corners, or that rectangle alone.
+/// A frame that covers the picture outside a rectangle with round corners, or that covers only the rectangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     middle: [f32; 2],
@@ -13,18 +13,18 @@ pub(super) struct Window {
     along: [f32; 2],
     soft: f32,
     light: f32,
-    /// Light changes by this much a pixel.
+    /// Change of the light per pixel.
     slope: [f32; 2],
-    /// The frame ends again after this many pixels; infinite when it fills the picture.
+    /// Depth of the frame in pixels; infinite if it fills the picture.
     depth: f32,
-    /// Light shines through the opening instead of from the frame: a lit room or another window behind.
+    /// If true, light comes through the opening instead of from the frame: a lit room, or another window behind.
     through: bool,
 }
 
 impl Window {
-    /// Half sides of 0.15 to 0.9 diagonals, corners from sharp to a porthole's, tilted at will, its edge through the
-    /// picture; out of focus by 0.5 to 12 px; light 0.05 to 0.8; for one in three the frame is 5 to 60 px deep; for one
-    /// in four the opening is lit and not the frame.
+    /// Draws a window with half sides of 0.15 to 0.9 diagonals and corners from sharp to a full porthole. It has any
+    /// tilt, and its edge passes through the picture. The blur is 0.5 to 12 px and the light 0.05 to 0.8. In one of
+    /// three the frame is 5 to 60 px deep; in one of four the opening is lit and not the frame.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let half = [dice.between_log(0.15, 0.9), dice.between_log(0.15, 0.9)].map(|h| h * canvas.diagonal);
         let porthole = dice.chance(0.3);
@@ -34,7 +34,8 @@ impl Window {
         let (a, b) = libm::sincos(dice.turn());
         let slope = dice.between(0.0, 0.3) / canvas.diagonal;
         let corner = if porthole { least } else { least * dice.between(0.0, 1.0) };
-        // A place of the frame's edge, in its own axes: on a side or, a quarter as often, on a corner's arc.
+        // (s, t) is a point on the frame's edge, in the frame's axes: on a side or, in one of four, on the arc of a
+        // corner.
         let straight = [half[0] - corner, half[1] - corner];
         let (mut s, mut t) = (half[0], dice.between(-1.0, 1.0) * straight[1]);
         if dice.chance(0.5) {

@@ -1,4 +1,4 @@
-//! One answer beside its truth.
+//! One answer and its truth.
 
 use std::collections::HashMap;
 
@@ -11,36 +11,36 @@ use serde::Serialize;
 
 use crate::truth::Truth;
 
-/// What the sensor says about one picture and body.
+/// The sensor's answer about one body in one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
-    /// Name of the picture as the run was given it; a folder before the name does not matter.
+    /// Name of the picture as the run got it; a folder before the name does not matter.
     pub file: String,
     /// The body's kind as in sensor.toml.
     pub body: String,
     /// Outcome.
     pub status: Status,
-    /// The direction, beside `ok`.
+    /// The direction, if the status is `ok`.
     pub found: Option<MeasuredDirection>,
 }
 
 /// A direction with its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredDirection {
-    /// Unit vector to the body in the camera frame.
+    /// Unit vector to the body, in the camera frame.
     pub axis: [f64; 3],
-    /// Its covariance: xx, xy, xz, yy, yz, zz in rad².
+    /// Covariance of the axis: xx, xy, xz, yy, yz, zz in rad².
     pub covariance_rad2: [f64; 6],
     /// Half-angle of the half-angle-free fit in degrees.
     pub half_angle_deg: Option<f64>,
 }
 
-/// Sun and Moon, which have no nadir.
+/// Returns true for Sun and Moon, which have no nadir.
 fn in_the_sky(body: &str) -> bool {
     body == Kind::Sun.name() || body == Kind::Moon.name()
 }
 
-/// One picture and body: what was there, and what was made of it.
+/// One body in one picture: the truth, and the result of the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Case {
     /// Name of the picture.
@@ -49,48 +49,49 @@ pub struct Case {
     pub body: String,
     /// Time of the truth in seconds.
     pub time_s: f64,
-    /// Enough limb is in view to be answered.
+    /// True if enough limb is in view for an answer.
     pub limb: bool,
-    /// Outcome, by its name.
+    /// Name of the status.
     pub status: &'static str,
-    /// Altitude in kilometres; of Sun and Moon there is none.
+    /// Altitude in kilometres; `None` for Sun and Moon.
     pub altitude_km: Option<f64>,
-    /// Angle of the optical axis from the body's direction in degrees.
+    /// Angle between the optical axis and the body's direction, in degrees.
     pub off_axis_deg: f64,
-    /// Length in pixels of the limb within the picture, lit or not; `None` where the camera is not known.
+    /// Length of the limb within the picture, lit or not, in pixels; `None` if the camera is not known.
     pub limb_in_view_px: Option<f64>,
-    /// How far off the answer is, where there is one.
+    /// Error of the answer; `None` without an answer.
     pub miss: Option<Miss>,
 }
 
 impl Case {
-    /// What [`Self::off_axis_deg`] is called with this body.
+    /// Returns the name of [`Self::off_axis_deg`] for this body.
     pub fn off_axis_name(&self) -> &'static str {
         if in_the_sky(&self.body) { "off axis" } else { "off nadir" }
     }
 }
 
-/// How far an answer is off.
+/// Error of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Miss {
     /// Angle between answer and truth in degrees.
     pub angle_deg: f64,
-    /// The rotation that takes the answer to the truth, about the camera's x, y and z axes, in degrees. For a camera
-    /// that looks along the horizon x is its pitch and z its roll.
+    /// Rotation from the answer to the truth, about the camera's x, y and z axes, in degrees. For a camera that looks
+    /// along the horizon, x is its pitch and z is its roll.
     pub about_deg: [f64; 3],
-    /// The larger of the two standard deviations that the answer claims, in degrees.
+    /// The larger of the two standard deviations of the answer's covariance, in degrees.
     pub sigma_max_deg: f64,
-    /// Squared error over covariance on the tangent plane, two degrees of freedom; `None` when the covariance is
-    /// singular there.
+    /// Normalised estimation error squared (NEES) on the tangent plane, with two degrees of freedom. It is `None` if
+    /// the covariance is singular there.
     pub nees: Option<f64>,
-    /// Half-angle that was found over the true one; `None` when none was given, and of the Sun, which blooms.
+    /// Measured half-angle divided by the true one. It is `None` if the answer has no half-angle, and for the Sun
+    /// because it blooms.
     pub half_angle_ratio: Option<f64>,
-    /// The error of the direction in true half-angles.
+    /// Error of the direction divided by the true half-angle.
     pub half_angles: f64,
 }
 
 impl Miss {
-    /// Of one direction against the truth; `None` when either is no direction.
+    /// Compares one direction with the truth; returns `None` if either vector has no length.
     pub fn new(found: &MeasuredDirection, truth_axis: [f64; 3], truth_half_angle_deg: f64) -> Option<Self> {
         let unit = |v: [f64; 3]| Vector3::from(v).try_normalize(1e-12);
         let (e, truth) = (unit(found.axis)?, unit(truth_axis)?);
@@ -99,11 +100,11 @@ impl Miss {
         let about_deg = cross.try_normalize(1e-300).map_or([0.0; 3], |n| (n * angle_deg).into());
         let [xx, xy, xz, yy, yz, zz] = found.covariance_rad2;
         let p = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        // In the tangent plane of the answer, where the covariance lives.
+        // The covariance is defined in the tangent plane of the answer.
         let across = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
         let basis = nalgebra::Matrix3x2::from_columns(&[across, e.cross(&across)]);
         let tangent = basis.transpose() * p * basis;
-        // By length of arc, so that large errors are not foreshortened.
+        // The error is an arc length, so large errors are not foreshortened.
         let d = basis.transpose() * truth;
         let d = d * (angle_deg.to_radians() / d.norm().max(1e-300));
         let nees = tangent.cholesky().map(|c| d.dot(&c.solve(&d))).filter(|x| x.is_finite());
@@ -118,7 +119,7 @@ impl Miss {
     }
 }
 
-/// Why answers and truth do not belong together; displayed with the first name that does not fit.
+/// The reason why answers and truth do not match; the message names the first picture that does not fit.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Mismatch {
     /// An answer whose picture has no truth.
@@ -129,7 +130,7 @@ pub enum Mismatch {
         /// The body.
         body: String,
     },
-    /// An answer about another body than the truth of its picture.
+    /// An answer about a body that differs from the body of the picture's truth.
     #[error("{file}: the results are about {body}, the truth about {truth}: set [body] kind to {truth}")]
     Body {
         /// Name of the picture.
@@ -139,7 +140,7 @@ pub enum Mismatch {
         /// The body of the truth.
         truth: String,
     },
-    /// A truth whose picture was not answered, not even with a status.
+    /// A truth whose picture has no result, not even a status.
     #[error("{file} ({body}) has a row in the truth but none among the results: was the run cut off?")]
     NoAnswer {
         /// Name of the picture.
@@ -147,14 +148,14 @@ pub enum Mismatch {
         /// The body.
         body: String,
     },
-    /// A picture and body that stand twice.
+    /// A picture and body that occur twice.
     #[error("{file} ({body}) stands twice {among}")]
     Twice {
         /// Name of the picture.
         file: String,
         /// The body.
         body: String,
-        /// Where: `among the results` or `in the truth`.
+        /// Place of the repetition: `among the results` or `in the truth`.
         among: &'static str,
     },
     /// No answers at all.
@@ -162,16 +163,16 @@ pub enum Mismatch {
     Empty,
 }
 
-/// The name without folders, as truth.csv has it.
+/// Returns the name without folders, as in truth.csv.
 fn base(file: &str) -> &str {
     file.rsplit(['/', '\\']).next().unwrap_or(file)
 }
 
-/// Puts every answer beside the truth of its picture and body, in the order of the truth. Truths of bodies that no
-/// answer is about are passed over. `camera` serves [`Case::limb_in_view_px`].
+/// Pairs every answer with the truth of its picture and body, in the order of the truth. Truths about bodies without
+/// any answer are skipped. `camera` is needed only for [`Case::limb_in_view_px`].
 ///
 /// # Errors
-/// The first answer or truth that has no counterpart, or that stands twice.
+/// Fails if there are no answers, and for the first answer or truth that has no counterpart or occurs twice.
 pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -> Result<Vec<Case>, Mismatch> {
     let mut by_name: HashMap<(&str, &str), &Answer> = HashMap::new();
     for a in answers {
@@ -216,7 +217,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
             off_axis_deg: axis[0].hypot(axis[1]).atan2(axis[2]).to_degrees(),
             limb_in_view_px: camera.map(|c| limb_in_view_px(c, axis, t.half_angle_deg.to_radians())),
             miss: answer.found.and_then(|f| {
-                // The Sun blooms: its size is no measure.
+                // The Sun blooms, so its apparent size says nothing about the sensor.
                 let half_angle_deg = f.half_angle_deg.filter(|_| t.body != Kind::Sun.name());
                 Miss::new(&MeasuredDirection { half_angle_deg, ..f }, axis, t.half_angle_deg)
             }),
@@ -225,8 +226,8 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
     Ok(cases)
 }
 
-/// Length in pixels of the part of a cone about `axis` (camera frame) that is in the picture and within the image
-/// circle, whether it is lit or not.
+/// Returns the length in pixels of the part of a cone about `axis` (camera frame) that is in the picture and in the
+/// image circle, lit or not.
 pub fn limb_in_view_px(camera: &Camera<f64>, axis: [f64; 3], half_angle_rad: f64) -> f64 {
     const STEPS: usize = 4096;
     let Some(e) = Vector3::from(axis).try_normalize(1e-12) else { return 0.0 };

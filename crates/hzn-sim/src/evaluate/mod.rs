@@ -1,4 +1,5 @@
-//! Answers of the sensor beside the truth: how many, how good, how honest.
+//! Answers of the sensor compared with the truth: how many there are, how accurate they are, and whether their
+//! covariances are right.
 //!
 //! ```text
 //!   answers ─┐
@@ -6,8 +7,9 @@
 //!   truth  ──┘
 //! ```
 //!
-//! Nothing is left out quietly: an answer without a truth and a truth without an answer are a [`Mismatch`], a frame
-//! that was not answered counts as such, and an answer where no limb is in view counts as a false one.
+//! Nothing is left out silently. An answer without a truth is a [`Mismatch`], and so is a truth without an answer. A
+//! picture that was not answered counts as unanswered. An answer to a picture without a limb in view counts as a false
+//! answer.
 
 mod case;
 mod honesty;

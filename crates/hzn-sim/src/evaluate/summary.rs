@@ -1,4 +1,4 @@
-//! Many cases in a few numbers.
+//! A summary of many cases.
 
 use std::collections::BTreeMap;
 
@@ -7,97 +7,97 @@ use serde::Serialize;
 use super::case::Case;
 use super::honesty::Honesty;
 
-/// HORACE counts an answer when radius and centre are right to this part of the radius.
+/// HORACE counts an answer as a success if radius and centre are right within this fraction of the radius.
 const HORACE_PART: f64 = 0.1;
-/// About so many rows a group has.
+/// Approximate number of rows in a group.
 const ROWS: f64 = 6.0;
 
-/// A run against its truth, for one body.
+/// A run compared with its truth, for one body.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
     /// The body's kind.
     pub body: String,
-    /// Pictures.
+    /// Number of pictures.
     pub frames: usize,
-    /// Pictures with a limb in view.
+    /// Number of pictures with a limb in view.
     pub with_limb: usize,
-    /// Of these, answered.
+    /// Number of answered pictures with a limb in view.
     pub answered: usize,
-    /// Pictures with a limb in view that were not answered, by their status.
+    /// Number of pictures with a limb in view that were not answered, by status.
     pub unanswered: BTreeMap<&'static str, usize>,
-    /// Pictures that were answered though no limb is in view.
+    /// Number of answered pictures without a limb in view.
     pub false_answers: usize,
-    /// Errors of the answers where a limb is in view; `None` without any.
+    /// Errors of the answers to pictures with a limb in view; `None` if there are none.
     pub errors: Option<Errors>,
-    /// Whether the covariances say so; `None` without answers.
+    /// Comparison of these errors with their covariances; `None` if there are no answers.
     pub honesty: Option<Honesty>,
-    /// HORACE's own criteria.
+    /// Result by the criteria of HORACE.
     pub horace: Horace,
-    /// The same by altitude, by angle off nadir (of Sun and Moon: off axis), by length of limb in view. One that does
-    /// not vary is left out.
+    /// Results by altitude, by angle off nadir (off axis for Sun and Moon), and by length of limb in view. A quantity
+    /// that does not vary is left out.
     pub groups: Vec<Group>,
 }
 
-/// Errors of many answers, angles in degrees.
+/// Errors of many answers, all angles in degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Errors {
-    /// Answers.
+    /// Number of answers.
     pub answers: usize,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms_deg: f64,
-    /// Half are below.
+    /// Median.
     pub median_deg: f64,
-    /// 95 % are below.
+    /// 95th percentile.
     pub p95_deg: f64,
-    /// The largest.
+    /// Largest error.
     pub worst_deg: f64,
-    /// Mean of the rotation from answer to truth about the camera's x, y, z axes.
+    /// Mean rotation from answer to truth, about the camera's x, y, z axes.
     pub mean_about_deg: [f64; 3],
-    /// Root of its mean square about the camera's x, y, z axes.
+    /// RMS rotation from answer to truth, about the camera's x, y, z axes.
     pub rms_about_deg: [f64; 3],
 }
 
-/// The success criteria of HORACE (Barf 2014; Barf et al. 2015), said in angles instead of pixels of a picture: radius
-/// is the half-angle of the half-angle-free fit, centre the direction.
+/// The success criteria of HORACE (Barf 2014; Barf et al. 2015), in angles instead of pixels. The radius is the
+/// half-angle of the half-angle-free fit, and the centre is the direction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Horace {
-    /// Share of the pictures with a limb whose answer has its radius within 10 %, and its centre within 10 % of the
-    /// radius. NaN when there are none.
+    /// Share of the pictures with a limb whose answer has the radius right within 10 %, and the centre right within
+    /// 10 % of the radius. It is NaN if there are no pictures with a limb.
     pub success: f64,
-    /// Share of the pictures with a limb that were not answered so. Their goal was below 10 %.
+    /// Share of the pictures with a limb that are not a success. HORACE's goal was below 10 %.
     pub false_negatives: f64,
-    /// Share of the pictures without a limb that were answered; `None` when there are none.
+    /// Share of the pictures without a limb that were answered; `None` if there are no pictures without a limb.
     pub false_positives: Option<f64>,
 }
 
-/// Cases in ranges of one quantity.
+/// Cases, grouped by ranges of one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Group {
-    /// The quantity, such as `altitude`.
+    /// Name of the quantity, for example `altitude`.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit of the quantity.
     pub unit: &'static str,
-    /// Its ranges, rising; empty ones are left out.
+    /// Ranges in rising order; empty ones are left out.
     pub rows: Vec<GroupRow>,
 }
 
-/// Cases whose quantity is within a range.
+/// Cases whose quantity is within one range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GroupRow {
-    /// The range: from, and up to but without.
+    /// The range: the lower limit is included, the upper limit is not.
     pub range: [f64; 2],
-    /// Pictures with a limb in view.
+    /// Number of pictures with a limb in view.
     pub with_limb: usize,
-    /// Of these, answered.
+    /// Number of answered pictures with a limb in view.
     pub answered: usize,
-    /// Their errors.
+    /// Errors of these answers; `None` if there are none.
     pub errors: Option<Errors>,
-    /// Their honesty.
+    /// Comparison of these errors with their covariances; `None` if there are no answers.
     pub honesty: Option<Honesty>,
 }
 
 impl Evaluation {
-    /// Of cases, one evaluation a body, in the order in which bodies come.
+    /// Makes one evaluation per body, in the order in which the bodies first occur.
     pub fn by_body(cases: &[Case]) -> Vec<Self> {
         let mut bodies: Vec<&str> = Vec::new();
         for case in cases {
@@ -109,7 +109,7 @@ impl Evaluation {
         bodies.iter().map(|body| Self::new(&of(body))).collect()
     }
 
-    /// Of the cases of one body.
+    /// Evaluates the cases of one body.
     pub fn new(cases: &[&Case]) -> Self {
         let with_limb: Vec<&Case> = cases.iter().copied().filter(|c| c.limb).collect();
         let without = cases.len() - with_limb.len();
@@ -146,7 +146,7 @@ impl Evaluation {
         }
     }
 
-    /// Pictures with a limb in view that were answered, as a share; NaN when there are none.
+    /// Returns the share of pictures with a limb in view that were answered; NaN if there are no pictures with a limb.
     pub fn answered_share(&self) -> f64 {
         self.answered as f64 / self.with_limb as f64
     }
@@ -165,7 +165,7 @@ fn honesty(cases: &[&Case]) -> Option<Honesty> {
 }
 
 impl Errors {
-    /// Of the answers among some cases; `None` without any.
+    /// Summarises the errors of the answers among `cases`; returns `None` if there are no answers.
     fn new(cases: &[&Case]) -> Option<Self> {
         let misses: Vec<_> = cases.iter().filter_map(|c| c.miss).collect();
         let mut sorted: Vec<f64> = misses.iter().map(|m| m.angle_deg).collect();
@@ -184,7 +184,8 @@ impl Errors {
     }
 }
 
-/// The value below which the share `p` of sorted values is, linear between neighbours; NaN without any.
+/// Returns the value below which the share `p` of the sorted values lies. It is linear between neighbours, and NaN if
+/// there are no values.
 pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
     let place = p * sorted.len().saturating_sub(1) as f64;
     let (below, part) = (place.floor() as usize, place.fract());
@@ -196,7 +197,8 @@ pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
 }
 
 impl Group {
-    /// In ranges of about a sixth of where the values are; `None` when they are all alike, or not known.
+    /// Groups the cases into ranges of about one sixth of the spread of the values. Returns `None` if the values are
+    /// all alike or not known.
     fn new(
         name: &'static str,
         unit: &'static str,
@@ -206,7 +208,7 @@ impl Group {
         let values: Vec<f64> = cases.iter().map(|c| value(c)).collect::<Option<_>>()?;
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)));
         let step = nice_step((high - low) / ROWS)?;
-        // A spread that tells nothing apart makes no table.
+        // A spread below 1 % of the values separates nothing, so it gets no table.
         if high - low < 0.01 * high.abs() {
             return None;
         }
@@ -228,7 +230,8 @@ impl Group {
     }
 }
 
-/// The next of 1, 2, 5, 10, … (times a power of ten) that is not below; `None` for what has no size.
+/// Returns the smallest of 1, 2, 5, 10, … (times a power of ten) that is at least `at_least`. Returns `None` if
+/// `at_least` is not positive and finite.
 pub(super) fn nice_step(at_least: f64) -> Option<f64> {
     if !(at_least > 0.0 && at_least.is_finite()) {
         return None;

@@ -5,7 +5,7 @@ use crate::truth::Truth;
 use hzn_core::camera::{Camera, Config, Model};
 use hzn_core::status::Status;
 
-/// Down along the picture's y axis, half-angle 60°.
+/// The limb axis points down, along the picture's y axis; the half-angle is 60°.
 fn truth(file: &str, limb: u8) -> Truth {
     Truth {
         file: file.into(),
@@ -19,13 +19,14 @@ fn truth(file: &str, limb: u8) -> Truth {
     }
 }
 
-/// Off by a turn of `x_deg` about x and of `z_deg` about z, sigmas 0.1° (about x) and 0.2° (about z).
+/// The answer is off by a turn of `x_deg` about x and of `z_deg` about z. Its sigmas are 0.1° (about x) and 0.2°
+/// (about z).
 fn answer(file: &str, x_deg: f64, z_deg: f64) -> Answer {
     let (x, z) = (x_deg.to_radians(), z_deg.to_radians());
-    // The truth is the answer turned by (x, 0, z): to first order answer = (0, 1, 0) − (x, 0, z) × (0, 1, 0).
+    // The truth is the answer turned by (x, 0, z). To first order, answer = (0, 1, 0) − (x, 0, z) × (0, 1, 0).
     let axis = [z, 1.0, -x];
     let (a, b) = (0.1f64.to_radians(), 0.2f64.to_radians());
-    // A turn about z moves the x component, one about x the z component.
+    // A turn about z moves the x component, and a turn about x moves the z component.
     let covariance_rad2 = [b * b, 0.0, 0.0, 0.0, 0.0, a * a];
     let found = MeasuredDirection { axis, covariance_rad2, half_angle_deg: Some(60.0) };
     Answer { file: file.into(), body: "earth".into(), status: Status::Ok, found: Some(found) }
@@ -41,7 +42,7 @@ fn errors_by_axis_and_their_sigmas() {
     let m = cases[0].miss.unwrap();
     assert!((m.angle_deg - 0.17f64.sqrt()).abs() < 1e-5, "{m:?}");
     assert!((m.about_deg[0] - 0.1).abs() < 1e-5 && (m.about_deg[2] + 0.4).abs() < 1e-5 && m.about_deg[1].abs() < 1e-5);
-    // One sigma about x and two about z: 1 + 4.
+    // The error is one sigma about x and two sigma about z: 1 + 4.
     assert!((m.nees.unwrap() - 5.0).abs() < 1e-3 && (m.sigma_max_deg - 0.2).abs() < 1e-5);
     assert_eq!((m.half_angle_ratio, cases[0].off_axis_deg), (Some(1.0), 90.0));
 }
@@ -69,7 +70,7 @@ fn shares_count_every_picture() {
         answer("x/a", 0.3, 0.0),
         answer("x/b", 0.0, 0.4),
         none("x/c", Status::NoLimb),
-        // 8° of 60° is more than a tenth.
+        // An error of 8° at a half-angle of 60° is more than a tenth.
         answer("x/d", 8.0, 0.0),
         answer("x/e", 0.0, 0.0),
         none("x/f", Status::NoLimb),
@@ -82,7 +83,7 @@ fn shares_count_every_picture() {
     assert_eq!((e.horace.success, e.horace.false_negatives, e.horace.false_positives), (0.5, 0.5, Some(0.5)));
     let errors = e.errors.unwrap();
     assert!((errors.median_deg - 0.4).abs() < 1e-4 && (errors.worst_deg - 8.0).abs() < 0.06);
-    // The answer without a limb in view is no part of the errors.
+    // The answer without a limb in view is not part of the errors.
     assert_eq!((errors.answers, e.honesty.unwrap().answers), (3, 3));
 }
 
@@ -126,7 +127,7 @@ fn bodies_are_evaluated_apart_and_unasked_ones_passed_over() {
     let cases = pair(&[of("earth", 0.1), of("moon", 0.5)], &[body("earth"), body("sun"), body("moon")], None).unwrap();
     let all = Evaluation::by_body(&cases);
     assert_eq!(all.iter().map(|e| (e.body.as_str(), e.frames)).collect::<Vec<_>>(), [("earth", 1), ("moon", 1)]);
-    // The Moon has no nadir, and a camera no altitude above it.
+    // The Moon has no nadir, and the camera has no altitude above it.
     let names: Vec<_> = cases.iter().map(|c| (c.altitude_km.is_some(), c.off_axis_name())).collect();
     assert_eq!(names, [(true, "off nadir"), (false, "off axis")]);
 }
@@ -138,7 +139,7 @@ fn groups_have_nice_ranges_and_hold_every_case() {
     let answers: Vec<Answer> = many.iter().map(|t| answer(&t.file, 0.01, 0.0)).collect();
     let cases = pair(&answers, &many, None).unwrap();
     let e = &Evaluation::by_body(&cases)[0];
-    // Off nadir is the same for all, the camera is not known: only the altitude varies.
+    // The angle off nadir is the same for all pictures and the camera is not known, so only the altitude varies.
     let [by_altitude] = e.groups.as_slice() else { panic!("{:?}", e.groups) };
     assert_eq!((by_altitude.name, by_altitude.rows.first().unwrap().range), ("altitude", [50.0, 100.0]));
     assert_eq!(by_altitude.rows.iter().map(|r| r.with_limb).sum::<usize>(), 24);
@@ -146,7 +147,7 @@ fn groups_have_nice_ranges_and_hold_every_case() {
 
 #[test]
 fn intervals_are_those_of_chi_square() {
-    // Tables: χ² of 20 degrees of freedom has 9.591 and 34.170 at 2.5 % and 97.5 %; n = 10.
+    // Tables give 9.591 and 34.170 for χ² of 20 degrees of freedom at 2.5 % and 97.5 %; n = 10.
     let [low, high] = interval(10);
     assert!((low - 0.9591).abs() < 1e-4 && (high - 3.4170).abs() < 1e-4, "{low} {high}");
     let h = Honesty::from_nees(&[2.0; 10]).unwrap();
@@ -171,7 +172,7 @@ fn limb_in_view_is_the_circumference_of_a_whole_disc() {
     let whole = limb_in_view_px(&camera, [0.0, 0.0, 1.0], 0.1);
     assert!((whole - core::f64::consts::TAU * 500.0 * 0.1f64.tan()).abs() < 0.01);
     assert_eq!(limb_in_view_px(&camera, [0.0, 0.0, -1.0], 0.1), 0.0);
-    // Half of it beyond the left border; a pinhole stretches towards its corners.
+    // Half of the disc is beyond the left border; a pinhole camera stretches the picture towards its corners.
     let half = limb_in_view_px(&camera, [-320.0, 0.0, 500.0], 0.1);
     assert!(half > 0.55 * whole && half < 0.7 * whole, "{half} {whole}");
 }

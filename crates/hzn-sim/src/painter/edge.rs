@@ -1,11 +1,11 @@
-//! How much of a pixel's light is the body's, by height above the limb.
+//! The body's share of a pixel's light, by height above the limb.
 
 use crate::scene::Profile;
 
-/// Points across a pixel where it is averaged by sampling.
+/// Number of points along each side of a pixel that is averaged by sampling.
 const SAMPLES: i32 = 5;
 
-/// The limb's profile, prepared: the body's share of the light by tangent height above the limb height.
+/// The limb's profile, prepared for rendering: the body's share of the light by tangent height above the limb height.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Edge {
     Sharp,
@@ -23,20 +23,20 @@ impl Edge {
         }
     }
 
-    /// Share at a height in metres above the limb.
+    /// Returns the share at a height in metres above the limb.
     #[inline(always)]
     pub(super) fn at(&self, height_m: f64) -> f32 {
         match *self {
             Self::Sharp => f32::from(u8::from(height_m <= 0.0)),
             Self::Exponential { per_m, knee_m } => {
                 let scales = ((height_m - knee_m) * per_m) as f32;
-                // Less than a millionth of the light is none.
+                // Less than a millionth of the light counts as none.
                 if scales > 14.0 { 0.0 } else { libm::expf(-scales.max(0.0)) }
             }
         }
     }
 
-    /// Mean share over a pixel with this height in its middle and this gradient in metres a pixel.
+    /// Returns the mean share over a pixel with this height in its middle and this gradient in metres per pixel.
     pub(super) fn mean(&self, height_m: f64, [gu, gv]: [f64; 2]) -> f32 {
         match self {
             Self::Sharp => {
@@ -61,11 +61,11 @@ impl Edge {
     }
 }
 
-/// Share of a unit square that lies in a half plane whose border, with normal (nx, ny), passes `inside` beyond the
-/// square's middle (positive when the middle is inside).
+/// Returns the share of a unit square that is in a half plane. Its border has the normal (nx, ny) and passes `inside`
+/// beyond the square's middle (positive if the middle is in the half plane).
 fn half_plane(inside: f64, nx: f64, ny: f64) -> f64 {
     let (a, b) = (nx.abs().max(ny.abs()), nx.abs().min(ny.abs()));
-    // The share is the integral of a trapezoid: a box of width a smoothed by one of width b.
+    // The share is the integral of a trapezoid, which is a box of width a smoothed by a box of width b.
     let d = inside.abs();
     let share = if d <= 0.5 * (a - b) {
         0.5 + d / a

@@ -1,4 +1,4 @@
-//! Where the light falls on the body.
+//! The distribution of light on the body.
 
 use hzn_core::ellipsoid::LimbCone;
 use nalgebra::Vector3;
@@ -8,7 +8,7 @@ use crate::globe::{Globe, RayHit, View};
 use crate::scene::{Light, Scene};
 use crate::texture::smoothstep;
 
-/// [`Light`], prepared.
+/// [`Light`], prepared for rendering.
 #[derive(Debug, Clone)]
 pub(super) enum Lamp {
     Full,
@@ -42,7 +42,7 @@ impl Lamp {
         })
     }
 
-    /// How much of the light falls where the ray meets the body, 0 to 1.
+    /// Returns the share of light that falls where the ray meets the body, 0 to 1.
     #[inline(always)]
     pub(super) fn at(&self, view: &View, sight: &RayHit, point: &Vector3<f64>) -> f32 {
         let x = match self {

@@ -1,4 +1,4 @@
-//! Every value of a scenario against its limits.
+//! Checks of every value of a scenario against its limits.
 
 use hzn_core::body::Kind;
 use hzn_core::camera::Camera;
@@ -8,12 +8,12 @@ use crate::scene::World;
 use crate::texture::Clouds;
 use crate::utc;
 
-/// A key, its value, and the least and the most that it may be.
+/// A key, its value, and the smallest and largest allowed value.
 struct Limit(String, f64, [f64; 2]);
 
 /// No upper limit.
 const ANY: f64 = f64::INFINITY;
-/// Above 0, for what is divided by.
+/// Lower limit "above 0", for divisors.
 const SOME: f64 = 1e-9;
 
 impl Limit {
@@ -38,10 +38,10 @@ impl Limit {
 }
 
 impl Scenario {
-    /// The first value out of its limits.
+    /// Checks all values.
     ///
     /// # Errors
-    /// Which, and the limit.
+    /// Returns the first value that is out of its limits, with the limit.
     pub fn check(&self) -> Result<(), ScenarioError> {
         if self.name.is_empty() || !self.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
             return Err(ScenarioError::new("name", "must be letters, digits, - and _: pictures are called after it"));
@@ -84,7 +84,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// Limits of single numbers, in the order of the file.
+    /// Returns the limits of single numbers, in the order of the file.
     fn limits(&self) -> Vec<Limit> {
         let share = [0.0, 1.0];
         let Self { capture, optics, shutter, exposure, detector, known, .. } = self;

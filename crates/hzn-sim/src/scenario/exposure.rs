@@ -1,4 +1,4 @@
-//! How bright pictures become.
+//! The exposure of the pictures.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,12 +9,14 @@ use crate::scene::Scene;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Exposure {
-    /// What light is multiplied by; with a target, only at the first picture.
+    /// Factor on the light. It has no effect if `target_mean` is set.
     pub gain: f64,
-    /// Mean brightness the controller wants, fraction of full scale before the tone curve; none: the gain is fixed.
+    /// Mean brightness that the controller aims at, as a fraction of full scale before the tone curve. Without it the
+    /// gain is fixed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_mean: Option<f64>,
-    /// Time in which the controller makes up for 63 % of what is wrong, seconds; 0: every picture is right at once.
+    /// Time in which the controller corrects 63 % of an error, seconds. With 0 every picture has the right gain at
+    /// once.
     pub lag_s: f64,
     /// Smallest and largest gain of the controller.
     pub limits: [f64; 2],
@@ -26,11 +28,11 @@ impl Default for Exposure {
     }
 }
 
-/// Pictures are measured this many times smaller.
+/// Factor by which pictures are reduced to measure their mean light.
 const REDUCED: f64 = 24.0;
 
 impl Exposure {
-    /// Sets the exposure of scenes in the order of time.
+    /// Sets the exposure of scenes that are in the order of time.
     pub(crate) fn set(&self, scenes: &mut [(f64, Scene)]) -> Result<(), SceneError> {
         let mut gain = self.gain;
         let mut last: Option<f64> = None;
@@ -42,7 +44,7 @@ impl Exposure {
                     Some(before) if self.lag_s > 0.0 => 1.0 - libm::exp(-(*time_s - before) / self.lag_s),
                     _ => 1.0,
                 };
-                // In stops, as apertures and exposure times are set.
+                // The gain changes in stops, like apertures and exposure times.
                 gain *= libm::pow(right / gain, share);
                 last = Some(*time_s);
             }
@@ -52,7 +54,7 @@ impl Exposure {
     }
 }
 
-/// Mean light of a picture at a gain of 1, from one of a few thousand pixels.
+/// Returns the mean light of a picture at a gain of 1, from a picture of only a few thousand pixels.
 fn mean_light(scene: &Scene) -> Result<f64, SceneError> {
     let c = &scene.camera;
     let scale = REDUCED.min(f64::from(c.width.min(c.height)) / 8.0).max(1.0);

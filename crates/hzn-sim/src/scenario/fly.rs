@@ -1,4 +1,4 @@
-//! From a scenario to scenes: a [`Flight`].
+//! The step from a scenario to scenes: a [`Flight`].
 
 use hzn_core::Preset;
 use hzn_core::body::Kind;
@@ -14,32 +14,32 @@ use crate::trajectory::Path;
 use crate::utc;
 use hzn_nav::ephemeris;
 
-/// Most pictures before a wanted one that the exposure is followed over.
+/// Largest number of pictures over which the exposure is followed before a wanted picture.
 const LEADS_MOST: f64 = 32.0;
-/// Pixels that a mask reaches beyond what it hides, as edges are blurred.
+/// Width in pixels by which a mask extends beyond the hidden part, because edges are blurred.
 const MASK_MARGIN_PX: f64 = 4.0;
 
 impl Scenario {
-    /// The pictures' times in seconds.
+    /// Returns the times of the pictures in seconds.
     pub fn times_s(&self) -> Vec<f64> {
         let c = &self.capture;
         let last = f64::from(c.frames.saturating_sub(1).max(1));
         (0..c.frames).map(|i| c.from_s + (c.to_s - c.from_s) * f64::from(i) / last).collect()
     }
 
-    /// Name of a picture's file, by its number.
+    /// Returns the file name of a picture by its number.
     pub fn file(&self, index: usize) -> String {
         format!("{}-{index:05}.{}", self.name, self.capture.format.ending())
     }
 
-    /// The sensor, with the noise model of the defaults; [`super::Fit`] brings one that fits.
+    /// Returns the sensor with the default noise model; [`super::Fit`] measures the noise model of the scenario.
     pub fn sensor(&self) -> hzn_core::Config {
         let preset = |kind: Kind| match kind {
             Kind::Sun => Preset::Sun,
             Kind::Moon => Preset::Moon,
             _ => Preset::Hzn,
         };
-        // Of several bodies the last is the faintest: its gates let the others through too.
+        // The last of several bodies is the faintest. Its gates also pass the others.
         let gates = self.bodies.last().copied().map_or(Preset::Hzn, preset);
         let mut sensor = hzn_core::Config::preset(gates, self.camera.clone());
         sensor.mount = self.mount;
@@ -50,7 +50,7 @@ impl Scenario {
         };
         match self.bodies.as_slice() {
             [one] => sensor.body = body(*one),
-            // No more than three, as `check` says.
+            // There are at most three bodies; `check` refuses more.
             several => {
                 let own = |kind: Kind| hzn_core::body::Config {
                     binarize: Some(hzn_core::Config::preset(preset(kind), self.camera.clone()).binarize),
@@ -62,22 +62,23 @@ impl Scenario {
         }
         for part in self.vehicle.iter().filter(|p| p.masked) {
             let polygon: region::Polygon = grown(&part.polygon_px, MASK_MARGIN_PX).into_iter().collect();
-            // More than eight masks are refused by `check`.
+            // `check` refuses more than eight masks.
             let _ = sensor.mask.polygons_px.push(polygon);
         }
         sensor
     }
 
-    /// Every picture's scene, in the order of time.
+    /// Returns the scenes of all pictures, in the order of time.
     ///
     /// # Errors
-    /// A value out of its limits, a camera inside the Earth, or nothing to be seen in any picture.
+    /// Fails if a value is out of its limits, if the camera is inside the Earth, or if no picture shows the body.
     pub fn flight(&self) -> Result<Flight, ScenarioError> {
         self.flight_at(&self.times_s())
     }
 
-    /// As [`Scenario::flight`], with pictures at these times instead of the capture's own. Way and attitude stay those
-    /// of the whole capture; the exposure, too, which has followed the pictures that the capture takes before.
+    /// Returns [`Scenario::flight`] with pictures at these times instead of the times of the capture. Trajectory and
+    /// attitude are those of the whole capture. The exposure follows the pictures that the capture would take before
+    /// each of these.
     pub(super) fn flight_at(&self, times_s: &[f64]) -> Result<Flight, ScenarioError> {
         self.check()?;
         let sensor = self.sensor();
@@ -111,18 +112,18 @@ impl Scenario {
         Ok(Flight { name: self.name.clone(), sensor, frames })
     }
 
-    /// The capture's own pictures between a picture and the next wanted one, as far back as the exposure controller
-    /// remembers.
+    /// Returns the times of the capture's pictures before a wanted picture: later than the picture before it, and
+    /// within the memory of the exposure controller.
     fn leads_s(&self, before_s: f64, time_s: f64) -> Vec<f64> {
         let [from_s, to_s] = self.span_s();
         let every_s = (to_s - from_s) / f64::from(self.capture.frames.saturating_sub(1).max(1));
         if self.exposure.target_mean.is_none() || !(every_s > 0.0) {
             return Vec::new();
         }
-        // Of a step 1 % is left after 4.6 lags.
+        // After 4.6 lags, 1 % of a step is left.
         let most = (4.6 * self.exposure.lag_s / every_s).ceil().min(LEADS_MOST) as u32;
         let at = |k: u32| time_s - f64::from(k) * every_s;
-        // Half a step of room: times are rounded.
+        // The times are rounded, so half a step is allowed.
         (1..=most).rev().map(at).filter(|&t| t >= from_s && t > before_s + 0.5 * every_s).collect()
     }
 
@@ -130,7 +131,7 @@ impl Scenario {
         let pose = path.camera(time_s);
         let unix_s = path.unix_s(time_s);
         let mut scene = Scene::new(self.camera.clone(), pose);
-        // The camera flies around the Earth, whatever it looks for.
+        // The camera flies around the Earth for every body that it looks for.
         scene.body = self.body_of(Kind::Earth);
         let altitude_km = crate::Globe::new(&scene.body).altitude_m(pose.position_m) * 1e-3;
         if !(altitude_km > scene.body.limb_height_km) {
@@ -174,10 +175,10 @@ impl Scenario {
         Ok(scene)
     }
 
-    /// Refuses a scenario in which the sensor's body is never in view.
+    /// Refuses a scenario in which the sensor's first body is never in view.
     fn something_is_seen(&self, scenes: &[(f64, Scene)]) -> Result<(), ScenarioError> {
         let kind = self.bodies.first().copied().unwrap_or_default();
-        // Some 200 pictures say enough about thousands.
+        // About 200 pictures represent thousands.
         let step = (scenes.len() / 200).max(1);
         for (_, scene) in scenes.iter().step_by(step).chain(scenes.last()) {
             if scene.visible_px(kind).map_err(|e| ScenarioError::new("[trajectory]", e.to_string()))? > 0.0 {
@@ -192,7 +193,7 @@ impl Scenario {
         Err(ScenarioError::new("[attitude]", what))
     }
 
-    /// What frames.csv says of a picture: the position with its error, and the attitude with its error where
+    /// Returns the row of frames.csv for a picture: the position with its error, and the attitude with its error if
     /// `[known]` has one.
     pub fn known_of(&self, frame: &FlightFrame) -> crate::flight::FrameRow {
         let draws = Counter::new(frame.scene.seed, Stream::Gnss);
@@ -211,7 +212,7 @@ impl Scenario {
     }
 }
 
-/// A polygon with its corners moved outward, away from their middle.
+/// Returns a polygon with its corners moved outward, away from their middle.
 fn grown(corners: &[[f64; 2]], by_px: f64) -> Vec<[f64; 2]> {
     let n = corners.len().max(1) as f64;
     let middle = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / n);
@@ -219,7 +220,7 @@ fn grown(corners: &[[f64; 2]], by_px: f64) -> Vec<[f64; 2]> {
         .iter()
         .map(|c| {
             let d = [c[0] - middle[0], c[1] - middle[1]];
-            // Along both axes, so that upright edges move by as much as asked for.
+            // Both coordinates move by the same amount, so that upright edges move by `by_px`.
             [0, 1].map(|i| c[i] + by_px * d[i].signum() * f64::from(u8::from(d[i] != 0.0)))
         })
         .collect()

@@ -1,9 +1,8 @@
-//! A whole simulated sequence in one description: what a `scene.toml` says.
+//! A whole simulated sequence in one description: the content of a `scene.toml`.
 //!
-//! A [`Scenario`] becomes a [`Flight`](crate::Flight): scenes with truth, and the sensor that took them. [`BUILTIN`]
-//! are the scenes that come with hzn. Reading a file (with lines and suggestions in errors) is the command line's
-//! business; every value is checked here, by [`Scenario::check`], and whether anything can be seen, by
-//! [`Scenario::flight`].
+//! A [`Scenario`] becomes a [`Flight`](crate::Flight): scenes with truth, and the sensor that takes them. [`BUILTIN`]
+//! has the scenes that come with hzn. The command line reads the file, with lines and suggestions in errors.
+//! [`Scenario::check`] checks every value, and [`Scenario::flight`] checks that something can be seen.
 
 mod check;
 mod exposure;
@@ -28,7 +27,7 @@ use crate::trajectory::instruments::{Gnss, Imu};
 use crate::trajectory::{Attitude, Path, Trajectory};
 use crate::utc;
 
-/// Scenes that come with hzn: name, what it is, its scene.toml.
+/// Scenes that come with hzn: name, description, text of the scene.toml.
 pub const BUILTIN: [(&str, &str, &str); 8] = [
     (
         "rocket",
@@ -64,51 +63,51 @@ pub const BUILTIN: [(&str, &str, &str); 8] = [
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// Short name; pictures are called after it.
+    /// Short name; the names of the pictures begin with it.
     pub name: String,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     #[serde(default = "one")]
     pub seed: u64,
-    /// UTC of time 0, as a TOML date and time: where Sun and Moon stand, and the season.
+    /// UTC of time 0, as a TOML date and time. It sets the positions of Sun and Moon, and the season.
     pub utc: toml::value::Datetime,
-    /// Bodies that the sensor looks for and truth.csv tells of: `earth`, `sun`, `moon`.
+    /// Bodies that the sensor looks for and that truth.csv lists: `earth`, `sun`, `moon`.
     #[serde(default = "earth")]
     pub bodies: Vec<Kind>,
-    /// When pictures are taken, and how they are written.
+    /// Times and file format of the pictures.
     pub capture: Capture,
     /// The lens and the size of the picture, as in sensor.toml.
     pub camera: camera::Config,
-    /// How the camera sits in the vehicle, as in sensor.toml.
+    /// Attitude of the camera on the vehicle, as in sensor.toml.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mount: Option<Mount>,
-    /// The way.
+    /// Trajectory of the vehicle.
     pub trajectory: Trajectory,
-    /// The attitude.
+    /// Attitude of the vehicle.
     pub attitude: Attitude,
-    /// What is seen.
+    /// World in front of the camera.
     pub world: World,
     /// Imperfections of the lens.
     #[serde(default)]
     pub optics: Optics,
-    /// How long a picture takes.
+    /// Exposure and readout time of a picture.
     #[serde(default)]
     pub shutter: Shutter,
-    /// How bright a picture becomes.
+    /// Gain of the pictures, or its controller.
     #[serde(default)]
     pub exposure: Exposure,
-    /// From light to numbers.
+    /// Detector, which turns light into numbers.
     #[serde(default)]
     pub detector: Detector,
     /// Parts of the vehicle in the picture.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vehicle: Vec<Part>,
-    /// What the sensor is told besides the pictures.
+    /// Prior that the sensor gets with the pictures.
     #[serde(default)]
     pub known: Known,
     /// Inertial sensors, for imu.csv.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imu: Option<Imu>,
-    /// Satellite receiver, for gnss.csv.
+    /// Satellite navigation receiver, for gnss.csv.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gnss: Option<Gnss>,
 }
@@ -120,21 +119,21 @@ fn earth() -> Vec<Kind> {
     vec![Kind::Earth]
 }
 
-/// `[capture]`: when pictures are taken.
+/// `[capture]`: times and file format of the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Capture {
     /// Time of the first picture, seconds from time 0.
     #[serde(default)]
     pub from_s: f64,
-    /// Time of the last picture.
+    /// Time of the last picture, seconds from time 0.
     pub to_s: f64,
-    /// How many, evenly in between, 1 to 100000.
+    /// Number of pictures, evenly spaced in time, 1 to 100000.
     pub frames: u32,
-    /// The files' format.
+    /// File format of the pictures.
     #[serde(default)]
     pub format: Format,
-    /// Quality of JPEG, 1 to 100.
+    /// Quality of JPEG files, 1 to 100.
     #[serde(default = "quality")]
     pub jpeg_quality: u8,
 }
@@ -147,15 +146,15 @@ fn quality() -> u8 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// Without loss; 8 or 16 bits.
+    /// Lossless; 8 or 16 bits.
     #[default]
     Png,
-    /// With loss; 8 bits.
+    /// With losses; 8 bits.
     Jpeg,
 }
 
 impl Format {
-    /// The files' ending.
+    /// Returns the ending of the file names, without a dot.
     pub fn ending(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -164,13 +163,13 @@ impl Format {
     }
 }
 
-/// `[shutter]`: how long a picture takes; all zero: none.
+/// `[shutter]`: exposure and readout time of a picture. If both are zero, a picture takes no time.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Shutter {
-    /// Exposure of a row, seconds.
+    /// Exposure time of a row, seconds.
     pub exposure_s: f64,
-    /// From the first row's exposure to the last one's, seconds; 0 is a global shutter.
+    /// Time from the first row's exposure to the last row's exposure, seconds; 0 is a global shutter.
     pub readout_s: f64,
 }
 
@@ -178,22 +177,23 @@ pub struct Shutter {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
-    /// Corners (x, y) in pixels; the last is joined to the first.
+    /// Corners (x, y) in pixels; the last corner is joined to the first.
     pub polygon_px: Vec<[f64; 2]>,
-    /// Light it sends, as a white surface under the Sun sends 1.
+    /// Brightness of the part; a white surface under the Sun has 1.
     pub brightness: f64,
-    /// Whether sensor.toml masks it, four pixels beyond its outline.
+    /// If true, sensor.toml masks the part, four pixels beyond its outline.
     #[serde(default)]
     pub masked: bool,
 }
 
-/// `[known]`: what frames.csv and sensor.toml say.
+/// `[known]`: errors of the prior in frames.csv and sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Known {
-    /// Error (1-sigma) of every component of the position, kilometres.
+    /// 1-sigma error of every component of the position, kilometres.
     pub position_sigma_km: f64,
-    /// Error (1-sigma, about each axis) of the prior attitude in frames.csv, degrees; none: it has no attitude.
+    /// 1-sigma error of the prior attitude in frames.csv about each axis, degrees. Without it frames.csv has no
+    /// attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attitude_sigma_deg: Option<f64>,
 }
@@ -204,13 +204,13 @@ impl Default for Known {
     }
 }
 
-/// Why a scenario cannot be.
+/// The reason why a scenario is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: {what}")]
 pub struct ScenarioError {
-    /// The key, as `[capture] frames`.
+    /// The key, for example `[capture] frames`.
     pub field: String,
-    /// What is wrong and what to do.
+    /// Description of the error, and how to correct it.
     pub what: String,
 }
 
@@ -227,19 +227,19 @@ impl From<(String, String)> for ScenarioError {
 }
 
 impl Scenario {
-    /// A scene that comes with hzn; `None` for another name.
+    /// Returns a scene that comes with hzn; `None` for an unknown name.
     ///
     /// # Panics
-    /// Never: the tests read every one.
+    /// Never: the tests read every built-in scene.
     pub fn builtin(name: &str) -> Option<Self> {
         let text = BUILTIN.iter().find(|b| b.0 == name)?.2;
         Some(toml::from_str(text).expect("built-in scenes are valid"))
     }
 
-    /// Reads the files that the scenario names (maps, tables); `folder` is where their paths start.
+    /// Reads the files that the scenario names (maps, tables); their paths are relative to `folder`.
     ///
     /// # Errors
-    /// One that cannot be read.
+    /// Fails if a file cannot be read.
     pub fn read_files(&mut self, folder: &FilePath) -> Result<(), ScenarioError> {
         if let World::Visible(world) = &mut self.world {
             world.ground.read_map(folder).map_err(|e| ScenarioError::new("[world] visible.ground.map", e))?;
@@ -253,7 +253,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// The paths of those files, each with a word for what it is.
+    /// Returns the paths of the files that the scenario names, each with a word for its content.
     pub fn files_mut(&mut self) -> Vec<(&'static str, &mut PathBuf)> {
         let world = match &mut self.world {
             World::Visible(world) => world.ground.map.as_mut().map(|map| ("map", map)),
@@ -267,24 +267,24 @@ impl Scenario {
         world.into_iter().chain(way).collect()
     }
 
-    /// UTC of time 0 in seconds since 1970.
+    /// Returns UTC of time 0 in seconds since 1970.
     pub fn start_unix_s(&self) -> f64 {
         utc::unix_s(&self.utc).unwrap_or(0.0)
     }
 
-    /// First and last time, seconds.
+    /// Returns the times of the first and the last picture, seconds.
     pub fn span_s(&self) -> [f64; 2] {
         [self.capture.from_s, self.capture.to_s]
     }
 
-    /// Way and attitude.
+    /// Prepares trajectory and attitude.
     ///
     /// # Errors
-    /// What cannot be, with its key.
+    /// Fails for an invalid value and names its key.
     pub fn path(&self) -> Result<Path, ScenarioError> {
         let mount = self.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
         let [from_s, to_s] = self.span_s();
-        // A second before and after, for exposures and rates at the ends; a table has no more than its rows.
+        // A table covers only its rows; the other trajectories need a span above zero.
         let span = match self.trajectory {
             Trajectory::Table(_) => [from_s, to_s],
             Trajectory::Rocket(_) | Trajectory::Orbit(_) => [from_s, to_s.max(from_s + 1e-3)],
@@ -292,7 +292,7 @@ impl Scenario {
         Ok(Path::try_new(&self.trajectory, &self.attitude, mount, span, self.start_unix_s(), self.seed)?)
     }
 
-    /// A body as the sensor is told of it, with the height at which the simulated limb stands.
+    /// Returns the sensor's configuration of a body, with the limb height of the simulated limb.
     pub fn body_of(&self, kind: Kind) -> body::Config {
         let limb_height_km = match (&self.world, kind) {
             (_, Kind::Sun | Kind::Moon) => 0.0,

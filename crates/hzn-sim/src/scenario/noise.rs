@@ -1,13 +1,17 @@
-//! The noise model that fits a scenario: how high its limb stands, and how edge points scatter about it.
+//! The noise model of a scenario: the height of its limb, and the scatter of edge points about it.
 //!
-//! Pictures of the same scenario with other seeds (other clouds, another drift) go through the sensor. Edge points that
-//! it holds for limb are compared with the exact limb: their mean height is the limb height, the scatter of the
-//! pictures' means its sigma. For a limb, each picture's own residuals then tell the noise (`covariance.noise =
-//! "rms"`): one picture may be far worse than the others, and it need not be among those that are measured. Where the
-//! residuals alone make the answers too sure, the model below is their floor. For Sun and Moon the model is told: a
-//! process along the edge with a variance and an integral length: of the lengths tried the likeliest, each with the
-//! variance that makes the answers' errors as large as they are said to be. (The points themselves do not tell the
-//! length: what turns an answer is alike along the whole edge, and small beside each one's noise.)
+//! Pictures of the same scenario with other seeds (other clouds, another drift) go through the sensor. The edge points
+//! that the sensor keeps are compared with the exact limb. Their mean height is the limb height, and the scatter of the
+//! pictures' means is its sigma.
+//!
+//! For a limb, the noise of each picture comes from its own residuals (`covariance.noise = "rms"`). The reason is that
+//! one picture may be far worse than the others, and it may not be among the measured ones. If the residuals alone give
+//! covariances that are too small, the model below is their floor.
+//!
+//! For Sun and Moon the sensor gets a fixed model: a process along the edge with a variance and an integral length. Of
+//! the tested lengths, the likeliest one is taken. For each length, the variance is chosen so that the errors of the
+//! answers are as large as their covariance. (The points themselves do not determine the length. The error that turns
+//! an answer is the same along the whole edge, and it is small compared with the noise of a point.)
 
 use hzn_calib::noise::{Points, Weighted};
 use hzn_core::body::{self, Kind};
@@ -24,49 +28,50 @@ use crate::globe::{Globe, View};
 use crate::picture::Picture;
 use crate::scene::World;
 
-/// What was measured of one body.
+/// Measured noise model of one body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
-    /// Which.
+    /// The body.
     pub body: Kind,
     /// Effective limb height in kilometres; 0 for Sun and Moon.
     pub limb_height_km: f64,
-    /// Standard deviation of the pictures' own limb heights, kilometres.
+    /// Standard deviation of the limb heights of the pictures, kilometres.
     pub limb_height_sigma_km: f64,
-    /// Whether the errors are the two values below in every picture, or each picture's residuals tell them.
+    /// Source of the noise: the two values below for every picture, or the residuals of each picture.
     pub noise: Noise,
-    /// Standard deviation of an edge point in pixels; with [`Noise::Rms`] its floor.
+    /// Standard deviation of an edge point in pixels; with [`Noise::Rms`] it is a floor.
     pub sigma_px: f64,
-    /// Integral length of the errors along the limb in pixels; with [`Noise::Rms`] its floor.
+    /// Integral length of the errors along the limb in pixels; with [`Noise::Rms`] it is a floor.
     pub correlation_px: f64,
-    /// Mean squared error over covariance with this model; 2 is ideal.
+    /// Mean NEES with this model; 2 is ideal.
     pub nees: f64,
-    /// Pictures with an answer, and how many were looked at.
+    /// Number of pictures with an answer, and number of examined pictures.
     pub frames: [usize; 2],
 }
 
-/// What is added to the scenario's seed, again and again, for the pictures that are measured; and how many seeds.
+/// Step from one seed of the measured pictures to the next. The first seed is one step above the scenario's seed.
 const OTHER_SEED: u64 = 7919;
+/// Number of other seeds that are measured.
 const SEEDS: u64 = 16;
-/// Pictures that a [`Fit`] is measured on where nobody says otherwise.
+/// Default number of pictures on which a [`Fit`] is measured.
 pub const MEASURED: u32 = 32;
-/// Integral lengths that are tried, pixels.
+/// Integral lengths that are tested, pixels.
 const LENGTHS_PX: [f64; 7] = [10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0];
-/// A mean NEES up to this is settled: 2 times the square of 1.15.
+/// Largest mean NEES of a settled model: 2 times the square of 1.15.
 const NEES_MOST: f64 = 2.645;
 /// Smallest sigma of an edge point, pixels.
 const LEAST_PX: f64 = 0.02;
-/// How often the sigmas are scaled at most.
+/// Largest number of times that the sigmas are scaled.
 const ROUNDS: u32 = 4;
-/// An error beyond this is a wrong answer, not a noisy one: 2 degrees.
+/// An answer with a larger error is wrong, not noisy: 2 degrees.
 const GROSS_RAD: f64 = std::f64::consts::PI / 90.0;
 
 impl Fit {
-    /// Measures `pictures` pictures of the scenario, spread over sixteen other seeds; `progress` hears of every one.
-    /// One fit a body, but for those of which too few pictures are answered to say anything.
+    /// Measures the noise model on `pictures` pictures of the scenario, spread over sixteen other seeds. `progress` is
+    /// called after every picture. There is one fit per body, except for bodies with too few answered pictures.
     ///
     /// # Errors
-    /// As [`crate::Scene::render`].
+    /// Fails like [`crate::Scene::render`].
     pub fn measure(
         scenario: &Scenario,
         pictures: u32,
@@ -75,7 +80,7 @@ impl Fit {
         let mut flights = Vec::new();
         for i in 1..=SEEDS {
             let other = Scenario { seed: scenario.seed.wrapping_add(i * OTHER_SEED), ..scenario.clone() };
-            // With another drift the limb may stay out of view: nothing to measure there.
+            // With another drift the limb may stay out of view; such a seed is skipped.
             flights.extend(other.flight_at(&spread_s(scenario.span_s(), i - 1, pictures)).ok());
         }
         let frames: Vec<&FlightFrame> = flights.iter().flat_map(|f| &f.frames).collect();
@@ -87,21 +92,21 @@ impl Fit {
         Ok(Self::of_pictures(scenario, &frames.into_iter().zip(&rendered).collect::<Vec<_>>()))
     }
 
-    /// As [`Fit::measure`], on pictures of the scenario that are rendered already, each with its frame.
+    /// Measures the noise model, like [`Fit::measure`], on pictures that are already rendered, each with its frame.
     pub fn of_pictures(scenario: &Scenario, seen: &[(&FlightFrame, &Picture)]) -> Vec<Self> {
         let sensor = scenario.sensor();
         let alone = |body: &body::Config| Config { body: body.clone(), bodies: Default::default(), ..sensor.clone() };
         sensor.each_body().iter().filter_map(|body| Self::new(scenario, &alone(body), seen)).collect()
     }
 
-    /// Of the one body that the sensor looks for.
+    /// Measures the noise model of the one body that the sensor looks for.
     fn new(scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, &Picture)]) -> Option<Self> {
         let kind = alone.body.kind;
-        // At first nothing is known of the limb's height, and points scatter by a pixel.
+        // In the first pass the limb height is unknown, and the points scatter by a pixel.
         let mut sensor = alone.clone();
         sensor.body.limb_height_sigma_km = 8.0;
         let first = look(scenario, &sensor, seen);
-        // Wrong answers would bring points that are not of the limb.
+        // Wrong answers would add points that are not on the limb.
         let most = 4.0 * median(first.iter().map(|l| l.error_rad));
         let answered: Vec<&Looked> = first.iter().filter(|l| l.error_rad <= most.min(0.02)).collect();
         if answered.len() < 4 {
@@ -109,7 +114,7 @@ impl Fit {
         }
         let mut pictures: Vec<Edge> =
             answered.iter().filter_map(|l| Edge::new(kind, l, sensor.body.limb_height_km)).collect();
-        // A picture far from all others is an answer on another edge: its direction is right by chance.
+        // A picture whose mean is far from all others has an answer on another edge; its direction is right by chance.
         let middle = median(pictures.iter().map(|p| p.mean_km));
         let usual = median(pictures.iter().map(|p| (p.mean_km - middle).abs()));
         pictures.retain(|p| (p.mean_km - middle).abs() <= 6.0 * usual.max(0.1));
@@ -130,13 +135,13 @@ impl Fit {
             nees: f64::NAN,
             frames: [answered.len(), seen.len()],
         };
-        // What the points of a picture share is in the limb height's sigma, so that no floor is left but that of
-        // rounding.
+        // The sigma of the limb height contains the error that the points of a picture share. The only floor left is
+        // the floor for rounding.
         let by_picture = Self { noise: Noise::Rms, sigma_px: LEAST_PX, correlation_px: 0.0, ..fit };
         let noise = if disc { Noise::Told } else { Noise::Rms };
         let by_itself = (!disc).then(|| by_picture.settled(scenario, alone, seen)).flatten();
         let by_itself = by_itself.filter(|(fit, _)| fit.nees <= NEES_MOST);
-        // What residuals do not show, such as light that clips along the limb, wants a floor.
+        // Errors that the residuals do not show, for example light that clips along the limb, need a floor.
         by_itself.map(|(fit, _)| fit).or_else(|| {
             let floors = LENGTHS_PX.map(|length| Self { noise, correlation_px: length, ..fit });
             let settled = floors.into_iter().map(|model| model.settled(scenario, alone, seen));
@@ -144,8 +149,8 @@ impl Fit {
         })
     }
 
-    /// With the sigmas at which the answers' errors are as large as they are said to be; and how unlikely these errors
-    /// are then: the mean of the negative log-likelihood, twice, but for a constant.
+    /// Scales the sigmas until the errors of the answers are as large as their covariance. Also returns how unlikely
+    /// these errors are: twice the mean negative log-likelihood, without a constant.
     fn settled(
         mut self,
         scenario: &Scenario,
@@ -166,7 +171,7 @@ impl Fit {
             self.nees = mean(&|l| l.nees);
             unlikely = mean(&|l| l.log_det) + self.nees;
             let scale = (self.nees / 2.0).sqrt().clamp(0.5, 2.5);
-            // What is told of the last model is what holds with it, settled or not.
+            // The reported values belong to the last model, settled or not.
             if (0.85..1.15).contains(&scale) || round == ROUNDS {
                 break;
             }
@@ -180,7 +185,7 @@ impl Fit {
 
     /// Writes the model of the body into a sensor that looks for it.
     pub fn apply(&self, sensor: &mut Config) {
-        // Two digits more than are known. Rows by latitude go up or down with the mean.
+        // The values keep two digits more than are significant. Rows by latitude move up or down with the mean.
         let digits = |x: f64| (x * 1e3).round() / 1e3;
         let noise = covariance::Config {
             method: sensor.covariance.method,
@@ -195,7 +200,7 @@ impl Fit {
             }
             body.limb_height_km = digits(self.limb_height_km);
             body.limb_height_sigma_km = digits(self.limb_height_sigma_km);
-            // The measured height is already that of clipped limbs.
+            // The measured height already includes clipped limbs.
             [body.clipped_height_km, body.clipped_sigma_km] = [0.0; 2];
         }
         if several {
@@ -206,25 +211,25 @@ impl Fit {
     }
 }
 
-/// Times at which pictures of the seed number `which` (from 0) are taken: together those of all seeds are `pictures`,
-/// spread evenly over the whole span, and each seed's own are far apart.
+/// Returns the times of the pictures of seed number `which` (from 0). The pictures of all seeds together are
+/// `pictures`, spread evenly over the whole span. The pictures of one seed are far apart.
 fn spread_s([from_s, to_s]: [f64; 2], which: u64, pictures: u32) -> Vec<f64> {
     let each = u64::from(pictures).div_ceil(SEEDS).max(2);
     let place = |k: u64| ((k * SEEDS + which) as f64 + 0.5) / (each * SEEDS) as f64;
     (0..each).map(|k| from_s + (to_s - from_s) * place(k)).collect()
 }
 
-/// The middle value.
+/// Returns the middle value.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// What the sensor says to one picture, beside the truth.
+/// The sensor's answer to one picture, compared with the truth.
 struct Looked<'a> {
     frame: &'a FlightFrame,
-    /// Edge points of the answer with their weights, in their order.
+    /// Edge points of the answer with their weights, in order.
     points: Weighted,
     error_rad: f64,
     nees: f64,
@@ -234,7 +239,8 @@ struct Looked<'a> {
 
 fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &[(&'a FlightFrame, &Picture)]) -> Vec<Looked<'a>> {
     let config = sensor.clone();
-    // A host sensor is some megabytes, and made on the stack before it is moved: more than a thread may have.
+    // A host sensor has some megabytes and is made on the stack before it is moved. The stack of a thread may be too
+    // small.
     let make = move || HostHorizon::new(&config).map(Box::new);
     let made = std::thread::Builder::new().stack_size(64 << 20).spawn(make).map(std::thread::JoinHandle::join);
     let Ok(Ok(Ok(mut horizon))) = made else { return Vec::new() };
@@ -252,7 +258,7 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &[(&'a FlightFrame, &Pic
         let points = watch.of_candidate(solution.candidate);
         let p = solution.covariance.rows();
         let e = Vector3::from(solution.axis.xyz());
-        // Rank 2: the null direction is filled up before inverting.
+        // The covariance has rank 2, so its null direction is filled before the inversion.
         let scale = p[0][0] + p[1][1] + p[2][2];
         let full = Matrix3::from_fn(|i, j| p[i][j] + scale * e[i] * e[j]);
         let d = Vector3::from(axis.xyz()) - e;
@@ -271,7 +277,7 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &[(&'a FlightFrame, &Pic
 struct Edge {
     /// Mean height above the assumed limb, kilometres.
     mean_km: f64,
-    /// Mean square of the errors along the normal without it.
+    /// Mean square of the errors along the normal, without their mean.
     variance_px2: f64,
 }
 
@@ -280,13 +286,13 @@ impl Edge {
         let scene = &looked.frame.scene;
         let readout_s = scene.motion.map_or(0.0, |motion| motion.readout_s);
         let camera = Camera::<f64>::try_new(&camera::Config { readout_s, ..scene.camera.clone() }).ok()?;
-        // Rays as at the time of the middle row, for which the truth holds.
+        // The rays are for the time of the middle row, because the truth holds for that time.
         let camera = camera.turning(looked.frame.known().rate_rad_s);
         let view = View::try_new(Globe::new(&scene.body).raised(limb_height_km * 1e3), &scene.pose)?;
         let truth = scene.truth_of(kind, "", 0.0).ok()?;
         let axis: UnitVec3<_, f64> = truth.axis()?;
         let disc = matches!(kind, Kind::Sun | Kind::Moon);
-        // How much higher the limb is over this latitude than on average, as the scene has it.
+        // `higher_km` is the height of the scene's limb at a latitude above the mean limb.
         let levels = match &scene.world {
             World::Infrared(world) => Some((world.half_levels(), world.mean_half_level_km())),
             World::Plain | World::Visible(_) => None,
@@ -295,7 +301,7 @@ impl Edge {
             let latitude_deg = libm::asin(up.z.clamp(-1.0, 1.0)).to_degrees();
             levels.as_ref().map_or(0.0, |(half_level_km, mean_km)| half_level_km(latitude_deg) - mean_km)
         };
-        // (off the limb outward, the same a pixel, weight)
+        // (distance outside the limb, the same per pixel, weight)
         let off: Vec<(f64, f64, f64)> = looked
             .points
             .iter()
@@ -339,7 +345,7 @@ mod tests {
         assert_eq!(spread_s([0.0, 32.0], 3, 1), [3.5, 19.5], "at least two a seed");
     }
 
-    /// A sigma so large that four scalings do not bring it down to the errors.
+    /// The start sigma is so large that four scalings do not bring it down to the errors.
     #[test]
     fn a_fit_that_does_not_settle_says_what_holds_with_it() {
         let mut scenario: Scenario = toml::from_str(crate::scenario::BUILTIN[2].2).unwrap();
@@ -348,7 +354,7 @@ mod tests {
         let pictures: Vec<_> = flight.frames.iter().map(|f| f.render().unwrap()).collect();
         let seen: Vec<_> = flight.frames.iter().zip(&pictures).collect();
         let mut sensor = scenario.sensor();
-        // Whatever they are said to be, the answers are there.
+        // Open gates accept the answers for every covariance.
         sensor.select.max_sigma_deg = 90.0;
         sensor.select.max_half_angle_sigma = 1e6;
         let start = Fit {

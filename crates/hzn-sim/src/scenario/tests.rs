@@ -7,7 +7,7 @@ fn built_in_scenes_are_valid_and_show_their_bodies() {
         let mut scenario = Scenario::builtin(name).unwrap();
         assert_eq!(scenario.name, name);
         assert!(!what.is_empty());
-        // As a user's file would be.
+        // A user's file would have the same text.
         assert_eq!(toml::from_str::<Scenario>(text).unwrap(), scenario);
         let again = toml::to_string(&scenario).unwrap();
         assert_eq!(toml::from_str::<Scenario>(&again).unwrap(), scenario, "{again}");
@@ -29,7 +29,7 @@ fn each_body_has_edge_errors_of_its_own() {
     let fits = Fit::measure(&scenario, 8, &|_, _| ()).unwrap();
     let [sun, moon] = &fits[..] else { panic!("{fits:?}") };
     assert_eq!((sun.body, moon.body), (Kind::Sun, Kind::Moon));
-    // Half of a disc in light and shade against a whole one.
+    // The Moon's disc is half in shade and the Sun's disc is whole.
     assert!(moon.sigma_px > 3.0 * sun.sigma_px, "{sun:?} {moon:?}");
     let mut sensor = scenario.sensor();
     fits.iter().for_each(|fit| fit.apply(&mut sensor));
@@ -97,7 +97,7 @@ fn sun_stands_where_the_ephemeris_says_and_seeds_change_the_clouds() {
     assert_eq!(direction, hzn_nav::ephemeris::sun(s.start_unix_s() + 430.0).direction);
     assert_ne!(a.frames[0].scene.world, b.frames[0].scene.world);
     assert_eq!(a, s.flight().unwrap());
-    // 10:30 UTC on 13 June at Esrange: 45 degrees above the horizon.
+    // At 10:30 UTC on 13 June the Sun is 45 degrees above the horizon of Esrange.
     let up = nalgebra::Vector3::from(a.frames[0].scene.pose.position_m).normalize();
     let elevation = libm::asin(up.dot(&nalgebra::Vector3::from(direction))).to_degrees();
     assert!((elevation - 45.0).abs() < 2.0, "{elevation}");

@@ -1,25 +1,25 @@
-//! Which limb is seen from where, and what a sphere for the Earth costs.
+//! Charts of the visible limb, and the error of a spherical Earth.
 
 use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, from_geodetic};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Full fields of view, in degrees, from which on a limb of each kind can be seen in the plane of a pinhole picture
-/// (Braun & Barf 2022, section 2.7, with the two conditions put right).
+/// Full fields of view in degrees above which each kind of limb can be seen in the plane of a pinhole picture (Braun &
+/// Barf 2022, section 2.7, with the two conditions corrected).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Visibility {
     /// Half-angle of the limb's cone in degrees.
     pub half_angle_deg: f64,
-    /// An arc of an ellipse is seen above γ = 4α − π; 0 when always.
+    /// An arc of an ellipse is visible above γ = 4α − π; 0 means always.
     pub ellipse_deg: f64,
-    /// An arc of a hyperbola is seen above γ = π − 4α; 0 when always.
+    /// An arc of a hyperbola is visible above γ = π − 4α; 0 means always.
     pub hyperbola_deg: f64,
     /// The whole disc fits above γ = 2α.
     pub disc_deg: f64,
 }
 
 impl Visibility {
-    /// Of a half-angle in radians.
+    /// Returns the fields of view for a half-angle in radians.
     pub fn new(half_angle_rad: f64) -> Self {
         let alpha = half_angle_rad.to_degrees();
         Self {
@@ -31,22 +31,22 @@ impl Visibility {
     }
 }
 
-/// Directions "down" at one place above WGS-84: angles between them in degrees.
+/// Angles in degrees between the directions "down" at a position above WGS-84.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Vertical {
-    /// From the direction to the Earth's centre to the geodetic vertical.
+    /// Angle from the direction to the Earth's centre to the geodetic vertical.
     pub geocentric_to_geodetic_deg: f64,
-    /// From the direction to the Earth's centre to the limb axis: the error of taking the Earth for a sphere.
+    /// Angle from the direction to the Earth's centre to the limb axis. It is the error of a spherical Earth model.
     pub geocentric_to_axis_deg: f64,
-    /// From the geodetic vertical to the limb axis.
+    /// Angle from the geodetic vertical to the limb axis.
     pub geodetic_to_axis_deg: f64,
     /// Difference of the limb cone's two half-angles.
     pub half_angle_spread_deg: f64,
 }
 
 impl Vertical {
-    /// At a geodetic latitude (degrees) and an altitude (kilometres, above `limb_height_km`); `None` when the place is
-    /// not above the limb.
+    /// Returns the angles at a geodetic latitude (degrees) and an altitude (kilometres). Returns `None` if the altitude
+    /// is not above `limb_height_km`.
     pub fn at(latitude_deg: f64, altitude_km: f64, limb_height_km: f64) -> Option<Self> {
         let latitude = latitude_deg.to_radians();
         let position = from_geodetic(latitude, 0.0, altitude_km * 1e3, WGS84_A_M, WGS84_B_M);
@@ -79,12 +79,12 @@ mod tests {
         let v = Visibility::new((6371.0f64 / 6609.0).asin());
         assert!((v.ellipse_deg - 118.3).abs() < 0.05 && v.hyperbola_deg == 0.0, "{v:?}");
         assert!((v.disc_deg - 2.0 * v.half_angle_deg).abs() < 1e-12);
-        // From far away only ellipses are seen in small pictures.
+        // From far away, small pictures show only ellipses.
         let far = Visibility::new((6371.0f64 / 42_157.0).asin());
         assert!(far.ellipse_deg == 0.0 && far.hyperbola_deg > 140.0);
     }
 
-    /// Section 6.1 of the mathematics, latitude 45°, without a limb height.
+    /// The values are from section 6.1 of the mathematics: latitude 45°, without a limb height.
     #[test]
     fn the_axis_is_close_to_the_geodetic_vertical() {
         for (altitude, geodetic, axis, rest) in [

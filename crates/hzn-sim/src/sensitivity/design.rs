@@ -1,4 +1,4 @@
-//! Camera, body and place of a sensor that does not exist yet.
+//! Camera, body and position of a sensor that does not exist yet.
 
 use core::f64::consts::TAU;
 
@@ -10,9 +10,10 @@ use nalgebra::Vector3;
 
 use super::sigmas::Sigmas;
 
-/// Steps around the cone in which its parts in view are found; parts between two of them are missed.
+/// Number of steps around the cone to find its visible segments; a segment between two steps is missed.
 const STEPS: usize = 16_384;
-/// Most points of a limb; beyond, they are farther apart than a pixel.
+/// Largest number of points on a visible segment of the limb. On longer segments the points are more than a pixel
+/// apart.
 const MOST_POINTS: f64 = 20_000.0;
 
 /// A camera above a sphere.
@@ -22,7 +23,7 @@ pub struct Design {
     pub camera: camera::Config,
     /// Radius of the body in kilometres, above 0.
     pub radius_km: f64,
-    /// Altitude above it in kilometres, above the limb height.
+    /// Altitude above the body in kilometres; it must be above the limb height.
     pub altitude_km: f64,
     /// 1-sigma of the altitude in kilometres, 0 or more.
     pub altitude_sigma_km: f64,
@@ -34,13 +35,13 @@ pub struct Design {
     pub depression_deg: f64,
     /// Turn about the optical axis in degrees.
     pub roll_deg: f64,
-    /// 1-sigma of an edge point along u and along v in pixels.
+    /// 1-sigma of an edge point along u and along v, in pixels.
     pub sigma_px: f64,
-    /// Length along the edge over which errors stay alike in pixels; 0 for white errors.
+    /// Correlation length of the errors along the edge in pixels; 0 means white errors.
     pub correlation_px: f64,
 }
 
-/// Why a design cannot be.
+/// The reason why a design is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// The camera is out of its limits.
@@ -49,9 +50,9 @@ pub enum DesignError {
     /// The camera is not above the limb.
     #[error("the camera at {altitude_km} km is not above the limb at {limb_height_km} km, or the body has no radius")]
     Inside {
-        /// Its altitude in kilometres.
+        /// Altitude of the camera in kilometres.
         altitude_km: f64,
-        /// The limb's height in kilometres.
+        /// Height of the limb in kilometres.
         limb_height_km: f64,
     },
 }
@@ -60,15 +61,15 @@ pub enum DesignError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Station {
     pub(super) point: ImagePoint<f64>,
-    /// Length of limb from the point before it; `None` where a piece begins.
+    /// Length of limb from the point before, in pixels; `None` at the first point of a segment.
     pub(super) step_px: Option<f64>,
 }
 
 impl Design {
-    /// Half-angle of the limb's cone in radians: sin α = (R + d)/(R + H).
+    /// Returns the half-angle of the limb's cone in radians: sin α = (R + d)/(R + H).
     ///
     /// # Errors
-    /// The camera is not above the limb.
+    /// Fails if the camera is not above the limb.
     pub fn half_angle_rad(&self) -> Result<f64, DesignError> {
         let sin = (self.radius_km + self.limb_height_km) / (self.radius_km + self.altitude_km);
         if self.radius_km > 0.0 && sin > 0.0 && sin < 1.0 {
@@ -78,25 +79,25 @@ impl Design {
         }
     }
 
-    /// Direction to the body's centre in the camera frame.
+    /// Returns the unit direction to the body's centre in the camera frame.
     pub fn axis(&self) -> [f64; 3] {
         let (sd, cd) = self.depression_deg.to_radians().sin_cos();
         let (sr, cr) = self.roll_deg.to_radians().sin_cos();
         [sr * cd, cr * cd, sd]
     }
 
-    /// How far the limb is below the local horizontal in degrees, where it is nearest.
+    /// Returns the angle in degrees from the local horizontal down to the nearest point of the limb.
     ///
     /// # Errors
-    /// As [`Self::half_angle_rad`].
+    /// Fails like [`Self::half_angle_rad`].
     pub fn dip_deg(&self) -> Result<f64, DesignError> {
         Ok(90.0 - self.half_angle_rad()?.to_degrees())
     }
 
-    /// The sigmas of this design; `None` when no limb is in view, or too little of it to determine a direction.
+    /// Returns the sigmas of this design; `None` if the limb in view is too short for a direction, or if there is none.
     ///
     /// # Errors
-    /// A camera that is refused, or one that is not above the limb.
+    /// Fails if the camera is invalid or not above the limb.
     pub fn sigmas(&self) -> Result<Option<Sigmas>, DesignError> {
         let half_angle_rad = self.half_angle_rad()?;
         let camera = Camera::try_new(&self.camera)?;
@@ -104,7 +105,7 @@ impl Design {
         Ok(Sigmas::new(self, &camera, half_angle_rad, &stations))
     }
 
-    /// The limb in view as points a pixel apart.
+    /// Returns the limb in view as points one pixel apart.
     pub(super) fn stations(&self, camera: &Camera<f64>, half_angle_rad: f64) -> Vec<Station> {
         let e = Vector3::from(self.axis());
         let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
@@ -119,7 +120,7 @@ impl Design {
         let mut stations = Vec::new();
         for azimuths in pieces(&at) {
             let points: Vec<(f64, ImagePoint<f64>)> = azimuths.iter().filter_map(|&a| Some((a, at(a)?))).collect();
-            // (arc length, azimuth) along the piece.
+            // Each entry has (arc length, azimuth) along the segment.
             let mut arc = 0.0;
             let mut along = Vec::with_capacity(points.len());
             for (i, (azimuth, p)) in points.iter().enumerate() {
@@ -148,7 +149,7 @@ impl Design {
     }
 }
 
-/// Ranges of azimuth that are in view, as rising azimuths with their ends bisected.
+/// Returns the visible ranges of azimuth as rising azimuths in radians. Bisection locates their ends.
 fn pieces(at: &impl Fn(f64) -> Option<ImagePoint<f64>>) -> Vec<Vec<f64>> {
     let azimuth = |i: usize| TAU * i as f64 / STEPS as f64;
     let seen: Vec<bool> = (0..STEPS).map(|i| at(azimuth(i)).is_some()).collect();

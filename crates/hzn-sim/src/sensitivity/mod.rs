@@ -1,12 +1,12 @@
-//! What a camera can reach before it is bought: covariances by design, without rendering, and the charts that say which
-//! limb it will see.
+//! The accuracy that a camera can reach before it is bought: covariances by design, without rendering, and charts of
+//! the limb that it will see.
 //!
-//! | module | idea |
+//! | module | content |
 //! |---|---|
-//! | [`design`] | camera, body and place; the limb as points one pixel apart |
-//! | [`sigmas`] | the covariance that such points have with correlated errors |
-//! | [`mod@reference`] | published results, worked out apart from this program |
-//! | [`chart`] | which conic is seen from where; what a sphere for the Earth costs |
+//! | [`design`] | camera, body and position; the limb as points one pixel apart |
+//! | [`sigmas`] | the covariance of these points with correlated errors |
+//! | [`mod@reference`] | published results, computed independently of this program |
+//! | [`chart`] | the conic that is seen from each altitude; the error of a spherical Earth |
 
 pub mod chart;
 pub mod design;

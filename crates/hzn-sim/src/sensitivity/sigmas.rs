@@ -1,9 +1,9 @@
-//! The covariance of a direction from limb points whose errors are alike along the edge.
+//! The covariance of a direction from limb points whose errors are correlated along the edge.
 //!
-//! Errors of the points along u and v are independent Gauss-Markov processes of variance R and correlation
-//! ρ = exp(−Δs/L). A point enters the normal equations N with a row q and moves the residual by gᵀ(δu, δv); with
-//! b = q gᵀ the covariance is N⁻¹ (R X) N⁻¹, X = Σ (b bᵀ + b aᵀ + a bᵀ), a running along the edge: a ← ρ (a + b).
-//! It is written here apart from hzn-core's own, and a test holds the two together.
+//! Errors of the points along u and v are independent Gauss-Markov processes with variance R and correlation
+//! ρ = exp(−Δs/L). A point enters the normal equations N with a row q, and its error moves the residual by gᵀ(δu, δv).
+//! With b = q gᵀ the covariance is N⁻¹ (R X) N⁻¹, X = Σ (b bᵀ + b aᵀ + a bᵀ). The sum a runs along the edge:
+//! a ← ρ (a + b). This implementation is independent of hzn-core, and a test compares both.
 
 use hzn_core::camera::{Camera, Model};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
@@ -14,41 +14,42 @@ use super::design::{Design, Station};
 /// Standard deviations of a direction in degrees (1 sigma).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tilt {
-    /// Within the plane of optical axis and body: the pitch of a camera that looks along the horizon.
+    /// Sigma in the plane of optical axis and body: the pitch of a camera that looks along the horizon.
     pub pitch_deg: f64,
-    /// Across that plane: the roll about the optical axis of a camera that looks along the horizon.
+    /// Sigma across that plane: the roll about the optical axis of a camera that looks along the horizon.
     pub roll_deg: f64,
 }
 
-/// What a design reaches.
+/// The accuracy of a design.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Sigmas {
     /// Half-angle of the limb's cone in degrees.
     pub half_angle_deg: f64,
-    /// Length of limb in the picture in pixels.
+    /// Length of limb in the picture, in pixels.
     pub limb_px: f64,
-    /// Half-angle fitted too.
+    /// Sigmas with a fitted half-angle.
     pub free: Tilt,
-    /// The same with the half-angle that altitude and limb height give, by their sigmas: what `hzn run` reports.
+    /// Sigmas with the fitted half-angle fused with the half-angle from altitude and limb height, by their sigmas. `hzn
+    /// run` reports these.
     pub fused: Tilt,
-    /// Half-angle known exactly.
+    /// Sigmas with an exactly known half-angle.
     pub known: Tilt,
-    /// By equation 33 of Braun & Barf 2022 (unweighted least squares in the plane of a pinhole picture); only for a
-    /// pinhole.
+    /// Sigmas by equation 33 of Braun & Barf 2022 (unweighted least squares in the plane of a pinhole picture); `None`
+    /// for other lenses.
     pub braun_barf: Option<Tilt>,
-    /// The overbound of their equation 37, one sigma in every direction.
+    /// The overbound of their equation 37: one sigma for every direction.
     pub braun_barf_bound_deg: Option<f64>,
 }
 
-/// A point as the normal equations take it.
+/// A point's contribution to the normal equations.
 struct Row<const N: usize> {
     q: SVector<f64, N>,
     g: Vector2<f64>,
-    /// Correlation with the point before; 0 where a piece begins.
+    /// Correlation with the point before; 0 at the first point of a segment.
     rho: f64,
 }
 
-/// Σ over all pairs of b ρ… bᵀ.
+/// Returns X of the module's equation, the sum over all pairs of b ρ… bᵀ.
 fn correlated<const N: usize>(rows: &[Row<N>]) -> SMatrix<f64, N, N> {
     let mut x = SMatrix::<f64, N, N>::zeros();
     let (mut a, mut before) = (SMatrix::<f64, N, 2>::zeros(), SMatrix::<f64, N, 2>::zeros());
@@ -62,7 +63,7 @@ fn correlated<const N: usize>(rows: &[Row<N>]) -> SMatrix<f64, N, N> {
 }
 
 impl Sigmas {
-    /// `None` when the points do not determine a direction with a free half-angle.
+    /// Returns `None` if the points do not determine a direction with a free half-angle.
     pub(super) fn new(
         design: &Design,
         camera: &Camera<f64>,
@@ -70,7 +71,8 @@ impl Sigmas {
         stations: &[Station],
     ) -> Option<Self> {
         let e = Vector3::from(design.axis());
-        // Towards the optical axis, and across; looking straight down any plane will do.
+        // `tilt` points towards the optical axis and `across` is perpendicular to it. If the camera looks straight
+        // down, any plane is suitable.
         let z = Vector3::z();
         let tilt = (z - e * e.z).try_normalize(1e-9).unwrap_or_else(|| (Vector3::y() - e * e.y).normalize());
         let across = e.cross(&tilt);
@@ -100,7 +102,7 @@ impl Sigmas {
         let x = correlated(&rows) * variance;
         let n = normal.try_inverse()?;
         let free = n * x * n;
-        // The half-angle known: the upper two rows alone.
+        // With a known half-angle only the upper two rows count.
         let n2 = normal.fixed_view::<2, 2>(0, 0).into_owned().try_inverse()?;
         let known = n2 * x.fixed_view::<2, 2>(0, 0) * n2;
         let k = free.column(2) / (free[(2, 2)] + Self::variance_cos(design, half_angle_rad));
@@ -123,7 +125,7 @@ impl Sigmas {
         sigmas.free.pitch_deg.is_finite().then_some(sigmas)
     }
 
-    /// Variance of the expected cos α: sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    /// Returns the variance of the expected cos α: sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
     fn variance_cos(design: &Design, half_angle_rad: f64) -> f64 {
         let (sin, cos) = half_angle_rad.sin_cos();
         let distance_km = design.radius_km + design.altitude_km;
@@ -133,8 +135,8 @@ impl Sigmas {
     }
 }
 
-/// Braun & Barf 2022, equation 33: rows p = (x, y, f) in pixels about the principal point, and the corrected second
-/// line of equation 29 for how an error of a point moves its residual, g = (cos α p/|p| − e) in x and y.
+/// Braun & Barf 2022, equation 33. The rows are p = (x, y, f) in pixels about the principal point. The corrected second
+/// line of equation 29 tells how an error of a point moves its residual: g = (cos α p/|p| − e) in x and y.
 #[derive(Default)]
 struct Plane {
     rows: Vec<Row<3>>,

@@ -1,6 +1,7 @@
-//! How the vehicle turns.
+//! The rotation of the vehicle.
 //!
-//! The vehicle's axes: x forward, along a rocket; y and z across. Where the camera sits on it is the scene's `[mount]`.
+//! The x axis of the vehicle points forward, along a rocket; y and z are lateral. The scene's `[mount]` has the
+//! attitude of the camera on the vehicle.
 
 use core::f64::consts::TAU;
 
@@ -13,19 +14,19 @@ use crate::counter::{Counter, Stream};
 use crate::pose::{Look, Pose};
 use hzn_nav::ephemeris;
 
-/// How the vehicle turns.
+/// The rotation of the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Attitude {
     /// A sounding rocket: spin-up under thrust, yo-yo, then drift under rate control.
     Spin(Spin),
-    /// The camera looks down by an angle that changes evenly over the pictures.
+    /// The camera looks down at an angle that changes evenly over the pictures.
     Pointing(Pointing),
     /// The camera looks at Sun, Moon or Earth, one after the other.
     Towards(Towards),
-    /// A body that no torque acts on.
+    /// A rigid body without torque.
     Tumble(Tumble),
-    /// As `[trajectory] table` says.
+    /// The attitude comes from `[trajectory] table`.
     Table,
 }
 
@@ -33,20 +34,21 @@ pub enum Attitude {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Spin {
-    /// Spin about the long axis after burn-out, turns a second.
+    /// Spin about the long axis after burn-out, turns per second.
     pub spin_hz: f64,
-    /// When the spin is reached, seconds; it grows evenly from lift-off.
+    /// Time at which the spin is reached, seconds; the spin grows evenly from lift-off.
     pub spun_up_s: f64,
-    /// When the yo-yo is let go, seconds; the spin is gone a second later, and rate control begins. `inf`: it spins on.
+    /// Time at which the yo-yo is released, seconds. The spin is gone one second later, and rate control begins. `inf`:
+    /// the spin goes on.
     pub yoyo_s: f64,
-    /// Rate about the long axis at which a thruster fires, degrees a second.
+    /// Rate about the long axis at which a thruster fires, degrees per second.
     pub limit_deg_s: f64,
-    /// The same for the other two axes.
+    /// Rate about the other two axes at which a thruster fires, degrees per second.
     pub lateral_limit_deg_s: f64,
-    /// Angular acceleration by what disturbs it, degrees a second squared, over the limit in degrees a second; its sign
-    /// changes now and then.
+    /// Largest angular acceleration of the disturbance (degrees/s²) divided by the rate limit (degrees/s). Its size and
+    /// sign change at random times.
     pub disturbance_per_s: f64,
-    /// Angle between long axis and way at burn-out, degrees: with spin on, the cone it describes.
+    /// Angle between the long axis and the direction of flight at burn-out, degrees. It grows evenly from lift-off.
     pub cone_deg: f64,
 }
 
@@ -64,15 +66,15 @@ impl Default for Spin {
     }
 }
 
-/// A camera that looks as told, from the first picture's value to the last one's.
+/// A camera whose angles change evenly from the first picture to the last one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pointing {
-    /// Angle between the optical axis and straight down, degrees: first and last picture.
+    /// Angle between the optical axis and straight down, degrees, in the first and the last picture.
     pub off_nadir_deg: [f64; 2],
-    /// Direction over ground, degrees from north to east.
+    /// Azimuth over ground, degrees from north to east, in the first and the last picture.
     pub azimuth_deg: [f64; 2],
-    /// Turn about the optical axis, degrees.
+    /// Turn about the optical axis, degrees, in the first and the last picture.
     pub roll_deg: [f64; 2],
 }
 
@@ -86,9 +88,9 @@ impl Default for Pointing {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Towards {
-    /// `sun`, `moon`, `earth`: each for an equal share of the time.
+    /// `sun`, `moon`, `earth`; each gets an equal share of the time.
     pub bodies: Vec<Kind>,
-    /// How far the axis wanders around the body, degrees.
+    /// Amplitude of the optical axis's motion around the body, degrees.
     pub wander_deg: f64,
 }
 
@@ -102,7 +104,7 @@ impl Default for Towards {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Tumble {
-    /// Rates about the vehicle's axes at time 0, degrees a second.
+    /// Rates about the vehicle's axes at time 0, degrees per second.
     pub rates_deg_s: [f64; 3],
     /// Moments of inertia about the vehicle's axes, in any unit.
     pub inertia: [f64; 3],
@@ -114,10 +116,10 @@ impl Default for Tumble {
     }
 }
 
-/// [`Attitude`], prepared.
+/// [`Attitude`], prepared for evaluation.
 #[derive(Debug, Clone)]
 pub(crate) enum Turn {
-    /// Attitudes of the vehicle against space every [`STEP_S`] from a time on.
+    /// Attitudes of the vehicle relative to inertial space, every [`STEP_S`] from `from_s`.
     Steps {
         from_s: f64,
         steps: Vec<UnitQuaternion<f64>>,
@@ -220,7 +222,7 @@ impl Turn {
                 let helper = if to.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
                 let right = to.cross(&helper).normalize();
                 let pose = Pose::from_axes(here.into(), [right, to.cross(&right), to].map(Into::into));
-                // A slow figure of Lissajous: the body wanders over the picture.
+                // The body moves slowly over the picture on a Lissajous figure.
                 let angle = |cycles: f64| libm::sin(phase + TAU * cycles * place * n as f64);
                 let wander = towards.wander_deg.to_radians();
                 let off = [wander * angle(1.3), wander * angle(0.9 + 0.2 * phase), 0.6 * angle(0.4)];
@@ -236,7 +238,7 @@ fn quaternion(pose: &Pose) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
 }
 
-/// The attitude whose x axis is `x`, as far as that leaves it open level.
+/// Returns the attitude whose x axis is along `x` and whose y axis is perpendicular to `up`.
 fn along(x: Vector3<f64>, up: Vector3<f64>) -> UnitQuaternion<f64> {
     let x = x.normalize();
     let helper = if x.dot(&up).abs() < 0.999 * up.norm() { up } else { Vector3::new(up.y, up.z, up.x) };
@@ -261,7 +263,7 @@ impl Spin {
         let start_roll = TAU * next();
         let mut roll = start_roll;
         let mut q = UnitQuaternion::identity();
-        // Rates about the three axes under rate control, disturbances, and seconds until their sign may change.
+        // Under rate control, each axis has a rate and the acceleration of a disturbance.
         let mut rate: [f64; 3] = core::array::from_fn(|a| limits[a] * (1.6 * next() - 0.8));
         let mut torque: [f64; 3] = core::array::from_fn(|a| pushes[a] * (2.0 * next() - 1.0));
         let mut pulse = [0.0f64; 3];
@@ -274,7 +276,8 @@ impl Spin {
             };
             let free = t > self.yoyo_s + 1.0;
             if t <= burnout_s {
-                // Under thrust the long axis follows the way; from then on it keeps its place in space.
+                // Under thrust the long axis follows the direction of flight; after burn-out it keeps its direction in
+                // space.
                 let forward = from_ecef(path.sidereal_rad(t), &ascent.forward(t));
                 let up = from_ecef(path.sidereal_rad(t), &ascent.at(t).position_m.normalize());
                 let lean = self.cone_deg.to_radians() * (t / burnout_s);
@@ -291,7 +294,7 @@ impl Spin {
                         if next() < STEP_S / 12.0 {
                             torque[a] = pushes[a] * (2.0 * next() - 1.0);
                         }
-                        // A thruster takes the rate through zero within a third of a second.
+                        // A thruster brings the rate through zero within a third of a second.
                         if rate[a].abs() >= limit && pulse[a] == 0.0 {
                             pulse[a] = -rate[a] * (1.0 + 0.7 * next()) / 0.3;
                         }
@@ -316,7 +319,7 @@ impl Tumble {
         let mut q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(start));
         let [a, b, c] = self.inertia;
         let turn = |w: &Vector3<f64>| {
-            // Euler's equations without torque.
+            // These are Euler's equations without torque.
             Vector3::new((b - c) * w.y * w.z / a, (c - a) * w.z * w.x / b, (a - b) * w.x * w.y / c)
         };
         let mut w = Vector3::from(self.rates_deg_s.map(f64::to_radians));

@@ -1,4 +1,4 @@
-//! What the vehicle's other sensors say: gyroscopes and accelerometers, satellite receiver.
+//! Signals of the vehicle's other sensors: gyroscopes, accelerometers and satellite navigation receiver.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -10,28 +10,28 @@ use crate::counter::{Counter, Stream};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Imu {
-    /// Samples a second.
+    /// Samples per second.
     pub rate_hz: f64,
-    /// Standard deviation of the gyroscopes' constant errors, degrees a second.
+    /// Standard deviation of the gyroscopes' constant errors, degrees per second.
     pub gyro_bias_deg_s: f64,
-    /// Standard deviation of a gyroscope sample's noise, degrees a second.
+    /// Standard deviation of the noise of a gyroscope sample, degrees per second.
     pub gyro_noise_deg_s: f64,
-    /// Step of the gyroscopes' numbers, degrees a second; 0: none.
+    /// Quantisation step of the gyroscopes, degrees per second; 0 means no quantisation.
     pub gyro_step_deg_s: f64,
-    /// Largest rate a gyroscope can say, degrees a second.
+    /// Largest rate that a gyroscope can measure, degrees per second.
     pub gyro_range_deg_s: f64,
     /// Standard deviation of the accelerometers' constant errors, m/s².
     pub accel_bias_mps2: f64,
-    /// Standard deviation of an accelerometer sample's noise, m/s².
+    /// Standard deviation of the noise of an accelerometer sample, m/s².
     pub accel_noise_mps2: f64,
-    /// Step of the accelerometers' numbers, m/s²; 0: none.
+    /// Quantisation step of the accelerometers, m/s²; 0 means no quantisation.
     pub accel_step_mps2: f64,
-    /// Largest specific force an accelerometer can say, m/s².
+    /// Largest specific force that an accelerometer can measure, m/s².
     pub accel_range_mps2: f64,
 }
 
 impl Default for Imu {
-    /// A small unit of the better kind.
+    /// Returns the values of a small unit of good quality.
     fn default() -> Self {
         Self {
             rate_hz: 100.0,
@@ -52,27 +52,27 @@ impl Default for Imu {
 pub struct ImuRow {
     /// Time in seconds.
     pub time_s: f64,
-    /// Rate against inertial space about the vehicle's x axis, rad/s.
+    /// Rate relative to inertial space about the vehicle's x axis, rad/s.
     pub gyro_x_radps: f64,
-    /// About its y axis.
+    /// Rate about the vehicle's y axis, rad/s.
     pub gyro_y_radps: f64,
-    /// About its z axis.
+    /// Rate about the vehicle's z axis, rad/s.
     pub gyro_z_radps: f64,
     /// Specific force along the vehicle's x axis, m/s².
     pub accel_x_mps2: f64,
-    /// Along its y axis.
+    /// Specific force along the vehicle's y axis, m/s².
     pub accel_y_mps2: f64,
-    /// Along its z axis.
+    /// Specific force along the vehicle's z axis, m/s².
     pub accel_z_mps2: f64,
-    /// 1 when one of the six is at the end of its range.
+    /// 1 if one of the six values is at the end of its range, else 0.
     pub saturated: u8,
 }
 
-/// A satellite receiver.
+/// A satellite navigation receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gnss {
-    /// Fixes a second.
+    /// Fixes per second.
     pub rate_hz: f64,
     /// Standard deviation of every component of the position, metres.
     pub position_noise_m: f64,
@@ -86,33 +86,33 @@ impl Default for Gnss {
     }
 }
 
-/// A row of gnss.csv: ECEF, velocity against the Earth.
+/// A row of gnss.csv, in ECEF; the velocity is relative to the rotating Earth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GnssRow {
     /// Time in seconds.
     pub time_s: f64,
-    /// Position, metres.
+    /// First component of the position, metres.
     pub x_m: f64,
-    /// Second component of the position.
+    /// Second component of the position, metres.
     pub y_m: f64,
-    /// Third component of the position.
+    /// Third component of the position, metres.
     pub z_m: f64,
-    /// Velocity, m/s.
+    /// First component of the velocity, m/s.
     pub vx_mps: f64,
-    /// Second component of the velocity.
+    /// Second component of the velocity, m/s.
     pub vy_mps: f64,
-    /// Third component of the velocity.
+    /// Third component of the velocity, m/s.
     pub vz_mps: f64,
 }
 
-/// Times of a rate between two times, both included where they fall on a sample.
+/// Returns numbers and times of the samples from `from_s` to `to_s`. The last sample can be exactly at `to_s`.
 fn times(rate_hz: f64, [from_s, to_s]: [f64; 2]) -> impl Iterator<Item = (u64, f64)> {
     let count = ((to_s - from_s) * rate_hz + 1e-9).floor().max(0.0) as u64;
     (0..=count).map(move |i| (i, from_s + i as f64 / rate_hz))
 }
 
 impl Imu {
-    /// The first thing that is out of its limits.
+    /// Fails for the first value that is out of its limits.
     pub(crate) fn check(&self) -> Result<(), (String, String)> {
         let all = [
             ("rate_hz", self.rate_hz, self.rate_hz > 0.0 && self.rate_hz <= 10_000.0),
@@ -127,7 +127,7 @@ impl Imu {
         }
     }
 
-    /// Samples of a flight.
+    /// Returns the samples of a flight.
     pub fn rows(&self, path: &Path, span_s: [f64; 2], seed: u64) -> impl Iterator<Item = ImuRow> {
         let (imu, path, draws) = (*self, path.clone(), Counter::new(seed, Stream::Imu));
         let rad = f64::to_radians;
@@ -177,7 +177,7 @@ impl Gnss {
         Err(("[gnss] rate_hz".into(), format!("{} is refused: must be above 0, at most 1000", self.rate_hz)))
     }
 
-    /// Fixes of a flight.
+    /// Returns the fixes of a flight.
     pub fn rows(&self, path: &Path, span_s: [f64; 2], seed: u64) -> impl Iterator<Item = GnssRow> {
         let (gnss, path, draws) = (*self, path.clone(), Counter::new(seed, Stream::Gnss));
         times(gnss.rate_hz, span_s).map(move |(i, time_s)| {
@@ -215,7 +215,7 @@ mod tests {
         let limit = 0.9f64.to_radians() * 1.1;
         let most = (60..430).map(|t| path.state(f64::from(t)).rate_radps.amax()).fold(0.0, f64::max);
         assert!(most < limit && most > 0.4 * limit, "{most}");
-        // Under thrust the force is along the vehicle, but for the cone.
+        // Under thrust the force is along the vehicle, except for the angle `cone_deg`.
         let state = path.state(30.0);
         let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
         assert!(force.x > 0.99 * force.norm() && force.x > 20.0);
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn rates_turn_the_attitude() {
-        // What a strap-down integration of exact gyroscopes gives is the attitude.
+        // A strap-down integration of exact gyroscopes gives the attitude.
         let path = rocket();
         let exact = Imu {
             rate_hz: 1000.0,

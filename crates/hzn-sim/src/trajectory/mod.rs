@@ -1,12 +1,12 @@
-//! Where the vehicle is and how it turns, over time: in the Earth-fixed frame, with what its sensors feel.
+//! Position and attitude of the vehicle over time in the Earth-fixed frame, and the signals of its sensors.
 //!
-//! | module | idea |
+//! | module | content |
 //! |---|---|
 //! | `rocket` | a sounding rocket: two stages, then free fall |
 //! | `orbit` | Kepler's ellipse |
 //! | `table` | positions and attitudes from a CSV file |
-//! | `attitude` | how the vehicle turns |
-//! | [`instruments`] | gyroscopes, accelerometers, satellite receiver |
+//! | `attitude` | the rotation of the vehicle |
+//! | [`instruments`] | gyroscopes, accelerometers, satellite navigation receiver |
 
 mod attitude;
 pub mod instruments;
@@ -30,7 +30,7 @@ pub(crate) const MU: f64 = 3.986_004_418e14;
 /// Rotation rate of the Earth, rad/s (WGS-84).
 pub(crate) const EARTH_RATE: f64 = 7.292_115e-5;
 
-/// The way through space.
+/// The trajectory of the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trajectory {
@@ -47,17 +47,17 @@ pub enum Trajectory {
 pub struct State {
     /// Position in ECEF, metres.
     pub position_m: Vector3<f64>,
-    /// Velocity against the Earth, in ECEF, m/s.
+    /// Velocity relative to the rotating Earth, in ECEF, m/s.
     pub velocity_mps: Vector3<f64>,
-    /// Acceleration by all but gravity, in ECEF, m/s².
+    /// Acceleration by all forces except gravity, in ECEF, m/s².
     pub specific_force_mps2: Vector3<f64>,
-    /// Takes coordinates of the vehicle to ECEF.
+    /// Rotation from vehicle axes to ECEF.
     pub body_to_ecef: UnitQuaternion<f64>,
-    /// Rate of the vehicle against inertial space in its own axes, rad/s.
+    /// Rate of the vehicle relative to inertial space, in vehicle axes, rad/s.
     pub rate_radps: Vector3<f64>,
 }
 
-/// A place on the way.
+/// A point of the trajectory, all vectors in ECEF; the velocity is relative to the rotating Earth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point {
     pub(crate) position_m: Vector3<f64>,
@@ -65,18 +65,18 @@ pub(crate) struct Point {
     pub(crate) specific_force_mps2: Vector3<f64>,
 }
 
-/// Turns a vector that is fixed in space to ECEF, by Greenwich's sidereal time.
+/// Converts a vector from inertial axes to ECEF, by Greenwich sidereal time.
 pub(crate) fn to_ecef(sidereal_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
     let (s, c) = libm::sincos(sidereal_rad);
     Vector3::new(c * v.x + s * v.y, c * v.y - s * v.x, v.z)
 }
 
-/// The reverse of [`to_ecef`].
+/// Converts a vector from ECEF to inertial axes; the inverse of [`to_ecef`].
 pub(crate) fn from_ecef(sidereal_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
     to_ecef(-sidereal_rad, v)
 }
 
-/// A way, prepared for asking.
+/// A trajectory, prepared for evaluation.
 #[derive(Debug, Clone)]
 enum Way {
     Rocket(rocket::Ascent),
@@ -84,7 +84,7 @@ enum Way {
     Table(table::TableRows),
 }
 
-/// A flight: way and attitude, prepared.
+/// A flight: trajectory and attitude, prepared for evaluation.
 #[derive(Debug, Clone)]
 pub struct Path {
     way: Way,
@@ -93,14 +93,14 @@ pub struct Path {
     start_unix_s: f64,
 }
 
-/// Half the time over which rates are differences of attitudes, seconds.
+/// Half of the interval over which two attitudes are differenced to get a rate, seconds.
 const RATE_STEP_S: f64 = 1e-3;
 
 impl Path {
-    /// Prepares a flight that lasts to `to_s`; `start_unix_s` is the UTC of time 0 (seconds since 1970).
+    /// Prepares a flight that lasts to `to_s`. `start_unix_s` is the UTC of time 0, in seconds since 1970.
     ///
     /// # Errors
-    /// What is wrong, with the key it is about.
+    /// Returns the key with the invalid value, and a message.
     pub fn try_new(
         trajectory: &Trajectory,
         attitude: &Attitude,
@@ -121,7 +121,7 @@ impl Path {
         Ok(path)
     }
 
-    /// UTC in seconds since 1970.
+    /// Returns UTC in seconds since 1970.
     pub fn unix_s(&self, time_s: f64) -> f64 {
         self.start_unix_s + time_s
     }
@@ -145,7 +145,7 @@ impl Path {
         }
     }
 
-    /// The vehicle at a time in seconds.
+    /// Returns the state of the vehicle at a time in seconds.
     pub fn state(&self, time_s: f64) -> State {
         let Point { position_m, velocity_mps, specific_force_mps2 } = self.point(time_s);
         let body_to_ecef = self.body_to_ecef(time_s);
@@ -155,13 +155,13 @@ impl Path {
         State { position_m, velocity_mps, specific_force_mps2, body_to_ecef, rate_radps: against_earth + earth }
     }
 
-    /// The camera's pose at a time in seconds.
+    /// Returns the camera's pose at a time in seconds.
     pub fn camera(&self, time_s: f64) -> Pose {
         let q = self.body_to_ecef(time_s) * self.camera_to_body;
         Pose { position_m: self.point(time_s).position_m.into(), cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k] }
     }
 
-    /// Rate of the camera against ECEF in its own axes, rad/s: what blurs a picture.
+    /// Returns the rate of the camera relative to ECEF, in the camera frame, rad/s. This rate blurs a picture.
     pub fn camera_rate_radps(&self, time_s: f64) -> [f64; 3] {
         let [before, after] = [-RATE_STEP_S, RATE_STEP_S].map(|d| self.body_to_ecef(time_s + d));
         let body = (before.inverse() * after).scaled_axis() / (2.0 * RATE_STEP_S);
@@ -169,7 +169,8 @@ impl Path {
     }
 }
 
-/// Gravity on a mass at rest in space, m/s²: the central field and the Earth's flattening (J2).
+/// Returns the gravitational acceleration in m/s², from the central field and the Earth's flattening (J2). The
+/// centrifugal acceleration is not included.
 pub(crate) fn gravity(position_m: &Vector3<f64>) -> Vector3<f64> {
     const J2: f64 = 1.082_629_8e-3;
     const A: f64 = hzn_core::ellipsoid::WGS84_A_M;

@@ -1,5 +1,5 @@
-//! Kepler's ellipse around the Earth's centre of mass. No perturbations: over the minutes and hours of a sequence of
-//! pictures they move the satellite along its path, not the limb in the picture.
+//! Kepler's ellipse around the Earth's centre of mass, without perturbations. Over the minutes and hours of a sequence,
+//! perturbations move the satellite along its path, but they do not move the limb in the picture.
 
 use core::f64::consts::TAU;
 
@@ -10,13 +10,14 @@ use super::{EARTH_RATE, MU, Point, to_ecef};
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 use hzn_nav::ephemeris;
 
-/// An orbit, by its elements at time 0.
+/// An orbit, given by its elements at time 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Orbit {
     /// Height of the perigee above the mean radius (6371 km), kilometres.
     pub perigee_km: f64,
-    /// Height of the apogee, kilometres; the perigee's where it is left out.
+    /// Height of the apogee above the mean radius, kilometres. Without a value the orbit is a circle at the height of
+    /// the perigee.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub apogee_km: Option<f64>,
     /// Inclination in degrees.
@@ -42,14 +43,14 @@ impl Default for Orbit {
     }
 }
 
-/// [`Orbit`], prepared.
+/// [`Orbit`], prepared for evaluation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ellipse {
     semi_axis_m: f64,
     eccentricity: f64,
     mean_anomaly_rad: f64,
     rate_radps: f64,
-    /// Towards the perigee, and a quarter turn on, in space.
+    /// Unit vectors in inertial axes: towards the perigee, and a quarter turn further along the orbit.
     axes: [Vector3<f64>; 2],
     start_sidereal_rad: f64,
 }
@@ -86,7 +87,7 @@ impl Ellipse {
     pub(crate) fn at(&self, time_s: f64) -> Point {
         let (e, a) = (self.eccentricity, self.semi_axis_m);
         let mean = (self.mean_anomaly_rad + self.rate_radps * time_s).rem_euclid(TAU);
-        // Kepler's equation by Newton's steps, which converge from here for every ellipse.
+        // Newton's steps solve Kepler's equation. From this start they converge for every ellipse.
         let mut anomaly = if e > 0.8 { core::f64::consts::PI } else { mean };
         for _ in 0..15 {
             anomaly -= (anomaly - e * libm::sin(anomaly) - mean) / (1.0 - e * libm::cos(anomaly));

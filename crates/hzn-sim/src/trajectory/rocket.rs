@@ -1,4 +1,4 @@
-//! A sounding rocket of two stages, such as the VSB-30: a gravity turn under thrust, then free fall.
+//! A sounding rocket with two stages, for example the VSB-30: a gravity turn under thrust, then free fall.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use crate::pose::position_m;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M};
 use hzn_nav::ephemeris;
 
-/// The ascent. The stages' acceleration follows from the apogee.
+/// The ascent. The acceleration of the stages follows from the apogee.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rocket {
@@ -25,14 +25,14 @@ pub struct Rocket {
     pub apogee_km: f64,
     /// Seconds from lift-off at which the first stage burns out.
     pub first_stage_s: f64,
-    /// Seconds from lift-off at which the second stage is lit and burns out.
+    /// Seconds from lift-off at which the second stage ignites and burns out.
     pub second_stage_s: [f64; 2],
-    /// Acceleration by the first stage over that by the second.
+    /// Acceleration of the first stage divided by the acceleration of the second stage.
     pub first_over_second: f64,
 }
 
 impl Default for Rocket {
-    /// MAPHEUS-8 as far as is published: Esrange, apogee 238 km on a VSB-30 (12 s and 29 s of thrust).
+    /// Returns MAPHEUS-8 as far as it is published: Esrange, apogee 238 km on a VSB-30 (12 s and 29 s of thrust).
     fn default() -> Self {
         Self {
             lat_deg: 67.89,
@@ -61,10 +61,10 @@ impl Rocket {
     }
 }
 
-/// A flight in steps, in the frame that does not turn, aligned with ECEF at time 0.
+/// A flight in steps, in an inertial frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Ascent {
-    /// (position, velocity, specific force) every [`STEP_S`] from time 0.
+    /// (position, velocity, specific force) at every [`STEP_S`] from time 0.
     steps: Vec<[Vector3<f64>; 3]>,
     start_sidereal_rad: f64,
 }
@@ -101,7 +101,8 @@ impl Ascent {
         Ok(Self { steps, start_sidereal_rad })
     }
 
-    /// Steps up to `to_s` (or to the apogee when that is infinite, or to the ground), and the highest altitude, metres.
+    /// Returns the steps up to `to_s` or to the ground, and the highest altitude in metres. If `to_s` is infinite, the
+    /// flight ends at the apogee and no steps are kept.
     fn fly(rocket: &Rocket, second: f64, sidereal: f64, to_s: f64) -> (Vec<[Vector3<f64>; 3]>, f64) {
         let globe = Globe { a_m: WGS84_A_M, b_m: WGS84_B_M };
         let pad = Vector3::from(position_m(rocket.lat_deg, rocket.lon_deg, 0.3));
@@ -118,7 +119,7 @@ impl Ascent {
         let rail = from_ecef(sidereal, &rail);
         let (mut steps, mut highest, mut t) = (Vec::new(), 0.0f64, 0.0);
         loop {
-            // Along the rail until there is speed to fly by, then along the way through the air.
+            // The thrust is along the rail until the rocket is fast, then along its velocity through the air.
             let force = |t: f64, x: &Vector3<f64>, v: &Vector3<f64>| {
                 let through_air = v - earth.cross(x);
                 let along = if through_air.norm() > 60.0 { through_air.normalize() } else { rail };
@@ -129,12 +130,12 @@ impl Ascent {
             if to_s.is_finite() {
                 steps.push([x, v, force(t, &x, &v)]);
             }
-            // Two seconds more than asked for, to interpolate in.
+            // Two more seconds are kept for the interpolation.
             let over = if to_s.is_finite() { t > to_s + 2.0 } else { t > 60.0 && altitude < highest };
             if over || (t > 60.0 && altitude < 0.0) {
                 return (steps, highest);
             }
-            // Runge and Kutta's fourth order.
+            // The integration is a Runge-Kutta method of fourth order.
             let f = |t: f64, x: &Vector3<f64>, v: &Vector3<f64>| gravity(x) + force(t, x, v);
             let h = STEP_S;
             let (k1x, k1v) = (v, f(t, &x, &v));
@@ -147,7 +148,8 @@ impl Ascent {
         }
     }
 
-    /// Between two steps by Hermite's cubic, which keeps position and velocity together.
+    /// Interpolates between two steps. The position follows Hermite's cubic, which matches position and velocity at
+    /// both steps. Velocity and specific force are linear.
     pub(crate) fn at(&self, time_s: f64) -> Point {
         let place = (time_s / STEP_S).clamp(0.0, (self.steps.len().saturating_sub(2)) as f64);
         let i = place as usize;
@@ -171,7 +173,7 @@ impl Ascent {
         }
     }
 
-    /// Direction of the way through the air (ECEF) at a time; along the rail while it stands.
+    /// Returns the unit direction of the velocity through the air (ECEF) at a time; before 8 s, the direction at 8 s.
     pub(crate) fn forward(&self, time_s: f64) -> Vector3<f64> {
         let p = self.at(time_s.max(8.0));
         p.velocity_mps.normalize()
@@ -189,11 +191,11 @@ mod tests {
         let altitude_km = |t: f64| globe.altitude_m(ascent.at(t).position_m.into()) / 1e3;
         let highest = (0..4300).map(|i| altitude_km(f64::from(i) * 0.1)).fold(0.0, f64::max);
         assert!((highest - 238.0).abs() < 0.05, "{highest}");
-        // The published coast is T+60 s to T+430 s above some 70 to 80 km.
+        // The published coast is T+60 s to T+430 s, above about 70 to 80 km.
         assert!((60.0..95.0).contains(&altitude_km(60.0)) && (60.0..95.0).contains(&altitude_km(430.0)));
         assert_eq!(ascent.at(100.0).specific_force_mps2.norm(), 0.0);
         assert!(ascent.at(20.0).specific_force_mps2.norm() > 20.0);
-        // Velocity is the derivative of position.
+        // The velocity is the derivative of the position.
         let d = (ascent.at(200.01).position_m - ascent.at(199.99).position_m) / 0.02;
         assert!((d - ascent.at(200.0).velocity_mps).norm() < 1e-3);
     }

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 
 use super::Point;
 
-/// Rows of a CSV file with the columns `time_s, x_km, y_km, z_km` (ECEF) and, for `attitude = "table"`,
-/// `qw, qx, qy, qz` (camera to ECEF). Between rows positions follow a smooth cubic, attitudes the shortest turn.
+/// Rows of a CSV file with the columns `time_s, x_km, y_km, z_km` (ECEF). For `attitude = "table"` it also has
+/// `qw, qx, qy, qz` (camera to ECEF). Between rows, positions follow a smooth cubic and attitudes the shortest turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    /// The file; relative to the scene.toml.
+    /// Path of the file, relative to the scene.toml.
     pub file: PathBuf,
-    /// The file's text, read by [`Table::read`].
+    /// Text of the file, read by [`Table::read`].
     #[serde(skip)]
     pub text: Option<String>,
 }
@@ -32,10 +32,10 @@ struct Row {
 }
 
 impl Table {
-    /// Reads the file; `folder` is where its path starts.
+    /// Reads the file; its path is relative to `folder`.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// Fails if the file cannot be read.
     pub fn read(&mut self, folder: &Path) -> Result<(), String> {
         let path = folder.join(&self.file);
         let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -89,7 +89,7 @@ impl Table {
     }
 }
 
-/// [`Table`], prepared.
+/// [`Table`], prepared for evaluation.
 #[derive(Debug, Clone)]
 pub(crate) struct TableRows {
     points: Vec<(f64, Vector3<f64>)>,
@@ -101,14 +101,14 @@ impl TableRows {
         !self.turns.is_empty()
     }
 
-    /// The row before a time, and how far it is to the next, 0 to 1.
+    /// Returns the row before a time, and the position between this row and the next one, 0 to 1.
     fn place(&self, time_s: f64) -> (usize, f64) {
         let i = self.points.partition_point(|p| p.0 <= time_s).clamp(1, self.points.len() - 1) - 1;
         let (t0, t1) = (self.points[i].0, self.points[i + 1].0);
         (i, ((time_s - t0) / (t1 - t0)).clamp(0.0, 1.0))
     }
 
-    /// Velocity at a row: that of the parabola through it and its neighbours.
+    /// Returns the velocity at a row, from the parabola through the row and its neighbours.
     fn velocity(&self, i: usize) -> Vector3<f64> {
         let slope = |a: usize, b: usize| (self.points[b].1 - self.points[a].1) / (self.points[b].0 - self.points[a].0);
         let last = self.points.len() - 1;
@@ -132,7 +132,8 @@ impl TableRows {
             + x1 * (s * s * (3.0 - 2.0 * s))
             + v1 * (s * s * (s - 1.0) * h);
         let velocity_mps = v0 + (v1 - v0) * s;
-        // All that is not gravity, from how the velocity changes against the turning Earth.
+        // The specific force is the acceleration without gravity. It follows from the change of the velocity in the
+        // rotating frame.
         let earth = Vector3::new(0.0, 0.0, super::EARTH_RATE);
         let acceleration = (v1 - v0) / h + earth.cross(&velocity_mps) * 2.0 + earth.cross(&earth.cross(&position_m));
         Point { position_m, velocity_mps, specific_force_mps2: acceleration - super::gravity(&position_m) }

@@ -1,4 +1,4 @@
-//! The air: an exponential atmosphere that scatters once, by channel.
+//! The air: an exponential atmosphere with single scattering, by channel.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,29 +6,29 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Air {
-    /// Optical depth from the ground to the zenith: red, green, blue.
+    /// Optical depth from the ground to the zenith, for red, green and blue.
     pub optical_depth: [f64; 3],
-    /// Height over which the air thins by e, kilometres, above 0.
+    /// Height over which the density of the air falls by e, kilometres, above 0.
     pub scale_height_km: f64,
-    /// Brightness of air that is so deep that nothing is seen through it, under full sunlight.
+    /// Brightness of optically thick air under full sunlight.
     pub brightness: f64,
 }
 
 impl Default for Air {
     fn default() -> Self {
-        // Rayleigh scattering at 650, 550 and 450 nm.
+        // The values are for Rayleigh scattering at 650, 550 and 450 nm.
         Self { optical_depth: [0.049, 0.097, 0.22], scale_height_km: 8.0, brightness: 0.6 }
     }
 }
 
 impl Air {
-    /// Length of a grazing path from the ground to space over that to the zenith: √(π R / 2 H).
+    /// Returns the length of a grazing path from the ground to space divided by the path to the zenith: √(π R / 2 H).
     fn grazing(&self, radius_km: f64) -> f64 {
         (core::f64::consts::FRAC_PI_2 * radius_km / self.scale_height_km).sqrt()
     }
 
-    /// Tangent height in kilometres above the ground at which a channel mix is half as bright as deep air, where no
-    /// ground shines through. `weights` of red, green, blue sum to 1.
+    /// Returns the tangent height in kilometres above the ground at which a channel mix has half the brightness of
+    /// optically thick air. Ground light is not included. The `weights` of red, green and blue must sum to 1.
     pub fn half_height_km(&self, weights: [f64; 3], radius_km: f64) -> f64 {
         let chord = 2.0 * self.grazing(radius_km);
         let bright = |h_km: f64| -> f64 {
@@ -44,17 +44,17 @@ impl Air {
     }
 }
 
-/// [`Air`] around one globe, prepared.
+/// [`Air`] around one globe, prepared for rendering.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prepared {
     depth: [f32; 3],
     per_m: f32,
     pub(crate) brightness: f32,
-    /// Grazing path over zenith path.
+    /// Grazing path divided by zenith path.
     grazing: f32,
-    /// R/2H: how fast the shadow rises beyond the terminator.
+    /// R/2H; it determines how fast the shadow rises beyond the terminator.
     curve: f32,
-    /// Tangent heights above this have no air worth a thousandth of a count.
+    /// Tangent height in metres above which the light of the air is below a thousandth of a count.
     pub(crate) top_m: f64,
 }
 
@@ -71,8 +71,9 @@ impl Prepared {
         }
     }
 
-    /// How much more air than to the zenith a ray of the Sun passes, by the cosine of the Sun's zenith angle. Beyond
-    /// the terminator it dips below the horizontal: twice the grazing path, in air that is denser by the dip.
+    /// Returns the Sun's path through the air divided by the path to the zenith, by the cosine of the Sun's zenith
+    /// angle. Beyond the terminator the ray dips below the horizontal. It then has twice the grazing path, in air that
+    /// is denser because of the dip.
     #[inline(always)]
     pub(crate) fn sun_path(&self, mu0: f32) -> f32 {
         let g = self.grazing;
@@ -80,40 +81,42 @@ impl Prepared {
         if mu0 >= 0.0 { near } else { 2.0 * g * libm::expf((self.curve * mu0 * mu0).min(60.0)) - near }
     }
 
-    /// What a ray of this optical depth lets through.
+    /// Returns the transmission of a ray with this optical depth, by channel.
     #[inline(always)]
     pub(crate) fn clear(depth: [f32; 3]) -> [f32; 3] {
         depth.map(|d| libm::expf(-d))
     }
 
-    /// Optical depth of a ray that passes at a tangent height.
+    /// Returns the optical depth of a ray that passes at a tangent height, by channel.
     #[inline(always)]
     pub(crate) fn past(&self, height_m: f32) -> [f32; 3] {
         let thin = 2.0 * self.grazing * libm::expf(-height_m * self.per_m);
         self.depth.map(|d| d * thin)
     }
 
-    /// Optical depth of a ray that meets the ground under this cosine of the zenith angle.
+    /// Returns the optical depth of a ray that meets the ground at this cosine of the zenith angle, by channel.
     #[inline(always)]
     pub(crate) fn down(&self, mu: f32) -> [f32; 3] {
         let path = 1.0 / (mu * mu + 1.0 / (self.grazing * self.grazing)).sqrt();
         self.depth.map(|d| d * path)
     }
 
-    /// Sunlight that is left at a height: by channel, over that in space. `thin` is exp(−height/scale height).
+    /// Returns the sunlight at a height as a fraction of the sunlight in space, by channel. `thin` is exp(−height/scale
+    /// height).
     #[inline(always)]
     pub(crate) fn sunlight(&self, sun_path: f32, thin: f32) -> [f32; 3] {
         self.depth.map(|d| libm::expf(-(d * thin * sun_path).min(60.0)))
     }
 
-    /// exp(−height/scale height).
+    /// Returns exp(−height/scale height).
     #[inline(always)]
     pub(crate) fn thin(&self, height_m: f32) -> f32 {
         libm::expf(-height_m.max(0.0) * self.per_m)
     }
 
-    /// Light that the air along a ray of this optical depth, which lets `clear` = exp(−depth) through, sends to the
-    /// camera. What shines through deep air comes from its upper part: the density there is less by 1 + depth.
+    /// Returns the light that the air along a ray of this optical depth sends to the camera; `clear` = exp(−depth) is
+    /// the transmission of the ray. The light of optically thick air comes from its upper part, where the density is
+    /// lower by 1 + depth.
     #[inline(always)]
     pub(crate) fn glow(&self, depth: [f32; 3], clear: [f32; 3], thin: f32, sun_path: f32, phase: f32) -> [f32; 3] {
         core::array::from_fn(|c| {
@@ -130,7 +133,7 @@ mod tests {
     #[test]
     fn half_height_is_where_one_channel_is_at_half() {
         let air = Air::default();
-        // 1 − exp(−τ) = ½ at τ = ln 2; √(2 π R/H) is 70.7 for 6371 and 8 km.
+        // 1 − exp(−τ) = ½ holds at τ = ln 2; √(2 π R/H) is 70.7 for 6371 km and 8 km.
         for (c, weights) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate() {
             let tau0 = air.optical_depth[c] * (core::f64::consts::TAU * 6371.0 / 8.0).sqrt();
             let want = 8.0 * (tau0 / core::f64::consts::LN_2).ln();
@@ -146,11 +149,11 @@ mod tests {
         assert!((noon[1] - (-0.097f32).exp()).abs() < 1e-3);
         assert!(low[0] > 2.0 * low[1] && low[1] > 2.0 * low[2]);
         assert!(night.iter().all(|&x| x < 1e-6));
-        // Continuous at the horizon.
+        // The path is continuous at the horizon.
         assert!((air.sun_path(1e-6) / air.sun_path(-1e-6) - 1.0).abs() < 1e-4);
     }
 
-    /// book/theory/methods.md tells users how high the limb stands in their band.
+    /// book/theory/methods.md gives users the limb height in their band.
     #[test]
     fn half_levels_by_wavelength_are_those_of_the_documents() {
         let text = include_str!("../../../../book/theory/methods.md");

@@ -1,4 +1,4 @@
-//! Sun, Moon and stars behind the air, and what the Sun does to a lens.
+//! Sun, Moon and stars behind the air, and the stray light of the Sun in the lens.
 
 use hzn_core::body::{AU_KM, MOON_RADIUS_KM, SUN_RADIUS_KM};
 use hzn_core::frames::UnitVec3;
@@ -12,15 +12,15 @@ use crate::counter::{Counter, Stream};
 use crate::optics::{GHOSTS, Optics};
 use crate::texture::{Drawn, Relief, smoothstep};
 
-/// Rays a side of a pixel of a disc.
+/// Number of rays along each side of a pixel of a disc.
 const SAMPLES: i32 = 4;
-/// The Sun is 46 000 times as bright as white paper under it. More than this much of it does nothing but saturate;
-/// what the optics spread of it is the bloom's business.
+/// Brightness of the Sun's disc. The real Sun is 46 000 times as bright as white paper in its light, but a larger value
+/// would only saturate. The bloom describes the light that the optics spread.
 const SUN: f32 = 20.0;
-/// What the Moon's bright and dark ground sends back.
+/// Reflectance of the Moon's bright and dark ground.
 const MOON: [f32; 2] = [0.16, 0.08];
 
-/// A picture under way: pixels of three channels.
+/// An unfinished picture: pixels with three channels.
 pub(crate) struct Canvas<'a> {
     pub(crate) width: usize,
     pub(crate) pixels: &'a mut [[f32; 3]],
@@ -40,14 +40,14 @@ impl Canvas<'_> {
     }
 }
 
-/// A disc of the sky.
+/// A disc in the sky.
 struct Disc {
     centre: Vector3<f64>,
     half_angle: f64,
 }
 
 impl Disc {
-    /// Two directions across the centre.
+    /// Returns two unit vectors perpendicular to the centre and to each other.
     fn across(&self) -> [Vector3<f64>; 2] {
         let helper = if self.centre.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
         let a = self.centre.cross(&helper).normalize();
@@ -56,12 +56,13 @@ impl Disc {
 }
 
 impl Shader {
-    /// The Sun's place in the picture, whether or not it is inside, and its half-angle.
+    /// Returns the Sun's position in the plane of the picture, inside the picture or not; `None` if the lens does not
+    /// reach it.
     pub(crate) fn sun_point(&self) -> Option<ImagePoint<f64>> {
         self.camera().project(&self.view.to_camera(self.sun)?)
     }
 
-    /// How much of the Sun is not behind the Earth, by channel.
+    /// Returns the share of the Sun's light that passes the Earth and its air, by channel.
     pub(crate) fn sun_left(&self) -> [f32; 3] {
         let Some(centre) = self.view.to_camera(self.sun) else { return [0.0; 3] };
         let disc = Disc { centre: centre.xyz().into(), half_angle: SUN_RADIUS_KM / AU_KM };
@@ -78,7 +79,7 @@ impl Shader {
         sum
     }
 
-    /// Adds the Sun's disc, darker towards its limb.
+    /// Adds the Sun's disc, which is darker towards its limb.
     pub(crate) fn draw_sun(&self, canvas: &mut Canvas<'_>, weight: f32) {
         let Some(centre) = self.view.to_camera(self.sun) else { return };
         let disc = Disc { centre: centre.xyz().into(), half_angle: SUN_RADIUS_KM / AU_KM };
@@ -88,7 +89,8 @@ impl Shader {
         });
     }
 
-    /// Adds the Moon with its phase; `ecef_m` is its position from the Earth's centre, `from_m` the camera's.
+    /// Adds the Moon with its phase. `ecef_m` is its position from the Earth's centre in ECEF, `from_m` the camera's
+    /// position.
     pub(crate) fn draw_moon(&self, canvas: &mut Canvas<'_>, weight: f32, ecef_m: [f64; 3], from_m: [f64; 3]) {
         let to = Vector3::from(ecef_m) - Vector3::from(from_m);
         let Some(centre) = self.view.to_camera(to.normalize()) else { return };
@@ -104,7 +106,7 @@ impl Shader {
             let (mu0, mu) = (normal.dot(&sun).max(0.0) as f32, depth as f32);
             let dark = smoothstep((0.5 + 0.4 * maria.at(&normal, 20.0, &mut drawn)).clamp(0.0, 1.0));
             let albedo = MOON[0] + (MOON[1] - MOON[0]) * dark;
-            // Lommel and Seeliger: no darkening towards the limb at full moon.
+            // This is the law of Lommel and Seeliger: a full moon is not darker towards its limb.
             let light = albedo * 2.0 * mu0 / (mu0 + mu + 1e-3);
             [light, light * 0.98, light * 0.94]
         });
@@ -168,7 +170,7 @@ impl Shader {
             let r = (1.0 - z * z).sqrt();
             let Some(cam) = self.view.to_camera(Vector3::new(r * cos, r * sin, z)) else { continue };
             let Some(p) = self.camera().project(&cam) else { continue };
-            // Evenly distributed in magnitude over five magnitudes.
+            // The stars are evenly distributed over five magnitudes.
             let light = weight * world.star_brightness as f32 * libm::exp(-4.6 * c) as f32;
             let left = self.through(&cam.xyz().into()).map(|l| l * light);
             let (x, y) = (p.u.floor(), p.v.floor());
@@ -181,11 +183,12 @@ impl Shader {
         }
     }
 
-    /// Adds what the lens makes of the Sun: bloom around it, a veil over all, ghosts on the line through the middle.
+    /// Adds the Sun's stray light in the lens: bloom around the Sun, a veil over the picture, ghosts on the line
+    /// through the principal point.
     pub(crate) fn draw_glare(&self, canvas: &mut Canvas<'_>, optics: &Optics, hidden: bool) {
         let Some(direction) = self.view.to_camera(self.sun) else { return };
         let left = self.sun_left();
-        // Less and less of the Sun falls on the lens from aside, and none from behind.
+        // The light on the lens falls with the Sun's angle off the axis; a Sun behind the camera gives none.
         let on_lens = direction.xyz()[2].max(0.0) as f32;
         if hidden || on_lens <= 0.0 || left.iter().all(|&l| l < 1e-4) {
             return;
@@ -213,7 +216,7 @@ impl Shader {
                     let (dx, dy) = (x as f32 - sun.u as f32, y as f32 - sun.v as f32);
                     let r = (dx * dx + dy * dy).sqrt().max(radius_px) / radius_px;
                     if r < 120.0 {
-                        // Six faint spikes of an aperture with six blades.
+                        // An aperture with six blades makes six faint spikes.
                         let cos = if r > 1.5 { dx / (r * radius_px) } else { 0.0 };
                         let three = cos * (4.0 * cos * cos - 3.0);
                         let spike = 1.0 + 1.5 * (three * three).powi(24);

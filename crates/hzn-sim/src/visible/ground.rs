@@ -1,4 +1,4 @@
-//! Land, sea and ice: made up, or from a map.
+//! Land, sea and ice: generated, or from a map.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,14 +12,14 @@ use crate::texture::{Drawn, Relief, smoothstep};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Ground {
-    /// Share of land, 0 to 1, roughly.
+    /// Approximate share of land, 0 to 1.
     pub land: f64,
-    /// Latitude in degrees beyond which land and sea are white, on average.
+    /// Mean latitude in degrees beyond which land and sea are white.
     pub ice_deg: f64,
-    /// Which continents.
+    /// Seed of the continents; another seed gives other continents.
     pub seed: u64,
-    /// A map in their place: a picture in equirectangular projection, 180° W to 180° E and 90° N to 90° S, sRGB. The
-    /// path is relative to the scene.toml.
+    /// A map that replaces the generated ground: a picture in equirectangular projection, 180° W to 180° E and 90° N to
+    /// 90° S, sRGB. The path is relative to the scene.toml.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<PathBuf>,
     /// The map, read by [`Ground::read_map`].
@@ -34,10 +34,10 @@ impl Default for Ground {
 }
 
 impl Ground {
-    /// Reads the map, if one is named; `folder` is where the path starts.
+    /// Reads the map, if one is named; its path is relative to `folder`.
     ///
     /// # Errors
-    /// The picture cannot be read.
+    /// Fails if the picture cannot be read.
     pub fn read_map(&mut self, folder: &Path) -> Result<(), String> {
         if let Some(map) = &self.map {
             let path = folder.join(map);
@@ -58,7 +58,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// From a picture in sRGB that spans 360° by 180°.
+    /// Converts a picture in sRGB that spans 360° by 180°.
     pub fn new(picture: &image::RgbImage) -> Self {
         let linear = |v: u8| {
             let v = f32::from(v) / 255.0;
@@ -71,7 +71,7 @@ impl Texture {
         }
     }
 
-    /// Between four pixels; around in longitude.
+    /// Interpolates between four pixels; the longitude wraps around.
     fn at(&self, lon_rad: f64, lat_rad: f64) -> [f32; 3] {
         let u = (lon_rad / core::f64::consts::TAU + 0.5) * self.width as f64 - 0.5;
         let v = (0.5 - lat_rad / core::f64::consts::PI) * self.height as f64 - 0.5;
@@ -100,7 +100,7 @@ fn mix(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
     core::array::from_fn(|i| a[i] + t * (b[i] - a[i]))
 }
 
-/// [`Ground`], prepared.
+/// [`Ground`], prepared for rendering.
 #[derive(Debug, Clone)]
 pub(crate) struct Soil {
     texture: Option<Arc<Texture>>,
@@ -117,13 +117,13 @@ impl Soil {
             texture: ground.texture.clone(),
             continents: Arc::new(Relief::new([5000.0, 5.0], 0.55, radius_m, ground.seed)),
             plants: Arc::new(Relief::new([700.0, 3.0], 0.7, radius_m, ground.seed.wrapping_add(77))),
-            // Inverse of the logistic curve that stands for the distribution function.
+            // A logistic curve approximates the distribution function; this is its inverse.
             sea_level: (libm::log((1.0 - land) / land) / 1.7) as f32,
             ice: libm::sin(ground.ice_deg.to_radians()) as f32,
         }
     }
 
-    /// Reflectance by channel, and how much of it is open sea, at a point of the unit sphere with this normal.
+    /// Returns the reflectance by channel and the share of open sea, at a point of the unit sphere with this normal.
     pub(crate) fn at(
         &self,
         point: &Vector3<f64>,
@@ -133,7 +133,7 @@ impl Soil {
     ) -> ([f32; 3], f32) {
         if let Some(texture) = &self.texture {
             let colour = texture.at(libm::atan2(normal.y, normal.x), libm::asin(normal.z.clamp(-1.0, 1.0)));
-            // What is dark and blue is taken for water.
+            // Dark and blue ground counts as water.
             let sea =
                 ((colour[2] - 1.2 * colour[0]) * 20.0).clamp(0.0, 1.0) * ((0.25 - colour[0]) * 8.0).clamp(0.0, 1.0);
             return (colour, sea);
@@ -141,7 +141,7 @@ impl Soil {
         let height = self.continents.at(point, footprint_km, continents) - self.sea_level;
         let dry = self.plants.at(point, footprint_km, plants);
         let sin_lat = normal.z.abs() as f32;
-        // Deserts lie under the descending air of the horse latitudes.
+        // Deserts are under the descending air of the horse latitudes.
         let belt = 1.0 - ((sin_lat - 0.40).abs() * 5.0).min(1.0);
         let steppe = smoothstep((0.35 + 0.25 * dry + 0.4 * belt + 0.15 * height).clamp(0.0, 1.0));
         let desert = smoothstep((0.9 * belt + 0.3 * dry - 0.35).clamp(0.0, 1.0));
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_map_is_read_where_it_should_be() {
-        // West red, east green; the southernmost row blue.
+        // The map is red in the west and green in the east; its southernmost row is blue.
         let picture = image::RgbImage::from_fn(8, 4, |x, y| {
             image::Rgb(if y == 3 {
                 [0, 0, 255]
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(texture.at(-1.5, 0.3), [1.0, 0.0, 0.0]);
         assert_eq!(texture.at(1.5, 0.3), [0.0, 1.0, 0.0]);
         assert_eq!(texture.at(0.5, -1.5), [0.0, 0.0, 1.0]);
-        // Around the date line.
+        // The map wraps around at the date line.
         let seam = texture.at(core::f64::consts::PI, 0.3);
         assert!((seam[0] - 0.5).abs() < 1e-6 && (seam[1] - 0.5).abs() < 1e-6);
     }

@@ -1,7 +1,7 @@
-//! The Earth in sunlight as a camera in the visible sees it: ground, clouds, air, Sun, Moon and stars.
+//! The Earth in sunlight, as a camera for visible light sees it: ground, clouds, air, Sun, Moon and stars.
 //!
-//! Light is counted in units of what a white, matt surface sends back under the Sun at the zenith, before the exposure;
-//! three channels (red 650 nm, green 550 nm, blue 450 nm). The equations are in book/theory/simulator.md.
+//! The unit of light is the light that a white, matt surface reflects under the Sun at the zenith, before the exposure.
+//! There are three channels (red 650 nm, green 550 nm, blue 450 nm). The equations are in book/theory/simulator.md.
 
 pub(crate) mod air;
 pub(crate) mod discs;
@@ -15,24 +15,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::texture::Clouds;
 
-/// What a camera in the visible sees. Where the Sun stands is said by the scene's `light`: `Light::Sun`, else it is at
-/// the camera's zenith.
+/// The world that a camera for visible light sees. The scene's `light` sets the direction of the Sun. If it is not
+/// `Light::Sun`, the Sun is at the camera's zenith.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Visible {
-    /// Whether the Sun's own disc, with its bloom, glare and ghosts, is drawn where it is in view.
+    /// Draws the Sun's disc with its bloom, glare and ghosts if it is in view.
     pub sun_in_view: bool,
     /// Land, sea, ice.
     pub ground: Ground,
-    /// Clouds; none: leave the table out and set `clear = true`.
+    /// Clouds. For a clear sky, leave the table out and set `clear = true`.
     pub clouds: Clouds,
-    /// No clouds at all.
+    /// Leaves out all clouds.
     pub clear: bool,
     /// The air.
     pub air: Air,
     /// Number of stars over the whole sphere.
     pub stars: u32,
-    /// Light of the brightest star in one pixel at exposure 1; the faintest has a hundredth of it.
+    /// Light of the brightest star in one pixel at exposure 1; the faintest star has a hundredth of it.
     pub star_brightness: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Light along one ray: ground, clouds and air.
+//! The light along one ray: ground, clouds and air.
 
 use std::sync::Arc;
 
@@ -13,17 +13,18 @@ use crate::globe::{Globe, RayHit, View};
 use crate::pose::Pose;
 use crate::texture::{CloudField, Drawn};
 
-/// Every how many pixels of a row a ray is asked of the lens; between them it is interpolated, which is good to a
-/// hundredth of a pixel.
+/// Step in pixels along a row between the rays that the lens computes. Between them rays are interpolated, accurate to
+/// a hundredth of a pixel.
 const STRIDE: usize = 8;
-/// Metres of tangent height a pixel may cover before it is averaged over several rays.
+/// Largest tangent height range of a pixel, in metres, that needs only one ray. A larger range is averaged over several
+/// rays.
 const FINE_M: f64 = 2500.0;
-/// Height of the clouds' tops above the ground, where sunlight reaches them, metres.
+/// Height of the cloud tops above the ground for the sunlight on them, metres.
 const CLOUD_TOP_M: f32 = 6000.0;
-/// Light of the whole sky on the ground over that of the Sun.
+/// Light of the whole sky on the ground as a fraction of the Sun's light, by channel.
 const SKYLIGHT: [f32; 3] = [0.03, 0.05, 0.09];
 
-/// What was drawn of the textures for the ray before.
+/// Texture values that were drawn for the ray before.
 #[derive(Debug, Default)]
 struct Before {
     clouds: Drawn,
@@ -39,18 +40,20 @@ pub(crate) struct Shader {
     pub(crate) air: Prepared,
     soil: Soil,
     clouds: Option<Arc<CloudField>>,
-    /// Direction to the Sun in ECEF, and in the camera.
+    /// Direction to the Sun in ECEF.
     pub(crate) sun: Vector3<f64>,
+    /// Direction to the Sun in the camera frame.
     sun_cam: Vector3<f64>,
     pixel_rad: f64,
     radius_km: f32,
-    /// Rays a side of a pixel close to the limb, and [`RayHit::miss`] up to where that is.
+    /// Number of rays along each side of a pixel close to the limb.
     samples: u32,
+    /// Largest absolute [`RayHit::miss`] that counts as close to the limb.
     near: f64,
 }
 
 impl Shader {
-    /// `None` when the position is not outside the globe.
+    /// Returns `None` if the position is not outside the globe.
     pub(crate) fn try_new(
         world: &Visible,
         camera: Camera<f64>,
@@ -81,7 +84,7 @@ impl Shader {
         })
     }
 
-    /// The same from another attitude.
+    /// Returns the same shader for another pose.
     pub(crate) fn turned(&self, pose: &Pose) -> Self {
         let view = View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone());
         let sun_cam = view.to_camera(self.sun).map_or(Vector3::z(), |s| s.xyz().into());
@@ -116,7 +119,7 @@ impl Shader {
         }
     }
 
-    /// The mean over a pixel.
+    /// Returns the mean light over a pixel.
     fn averaged(&self, u: f64, v: f64, before: &mut Before) -> [f32; 3] {
         let mut sum = [0.0; 3];
         let n = self.samples;
@@ -132,7 +135,7 @@ impl Shader {
         sum.map(|x| x / (n * n) as f32)
     }
 
-    /// Light along one ray.
+    /// Returns the light along one ray.
     #[inline]
     fn colour(&self, s: &Vector3<f64>, sight: &RayHit, before: &mut Before) -> [f32; 3] {
         let air = &self.air;
@@ -155,7 +158,7 @@ impl Shader {
         let depth = air.down(mu as f32);
         let clear = Prepared::clear(depth);
         let glow = air.glow(depth, clear, 1.0, sun_path, phase);
-        // Deep night, or air that hides the ground.
+        // In deep night, or under air that hides the ground, only the air is visible.
         if mu0 < -0.15 || depth[0] > 5.0 {
             return glow;
         }
@@ -175,7 +178,7 @@ impl Shader {
         }
         if cover > 0.0 {
             let above = air.sunlight(sun_path, air.thin(CLOUD_TOP_M));
-            // A cloud is no flat sheet: its sides are lit when the Sun is low.
+            // A cloud is not a flat sheet: a low Sun lights its sides.
             let lit = ((mu0 + 0.08) / 1.08).max(0.0);
             for c in 0..3 {
                 light[c] += cover * bright * (above[c] * lit + SKYLIGHT[c] * day);
@@ -184,7 +187,7 @@ impl Shader {
         core::array::from_fn(|c| glow[c] + light[c] * clear[c])
     }
 
-    /// The Sun mirrored by a rough sea.
+    /// Returns the reflection of the Sun in a rough sea.
     fn glint(&self, s: &Vector3<f64>, normal: &Vector3<f64>, mu: f32) -> f32 {
         let Some(normal) = self.view.to_camera(*normal) else { return 0.0 };
         let half = (self.sun_cam - s).normalize();
@@ -196,7 +199,8 @@ impl Shader {
         (0.02 + 0.98 * grazing).min(0.5) * 12.0 * libm::powf(along, 250.0)
     }
 
-    /// What the air leaves of the light of something beyond, by channel: 0 behind the globe.
+    /// Returns the share of light from a distant source that passes the air along the ray `s`, by channel; 0 behind the
+    /// globe.
     pub(crate) fn through(&self, s: &Vector3<f64>) -> [f32; 3] {
         let sight = self.view.look((*s).into());
         if sight.miss <= 0.0 {
@@ -209,7 +213,7 @@ impl Shader {
         Prepared::clear(self.air.past(height_m as f32))
     }
 
-    /// Roughly downward, in the camera.
+    /// Returns a direction that points roughly downward, in the camera frame.
     fn down_cam(&self) -> Vector3<f64> {
         self.view.to_camera(-self.view.up()).map_or(Vector3::z(), |d| d.xyz().into())
     }
