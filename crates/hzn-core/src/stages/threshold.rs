@@ -294,8 +294,8 @@ impl Histogram {
     /// Returns the width of a bin in counts.
     fn width<T: Real>(&self) -> T {
         T::from_f64(f64::from(1u32 << self.shift))
-    /// Returns the number of the first bin.
     }
+    /// Returns the number of the first bin.
     fn offset<T: Real>(&self) -> T {
         T::from_f64(f64::from(self.first))
     }
