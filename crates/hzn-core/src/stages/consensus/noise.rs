@@ -9,8 +9,8 @@ use crate::geometry::block::{Block, LANES};
 const MOST: usize = 64;
 
 /// Measures the noise from point to point across the edge, in pixels. For each of up to 64 points, the method takes the
-/// distance from the middle between its two neighbours. For independent errors, the median of these distances is 0.6745
-/// √1.5 times sigma. The curvature of the limb, spacing²/2R, and smooth deviations do not contribute.
+/// distance from the middle between its two neighbours. For independent errors, the median of these distances is
+/// 0.6745 √1.5 times sigma. The curvature of the limb, spacing²/2R, and smooth deviations do not contribute.
 ///
 /// d = s_b − (s_a + s_c)/2 is projected on the normal n = s_b × (s_f − s_e) of the edge. The points e and f, which are
 /// eight points before and after, give the direction of the edge. A direction from adjacent points would depend on

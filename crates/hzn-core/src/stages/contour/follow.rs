@@ -5,7 +5,7 @@
 //! goes counter-clockwise around the lit side, as seen on the screen. At each pixel it examines the neighbours
 //! counter-clockwise, beginning after the one where it came from. The first lit neighbour is the next pixel. The dark
 //! neighbours that it passes belong to the edge. If one of them is beyond the region, the edge ends there. If one of
-//! them is masked, the pixel is no edge point.
+//! the neighbours is bright but masked, the pixel is no edge point.
 //!
 //! Most steps are far from the border, the masks, the search lines and the start. These steps are done in runs, in
 //! which only the threshold is checked.
@@ -42,7 +42,7 @@ pub(crate) struct BinaryPicture<'a, T, P, O> {
     pub(crate) blooms: bool,
     /// Smallest local contrast, in counts, for which an edge point has its own mid-level.
     pub(crate) least_contrast: i32,
-    /// Cost of a read of the mask, and of a [`Self::look`] at all neighbours, in the unit of the work budget.
+    /// Cost of a read of the mask, and of a look at all neighbours, in the unit of the work budget.
     mask: u32,
     look: u32,
     /// Number of mask reads outside of the follower that are not yet paid for.
@@ -55,8 +55,8 @@ pub(crate) struct BinaryPicture<'a, T, P, O> {
 #[derive(Clone, Copy)]
 struct Move {
     /// Direction of the step, and the first direction to examine after it. The last dark neighbour that was passed is
-    /// also a neighbour of the new pixel, and is not read again. `first` is therefore three directions after the way
-    /// back for a straight step, and two for a diagonal one.
+    /// also a neighbour of the new pixel, and is not read again. `first` is therefore three directions
+    /// counter-clockwise of the way back after a straight step, and two after a diagonal one.
     direction: u8,
     first: u8,
     dx: i32,
@@ -86,8 +86,8 @@ impl Move {
 pub(crate) enum End {
     /// The edge ends at the border of the region.
     Open,
-    /// The edge returns to its start. `twice_area` is twice the enclosed area in px², negative for an outer edge (y
-    /// down).
+    /// The edge returns to its start. `twice_area` is twice the enclosed area in px², negative for an outer edge
+    /// (y down).
     Closed { twice_area: i64 },
     /// The work budget of the edge is used up.
     OutOfSteps,
@@ -315,8 +315,8 @@ fn pixel(word: u32) -> Pixel {
     Pixel { x: word as u16, y: (word >> 16) as u16 }
 }
 
-/// Result of [`BinaryPicture::look`]. `cut` says that a masked lit pixel was passed, so that this pixel is no edge
-/// point.
+/// Result of a look at all neighbours. `cut` says that a bright but masked pixel was passed, so that this pixel is no
+/// edge point.
 enum Seen {
     /// The next pixel.
     Lit {

@@ -2,9 +2,9 @@
 //! neighbour is dark.
 //!
 //! Every closed edge that crosses a search line has a crossing on it. The marks therefore ensure that each edge is
-//! followed only once. If memory suffices, there is one bit for each pixel of the lines. Otherwise a table holds the
-//! crossings themselves: small bodies in large pictures need lines that are close together. If the table is full, edges
-//! are followed again; the work budget of the picture limits this.
+//! followed only once. If memory suffices, there is one bit for each pixel of the lines. Small bodies in large pictures
+//! need lines that are too close together for this; then a table holds the crossings themselves. If the table is full,
+//! edges are followed again; the work budget of the picture limits this.
 
 /// Search lines at the rows y with y mod spacing = offset; the spacing is a power of two, in pixels.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! Searches the beginnings of edges: at the border of the region (the ring), and on search lines.
+//! Finds the beginnings of edges: at the border of the region (the ring), and on search lines.
 
 use super::follow::{BinaryPicture, WEST};
 use super::marks::Marks;

@@ -1,9 +1,9 @@
 //! Covariance of the direct nadir (Braun & Barf 2022, (33) to (37)), in one pass.
 //!
-//! The equation of an edge point is p·e = cos α ‖p‖, with p = s/s_z. An error δ(u, v) of the point changes it by g·δ(u,
-//! v)/s_z, where g is the derivative of s·e by (u, v). With b = p gᵀ/s_z, the covariance of the *unnormalised* vector
-//! is P = (HᵀH)⁻¹ R (Σ Σ b ρ… bᵀ) (HᵀH)⁻¹. The double sum is over all pairs of points, with the correlation of their
-//! errors. It reduces to one recursion as in [`super`].
+//! The equation of an edge point is p·e = cos α ‖p‖, with p = s/s_z. An error δ(u, v) of the point changes it by
+//! g·δ(u, v)/s_z, where g is the derivative of s·e by (u, v). With b = p gᵀ/s_z, the covariance of the *unnormalised*
+//! vector is P = (HᵀH)⁻¹ R (Σ Σ b ρ… bᵀ) (HᵀH)⁻¹. The double sum is over all pairs of points, with the correlation of
+//! their errors. It reduces to one recursion as in [`super`].
 //!
 //! Differences from the paper:
 //! - (29) means pᵀ δe = (cos α/‖p‖ pᵀ − eᵀ) δp; its second line prints the left side as δpᵀ e.

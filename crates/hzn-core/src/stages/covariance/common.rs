@@ -1,7 +1,7 @@
 //! Errors that all points of an edge share, so that they do not appear in the residuals.
 //!
-//! Each error is a signal x along the edge, in radians. The fit converts a signal of unit size into the error v = R Σ w
-//! h x of (δ₁₂, δc), where R is the response of the fit. The covariance grows by σ² v vᵀ.
+//! Each error is a signal x along the edge, in radians. The fit converts a signal of unit size into the error
+//! v = R Σ w h x of (δ₁₂, δc), where R is the response of the fit. The covariance grows by σ² v vᵀ.
 //!
 //! | term | signal |
 //! |---|---|

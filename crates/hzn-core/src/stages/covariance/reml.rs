@@ -7,10 +7,10 @@
 //! −2 ℓ = (n − 3) ln(q/(n − 3)) + ln|V/σ²| + ln|Hᵀ(V/σ²)⁻¹H|, σ² = q/(n − 3),
 //!
 //! where q is the sum of squares of generalised least squares. A scalar Kalman filter along the edge with the columns
-//! (r, H) gives all terms in one pass. The likelihood of one picture says little about L: values from a tenth to ten
-//! times are about equally likely. The covariance is therefore averaged over the posterior with the prior ln L ~
-//! N(ln(arc/4), 0.7²). A flat prior would make the sigma of a disc three times too large, and without a white part the
-//! process would have an L of a few pixels.
+//! (r, H) gives all terms in one pass. The likelihood of one picture says little about L: a tenth of L and ten times L
+//! are nearly as likely as L. The covariance is therefore averaged over the posterior with the prior
+//! ln L ~ N(ln(arc/4), 0.7²). A flat prior would make the sigma of a disc three times too large, and without a white
+//! part the process would have an L of a few pixels.
 
 use super::correlated;
 use crate::base::linalg::{basis, invert_spd3};

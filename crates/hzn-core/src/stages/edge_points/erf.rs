@@ -150,7 +150,7 @@ pub(super) fn fit<T: Real>(patch: &Patch<T>, start: Edge<T>, levels: &Levels<T>)
                 g[i] += row[i] * r;
             }
         });
-        // The width is damped, because noise can increase it without limit if the patch shows little of the edge.
+        // The width is damped, because noise can make it much too large if the patch shows little of the edge.
         m[5] += T::from_f64(0.02);
         let step = invert_spd3(&m)? * V3::new(g[0], g[1], g[2]);
         let turn = step.y.max(T::from_f64(-0.5)).min(T::from_f64(0.5));

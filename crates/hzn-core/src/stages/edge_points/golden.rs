@@ -102,8 +102,8 @@ fn by(
     }
 }
 
-/// Blur in pixels, ratio of contrast to noise, and the expected errors in pixels. The errors come from simulations of
-/// each method with known levels: the Cramér-Rao bound, `linear`, `zernike`.
+/// Blur in pixels, ratio of contrast to noise, and three expected errors in pixels: the Cramér-Rao bound, `linear` and
+/// `zernike`. The errors come from simulations with known levels.
 const TABLE: [(f64, f64, f64, f64, f64); 7] = [
     (0.5, 5.0, 0.103, 0.196, 0.29),
     (0.5, 20.0, 0.026, 0.051, 0.077),

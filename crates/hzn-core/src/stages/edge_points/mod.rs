@@ -73,7 +73,7 @@ impl Config {
     }
 }
 
-/// Largest distance at which a plateau is searched, in steps.
+/// Largest distance up to which a plateau is searched for, in steps.
 const REACH: i32 = 10;
 /// Longest step of a profile, in pixels.
 const WIDEST: i32 = 6;
@@ -644,8 +644,8 @@ mod tests {
     use crate::model::observer::Unobserved;
     use std::vec::Vec;
 
-    /// Makes a picture of a straight edge between two plateaus, blurred over `width_px` and lit where (x, y)·n >
-    /// offset.
+    /// Makes a picture of a straight edge between two plateaus, blurred over `width_px` and lit where
+    /// (x, y)·n > offset.
     fn picture(n: [f64; 2], offset: f64, width_px: f64, dim: f64, bright: f64) -> Vec<u8> {
         (0..100 * 100)
             .map(|i| {

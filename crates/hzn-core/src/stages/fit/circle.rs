@@ -2,10 +2,10 @@
 //! 2014, 2.2.4 and 2.2.5; Barf et al. 2015).
 //!
 //! The circle is fitted in the picture as it is, in focal lengths from the principal point. The lens model gives only
-//! two values: the direction of the centre, and the off-axis angle of the radius. This angle is α with sin α = R/(R +
-//! h). The printed (2.27) has (R − h)/R, which at 80 km is 0.98744 instead of 0.98760. Equation (2.37) counts the
-//! centre of the picture from its corner, which is half a pixel off from the centres of the pixels. Here the calibrated
-//! principal point is used.
+//! two values: the direction of the centre, and the off-axis angle of the radius. This angle is α with
+//! sin α = R/(R + h). The printed (2.27) has (R − h)/R, which at 80 km is 0.98744 instead of 0.98760. Equation (2.37)
+//! counts the centre of the picture from its corner, which is half a pixel off from the centres of the pixels. Here the
+//! calibrated principal point is used.
 //!
 //! All this is right for a camera that points at the centre of the body. Off the optical axis, a limb is no circle.
 //! With an equidistant lens it is nearly one, so that the error at 25° off nadir is a tenth of a degree. In the picture

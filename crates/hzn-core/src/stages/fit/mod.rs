@@ -3,9 +3,9 @@
 //! The state is the unit axis e and k = 1 − cos α. For a small disc, k keeps its precision while cos α loses it; for
 //! the same reason 1 − s·e is computed as |s − e|²/2. In the following, c = cos α. For each point, r = c − s·e is the
 //! residual and g = ∂(s·e)/∂(u, v). Then |r|/|g| is the distance from the limb in pixels, so that w = 1/|g|² weighs by
-//! pixels. Let h = [Bᵀs − m, −1], where B is the tangent basis at e and m is the mean of Bᵀs. A step solves (Σ w h hᵀ)
-//! δ = Σ w r h. Subtracting the means keeps the sums well-conditioned in single precision; the third unknown is then
-//! δc' = δc − m·δ₁₂.
+//! pixels. Let h = [Bᵀs − m, −1], where B is the tangent basis at e and m is the mean of Bᵀs. A step solves
+//! (Σ w h hᵀ) δ = Σ w r h. Subtracting the means keeps the sums well-conditioned in single precision; the third unknown
+//! is then δc' = δc − m·δ₁₂.
 //!
 //! In the robust iterations, the expected half-angle is one more row. Its weight takes into account that the errors of
 //! the edge are *correlated*. Then the half-angle is fitted freely with the weights that were found: for the
@@ -113,7 +113,7 @@ const ROBUST: usize = 10;
 const PART: usize = 24;
 const SETTLE: usize = 5;
 
-/// Returns the correction by azimuth for an ellipsoid; `None` if the attitude is unknown.
+/// Returns the correction by azimuth for an ellipsoid; `None` if the body is no ellipsoid or the attitude is unknown.
 pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
     let cone = expected.ellipsoid.as_ref()?;
     let to_cam = expected.cam_to_ecef?.inverse();
@@ -287,7 +287,7 @@ fn at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
     })
 }
 
-/// Largest possible angle between the axis and the optical axis.
+/// Largest possible angle between the axis and the optical axis, in radians.
 #[cfg(feature = "zju")]
 const HALF_TURN_RAD: f64 = core::f64::consts::PI;
 

@@ -2,8 +2,8 @@
 //! or sphere.
 //!
 //! A limb ray satisfies sᵀ M s = 0. M is symmetric, and one eigenvalue has a sign that the others do not have: it
-//! belongs to the axis (Wang 7 and 22). With e = (x², xy, y², xz, yz, 1), where 1 is x² + y² + z², this is e·v = 0: M₁₁
-//! = v₁ + v₆, M₂₂ = v₃ + v₆, M₃₃ = v₆, M₁₂ = v₂/2, M₁₃ = v₄/2, M₂₃ = v₅/2.
+//! belongs to the axis (Wang 7 and 22). With e = (x², xy, y², xz, yz, 1), where 1 is x² + y² + z², this is e·v = 0:
+//! M₁₁ = v₁ + v₆, M₂₂ = v₃ + v₆, M₃₃ = v₆, M₁₂ = v₂/2, M₁₃ = v₄/2, M₂₃ = v₅/2.
 //!
 //! * `tls` (10-17): v has the length 1 and the smallest Σ (e·v)². It is the right singular vector of the smallest
 //!   singular value. Wang et al. divide by v₆ to have five unknowns, which fails for M₃₃ → 0, a limb through the image

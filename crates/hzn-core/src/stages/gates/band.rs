@@ -19,11 +19,11 @@ const SHORTEST_PX: i32 = 32;
 const ACROSS: f64 = 0.8;
 /// Distance to each side over which the step of the limb, and that of the far edge of a band, is read, in pixels.
 const ASIDE_PX: i32 = 6;
-/// Smallest part of the places behind a band that must be sky, as [numerator, denominator]. Inside a body, almost no
+/// Smallest part of the places behind a band that must be sky, as numerator and denominator. Inside a body, almost no
 /// place is sky.
 const FOR_GOOD: [usize; 2] = [2, 3];
-/// Brightness up to which a place behind a band is sky: above the median of the sky, as a part of the step at the limb.
-/// Blur and stray light cause it.
+/// Largest brightness of a sky place behind a band, above the median of the sky, as a part of the step at the limb. It
+/// allows for blur and stray light.
 const SKY_PART: f64 = 0.1;
 
 /// Returns the part of the looks inwards that come back to the sky across a second edge, 0 to 1. The step of this edge
@@ -106,8 +106,8 @@ fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
     within
 }
 
-/// Returns the first sky place after which most of the visible places are sky, too. At least three visible places are
-/// necessary.
+/// Returns the first place that is sky and from which on at least `FOR_GOOD` of the visible places are sky. At least
+/// three visible places are necessary.
 fn back_for_good(is_sky: &[Option<bool>]) -> Option<usize> {
     let (mut first, mut sky, mut all) = (None, 0, 0);
     // The loop begins at the far end, so that each place is added to those behind it.

@@ -30,8 +30,8 @@ impl<T: Real> Circle<T> {
         Some(Self { at: p, n, kappa })
     }
 
-    /// Returns the signed distance of a point and its position relative to `at`. The distance is (2 n·q − κ|q|²)/(1 +
-    /// √(1 − 2κ n·q + κ²|q|²)), which is valid for a straight line, too.
+    /// Returns the signed distance of a point and its position relative to `at`. The distance is
+    /// (2 n·q − κ|q|²)/(1 + √(1 − 2κ n·q + κ²|q|²)), which is valid for a straight line, too.
     fn distance(&self, p: [T; 2]) -> (T, T, T, T) {
         let q = [p[0] - self.at[0], p[1] - self.at[1]];
         let (along, q2) = (self.n[0] * q[0] + self.n[1] * q[1], q[0] * q[0] + q[1] * q[1]);

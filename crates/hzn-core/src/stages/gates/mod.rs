@@ -58,7 +58,7 @@ section! {
         @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
         /// Smallest part of an edge's points that must be inliers.
         ///
-        /// With one point in 20, three pixels of threshold and a cone that is free to turn, a curve passes through
+        /// With one inlier in 20 points and a threshold of three pixels, a cone that is free to turn passes through
         /// clutter by chance.
         @- min_inlier_share: f64 = 0.05, [0.0 to 1.0];
         /// Largest number of points close to the fitted limb that are no inliers, as a part of the inliers.
@@ -105,7 +105,7 @@ section! {
         /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb with
         /// its contrast kept; 0 turns the gate off.
         ///
-        /// The corner of an iris and the crossing of two flares end an edge like that. The default is 0, because 0.7
+        /// The corner of an iris and the crossing of two flares end an edge in this way. The default is 0, because 0.7
         /// also refuses half-lit discs and crescents.
         @- min_support_abrupt: f64 = 0.0, [0.0 to 1.0];
         /// Largest turn between two lengths of 16 px of edge that counts as smooth, degrees.
@@ -138,17 +138,19 @@ section! {
         /// Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard
         /// deviations.
         ///
-        /// The curvature of the edge tells on which side the body is.
+        /// The curvature of the edge shows on which side the body is.
         @- min_side_sigma: f64 = 4.0, [0.0 to 1e6];
         /// Answers farther apart than this contradict each other, degrees.
         @- ambiguous_deg: f64 = 5.0, [0.0 to 180.0];
         /// Of answers that contradict each other, the better one counts where its score is better by this factor.
         @- ambiguous_score: f64 = 2.0, [1.0 to 1e6];
-        /// An answer ends the search where its edge covers at least this part of the limb in view.
+        /// An answer ends the search where its edge covers more than this part of the limb in view; `certain_share`
+        /// must hold, too.
         @- certain_support: f64 = 0.5, [0.0 to 1.0];
-        /// An answer ends the search where at least this part of its edge's points are inliers.
+        /// An answer ends the search where more than this part of its edge's points are inliers; `certain_support` must
+        /// hold, too.
         ///
-        /// A residual of a quarter of the threshold does as well.
+        /// An RMS below a quarter of the largest distance of an inlier replaces this condition.
         @- certain_share: f64 = 0.8, [0.0 to 1.0];
         /// [smallest, largest] half-angle of a Sun, as multiples of its true one.
         ///
@@ -156,7 +158,7 @@ section! {
         @- sun_size: [f64; 2] = [0.9, 12.0], [above 0.0 to 1e6];
         /// [smallest, largest] half-angle of a Moon, as multiples of its mean one.
         ///
-        /// The saturated part of the Moon is smaller than the Moon, and the Moon is nearer at times.
+        /// The saturated part of the Moon is smaller than the Moon, and the Moon is sometimes nearer than on average.
         @- moon_size: [f64; 2] = [0.5, 1.1], [above 0.0 to 1e6];
         /// Largest blooming by which a Moon may exceed `moon_size`, px.
         @- moon_bloom_px: f64 = 10.0, [0.0 to 1e6];
@@ -379,8 +381,7 @@ fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config:
     let px = T::one() / fx.min(fy);
     let times = |n: f64| expected.sin * T::from_f64(n);
     let (least, most) = if expected.blooms() {
-        // The limit is one pixel smaller, which is within the error of the measurement, but it is at least half of its
-        // value.
+        // The lower limit is reduced by one pixel, the error of the measurement, but never below half of its value.
         let [least, most] = config.sun_size;
         ((times(least) - px).max(times(least * 0.5)), times(most))
     } else {
