@@ -1,4 +1,4 @@
-//! The stages, in the order of the data's way. A stage knows those before it.
+//! The stages, in the order in which data pass through them. A stage imports only earlier stages.
 
 pub mod threshold;
 

@@ -1,8 +1,8 @@
-//! Brightness gate, and the level between dark and lit, from a sparse sample of the picture.
+//! Brightness gate, and the threshold between dark and lit, from a sparse sample of the picture.
 //!
-//! The picture is cut into equal cells and one pixel is drawn in each, so that the sample is even and yet random. A
-//! body that is too small for the sample (its histogram has no second class) is sampled once more, sixteen times
-//! finer.
+//! The picture is cut into equal cells, and one pixel is drawn at random in each cell. The sample is therefore both
+//! even and random. A small body may be missed: then the histogram of the sample has no second class. In this case a
+//! second sample, sixteen times finer, is taken.
 
 use crate::base::real::Real;
 use crate::base::rng::Rng;
@@ -14,71 +14,73 @@ use crate::model::status::Status;
 pub(crate) use crate::model::threshold::SUN;
 pub use crate::model::threshold::{Config, Gate, Method};
 
-/// The level in counts of a configuration with a fixed level.
+/// Returns the threshold in counts if the configuration fixes it, otherwise `None`.
 pub(crate) fn fixed_level<T: Real>(config: &Config, full_scale: u16) -> Option<u16> {
     let unit = if config.level < 1.0 { f64::from(full_scale) } else { 1.0 };
     (config.method == Method::Fixed).then(|| counts(T::from_f64(config.level * unit)))
 }
 
-/// The level, and the sample it comes from.
+/// The threshold, and statistics of the sample from which it comes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level<T> {
-    /// A pixel is lit at this value or above, in counts.
+    /// Threshold in counts. A pixel is lit at this value or above.
     pub level: u16,
     /// Mean of the sample in counts.
     pub mean: T,
-    /// Pixels in the sample.
+    /// Number of pixels in the sample.
     pub samples: u32,
-    /// Mean of the sample's dark pixels in counts.
+    /// Mean of the dark pixels of the sample, in counts.
     pub dark: T,
-    /// How much brighter its lit pixels are, on the average, in counts; 0 where it has none.
+    /// Mean of the lit pixels of the sample minus the mean of the dark ones, in counts; 0 if one class is empty.
     pub contrast: T,
 }
 
 impl<T: Real> Level<T> {
-    /// The level that stands `part` of the way from the dark pixels to this one, 1 at this one: half of a level means
-    /// half of the light also where the sky is not black, as in words of a thermal camera.
+    /// Returns the threshold at the fraction `part` of the way from the dark pixels to this threshold, in counts. A
+    /// `part` of 1 gives this threshold. Half of a threshold then means half of the light, even if the sky is not
+    /// black, as in 16-bit pictures of a thermal camera.
     pub(crate) fn part(&self, part: f64) -> u16 {
         let level = T::from_i32(i32::from(self.level));
         counts(self.dark + (level - self.dark) * T::from_f64(part))
     }
 }
 
-/// Bins of the histogram.
+/// Number of bins of the histogram.
 const BINS: usize = 256;
-/// Dark and lit are two classes from this part of full scale on, or from so many standard deviations of the dark ones:
-/// of mere noise, cut at its middle, the classes stand 2.7 standard deviations apart, of a ramp 3.5.
+/// Smallest contrast between the dark and the lit class, as a fraction of full scale. A smaller contrast also suffices
+/// if it is at least `LEAST_SPREADS` standard deviations of the dark class. Pure noise that is cut at its middle gives
+/// classes 2.7 standard deviations apart; a ramp gives 3.5.
 const LEAST_CONTRAST: f64 = 0.03;
 const LEAST_SPREADS: f64 = 4.0;
-/// Steps of the samples that classes must be apart at least: fewer are rounding.
+/// Smallest contrast between the classes in counts, where `LEAST_SPREADS` decides. A smaller contrast can be rounding.
 const LEAST_COUNTS: f64 = 4.0;
-/// Sigma over the mean distance of two values of a normal distribution: √π/2.
+/// Ratio of sigma to the mean distance between two values of a normal distribution: √π/2.
 const BY_DISTANCE: f64 = 0.886_226_925_452_758;
-/// Cells along each side of the first sample and of the second, as powers of two.
+/// Number of cells along each side of the first and of the second sample, as powers of two.
 const SIDES_LOG2: [u32; 2] = [4, 6];
 
-/// A level as a number of counts; one of 0 would make everything lit.
+/// Converts a threshold to whole counts from 1 to 65535; a threshold of 0 would make every pixel lit.
 fn counts<T: Real>(level: T) -> u16 {
     level.to_i32().clamp(1, 65535) as u16
 }
 
-/// How often each brightness occurs, in bins that are as fine as the sample's own range allows: words of 16 bits may
-/// hold a picture of a thousand counts.
+/// Number of pixels per brightness. The bins are as narrow as the range of the sample allows, because a picture with 16
+/// bits may use only a thousand counts.
 #[derive(Debug)]
 struct Histogram {
     bins: [u16; BINS],
     sum: u64,
     count: u32,
-    /// A bin is 2^shift counts wide, and this is the number of the first.
+    /// A bin is 2^shift counts wide. `first` is the number of the first bin.
     shift: u32,
     first: u32,
 }
 
-/// Finds the level. `last`: what the picture before says of it, for `track`.
+/// Finds the threshold. `last` is the threshold that the previous picture gives, for `track`.
 ///
 /// # Errors
-/// `too-dark`, `too-bright`, or `no-limb` when dark and lit differ by less than 3 % of full scale and by less than the
-/// sample's noise explains.
+/// `too-dark` or `too-bright` if the mean is outside of the gate. `no-limb` if dark and lit differ by less than 3 % of
+/// full scale and by less than the noise of the sample explains.
 pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
     region: &Region<T>,
@@ -100,8 +102,9 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     Err(Status::NoLimb)
 }
 
-/// 1-sigma of the noise of the dark pixels in counts, from how far neighbours below the level are apart; 0 where there
-/// are none. Noise that is cut off at 0 makes it smaller.
+/// Returns the 1-sigma noise of the dark pixels in counts, from the differences of neighbours below the threshold
+/// `level`. The result is 0 if there are no dark neighbours. If the noise is clipped at 0 counts, the result is too
+/// small.
 #[cold]
 pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
@@ -121,7 +124,7 @@ pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
     sample.histogram.mean().unwrap_or(T::ZERO) * T::from_f64(BY_DISTANCE)
 }
 
-/// Both samples of a picture whose rows pass.
+/// Both samples of a picture that arrives row by row.
 #[derive(Debug)]
 pub(crate) struct RowSampler([Sample; SIDES_LOG2.len()]);
 
@@ -129,7 +132,7 @@ impl RowSampler {
     pub(crate) fn new<T: Real>(seed: u32, full_scale: u16, region: &Region<T>) -> Self {
         Self(SIDES_LOG2.map(|side_log2| Sample::new(seed, side_log2, full_scale, region)))
     }
-    /// Takes from row `y` what belongs to the samples; rows come in order.
+    /// Adds the pixels of row `y` that belong to the samples. Rows must come in order.
     pub(crate) fn row<T: Real, S: image::Sample, O: Observer<T>>(
         &mut self,
         region: &Region<T>,
@@ -143,7 +146,7 @@ impl RowSampler {
             }
         }
     }
-    /// As [`split`].
+    /// Finds the threshold as [`split`] does.
     pub(crate) fn split<T: Real, O: Observer<T>>(
         &self,
         gate: &Gate,
@@ -155,14 +158,14 @@ impl RowSampler {
     }
 }
 
-/// A sample in the making: pixels of one row after another.
+/// A sample that is still being taken, from one row after another.
 #[derive(Debug)]
 struct Sample {
     histogram: Histogram,
     rng: Rng,
     side_log2: u32,
     full_scale: u16,
-    /// The row of cells that is drawn from, and the row of the picture in it.
+    /// Number of the current row of cells. `y` is the row of the picture that is sampled in it.
     cells: u32,
     y: u16,
 }
@@ -175,19 +178,19 @@ impl Sample {
         sample
     }
 
-    /// A place in cell number `cell` of a side of `length` pixels.
+    /// Draws a pixel coordinate in cell number `cell` of a side of `length` pixels.
     fn draw(&mut self, cell: u32, length: u16) -> u16 {
         let length = u32::from(length);
         ((cell * length + ((length * self.rng.below(65536)) >> 16)) >> self.side_log2) as u16
     }
 
-    /// The row of the picture that is looked at next; rows come in order.
+    /// Returns the row of the picture that is sampled next; rows come in order.
     fn row(&self) -> Option<u16> {
         (self.cells < 1 << self.side_log2).then_some(self.y)
     }
 
-    /// Looks at that row. The cells of a row share theirs: each row of a picture is a page of memory away from the
-    /// next.
+    /// Samples that row. All cells of a row of cells use one row of the picture, because each row of the picture is on
+    /// another page of memory.
     fn take<T: Real, O: Observer<T>>(&mut self, region: &Region<T>, observer: &O, at: impl Fn(u16) -> Option<u16>) {
         for cell in 0..1u32 << self.side_log2 {
             let x = self.draw(cell, region.width());
@@ -203,7 +206,7 @@ impl Sample {
         self.y = self.draw(self.cells, region.height());
     }
 
-    /// The level, or why there is none; `None` when a finer sample is to decide.
+    /// Returns the threshold, or the reason why there is none; `None` if a finer sample has to decide.
     fn decide<T: Real, O: Observer<T>>(
         &self,
         gate: &Gate,
@@ -237,10 +240,10 @@ impl Histogram {
     fn count(&mut self, v: u16) {
         let v = u32::from(v);
         if self.count == 0 {
-            // A byte never needs wider bins, nor others.
+            // 8-bit values always fit into the bins that start at 0.
             self.first = if v < BINS as u32 { 0 } else { v - BINS as u32 / 2 };
         }
-        // Sixteen times at most: then every word has its bin.
+        // At most sixteen rounds: then every 16-bit value has its bin.
         while self.bin(v).is_none() {
             self.widen(v);
         }
@@ -255,7 +258,7 @@ impl Histogram {
         (v >> self.shift).checked_sub(self.first).map(|k| k as usize).filter(|&k| k < BINS)
     }
 
-    /// Makes bins twice as wide, and begins with one as near to `v` as leaves those in place that there are.
+    /// Doubles the width of the bins. The first bin moves as near to `v` as the filled bins allow.
     #[cold]
     fn widen(&mut self, v: u32) {
         let old = core::mem::replace(&mut self.bins, [0; BINS]);
@@ -269,7 +272,7 @@ impl Histogram {
         }
     }
 
-    /// Mean of the pixels below the level, and how much brighter the mean of the others is; counts.
+    /// Returns the mean of the pixels below the threshold, and the mean of the others minus this mean, in counts.
     #[inline(never)]
     fn classes<T: Real>(&self, level: u16, mean: T) -> (T, T) {
         let lit = (u32::from(level) >> self.shift).saturating_sub(self.first) as usize;
@@ -283,15 +286,16 @@ impl Histogram {
             return (if count == 0 { T::ZERO } else { mean }, T::ZERO);
         }
         let dark = (T::from_f64(f64::from(sum)) / T::from_f64(f64::from(count)) + self.offset()) * self.width();
-        // What the dark ones lack of the mean, the lit ones have over it.
+        // The deviations of both classes from the common mean cancel.
         let (count, above) = (T::from_f64(f64::from(count)), T::from_f64(f64::from(above)));
         (dark, (mean - dark) * (count + above) / above)
     }
 
-    /// Counts a bin, and the number of the first.
+    /// Returns the width of a bin in counts.
     fn width<T: Real>(&self) -> T {
         T::from_f64(f64::from(1u32 << self.shift))
     }
+    /// Returns the number of the first bin.
     fn offset<T: Real>(&self) -> T {
         T::from_f64(f64::from(self.first))
     }
@@ -300,7 +304,8 @@ impl Histogram {
         (self.count > 0).then(|| T::from_f64(self.sum as f64) / T::from_f64(f64::from(self.count)))
     }
 
-    /// Otsu's level: the largest variance between the classes; the middle of the levels that reach it.
+    /// Returns Otsu's threshold in counts: it maximises the variance between the classes. If several thresholds reach
+    /// the maximum, the result is their middle. `None` if the classes are too close to each other.
     fn otsu<T: Real>(&self, full_scale: u32) -> Option<T> {
         let total = self.count;
         let sum: u32 = self.bins.iter().zip(0u32..).map(|(&n, v)| u32::from(n) * v).sum();
@@ -315,7 +320,7 @@ impl Histogram {
                 continue;
             }
             if n == 0 {
-                // An empty bin changes nothing: a run of equal levels goes on.
+                // An empty bin changes nothing: a run of equally good thresholds continues.
                 if last + 1 == v {
                     last = v;
                 }
@@ -335,12 +340,13 @@ impl Histogram {
             let spread = self.spread::<T>(first, dark) * scale;
             contrast >= (spread * T::from_f64(LEAST_SPREADS)).max(T::from_f64(LEAST_COUNTS))
         };
-        // Lit begins one bin above the dark class.
+        // The lit class begins one bin above the dark class.
         let level = T::from_f64(f64::from(first + last)) * T::from_f64(0.5) + T::one() + self.offset();
         (apart && contrast >= T::from_f64(2.0)).then_some(level * scale)
     }
 
-    /// Standard deviation of the bins up to number `last` from their mean, in bins; that of rounding included.
+    /// Returns the standard deviation of the bins up to number `last` about `mean`, in bins. It includes the rounding
+    /// to bins.
     #[cold]
     fn spread<T: Real>(&self, last: u32, mean: T) -> T {
         let (mut count, mut sum) = (0u32, T::from_f64(0.0));
@@ -365,7 +371,7 @@ mod tests {
         split(&picture, &Region::whole(64, 64), &gate, &config, None, 1, &Unobserved)
     }
 
-    /// The upper part dark, the lower lit.
+    /// The upper part is dark, the lower part is lit.
     fn halves(dark: u16, lit: u16) -> Vec<u16> {
         (0..64 * 64).map(|i| if i < 64 * 24 { dark } else { lit }).collect()
     }
@@ -374,7 +380,7 @@ mod tests {
     fn otsu_stands_half_way_between_two_values() {
         let found = level(&halves(10, 210), 8, Gate::default(), Config::default()).unwrap();
         assert_eq!((found.level, found.samples), (110, 256));
-        // 12 bits: the level is in the picture's own counts.
+        // With 12 bits, the threshold is in the counts of the picture.
         let found = level(&halves(100, 3900), 12, Gate::default(), Config::default()).unwrap();
         assert!(found.level.abs_diff(2000) <= 16, "{}", found.level);
     }
@@ -403,16 +409,17 @@ mod tests {
 
     #[test]
     fn a_thermal_camera_uses_a_small_part_of_its_words() {
-        // A range of 1200 counts of 65536, with noise of 10 on both sides: 1.8 % of full scale, 60 standard deviations.
+        // The contrast is 1200 of 65536 counts, which is 1.8 % of full scale or 60 standard deviations. The noise is 10
+        // counts on both sides.
         let noise = |i: usize| (i * 7919 % 41) as u16;
         for sky in [0, 7000, 30_000] {
             let data: Vec<u16> = halves(sky, sky + 1200).iter().enumerate().map(|(i, v)| v + noise(i)).collect();
             let found = level(&data, 16, Gate::default(), Config::default()).unwrap();
             assert!(found.level.abs_diff(sky + 620) < 40, "{sky}: {found:?}");
             assert!((found.contrast - 1200.0).abs() < 40.0 && (found.dark - f64::from(sky) - 20.0).abs() < 40.0);
-            // Half of the light, wherever the dark lies.
+            // Half of the light is found at every brightness of the sky.
             assert!(found.part(0.5).abs_diff(sky + 320) < 40, "{sky}: {}", found.part(0.5));
-            // Noise alone has no two sides.
+            // Noise alone does not form two classes.
             let flat: Vec<u16> = (0..64 * 64).map(|i| sky + noise(i)).collect();
             assert_eq!(level(&flat, 16, Gate::default(), Config::default()).unwrap_err(), Status::NoLimb);
         }
@@ -420,7 +427,8 @@ mod tests {
 
     #[test]
     fn the_noise_of_the_dark_is_told_whatever_lies_in_it() {
-        // Noise of a normal distribution, 4 counts, by the sum of twelve numbers, on a sky and on dim ground.
+        // The noise is the sum of twelve numbers: nearly normal, with a sigma of 4 counts. It lies on a sky and on dim
+        // ground.
         let mut rng = Rng::new(5);
         let mut noise = || (0..12).map(|_| f64::from(rng.below(1000)) / 1000.0).sum::<f64>() * 4.0;
         let ground = |i: usize| if i < 64 * 12 { 30 } else { 0 };

@@ -1,9 +1,9 @@
-//! MLESAC (Torr & Zisserman 2000): RANSAC with the likelihood in place of the number of points.
+//! MLESAC (Torr & Zisserman 2000): RANSAC that maximises the likelihood instead of the number of points.
 //!
-//! A point's distance d from the limb comes from a normal distribution of standard deviation σ if it is an inlier, and
-//! from an even one over ν otherwise; the share γ of inliers is found for every hypothesis by a few steps of
-//! expectation and maximisation. The hypothesis with the least −Σ ln(γ N(d; σ) + (1 − γ)/ν) wins. Every point is looked
-//! at several times in every draw, with an exponential each.
+//! The distance d of a point from the limb has a normal distribution with standard deviation σ if the point is an
+//! inlier. Otherwise it has a uniform distribution over the range ν. For every hypothesis, a few steps of
+//! expectation-maximisation find the share γ of inliers. The hypothesis with the smallest −Σ ln(γ N(d; σ) + (1 − γ)/ν)
+//! wins. Every draw evaluates every point several times, with one exponential each.
 
 use super::sampled::{FEWEST, conclude, distances2, drawn, needed};
 use super::{Config, Consensus, Threshold};
@@ -13,13 +13,13 @@ use crate::base::rng::Rng;
 use crate::geometry::block::{Block, LANES, sum};
 use crate::model::work::{DRAW, LIKELIHOOD, WorkBudget};
 
-/// Steps for the share of inliers.
+/// Number of steps that find the share of inliers.
 const STEPS: usize = 3;
-/// Standard deviations within the threshold: 95 % of the inliers.
+/// The threshold in standard deviations: 95 % of the inliers are within it.
 const SIGMAS: f64 = 1.96;
 
-/// The most likely cone; points farther from it than the threshold lose their weight. `None` with fewer than three
-/// points, or when hardly any is on a cone.
+/// Finds the most likely cone; points beyond the threshold get weight 0. The result is `None` with fewer than three
+/// points, or if hardly any points are on a cone.
 pub(super) fn keep<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
@@ -31,7 +31,7 @@ pub(super) fn keep<T: Real>(
     if count < 3 {
         return None;
     }
-    // Outliers lie up to a radian from the limb, to both sides.
+    // Outliers are up to one radian from the limb, on both sides.
     let mixture = Mixture { sigma: threshold.px / T::from_f64(SIGMAS), range: focal_px * T::from_f64(2.0) };
     let mut rng = Rng::new(config.seed);
     let mut best: Option<(V3<T>, T, T)> = None;
@@ -50,15 +50,15 @@ pub(super) fn keep<T: Real>(
     conclude(blocks, cone, threshold.px * threshold.px, draws)
 }
 
-/// Inliers and outliers: standard deviation of the ones, range of the others, in pixels.
+/// Mixture of inliers and outliers: standard deviation of the inliers, and range of the outliers, in pixels.
 struct Mixture<T> {
     sigma: T,
     range: T,
 }
 
 impl<T: Real> Mixture<T> {
-    /// Of the inliers, at a squared distance; nothing beyond eight standard deviations, where numbers become too small
-    /// to be computed with at speed.
+    /// Returns the density of the inliers at a squared distance. It is 0 beyond eight standard deviations, where the
+    /// numbers would become so small that computing is slow.
     #[inline]
     fn density(&self, d2: T) -> T {
         let z2 = d2 / (self.sigma * self.sigma);
@@ -69,7 +69,7 @@ impl<T: Real> Mixture<T> {
         }
     }
 
-    /// −Σ ln of the likelihood, and the share of inliers.
+    /// Returns −Σ ln of the likelihood, and the share of inliers.
     fn cost(&self, blocks: &[Block<T>], e: &V3<T>, c: T) -> (T, T) {
         let mut share = T::from_f64(0.5);
         for _ in 0..STEPS {
@@ -83,7 +83,7 @@ impl<T: Real> Mixture<T> {
                     points[l] += b.weight[l];
                 }
             }
-            // Neither all nor none, so that the logarithm is finite.
+            // The share is neither 0 nor 1, so that the logarithm is finite.
             share = (sum(&inliers) / sum(&points).max(T::one())).max(T::from_f64(1e-3)).min(T::from_f64(0.999));
         }
         let outlier = (T::one() - share) / self.range;

@@ -1,9 +1,9 @@
-//! Outlier rejection: the cone that most points agree on.
+//! Outlier rejection: finds the cone that most points agree on.
 //!
-//! Random sample consensus on the minimal solver for a known half-angle, two points; on three points where the
-//! half-angle is known to no better than a degree. A hypothesis is first verified on one further point, so that most
-//! wrong ones cost next to nothing, then scored by truncated squares on a part of the points. With 80 % outliers 574
-//! draws find the limb with 99 % probability.
+//! The default method is random sample consensus (RANSAC) with the minimal solver for a known half-angle, which needs
+//! two points. It uses three points if the sigma of the half-angle is above one degree. A further point verifies each
+//! hypothesis, so that most wrong hypotheses cost little. The others are scored by truncated squared distances on a
+//! part of the points. With 80 % outliers, 574 draws find the limb with a probability of 99 %.
 
 #[cfg(feature = "zju")]
 mod mlesac;
@@ -62,25 +62,25 @@ section! {
     }
 }
 
-/// The distance from the limb up to which a point of one edge can be an inlier.
+/// Largest distance from the limb at which a point of one edge can be an inlier.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Threshold<T> {
-    /// The distance in pixels.
+    /// The largest distance, in pixels.
     pub(crate) px: T,
-    /// The distance over `threshold_px`, 1 or more. The largest RMS of the fit grows with it.
+    /// Ratio of the largest distance to `threshold_px`, 1 or more. The largest RMS of the fit grows with it.
     pub(crate) raised: T,
 }
 
 impl<T: Real> Threshold<T> {
-    /// `threshold_px` as it was told.
+    /// Uses `threshold_px` of the configuration as it is.
     #[cfg(test)]
     pub(crate) fn told(config: &Config) -> Self {
         Self { px: T::from_f64(config.threshold_px), raised: T::one() }
     }
-    /// The threshold for the first `count` points of the blocks, which are rays in the order of the edge.
+    /// Makes the threshold for the first `count` points of the blocks, which are rays in the order of the edge.
     ///
-    /// Noise raises it to no more than the sigma of the limb's own height. The air spreads a limb no farther, so an
-    /// edge that scatters more belongs to something else.
+    /// Noise raises the threshold at most to the sigma of the limb height. Air does not spread a limb farther, so an
+    /// edge with more scatter belongs to something else.
     pub(crate) fn new(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
         let told = T::from_f64(config.threshold_px);
         let most = if expected.free { told } else { told.max(expected.limb_sigma_rad() * focal_px) };
@@ -94,27 +94,27 @@ impl<T: Real> Threshold<T> {
     }
 }
 
-/// What most points agree on.
+/// The cone that most points agree on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Consensus<T> {
-    /// Axis of the cone.
+    /// Unit axis of the cone, in the camera frame.
     pub(crate) e: V3<T>,
-    /// cos of its half-angle.
+    /// cos of the half-angle of the cone.
     pub(crate) c: T,
-    /// Draws made.
+    /// Number of draws.
     pub(crate) draws: u32,
-    /// No point is to be left out.
+    /// Every point is an inlier: the fit leaves none out.
     #[allow(dead_code, reason = "for the estimators behind features")]
     pub(crate) all: bool,
 }
 
-/// Blocks that are scored.
+/// Largest number of blocks that are scored.
 const SCORED: usize = 20;
-/// Fewest draws, however well the first one fits.
+/// Smallest number of draws, even if the first one fits well.
 const FEWEST: u32 = 6;
 
-/// Finds the consensus, and takes the weight from the points whose lit side lies away from it: they are edges of
-/// something else. `None` when no cone goes through a tenth of the points.
+/// Finds the consensus. A point whose lit side is away from the consensus gets weight 0, because it belongs to another
+/// edge. The result is `None` if no cone goes through about a tenth of the points.
 pub(crate) fn keep<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
@@ -157,8 +157,8 @@ fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
     expected.sigma_cos / expected.sin
 }
 
-/// Whether the Sun lights the body where the ray touches it; yes, where its direction is unknown. The normal there is
-/// (s cos α − e)/sin α.
+/// Whether the Sun lights the body where the ray touches it. The answer is yes if the direction of the Sun is unknown.
+/// The surface normal at this place is (s cos α − e)/sin α.
 fn is_lit<T: Real>(s: &V3<T>, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
     expected.sun.as_ref().is_none_or(|sun| s.dot(sun) * c - e.dot(sun) > T::ZERO)
 }
@@ -181,7 +181,8 @@ fn search<T: Real>(
     }
     let sigma_alpha = sigma_alpha(expected);
     let free = expected.free || sigma_alpha > T::from_f64(0.0175);
-    // An error of the half-angle bends the edge by a small part of itself: room for it, within reason.
+    // An error of the half-angle bends the edge by a small part of this error. The limit grows accordingly, at most by
+    // three thresholds.
     let threshold = threshold.px;
     let bend =
         if free { T::ZERO } else { (sigma_alpha * focal_px * T::from_f64(0.05)).min(threshold * T::from_f64(3.0)) };
@@ -199,8 +200,8 @@ fn search<T: Real>(
     'draws: while draws < needed.max(FEWEST).min(config.max_draws) && work.try_spend(DRAW) {
         draws += 1;
         let i = rng.below(count);
-        // Far apart for precision, close together for a limb that is a small part of the edge: there, neighbours of a
-        // limb point are limb points more often than not.
+        // Points far apart give a precise cone. Points close together find a limb that is a small part of the edge,
+        // because most neighbours of a limb point are limb points, too. The reach varies from draw to draw.
         let reach = (count >> (draws % 6)).max(8);
         let mut near = || (i + 1 + rng.below(reach)) % count;
         let (j, k, check) = (near(), near(), near());
@@ -230,7 +231,8 @@ fn search<T: Real>(
             if cost < best_cost {
                 best_cost = cost;
                 best = Some((e, c));
-                // With the inlier share w a draw succeeds with w³ (w⁴ on three points): 99 % of finding a better one.
+                // With the inlier share w, a draw succeeds with probability w³ (w⁴ with three points). After `needed`
+                // draws the probability of a success is 99 %.
                 let share = T::one() - cost / nothing;
                 let p = share * share * share * if free { share } else { T::one() };
                 needed = if p > T::from_f64(0.99) {
@@ -246,7 +248,7 @@ fn search<T: Real>(
     (share > T::from_f64(0.06)).then_some(Consensus { e, c, draws, all: false })
 }
 
-/// Squared distance of a point from the limb in pixels.
+/// Returns the squared distance of a point from the limb, in px².
 fn distance2<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T) -> T {
     let Some(block) = blocks.get(i as usize / LANES) else { return T::from_f64(1e30) };
     let lane = i as usize % LANES;
@@ -255,7 +257,8 @@ fn distance2<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T) -> T {
     r * r / (gu * gu + gv * gv).max(T::from_f64(1e-20))
 }
 
-/// Sum of squared distances, each at most `limit2`, over every `scored`-th block. Empty lanes count as outliers.
+/// Returns the sum of the squared distances, each at most `limit2`, over every `scored`-th block, in px². Empty lanes
+/// count as outliers.
 fn score<T: Real>(blocks: &[Block<T>], scored: usize, e: &V3<T>, c: T, limit2: T) -> T {
     let mut total = [T::ZERO; LANES];
     for b in blocks.iter().step_by(scored) {

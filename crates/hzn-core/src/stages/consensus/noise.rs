@@ -1,20 +1,21 @@
-//! The noise of an edge from point to point, before anything is fitted to it.
+//! Noise of an edge from point to point, measured before the fit.
 
 use crate::base::linalg::V3;
 use crate::base::median;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 
-/// Most points whose noise is looked at, evenly along the edge: the median is then known to some 10 %.
+/// Largest number of points that are measured, evenly along the edge. It gives the median to about 10 %.
 const MOST: usize = 64;
 
-/// Noise from point to point in pixels, across the edge. For each of up to 64 points, the distance from the middle
-/// between its two neighbours is 0.6745 √1.5 times the sigma of independent errors in the median. The limb's own
-/// bend, spacing²/2R, and smooth deviations are not seen.
+/// Measures the noise from point to point across the edge, in pixels. For each of up to 64 points, the method takes the
+/// distance from the middle between its two neighbours. For independent errors, the median of these distances is
+/// 0.6745 √1.5 times sigma. The curvature of the limb, spacing²/2R, and smooth deviations do not contribute.
 ///
-/// d = s_b − (s_a + s_c)/2 is projected on the normal n = s_b × (s_f − s_e) of the edge, whose direction comes from the
-/// points e and f eight before and after: between neighbours it would be the noise's own. The derivative of s·n by
-/// (u, v) turns it into pixels. Only differences of near rays occur, which keep their digits in single precision.
+/// d = s_b − (s_a + s_c)/2 is projected on the normal n = s_b × (s_f − s_e) of the edge. The points e and f, which are
+/// eight points before and after, give the direction of the edge. A direction from adjacent points would depend on
+/// their noise. The derivative of s·n by (u, v) converts the result to pixels. The method uses only differences of rays
+/// close to each other, so single precision suffices.
 pub(super) fn point_to_point<T: Real>(blocks: &[Block<T>], count: u32) -> T {
     let every = (count as usize / MOST).max(1);
     let mut all = heapless::Vec::<T, MOST>::new();
@@ -29,10 +30,10 @@ pub(super) fn point_to_point<T: Real>(blocks: &[Block<T>], count: u32) -> T {
     median::of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
 }
 
-/// Points to each side of which the direction of the edge comes.
+/// Number of points to each side from which the direction of the edge is computed.
 const ALONG: usize = 8;
 
-/// Distance of point `b` from the middle between its neighbours, across the edge, in pixels.
+/// Returns the distance of point `b` from the middle between its neighbours, across the edge, in pixels.
 fn second_difference<T: Real>(blocks: &[Block<T>], b: usize) -> Option<T> {
     let (before, at, after) = (seen(blocks, b - 1)?, seen(blocks, b)?, seen(blocks, b + 1)?);
     let normal = at.cross(&(seen(blocks, b + ALONG)? - seen(blocks, b - ALONG)?));
@@ -42,7 +43,7 @@ fn second_difference<T: Real>(blocks: &[Block<T>], b: usize) -> Option<T> {
     (size > T::ZERO).then(|| (off.dot(&normal) * T::from_f64(0.5) / size).abs())
 }
 
-/// The ray of a point that the lens sees.
+/// Returns the ray of a point if it is inside the range of the lens.
 fn seen<T: Real>(blocks: &[Block<T>], i: usize) -> Option<V3<T>> {
     let (block, lane) = (blocks.get(i / LANES)?, i % LANES);
     block.m.iter().any(|m| m[lane] != T::ZERO).then(|| block.ray(lane))
@@ -58,7 +59,8 @@ mod tests {
     use crate::stages::rays;
     use std::vec;
 
-    /// The noise of points on an arc of `radius_px`, `spacing_px` apart, moved across it by up to `half_width_px`.
+    /// Measures the noise of points on an arc of `radius_px`, `spacing_px` apart, displaced across it by up to
+    /// `half_width_px`.
     fn measured<T: Real>(radius_px: f64, spacing_px: f64, half_width_px: f64) -> f64 {
         let config = camera::Config::ideal(camera::Model::Pinhole, 1024, 768, 2133.0);
         let camera = Camera::<T>::try_new(&config).unwrap();
@@ -78,12 +80,13 @@ mod tests {
 
     #[test]
     fn noise_is_measured_and_a_bend_is_not() {
-        // Even noise of half-width h has the sigma h/√3; the median of its second differences is 0.9 of a normal one's.
+        // Uniform noise of half-width h has sigma h/√3. The median of its second differences is 0.9 of the median for
+        // normal noise.
         for half_width_px in [1.0, 4.0, 20.0] {
             let ratio = measured::<f32>(3000.0, 1.0, half_width_px) / (half_width_px / 3f64.sqrt());
             assert!((0.75..1.35).contains(&ratio), "{half_width_px} px: {ratio}");
         }
-        // The sagitta 1/2R between neighbours of 1 px, and what single precision makes of the rays.
+        // There remain the sagitta 1/2R between neighbours 1 px apart, and the rounding of rays in single precision.
         assert!(measured::<f64>(200.0, 1.0, 0.0) < 4e-3);
         assert!(measured::<f32>(3000.0, 1.0, 0.0) < 2e-3);
     }

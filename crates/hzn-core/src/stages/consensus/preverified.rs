@@ -1,12 +1,13 @@
 //! RANSAC with pre-verification (Wang et al. 2022, 2.3).
 //!
-//! Five points are drawn; three make a cone, and only if the other two lie on it as well, every point is compared with
-//! it. So most wrong hypotheses cost two comparisons. It ends when half of the points agree, or after k_max hypotheses.
+//! Five points are drawn, and three of them define a cone. Only if the other two are also on this cone, the cone is
+//! compared with every point. Most wrong hypotheses therefore cost only two comparisons. The search ends when more than
+//! half of the points agree, or after k_max hypotheses.
 //!
-//! k_max by (25), ln(1 − p)/ln(1 − (1 − r)³) with p = 90 % and a share r = 80 % of outliers, is printed as 286; rounded
-//! up it is 287. And it can only count the *accepted* hypotheses: a draw comes through the test with all five points on
-//! the limb, which needs 7195 draws for the same p. With 286 draws in all, 8.7 % of such pictures are solved. Draws are
-//! bounded by `max_draws`.
+//! Equation (25) gives k_max = ln(1 − p)/ln(1 − (1 − r)³). With p = 90 % and a share r = 80 % of outliers the paper
+//! prints 286; rounded up it is 287. This number can only count *accepted* hypotheses. A draw passes the test only if
+//! all five points are on the limb, which needs 7195 draws for the same p. With 286 draws in all, only 8.7 % of these
+//! pictures are solved. Here `max_draws` limits the number of draws.
 
 use super::sampled::{agreeing, conclude, distances2, point};
 use super::{Config, Consensus, Threshold};
@@ -17,13 +18,13 @@ use crate::geometry::block::{Block, LANES};
 use crate::geometry::cone::through_three;
 use crate::model::work::{DRAW, SCORE, WorkBudget};
 
-/// k_max.
+/// Largest number of accepted hypotheses, k_max.
 const HYPOTHESES: u32 = 287;
-/// Drawn points.
+/// Number of points in a draw.
 const SAMPLE: usize = 5;
 
-/// The accepted cone with the most points near it; the others lose their weight. `None` with fewer than five points,
-/// or when no draw was accepted.
+/// Finds the accepted cone with the most points near it; the other points get weight 0. The result is `None` with fewer
+/// than five points, or if no draw is accepted.
 pub(super) fn keep<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
@@ -57,10 +58,10 @@ pub(super) fn keep<T: Real>(
     conclude(blocks, best, limit2, draws)
 }
 
-/// The cone through the first three points, if the others lie on it too.
+/// Returns the cone through the first three points if the other two are on it, too.
 fn verified<T: Real>(blocks: &[Block<T>], sample: [u32; SAMPLE], limit2: T) -> Option<(V3<T>, T)> {
     let [i, j, k, m, n] = sample;
-    // A point drawn twice verifies nothing.
+    // A point that is drawn twice verifies nothing.
     if m == n || [i, j, k].contains(&m) || [i, j, k].contains(&n) {
         return None;
     }

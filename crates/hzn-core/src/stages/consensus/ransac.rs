@@ -1,9 +1,9 @@
 //! Classic RANSAC on three points (Fischler & Bolles 1981; Braun & Barf 2022, section 3.6).
 //!
-//! Three rays determine a cone, its half-angle included: the normal of their plane. Every point is compared with it,
-//! and the cone with the most points within the threshold wins. Nothing of what is known beforehand is used, neither
-//! the half-angle nor on which side of the edge the light is, and every draw looks at every point: that is what the
-//! default, `two-point`, is better at.
+//! Three rays determine a cone with its half-angle: the axis is the normal of the plane through the rays. Every point
+//! is compared with the cone, and the cone with the most points within the threshold wins. The method uses no prior
+//! knowledge: neither the half-angle nor the side of the edge on which the light is. Every draw is compared with every
+//! point. The default method, `two-point`, is better in these respects.
 
 use super::sampled::{FEWEST, agreeing, conclude, drawn, needed};
 use super::{Config, Consensus, Threshold};
@@ -12,8 +12,8 @@ use crate::base::rng::Rng;
 use crate::geometry::block::Block;
 use crate::model::work::{DRAW, SCORE, WorkBudget};
 
-/// The cone with the most points near it; the others lose their weight. `None` with fewer than three points, or when
-/// no cone has more points than the three it goes through.
+/// Finds the cone with the most points near it; the other points get weight 0. The result is `None` with fewer than
+/// three points, or if no cone has more points than the three through which it goes.
 pub(super) fn keep<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,

@@ -1,4 +1,4 @@
-//! What the published samplers share: cones through three points, compared with every point.
+//! Common parts of the published samplers: cones through three points that are compared with every point.
 
 use super::Consensus;
 use crate::base::linalg::V3;
@@ -7,25 +7,27 @@ use crate::base::rng::Rng;
 use crate::geometry::block::{Block, LANES, sum};
 use crate::geometry::cone::through_three;
 
-/// Fewest draws, however well the first one fits.
+/// Smallest number of draws, even if the first one fits well.
 pub(super) const FEWEST: u32 = 6;
 
-/// Most draws that `max_draws` can ask for.
+/// Largest value of `max_draws`.
 const MOST: u32 = 100_000;
 
-/// A point that may count.
+/// Returns the ray of a point with a weight above 0.
 pub(super) fn point<T: Real>(blocks: &[Block<T>], i: u32) -> Option<V3<T>> {
     let (block, lane) = (blocks.get(i as usize / LANES)?, i as usize % LANES);
     (block.weight[lane] > T::ZERO).then(|| block.ray(lane))
 }
 
-/// Axis and cos of the half-angle of the cone through three points drawn at random, if they make one.
+/// Draws three points at random and returns the axis and the cos of the half-angle of the cone through them, if there
+/// is one.
 pub(super) fn drawn<T: Real>(blocks: &[Block<T>], count: u32, rng: &mut Rng) -> Option<(V3<T>, T)> {
     let [i, j, k] = [(); 3].map(|()| rng.below(count));
     through_three(&point(blocks, i)?, &point(blocks, j)?, &point(blocks, k)?)
 }
 
-/// Draws after which one of three inliers was among them with 99 %, when the share `w` of the points are inliers.
+/// Returns the number of draws that give 99 % probability of a draw with three inliers, if the share `w` of the points
+/// are inliers.
 pub(super) fn needed<T: Real>(w: T) -> u32 {
     let p = w * w * w;
     if p > T::from_f64(0.99) {
@@ -37,7 +39,7 @@ pub(super) fn needed<T: Real>(w: T) -> u32 {
     }
 }
 
-/// Squared distances of the points from the limb in pixels.
+/// Returns the squared distances of the points from the limb, in px².
 pub(super) fn distances2<T: Real>(b: &Block<T>, e: &V3<T>, c: T) -> [T; LANES] {
     let g = b.gradient(e);
     core::array::from_fn(|l| {
@@ -46,7 +48,7 @@ pub(super) fn distances2<T: Real>(b: &Block<T>, e: &V3<T>, c: T) -> [T; LANES] {
     })
 }
 
-/// Number of points that may count within the threshold of a cone.
+/// Returns the number of points with a weight that are within the threshold of a cone.
 pub(super) fn agreeing<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit2: T) -> T {
     let mut n = [T::ZERO; LANES];
     for b in blocks {
@@ -58,7 +60,7 @@ pub(super) fn agreeing<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit2: T)
     sum(&n)
 }
 
-/// The consensus on the cone that was found; the points beyond the threshold lose their weight.
+/// Returns the consensus for the cone that was found. Points beyond the threshold get weight 0.
 pub(super) fn conclude<T: Real>(
     blocks: &mut [Block<T>],
     cone: Option<(V3<T>, T)>,
@@ -70,7 +72,7 @@ pub(super) fn conclude<T: Real>(
     Some(Consensus { e, c, draws, all: false })
 }
 
-/// Takes the weight from the points beyond the threshold.
+/// Sets the weight of the points beyond the threshold to 0.
 fn leave_out<T: Real>(blocks: &mut [Block<T>], e: &V3<T>, c: T, limit2: T) {
     for block in blocks {
         let d2 = distances2(block, e, c);

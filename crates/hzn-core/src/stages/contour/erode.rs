@@ -1,8 +1,9 @@
-//! Edges by erosion (Barf 2014, 2.2.3): a lit pixel with too few lit ones around it would be eroded, so it is edge.
+//! Edges by erosion (Barf 2014, 2.2.3). A lit pixel with too few lit pixels around it would be eroded, so it is an edge
+//! pixel.
 //!
-//! Every pixel of the picture is looked at with its whole neighbourhood, and all edges of the picture are one list,
-//! whatever they belong to: there is no border to follow. To give the points an order along the limb they are sorted
-//! about the centre of the circle through all of them, from the widest gap on.
+//! The method reads every pixel of the picture with its whole neighbourhood. It follows no border: all edge pixels of
+//! the picture are in one list. To give them an order along the limb, they are sorted by their angle about the centre
+//! of the circle through all of them. The order begins after the widest gap.
 
 use super::order::about_their_circle;
 use super::thinned::Thinned;
@@ -13,8 +14,8 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::model::work::{self, WorkBudget};
 
-/// The edge pixels of the picture, in order about their circle. Beside the end of the region, or a mask, there is no
-/// edge.
+/// Returns the edge pixels of the picture, sorted by their angle about the common circle. Pixels next to the end of the
+/// region or to a mask are no edge pixels.
 pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
@@ -27,7 +28,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     let around = work::square(config.erode_size_px, binary.mask_cost());
     for y in 0..binary.region.height() {
         let Some((x0, x1)) = binary.region.span(y) else { continue };
-        // What was looked at of the mask in the row before, too.
+        // This includes the mask reads of the previous row.
         if !work.try_spend(u32::from(x1 - x0) + binary.cost()) {
             break;
         }
@@ -44,7 +45,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     edge
 }
 
-/// Whether fewer than `least` pixels of the neighbourhood are lit, and none masked.
+/// Whether fewer than `least` pixels of the neighbourhood are lit, and none is masked.
 fn is_edge<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: u16,
@@ -85,11 +86,11 @@ mod tests {
     #[test]
     fn a_straight_edge_is_as_wide_as_the_neighbourhood_reaches() {
         let data: Vec<u8> = (0..20 * 20).map(|i| if i / 20 >= 8 { 200 } else { 0 }).collect();
-        // 3×3 of a flat edge's first row: six lit. In the second all nine.
+        // In the first row of a straight edge, six of 3×3 pixels are lit; in the second row, all nine.
         let first: Vec<_> = (1..19).map(|x| (x, 8)).collect();
         assert_eq!(eroded(&data, 20, 20, 3, 9), first);
         assert_eq!(eroded(&data, 20, 20, 3, 6), []);
-        // 5×5: fifteen, then twenty, then all.
+        // With 5×5 pixels, fifteen are lit in the first row, twenty in the second, and all in the third.
         assert_eq!(eroded(&data, 20, 20, 5, 25).len(), 2 * 16);
         assert_eq!(eroded(&data, 20, 20, 5, 20).len(), 16);
     }
@@ -106,7 +107,7 @@ mod tests {
         let edge = eroded(&data, w, h, 3, 9);
         assert!(edge.len() > 60);
         let along: Vec<f64> = edge.iter().map(|p| libm::atan2(f64::from(p.1) - cy, f64::from(p.0) - cx)).collect();
-        // From the left to the right, the gap below the picture left out; neighbours are a pixel or two apart.
+        // The points go from left to right, without the gap below the picture. Neighbours are one or two pixels apart.
         assert!(along.is_sorted_by(|a, b| *a <= *b + 0.01), "{along:?}");
         for pair in edge.windows(2) {
             assert!(pair[0].0.abs_diff(pair[1].0) <= 4 && pair[0].1.abs_diff(pair[1].1) <= 4, "{pair:?}");

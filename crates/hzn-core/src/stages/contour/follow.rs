@@ -1,13 +1,14 @@
-//! The border follower: from a lit pixel and a dark neighbour along the edge, the lit side on the left.
+//! The border follower. It starts at a lit pixel with a dark neighbour and walks along the edge, with the lit side on
+//! the left.
 //!
-//! Moore neighbourhood, lit pixels 8-connected, as Suzuki & Abe 1985 and OpenCV's `findContours`. Going
-//! counter-clockwise about the lit side (as seen on the screen), the neighbours of a pixel are examined
-//! counter-clockwise from the one where the follower came from; the first lit one is next. The dark ones passed over
-//! belong to the edge: where one of them lies beyond the region, the edge ends there; where it is masked, the pixel
-//! is no edge point.
+//! It uses the Moore neighbourhood with 8-connected lit pixels, like Suzuki & Abe 1985 and OpenCV's `findContours`. It
+//! goes counter-clockwise around the lit side, as seen on the screen. At each pixel it examines the neighbours
+//! counter-clockwise, beginning after the one where it came from. The first lit neighbour is the next pixel. The dark
+//! neighbours that it passes belong to the edge. If one of them is beyond the region, the edge ends there. If one of
+//! the neighbours is bright but masked, the pixel is no edge point.
 //!
-//! Most steps are far from the border, the masks, the search lines and the start: they are taken in runs in which
-//! nothing is looked at but the level.
+//! Most steps are far from the border, the masks, the search lines and the start. These steps are done in runs, in
+//! which only the threshold is checked.
 
 use super::marks::Marks;
 use super::thinned::Thinned;
@@ -19,48 +20,50 @@ use crate::model::observer::Observer;
 use crate::model::work;
 use core::cell::Cell;
 
-/// Neighbours counter-clockwise on the screen from east: (dx, dy).
+/// Steps to the eight neighbours, counter-clockwise on the screen from east: (dx, dy).
 pub(super) const STEPS: [(i32, i32); 8] = [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
-/// The western neighbour, which search lines mark.
+/// Direction of the western neighbour, which search lines mark.
 pub(super) const WEST: u8 = 4;
 
-/// An edge point's mid-level is its own from this part of full scale on, or of the picture's contrast, and from so many
-/// counts.
+/// An edge point has its own mid-level if its local contrast is at least 1/`FULL_SCALE_PART` of full scale, or
+/// 1/`CONTRAST_PART` of the contrast of the picture. In both cases `LEAST_CONTRAST` counts are necessary.
 const FULL_SCALE_PART: i32 = 64;
 const CONTRAST_PART: i32 = 16;
 const LEAST_CONTRAST: i32 = 2;
 
-/// What is followed: a picture, its level and its region.
+/// The picture as the follower sees it: lit and dark pixels of a region.
 pub(crate) struct BinaryPicture<'a, T, P, O> {
     pub(crate) picture: &'a P,
     pub(crate) region: &'a Region<T>,
     pub(crate) level: u16,
     pub(crate) observer: &'a O,
-    /// The body's disc blooms: its edge is where the picture's level says, as what lies around it is no plateau.
+    /// Whether the disc of the body blooms. Its edge points then use the threshold of the picture, because the glare
+    /// around the disc is no plateau.
     pub(crate) blooms: bool,
-    /// Contrast in counts that an edge point's own mid-level needs at least.
+    /// Smallest local contrast, in counts, for which an edge point has its own mid-level.
     pub(crate) least_contrast: i32,
-    /// What a look at the mask costs, and a look around.
+    /// Cost of a read of the mask, and of a look at all neighbours, in the unit of the work budget.
     mask: u32,
     look: u32,
-    /// Looks at the mask outside of the follower that were not paid for yet.
+    /// Number of mask reads outside of the follower that are not yet paid for.
     masked: Cell<u32>,
-    /// Twice around, so that eight directions follow each other from any of the first eight.
+    /// The eight moves, twice: a search over eight directions can begin at any of the first eight without wrapping.
     moves: [Move; 16],
 }
 
 /// A step of the follower.
 #[derive(Clone, Copy)]
 struct Move {
-    /// Its direction, and the first to be looked at after it: the dark neighbour passed over last is a neighbour of the
-    /// new pixel, too. It stands three directions before the way back after a straight step, two after a diagonal one.
+    /// Direction of the step, and the first direction to examine after it. The last dark neighbour that was passed is
+    /// also a neighbour of the new pixel, and is not read again. `first` is therefore three directions
+    /// counter-clockwise of the way back after a straight step, and two after a diagonal one.
     direction: u8,
     first: u8,
     dx: i32,
     dy: i32,
-    /// Added to a pixel as one word.
+    /// The step as one word, to be added to a pixel as one word.
     word: u32,
-    /// In the picture's memory.
+    /// The step as an offset in the memory of the picture.
     offset: isize,
 }
 
@@ -81,25 +84,26 @@ impl Move {
 /// How an edge ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum End {
-    /// At the border of the region.
+    /// The edge ends at the border of the region.
     Open,
-    /// Back at its start; twice the enclosed area, negative for an outer edge (y down).
+    /// The edge returns to its start. `twice_area` is twice the enclosed area in px², negative for an outer edge
+    /// (y down).
     Closed { twice_area: i64 },
-    /// The picture's steps are used up.
+    /// The work budget of the edge is used up.
     OutOfSteps,
 }
 
-/// Where the follower stands.
+/// State of the follower.
 struct Walk {
     at: Pixel,
     index: usize,
-    /// The direction back to where it came from.
+    /// Direction back to the previous pixel.
     back: u8,
-    /// Twice the area on the right of its way so far, by Green's theorem: each step adds (2x + dx) dy.
+    /// Twice the area on the right of the way so far in px², by Green's theorem: each step adds (2x + dx) dy.
     twice_area: i64,
 }
 
-/// Most steps of a run.
+/// Largest number of steps of a run.
 const RUN: usize = 32;
 
 impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
@@ -121,9 +125,9 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         }
     }
 
-    /// With the contrast between the picture's dark and its lit pixels in counts: where it is a small part of full
-    /// scale, as in words of a thermal camera, an edge has less of it, too. Of bytes three counts are little in any
-    /// case.
+    /// Reduces the smallest contrast of edge points to 1/16 of `contrast`, which is the contrast between the dark and
+    /// the lit pixels of the picture in counts. It may be a small part of full scale, as in 16-bit pictures of a
+    /// thermal camera. Pictures with 8 bits keep their limit of three counts, which is small in any case.
     pub(crate) fn contrasting(self, contrast: T) -> Self {
         let own = (contrast / T::from_i32(CONTRAST_PART)).to_i32();
         let least = if own > 0 && self.picture.full_scale() > 255 { own.max(LEAST_CONTRAST) } else { i32::MAX };
@@ -134,7 +138,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         Self { blooms, ..self }
     }
 
-    /// Whether a pixel of the region is lit.
+    /// Whether a pixel of the region is lit and not masked.
     #[inline(always)]
     pub(crate) fn lit(&self, x: u16, y: u16) -> bool {
         self.brightness(x, y) >= self.level && !self.masked(x, y)
@@ -149,24 +153,24 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         self.masked.set(self.masked.get() + 1);
         self.region.masked(x, y)
     }
-    /// What a look at the mask costs.
+    /// Cost of one read of the mask.
     pub(crate) fn mask_cost(&self) -> u32 {
         self.mask
     }
-    /// What [`Self::lit`] has cost since the last time.
+    /// Returns the cost of [`Self::lit`] since the last call.
     pub(crate) fn cost(&self) -> u32 {
         self.masked.take() * self.mask
     }
 
-    /// The brightness of a pixel in counts.
+    /// Reads the brightness of a pixel in counts.
     #[inline(always)]
     pub(crate) fn brightness(&self, x: u16, y: u16) -> u16 {
         self.observer.pixel(x, y);
         self.picture.at(x, y)
     }
 
-    /// Follows the edge that passes between the lit pixel `start` and its dark neighbour in direction `dark`.
-    /// Stores it in `edge`, marks the crossings of search lines, and counts `steps` down.
+    /// Follows the edge that passes between the lit pixel `start` and its dark neighbour in direction `dark`. The
+    /// function stores the edge in `edge`, marks the crossings of search lines, and counts `steps` down.
     pub(crate) fn follow(
         &self,
         start: Pixel,
@@ -214,7 +218,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         }
     }
 
-    /// Steps from here during which nothing counts but the level.
+    /// Returns the number of steps from here in which only the threshold needs to be checked.
     #[inline]
     fn free_steps(&self, here: Pixel, start: Pixel, marks: &Marks<'_>) -> u32 {
         let home = here.x.abs_diff(start.x).max(here.y.abs_diff(start.y));
@@ -222,11 +226,11 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         if most == 0 {
             return 0;
         }
-        // What the last step looks at is one pixel further.
+        // The last step reads one pixel further.
         u32::from(self.region.clearance(here.x, here.y, most + 1).saturating_sub(1))
     }
 
-    /// `n` free steps, at most [`RUN`].
+    /// Does `n` free steps, at most [`RUN`].
     #[inline(never)]
     fn run(&self, walk: &mut Walk, n: usize, edge: &mut Thinned<'_>) {
         let mut passed = [Pixel::default(); RUN];
@@ -252,7 +256,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         *walk = Walk { at: pixel(at), index, back: (last.direction + 4) & 7, twice_area };
     }
 
-    /// One step.
+    /// Does one step.
     fn go(&self, walk: &mut Walk, direction: u8) {
         let step = &self.moves[usize::from(direction & 7)];
         walk.twice_area += i64::from((2 * i32::from(walk.at.x) + step.dx) * step.dy);
@@ -261,9 +265,9 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         walk.back = (direction + 4) & 7;
     }
 
-    /// Looks around a pixel where more counts than the level: at the border, at the mask, on a search line, at home.
-    /// Every neighbour is looked at, also the dark ones that are known already. `home`: at the start again, the
-    /// direction whose dark neighbour closes the edge.
+    /// Examines all neighbours of a pixel where more than the threshold has to be checked: at the border, at a mask, on
+    /// a search line, or at the start. It also reads the dark neighbours that are already known. `home` is set at the
+    /// start of the edge: it is the direction of the dark neighbour that closes the edge.
     #[inline(never)]
     fn look(&self, walk: &Walk, home: Option<u8>, marks: &mut Marks<'_>) -> Seen {
         let here = walk.at;
@@ -276,7 +280,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
             let (nx, ny) = (i32::from(here.x) + step.dx, i32::from(here.y) + step.dy);
             if !inside {
                 let beyond = nx < 0 || ny < 0 || !self.region.contains(nx as u16, ny as u16);
-                // The ring is made of the pixels with an outer 4-neighbour: an outer corner is merely dark.
+                // The ring consists of the pixels with an outer 4-neighbour. An outer pixel at a corner counts as dark.
                 if beyond && direction % 2 == 1 {
                     continue;
                 }
@@ -303,7 +307,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     }
 }
 
-/// A pixel as one word, row above column, so that a step is one addition.
+/// Packs a pixel into one word, with the row above the column, so that a step is one addition.
 fn word(p: Pixel) -> u32 {
     u32::from(p.y) << 16 | u32::from(p.x)
 }
@@ -311,7 +315,8 @@ fn pixel(word: u32) -> Pixel {
     Pixel { x: word as u16, y: (word >> 16) as u16 }
 }
 
-/// What a look around came upon; `cut`: a masked pixel on the way, so that this one is no edge point.
+/// Result of a look at all neighbours. `cut` says that a bright but masked pixel was passed, so that this pixel is no
+/// edge point.
 enum Seen {
     /// The next pixel.
     Lit {
@@ -322,7 +327,7 @@ enum Seen {
         cut: bool,
     },
     Home,
-    /// A single pixel: all around it is dark.
+    /// The pixel is single: all its neighbours are dark.
     Nothing {
         cut: bool,
     },

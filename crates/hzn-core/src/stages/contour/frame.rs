@@ -1,6 +1,6 @@
 //! A dark frame around the picture: rows and columns that the camera fills with black, as demosaicing and scaling do.
 //!
-//! Over a lit body it makes the picture's own outline an edge, to which the limb is joined at both ends.
+//! If a lit body reaches the frame, the outline of the picture becomes an edge that is joined to the limb at both ends.
 
 use super::follow::BinaryPicture;
 use crate::base::real::Real;
@@ -8,16 +8,18 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::model::work::{self, WorkBudget};
 
-/// Of a frame's pixels fewer than one in so many is lit, and of those next to it more than one in so many, of all
-/// around the picture: where an image circle leaves few of them, they tell nothing.
+/// In a ring of the frame, at most one in `SPECKS` pixels is lit. In the ring next to the frame, more than one in `LIT`
+/// is lit. Both fractions refer to the whole circumference of the picture: if an image circle leaves only few pixels of
+/// it, they prove nothing.
 const SPECKS: u32 = 64;
 const LIT: u32 = 8;
-/// Pixels between those that are looked at first: they tell of nearly every picture that it has none.
+/// Distance in pixels between the pixels that are read first. They show for nearly every picture that it has no frame.
 const COARSE: u16 = 64;
 
 impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
-    /// Width of the frame in pixels, `most` at most; 0 where there is none: light must come at once from its inner side
-    /// on, and not grow from the picture's border inwards as that of a disc or a glare does.
+    /// Returns the width of the frame in pixels, at most `most`; 0 if there is none. The light must begin abruptly at
+    /// the inner side of the frame. The light of a disc or a glare grows from the border of the picture inwards, and is
+    /// no sign of a frame.
     pub(crate) fn dark_frame_px(&self, most: u16, work: &mut WorkBudget) -> u16 {
         let (w, h) = (self.region.width(), self.region.height());
         let most = most.min(w.min(h).saturating_sub(1) / 4);
@@ -42,7 +44,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         0
     }
 
-    /// How many are lit of every `stride`-th of the region's pixels that are `px` from the picture's sides.
+    /// Returns how many pixels are lit, of every `stride`-th pixel of the region that is `px` pixels from the sides of
+    /// the picture.
     fn count_ring(&self, px: u16, stride: u16) -> u32 {
         let (right, bottom) = (self.region.width().saturating_sub(1 + px), self.region.height().saturating_sub(1 + px));
         let mut lit = 0;

@@ -1,11 +1,12 @@
-//! The crossings of search lines that have been followed: lit pixels on them whose western neighbour is dark.
+//! Marks of the crossings of search lines that have been followed. A crossing is a lit pixel on a line whose western
+//! neighbour is dark.
 //!
-//! Every closed edge that crosses a line has such a crossing on it, so a line's edges are followed once each. There is
-//! one bit for each pixel of the lines where memory suffices; for the narrow lines that small bodies need in large
-//! pictures, a table of the crossings themselves. When that is full, edges are followed again, which the picture's
-//! steps bound.
+//! Every closed edge that crosses a search line has a crossing on it. The marks therefore ensure that each edge is
+//! followed only once. If memory suffices, there is one bit for each pixel of the lines. Small bodies in large pictures
+//! need lines that are too close together for this; then a table holds the crossings themselves. If the table is full,
+//! edges are followed again; the work budget of the picture limits this.
 
-/// Search lines at rows y with y mod spacing = offset; the spacing is a power of two.
+/// Search lines at the rows y with y mod spacing = offset; the spacing is a power of two, in pixels.
 #[derive(Debug)]
 pub(crate) struct Marks<'a> {
     words: &'a mut [u32],
@@ -13,21 +14,22 @@ pub(crate) struct Marks<'a> {
     spacing: u16,
     offset: u16,
     bits: bool,
-    /// The table has no place for more.
+    /// The table has no free place.
     full: bool,
 }
 
-/// Places of the table that are tried for a crossing.
+/// Number of places in the table that are tried for a crossing.
 const TRIES: usize = 16;
 
-/// A power of two, `spacing` or less.
+/// Rounds `spacing` down to a power of two.
 fn rounded(spacing: u16) -> u16 {
     1 << (15 - spacing.clamp(1, 1 << 14).leading_zeros())
 }
 
 impl<'a> Marks<'a> {
-    /// Lines at most `spacing` rows apart, rounded down to a power of two; up to `widest` when the bits do not suffice
-    /// for more. All clear.
+    /// Places lines at most `spacing` rows apart, rounded down to a power of two. If memory does not suffice for the
+    /// bits of these lines, the spacing grows up to `widest`. If it still does not suffice, the table is used with the
+    /// small spacing. All marks are clear.
     pub(crate) fn new(words: &'a mut [u32], width: u16, height: u16, spacing: u16, widest: u16) -> Self {
         let needed = |spacing: u16| (u32::from(height).div_ceil(u32::from(spacing)) * u32::from(width)).div_ceil(32);
         let fit = |spacing: u16| needed(spacing) as usize <= words.len();
@@ -46,7 +48,7 @@ impl<'a> Marks<'a> {
         y & (self.spacing - 1) == self.offset & (self.spacing - 1)
     }
 
-    /// Rows from `y` to the nearest search line.
+    /// Returns the number of rows from `y` to the nearest search line.
     #[inline(always)]
     pub(crate) fn rows_away(&self, y: u16) -> u16 {
         let above = y.wrapping_sub(self.offset) & (self.spacing - 1);
@@ -57,7 +59,7 @@ impl<'a> Marks<'a> {
         let bit = u32::from(y >> (self.spacing.trailing_zeros() & 15)) * self.width + u32::from(x);
         ((bit / 32) as usize, 1 << (bit % 32))
     }
-    /// The crossing as it stands in the table, where 0 is an empty place, and the places that it may have.
+    /// Returns the entry of a crossing in the table (0 is an empty place), and the places where it may be.
     fn key(&self, x: u16, y: u16) -> (u32, impl Iterator<Item = usize> + use<>) {
         let key = (u32::from(y) << 16 | u32::from(x)) + 1;
         let (n, first) = (self.words.len().max(1), key.wrapping_mul(0x9e37_79b1) >> 7);
@@ -89,10 +91,10 @@ impl<'a> Marks<'a> {
             return self.words.get(word).is_some_and(|w| w & bit != 0);
         }
         let (key, mut places) = self.key(x, y);
-        // It would stand in the first place that is empty.
+        // A marked crossing comes before the first empty place.
         places.find_map(|p| self.words.get(p).filter(|&&w| w == 0 || w == key)) == Some(&key)
     }
-    /// The rows of the lines within `height`.
+    /// Returns the rows of the lines within `height`.
     pub(crate) fn rows(&self, height: u16) -> impl Iterator<Item = u16> + use<> {
         (self.offset..height).step_by(usize::from(self.spacing.max(1)))
     }
@@ -111,7 +113,8 @@ mod tests {
             (marks.spacing, marks.bits)
         };
         assert_eq!(spacing(16384, 5, 5), (4, true));
-        // 9 lines of 1920 bits are still more than 512 words: further apart, as far as the body allows.
+        // At a spacing of 128, the 9 lines with 1920 bits each exceed 512 words. The spacing therefore grows to
+        // `widest`.
         assert_eq!(spacing(512, 32, 256), (256, true));
         assert_eq!(spacing(512, 4, 16), (4, false));
         assert_eq!(spacing(1, 1, 1), (1, false));

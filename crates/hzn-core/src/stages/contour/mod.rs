@@ -1,8 +1,8 @@
-//! Lazy border following: a pixel is compared with the level only when the search or the follower touches it.
+//! Lazy border following: a pixel is compared with the threshold only when the search or the follower reads it.
 //!
-//! Edges begin at the border of the region, where dark turns to lit; they are followed until they leave the picture.
-//! Edges that close on themselves are found on horizontal search lines. So the cost grows with the length of the edges,
-//! not with the number of pixels.
+//! Edges begin at the border of the region, where dark turns to lit, and are followed until they leave the picture.
+//! Closed edges are found on horizontal search lines. The cost therefore grows with the length of the edges, and not
+//! with the number of pixels.
 
 #[cfg(feature = "horace")]
 pub(crate) mod erode;

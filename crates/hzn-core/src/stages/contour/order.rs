@@ -1,16 +1,16 @@
-//! An order along the limb for edge pixels that were found one by one, of the whole picture.
+//! Sorts edge pixels along the limb if they were found one by one in the whole picture.
 
 use crate::base::real::Real;
 use crate::base::sort;
 use crate::geometry::circle::Circle;
 use crate::geometry::pixel::Pixel;
 
-/// Sorts by the angle about the circle through all pixels, the widest gap between the last and the first. Pixels on a
-/// line stay in their order.
+/// Sorts the pixels by their angle about the circle through all of them. The widest gap is between the last and the
+/// first pixel. Pixels on a straight line keep their order.
 pub(super) fn about_their_circle<T: Real>(pixels: &mut [Pixel]) {
     let place = |p: &Pixel| [T::from_i32(i32::from(p.x)), T::from_i32(i32::from(p.y))];
     let Some(circle) = Circle::through(pixels.iter().map(place)) else { return };
-    // Grows with the angle from −x over −y: 0 to 4.
+    // This value grows with the angle from −x over −y, from 0 to 4.
     let angle = |p: &Pixel| -> T {
         let [x, y] = place(p);
         let (x, y) = (x - circle.centre[0], y - circle.centre[1]);

@@ -1,13 +1,13 @@
-//! Outer borders in raster order: algorithm 2 of Suzuki & Abe 1985, as HORACE's topological search runs it.
+//! Outer borders in raster order, as in HORACE's topological search: algorithm 2 of Suzuki & Abe 1985.
 //!
-//! The whole picture is scanned. A border begins at a lit pixel with a dark one to its left, unless it has been
-//! followed, and unless the scan is inside another one: what lies in a hole is not looked at. The algorithm labels
-//! the picture; what it needs of the labels is one bit a pixel here: the lit pixels at which a followed border faces a
-//! dark one to their left, where the scan enters, and the dark pixels that a followed border faces to the right,
-//! where it leaves.
+//! The whole picture is scanned row by row. A border begins at a lit pixel with a dark one to its left, unless this
+//! border has been followed already, and unless the scan is inside another border. Pixels in a hole are therefore
+//! ignored. The original algorithm labels the picture. Here one bit per pixel replaces the labels. A bit is set for lit
+//! pixels of a followed border with a dark pixel to their left: there the scan enters. A bit is also set for dark
+//! pixels to the right of a followed border: there the scan leaves.
 //!
-//! A border that runs along the side of the picture, or along a mask, is no edge there: it is split into the pieces
-//! between.
+//! A border along the side of the picture or along a mask is no edge. The border is split into the pieces between these
+//! parts.
 
 use super::BinaryPicture;
 use super::follow::STEPS;
@@ -23,12 +23,13 @@ const WEST: u8 = 4;
 /// How the scan ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scanned {
-    /// At the last pixel, or where it was told to stop.
+    /// The scan ended at the last pixel, or `found` stopped it.
     All,
-    /// The steps are used up, or there are more pixels than bits.
+    /// The steps are used up, or the picture has more pixels than there are bits.
     Truncated,
 }
 
+/// One bit for each pixel of the picture.
 struct Bits<'a> {
     words: &'a mut [u32],
     width: usize,
@@ -51,8 +52,8 @@ impl Bits<'_> {
     }
 }
 
-/// Calls `found` with every piece of every outer border, stored in `buffer`, until it says to stop. `steps` is counted
-/// down by the border pixels followed.
+/// Calls `found` with every piece of every outer border, stored in `buffer`, until it returns `false`. Each border
+/// pixel that is followed reduces `steps` by one.
 pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     words: &mut [u32],
@@ -74,7 +75,7 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
                 let Some(border) = follow(binary, start, u32::MAX, &mut bits, steps, |_, _| true) else {
                     return Scanned::Truncated;
                 };
-                // From a place where it is cut, if there is one, so that no piece is cut at the start.
+                // The second walk begins at a cut, if there is one, so that the start does not cut a piece in two.
                 let (from, length) = (border.cut.unwrap_or(start), border.length);
                 let mut piece = Thinned::new(buffer);
                 let mut go_on = true;
@@ -119,16 +120,16 @@ struct At {
     back: u8,
 }
 
-/// A border that was followed once around.
+/// A border after it was followed once around.
 struct Border {
     length: u32,
-    /// A pixel that is no edge point.
+    /// A pixel of the border that is no edge point.
     cut: Option<At>,
 }
 
-/// Follows an outer border counter-clockwise as seen on the screen, once around or `most` pixels far, as long as
-/// `visit` says so; it gets every pixel, and whether it is no edge point because what the border faces there is the end
-/// of the region, or a mask. `None` when the steps are used up.
+/// Follows an outer border counter-clockwise as seen on the screen: once around, at most `most` pixels, or until
+/// `visit` returns `false`. `visit` receives every pixel, and `true` if the pixel is no edge point because the border
+/// faces the end of the region or a mask there. The result is `None` if the steps are used up.
 fn follow<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     start: At,
@@ -151,14 +152,14 @@ fn follow<T: Real, P: Pixels, O: Observer<T>>(
                 next = Some(At { pixel: Pixel { x: x as u16, y: y as u16 }, back: (d + 4) & 7 });
                 break;
             }
-            // Only what shares a side with the pixel is faced; an outer corner is merely dark.
+            // Only neighbours that share a side with the pixel matter here; a corner beyond the region counts as dark.
             cut |= d.is_multiple_of(2) && hidden(binary, x, y);
             if d == WEST {
                 bits.set(here.x, here.y);
             } else if d == EAST && x < i32::from(binary.region.width()) {
                 bits.set(x as u16, here.y);
             }
-            // Around, and at the dark pixel where it began.
+            // The walk is complete: it is at the start again, and at the dark pixel where it began.
             if most == u32::MAX && border.length > 0 && here == start.pixel && d == start.back {
                 home = true;
                 break;
@@ -176,14 +177,14 @@ fn follow<T: Real, P: Pixels, O: Observer<T>>(
         }
         match next {
             Some(to) => at = to,
-            // A single pixel.
+            // The border is a single pixel.
             None => break,
         }
     }
     Some(border)
 }
 
-/// Beyond the region, or lit under a mask.
+/// Whether the pixel is beyond the region, or bright enough to be lit but masked.
 fn hidden<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> bool {
     let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return true };
     !binary.region.contains(x, y) || (binary.region.masked(x, y) && binary.picture.at(x, y) >= binary.level)
@@ -215,8 +216,8 @@ mod tests {
         found
     }
 
-    /// `tests/golden/contours.json`: OpenCV 5.0 `findContours`, RETR_EXTERNAL, CHAIN_APPROX_NONE. With a dark frame
-    /// around, as the outside counts as dark there.
+    /// Compares with `tests/golden/contours.json`: OpenCV 5.0 `findContours`, RETR_EXTERNAL, CHAIN_APPROX_NONE. A dark
+    /// frame is added, because OpenCV counts the outside as dark.
     #[test]
     fn external_borders_equal_opencv_point_for_point() {
         let golden: serde_json::Value =
@@ -250,12 +251,12 @@ mod tests {
 
     #[test]
     fn the_side_of_the_picture_is_no_edge() {
-        // Sky above, ground below and on both sides: one piece, without the columns at the sides.
+        // The sky is above, the ground below and on both sides: one piece, without the columns at the sides.
         let data: Vec<u8> = (0..8 * 6).map(|i| if i / 8 >= 2 { 200 } else { 0 }).collect();
         assert_eq!(borders(&data, 8, 6), [(1..7).rev().map(|x| (x, 2)).collect::<Points>()]);
-        // A whole picture has no edge, and neither has an empty one.
+        // A picture that is lit everywhere has no edge, and neither has a dark one.
         assert!(borders(&[200; 48], 8, 6).is_empty() && borders(&[0; 48], 8, 6).is_empty());
-        // One pixel.
+        // A single lit pixel is one border.
         let mut data = [0u8; 48];
         data[19] = 255;
         assert_eq!(borders(&data, 8, 6), [[(3, 2)]]);

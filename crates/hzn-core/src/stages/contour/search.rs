@@ -1,4 +1,4 @@
-//! Where edges begin: at the border of the region, and on search lines.
+//! Finds the beginnings of edges: at the border of the region (the ring), and on search lines.
 
 use super::follow::{BinaryPicture, WEST};
 use super::marks::Marks;
@@ -8,11 +8,11 @@ use crate::image::Pixels;
 use crate::image::region::Run;
 use crate::model::observer::Observer;
 
-/// Most starts that are ranked.
+/// Largest number of starts that are ranked.
 pub(crate) const RANKED: usize = 4;
 
-/// An edge begins here: a lit pixel of the ring, the direction of the dark one before it, and how long the dark
-/// stretch before it is.
+/// The beginning of an edge: a lit pixel of the ring after a dark one. `dark` is the direction to that dark pixel, and
+/// `stretch` is the number of dark pixels before the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Start {
     pub(crate) pixel: Pixel,
@@ -20,24 +20,27 @@ pub(crate) struct Start {
     pub(crate) stretch: u32,
 }
 
-/// The starts beside the longest dark stretches of the ring, longest first. The sky is the longest of all in most
-/// pictures, so the limb comes first, however many edges the clouds have.
+/// The starts after the longest dark stretches of the ring, longest first. In most pictures the sky is the longest
+/// stretch. The limb therefore comes first, even if clouds have many edges.
 pub(crate) type Ranked = heapless::Vec<Start, RANKED>;
 
 impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
-    /// Calls `found` with every start along the ring, clockwise, until it says to stop. Each open edge has exactly
-    /// one start. The ring is read at every `stride`-th pixel, and at all of them where it changes in between; where
-    /// it becomes lit also at those before, as noise frays the place where a wide edge begins.
+    /// Calls `found` with every start along the ring, clockwise, until it returns `false`. Each open edge has exactly
+    /// one start.
     ///
-    /// The first start's stretch does not count what lies beyond the place where the walk begins; the return value
-    /// does: the stretch that ends the walk.
+    /// The ring is read at every `stride`-th pixel. If the pixel differs from the one read before, all pixels between
+    /// them are read. If it is lit after dark, the pixels of the stride before are read too, because noise frays the
+    /// beginning of a wide edge.
+    ///
+    /// The stretch of the first start leaves out the dark pixels at the end of the walk. The return value is the number
+    /// of these pixels.
     pub(crate) fn each_start(&self, stride: u16, found: &mut dyn FnMut(Start) -> bool) -> u32 {
         let stride = stride.max(1);
         let mut stretch = 0u32;
         let mut before: Option<(Pixel, bool)> = None;
         let mut first: Option<(Pixel, bool)> = None;
         let mut go_on = true;
-        // One pixel after another.
+        // Handles one pixel of the ring.
         let mut step = |before: &mut Option<(Pixel, bool)>, stretch: &mut u32, pixel: Pixel, lit: bool| -> bool {
             let go_on = match *before {
                 Some((dark, false)) if lit => found(Start { pixel, dark: direction(pixel, dark), stretch: *stretch }),
@@ -53,7 +56,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         };
         self.region.each_run(|run| {
             let mut k = 0;
-            // The dark pixels that were passed over last: how many, how many of them counted, and what was before.
+            // The last dark pixels that were skipped: their number, how many of them counted, and the pixel before
+            // them.
             let mut passed = (0, 0, None);
             while k < run.len {
                 let next = (k + stride).min(run.len) - 1;
@@ -99,7 +103,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
             }
             true
         });
-        // Close the ring: the last pixel and the first may make a start.
+        // Close the ring: the last and the first pixel may form a start.
         if let (true, Some((pixel, true))) = (go_on, first) {
             step(&mut before, &mut stretch, pixel, true);
             return 0;
@@ -107,8 +111,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         stretch
     }
 
-    /// How many times `stride` pixels can be passed over from number `k` of a run and what is there is lit, or dark, as
-    /// it.
+    /// Returns how many times `stride` pixels can be skipped from pixel number `k` of a run, as long as each pixel read
+    /// is lit (or dark) as `lit` says.
     #[inline(always)]
     fn leaps(&self, run: &Run, k: u16, stride: u16, lit: bool) -> u16 {
         let Pixel { x, y } = run.at(k);
@@ -128,14 +132,15 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         most
     }
 
-    /// Calls `found` with the starts that [`Self::each_start`] can have passed over, until it says to stop: those with
-    /// fewer than `stride` dark pixels before them, or lit ones after them. Every pixel of the ring is read.
+    /// Calls `found` with the starts that [`Self::each_start`] can miss, until it returns `false`. These starts have
+    /// fewer than `stride` dark pixels before them, or fewer than `stride` lit pixels after them. Every pixel of the
+    /// ring is read.
     pub(crate) fn each_narrow_start(&self, stride: u16, found: &mut dyn FnMut(Start) -> bool) {
         let mut before: Option<(Pixel, bool)> = None;
         let (mut dark_px, mut lit_px) = (0u32, 0u32);
         let mut waiting: Option<Start> = None;
         let mut go_on = true;
-        // The last start's lit pixels may go on where the ring closes.
+        // The lit pixels of the last start may continue where the ring closes.
         for round in 0..2 {
             let mut starts = true;
             self.region.each_run(|run| {
@@ -173,7 +178,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         }
     }
 
-    /// The ranked starts.
+    /// Returns the ranked starts.
     pub(crate) fn ranked_starts(&self, stride: u16) -> Ranked {
         let mut ranked = Ranked::new();
         let mut first: Option<Start> = None;
@@ -191,9 +196,9 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         ranked
     }
 
-    /// Calls `found` with every unmarked lit pixel of a search line, from column `x0` to `x1` of row `y`, whose western
-    /// neighbour is dark, until it says to stop. `found` gets the marks back, for the follower. Gives how often the
-    /// line was lit after dark.
+    /// Calls `found` with every crossing of a search line, until it returns `false`. A crossing is an unmarked lit
+    /// pixel from column `x0` to `x1` of row `y` whose western neighbour is dark. `found` receives the marks for the
+    /// follower. The return value is the number of changes from dark to lit on the line.
     pub(crate) fn each_crossing<'m>(
         &self,
         y: u16,
@@ -219,8 +224,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         crossings
     }
 
-    /// Of the `count` pixels east of column `x` of row `y`, how many are lit as that one, or dark as it, before the
-    /// first that is not.
+    /// Returns how many of the `count` pixels east of column `x` of row `y` are lit (or dark) like that pixel, before
+    /// the first one that differs.
     #[inline(never)]
     fn alike_beyond(&self, x: u16, y: u16, count: u16) -> u16 {
         let index = self.picture.index(x, y);
@@ -237,7 +242,7 @@ fn insert(ranked: &mut Ranked, start: Start) {
     if ranked.is_full() && ranked.last().is_some_and(|last| last.stretch < start.stretch) {
         ranked.pop();
     }
-    // Full of longer ones: it is none of them.
+    // A full list holds only longer stretches here.
     let Ok(()) = ranked.push(start) else { return };
     let mut upwards = ranked.as_mut_slice();
     while let [.., longer, new] = &mut *upwards
@@ -248,7 +253,7 @@ fn insert(ranked: &mut Ranked, start: Start) {
     }
 }
 
-/// The direction from `a` to its neighbour `b`, counter-clockwise from east.
+/// Returns the direction from `a` to its neighbour `b`, counter-clockwise from east.
 fn direction(a: Pixel, b: Pixel) -> u8 {
     match (i32::from(b.x) - i32::from(a.x), i32::from(b.y) - i32::from(a.y)) {
         (1, 0) => 0,

@@ -1,10 +1,13 @@
 //! Edges of the whole picture by Sobel's gradient (Wang et al. 2022, 2.1).
 //!
-//! Every pixel's gradient is looked at, and every edge of the picture is in one list, whatever it belongs to: rejection
-//! is left to the sampler. An edge pixel has a gradient of more than twice the root mean square of all, as the
-//! automatic threshold of common tools, and no larger one beside it along the axis on which it is larger. A limb is
-//! found even where one level does not part ground from sky. To give the points an order along the limb they are sorted
-//! about the centre of the circle through all of them, from the widest gap on.
+//! The method reads the gradient of every pixel and puts all edge pixels of the picture into one list. The sampler of
+//! the consensus rejects those that do not belong to the limb. An edge pixel has a gradient of more than twice the root
+//! mean square of all gradients, as in the automatic threshold of common tools. It is also a maximum: neither neighbour
+//! has a larger gradient, along the axis on which the gradient is larger. The method finds a limb even where one
+//! threshold does not separate ground from sky.
+//!
+//! To give the pixels an order along the limb, they are sorted by their angle about the centre of the circle through
+//! all of them. The order begins after the widest gap.
 
 use super::BinaryPicture;
 use super::order::about_their_circle;
@@ -15,11 +18,11 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::model::work::{self, WorkBudget};
 
-/// Least gradient of an edge over the root mean square of all: its square.
+/// Smallest ratio of the gradient of an edge to the root mean square of all gradients, squared.
 const LEAST: u64 = 4;
 
-/// The edge pixels of the picture, in order about their circle. Beside the end of the region, or a mask, there is no
-/// edge.
+/// Returns the edge pixels of the picture, sorted by their angle about the common circle. Pixels next to the end of the
+/// region or to a mask are no edge pixels.
 pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     buffer: &'a mut [Pixel],
@@ -34,7 +37,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
             count += 1;
         }
     });
-    // A picture without any gradient has none above the mean.
+    // In a picture without any gradient no pixel is above this limit.
     let least = LEAST * (sum / count.max(1));
     each_pixel(binary, look, work, |x, y, work| {
         if let Some((gx, gy)) = gradient(binary, x, y)
@@ -73,7 +76,8 @@ fn each_pixel<T: Real, P: Pixels, O: Observer<T>>(
     }
 }
 
-/// Eight times the brightness change a pixel, to the right and down; `None` beside the end of the region or a mask.
+/// Returns eight times the brightness change per pixel, to the right and down; `None` next to the end of the region or
+/// a mask.
 fn gradient<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: u16,
@@ -96,8 +100,7 @@ fn gradient<T: Real, P: Pixels, O: Observer<T>>(
     Some(((ne + 2 * e + se) - (nw + 2 * w + sw), (sw + 2 * s + se) - (nw + 2 * n + ne)))
 }
 
-/// Whether the gradient is no smaller than those beside it along the axis on which it is larger; of two alike the
-/// first.
+/// Whether the gradient is a maximum along the axis on which it is larger. Of two equal neighbours the first counts.
 fn is_largest<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: u16,
@@ -125,7 +128,7 @@ mod tests {
     fn found(data: &[u8], w: u16, h: u16) -> Vec<(u16, u16)> {
         let picture = Grey::try_new(data, Layout::packed(w.into(), h.into(), 1, 8)).unwrap();
         let region = Region::<f64>::whole(w, h);
-        // No level: every pixel is lit.
+        // No threshold is needed: every pixel is lit.
         let binary = BinaryPicture::new(&picture, &region, 1, &Unobserved);
         let mut buffer = vec![Pixel::default(); 4096];
         edges(&binary, &mut buffer, &mut WorkBudget::unlimited()).pixels().iter().map(|p| (p.x, p.y)).collect()
@@ -133,7 +136,7 @@ mod tests {
 
     #[test]
     fn an_edge_is_one_pixel_wide_and_needs_no_level() {
-        // A blurred step between 60 and 180, row 12 in its middle.
+        // The step from 60 to 180 is blurred, with row 12 in its middle.
         let row = |y: i32| [60, 75, 100, 140, 165, 180][(y - 10).clamp(0, 5) as usize];
         let data: Vec<u8> = (0..30 * 30).map(|i| row(i / 30)).collect();
         let edge = found(&data, 30, 30);

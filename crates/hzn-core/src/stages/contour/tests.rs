@@ -17,7 +17,7 @@ struct Bitmap {
 }
 
 impl Bitmap {
-    /// Rows of '#' and '.', with a dark frame of one pixel around: the outside counts as dark.
+    /// Reads rows of '#' and '.', and adds a dark frame of one pixel, because OpenCV counts the outside as dark.
     fn framed(rows: &[&str]) -> Self {
         let (w, h) = (rows[0].len() + 2, rows.len() + 2);
         let mut data = vec![0; w * h];
@@ -33,7 +33,7 @@ impl Bitmap {
         Grey::try_new(&self.data, Layout::packed(u32::from(self.w), u32::from(self.h), 1, 8)).unwrap()
     }
 
-    /// Every closed edge at a spacing: (points, twice the area).
+    /// Returns every closed edge that search lines at a spacing find: (points, twice the area).
     fn closed(&self, spacing: u16) -> Vec<(Points, i64)> {
         let region = Region::<f64>::whole(self.w, self.h);
         let grey = self.grey();
@@ -76,7 +76,7 @@ impl Bitmap {
     }
 }
 
-/// `tests/golden/contours.json`: OpenCV 5.0 `findContours`, RETR_CCOMP, CHAIN_APPROX_NONE.
+/// Compares with `tests/golden/contours.json`: OpenCV 5.0 `findContours`, RETR_CCOMP, CHAIN_APPROX_NONE.
 #[test]
 fn outer_borders_equal_opencv_point_for_point() {
     let golden: serde_json::Value = serde_json::from_str(include_str!("../../../tests/golden/contours.json")).unwrap();
@@ -108,7 +108,7 @@ fn outer_borders_equal_opencv_point_for_point() {
 
 #[test]
 fn an_open_edge_ends_at_the_border() {
-    // Sky above, ground below: one edge, from the right to the left, lit side on the left.
+    // The sky is above, the ground below: one edge, from right to left, with the lit side on the left.
     let (w, h) = (6, 5);
     let data = (0..h * w).map(|i| if i / w >= 2 { 200 } else { 0 }).collect();
     let edges = Bitmap { w: 6, h: 5, data }.open();
@@ -123,7 +123,7 @@ fn random_bitmap(w: u16, h: u16, density: u8, seed: u32) -> Bitmap {
 }
 
 proptest! {
-    /// Every edge ends, its points are lit and touch a dark pixel or the border.
+    /// Every edge ends. Its points are lit, and each touches a dark pixel or the border.
     #[test]
     fn points_are_lit_and_beside_the_dark(w in 2u16..40, h in 2u16..40, density in 0u8..=100, seed in 0u32..10_000) {
         let map = random_bitmap(w, h, density, seed);
@@ -141,7 +141,7 @@ proptest! {
         }
     }
 
-    /// Between the strides and pixel by pixel together every start is found.
+    /// The search with strides and the search pixel by pixel together find every start.
     #[test]
     fn no_start_is_passed_over(
         w in 3u16..40, h in 3u16..40, density in 5u8..=95, seed in 0u32..10_000, stride in 1u16..7, grain in 1u16..5,
@@ -164,7 +164,7 @@ proptest! {
     #[test]
     fn no_edge_is_missed(w in 3u16..24, h in 3u16..24, density in 5u8..=95, seed in 0u32..10_000) {
         let mut map = random_bitmap(w, h, density, seed);
-        // A dark frame: then there are only closed edges.
+        // With a dark frame, there are only closed edges.
         for y in 0..h { for x in 0..w {
             if x == 0 || y == 0 || x == w - 1 || y == h - 1 { map.data[usize::from(y * w + x)] = 0; }
         } }
@@ -177,10 +177,10 @@ proptest! {
         } }
     }
 
-    /// In runs between the search lines, the same edges as step by step.
+    /// Runs between the search lines find the same edges as single steps.
     #[test]
     fn runs_follow_as_single_steps_do(seed in 0u32..10_000, scale in 3u16..12) {
-        // Blobs that are large enough for runs: a coarse random bitmap, enlarged, with the odd pixel changed.
+        // Blobs must be large enough for runs: a coarse random bitmap is enlarged, and a few pixels are changed.
         let (w, h) = (120u16, 90u16);
         let mut rng = crate::base::rng::Rng::new(seed);
         let coarse: Vec<bool> = (0..40 * 40).map(|_| rng.below(100) < 45).collect();
@@ -207,9 +207,9 @@ proptest! {
     }
 }
 
-/// A closed edge from its least point on.
+/// Rotates a closed edge so that it begins at its smallest point.
 fn rotated(mut points: Points) -> Points {
-    // An edge may pass its least pixel twice: the rotation that is least as a whole.
+    // An edge may pass its smallest point twice. Then the rotation that is smallest as a whole is used.
     let least = points.iter().min().copied();
     let best = (0..points.len())
         .filter(|&i| Some(points[i]) == least)
@@ -218,7 +218,7 @@ fn rotated(mut points: Points) -> Points {
     points
 }
 
-/// A lit lower half under a frame of `px` dark pixels.
+/// Makes a picture with a lit lower half under a frame of `px` dark pixels.
 fn under_a_frame(px: u16) -> Bitmap {
     let (w, h) = (60u16, 50u16);
     let lit = |x: u16, y: u16| y >= 20 && x >= px && x < w - px && y < h - px;
@@ -238,7 +238,7 @@ fn a_dark_frame_is_measured_and_nothing_else_is_one() {
         assert_eq!(frame(&under_a_frame(px), 8), if px <= 8 { px } else { 0 }, "{px}");
         assert_eq!(frame(&under_a_frame(px), 0), 0);
     }
-    // A disc that nearly touches the border, and one that grows brighter inwards.
+    // A disc near the border of the picture makes no frame: the share of lit pixels grows gradually inwards.
     for (r, x0) in [(20i32, 25i32), (22, 30), (24, 30)] {
         let inside = |i: i32| (i % 60 - x0).pow(2) + (i / 60 - 25).pow(2) < r * r;
         let data = (0..60 * 50).map(|i| if inside(i) { 200 } else { 0 }).collect();

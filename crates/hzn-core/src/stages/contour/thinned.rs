@@ -1,5 +1,5 @@
-//! A list of border pixels that never overflows: when it is full, every second one is dropped and the stride
-//! doubles, so that the whole edge stays covered.
+//! A list of border pixels that never overflows. If it is full, every second pixel is dropped and the stride doubles,
+//! so that the list still covers the whole edge.
 
 use crate::geometry::pixel::Pixel;
 
@@ -9,7 +9,7 @@ pub(crate) struct Thinned<'a> {
     buffer: &'a mut [Pixel],
     len: usize,
     stride: u32,
-    /// Pixels to come before the next one is stored.
+    /// Number of pixels to skip before the next one is stored.
     wait: u32,
     total: u32,
 }
@@ -39,7 +39,7 @@ impl<'a> Thinned<'a> {
         self.wait = self.stride - 1;
     }
 
-    /// Pushes several.
+    /// Adds several pixels.
     #[inline]
     pub(crate) fn extend(&mut self, passed: &[Pixel]) {
         if self.stride == 1
@@ -65,33 +65,34 @@ impl<'a> Thinned<'a> {
                 *slot = p;
             }
         }
-        // The next stored pixel is 2·stride after the last kept one; an odd one out has been dropped if len is even.
+        // The next stored pixel must be 2·stride after the last kept one. If `len` is even, this is the next pixel,
+        // because the last stored one is dropped.
         self.wait = if self.len.is_multiple_of(2) { 0 } else { self.stride };
         self.len = kept;
         self.stride *= 2;
     }
 
-    /// Forgets everything.
+    /// Clears the list.
     #[cfg(feature = "horace")]
     pub(crate) fn clear(&mut self) {
         (self.len, self.stride, self.wait, self.total) = (0, 1, 0, 0);
     }
 
-    /// The stored pixels, to be brought into another order.
+    /// Returns the stored pixels, so that they can be sorted.
     #[cfg(any(feature = "horace", feature = "zju"))]
     pub(crate) fn pixels_mut(&mut self) -> &mut [Pixel] {
         self.buffer.get_mut(..self.len).unwrap_or_default()
     }
 
-    /// The stored pixels in order.
+    /// Returns the stored pixels in order.
     pub(crate) fn pixels(&self) -> &[Pixel] {
         self.buffer.get(..self.len).unwrap_or_default()
     }
-    /// Every how many pixels one is stored.
+    /// Returns the stride: one pixel in `stride` is stored.
     pub(crate) fn stride(&self) -> u32 {
         self.stride
     }
-    /// Pixels pushed.
+    /// Returns the number of pixels that were pushed.
     pub(crate) fn total(&self) -> u32 {
         self.total
     }

@@ -1,18 +1,19 @@
 //! Covariance of the direct nadir (Braun & Barf 2022, (33) to (37)), in one pass.
 //!
-//! An edge point wrong by δ(u, v) changes its equation p·e = cos α ‖p‖, p = s/s_z, by g·δ(u, v)/s_z, where g is the
-//! derivative of s·e by (u, v). With b = p gᵀ/s_z the covariance of the *unnormalised* vector is
-//! P = (HᵀH)⁻¹ R (Σ Σ b ρ… bᵀ) (HᵀH)⁻¹, the double sum over all pairs of points with the correlation of their errors;
-//! it collapses to one recursion as in [`super`].
+//! The equation of an edge point is p·e = cos α ‖p‖, with p = s/s_z. An error δ(u, v) of the point changes it by
+//! g·δ(u, v)/s_z, where g is the derivative of s·e by (u, v). With b = p gᵀ/s_z, the covariance of the *unnormalised*
+//! vector is P = (HᵀH)⁻¹ R (Σ Σ b ρ… bᵀ) (HᵀH)⁻¹. The double sum is over all pairs of points, with the correlation of
+//! their errors. It reduces to one recursion as in [`super`].
 //!
-//! What differs from the paper, and why:
-//! - (29) is meant as pᵀ δe = (cos α/‖p‖ pᵀ − eᵀ) δp; the second line prints the left side as δpᵀ e.
-//! - (33) has raw pixels in p. It holds on the undistorted plane; here g goes through the lens, so that an error is one
-//!   of the picture's pixels. For a pinhole both are the same.
-//! - (35) takes 1 − 1/L from point to point. Points are not one pixel apart (diagonal steps, thinning): the correlation
-//!   is exp(−Δs/L) over the distance between them.
-//! - (37), λ_max I in place of P, is said to be needed because P has no full rank after e is normalised. A filter needs
-//!   no full rank: project on the plane across e. The overbound is an option; it is some twenty times too careful.
+//! Differences from the paper:
+//! - (29) means pᵀ δe = (cos α/‖p‖ pᵀ − eᵀ) δp; its second line prints the left side as δpᵀ e.
+//! - (33) has raw pixels in p and holds on the undistorted plane. Here g includes the lens, so that an error is in
+//!   pixels of the picture. For a pinhole camera both are the same.
+//! - (35) uses 1 − 1/L from point to point. Points are not one pixel apart, because of diagonal steps and thinning.
+//!   Here the correlation is exp(−Δs/L), with the distance Δs between the points.
+//! - (37) replaces P by λ_max I. The paper says that this is necessary, because P does not have full rank after e is
+//!   normalised. A filter does not need full rank: P can be projected on the plane perpendicular to e. The overbound is
+//!   an option; it is about twenty times too large.
 
 use super::{Config, EdgeNoise, Fused};
 use crate::base::linalg::{M3, V3, basis, symmetric_eigen};
@@ -21,10 +22,10 @@ use crate::geometry::block::{Block, LANES};
 use crate::stages::fit::Fit;
 use crate::stages::fit::direct::{LEAST_Z, Normal};
 
-/// The answer of a fit with this covariance.
+/// Returns the answer of a fit with this covariance.
 pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config) -> Option<Fused<T>> {
     let p = of(blocks, &fit.e, T::from_f64(config.correlation_px))? * T::from_f64(config.sigma_px * config.sigma_px);
-    // The length of the unnormalised vector is cos α assumed over cos α measured.
+    // The length of the unnormalised vector is the assumed cos α divided by the measured one.
     let var_c = fit.c * fit.c * fit.e.dot(&(p * fit.e));
     Some(Fused {
         e: fit.e,
@@ -40,13 +41,13 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
     })
 }
 
-/// P of the unnormalised nadir in the camera frame for unit variance of the edge errors (px²), at the unit axis `e`.
-/// `None` when the points do not determine it.
+/// Returns P of the unnormalised nadir in the camera frame at the unit axis `e`, for an edge variance of 1 px². The
+/// result is `None` if the points do not determine it.
 pub(crate) fn of<T: Real>(blocks: &[Block<T>], e: &V3<T>, length_px: T) -> Option<M3<T>> {
     let (b1, b2) = basis(e);
     let normal = Normal::new(blocks, &b1, &b2, e)?;
     let zero = V3::new(T::ZERO, T::ZERO, T::ZERO);
-    // Errors in u and in v: what the points before carry over to this one.
+    // Errors in u and in v that the previous points carry over to this one.
     let mut carried = [zero; 2];
     let mut x = M3::from_columns(&[zero; 3]);
     for b in blocks {
@@ -67,7 +68,7 @@ pub(crate) fn of<T: Real>(blocks: &[Block<T>], e: &V3<T>, length_px: T) -> Optio
         }
     }
     let p = normal.inverse() * x * normal.inverse();
-    // Columns of the change from the sheared basis to the camera frame.
+    // The columns transform from the sheared basis to the camera frame.
     let turn = M3::from_columns(&[
         normal.vector(&V3::new(T::one(), T::ZERO, T::ZERO)),
         normal.vector(&V3::new(T::ZERO, T::one(), T::ZERO)),
@@ -76,8 +77,8 @@ pub(crate) fn of<T: Real>(blocks: &[Block<T>], e: &V3<T>, length_px: T) -> Optio
     Some(turn * p * turn.transpose())
 }
 
-/// What of `p` lies across the unit axis `e`: (11, 12, 22) on its tangent basis, rad². With `overbound`, (37): the
-/// largest eigenvalue in every direction.
+/// Projects `p` on the plane perpendicular to the unit axis `e`: (11, 12, 22) on its tangent basis, rad². With
+/// `overbound`, the largest eigenvalue holds in every direction, as in (37).
 pub(crate) fn across<T: Real>(p: &M3<T>, e: &V3<T>, overbound: bool) -> [T; 3] {
     if overbound {
         let rows = core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)]));

@@ -1,7 +1,7 @@
-//! Errors that all points of an edge share, so that no residual shows them.
+//! Errors that all points of an edge share, so that they do not appear in the residuals.
 //!
-//! Each is a signal x along the edge, in radians: the fit turns a signal of unit size into the error v = R Σ w h x of
-//! (δ₁₂, δc), R the response of the fit, and the covariance grows by σ² v vᵀ.
+//! Each error is a signal x along the edge, in radians. The fit converts a signal of unit size into the error
+//! v = R Σ w h x of (δ₁₂, δc), where R is the response of the fit. The covariance grows by σ² v vᵀ.
 //!
 //! | term | signal |
 //! |---|---|
@@ -10,14 +10,14 @@
 //! | unknown azimuth | cos kφ and sin kφ of the azimuth φ about the axis, k = 1, 2 |
 //! | lens | g·∂u/∂p, the pixel's move for an intrinsic parameter p |
 //!
-//! Of the azimuth: the limb of an ellipsoid differs from its mean cone by a second harmonic, one whose height varies
-//! with latitude also by a first. Unless an attitude tells where north is, the phase is anything: with the amplitude a
-//! the residuals hold a cos(kφ + ψ), ψ evenly distributed, so that each of the two signals counts with a²/2. Around the
-//! whole limb the second harmonic leaves nothing behind, on a short arc nearly all of it is taken for a tilt or another
-//! half-angle: which, the visible arc tells.
+//! The limb of an ellipsoid differs from its mean cone by a second harmonic of the azimuth. A limb height that varies
+//! with latitude also adds a first harmonic. The phase is unknown unless an attitude gives the direction of north. With
+//! the amplitude a, the residuals contain a cos(kφ + ψ) with ψ uniformly distributed, so that each of the two signals
+//! counts with a²/2. Around the whole limb, the second harmonic causes no error. On a short arc, nearly all of it is
+//! fitted as a tilt or as another half-angle; the visible arc decides which.
 //!
-//! The signals vary slowly along the limb: a part of the points is fitted in their place, with its own normal
-//! equations, so that a signal which the cone can follow comes out whole.
+//! The signals vary slowly along the limb, so that a part of the points is used instead of all. This part has its own
+//! normal equations; a signal that the cone can follow is then fitted completely.
 
 use super::noise::Levels;
 use super::{Term, response};
@@ -28,13 +28,13 @@ use crate::geometry::camera::{Camera, INTRINSICS};
 use crate::model::body::Expected;
 use crate::stages::fit::Fit;
 
-/// Points that the signals are summed over, at most, evenly along the edge.
+/// Largest number of points over which the signals are summed, evenly along the edge.
 const PART: usize = 64;
 
-/// The standard deviation of a place along the edge, for places from −1 to 1: 1/√3.
+/// Standard deviation of the position along the edge, for positions from −1 to 1: 1/√3.
 const SPREAD: f64 = 0.577_350_269_189_625_8;
 
-/// Hands each term with its covariance of (δ₁₂, δc) to `add`.
+/// Calls `add` with each term and its covariance of (δ₁₂, δc).
 pub(super) fn each<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
@@ -67,17 +67,18 @@ pub(super) fn each<T: Real>(
     Some(())
 }
 
-/// Σ w h x over a part of the points, for each signal x.
+/// Sums Σ w h x over a part of the points, for each signal x.
 struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
     normal: [T; 6],
     shift: V3<T>,
-    /// Σ w h g i, with i the number of the point, and what makes τ of i: Σ, Σ i and Σ i² of the robust weights.
+    /// Σ w h g i, where i is the number of the point. `numbers` are Σ, Σ i and Σ i² of the robust weights, from which τ
+    /// is computed.
     by_number: V3<T>,
     numbers: [T; 3],
-    /// By harmonic, cosine and sine.
+    /// Sums of the harmonics: for each harmonic, cosine and sine.
     harmonics: [[V3<T>; 2]; 2],
-    /// By intrinsic parameter.
+    /// Sums for each intrinsic parameter.
     lens: [V3<T>; INTRINSICS],
 }
 
@@ -97,7 +98,7 @@ impl<T: Real> Sums<T> {
         let is_uncertain = camera.uncertain().is_some();
         let points = blocks.iter().flat_map(|block| (0..LANES).map(move |l| (block, l))).enumerate();
         let carrying = points.filter(|(_, (block, l))| block.weight[l & 7] > T::ZERO);
-        // From the middle of each stretch.
+        // The points are in the middle of each stretch.
         let every = (fit.inliers as usize).div_ceil(PART).max(1);
         for (place, (block, l)) in carrying.skip(every / 2).step_by(every) {
             let s = block.ray(l);
@@ -131,7 +132,7 @@ impl<T: Real> Sums<T> {
         sums
     }
 
-    /// Of the tilt: τ = (i − ī)/(√3 σ_i), which goes from −1 to 1 over points that are evenly spread.
+    /// Returns the sum for the tilt, with τ = (i − ī)/(√3 σ_i). For evenly distributed points τ goes from −1 to 1.
     fn tilt(&self) -> V3<T> {
         let [n, sum, squares] = self.numbers;
         let mean = sum / n.max(T::one());

@@ -1,19 +1,19 @@
-//! Covariance of an elliptic cone: the same correlated errors, through what that fit makes of them.
+//! Covariance of an elliptic cone: the same correlated errors, with the response of this fit.
 //!
-//! A point's error by δ(u, v) along the gradient g of its equation moves axis and cos α by k g·δ(u, v), where k is the
-//! fit's answer to its row. With b = k gᵀ the covariance is R Σ Σ b ρ… bᵀ, which collapses as in [`super`]: c₁ = b₁,
-//! c_{j+1} = ρ_j c_j + b_{j+1}, Σ (1 − ρ_j²) c_j c_jᵀ.
+//! An error δ(u, v) of a point along the gradient g of its equation moves the axis and cos α by k g·δ(u, v), where k is
+//! the response of the fit to the row of the point. With b = k gᵀ the covariance is R Σ Σ b ρ… bᵀ. It reduces to a
+//! recursion as in [`super`]: c₁ = b₁, c_{j+1} = ρ_j c_j + b_{j+1}, Σ (1 − ρ_j²) c_j c_jᵀ.
 
 use crate::base::linalg::{M3, V3};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::stages::fit::Quadric;
 
-/// Covariance of (δ₁₂, δc) for unit variance of the edge errors, px².
+/// Returns the covariance of (δ₁₂, δc) for an edge variance of 1 px².
 pub(super) fn covariance<T: Real>(blocks: &[Block<T>], quadric: &Quadric<T>, length_px: T) -> M3<T> {
     let zero = V3::new(T::ZERO, T::ZERO, T::ZERO);
     let mut p = M3::from_columns(&[zero; 3]);
-    // Errors in u and in v.
+    // Carried errors in u and in v.
     let mut carried = [zero; 2];
     for block in blocks {
         for lane in 0..LANES {

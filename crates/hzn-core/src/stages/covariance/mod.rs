@@ -1,13 +1,13 @@
-//! Honest covariance in one pass: errors of neighbouring edge points are alike.
+//! Covariance of the fit with correlated errors of neighbouring edge points, in one pass.
 //!
-//! Pixel errors in x and y are independent Gauss-Markov processes along the edge with variance R and correlation
-//! ρ = exp(−Δs/L) from point to point. With q = w h (the row entering the normal equations) and b = q gᵀ the
-//! covariance of the fit is P = N⁻¹ (R X) N⁻¹, X = Σ Σ b ρ… bᵀ over all pairs. The double sum collapses: with
-//! c₁ = b₁ and c_{j+1} = ρ_j c_j + b_{j+1}, X = Σ (1 − ρ_j²) c_j c_jᵀ, the last ρ being 0. Taking the errors for
-//! independent instead would give a sigma some twenty times too small.
+//! Pixel errors in x and y are independent Gauss-Markov processes along the edge, with variance R and the correlation ρ
+//! = exp(−Δs/L) from point to point. Let q = w h (the row in the normal equations) and b = q gᵀ. The covariance of the
+//! fit is P = N⁻¹ (R X) N⁻¹, with X = Σ Σ b ρ… bᵀ over all pairs. The double sum reduces to a recursion: with c₁ = b₁
+//! and c_{j+1} = ρ_j c_j + b_{j+1}, X = Σ (1 − ρ_j²) c_j c_jᵀ, where the last ρ is 0. With independent errors instead,
+//! sigma would be about twenty times too small.
 //!
-//! R and L are told, or come from the residuals ([`Noise`]). Errors that all points of the edge share show in no
-//! residual, and each adds its own term; the expected half-angle is fused last.
+//! R and L come from the configuration or from the residuals ([`Noise`]). Errors that all points of the edge share do
+//! not appear in the residuals; each of them adds a term. Last, the expected half-angle is fused.
 
 #[cfg(feature = "dlr")]
 pub(crate) mod braun_barf;
@@ -32,7 +32,7 @@ pub(crate) use noise::measured_length_px;
 /// The answer of a fit with its covariance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fused<T> {
-    /// Axis after fusing the expected half-angle.
+    /// Unit axis after fusing the expected half-angle, in the camera frame.
     pub(crate) e: V3<T>,
     /// cos of the half-angle after fusing.
     pub(crate) c: T,
@@ -42,22 +42,22 @@ pub(crate) struct Fused<T> {
     pub(crate) var_free_cos: Option<T>,
     /// (ĉ − c₀)²/(P₃₃ + σ_c²): a χ² of one degree of freedom when the candidate is the body's limb.
     pub(crate) chi2: T,
-    /// What the edge's own errors are in it.
+    /// Errors of the edge points in this answer.
     pub(crate) edge: EdgeNoise<T>,
 }
 
-/// The edge errors that a covariance was made with.
+/// Errors of the edge points that a covariance includes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EdgeNoise<T> {
-    /// Their part of the variance of the freely fitted cos α; 0 when it was not fitted.
+    /// Contribution to the variance of the freely fitted cos α; 0 if it was not fitted.
     pub(crate) var_cos: T,
-    /// 1-sigma in pixels, and the length over which they stay alike.
+    /// 1-sigma of an edge point in pixels. `length_px` is the correlation length, in pixels.
     pub(crate) sigma_px: T,
     pub(crate) length_px: T,
 }
 
-/// Covariance of the fit from every source of error, never below the told values'; then the expected half-angle is
-/// fused. Leaves each source's part in `budget`.
+/// Computes the covariance of the fit from all sources of error, and then fuses the expected half-angle. The noise is
+/// never below the values of the configuration. The contribution of each source is recorded in `budget`.
 pub(crate) fn fuse<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
@@ -93,24 +93,26 @@ pub(crate) fn fuse<T: Real>(
     fused(fit, &p, edge, expected, estimate, budget)
 }
 
-/// The linear map from Σ w h x, about the means, to the errors (δ₁₂, δc) that the signal x in the residuals makes: T
-/// N⁻¹ with T = [[I, 0], [mᵀ, 1]], or, with the half-angle held, the inverse of the upper block, which leaves δc at 0.
+/// Returns the linear map from Σ w h x, about the means, to the errors (δ₁₂, δc) that a signal x in the residuals
+/// causes. It is T N⁻¹ with T = [[I, 0], [mᵀ, 1]]. With a fixed half-angle it is the inverse of the upper block, and δc
+/// is 0.
 pub(crate) fn response<T: Real>(sums: &fit::Sums<T>, [m1, m2]: [T; 2], free: bool) -> Option<M3<T>> {
     let (one, zero) = (T::one(), T::ZERO);
     if free {
         return Some(M3::new(one, zero, zero, zero, one, zero, m1, m2, one) * fit::inverse(sums)?);
     }
     let [a, b, d] = invert_spd2(sums.known([m1, m2]))?;
-    // Rows Bᵀs = h₁₂ − m h₃.
+    // The rows are Bᵀs = h₁₂ − m h₃.
     Some(M3::new(a, b, -(a * m1 + b * m2), b, d, -(b * m1 + d * m2), zero, zero, zero))
 }
 
-/// Covariance of (δ₁₂, δc) from that of the right-hand side, given by its upper triangle.
+/// Returns the covariance of (δ₁₂, δc) from the upper triangle of the covariance of the right-hand side.
 pub(crate) fn sandwich<T: Real>(response: &M3<T>, x: &[T; 6]) -> M3<T> {
     response * M3::new(x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]) * response.transpose()
 }
 
-/// A fit and the covariance of its (δ₁₂, δc), fused with the expected half-angle, unless that is to count for nothing.
+/// Fuses a fit and the covariance of its (δ₁₂, δc) with the expected half-angle, unless this half-angle is not to be
+/// used.
 fn fused<T: Real>(
     fit: &Fit<T>,
     p: &M3<T>,
@@ -123,7 +125,7 @@ fn fused<T: Real>(
     let var_c = expected.sigma_cos * expected.sigma_cos;
     let var_free = fit.free.then_some(p.m33);
     if !fit.free || estimate.half_angle == fit::HalfAngle::Free || expected.free {
-        // Half-angle held at the expected one: what it is wrong by, the axis is wrong by in proportion.
+        // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
         let k = held_gain(fit);
         let var_c = if estimate.half_angle == fit::HalfAngle::Known { T::ZERO } else { var_c };
         let (k, var_c) = k.filter(|_| !fit.free).map_or(([T::ZERO; 2], T::ZERO), |k| (k, var_c));
@@ -140,8 +142,8 @@ fn fused<T: Real>(
     if let Some(budget) = budget {
         budget.project(&b1, &b2, [k.x, k.y], [k.x * expected.sigma_cos, k.y * expected.sigma_cos], expected);
     }
-    // The tangent basis at the fused axis differs by the small turn only; the covariance is carried over as it is,
-    // through the camera frame.
+    // The tangent basis at the fused axis differs only by a small rotation. The covariance is therefore transformed
+    // through the camera frame without other changes.
     let fused = [p.m11 - k.x * p.m13, p.m12 - k.x * p.m23, p.m22 - k.y * p.m23];
     let (n1, n2) = basis(&e);
     let turn = |n: &V3<T>| [n.dot(&b1), n.dot(&b2)];
@@ -158,7 +160,7 @@ fn fused<T: Real>(
     })
 }
 
-/// By how much the axis moves for δc = 1 with the half-angle held: Σ w Bᵀs · 1 through the normal equations.
+/// Returns the change of the axis for δc = 1 with a fixed half-angle: Σ w Bᵀs · 1 through the normal equations.
 fn held_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
     let (sums, mean) = (&fit.sums, fit.mean);
     let n = invert_spd2(sums.known(mean))?;
@@ -166,7 +168,7 @@ fn held_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
     Some([n[0] * k1 + n[1] * k2, n[1] * k1 + n[2] * k2])
 }
 
-/// Σ (1 − ρ²) c cᵀ about `mean`, upper triangle.
+/// Returns the upper triangle of Σ (1 − ρ²) c cᵀ about `mean`.
 pub(crate) fn correlated<T: Real>(
     blocks: &[Block<T>],
     e: &V3<T>,
@@ -176,7 +178,7 @@ pub(crate) fn correlated<T: Real>(
     length_px: T,
 ) -> [T; 6] {
     let mut sums = [[T::ZERO; HALF]; 6];
-    // c for the errors in u and in v.
+    // c for the errors in u and for those in v.
     let mut c = [[T::ZERO; 3]; 2];
     let per_length = if length_px > T::ZERO { T::one() / length_px } else { T::ZERO };
     for block in blocks {
@@ -191,7 +193,8 @@ pub(crate) fn correlated<T: Real>(
         }
         let rho =
             if per_length > T::ZERO { exp_neg(&block.step_px.map(|step| step * per_length)) } else { [T::ZERO; LANES] };
-        // Each step closes the point before with 1 − ρ², then carries on: only the carrying is one lane after another.
+        // Each step completes the term of the point before with 1 − ρ², then updates c. Only the update depends on the
+        // lane before.
         let gap = rho.map(|r| T::one() - r * r);
         let mut before = [[[T::ZERO; LANES]; 3]; 2];
         for (before, (c, g)) in before.iter_mut().zip(c.iter_mut().zip(&g)) {

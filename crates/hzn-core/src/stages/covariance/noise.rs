@@ -1,4 +1,4 @@
-//! How large the errors of the edge points are, and over which length they stay alike: told, or measured.
+//! Size and correlation length of the errors of the edge points, from the configuration or from the residuals.
 
 use super::{Config, EdgeNoise, Noise, correlated};
 use crate::base::linalg::basis;
@@ -7,18 +7,19 @@ use crate::geometry::block::Block;
 use crate::model::body::Expected;
 use crate::stages::fit::Fit;
 
-/// With `rms` the correlation length is the length of the edge over this. The fit takes up the longest wavelengths of
-/// the errors (shift, tilt, bend of the whole edge); the residuals show the shorter ones, best those of about half the
-/// edge. The spectrum of a Gauss-Markov process is flat above the wavelength 2πL, which is 0.52 edges for a twelfth of
-/// the edge: the wavelengths that the fit takes up are assumed to be as strong as the longest that the residuals show.
+/// Ratio of the edge length to the correlation length, with `rms`. The fit absorbs the longest wavelengths of the
+/// errors (shift, tilt and curvature of the whole edge). The residuals show the shorter wavelengths, and best those of
+/// about half the edge. The spectrum of a Gauss-Markov process is flat above the wavelength 2πL, which is 0.52 edge
+/// lengths for this ratio. The model thus assumes that the absorbed wavelengths are as strong as the longest ones in
+/// the residuals.
 const LENGTHS_PER_EDGE: f64 = 12.0;
 
-/// The correlation length that an edge's own residuals are taken to have, pixels.
+/// Returns the correlation length that is assumed for the residuals of the edge, in pixels.
 pub(crate) fn measured_length_px<T: Real>(fit: &Fit<T>) -> T {
     fit.arc_px / T::from_f64(LENGTHS_PER_EDGE)
 }
 
-/// A tilt whose RMS along the edge is 1 is so large at its ends: √3.
+/// Value of a tilt at the ends of the edge if its RMS along the edge is 1: √3.
 const ENDS: f64 = 1.732_050_807_568_877_2;
 
 /// The noise model of one edge.
@@ -31,18 +32,18 @@ pub(super) struct Levels<T> {
     pub(super) shift_px: T,
     /// 1-sigma of the common tilt, px.
     pub(super) tilt_px: T,
-    /// The told sigma where the residuals' likelihood is asked.
+    /// Sigma of the configuration in pixels, if the likelihood of the residuals gives the noise.
     #[cfg(feature = "reml")]
     reml: Option<f64>,
 }
 
 impl<T: Real> Levels<T> {
-    /// Of an edge, by its residuals where the configuration says so.
+    /// Makes the noise model of an edge, from its residuals if the configuration says so.
     pub(super) fn new(fit: &Fit<T>, config: &Config) -> Self {
         let told = T::from_f64(config.sigma_px);
         let (length_px, common) = match config.noise {
             Noise::Rms => (measured_length_px(fit), fit.rms_px),
-            // What the fit takes up is in the likelihood, at every length.
+            // The likelihood includes the errors that the fit absorbs, at every length.
             Noise::Told | Noise::Reml => (T::ZERO, T::ZERO),
         };
         Self {
@@ -55,12 +56,12 @@ impl<T: Real> Levels<T> {
         }
     }
 
-    /// The edge's own errors, with their part of the variance of the freely fitted cos α.
+    /// Returns the errors of the edge points, with their contribution to the variance of the freely fitted cos α.
     pub(super) fn edge(&self, var_cos: T) -> EdgeNoise<T> {
         EdgeNoise { var_cos, sigma_px: self.variance.sqrt(), length_px: self.length_px }
     }
 
-    /// Covariance of the right-hand side Σ w r h of the normal equations, upper triangle.
+    /// Returns the upper triangle of the covariance of the right-hand side Σ w r h of the normal equations.
     pub(super) fn correlated(&self, blocks: &[Block<T>], fit: &Fit<T>, expected: &Expected<T>) -> [T; 6] {
         #[cfg(not(feature = "reml"))]
         let _ = expected;

@@ -1,15 +1,16 @@
 //! Edge noise from the residuals of one fit, by restricted maximum likelihood.
 //!
-//! The residuals r of n points that three fitted parameters with the columns H left behind are taken for a Gauss-Markov
-//! process with a white part, V = σ² [(1 − ν) exp(−Δs/L) + ν I]. A fitted autocovariance is biased, because the fit has
-//! taken the longest wavelengths away; the likelihood of what is orthogonal to H is not:
+//! The fit has three parameters with the columns H. The residuals r of n points are modelled as a Gauss-Markov process
+//! with a white part, V = σ² [(1 − ν) exp(−Δs/L) + ν I]. A fitted autocovariance would be biased, because the fit has
+//! removed the longest wavelengths. The likelihood of the part that is orthogonal to H has no bias:
 //!
 //! −2 ℓ = (n − 3) ln(q/(n − 3)) + ln|V/σ²| + ln|Hᵀ(V/σ²)⁻¹H|, σ² = q/(n − 3),
 //!
-//! q the generalised least squares' sum of squares. A scalar Kalman filter along the edge with the columns (r, H) gives
-//! all of it in one pass. The likelihood of one picture says little about L (a tenth to ten times are alike), so that
-//! the covariance is averaged over the posterior with ln L ~ N(ln(arc/4), 0.7²): a flat prior makes a disc's sigma
-//! three times too large, and a process without a white part picks a few pixels.
+//! where q is the sum of squares of generalised least squares. A scalar Kalman filter along the edge with the columns
+//! (r, H) gives all terms in one pass. The likelihood of one picture says little about L: a tenth of L and ten times L
+//! are nearly as likely as L. The covariance is therefore averaged over the posterior with the prior
+//! ln L ~ N(ln(arc/4), 0.7²). A flat prior would make the sigma of a disc three times too large, and without a white
+//! part the process would have an L of a few pixels.
 
 use super::correlated;
 use crate::base::linalg::{basis, invert_spd3};
@@ -22,30 +23,30 @@ use crate::stages::fit::{self, Fit};
 /// One point of an edge, in the order of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Distance from the point before along the edge, pixels.
+    /// Distance from the previous point along the edge, in pixels.
     pub step_px: f64,
-    /// Residual: the distance from the fitted limb, pixels.
+    /// Residual: the distance from the fitted limb, in pixels.
     pub residual_px: f64,
-    /// Its derivatives by the three fitted parameters, in any units and about any means.
+    /// Derivatives of the residual by the three fitted parameters, in any units and about any means.
     pub columns: [f64; 3],
 }
 
-/// What the likelihood says of one noise model.
+/// Likelihood of one noise model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Likelihood {
-    /// −2 ln of the restricted likelihood at the best sigma, up to a constant of the rows.
+    /// −2 ln of the restricted likelihood at the best sigma, except for a constant that depends only on the rows.
     pub minus_two_ln: f64,
     /// The best variance, px².
     pub variance_px2: f64,
-    /// Points less fitted parameters.
+    /// Number of points minus the number of fitted parameters.
     pub freedoms: f64,
 }
 
-/// Restricted likelihood of the correlation length (pixels, above 0) and the white part ν (0 to 1). `None` when there
-/// are too few rows or the columns do not tell the three parameters apart.
+/// Computes the restricted likelihood of the correlation length (in pixels, above 0) and the white part ν (0 to 1). The
+/// result is `None` if there are too few rows, or if the columns cannot separate the three parameters.
 pub fn likelihood(rows: impl IntoIterator<Item = Row>, length_px: f64, white: f64) -> Option<Likelihood> {
     let alike = 1.0 - white;
-    // The correlated part's estimate for each column, and its variance.
+    // Estimate of the correlated part for each column, and its variance.
     let (mut state, mut variance) = ([0.0; 4], alike);
     let (mut sums, mut ln_v, mut n) = ([[0.0; 4]; 4], 0.0, 0.0);
     for row in rows {
@@ -75,7 +76,7 @@ pub fn likelihood(rows: impl IntoIterator<Item = Row>, length_px: f64, white: f6
     let right = nalgebra::Vector3::new(r1, r2, r3);
     let q = rr - right.dot(&(inverse * right));
     let freedoms = n - 3.0;
-    // Positive, as the inverse exists.
+    // The value is positive, because the inverse exists.
     let cofactors = [n22 * n33 - n23 * n23, n23 * n13 - n12 * n33, n12 * n23 - n22 * n13];
     let ln_h = libm::log(n11 * cofactors[0] + n12 * cofactors[1] + n13 * cofactors[2]);
     let variance_px2 = q / freedoms;
@@ -83,40 +84,41 @@ pub fn likelihood(rows: impl IntoIterator<Item = Row>, length_px: f64, white: f6
     (freedoms > 0.0 && minus_two_ln.is_finite()).then_some(Likelihood { minus_two_ln, variance_px2, freedoms })
 }
 
-/// Correlation lengths that are averaged over, in standard deviations of ln L.
+/// Correlation lengths in the average, in standard deviations of ln L.
 const LENGTHS: [f64; 7] = [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5];
 /// Standard deviation of ln L.
 const SPREAD: f64 = 0.7;
-/// The most likely L is the length of the edge over this.
+/// Ratio of the edge length to the most likely L.
 const LENGTHS_PER_EDGE: f64 = 4.0;
-/// White parts that are averaged over.
+/// White parts in the average.
 const WHITES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.95];
-/// A process so long that it hardly varies along the edge could have any sigma: it has at most twice the RMS.
+/// Largest ratio of sigma to the RMS of the residuals. It limits processes with a very long correlation length: they
+/// hardly vary along the edge, so that any sigma would be possible.
 const MOST_RMS: f64 = 2.0;
 
 /// A noise model with its weight.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Model {
-    /// Correlation length, pixels.
+    /// Correlation length, in pixels.
     pub length_px: f64,
     /// White part of the variance, 0 to 1.
     pub white: f64,
     /// Variance of a point, px².
     pub variance_px2: f64,
-    /// Posterior probability; over all models the sum is 1.
+    /// Posterior probability; the sum over all models is 1.
     pub weight: f64,
 }
 
 /// The posterior of an edge's noise over a grid of correlation lengths and white parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Posterior {
-    /// Noise models, by length and then by white part.
+    /// Noise models, by correlation length and then by white part.
     pub models: [[Model; WHITES.len()]; LENGTHS.len()],
 }
 
 impl Posterior {
-    /// Of the rows of an edge of the length `arc_px`, whose residuals have the given RMS. Variances lie between
-    /// `floor_px` and twice the RMS, squared. `None` as of [`likelihood`].
+    /// Computes the posterior from the rows of an edge of the length `arc_px`, with the RMS `rms_px` of its residuals.
+    /// Sigma is between `floor_px` and twice the RMS. The result is `None` in the same cases as for [`likelihood`].
     pub fn new<R: IntoIterator<Item = Row>>(
         rows: impl Fn() -> R,
         arc_px: f64,
@@ -145,13 +147,14 @@ impl Posterior {
         Some(Self { models })
     }
 
-    /// Posterior mean of a function of the model.
+    /// Returns the posterior mean of a function of the model.
     pub fn mean(&self, f: impl Fn(&Model) -> f64) -> f64 {
         self.models.iter().flatten().map(|model| model.weight * f(model)).sum()
     }
 }
 
-/// Covariance of the right-hand side of a fit's normal equations, averaged over the posterior, upper triangle.
+/// Returns the covariance of the right-hand side of the normal equations, averaged over the posterior, as its upper
+/// triangle.
 pub(super) fn averaged<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
@@ -178,7 +181,7 @@ pub(super) fn averaged<T: Real>(
     Some(x)
 }
 
-/// The rows of a fit's inliers.
+/// Returns the rows of the inliers of a fit.
 fn rows<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, azimuth: Option<&Azimuth<T>>) -> impl Iterator<Item = Row> {
     let (b1, b2) = basis(&fit.e);
     let (e, c, [m1, m2]) = (fit.e, fit.c, fit.mean);
@@ -209,7 +212,7 @@ mod tests {
     use crate::base::rng::Rng;
     use std::vec::Vec;
 
-    /// A Gauss-Markov process with a white part along a straight edge, less a fitted parabola.
+    /// Draws a Gauss-Markov process with a white part along a straight edge, and subtracts a fitted parabola.
     fn drawn(seed: u32, sigma: f64, length: f64, white: f64) -> Vec<Row> {
         let mut rng = Rng::new(seed);
         let mut normal = || (0..12).map(|_| f64::from(rng.below(1 << 20)) / f64::from(1 << 20)).sum::<f64>() - 6.0;

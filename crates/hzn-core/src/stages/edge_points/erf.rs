@@ -1,9 +1,9 @@
-//! The best accuracy there is: a blurred step fitted to 7×7 pixels.
+//! The most accurate method: fits a blurred step to 7×7 pixels.
 //!
-//! The picture of a straight edge through optics of a round blur is dim + (bright − dim) Φ((x·n − ρ)/σ), Φ the normal
-//! distribution. Gauss-Newton fits its offset ρ and the angle of its normal n to the 49 pixels and reaches the
-//! Cramér-Rao bound of the patch; the levels are means over the plateaus on both sides, and the width σ is fitted
-//! along: its derivative is odd about the edge and that of the offset even, so that it costs no accuracy.
+//! A straight edge through optics with a round blur has the brightness dim + (bright − dim) Φ((x·n − ρ)/σ), where Φ is
+//! the normal distribution. Gauss-Newton fits the offset ρ and the angle of the normal n to the 49 pixels and reaches
+//! the Cramér-Rao bound of the patch. The levels are means over the plateaus on both sides. The width σ is fitted, too,
+//! at no cost in accuracy: its derivative is odd about the edge, and the derivative of the offset is even.
 
 use super::patch::{HALF, Patch, brightness};
 use crate::base::linalg::{V3, invert_spd3};
@@ -13,42 +13,42 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Gauss-Newton steps in one patch.
+/// Largest number of Gauss-Newton steps in one patch.
 const STEPS: usize = 6;
-/// Fits, each in a patch about the edge of the one before.
+/// Largest number of fits; each one uses a patch about the edge of the fit before.
 const WINDOWS: usize = 6;
-/// Where a plateau begins, from the edge: in widths of it, and in pixels at least and at most.
+/// Distance from the edge at which a plateau begins: in units of σ, and the smallest and the largest value in pixels.
 const BEGINS: (f64, f64, f64) = (2.7, 2.0, 9.0);
-/// Extent of a plateau across the edge and to each side along it, in pixels.
+/// Extent of a plateau across the edge (`DEEP`), and to each side along it (`ALONG`), in pixels.
 const DEEP: i32 = 5;
 const ALONG: i32 = 4;
 
 /// A blurred step in a patch.
 #[derive(Clone, Copy)]
 pub(super) struct Edge<T> {
-    /// From the patch's centre along the normal, pixels.
+    /// Distance from the centre of the patch along the normal, in pixels.
     pub(super) offset: T,
-    /// Unit normal towards the light.
+    /// Unit normal towards the light, in image coordinates (u, v).
     pub(super) n: [T; 2],
-    /// Width: the blur's standard deviation in pixels.
+    /// Width of the edge: standard deviation of the blur, in pixels.
     pub(super) sigma: T,
 }
 
 impl<T: Real> Edge<T> {
-    /// The point of the edge nearest to the centre (x, y) of the patch.
+    /// Returns the point of the edge nearest to the centre (x, y) of the patch.
     pub(super) fn point(&self, x: i32, y: i32) -> ImagePoint<T> {
         ImagePoint { u: T::from_i32(x) + self.offset * self.n[0], v: T::from_i32(y) + self.offset * self.n[1] }
     }
 }
 
-/// Brightness of the dark side and of the lit one.
+/// Brightness of the dark side and of the lit side, in counts.
 pub(super) struct Levels<T> {
     pub(super) dim: T,
     pub(super) bright: T,
 }
 
-/// The edge next to a border pixel and the direction (du, dv) of its gradient; `None` without a clear edge within
-/// reach.
+/// Locates the edge next to a border pixel, and the unit direction (du, dv) of its gradient. The result is `None` if
+/// there is no clear edge within reach.
 pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
@@ -61,7 +61,8 @@ pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
         let before = edge;
         edge = fit(&patch, edge, &levels)?;
         let (dx, dy) = towards(edge.offset, edge.n);
-        // The levels are those about this edge and the patch holds all of it; or noise moves it to and fro.
+        // The fit has settled if the levels were measured at this edge and the patch holds all of it. In the last round
+        // the edge may still move back and forth with the noise.
         let moved = (edge.offset - before.offset).abs() + (edge.sigma - before.sigma).abs() * T::from_f64(0.2);
         let settled = dx == 0 && dy == 0 && moved < T::from_f64(0.05);
         if settled || (last == 0 && edge.offset.abs() < T::from_f64(1.5)) {
@@ -73,7 +74,7 @@ pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
     None
 }
 
-/// An edge of a pixel's width through (x, y), normal to the gradient.
+/// Makes an edge through (x, y), perpendicular to the gradient, with a width of one pixel.
 pub(super) fn start<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: i32,
@@ -82,7 +83,7 @@ pub(super) fn start<T: Real, P: Pixels, O: Observer<T>>(
     Some(Edge { offset: T::ZERO, n: direction(&Patch::read(binary, x, y)?)?, sigma: T::one() })
 }
 
-/// Direction towards the light: the first moments over the disc of the patch.
+/// Returns the unit direction towards the light, from the first moments over the disc of the patch.
 fn direction<T: Real>(patch: &Patch<T>) -> Option<[T; 2]> {
     let (mut gx, mut gy) = (T::ZERO, T::ZERO);
     each(patch, |x, y, value| {
@@ -95,7 +96,7 @@ fn direction<T: Real>(patch: &Patch<T>) -> Option<[T; 2]> {
     (norm > T::ZERO).then(|| [gx / norm, gy / norm])
 }
 
-/// Means over the plateaus on both sides of an edge.
+/// Returns the means over the plateaus on both sides of an edge; `None` if their contrast is too small.
 fn levels<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: i32,
@@ -126,7 +127,7 @@ fn levels<T: Real, P: Pixels, O: Observer<T>>(
     (bright - dim >= T::from_i32(least)).then_some(Levels { dim, bright })
 }
 
-/// The best edge from `start` on; `None` when it leaves the patch.
+/// Fits the edge, beginning at `start`; `None` if it leaves the patch.
 pub(super) fn fit<T: Real>(patch: &Patch<T>, start: Edge<T>, levels: &Levels<T>) -> Option<Edge<T>> {
     let contrast = levels.bright - levels.dim;
     let Edge { mut offset, mut n, mut sigma } = start;
@@ -149,7 +150,7 @@ pub(super) fn fit<T: Real>(patch: &Patch<T>, start: Edge<T>, levels: &Levels<T>)
                 g[i] += row[i] * r;
             }
         });
-        // Some friction for the width, which noise can blow up where the patch shows little of the edge.
+        // The width is damped, because noise can make it much too large if the patch shows little of the edge.
         m[5] += T::from_f64(0.02);
         let step = invert_spd3(&m)? * V3::new(g[0], g[1], g[2]);
         let turn = step.y.max(T::from_f64(-0.5)).min(T::from_f64(0.5));
@@ -169,14 +170,14 @@ pub(super) fn fit<T: Real>(patch: &Patch<T>, start: Edge<T>, levels: &Levels<T>)
     Some(Edge { offset, n, sigma })
 }
 
-/// Whole pixels from the centre of a patch to the edge at `offset` along the unit normal, along the axis of the larger
-/// component: so the edge comes closer than half a pixel.
+/// Returns the step in whole pixels from the centre of a patch to the edge at `offset` along the unit normal. The step
+/// is along the axis of the larger component, so that the edge is then less than half a pixel away.
 fn towards<T: Real>(offset: T, [x, y]: [T; 2]) -> (i32, i32) {
     let whole = |v: T| (v + T::from_f64(0.5)).floor().to_i32();
     if x.abs() >= y.abs() { (whole(offset / x), 0) } else { (0, whole(offset / y)) }
 }
 
-/// Calls `visit` with each pixel's place from the centre and its brightness.
+/// Calls `visit` with the position of each pixel relative to the centre, and its brightness.
 #[inline(always)]
 fn each<T: Real>(patch: &Patch<T>, mut visit: impl FnMut(T, T, T)) {
     for (row, dy) in patch.rows.iter().zip(-HALF..) {

@@ -1,4 +1,4 @@
-//! How well each method locates an edge: blurred steps, integrated over the pixels, with noise.
+//! Tests the accuracy of each method on blurred steps that are integrated over the pixels, with noise.
 
 use super::*;
 use crate::image::region::Region;
@@ -11,7 +11,7 @@ const DIM: f64 = 8000.0;
 const CONTRAST: f64 = 20000.0;
 const EDGES: u32 = 400;
 
-/// Repeatable normal deviates: sums of twelve even ones from a linear congruence.
+/// Repeatable normal deviates: sums of twelve uniform numbers from a linear congruential generator.
 struct Noise(u64);
 impl Noise {
     fn even(&mut self) -> f64 {
@@ -23,7 +23,7 @@ impl Noise {
     }
 }
 
-/// One noisy edge: the picture, its unit normal towards the light and x·n on it.
+/// One noisy edge: the picture, the unit normal `n` of the edge towards the light, and the value of x·n on the edge.
 struct Drawn {
     data: Vec<u16>,
     n: [f64; 2],
@@ -31,14 +31,14 @@ struct Drawn {
 }
 
 fn draw(noise: &mut Noise, sigma_px: f64, snr: f64) -> Drawn {
-    // Within ±45° of one of the four directions, the edge anywhere between pixels.
+    // The normal is within ±45° of one of the four directions. The edge is anywhere between pixels.
     let angle = (noise.even() - 0.5) * core::f64::consts::FRAC_PI_2
         + core::f64::consts::FRAC_PI_2 * (noise.even() * 4.0).floor();
     let (ny, nx) = libm::sincos(angle);
     let offset = f64::from(SIZE / 2) * (nx + ny) + noise.even() - 0.5;
     let data = (0..SIZE * SIZE)
         .map(|i| {
-            // The mean over the pixel, 4×4.
+            // Mean over the pixel, from 4×4 points.
             let (x, y) = (f64::from(i % SIZE), f64::from(i / SIZE));
             let middle = x * nx + y * ny - offset;
             if middle.abs() > 4.5 * sigma_px + 1.0 {
@@ -58,8 +58,8 @@ fn draw(noise: &mut Noise, sigma_px: f64, snr: f64) -> Drawn {
     Drawn { data, n: [nx, ny], offset }
 }
 
-/// Calls `find` with scene and border pixel of `EDGES` edges, and gives the root mean square distance of what it finds
-/// from the true edge along its normal. All but a hundredth must be found.
+/// Calls `find` with the scene and a border pixel of `EDGES` edges. Returns the root mean square distance of the points
+/// from the true edge along its normal, in pixels. At least 99 % of the edges must be found.
 fn rmse(
     sigma_px: f64,
     snr: f64,
@@ -75,7 +75,7 @@ fn rmse(
         let binary = BinaryPicture::new(&grey, &region, level, &Unobserved);
         let dark = |x: i32, y: i32| !binary.lit(x as u16, y as u16);
         let beside = |x: i32, y: i32| f64::from(x) * n[0] + f64::from(y) * n[1] - offset;
-        // The border pixel nearest to the middle; noise far from the edge makes others.
+        // Use the border pixel nearest to the middle; noise makes others far from the edge.
         let (x, y) = (0..SIZE * SIZE)
             .map(|i| (i % SIZE, i / SIZE))
             .filter(|&(x, y)| (10..31).contains(&x) && (10..31).contains(&y) && !dark(x, y))
@@ -102,8 +102,8 @@ fn by(
     }
 }
 
-/// Blur in pixels, contrast over noise, and what simulations of each method with known levels reach, in pixels: the
-/// bound of Cramér and Rao, `linear`, `zernike`.
+/// Blur in pixels, ratio of contrast to noise, and three expected errors in pixels: the Cramér-Rao bound, `linear` and
+/// `zernike`. The errors come from simulations with known levels.
 const TABLE: [(f64, f64, f64, f64, f64); 7] = [
     (0.5, 5.0, 0.103, 0.196, 0.29),
     (0.5, 20.0, 0.026, 0.051, 0.077),
@@ -138,26 +138,27 @@ fn erf_reaches_the_bound() {
     }
 }
 
-/// The levels are estimated here: that costs up to a third.
+/// The levels are estimated here, which increases the error by up to a third.
 #[cfg(feature = "erf")]
 #[test]
 fn erf_with_its_own_levels_stays_near_the_bound() {
     all(SubPixel::Erf, |row| Some(row.2 * 1.35));
 }
 
-/// Its levels are those of one row: that costs.
+/// The levels come from a single row here, which increases the error.
 #[test]
 fn linear_is_within_its_table() {
     all(SubPixel::Linear, |row| Some(row.3 * if row.0 < 2.0 { 1.7 } else { 2.5 }));
 }
 
-/// The border pixel half a pixel out: a quarter of a pixel of rounding, and the noise.
+/// The point is half a pixel from the border pixel: the error is a quarter of a pixel by rounding, and the noise.
 #[test]
 fn none_is_within_a_pixel_of_its_table() {
     all(SubPixel::None, |_| Some(0.45));
 }
 
-/// A step across a disc is no blurred edge: beyond 1 px of blur the table's pixels were chosen by the truth.
+/// A step across a disc is no blurred edge. With a blur of more than 1 px, the pixels of the table were chosen with
+/// knowledge of the truth.
 #[cfg(feature = "zju")]
 #[test]
 fn zernike_is_within_its_table() {

@@ -1,11 +1,14 @@
 //! Sub-pixel points of a candidate edge.
 //!
-//! A border pixel is lit and has a dark neighbour; the edge itself runs somewhere between. The local limb is where
-//! the brightness is half-way between the plateaus on both sides: a level of the whole picture would move it with
-//! the illumination, which is an error of the limb height. Across the edge (along the axis of the larger gradient)
-//! three rows are smoothed with 1-2-1 and read outwards on both sides only until they level off, at most ten steps. A
-//! step is a pixel for a sharp edge, and more for one that is spread over many, such as air seen from a rocket or haze
-//! through a long lens: read in pixels, its plateaus would end within it, and the limb move with the illumination.
+//! A border pixel is lit and has a dark neighbour; the edge itself lies between both. The local limb is where the
+//! brightness is halfway between the plateaus on both sides. A threshold of the whole picture would move the edge with
+//! the illumination, which would be an error of the limb height.
+//!
+//! The profile is read across the edge, along the axis of the larger gradient. Three rows are smoothed with 1-2-1 and
+//! read outwards on both sides until they level off, at most ten steps. A step is one pixel for a sharp edge. It is
+//! longer for an edge that is spread over many pixels, for example by air seen from a rocket or by haze through a long
+//! lens. With steps of one pixel the profile would end before the plateaus, and the limb would move with the
+//! illumination.
 
 #[cfg(feature = "erf")]
 mod erf;
@@ -70,39 +73,40 @@ impl Config {
     }
 }
 
-/// How far a plateau is looked for, in steps.
+/// Largest distance up to which a plateau is searched for, in steps.
 const REACH: i32 = 10;
-/// Widest step of a profile in pixels.
+/// Longest step of a profile, in pixels.
 const WIDEST: i32 = 6;
-/// Steps from a border pixel within which everything is read.
+/// All reads are within this distance from a border pixel, in steps.
 const MARGIN: i32 = REACH + 3;
-/// Where an edge that is no wider than four pixels has faded to half of the level, pixels.
+/// Distance from the border pixel towards the dark, in pixels. There, an edge at most four pixels wide has faded to
+/// half of the threshold.
 const FADED: i32 = 3;
-/// A plateau is clipped when it is within this part of full scale below it, which is room for what JPEG makes of one. A
-/// bright one with noise seldom comes so near.
+/// A lit plateau counts as clipped if it is at most 1/128 of full scale below full scale. This leaves room for JPEG
+/// artefacts. A bright, noisy plateau that is not clipped seldom comes so near to full scale.
 const CLIPPED_PART: i32 = 128;
-/// Farther than an edge point can stand from its border pixel, pixels.
+/// More than the largest distance of an edge point from its border pixel, in pixels.
 const FARTHEST: i32 = 1024;
-/// Stands for a brightness that cannot be read.
+/// Value for a brightness that cannot be read.
 const UNSEEN: i32 = i32::MIN;
 
-/// What came of a candidate's border.
+/// Numbers of edge points made from the border of a candidate.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Points {
-    /// Points made.
+    /// Number of points made.
     pub(crate) count: u32,
-    /// Of them, points at the global level, because the local one was not found.
+    /// Number of these points at the threshold of the picture, because no local mid-level was found.
     pub(crate) fallback: u32,
-    /// Of them, points whose lit side is clipped at full scale.
+    /// Number of these points with a lit side that is clipped at full scale.
     pub(crate) clipped: u32,
-    /// Border pixels that took longer: beside a mask or the picture's border, or on a wide edge.
+    /// Number of border pixels that cost more: next to a mask or the border of the picture, or on a wide edge.
     pub(crate) slow: u32,
-    /// Of a picture that came row by row: points whose plateaus were not within the rows held.
+    /// In a picture that arrives row by row: number of points with plateaus outside of the rows that are kept.
     pub(crate) cut: u32,
 }
 
-/// Fills `blocks` with the points of a border, evenly thinned to `keep_points`. Lanes that stay empty have weight 0.
-/// Ends after `most_slow` points that are slow.
+/// Fills `blocks` with the edge points of a border, thinned evenly to `keep_points`. Empty lanes have weight 0. The
+/// function stops after `most_slow` points that cost more.
 pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
@@ -151,22 +155,22 @@ pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
 /// An edge point.
 struct EdgePoint<T> {
     point: ImagePoint<T>,
-    /// The side of the light.
+    /// Side on which the light is.
     lit: Lit,
-    /// It stands at the global level, because the local one was not found.
+    /// The point is at the threshold of the picture, because no local mid-level was found.
     fallback: bool,
-    /// The lit side is clipped at full scale, so that its half is not half of the light.
+    /// The lit side is clipped at full scale, so that half of its brightness is not half of the light.
     clipped: bool,
 }
 
 impl<T> EdgePoint<T> {
-    /// Of a method that has no level of its own.
+    /// Makes a point of a method that has no mid-level.
     fn plain(point: ImagePoint<T>, lit: Lit) -> Self {
         Self { point, lit, fallback: false, clipped: false }
     }
 }
 
-/// The edge point at a border pixel.
+/// Locates the edge point at a border pixel.
 #[inline(always)]
 fn locate<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -186,7 +190,8 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
     }
 }
 
-/// The edge point at a border pixel, to be kept when the picture is not: of the methods that locate it along an axis.
+/// Locates the edge point at a border pixel of a picture that is not kept. It is for the methods that locate a point
+/// along an axis.
 #[inline(never)]
 pub(crate) fn pass<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -194,15 +199,15 @@ pub(crate) fn pass<T: Real, P: Pixels, O: Observer<T>>(
     p: Pixel,
 ) -> Option<StreamedPoint> {
     let EdgePoint { point, lit, fallback, clipped } = locate(binary, config, p, &mut 0)?;
-    // The difference is exact, and so is the sum that makes the point again.
+    // The difference is exact, and the sum that restores the point from it is exact, too.
     let (dx, dy) = lit.towards_dark();
     let off =
         (point.u - T::from_i32(p.x.into())) * T::from_i32(dx) + (point.v - T::from_i32(p.y.into())) * T::from_i32(dy);
     Some(StreamedPoint { towards_dark_px: off.to_f64() as f32, lit, fallback, clipped, cut: false })
 }
 
-/// Reads around one border pixel; `None` beyond the region and under the mask. `FREE`: no read within reach needs a
-/// check.
+/// Reads pixels around one border pixel; a read gives `None` beyond the region and under a mask. With `FREE`, all
+/// pixels within reach are known to be readable, so no read is checked.
 struct Around<'a, 'b, T, P, O, const FREE: bool> {
     binary: &'a BinaryPicture<'b, T, P, O>,
     x: i32,
@@ -229,13 +234,13 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
         self.read(dx, dy, dx as isize * self.across + dy as isize * self.down)
     }
 
-    /// The pixel (dx, dy) further, which stands `offset` further in memory.
+    /// Reads the pixel at (dx, dy) from the border pixel, which is `offset` further in memory.
     #[inline(always)]
     fn read(&self, dx: i32, dy: i32, offset: isize) -> Option<i32> {
         read::<T, P, O, FREE>(self.binary, (self.x + dx, self.y + dy), self.index.wrapping_add_signed(offset))
     }
 
-    /// Three pixels side by side, `dy` rows down.
+    /// Reads three pixels side by side, `dy` rows down.
     #[inline(always)]
     fn row(&self, dy: i32) -> Option<[i32; 3]> {
         if !FREE {
@@ -249,7 +254,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
         Some(self.binary.picture.three(first).map(i32::from))
     }
 
-    /// The 3×3 neighbourhood.
+    /// Reads the 3×3 neighbourhood.
     #[inline(always)]
     fn near(&self) -> Option<Near> {
         let [nw, n, ne] = self.row(-1)?;
@@ -264,7 +269,8 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
 /// The line across the edge through a border pixel.
 struct Line<'a, 'b, 'c, T, P, O, const FREE: bool> {
     around: &'a Around<'b, 'c, T, P, O, FREE>,
-    /// A step towards the dark in pixels, and in memory; a pixel to the side of it in memory.
+    /// A step towards the dark, in pixels. `ahead` is the same step in memory, and `aside` is a pixel to its side in
+    /// memory.
     step: (i32, i32),
     ahead: isize,
     aside: isize,
@@ -284,21 +290,21 @@ impl<'a, 'b, 'c, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'a, 
     #[inline(always)]
     fn at(&self, k: i32, side: i32) -> Option<i32> {
         let (dx, dy) = self.step;
-        // To the side is across the step, one pixel.
+        // The side is one pixel, perpendicular to the step.
         let (sx, sy) = (dy.signum() * side, dx.signum() * side);
         self.around.read(k * dx + sx, k * dy + sy, k as isize * self.ahead + side as isize * self.aside)
     }
-    /// Four times the brightness `k` steps towards the dark, smoothed with 1-2-1 along the edge.
+    /// Returns four times the brightness `k` steps towards the dark, smoothed with 1-2-1 along the edge.
     #[inline(always)]
     fn three(&self, k: i32) -> Option<i32> {
         Some(self.at(k, -1)? + 2 * self.at(k, 0)? + self.at(k, 1)?)
     }
 }
 
-/// Reads in a straight line.
+/// Reads pixels in a straight line.
 struct Walk<'a, 'b, T, P, O, const FREE: bool> {
     binary: &'a BinaryPicture<'b, T, P, O>,
-    /// Column and row of the next pixel, and the step to the one after it.
+    /// Column and row of the next pixel. `step` leads to the one after it.
     at: (i32, i32),
     step: (i32, i32),
     index: usize,
@@ -306,7 +312,7 @@ struct Walk<'a, 'b, T, P, O, const FREE: bool> {
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O, FREE> {
-    /// Four times the brightness of the next pixel; [`UNSEEN`] where nothing can be read.
+    /// Returns four times the brightness of the next pixel, or [`UNSEEN`] where nothing can be read.
     #[inline(always)]
     fn next(&mut self) -> i32 {
         let seen = read::<T, P, O, FREE>(self.binary, self.at, self.index);
@@ -316,8 +322,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O,
     }
 }
 
-/// The pixel at column `x`, row `y`, which stands at `index`; `None` beyond the region and under the mask. `FREE`: it
-/// is known to be within and unmasked.
+/// Reads the pixel at column `x` and row `y`, which is at `index` in memory; `None` beyond the region and under a mask.
+/// With `FREE`, the pixel is known to be inside the region and unmasked.
 #[inline(always)]
 fn read<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -338,12 +344,12 @@ struct Near {
 }
 
 impl Near {
-    /// Eight times the brightness change a pixel, to the right and down.
+    /// Returns eight times the brightness change per pixel, to the right and down.
     #[inline(always)]
     fn gradient(&self) -> (i32, i32) {
         (self.columns[2] - self.columns[0], self.rows[2] - self.rows[0])
     }
-    /// One step to the lit side, here, and one step to the dark side.
+    /// Returns the smoothed brightness one step to the lit side, here, and one step to the dark side.
     #[inline(always)]
     fn across(&self, lit: Lit) -> [i32; 3] {
         let ([w, x, e], [n, y, s]) = (self.columns, self.rows);
@@ -356,7 +362,8 @@ impl Near {
     }
 }
 
-/// The side of the light by the larger component, and the step (dx, dy) towards the dark.
+/// Returns the side of the light along the axis of the larger component, and the step (dx, dy) towards the dark. The
+/// result is `None` if the gradient is zero.
 fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
     if gx == 0 && gy == 0 {
         return None;
@@ -372,10 +379,10 @@ fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
     Some((lit, dx, dy))
 }
 
-/// A point of the methods that know the gradient's direction.
+/// Makes an edge point for the methods that know the direction of the gradient.
 #[cfg(any(feature = "erf", feature = "zju"))]
 fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<EdgePoint<T>> {
-    // Whole numbers are what `orientation` compares; the direction is a unit vector.
+    // `orientation` compares integers, and the direction is a unit vector.
     let scale = T::from_f64(1024.0);
     let (lit, _, _) = orientation(((x * scale).to_i32(), (y * scale).to_i32()))?;
     Some(EdgePoint::plain(point, lit))
@@ -397,7 +404,7 @@ fn point_off<T: Real>(p: Pixel, (dx, dy): (i32, i32), towards_dark: T) -> ImageP
     }
 }
 
-/// The crossing of the mid-level; also whether the global level had to stand in for it.
+/// Locates the crossing of the mid-level along the axis of the larger gradient.
 #[inline(always)]
 fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -415,9 +422,10 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
         let part = T::from_i32(inner - level4) / T::from_i32((inner - outer).max(1));
         return (inner > outer).then(|| EdgePoint::plain(point_off(p, (dx, dy), part), lit));
     }
-    // The edge fades over level / gradient pixels; at the top of a narrow one the gradient says less than how soon it
-    // is dark. A step is half of that, so that air seen from a rocket is read to where it ends; but of haze through a
-    // long lens, below which the clouds begin, only a fifth.
+    // The edge fades over level / gradient pixels. At the top of a narrow edge, the gradient says less than the
+    // distance at which the profile is dark, so both are tested. A step is half of the fading width, so that the
+    // profile of air seen from a rocket is read to its end. Above 4 pixels, a step is only a fifth of this width,
+    // because in haze through a long lens the clouds begin just below.
     let steep = gradient.0.abs().max(gradient.1.abs());
     let line = Line::new(&around, (dx, dy), 1);
     if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
@@ -437,11 +445,12 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
 }
 
-/// Most times that a profile is read again from where it crosses.
+/// Largest number of times that a profile is read again about its crossing.
 const CLIMBS: u32 = 4;
 
-/// A profile that still grows brighter where it was read to has no plateau there, and its middle moves with the level
-/// that led to its border: it is read again about its crossing, until that is its middle.
+/// Reads a profile again about its crossing, until the crossing is in the middle of the profile. This is necessary if
+/// the lit side still rises at the end of the reach. There is no plateau then, and the mid-level depends on the
+/// threshold that determined the border pixel.
 #[inline(never)]
 fn climb<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -471,14 +480,14 @@ fn climb<T: Real, P: Pixels, O: Observer<T>>(
     found
 }
 
-/// Whether neither the region's border nor a mask is within `margin` pixels.
+/// Whether the border of the region and all masks are more than `margin` pixels away.
 #[inline(always)]
 fn is_clear<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, p: Pixel, margin: u16) -> bool {
     let region = binary.region;
     region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || region.clearance(p.x, p.y, margin) == margin)
 }
 
-/// Where a wide edge crosses the mid-level, pixels from a border pixel towards the dark.
+/// Crossing of the mid-level on a wide edge; `off` is its distance from the border pixel towards the dark, in pixels.
 struct Wide<T> {
     off: T,
     fallback: bool,
@@ -487,7 +496,7 @@ struct Wide<T> {
     rising: bool,
 }
 
-/// As [`linear`], `step` pixels a step.
+/// Locates the crossing like [`linear`], with steps of `step` pixels.
 #[inline(never)]
 fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -500,7 +509,7 @@ fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let Crossing { part, mid2, fallback, clipped, rising } =
         line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
     let coarse = part * T::from_i32(step);
-    // The profile bends over a step: once more over half of one, in the middle of which the crossing should be.
+    // The profile is curved within a step. The crossing is therefore interpolated again over half a step around it.
     let half = step / 2;
     if half == 0 {
         return Some(Wide { off: coarse, fallback, clipped, rising });
@@ -514,13 +523,13 @@ fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     Some(Wide { off, fallback, clipped, rising })
 }
 
-/// Where an edge crosses the mid-level.
+/// Crossing of an edge with the mid-level.
 struct Crossing<T> {
-    /// Steps from the border pixel towards the dark.
+    /// Distance from the border pixel towards the dark, in steps.
     part: T,
-    /// Twice the level, in units of [`Line::three`].
+    /// Twice the mid-level, in units of [`Line::three`].
     mid2: i32,
-    /// Whether the global level had to stand in for the local one.
+    /// The threshold of the picture replaces the local mid-level.
     fallback: bool,
     /// The lit side is clipped at full scale.
     clipped: bool,
@@ -529,7 +538,7 @@ struct Crossing<T> {
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P, O, FREE> {
-    /// One pixel after another from `k` steps towards the dark, in the direction `out`.
+    /// Reads one step after another in the direction `out`, beginning `k` steps towards the dark.
     #[inline(always)]
     fn outwards(&self, k: i32, out: i32) -> Walk<'_, '_, T, P, O, FREE> {
         let Around { binary, x, y, index, .. } = *self.around;
@@ -543,15 +552,16 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         }
     }
 
-    /// Reads on from the border pixel or its dark neighbour, whose brightness is `v`, until the side has levelled off:
-    /// two more pixels change it by less than a twelfth of the contrast to `other` each. Gives the plateau's level and
-    /// the offset where it begins.
+    /// Returns the brightness of a plateau, in units of [`Line::three`], and the offset in steps where it begins. The
+    /// search begins at the border pixel (or its dark neighbour) with brightness `v` and goes outwards until the
+    /// profile levels off. It has levelled off if each of two more steps changes it by less than a twelfth of the
+    /// contrast to `other`.
     #[inline(always)]
     fn plateau<const LIT: bool>(&self, mut v: i32, other: i32) -> (i32, i32) {
         let (from, out) = if LIT { (0, -1) } else { (1, 1) };
-        // How far `v` lies beyond `w`, away from the other side.
+        // Difference between `v` and `w`, positive if `v` is further from the brightness of the other side.
         let beyond = |v: i32, w: i32| if LIT { v - w } else { w - v };
-        // Where nothing can be read the side ends.
+        // The side ends where nothing can be read.
         let or_here = |seen: i32, v: i32| if FREE || seen != UNSEEN { seen } else { v };
         let mut k = from;
         let mut outwards = self.outwards(from + out, out);
@@ -564,7 +574,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
             } else if 6 * beyond(f, v) > contrast {
                 (k, v, near) = (k + 2 * out, f, outwards.next());
             } else {
-                // What lies beyond on the same level counts towards it.
+                // Further pixels on the same level are part of the mean.
                 let level = match (6 * beyond(v, n) < contrast, 6 * beyond(v, f) < contrast) {
                     (true, true) => (v + n + f) / 3,
                     (true, false) => (v + n) / 2,
@@ -580,12 +590,13 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         }
     }
 
-    /// Steps from the border pixel to the crossing of the mid-level; also whether the global level had to stand in for
-    /// it. From the smoothed brightness one step to the lit side, here, and one step to the dark side.
+    /// Locates the crossing of the mid-level. The arguments are the smoothed brightness one step to the lit side, here,
+    /// and one step to the dark side.
     #[inline(always)]
     fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3]) -> Option<Crossing<T>> {
         let binary = self.around.binary;
-        // In one row for the plateaus, of which the mean of several is taken, over three rows for the crossing.
+        // The plateaus are read in one row, because a mean over several pixels is taken. The crossing is read in three
+        // rows.
         let (bright, inner) = self.plateau::<true>(first_lit, first_dark);
         let (dim, outer) = self.plateau::<false>(first_dark, bright);
         let contrast = bright - dim;
@@ -597,8 +608,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         } else {
             return None;
         };
-        // The crossing next to the border pixel: outwards from it while lit, else inwards. `a` at k is lit, `b` at k +
-        // 1 not.
+        // Finds the crossing next to the border pixel: outwards if the pixel is lit, otherwise inwards. In the end `a`
+        // at `k` is lit and `b` at `k + 1` is not.
         let (mut k, mut a, mut b) =
             if 2 * first_lit >= mid2 { (0, first_lit, first_dark) } else { (-1, inside, first_lit) };
         while 2 * b >= mid2 {
@@ -633,7 +644,8 @@ mod tests {
     use crate::model::observer::Unobserved;
     use std::vec::Vec;
 
-    /// A straight edge blurred over `width_px`, lit where (x, y)·n > offset, between two plateaus.
+    /// Makes a picture of a straight edge between two plateaus, blurred over `width_px` and lit where
+    /// (x, y)·n > offset.
     fn picture(n: [f64; 2], offset: f64, width_px: f64, dim: f64, bright: f64) -> Vec<u8> {
         (0..100 * 100)
             .map(|i| {
@@ -669,7 +681,7 @@ mod tests {
 
     #[test]
     fn linear_finds_the_local_mid_level_whatever_the_level() {
-        // Edges in four directions and at angles, narrow and wide.
+        // The edges have four directions and other angles, and are narrow or wide.
         for (nx, ny) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.8, 0.6), (-0.6, 0.8)] {
             for width in [1.0, 2.5, 5.0] {
                 let offset = 50.3 * nx + 49.8 * ny;
@@ -694,7 +706,7 @@ mod tests {
         }
     }
 
-    /// Half of full scale is not half of the light where the light goes on beyond it.
+    /// If the light exceeds full scale, half of full scale is not half of the light.
     #[test]
     fn points_before_a_clipped_side_are_counted() {
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();

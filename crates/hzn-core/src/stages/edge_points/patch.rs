@@ -1,23 +1,23 @@
-//! The 7×7 pixels about an edge, for the methods that look at all of them at once.
+//! The 7×7 pixels about an edge, for the methods that use all of them at once.
 
 use crate::base::real::Real;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Pixels from the centre to each side.
+/// Number of pixels from the centre to each side.
 pub(super) const HALF: i32 = 3;
-/// Pixels across.
+/// Number of pixels on each side of the patch.
 pub(super) const SIDE: usize = 7;
 
-/// Brightness about a pixel.
+/// Brightness of the pixels about a pixel, in counts.
 pub(super) struct Patch<T> {
     /// Rows from the top, each from the left.
     pub(super) rows: [[T; SIDE]; SIDE],
 }
 
 impl<T: Real> Patch<T> {
-    /// Reads the picture; `None` where the patch leaves the region or touches a mask.
+    /// Reads the patch; `None` if it leaves the region or touches a mask.
     pub(super) fn read<P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> Option<Self> {
         let mut rows = [[T::ZERO; SIDE]; SIDE];
         for (row, dy) in rows.iter_mut().zip(-HALF..) {
@@ -29,7 +29,7 @@ impl<T: Real> Patch<T> {
     }
 }
 
-/// Brightness of a pixel; `None` beyond the region and under the mask.
+/// Reads the brightness of a pixel, in counts; `None` beyond the region and under a mask.
 pub(super) fn brightness<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: i32,

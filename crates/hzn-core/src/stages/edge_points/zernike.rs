@@ -1,10 +1,10 @@
 //! Zernike moments of 7×7 pixels: the edge as a step across a disc (Ghosal & Mehrotra 1993; Wang et al. 2022, 2.1).
 //!
-//! For a step of height k at distance l from the centre of the unit disc, the moments turned to the edge's direction
-//! are A₁₁ = (2k/3)(1 − l²)^(3/2) and A₂₀ = l A₁₁, so the edge lies at l = A₂₀/A₁₁ along the direction of A₁₁. The limb
-//! is no step but a ramp, which pulls the point towards the centre of the patch. As with Wang et al. the patch stands
-//! on the pixel with the largest of Sobel's gradients, so that the edge and with it the bias are small; beyond a blur
-//! of about 1.5 px `linear` is better.
+//! For a step of height k at distance l from the centre of the unit disc, the moments in the direction of the edge are
+//! A₁₁ = (2k/3)(1 − l²)^(3/2) and A₂₀ = l A₁₁. The edge is therefore at l = A₂₀/A₁₁ along the direction of A₁₁. A real
+//! limb is a ramp and not a step, which pulls the point towards the centre of the patch. As in Wang et al., the centre
+//! of the patch is the pixel with the largest Sobel gradient, so that the distance l and the bias are small. With a
+//! blur of more than about 1.5 px, `linear` is better.
 
 use super::patch::{Patch, SIDE, brightness};
 use crate::base::real::Real;
@@ -16,14 +16,14 @@ use crate::stages::contour::BinaryPicture;
 /// Radius of the disc in pixels.
 const RADIUS_PX: f64 = 3.5;
 
-/// ∬ x over each pixel's part of the disc, in radii: right half, rows from the middle down.
+/// Integral ∬ x over the part of each pixel in the disc, in units of the radius: right half, rows from the middle down.
 const X: [[f64; 4]; 4] = [
     [0.0, 0.023_323_615, 0.046_647_230, 0.068_999_037],
     [0.0, 0.023_323_615, 0.046_647_230, 0.057_337_221],
     [0.0, 0.023_323_615, 0.046_573_851, 0.022_425_177],
     [0.0, 0.019_019_963, 0.015_045_882, 0.0],
 ];
-/// ∬ 2(x² + y²) − 1, likewise.
+/// Integral ∬ 2(x² + y²) − 1, for the same pixels.
 const BOWL: [[f64; 4]; 4] = [
     [-0.079_411_356, -0.066_083_576, -0.026_100_236, 0.039_551_926],
     [-0.066_083_576, -0.052_755_796, -0.012_772_456, 0.039_373_472],
@@ -31,7 +31,8 @@ const BOWL: [[f64; 4]; 4] = [
     [0.039_551_926, 0.039_373_472, 0.022_466_219, 0.0],
 ];
 
-/// The edge next to a border pixel and the direction (du, dv) of its gradient; `None` without an edge within reach.
+/// Locates the edge next to a border pixel, and the unit direction (du, dv) of its gradient; `None` without an edge
+/// within reach.
 pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
@@ -42,15 +43,15 @@ pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
     Some((ImagePoint { u, v }, direction))
 }
 
-/// Where Sobel's gradient is largest, up to a pixel from the border pixel along the axis on which it is larger: the
-/// edge pixel of a gradient picture thinned to its maxima.
+/// Returns the pixel with the largest Sobel gradient, at most one pixel from the border pixel, along the axis on which
+/// the gradient is larger. This pixel is the edge pixel of a gradient picture that is thinned to its maxima.
 fn steepest<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: i32,
     y: i32,
 ) -> Option<(i32, i32)> {
     let at = |x: i32, y: i32| brightness(binary, x, y);
-    // Eight times the change a pixel along (dx, dy).
+    // Eight times the brightness change per pixel along (dx, dy).
     let slope = |x: i32, y: i32, dx: i32, dy: i32| -> Option<i32> {
         let line = |k: i32| -> Option<i32> {
             let (x, y) = (x + k * dx, y + k * dy);
@@ -72,10 +73,11 @@ fn steepest<T: Real, P: Pixels, O: Observer<T>>(
     Some((best.1, best.2))
 }
 
-/// Distance of the edge from the centre in pixels, and the unit direction towards the light.
+/// Returns the distance of the edge from the centre in pixels, and the unit direction towards the light.
 fn edge<T: Real>(patch: &Patch<T>) -> Option<(T, [T; 2])> {
     let (mut re, mut im, mut a20, mut largest) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
-    // Without the middle's brightness the moments are of the contrast alone, and exact in single precision.
+    // The brightness of the middle is subtracted: then the moments depend on the contrast alone, and single precision
+    // suffices.
     let middle = patch.rows[SIDE / 2][SIDE / 2];
     for j in 0..SIDE {
         for i in 0..SIDE {
@@ -90,7 +92,7 @@ fn edge<T: Real>(patch: &Patch<T>) -> Option<(T, [T; 2])> {
         }
     }
     let a11 = (re * re + im * im).sqrt();
-    // A step through the centre has A₁₁ = 2/3 of its height.
+    // A step through the centre has an A₁₁ of 2/3 of its height.
     if !(a11 > largest * T::from_f64(0.05)) {
         return None;
     }
@@ -118,7 +120,7 @@ mod tests {
                     }
                 }
                 let area = (f64::from(N) * RADIUS_PX).powi(-2);
-                // The middle column and row lie on both sides of 0.
+                // The middle column is on both sides of 0, so that its integral cancels.
                 let x_sum = if a == 0 { 0.0 } else { x_sum * area };
                 assert!((X[b][a] - x_sum).abs() < 2e-5, "X {b} {a}: {x_sum}");
                 assert!((BOWL[b][a] - bowl * area).abs() < 2e-5, "BOWL {b} {a}: {}", bowl * area);

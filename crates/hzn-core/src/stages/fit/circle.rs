@@ -1,15 +1,16 @@
-//! HORACE: a circle through the edge points, its centre for the direction, its radius for the half-angle (Barf 2014,
-//! 2.2.4 and 2.2.5; Barf et al. 2015).
+//! HORACE: fits a circle to the edge points. Its centre gives the direction, and its radius gives the half-angle (Barf
+//! 2014, 2.2.4 and 2.2.5; Barf et al. 2015).
 //!
-//! The circle is laid through the picture as it is, in focal lengths from the principal point; the lens is asked only
-//! where its centre looks, and how far off axis its radius reaches, which is α for sin α = R/(R + h). (2.27) prints
-//! (R − h)/R, which at 80 km is 0.98744 and not 0.98760. (2.37) counts the picture's centre from its corner, half a
-//! pixel beside the centre of the pixels; here the calibrated principal point is taken.
+//! The circle is fitted in the picture as it is, in focal lengths from the principal point. The lens model gives only
+//! two values: the direction of the centre, and the off-axis angle of the radius. This angle is α with
+//! sin α = R/(R + h). The printed (2.27) has (R − h)/R, which at 80 km is 0.98744 instead of 0.98760. Equation (2.37)
+//! counts the centre of the picture from its corner, which is half a pixel off from the centres of the pixels. Here the
+//! calibrated principal point is used.
 //!
-//! All this is right for a camera that points at the body's centre. A limb beside the axis is no circle: an equidistant
-//! lens makes it nearly one, so that 25° off nadir cost a tenth of a degree; in the picture of a pinhole it is a conic,
-//! whose circle of curvature is centred elsewhere, 6° to 25° and more off, whatever the noise. It is here to be
-//! compared with.
+//! All this is right for a camera that points at the centre of the body. Off the optical axis, a limb is no circle.
+//! With an equidistant lens it is nearly one, so that the error at 25° off nadir is a tenth of a degree. In the picture
+//! of a pinhole camera it is a conic. Its circle of curvature has another centre, and the error is 6° to 25° and more,
+//! independent of noise. The method exists for comparisons.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -18,7 +19,7 @@ use crate::geometry::camera::Camera;
 use crate::geometry::circle::Circle;
 use crate::geometry::frames::UnitVec3;
 
-/// The axis and cos α of the circle through the points that may count.
+/// Returns the axis and cos α of the circle through the points with a weight.
 pub(crate) fn fit<T: Real>(blocks: &[Block<T>], camera: &Camera<T>) -> Option<(V3<T>, T)> {
     let points = blocks.iter().flat_map(|b| {
         (0..LANES)

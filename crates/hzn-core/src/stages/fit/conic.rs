@@ -1,22 +1,25 @@
-//! A conic through the edge points, and the axis from its coefficients (Braun & Barf 2022, (17) and (18), corrected).
+//! Fits a conic to the edge points, and computes the axis from its coefficients (Braun & Barf 2022, (17) and (18),
+//! corrected).
 //!
-//! On the plane z = 1 the limb of a sphere is A x² + B xy + C y² + D x + E y + F = 0. The coefficients are found by
-//! least squares under the constraint that the curve *is* an ellipse, 4AC − B² = 1, or a hyperbola, 4AC − B² = −1
-//! (Fitzgibbon et al. 1999; O'Leary & Zsombor-Murray 2004): both come from one eigenvalue problem, and the one that
-//! lies closer to the points is taken. A parabola lies between the two and comes out as either.
+//! On the plane z = 1 the limb of a sphere is A x² + B xy + C y² + D x + E y + F = 0. Least squares give the
+//! coefficients under the constraint that the curve *is* an ellipse, 4AC − B² = 1, or a hyperbola, 4AC − B² = −1
+//! (Fitzgibbon et al. 1999; O'Leary & Zsombor-Murray 2004). One eigenvalue problem gives both, and the curve closer to
+//! the points is used. A parabola is between the two, and is fitted as either.
 //!
-//! As a quadratic form of rays the conic is the cone e eᵀ − cos²α I times any factor: its eigenvector for the
-//! eigenvalue whose sign no other has is the axis, and the eigenvalues are as sin²α to −cos²α. (18) as printed takes
-//! square roots of the coefficients: the signs of the axis's components are lost, and with them the direction; and it
-//! takes the factor for 1, although a conic's coefficients have none. The nappe gives the sign of the whole.
+//! As a quadratic form of rays, the conic is the cone e eᵀ − cos²α I times any factor. One eigenvalue has a sign that
+//! the other two do not have; its eigenvector is the axis. The eigenvalues have the ratio sin²α to −cos²α. The printed
+//! (18) takes square roots of the coefficients and loses the signs of the components of the axis, and so its direction.
+//! It also assumes that the factor is 1, although the coefficients of a conic have a free factor. The nappe gives the
+//! sign of the axis.
 
 use super::direct::LEAST_Z;
 use crate::base::linalg::{M3, Triangle, V3, symmetric_eigen, unit};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 
-/// The axis and cos α of the conic closest to the points that may count; `None` when they do not determine a cone:
-/// fewer than five, all on a line, or on a conic that is no picture of a cone about its axis.
+/// Returns the axis and cos α of the conic closest to the points with a weight. The result is `None` if the points do
+/// not determine a cone: if there are fewer than five, if all are on a line, or if the conic is no picture of a cone
+/// about its axis.
 pub(crate) fn fit<T: Real>(blocks: &[Block<T>]) -> Option<(V3<T>, T)> {
     let plane = Plane::new(blocks)?;
     let mut best: Option<(T, V3<T>, T)> = None;
@@ -30,7 +33,7 @@ pub(crate) fn fit<T: Real>(blocks: &[Block<T>]) -> Option<(V3<T>, T)> {
     best.map(|(_, e, c)| (e, c))
 }
 
-/// Mean squared distance of the points from a cone in pixels.
+/// Returns the mean squared distance of the points from a cone, in px².
 fn distance2<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T) -> T {
     let (mut total, mut count) = (T::ZERO, T::ZERO);
     for b in blocks {
@@ -44,15 +47,15 @@ fn distance2<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T) -> T {
     total / count
 }
 
-/// Coefficients A to F of a conic about the points' centre and scale.
+/// Coefficients A to F of a conic, relative to the centre and the scale of the points.
 type Conic<T> = [T; 6];
 
-/// The points on the plane z = 1, moved to their centre and scaled to unit spread: powers of four of the
+/// The points on the plane z = 1, moved to their centre and scaled to unit spread, because fourth powers of the
 /// coordinates are summed.
 struct Plane<T> {
     centre: [T; 2],
     scale: T,
-    /// Mean direction of the points: on the nappe that is seen.
+    /// Mean direction of the points, which is on the visible nappe.
     towards: V3<T>,
 }
 
@@ -80,12 +83,13 @@ impl<T: Real> Plane<T> {
         Some(Self { centre, scale: T::one() / scale, towards: unit(&towards)? })
     }
 
-    /// The best ellipse and the best hyperbola.
+    /// Returns the best ellipse and the best hyperbola.
     ///
-    /// A triangle of rows (1, x, y, x², xy, y²) frees the quadratic terms of the linear ones: its last three rows and
-    /// columns, R, have aᵀ RᵀR a as the least sum of squares for a = (A, B, C). It shall be least for given
-    /// aᵀ C a = 4AC − B². With the singular values σ and vectors V of R and a = V σ⁻¹ y this is an ordinary symmetric
-    /// problem: the greatest eigenvalue of σ⁻¹ Vᵀ C V σ⁻¹ is the ellipse's and the least the hyperbola's.
+    /// A triangle of the rows (1, x, y, x², xy, y²) separates the quadratic terms from the linear ones. Let R be its
+    /// last three rows and columns. Then aᵀ RᵀR a is the least sum of squares for a = (A, B, C). It is minimised for a
+    /// given aᵀ C a = 4AC − B². With the singular values σ and vectors V of R, and a = V σ⁻¹ y, this is an ordinary
+    /// symmetric problem. The largest eigenvalue of σ⁻¹ Vᵀ C V σ⁻¹ belongs to the ellipse, and the smallest to the
+    /// hyperbola.
     fn conics(&self, blocks: &[Block<T>]) -> Option<[Conic<T>; 2]> {
         let mut triangle = Triangle::<T, 6>::new();
         each(blocks, |p, _| {
@@ -99,8 +103,9 @@ impl<T: Real> Plane<T> {
             quadratic.push([a, b, c]);
         }
         let (values, vectors) = quadratic.singular();
-        // Points on a conic make the least one zero but for rounding; when the next is zero too, more than one conic
-        // goes through them: they lie on a line, or in fewer than five places.
+        // If the points are exactly on a conic, the smallest singular value is zero except for rounding. If the next
+        // one is zero, too, more than one conic goes through the points: they are on a line, or at fewer than five
+        // places.
         let floor = values[2] * T::EPSILON * T::from_f64(4.0);
         if !(values[1] > floor * T::from_f64(16.0) && r33.abs() > T::EPSILON * T::from_f64(64.0) * r11.abs()) {
             return None;
@@ -112,7 +117,7 @@ impl<T: Real> Plane<T> {
         let (_, solutions) = symmetric_eigen::<T, 3>(problem);
         let conic = |y: &[T; 3]| -> Conic<T> {
             let [a, b, c]: [T; 3] = core::array::from_fn(|k| half[0][k] * y[0] + half[1][k] * y[1] + half[2][k] * y[2]);
-            // The linear terms: the first three rows, from below.
+            // The first three rows give the linear terms, from the last row to the first.
             let e = -(r34 * a + r35 * b + r36 * c) / r33;
             let d = -(r24 * a + r25 * b + r26 * c + r23 * e) / r22;
             let f = -(r14 * a + r15 * b + r16 * c + r12 * d + r13 * e) / r11;
@@ -125,7 +130,7 @@ impl<T: Real> Plane<T> {
         ((x - self.centre[0]) * self.scale, (y - self.centre[1]) * self.scale)
     }
 
-    /// The conic as a quadratic form of rays (x, y, 1), normalised to a unit largest entry.
+    /// Returns the conic as a quadratic form of rays (x, y, 1), normalised so that the largest entry is 1.
     fn rays(&self, &[a, b, c, d, e, f]: &Conic<T>) -> [[T; 3]; 3] {
         let half = T::from_f64(0.5);
         let local = M3::new(a, b * half, d * half, b * half, c, e * half, d * half, e * half, f);
@@ -142,12 +147,12 @@ impl<T: Real> Plane<T> {
     }
 }
 
-/// The axis and cos α of the cone rᵀ m r = 0, on the nappe of `towards`: (18), corrected. `None` when the eigenvalues
-/// have one sign: no cone is seen.
+/// Returns the axis and cos α of the cone rᵀ m r = 0, on the nappe of `towards`: (18), corrected. The result is `None`
+/// if all eigenvalues have the same sign, because then there is no cone.
 pub(crate) fn cone<T: Real>(m: &[[T; 3]; 3], towards: &V3<T>) -> Option<(V3<T>, T)> {
     let (values, vectors) = symmetric_eigen(*m);
     let [low, mid, high] = values;
-    // One positive and two negative, or the other way round, whatever the factor.
+    // One eigenvalue is positive and two are negative, or the other way round, depending on the factor.
     let (own, others, axis) = if mid < T::ZERO && high > T::ZERO {
         (high, low + mid, &vectors[2])
     } else if mid > T::ZERO && low < T::ZERO {
@@ -155,7 +160,7 @@ pub(crate) fn cone<T: Real>(m: &[[T; 3]; 3], towards: &V3<T>) -> Option<(V3<T>, 
     } else {
         return None;
     };
-    // cot²α of an elliptic cone: the mean of both transverse ones.
+    // cot²α of an elliptic cone is the mean of its two values.
     let cot2 = -others * T::from_f64(0.5) / own;
     let c = (cot2 / (T::one() + cot2)).sqrt();
     let e = unit(&V3::from(*axis))?;

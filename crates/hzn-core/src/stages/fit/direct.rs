@@ -1,29 +1,31 @@
-//! The nadir directly from the edge points, without a conic in between (Braun & Barf 2022, (24)).
+//! Computes the nadir directly from the edge points, without a conic (Braun & Barf 2022, (24)).
 //!
-//! On the plane z = 1 a limb point p = s/s_z fulfils p·e = cos α ‖p‖, which is linear in e: least squares over all
-//! points gives e = (HᵀH)⁻¹ Hᵀ (cos α ‖p‖) with the p as rows of H. In unit rays these are the equations s·e = cos α
-//! with the weights 1/s_z²: far from the axis a point counts for more, and beyond 90° there is no plane.
+//! On the plane z = 1, a limb point p = s/s_z satisfies p·e = cos α ‖p‖, which is linear in e. Least squares over all
+//! points give e = (HᵀH)⁻¹ Hᵀ (cos α ‖p‖), with the p as rows of H. In unit rays, these are the equations s·e = cos α
+//! with the weights 1/s_z². A point far from the optical axis therefore counts more, and beyond 90° there is no plane.
 //!
-//! The paper says that α must be known. It need not: another cos α scales e and leaves its direction as it is, so the
-//! length that comes out, cos α assumed over cos α measured, *measures* α. That also is the method's weakness: the
-//! half-angle is left free, which on a short arc costs a factor of three to six (book/theory/math.md).
+//! The paper says that α must be known. This is not necessary: another cos α scales e and does not change its
+//! direction. The length of the result is the assumed cos α divided by the measured one, so it *measures* α. This is
+//! also the weakness of the method: the half-angle is free, which increases the error on a short arc by a factor of
+//! three to six (book/theory/math.md).
 
 use crate::base::linalg::{M3, V3, basis, invert_spd3};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 
-/// Points nearer to the horizon of the camera than this (cosine of the angle off axis) are not on the plane.
+/// Points with a smaller s_z (cosine of the angle to the optical axis) are not used, because they are not on the plane.
 pub(crate) const LEAST_Z: f64 = 0.03;
 
-/// Rounds of residuals: each takes what rounding left in the one before by the condition of the equations.
+/// Largest number of refinement rounds. Each round removes the error that rounding left in the round before, as far as
+/// the condition of the equations allows.
 const ROUNDS: usize = 4;
 
-/// The least-squares nadir of the points that may count: the unit axis and cos α. `None` when they do not determine a
-/// cone: fewer than three, or all in a plane through the camera.
+/// Returns the least-squares nadir of the points with a weight: the unit axis and cos α. The result is `None` if the
+/// points do not determine a cone: if there are fewer than three, or if all are in a plane through the camera.
 pub(crate) fn fit<T: Real>(blocks: &[Block<T>]) -> Option<(V3<T>, T)> {
     let one = T::one();
-    // Start: the mean direction. The equations are solved for what is missing, in a basis along it, so that single
-    // precision suffices: p·δ = ‖p‖ − p·e for cos α assumed to be 1.
+    // The start is the mean direction. The equations are solved for the rest, in a basis along this direction, so that
+    // single precision suffices: p·δ = ‖p‖ − p·e, with cos α assumed to be 1.
     let mut e = mean(blocks)?;
     let (b1, b2) = basis(&e);
     let normal = Normal::new(blocks, &b1, &b2, &e.clone())?;
@@ -35,12 +37,12 @@ pub(crate) fn fit<T: Real>(blocks: &[Block<T>]) -> Option<(V3<T>, T)> {
         }
     }
     let norm = e.dot(&e).sqrt();
-    // cos α = 1 was assumed.
+    // The assumed cos α is 1.
     let c = one / norm;
     (norm.is_finite() && c > T::ZERO && c < one).then(|| (e * c, c))
 }
 
-/// Mean direction of the points.
+/// Returns the mean direction of the points.
 fn mean<T: Real>(blocks: &[Block<T>]) -> Option<V3<T>> {
     let mut total = V3::new(T::ZERO, T::ZERO, T::ZERO);
     for b in blocks {
@@ -53,16 +55,16 @@ fn mean<T: Real>(blocks: &[Block<T>]) -> Option<V3<T>> {
     crate::base::linalg::unit(&total)
 }
 
-/// 1/s_z² for a point that may count, else 0.
+/// Returns 1/s_z² for a point with a weight, otherwise 0.
 fn weight<T: Real>(b: &Block<T>, l: usize) -> T {
     let z = b.s[2][l & 7];
     if b.weight[l & 7] > T::ZERO && z > T::from_f64(LEAST_Z) { T::one() / (z * z) } else { T::ZERO }
 }
 
-/// HᵀH in the basis (b1, b2, e), the first two columns freed of the third, inverted.
+/// Inverse of HᵀH in the basis (b1, b2, e). The first two columns are made orthogonal to the third one.
 pub(crate) struct Normal<T> {
     axes: [V3<T>; 3],
-    /// What of the third column is in the first two.
+    /// Multiple of the third column that is subtracted from each of the first two.
     shear: [T; 2],
     inverse: M3<T>,
 }
@@ -93,25 +95,25 @@ impl<T: Real> Normal<T> {
         Some(Self { axes: [*b1, *b2, *e], shear, inverse: invert_spd3(&n)? })
     }
 
-    /// The row of a ray, before its weight.
+    /// Returns the row of a ray, without its weight.
     pub(crate) fn row(&self, s: &V3<T>) -> V3<T> {
         let [a, b, c] = &self.axes;
         V3::from(row(s, [a, b, c], self.shear))
     }
 
-    /// (HᵀH)⁻¹ in the sheared basis.
+    /// Returns (HᵀH)⁻¹ in the sheared basis.
     pub(crate) fn inverse(&self) -> &M3<T> {
         &self.inverse
     }
 
-    /// A solution in the sheared basis as a vector of the camera frame: with rows x' = x − m z the unknowns are
-    /// (x, y, z + m·(x, y)), so z is what remains.
+    /// Converts a solution in the sheared basis to a vector of the camera frame. With rows x' = x − m z, the unknowns
+    /// are (x, y, z + m·(x, y)), so that z follows.
     pub(crate) fn vector(&self, d: &V3<T>) -> V3<T> {
         let z = d.z - self.shear[0] * d.x - self.shear[1] * d.y;
         self.axes[0] * d.x + self.axes[1] * d.y + self.axes[2] * z
     }
 
-    /// Least squares of p·δ = ‖p‖ − p·e.
+    /// Solves p·δ = ‖p‖ − p·e by least squares.
     fn solve(&self, blocks: &[Block<T>], e: &V3<T>) -> V3<T> {
         let mut right = V3::new(T::ZERO, T::ZERO, T::ZERO);
         each(blocks, |w, s| {

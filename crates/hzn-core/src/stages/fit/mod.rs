@@ -1,14 +1,15 @@
-//! Gauss-Newton on the sphere: the cone s·e = cos α through the edge points.
+//! Gauss-Newton on the sphere: fits the cone s·e = cos α to the edge points.
 //!
-//! State: the unit axis e and k = 1 − cos α, which keeps its digits for a small disc where cos α does not; for the same
-//! reason 1 − s·e is formed as |s − e|²/2. In what follows c = cos α. For each point r = c − s·e is the residual, g =
-//! ∂(s·e)/∂(u, v), and |r|/|g| the distance from the limb in pixels, so w = 1/|g|² weighs by pixels. With h = [Bᵀs − m,
-//! −1], B the tangent basis at e and m the mean of Bᵀs, a step solves (Σ w h hᵀ) δ = Σ w r h. Subtracting the means
-//! keeps the sums well-conditioned in single precision; the third unknown then is δc' = δc − m·δ₁₂.
+//! The state is the unit axis e and k = 1 − cos α. For a small disc, k keeps its precision while cos α loses it; for
+//! the same reason 1 − s·e is computed as |s − e|²/2. In the following, c = cos α. For each point, r = c − s·e is the
+//! residual and g = ∂(s·e)/∂(u, v). Then |r|/|g| is the distance from the limb in pixels, so that w = 1/|g|² weighs by
+//! pixels. Let h = [Bᵀs − m, −1], where B is the tangent basis at e and m is the mean of Bᵀs. A step solves
+//! (Σ w h hᵀ) δ = Σ w r h. Subtracting the means keeps the sums well-conditioned in single precision; the third unknown
+//! is then δc' = δc − m·δ₁₂.
 //!
-//! The expected half-angle enters the robust iterations as one more row, weighed against the edge's *correlated*
-//! errors. With the weights so found the half-angle is then fitted freely, for the covariance, for the altitude
-//! estimate, and for the test of the candidate; `covariance` fuses the two.
+//! In the robust iterations, the expected half-angle is one more row. Its weight takes into account that the errors of
+//! the edge are *correlated*. Then the half-angle is fitted freely with the weights that were found: for the
+//! covariance, for the altitude estimate, and for the test of the candidate. `covariance` fuses the two half-angles.
 
 #[cfg(feature = "horace")]
 mod circle;
@@ -55,7 +56,8 @@ choices! {
         @- Conic = "conic" needs "dlr";
         /// An elliptic cone by total least squares (Wang et al. 2022, (10) to (17)).
         @- Tls = "tls" needs "zju";
-        /// The same with every point weighed by the angle of a pixel at its place (Wang et al. 2022, (18) to (21)).
+        /// An elliptic cone by total least squares; every point is weighed by the angle of a pixel at its place (Wang
+        /// et al. 2022, (18) to (21)).
         @- Wtls = "wtls" needs "zju";
         /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
         @- Circle = "circle" needs "horace";
@@ -78,40 +80,40 @@ section! {
 /// A fitted cone.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fit<T> {
-    /// Axis.
+    /// Unit axis, in the camera frame.
     pub(crate) e: V3<T>,
     /// cos of the (mean) half-angle.
     pub(crate) c: T,
-    /// 1 − cos of it, to its own digits.
+    /// 1 − cos of the half-angle, with the full relative precision.
     pub(crate) k: T,
-    /// The half-angle was fitted too; otherwise it is the expected one.
+    /// The half-angle was fitted, too; otherwise it is the expected one.
     pub(crate) free: bool,
     /// Weighted RMS distance of the points from the limb in pixels.
     pub(crate) rms_px: T,
-    /// Points with a weight.
+    /// Number of points with a weight.
     pub(crate) inliers: u32,
-    /// Length of edge between neighbouring points with a weight, in pixels.
+    /// Total length of the edge between adjacent points that both have a weight, in pixels.
     pub(crate) arc_px: T,
-    /// Points that the weights' cut-off leaves out although they lie within three times it.
+    /// Number of points beyond the cut-off of the weights, but within three times the cut-off.
     pub(crate) nearby: u32,
-    /// The normal equations at the cone, about `mean`.
+    /// Normal equations at the cone, about `mean`.
     pub(crate) sums: Sums<T>,
     /// Means of Bᵀs.
     pub(crate) mean: [T; 2],
-    /// The elliptic cone, of the methods that fit one: its covariance is not that of the normal equations.
+    /// The elliptic cone of the methods that fit one. Its covariance is not the one of the normal equations.
     #[cfg(feature = "zju")]
     pub(crate) quadric: Option<Quadric<T>>,
 }
 
-/// Tukey's constant: 95 % efficiency on Gaussian errors.
+/// Tukey's constant: it gives 95 % efficiency for Gaussian errors.
 const TUKEY: f64 = 4.685;
-/// Most robust iterations, and most with the weights kept.
+/// Largest number of robust iterations. `SETTLE` is the largest number of iterations with fixed weights.
 const ROBUST: usize = 10;
-/// Blocks that the first robust iterations look at.
+/// Number of blocks that the first robust iterations use.
 const PART: usize = 24;
 const SETTLE: usize = 5;
 
-/// The correction by azimuth of an ellipsoid seen with a known attitude.
+/// Returns the correction by azimuth for an ellipsoid; `None` if the body is no ellipsoid or the attitude is unknown.
 pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
     let cone = expected.ellipsoid.as_ref()?;
     let to_cam = expected.cam_to_ecef?.inverse();
@@ -126,7 +128,8 @@ pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
     })
 }
 
-/// Fits the cone; leaves in each point the weight that it had. `None` when the points do not determine one.
+/// Fits the cone, and stores the weight of each point in its block. The result is `None` if the points do not determine
+/// a cone.
 pub(crate) fn fit<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,
@@ -155,7 +158,7 @@ pub(crate) fn fit<T: Real>(
     Some(counted(blocks, cone))
 }
 
-/// The fit that a cone is, with what there is to count of its points.
+/// Makes the fit of a cone, and counts its points.
 fn counted<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T> {
     let (mut inliers, mut arc) = ([T::ZERO; LANES], [T::ZERO; LANES]);
     let mut before = T::ZERO;
@@ -185,10 +188,10 @@ fn counted<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T> {
     }
 }
 
-/// What every method ends with.
+/// Result of every method.
 struct Cone<T> {
     at: State<T>,
-    /// The means that `sums` are about.
+    /// Means about which `sums` are formed.
     mean: [T; 2],
     sums: Sums<T>,
     free: bool,
@@ -196,7 +199,8 @@ struct Cone<T> {
     quadric: Option<Quadric<T>>,
 }
 
-/// Robust iterations under the expected half-angle, then the half-angle freely with the weights so found.
+/// Fits the cone in robust iterations with the expected half-angle, then fits the half-angle freely with the weights
+/// that were found.
 fn sphere<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,
@@ -212,7 +216,7 @@ fn sphere<T: Real>(
     let freely = if known { None } else { settle(blocks, robust, Some(sums), true, azimuth) };
     let ((at, mean, sums), free) = match freely {
         Some(settled) => (settled, true),
-        // Sun and Moon have no other half-angle to fall back on.
+        // For Sun and Moon there is no expected half-angle to use instead.
         None if expected.free => return None,
         None => (settle(blocks, State { k: T::one() - expected.cos, ..robust }, None, false, azimuth)?, false),
     };
@@ -226,9 +230,10 @@ fn sphere<T: Real>(
     })
 }
 
-/// The cone that another method finds through the points within `threshold_px` of the consensus (all of them, when
-/// none was to be left out), with the normal equations there, so that it is weighed, judged and given a covariance
-/// as every other. `find` gets the blocks with weights 0 and 1 and gives axis and cos of the half-angle.
+/// Fits the cone by another method, `find`, and adds the normal equations at this cone. Weights, gates and covariance
+/// are therefore the same as for the default method. The method uses the points within `threshold_px` of the consensus,
+/// or all points if `start.all` is set. `find` receives the blocks with weights 0 and 1, and returns the axis and the
+/// cos of the half-angle.
 #[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
 #[allow(dead_code, reason = "for the estimators behind features")]
 fn held<T: Real>(
@@ -253,7 +258,7 @@ fn held<T: Real>(
     at(blocks, e, c)
 }
 
-/// The fit that a given cone is, by the weights that the points have.
+/// Returns the fit at a given cone, with the weights that the points have.
 #[cfg(any(test, feature = "_edges"))]
 #[allow(dead_code, reason = "behind a feature")]
 pub(crate) fn given<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Fit<T>> {
@@ -261,7 +266,7 @@ pub(crate) fn given<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<
     Some(counted(blocks, cone))
 }
 
-/// A cone with the normal equations there.
+/// Returns a cone with the normal equations at it.
 #[cfg(any(test, feature = "dlr", feature = "zju", feature = "horace", feature = "_edges"))]
 fn at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
     let e = unit(&e)?;
@@ -271,7 +276,7 @@ fn at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
     let (b1, b2) = basis(&e);
     let mean = means(blocks, &b1, &b2);
     let sums = pass(blocks, &e, &b1, &b2, T::one() - c, mean, &Weights::Kept, None);
-    // NaN is refused with the rest.
+    // This test also refuses NaN.
     (sums.weight > T::from_f64(2.5) && sums.cost >= T::ZERO).then_some(Cone {
         at: State { e, k: T::one() - c, mean, nearby: 0 },
         mean,
@@ -282,11 +287,12 @@ fn at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
     })
 }
 
-/// No axis lies further off.
+/// Largest possible angle between the axis and the optical axis, in radians.
 #[cfg(feature = "zju")]
 const HALF_TURN_RAD: f64 = core::f64::consts::PI;
 
-/// The elliptic cone through the points; its distances are those of `rms_px`, and its covariance is its own.
+/// Fits an elliptic cone to the points. `rms_px` uses the distances from this cone, and the covariance comes from
+/// `quadric`.
 #[cfg(feature = "zju")]
 fn elliptic<T: Real>(
     blocks: &mut [Block<T>],
@@ -305,7 +311,7 @@ fn elliptic<T: Real>(
     Some(Cone { sums, quadric, ..cone })
 }
 
-/// Where the iterations stand.
+/// State of the iterations.
 #[derive(Clone, Copy)]
 struct State<T> {
     e: V3<T>,
@@ -321,11 +327,11 @@ impl<T: Real> State<T> {
     fn c(&self) -> T {
         T::one() - self.k
     }
-    /// Its sine.
+    /// sin of the half-angle.
     fn sin(&self) -> T {
         (self.k * (T::one() + self.c())).max(T::ZERO).sqrt()
     }
-    /// Takes the step and gives its size in radians; `None` when it leads nowhere.
+    /// Does a step and returns its size in radians; `None` if the new axis has no direction.
     fn step(&mut self, b1: &V3<T>, b2: &V3<T>, ([d1, d2], dc): ([T; 2], T), sums: &Sums<T>) -> Option<T> {
         self.e = unit(&(self.e + b1 * d1 + b2 * d2))?;
         self.k -= dc;
@@ -334,8 +340,9 @@ impl<T: Real> State<T> {
     }
 }
 
-/// Iterations with Tukey's weights, whose cut-off shrinks from three thresholds to what the residuals ask for; writes
-/// the last weights into the points, and gives the sums there.
+/// Does the iterations with Tukey's weights. The cut-off begins at three thresholds and then follows the residuals,
+/// between half a threshold and two thresholds. The function stores the last weights in the points, and returns the
+/// sums with them.
 fn robust<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,
@@ -353,7 +360,7 @@ fn robust<T: Real>(
     let (b1, b2) = basis(&e);
     let k = T::one() - if known { expected.cos } else { start.c };
     let mut at = State { e, k, mean: means(blocks, &b1, &b2), nearby: 0 };
-    // A part of the points brings the cone near; all of them make the end.
+    // A part of the points brings the cone near; the last iterations use all points.
     let mut every = blocks.len().div_ceil(PART).max(1);
     for _ in 0..ROBUST {
         let (b1, b2) = basis(&at.e);
@@ -368,12 +375,12 @@ fn robust<T: Real>(
         at.k = clamp(at.k);
         let spread = (sums.cost / sums.weight.max(T::from_f64(1e-20))).sqrt() * T::from_f64(1.2);
         let next = (spread * T::from_f64(TUKEY)).max(narrowest).min(widest);
-        // Over all points a step leaves a small part of itself to the next; over some of them it is as good as they
-        // are.
+        // With all points, the next step is much smaller than this one. With a part of the points, the cone is only as
+        // good as this part, so more iterations would not help.
         let small = T::from_f64(if every == 1 { 5e-4 } else { 1e-4 });
         let settled = (next - cutoff).abs() < cutoff * T::from_f64(0.05) && size < small * at.sin();
         cutoff = next;
-        // All points and the last digits come with the weights kept.
+        // The iterations with fixed weights give the last digits, with all points.
         if settled {
             break;
         }
@@ -388,9 +395,9 @@ fn robust<T: Real>(
     (last.weight > T::from_f64(3.0)).then_some((at, last))
 }
 
-/// Iterations with the weights kept, to the end, and the normal equations there with the means they are about. `None`
-/// when the points do not determine the cone: for a free half-angle, when the arc is too short. `first`: the sums at
-/// the start, where they are known.
+/// Iterates with fixed weights until convergence, and returns the normal equations there with the means about which
+/// they are formed. The result is `None` if the points do not determine the cone; for a free half-angle, this happens
+/// if the arc is too short. `first` are the sums at the start, if they are known.
 fn settle<T: Real>(
     blocks: &mut [Block<T>],
     start: State<T>,
@@ -408,12 +415,13 @@ fn settle<T: Real>(
         let step = if free { sums.step(mean, None, at.c())? } else { sums.step_known(mean)? };
         sums.cost = (sums.cost - sums.gain(mean, step)).max(T::ZERO);
         let size = at.step(&b1, &b2, step, &sums)?;
-        // 20° from the robust solution is another cone.
+        // An axis more than 20° from the robust solution belongs to another cone.
         if !(at.k > T::ZERO && at.k < T::from_f64(2.0)) || at.e.dot(&start.e) < T::from_f64(0.94) {
             return None;
         }
         end = Some((at, mean, sums));
-        // Convergence is quadratic: after a step this small nothing is left, and the sums are those of the end.
+        // Convergence is quadratic: after a step this small nothing remains to be corrected, and the sums are the final
+        // ones.
         if size * size < T::EPSILON * T::from_f64(2.0) * at.sin() {
             break;
         }
@@ -421,7 +429,7 @@ fn settle<T: Real>(
     end
 }
 
-/// 1 − cos within its ends.
+/// Limits 1 − cos to its valid range.
 fn clamp<T: Real>(k: T) -> T {
     k.max(T::from_f64(1e-9)).min(T::from_f64(2.0 - 1e-6))
 }
@@ -433,7 +441,7 @@ struct HalfAngleRow<T> {
 }
 
 impl<T: Real> HalfAngleRow<T> {
-    /// Weighed so that an edge counts for as many points as it has independent errors: one in two correlation lengths.
+    /// Weighs the row by the number of independent errors of the edge: one error per two correlation lengths.
     fn new(blocks: &[Block<T>], expected: &Expected<T>, config: &Config, noise: &edge_noise::Config) -> Option<Self> {
         if expected.free || config.half_angle == HalfAngle::Free {
             return None;
@@ -459,26 +467,26 @@ pub(crate) struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
     pub(crate) n: [T; 6],
     g: [T; 3],
-    /// Σ of the robust weights, and of the squared distances times them, px².
+    /// Σ of the robust weights. `cost` is Σ of the squared distances multiplied by these weights, px².
     pub(crate) weight: T,
     pub(crate) cost: T,
-    /// Points that Tukey's cut-off leaves out although they lie within three times it; counted by the last pass only.
+    /// Number of points beyond Tukey's cut-off, but within three times the cut-off. Only the last pass counts them.
     nearby: T,
 }
 
 impl<T: Real> Sums<T> {
-    /// By how much a step lowers the cost, to the second order.
+    /// Returns the reduction of the cost by a step, to the second order.
     fn gain(&self, mean: [T; 2], ([d1, d2], dc): ([T; 2], T)) -> T {
         let [g1, g2, g3] = self.g;
         g1 * d1 + g2 * d2 + g3 * (dc - mean[0] * d1 - mean[1] * d2)
     }
 
-    /// The step (δ₁₂, δc) with the half-angle free or under its prior.
+    /// Returns the step (δ₁₂, δc) with a free half-angle, or with its prior.
     fn step(&self, mean: [T; 2], prior: Option<&HalfAngleRow<T>>, c: T) -> Option<([T; 2], T)> {
         let [mut n11, mut n12, mut n13, mut n22, mut n23, mut n33] = self.n;
         let [mut g1, mut g2, mut g3] = self.g;
         if let Some(p) = prior {
-            // Row [m, 1] on (δ₁₂, δc') with the value c₀ − c.
+            // The prior adds the row [m, 1] for (δ₁₂, δc'), with the value c₀ − c.
             let (w, [m1, m2], v) = (p.weight, mean, p.cos - c);
             n11 += w * m1 * m1;
             n12 += w * m1 * m2;
@@ -495,7 +503,7 @@ impl<T: Real> Sums<T> {
         Some(([d.x, d.y], d.z + mean[0] * d.x + mean[1] * d.y))
     }
 
-    /// The step with the half-angle held: δc = 0, that is δc' = −m·δ₁₂.
+    /// Returns the step with a fixed half-angle: δc = 0, and therefore δc' = −m·δ₁₂.
     fn step_known(&self, mean: [T; 2]) -> Option<([T; 2], T)> {
         let [a, b, d] = invert_spd2(self.known(mean))?;
         let [g1, g2, g3] = self.g;
@@ -503,7 +511,7 @@ impl<T: Real> Sums<T> {
         Some(([a * g1 + b * g2, b * g1 + d * g2], T::ZERO))
     }
 
-    /// Σ w (Bᵀs)(Bᵀs)ᵀ, upper triangle.
+    /// Returns the upper triangle of Σ w (Bᵀs)(Bᵀs)ᵀ.
     pub(crate) fn known(&self, [m1, m2]: [T; 2]) -> [T; 3] {
         let [n11, n12, n13, n22, n23, n33] = self.n;
         // h₁₂ + m times (h₃ = −1): Bᵀs = h₁₂ − m h₃.
@@ -514,24 +522,24 @@ impl<T: Real> Sums<T> {
         ]
     }
 
-    /// Weighted RMS of |g|: by how much cos α changes when every point moves by one pixel across the limb, 1/px.
+    /// Returns the weighted RMS of |g|: the change of cos α if every point moves by one pixel across the limb, in 1/px.
     pub(crate) fn cos_per_px(&self) -> T {
         (self.weight / self.n[5].max(T::from_f64(1e-20))).sqrt()
     }
 
-    /// With the normal equations of a part of the points.
+    /// Replaces the normal equations by those of a part of the points.
     pub(crate) fn of_part(&self, n: [T; 6]) -> Self {
         Self { n, ..*self }
     }
 
-    /// The means of Bᵀs, from the sums about the old ones.
+    /// Returns the means of Bᵀs, from the sums about the old means.
     pub(crate) fn means(&self, [m1, m2]: [T; 2]) -> [T; 2] {
         let w = self.n[5].max(T::from_f64(1e-20));
         [m1 - self.n[2] / w, m2 - self.n[4] / w]
     }
 }
 
-/// Means of Bᵀs over every point that may count.
+/// Returns the means of Bᵀs over all points with a weight.
 pub(crate) fn means<T: Real>(blocks: &[Block<T>], b1: &V3<T>, b2: &V3<T>) -> [T; 2] {
     let (mut n, mut x, mut y) = ([T::ZERO; LANES], [T::ZERO; LANES], [T::ZERO; LANES]);
     for b in blocks {
@@ -546,17 +554,17 @@ pub(crate) fn means<T: Real>(blocks: &[Block<T>], b1: &V3<T>, b2: &V3<T>) -> [T;
     [sum(&x) / n, sum(&y) / n]
 }
 
-/// What a pass weighs the points by, besides their distance in pixels.
+/// Weights of the points in a pass, in addition to 1/|g|².
 pub(crate) enum Weights<T> {
-    /// The weights that they have.
+    /// The weights that the points have.
     Kept,
-    /// Tukey's, on every so many blocks, which stand for all.
+    /// Tukey's weights. Only every `every`-th block is used, and represents the others.
     Tukey { cutoff2: T, every: usize },
-    /// Tukey's, which the points then keep.
+    /// Tukey's weights, which are also stored in the points.
     Last { cutoff2: T },
 }
 
-/// One pass: sums at (e, k), about `mean`.
+/// Does one pass over the points: sums at (e, k), about `mean`.
 pub(crate) fn pass<T: Real>(
     blocks: &mut [Block<T>],
     e: &V3<T>,
@@ -622,7 +630,7 @@ pub(crate) fn pass<T: Real>(
     Sums { n: [n11, n12, -n13, n22, -n23, n33], g: [g1, g2, -g3], weight, cost, nearby: sum(&nearby) * times }
 }
 
-/// Inverse of the free normal equations about `mean`.
+/// Returns the inverse of the normal equations for a free half-angle, about `mean`.
 pub(crate) fn inverse<T: Real>(sums: &Sums<T>) -> Option<M3<T>> {
     invert_spd3(&sums.n)
 }

@@ -1,48 +1,51 @@
-//! The limb as an elliptic cone, by total least squares (Wang et al. 2022, 2.4): no size, no altitude, no sphere.
+//! Fits the limb as an elliptic cone by total least squares (Wang et al. 2022, 2.4). The method needs no size, altitude
+//! or sphere.
 //!
-//! A limb ray satisfies sᵀ M s = 0, M symmetric with one eigenvalue of the distinct sign, that of the axis (Wang 7 and
-//! 22). With e = (x², xy, y², xz, yz, 1), where 1 stands for x² + y² + z², this is e·v = 0:
+//! A limb ray satisfies sᵀ M s = 0. M is symmetric, and one eigenvalue has a sign that the others do not have: it
+//! belongs to the axis (Wang 7 and 22). With e = (x², xy, y², xz, yz, 1), where 1 is x² + y² + z², this is e·v = 0:
 //! M₁₁ = v₁ + v₆, M₂₂ = v₃ + v₆, M₃₃ = v₆, M₁₂ = v₂/2, M₁₃ = v₄/2, M₂₃ = v₅/2.
 //!
-//! * `tls` (10-17): the v of length 1 with the least Σ (e·v)², which is the right singular vector of the smallest
+//! * `tls` (10-17): v has the length 1 and the smallest Σ (e·v)². It is the right singular vector of the smallest
 //!   singular value. Wang et al. divide by v₆ to have five unknowns, which fails for M₃₃ → 0, a limb through the image
-//!   centre; the vector itself is their solution wherever they have one.
-//! * `wtls` (18-21): every point's error weighed by what a pixel is to it, that is the least Σ (e·v)²/q with
-//!   q = |∂(e·v)/∂(u, v)|². Their cofactor matrix has (5n)² elements; the points are independent, so that it falls
-//!   apart into one block a point, and each iteration is one pass: least squares of the rows e − δ with
-//!   δ = J t (e·v)/q, t = Jᵀv, J = ∂e/∂(u, v), weighed by 1/q. Printed (18) has x z = sin²θ cos²θ u/ρ; it is
-//!   sin θ cos θ u/ρ, as here, where e is made of the unit ray itself.
+//!   centre. The vector v equals their solution where they have one.
+//! * `wtls` (18-21): the error of each point is weighed by the effect of one pixel on it. This minimises Σ (e·v)²/q
+//!   with q = |∂(e·v)/∂(u, v)|². Their cofactor matrix has (5n)² elements. The points are independent, so that the
+//!   matrix has one block for each point, and each iteration is one pass. It solves least squares of the rows e − δ,
+//!   weighed by 1/q, with δ = J t (e·v)/q, t = Jᵀv, J = ∂e/∂(u, v). The printed (18) has x z = sin²θ cos²θ u/ρ. The
+//!   correct form is sin θ cos θ u/ρ; here e is made from the unit ray.
 
 use crate::base::linalg::{Triangle, V3, basis, dot, symmetric_eigen};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 
-/// Unknowns: the cone's matrix up to its scale.
+/// Number of unknowns: the matrix of the cone up to its scale.
 const N: usize = 6;
-/// Most iterations of the weights.
+/// Largest number of iterations of the weights.
 const ITERATIONS: usize = 12;
 
-/// A fitted elliptic cone and how it answers to the points' errors.
+/// A fitted elliptic cone and its response to the errors of the points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Quadric<T> {
-    /// Unit axis, towards the body.
+    /// Unit axis towards the body, in the camera frame.
     pub(crate) e: V3<T>,
-    /// cos of the half-angle whose cot² is the mean of the two.
+    /// cos of the mean half-angle, whose cot² is the mean of the two values.
     pub(super) c: T,
-    /// The six numbers, of length 1.
+    /// The six unknowns, as a vector of length 1.
     v: [T; N],
-    /// Weighed by the pixels' errors.
+    /// The points were weighed by the errors of their pixels.
     weighted: bool,
-    /// What a unit of each of the six normal equations moves: the axis along the two vectors of `basis(e)`, and `c`.
+    /// Change of the axis (along the two vectors of `basis(e)`) and of `c` per unit of each of the six normal
+    /// equations.
     gains: [[T; N]; 3],
-    /// Points, and sum of their squared distances in pixels.
+    /// Number of points. `cost` is the sum of their squared distances, in px².
     pub(super) weight: T,
     pub(super) cost: T,
 }
 
 impl<T: Real> Quadric<T> {
-    /// The cone through the points with a weight; weighted total least squares when the axis lies further than
-    /// `weigh_above_rad` off the optical axis. `None` when the points do not determine a cone about one axis.
+    /// Fits the cone to the points with a weight. The fit uses weighted total least squares if the axis is more than
+    /// `weigh_above_rad` from the optical axis. The result is `None` if the points do not determine a cone about one
+    /// axis.
     pub(crate) fn fit(blocks: &[Block<T>], weigh_above_rad: T) -> Option<Self> {
         let v = tls(blocks)?;
         let shape = Shape::new(blocks, &v)?;
@@ -55,7 +58,7 @@ impl<T: Real> Quadric<T> {
             (v, shape)
         };
         let mut triangle = Triangle::<T, N>::new();
-        // The length of v is not determined by the points, and need not be.
+        // The points do not determine the length of v, and it is not needed.
         triangle.push(v);
         let (mut weight, mut cost) = (T::ZERO, T::ZERO);
         each(blocks, |block, lane| {
@@ -73,13 +76,13 @@ impl<T: Real> Quadric<T> {
         Some(Self { e, c, v, weighted, gains, weight, cost })
     }
 
-    /// The six numbers.
+    /// Returns the six unknowns.
     #[cfg(test)]
     pub(crate) fn numbers(&self) -> [T; N] {
         self.v
     }
 
-    /// How far an error of a point along its gradient moves (axis, axis, cos α), and the gradient by (u, v).
+    /// Returns the change of (axis, axis, cos α) per error of a point along its gradient, and the gradient by (u, v).
     #[inline]
     pub(crate) fn influence(&self, block: &Block<T>, lane: usize) -> ([T; 3], [T; 2]) {
         let point = Point::new(block, lane, &self.v);
@@ -100,17 +103,17 @@ fn each<T: Real>(blocks: &[Block<T>], mut visit: impl FnMut(&Block<T>, usize)) {
     }
 }
 
-/// (x², xy, y², xz, yz, 1).
+/// Returns the monomials (x², xy, y², xz, yz, 1).
 fn monomials<T: Real>(s: &V3<T>) -> [T; N] {
     [s.x * s.x, s.x * s.y, s.y * s.y, s.x * s.z, s.y * s.z, T::one()]
 }
 
-/// A point's part in the equations about `v`.
+/// Contribution of a point to the equations about `v`.
 struct Point<T> {
     e: [T; N],
     /// e·v.
     residual: T,
-    /// Jᵀv: its derivative by (u, v).
+    /// Jᵀv: derivative of the residual by (u, v).
     t: [T; 2],
     /// |t|².
     q: T,
@@ -123,7 +126,7 @@ impl<T: Real> Point<T> {
         let s = block.ray(lane);
         let e = monomials(&s);
         let (one, zero) = (T::one(), T::ZERO);
-        // ∂x, ∂y, ∂z by (u, v).
+        // Derivatives ∂x, ∂y, ∂z by (u, v).
         let d = [V3::new(one, zero, zero), V3::new(zero, one, zero), V3::new(zero, zero, one)]
             .map(|axis| block.gradient_at(lane, &axis));
         let two = T::from_f64(2.0);
@@ -140,7 +143,8 @@ impl<T: Real> Point<T> {
         Self { e, residual: dot(&e, v), t, q: (t[0] * t[0] + t[1] * t[1]).max(T::from_f64(1e-20)), jt }
     }
 
-    /// The row of the linearised equations, which `v` satisfies, and the square by whose root it is divided.
+    /// Returns the row of the linearised equations, which `v` satisfies. The second value is the square of the divisor
+    /// of the row.
     fn row(&self, v: &[T; N], weighted: bool) -> ([T; N], T) {
         let mut row = self.e;
         let (out, by, q) =
@@ -152,7 +156,7 @@ impl<T: Real> Point<T> {
     }
 }
 
-/// The smallest singular vector; `None` when it is not the only one.
+/// Returns the singular vector of the smallest singular value; `None` if it is not unique.
 fn tls<T: Real>(blocks: &[Block<T>]) -> Option<[T; N]> {
     let mut triangle = Triangle::<T, N>::new();
     each(blocks, |block, lane| triangle.push(monomials(&block.ray(lane))));
@@ -163,7 +167,7 @@ fn tls<T: Real>(blocks: &[Block<T>]) -> Option<[T; N]> {
 
 fn wtls<T: Real>(blocks: &[Block<T>], mut v: [T; N]) -> Option<[T; N]> {
     for _ in 0..ITERATIONS {
-        // A column more for the right-hand side.
+        // The additional column holds the right-hand side.
         let mut triangle = Triangle::<T, { N + 1 }>::new();
         let push = |triangle: &mut Triangle<T, { N + 1 }>, row: [T; N], last: T, per: T| {
             let [a, b, c, d, e, f] = row.map(|x| x * per);
@@ -181,13 +185,13 @@ fn wtls<T: Real>(blocks: &[Block<T>], mut v: [T; N]) -> Option<[T; N]> {
             *x += d;
             size += d * d;
         }
-        // Half a turn of the six numbers is another cone, or none.
+        // A step of half the length of `v` or more leads to another cone, or to none.
         if !(size < T::from_f64(0.25)) {
             return None;
         }
         let per = T::one() / dot(&v, &v).sqrt();
         v = v.map(|x| x * per);
-        // The weights hardly change with a step this small: the next would be lost in rounding.
+        // After a step this small the weights hardly change, and a further step would be lost in rounding.
         if size < T::EPSILON * T::from_f64(1e-3) {
             break;
         }
@@ -195,17 +199,18 @@ fn wtls<T: Real>(blocks: &[Block<T>], mut v: [T; N]) -> Option<[T; N]> {
     Some(v)
 }
 
-/// Axis and half-angles of a cone's matrix.
+/// Axis and half-angles of the matrix of a cone.
 struct Shape<T> {
     e: V3<T>,
     c: T,
-    /// Eigenvalue of the axis, the two others, and their eigenvectors.
+    /// Eigenvalue of the axis, then the two other eigenvalues; `others` are the eigenvectors of these two.
     values: [T; 3],
     others: [V3<T>; 2],
 }
 
 impl<T: Real> Shape<T> {
-    /// The eigenvector of the eigenvalue with the distinct sign, towards the points; `None` when there is no such one.
+    /// Finds the eigenvector of the eigenvalue with the distinct sign, and turns it towards the points. The result is
+    /// `None` if there is no distinct sign.
     fn new(blocks: &[Block<T>], v: &[T; N]) -> Option<Self> {
         let half = T::from_f64(0.5);
         let m = [
@@ -232,12 +237,12 @@ impl<T: Real> Shape<T> {
         (c < T::one()).then_some(Self { e, c, values, others })
     }
 
-    /// Derivatives by v of the axis along `basis(e)` and of cos α.
+    /// Returns the derivatives by v of the axis along `basis(e)`, and of cos α.
     fn derivatives(&self) -> [[T; N]; 3] {
         let [axis, first, second] = self.values;
         let (b1, b2) = basis(&self.e);
         let mut out = [[T::ZERO; N]; 3];
-        // ∂e = Σ u (uᵀ ∂M e)/(λ − λ_u) over the two others.
+        // ∂e = Σ u (uᵀ ∂M e)/(λ − λ_u) over the two other eigenvectors.
         for (u, value) in self.others.iter().zip([first, second]) {
             let by = form(u, &self.e);
             let per = T::one() / (axis - value);
@@ -258,7 +263,7 @@ impl<T: Real> Shape<T> {
     }
 }
 
-/// xᵀ M y as a sum over the six numbers.
+/// Returns xᵀ M y as coefficients of the six unknowns.
 fn form<T: Real>(x: &V3<T>, y: &V3<T>) -> [T; N] {
     let half = T::from_f64(0.5);
     [

@@ -1,4 +1,4 @@
-//! What is known of the attitude besides the picture: a prior attitude, and the last answer.
+//! Attitude gates: compare the axis with a prior attitude and with the last answer.
 
 use super::Config;
 use crate::base::linalg::V3;
@@ -7,8 +7,9 @@ use crate::geometry::frames::{Cam, UnitVec3};
 use crate::model::body::Expected;
 use crate::model::verdict::Verdict;
 
-/// `Passed`, `Attitude` where the axis is farther from the one that the prior attitude and the position lead to than
-/// both sigmas allow, or `Rate` where it is farther from the last answer than the vehicle can have turned.
+/// Returns `Attitude` if the axis is farther from the axis that the prior attitude and the position predict than both
+/// sigmas allow. Returns `Rate` if the axis is farther from the last answer than the vehicle can have turned. Otherwise
+/// returns `Passed`.
 pub(super) fn verdict<T: Real>(e: &V3<T>, sigma_max_rad: T, expected: &Expected<T>, config: &Config) -> Verdict {
     let off = |other: &V3<T>| UnitVec3::<Cam, T>::assume_unit(*e).angle_rad(&UnitVec3::assume_unit(*other));
     let within = |limit: T, sigma: T| (sigma * sigma + sigma_max_rad * sigma_max_rad).sqrt() * limit;
@@ -28,5 +29,6 @@ pub(super) fn verdict<T: Real>(e: &V3<T>, sigma_max_rad: T, expected: &Expected<
     Verdict::Passed
 }
 
-/// Sigmas of two answers that may lie between them besides the turn: `select.max_rate_deg_s` bounds the turn itself.
+/// Allowed distance between two answers in sigmas, in addition to the turn. `select.max_rate_deg_s` limits the turn
+/// itself.
 const LAST_SIGMAS: f64 = 4.0;

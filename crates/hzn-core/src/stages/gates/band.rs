@@ -1,4 +1,5 @@
-//! A band has sky on both sides: a ring, a streak and a window's frame. What lies inside a limb is the body.
+//! Band gate: a band has sky on both sides, for example a ring, a streak or the frame of a window. Inside a limb is the
+//! body.
 
 use super::sky;
 use crate::base::linalg::V3;
@@ -10,21 +11,24 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Places that are looked at from the limb inwards to the border of the region, evenly.
+/// Number of places that are read from the limb inwards to the border of the region, evenly distributed.
 const PLACES: i32 = 16;
-/// A look that ends nearer than this says nothing, pixels.
+/// Shortest look that counts, in pixels.
 const SHORTEST_PX: i32 = 32;
-/// The looks end before the far side of the body's disc, at this part of its diameter.
+/// A look ends before the far side of the body's disc, at this part of the diameter.
 const ACROSS: f64 = 0.8;
-/// The limb's own step is read so far to each side, and the far edge of a band likewise, pixels.
+/// Distance to each side over which the step of the limb, and that of the far edge of a band, is read, in pixels.
 const ASIDE_PX: i32 = 6;
-/// Of what lies behind a band so much must be sky; of a body nearly nothing is.
+/// Smallest part of the places behind a band that must be sky, as numerator and denominator. Inside a body, almost no
+/// place is sky.
 const FOR_GOOD: [usize; 2] = [2, 3];
-/// Of the limb's step so much stands above the sky at the most where there is sky again: blur and stray light.
+/// Largest brightness of a sky place behind a band, above the median of the sky, as a part of the step at the limb. It
+/// allows for blur and stray light.
 const SKY_PART: f64 = 0.1;
 
-/// The part of the looks inwards that come back to the sky across a second edge, at least `step` times as high as the
-/// limb, 0 to 1. A terminator fades and is no edge. `disc_px` is the diameter of the body's disc.
+/// Returns the part of the looks inwards that come back to the sky across a second edge, 0 to 1. The step of this edge
+/// must be at least `step` times that of the limb. A terminator fades and is no edge. `disc_px` is the diameter of the
+/// body's disc in pixels.
 pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
@@ -55,7 +59,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
         if end < SHORTEST_PX {
             continue;
         }
-        // The brightest: a band may end before that.
+        // The brightest pixel is used, because a band may be narrower than `ASIDE_PX`.
         let lit = (1..=ASIDE_PX).filter_map(seen).fold(T::ZERO, |a, b| a.max(b));
         let limb = (lit - sky.median).max(T::one());
         let dark = (sky.spread * T::from_f64(3.0)).max(limb * T::from_f64(SKY_PART)) + sky.median;
@@ -66,7 +70,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
             *cell = seen(place(k)).map(|b| b < dark);
         }
         let Some(back) = back_for_good(&is_sky) else { continue };
-        // The far edge is where half of the band's brightness is left: behind the last place that has more.
+        // The far edge is where half of the brightness of the band is left: after the last place that is brighter.
         let above = |px: i32| seen(px).map_or(T::ZERO, |b| b - sky.median);
         let passed = |k: i32| above(if k == 0 { ASIDE_PX } else { place(k) });
         let level = (0..=back as i32).fold(limb, |most, k| most.max(passed(k))) * T::from_f64(0.5);
@@ -76,7 +80,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
             let middle = (near + far) / 2;
             if seen(middle).is_some_and(|b| b - sky.median < level) { far = middle } else { near = middle }
         }
-        // Of three pixels, for the noise.
+        // The mean of three pixels reduces the noise.
         let edge = |px: i32| {
             let (mut sum, mut count) = (T::ZERO, 0);
             for b in [px - 1, px, px + 1].into_iter().filter_map(seen) {
@@ -85,14 +89,14 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
             }
             if count > 0 { sum / T::from_i32(count) } else { sky.median }
         };
-        // A narrow band is brightest less than so far from its far edge.
+        // In a narrow band, the brightest pixel is less than `ASIDE_PX` from the far edge.
         let bright = ((near - ASIDE_PX).max(1)..=near).map(edge).fold(T::ZERO, |a, b| a.max(b));
         bands += i32::from(bright - edge(far + ASIDE_PX) >= limb * step);
     }
     T::from_i32(bands) / T::from_i32(looks.max(1))
 }
 
-/// How far the region reaches from the limb inwards, pixels, by halving; at most `most`.
+/// Returns how far the region extends from the limb inwards, in pixels, at most `most`. The search halves the interval.
 fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
     let (mut within, mut beyond) = (0, most);
     while beyond - within > 4 {
@@ -102,10 +106,11 @@ fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
     within
 }
 
-/// The first place that is sky and from which on most of what is seen is, of three places or more.
+/// Returns the first place that is sky and from which on at least `FOR_GOOD` of the visible places are sky. At least
+/// three visible places are necessary.
 fn back_for_good(is_sky: &[Option<bool>]) -> Option<usize> {
     let (mut first, mut sky, mut all) = (None, 0, 0);
-    // From the far end, so that each place adds itself to what lies behind it.
+    // The loop begins at the far end, so that each place is added to those behind it.
     for (k, seen) in is_sky.iter().enumerate().rev() {
         let Some(is_sky) = *seen else { continue };
         all += 1;

@@ -1,10 +1,10 @@
-//! The rival circle: a flare is a circle in the image, a limb is one only on the sphere.
+//! Rival circle: a lens flare is a circle in the image, but a limb is a circle only on the sphere.
 
 use super::shape::{Place, Shape};
 use crate::base::linalg::{V3, invert_spd3};
 use crate::base::real::Real;
 
-/// Gauss-Newton steps; from a circle through three of the points two are enough.
+/// Number of Gauss-Newton steps. Two are enough from a circle through three of the points.
 const STEPS: usize = 2;
 
 /// A circle through `at` with the unit normal `n` towards its centre and the curvature `kappa`; 0 is a straight line.
@@ -15,11 +15,11 @@ struct Circle<T> {
 }
 
 impl<T: Real> Circle<T> {
-    /// Through three points, about the first.
+    /// Makes the circle through three points, relative to the first.
     fn through(p: [T; 2], a: [T; 2], b: [T; 2]) -> Option<Self> {
         let (a, b) = ([a[0] - p[0], a[1] - p[1]], [b[0] - p[0], b[1] - p[1]]);
         let (aa, bb) = (a[0] * a[0] + a[1] * a[1], b[0] * b[0] + b[1] * b[1]);
-        // 2 n·q = κ |q|² for both, so n is across |b|² a − |a|² b.
+        // 2 n·q = κ |q|² holds for both points, so n is perpendicular to |b|² a − |a|² b.
         let along = [bb * a[0] - aa * b[0], bb * a[1] - aa * b[1]];
         let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
         if !(length > T::from_f64(1e-20)) {
@@ -30,8 +30,8 @@ impl<T: Real> Circle<T> {
         Some(Self { at: p, n, kappa })
     }
 
-    /// The point as seen from `at` and its signed distance: (2 n·q − κ|q|²)/(1 + √(1 − 2κ n·q + κ²|q|²)), which holds
-    /// for a straight line, too.
+    /// Returns the signed distance of a point and its position relative to `at`. The distance is
+    /// (2 n·q − κ|q|²)/(1 + √(1 − 2κ n·q + κ²|q|²)), which is valid for a straight line, too.
     fn distance(&self, p: [T; 2]) -> (T, T, T, T) {
         let q = [p[0] - self.at[0], p[1] - self.at[1]];
         let (along, q2) = (self.n[0] * q[0] + self.n[1] * q[1], q[0] * q[0] + q[1] * q[1]);
@@ -41,12 +41,12 @@ impl<T: Real> Circle<T> {
         (d, along, self.n[0] * q[1] - self.n[1] * q[0], q2)
     }
 
-    /// One Gauss-Newton step.
+    /// Does one Gauss-Newton step.
     fn step(&mut self, points: impl Iterator<Item = ([T; 2], T)>) -> Option<()> {
         let (mut n, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
         for (p, w) in points {
             let (d, along, across, q2) = self.distance(p);
-            // ∂d by a shift along n, a turn, and the curvature.
+            // Derivatives of d by a shift along n, a rotation, and the curvature.
             let h = [self.kappa * along - T::one(), across, q2 * T::from_f64(-0.5)];
             let mut k = 0;
             for i in 0..3 {
@@ -68,12 +68,13 @@ impl<T: Real> Circle<T> {
     }
 }
 
-/// Weighted RMS distance of the points from the circle that fits them best, in pixels; `None` where none is found.
+/// Returns the weighted RMS distance of the points from the best circle, in pixels; `None` if there is no such circle.
 pub(super) fn rms<T: Real>(shape: &Shape<T>) -> Option<T> {
     let count = shape.len();
     let at = |i: usize| shape.get(i).map(|p: &Place<T>| p.at);
     let (first, middle, last) = (at(count / 6)?, at(count / 2)?, at(count - 1 - count / 6)?);
-    // Lengths in units of the distance between the ends, about the middle: single precision keeps its digits.
+    // Lengths are relative to the middle, and in units of the distance between the ends. This keeps the precision of
+    // `f32`.
     let (dx, dy) = (last[0] - first[0], last[1] - first[1]);
     let (ex, ey) = (first[0] - middle[0], first[1] - middle[1]);
     let unit = (dx * dx + dy * dy + ex * ex + ey * ey).sqrt();
@@ -106,14 +107,15 @@ mod tests {
     }
 
     proptest! {
-        /// Points of a circle of any size and place are on it, in both precisions; a straight line is a circle.
+        /// Points of a circle of any size and place fit a circle in both precisions; so do points of a nearly straight
+        /// line.
         #[test]
         fn circles_fit_circles(x in -500.0..2500.0f64, y in -500.0..2500.0f64, radius in 20.0..30_000.0f64,
                                from in 0.0..6.2f64, extent in 60.0..900.0f64) {
             let turn = (extent / radius).min(6.2) / 127.0;
             let at = |i: usize| {
                 let (s, c) = libm::sincos(from + turn * i as f64);
-                // The arc stays about (x, y), however large the circle.
+                // The arc stays near (x, y), even if the circle is large.
                 let (s0, c0) = libm::sincos(from);
                 [x + radius * (c - c0), y + radius * (s - s0)]
             };
@@ -124,7 +126,7 @@ mod tests {
 
     const MOST: usize = super::super::shape::MOST;
 
-    /// What is no circle is not: an ellipse of ten to nine, by about the size of the difference.
+    /// An ellipse of ten to nine is no circle: its RMS has about the size of the difference.
     #[test]
     fn an_ellipse_is_no_circle() {
         let at = |i: usize| {

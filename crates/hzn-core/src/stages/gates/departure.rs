@@ -1,4 +1,5 @@
-//! An edge that goes on smoothly next to the fitted cone counts against it: a limb does not bend away from itself.
+//! Departure gate: an edge that continues smoothly next to the fitted cone is evidence against a limb, because a limb
+//! stays on its cone.
 
 use super::Config;
 use super::shape::Curve;
@@ -10,18 +11,18 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Length of edge whose points are taken together, pixels: a direction is then known to a few degrees.
+/// Length of edge over which points are averaged (a box), in pixels. It gives the direction to a few degrees.
 const BOX_PX: f64 = 16.0;
-/// Most boxes that are looked at beyond each end of the inliers.
+/// Largest number of boxes beyond each end of the inliers.
 const BOXES: usize = 24;
-/// Boxes beyond an end that tell whether the edge keeps its contrast there.
+/// Number of boxes beyond an end that show whether the edge keeps its contrast there.
 const NEAR: usize = 2;
-/// Gaps up to this length do not end a run of inliers, pixels.
+/// Longest gap within a run of inliers, in pixels.
 const GAP_PX: f64 = 12.0;
-/// The edge's contrast is read so far to each side, pixels.
+/// Distance from the edge at which the contrast is read on each side, in pixels.
 const ASIDE_PX: i32 = 3;
 
-/// The longest run of inliers: its first and last point and its length in pixels.
+/// The longest run of inliers: its first and last point, and its length in pixels.
 struct Run<T> {
     first: usize,
     last: usize,
@@ -62,7 +63,7 @@ fn longer<T: Real>(a: Option<Run<T>>, b: Option<Run<T>>) -> Option<Run<T>> {
     }
 }
 
-/// A stretch of edge: where its middle is, and how far off the cone.
+/// A stretch of edge: the place of its middle, and its mean distance from the cone, in pixels.
 #[derive(Clone, Copy)]
 struct Stretch<T> {
     at: [T; 2],
@@ -71,7 +72,7 @@ struct Stretch<T> {
     points: i32,
 }
 
-/// What there is to look at.
+/// An edge with the data that the gate needs.
 struct Edge<'a, 'b, T, P, O> {
     blocks: &'a [Block<T>],
     points: usize,
@@ -86,14 +87,14 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
         Some((self.blocks.get(place / LANES)?, place % LANES))
     }
 
-    /// The points from `place` on, in the direction `ahead`, over a box; and the place after them.
+    /// Averages the points from `place` on over one box, in the direction `ahead`, and moves `place` past them.
     fn stretch(&self, place: &mut Option<usize>, ahead: bool) -> Option<Stretch<T>> {
         let mut sum = Stretch { at: [T::ZERO; 2], off: T::ZERO, length: T::ZERO, points: 0 };
         while sum.length < T::from_f64(BOX_PX) || sum.points == 0 {
             let here = (*place)?;
             let Some((block, lane)) = self.block(here) else { break };
             let Some(at) = self.camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { break };
-            // The step to the point before in the order of the walk.
+            // The step from the previous point in the order of the walk.
             let step = if ahead { Some((block, lane)) } else { self.block(here + 1) };
             sum.length += step.map_or(T::ZERO, |(b, l)| b.step_px[l]);
             sum.at = [sum.at[0] + at.u, sum.at[1] + at.v];
@@ -108,7 +109,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
         Some(Stretch { at: sum.at.map(|x| x / n), off: sum.off / n, ..sum })
     }
 
-    /// Difference in brightness across the edge at `at`, whose direction is (dx, dy), counts.
+    /// Returns the difference in brightness across the edge at `at`, in counts. The edge has the direction (dx, dy).
     fn contrast(&self, at: [T; 2], [dx, dy]: [T; 2]) -> Option<i32> {
         let norm = (dx * dx + dy * dy).sqrt().max(T::from_f64(1e-6));
         let side = |px: i32| {
@@ -123,13 +124,13 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     }
 }
 
-/// Whether the edge goes on beside the cone, where it keeps its contrast: smoothly over more than
-/// `select.max_departure` of the longest run of inliers, or at all, where less than `select.min_support_abrupt` of the
-/// limb in view is edge. `noise_px` is the noise from point to point, `support` the part of the limb in view that is
-/// edge.
+/// Whether the edge continues next to the cone and keeps its contrast there. There are two cases. Either the
+/// continuation is smooth and longer than `select.max_departure` of the longest run of inliers. Or edge points cover
+/// less than `select.min_support_abrupt` of the limb in view; then any continuation counts. `noise_px` is the noise
+/// from point to point. `support` is the part of the limb in view that edge points cover.
 ///
-/// Smooth is a turn from box to box of less than `select.departure_turn_deg` and what the noise of the boxes' places
-/// makes.
+/// A continuation is smooth if it turns from box to box by less than `select.departure_turn_deg`, plus an allowance for
+/// the noise of the boxes.
 pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     blocks: &[Block<T>],
     points: u32,
@@ -147,7 +148,7 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     let turn = T::from_f64(config.departure_turn_deg.to_radians());
     for ahead in [false, true] {
         let end = if ahead { run.last } else { run.first };
-        // Two boxes within the run give the direction in which it ends.
+        // Two boxes within the run give the direction at its end.
         let mut place = Some(end);
         let (Some(mut before), Some(further)) = (edge.stretch(&mut place, !ahead), edge.stretch(&mut place, !ahead))
         else {
@@ -161,7 +162,8 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
             let step = [now.at[0] - before.at[0], now.at[1] - before.at[1]];
             let cross = heading[0] * step[1] - heading[1] * step[0];
             let dot = heading[0] * step[0] + heading[1] * step[1];
-            // Means of n points, two differences of them: 4 √6 σ/√n over the box.
+            // Each place is a mean of n points, and a turn compares three places: four sigmas are 4 √6 σ/√n over the
+            // box.
             let n = T::from_i32(now.points.max(1)).sqrt();
             let length = (step[0] * step[0] + step[1] * step[1]).sqrt().max(T::one());
             let blur = noise_px * T::from_f64(4.0 * 2.449_489_743) / (n * length);
@@ -195,14 +197,14 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
             on_cone.add(edge.contrast([at.u, at.v], [-gv, gu]));
         }
     }
-    // A terminator fades, and the rim of something else does not.
+    // A terminator fades, and the rim of another object does not.
     let kept = |beside: &Mean| {
         beside.count > 0 && beside.mean::<T>() >= on_cone.mean::<T>() * T::from_f64(config.departure_contrast)
     };
     (is_long && kept(&smooth)) || (is_abrupt && kept(&near))
 }
 
-/// Contrasts in counts.
+/// Sum and number of contrasts, in counts.
 #[derive(Default)]
 struct Mean {
     sum: i32,

@@ -1,4 +1,4 @@
-//! The half-angle against the expected one, with the noise that the residuals show instead of the one that was told.
+//! Compares the fitted half-angle with the expected one, using the noise of the residuals instead of the given noise.
 
 use super::Config;
 use crate::base::linalg::basis;
@@ -8,13 +8,13 @@ use crate::model::body::Expected;
 use crate::stages::covariance::{self, Fused};
 use crate::stages::fit::Fit;
 
-/// Whether the half-angles differ by more than the residuals allow: an edge that is told to be rough and is smooth says
-/// more of its own curvature than its told noise admits.
+/// Whether the half-angles differ by more than the residuals allow. If an edge is smoother than the given noise says,
+/// its curvature is also more accurate than the given noise allows.
 ///
-/// (c₀ − ĉ)² / (P₃₃ + σ_c² + what else was told), where P₃₃ has the RMS of the residuals, `select.residual_floor_px` at
-/// least, alike over the length that the edge itself tells ([`covariance::measured_length_px`]). P₃₃ grows with the
-/// square of the first and at most in proportion to the second; the points are gone through once more only where that
-/// bound does not settle it.
+/// The test is (c₀ − ĉ)² / (P₃₃ + σ_c² + other given variances). P₃₃ uses the RMS of the residuals, at least
+/// `select.residual_floor_px`, and the correlation length from the length of the edge
+/// ([`covariance::measured_length_px`]). P₃₃ grows with the square of the RMS, and at most in proportion to the
+/// correlation length. The points are evaluated again only if this bound does not decide the test.
 pub(super) fn disagrees<T: Real>(
     fit: &Fit<T>,
     fused: &Fused<T>,
@@ -28,7 +28,7 @@ pub(super) fn disagrees<T: Real>(
     let (edge, rest) = (fused.edge.var_cos, var_free - fused.edge.var_cos + expected.sigma_cos * expected.sigma_cos);
     let difference = expected.cos - fit.c;
     let chi = T::from_f64(config.max_half_angle_sigma);
-    // Disagrees unless the edge's variance is at least this.
+    // The half-angles disagree unless the variance from the edge is at least this value.
     let needed = difference * difference / (chi * chi) - rest;
     let sigma = fit.rms_px.max(T::from_f64(config.residual_floor_px));
     let length = covariance::measured_length_px(fit);

@@ -1,4 +1,4 @@
-//! Gates and choice: whether a fitted cone is the body's limb, and which of several is.
+//! Gates and choice: decides whether a fitted cone is the limb of the body, and which of several cones is the answer.
 
 mod attitude;
 mod band;
@@ -58,13 +58,13 @@ section! {
         @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
         /// Smallest part of an edge's points that must be inliers.
         ///
-        /// With one point in 20, three pixels of threshold and a cone that is free to turn, a curve passes through
+        /// With one inlier in 20 points and a threshold of three pixels, a cone that is free to turn passes through
         /// clutter by chance.
         @- min_inlier_share: f64 = 0.05, [0.0 to 1.0];
         /// Largest number of points close to the fitted limb that are no inliers, as a part of the inliers.
         ///
-        /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has others close
-        /// to it.
+        /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has other points
+        /// close to it.
         @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
         /// An edge lies on the limb as a whole where at least this part of its points are inliers; 0 checks no edge for
         /// `max_way`.
@@ -78,23 +78,24 @@ section! {
         ///
         /// The Sun is a whole disc; a gibbous Moon shows less.
         @- min_support_whole: f64 = 0.7, [0.0 to 1.0];
-        /// Largest residual of the cone over that of a circle of the image or of four straight pieces; 1e6 turns the
-        /// gate off.
+        /// Largest ratio of the cone's residual to that of a circle of the image or of four straight pieces; 1e6 turns
+        /// the gate off.
         ///
         /// Lens flares are circles of the image; an iris and a vehicle have straight edges. Where residuals are noise
-        /// the ratio is about 1. A ratio of 2 stands for a likelihood of 4 to the power of half the independent points.
+        /// the ratio is about 1. A ratio of 2 is a likelihood ratio of 4 to the power of half the number of independent
+        /// points.
         @- max_rival_ratio: f64 = 2.0, [1.0 to 1e6];
-        /// Evidence for the limb over a straight line, and largest evidence for a rival shape over the limb: twice the
-        /// logarithm of the likelihood ratio; −1e6 turns the gate off.
+        /// Smallest evidence for the limb over a straight line, and largest evidence for a rival shape over the limb:
+        /// twice the logarithm of the likelihood ratio; −1e6 turns the gate off.
         ///
-        /// 9 are three standard deviations. Points whose residuals are alike count once.
+        /// A value of 9 is three standard deviations. Points with correlated residuals count once.
         @- min_evidence: f64 = 9.0, [-1e6 to 1e6];
         /// Residuals below this count as equal, px.
         ///
         /// Sampling and interpolation leave about this residual of a perfect edge.
         @- rival_floor_px: f64 = 0.03, [above 0.0 to 1e4];
-        /// Smallest noise of an edge in the gate of the half-angle, where its residuals are smaller than the told
-        /// noise, px; 1e4 leaves the gate to the told noise.
+        /// Smallest noise of an edge in the gate of the half-angle, where its residuals are smaller than the given
+        /// noise, px; 1e4 leaves the gate to the given noise.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
         /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
         /// turns the gate off.
@@ -104,7 +105,7 @@ section! {
         /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb with
         /// its contrast kept; 0 turns the gate off.
         ///
-        /// The corner of an iris and the crossing of two flares end an edge like that. The default is 0, because 0.7
+        /// The corner of an iris and the crossing of two flares end an edge in this way. The default is 0, because 0.7
         /// also refuses half-lit discs and crescents.
         @- min_support_abrupt: f64 = 0.0, [0.0 to 1.0];
         /// Largest turn between two lengths of 16 px of edge that counts as smooth, degrees.
@@ -137,17 +138,19 @@ section! {
         /// Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard
         /// deviations.
         ///
-        /// The curvature of the edge tells on which side the body is.
+        /// The curvature of the edge shows on which side the body is.
         @- min_side_sigma: f64 = 4.0, [0.0 to 1e6];
         /// Answers farther apart than this contradict each other, degrees.
         @- ambiguous_deg: f64 = 5.0, [0.0 to 180.0];
         /// Of answers that contradict each other, the better one counts where its score is better by this factor.
         @- ambiguous_score: f64 = 2.0, [1.0 to 1e6];
-        /// An answer ends the search where its edge covers at least this part of the limb in view.
+        /// An answer ends the search where its edge covers more than this part of the limb in view; `certain_share`
+        /// must hold, too.
         @- certain_support: f64 = 0.5, [0.0 to 1.0];
-        /// An answer ends the search where at least this part of its edge's points are inliers.
+        /// An answer ends the search where more than this part of its edge's points are inliers; `certain_support` must
+        /// hold, too.
         ///
-        /// A residual of a quarter of the threshold does as well.
+        /// An RMS below a quarter of the largest distance of an inlier replaces this condition.
         @- certain_share: f64 = 0.8, [0.0 to 1.0];
         /// [smallest, largest] half-angle of a Sun, as multiples of its true one.
         ///
@@ -155,9 +158,9 @@ section! {
         @- sun_size: [f64; 2] = [0.9, 12.0], [above 0.0 to 1e6];
         /// [smallest, largest] half-angle of a Moon, as multiples of its mean one.
         ///
-        /// The part of it that saturates is smaller, and it is nearer at times.
+        /// The saturated part of the Moon is smaller than the Moon, and the Moon is sometimes nearer than on average.
         @- moon_size: [f64; 2] = [0.5, 1.1], [above 0.0 to 1e6];
-        /// A Moon may be larger than that by this blooming, px.
+        /// Largest blooming by which a Moon may exceed `moon_size`, px.
         @- moon_bloom_px: f64 = 10.0, [0.0 to 1e6];
         /// Some of the limb of the expected half-angle about the fitted axis must lie in the picture.
         @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };
@@ -191,8 +194,8 @@ impl Config {
         Ok(())
     }
 
-    /// Turns off every gate that compares an edge with what is no limb, for chains that are rebuilt as they were
-    /// published.
+    /// Turns off every gate that compares an edge with shapes other than a limb. This is for the presets that rebuild
+    /// published systems.
     pub(crate) fn trust_every_shape(&mut self) {
         (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
         (self.min_support_abrupt, self.whole_edge) = (0.0, 0.0);
@@ -201,19 +204,19 @@ impl Config {
     }
 }
 
-/// A fit with what the gates look at.
+/// Result of the gates for a fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Judged<T> {
     /// `Passed`, or the gate that it failed.
     pub(crate) verdict: Verdict,
-    /// Weighted RMS over the part of the limb in view that it explains: the smallest wins.
+    /// Weighted RMS divided by the part of the limb in view that edge points cover; the smallest score wins.
     pub(crate) score: T,
-    /// The part of the limb in view that is edge, 0 to 1.
+    /// Part of the limb in view that edge points cover, 0 to 1.
     pub(crate) support: T,
 }
 
-/// Looks a fit over, with the points that carry it. `points` of the edge were made. `raised` is how many times larger
-/// the noise of the edge makes the threshold of the rejection, and with it the largest RMS.
+/// Tests a fit with its inliers in `blocks`. `points` is the number of points of the edge. `raised` is the factor by
+/// which the noise of the edge raises the threshold of the consensus; the largest RMS grows by the same factor.
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
@@ -267,13 +270,13 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support }
 }
 
-/// Whether a part of an edge lies on the cone as a part of any edge that winds may.
+/// Whether only a part of a winding edge is on the cone: this may happen by chance.
 fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Config) -> bool {
     let whole = T::from_i32(fit.inliers as i32) >= T::from_i32(points as i32) * T::from_f64(config.whole_edge);
     !whole && fit.arc_px > covered_px * T::from_f64(config.max_way)
 }
 
-/// Whether what lies beyond and within the fitted limb is the sky and the body.
+/// Tests whether the sky is beyond the fitted limb, and the body is inside.
 fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
     fused: &Fused<T>,
     expected: &Expected<T>,
@@ -289,8 +292,8 @@ fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
     if sun::unlit(&fused.e, fused.c, blocks, expected, config.min_sun_elevation_deg) > T::from_f64(config.max_unlit) {
         return Verdict::Sun;
     }
-    // Of a picture that came row by row only lit and dark is left, where a terminator is as steep as an edge.
-    // A disc that lies whole in the picture may be a crescent, which is a band.
+    // Of a picture that came row by row, only lit and dark pixels are left, and a terminator is as steep as an edge. A
+    // disc that is whole in the picture may be a crescent, which is a band, too.
     let disc_px = disc_px(expected, camera);
     let wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
     let looks = !P::STREAMED && config.max_band < 1.0 && wide;
@@ -301,14 +304,14 @@ fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
     Verdict::Passed
 }
 
-/// The diameter of the body's disc, 2 α f, in pixels.
+/// Returns the diameter of the body's disc, 2 α f, in pixels.
 fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T {
     let (fx, fy) = camera.focal_px();
     expected.half_angle_rad() * (fx + fy)
 }
 
-/// Whether the points are another curve's: that they fit the cone no worse than what is no limb, agree with its
-/// half-angle by their own noise, and do not go on beside it.
+/// Tests whether the points belong to another curve. They pass if they fit the cone as well as other shapes, if they
+/// agree with its half-angle within their own noise, and if the edge does not continue next to the cone.
 fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
@@ -326,7 +329,7 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     let (rms, noise) = (shape::rms(&shape), shape::local_noise(&shape));
     let independent = shape::independent(&shape);
     let evidence = T::from_f64(config.min_evidence);
-    // How much likelier the points are about one curve than about another: n ln(v/v').
+    // Log-likelihood ratio of the points for one curve over another: n ln(v/v').
     let likelier = |rms: T, than: T| {
         let v = rms.max(floor) / than.max(floor);
         independent * (v * v).ln()
@@ -334,13 +337,14 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     if !(likelier(polyline::straight_rms(&shape), rms) > evidence) {
         return Verdict::Straight;
     }
-    // No smooth curve fits better than the noise from point to point.
+    // No smooth curve can fit better than the noise from point to point.
     if rms > ratio * noise.max(floor) || likelier(rms, noise) > evidence {
         let worse = |rival: T| rms > ratio * rival.max(floor);
         if circle::rms(&shape).is_some_and(|c| worse(c) || (likelier(rms, c) > evidence && evidence > T::ZERO)) {
             return Verdict::Circle;
         }
-        // What it has more to turn makes its residual smaller, whatever the points are; of few points it tells nothing.
+        // The additional parameters of a polyline reduce its residual for any points. With too few points, the
+        // comparison proves nothing.
         let (points, turns) = (T::from_i32(shape.len() as i32), T::from_f64(polyline::PARAMETERS));
         let left = points - T::from_f64(3.0) - turns;
         if left > T::ZERO {
@@ -363,20 +367,21 @@ fn rivals<T: Real, P: Pixels, O: Observer<T>>(
     Verdict::Passed
 }
 
-/// The smallest part of the limb in view that must be edge; 0 asks for none of any body.
+/// Returns the smallest part of the limb in view that edge points must cover; 0 means no minimum for any body.
 fn least_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
     let whole = config.min_support > 0.0 && !expected.phases;
     if whole { config.min_support.max(config.min_support_whole) } else { config.min_support }
 }
 
-/// Whether a body of free half-angle can be seen under that of cosine `c`; others are weighed against the expected.
+/// Whether a body with a free half-angle can appear with the half-angle of cosine `c`. Other bodies always pass,
+/// because another gate compares them with the expected half-angle.
 fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config: &Config) -> bool {
     let sin = (T::one() - *c * *c).max(T::ZERO).sqrt();
     let (fx, fy) = camera.focal_px();
     let px = T::one() / fx.min(fy);
     let times = |n: f64| expected.sin * T::from_f64(n);
     let (least, most) = if expected.blooms() {
-        // A pixel is within the measure's own error, but half of the Sun is no Sun.
+        // The lower limit is reduced by one pixel, the error of the measurement, but never below half of its value.
         let [least, most] = config.sun_size;
         ((times(least) - px).max(times(least * 0.5)), times(most))
     } else {
@@ -386,18 +391,20 @@ fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config:
     !expected.free || (sin >= least && sin <= most.min(T::one()) && *c > T::ZERO)
 }
 
-/// A part of the border pixels of a body's disc, one in `part`, 8 or more: less is not asked of a small body.
+/// Returns one `part`-th of the circumference of the body's disc in pixels, at least 8. A small body needs no more
+/// points.
 pub(crate) fn small<T: Real>(sin: T, camera: &Camera<T>, part: i32) -> u16 {
     let (fx, fy) = camera.focal_px();
     let around = T::from_f64(core::f64::consts::PI) * (fx + fy) * sin;
     (around / T::from_i32(part)).to_i32().clamp(8, i32::from(u16::MAX)) as u16
 }
 
-/// Pictures with shorter sides than this are small: an edge across one has fewer points than the defaults ask for.
+/// Pictures with shorter sides than this are small, in pixels: an edge has fewer points there than the defaults
+/// require.
 const SMALL_PICTURE: u16 = 80;
 
-/// A part of a small picture's shorter side, one in `part`, 8 or more: of a thermal array of 24 rows a limb has no
-/// more.
+/// Returns one `part`-th of the shorter side of a small picture in pixels, at least 8. In a thermal array of 24 rows, a
+/// limb has no more points. Other pictures have no limit.
 pub(crate) fn few_rows<T: Real>(camera: &Camera<T>, part: u16) -> u16 {
     let side = camera.width().min(camera.height());
     if side < SMALL_PICTURE { (side / part.max(1)).max(8) } else { u16::MAX }
@@ -414,20 +421,22 @@ fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {
     ((w * w + h * h).sqrt() * T::from_f64(0.1)).min(circumference * T::from_f64(0.33))
 }
 
-/// Up to `count` inliers, evenly along the edge, from the middle of each part.
+/// Returns up to `count` inliers, evenly along the edge, each from the middle of its part.
 fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (&Block<T>, usize)> {
     let all = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l & 7] > T::ZERO).map(move |l| (b, l)));
     let every = (all().count() / count.max(1)).max(1);
     all().skip(every / 2).step_by(every).take(count)
 }
 
-/// Inliers from which is looked outwards and inwards.
+/// Number of inliers from which the gates look outwards and inwards.
 const LOOKS: usize = 12;
 
-/// Distance from the limb at which the brightness on both sides is read for the next picture's level, pixels.
+/// Distance from the limb at which the brightness on both sides is read for the threshold of the next picture, in
+/// pixels.
 const PLATEAU_PX: i32 = 6;
 
-/// Halfway between the brightness on both sides of the limb, in counts.
+/// Returns the brightness halfway between both sides of the limb, in counts; `None` if the body is not brighter than
+/// the sky.
 pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],

@@ -1,15 +1,15 @@
-//! The rival polyline: the iris of a lens and the parts of a vehicle have straight edges.
+//! Rival polyline: the iris of a lens and the parts of a vehicle have straight edges.
 
 use super::shape::{Place, Shape};
 use crate::base::real::Real;
 
-/// Most straight pieces. A cone meets a polygon of many corners near few of its sides.
+/// Largest number of straight pieces. A polygon of many corners touches a cone only near a few of its sides.
 const PIECES: usize = 4;
-/// Places at which a piece may end, besides the last.
+/// Number of places where a piece may end, in addition to the end of the shape.
 const PLACES: usize = 40;
 
-/// Sums of points about an origin, in a frame along one direction: of a straight line the second coordinate stays
-/// small, so that single precision keeps it.
+/// Sums of points in a frame along one direction. On a straight line the second coordinate stays small, so that single
+/// precision suffices.
 struct Line<T> {
     origin: [T; 2],
     along: [T; 2],
@@ -40,7 +40,8 @@ impl<T: Real> Line<T> {
         self.xy += w * x * y;
         self.yy += w * y * y;
     }
-    /// Σ w d² about the best straight line; the slope is small, so distances along y are those across the line.
+    /// Returns Σ w d² about the best straight line. The slope is small, so that distances along y are also those across
+    /// the line.
     fn cost(&self) -> T {
         let n = self.n.max(T::from_f64(1e-20));
         let xx = self.xx - self.x * self.x / n;
@@ -51,14 +52,14 @@ impl<T: Real> Line<T> {
     }
 }
 
-/// Weighted RMS distance of the points from the polyline of up to four pieces that fits them best, in pixels. Costs
-/// above those of the residual `worst_px` are not told apart.
+/// Returns the weighted RMS distance of the points from the best polyline of up to four pieces, in pixels. The result
+/// is at most `worst_px`.
 pub(super) fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
     let places = PLACES.min(shape.len() / 4).max(1);
     let start = |place: usize| place * shape.len() / places;
     let weight = shape.iter().fold(T::ZERO, |sum, p| sum + p.w).max(T::from_f64(1e-20));
     let most = worst_px * worst_px * weight;
-    // The least cost of the points before each place, by up to so many pieces.
+    // Least cost of the points before each place, by the largest number of pieces.
     let mut best = [[most; PLACES + 1]; PIECES + 1];
     for row in &mut best {
         row[0] = T::ZERO;
@@ -66,7 +67,7 @@ pub(super) fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
     for from in 0..places {
         let Some(rest) = shape.get(start(from)..) else { break };
         let (Some(first), Some(next)) = (rest.first(), rest.get(start(from + 1) - start(from))) else {
-            // The last stretch has its own end.
+            // The last stretch ends at the last point.
             let (Some(first), Some(last)) = (rest.first(), rest.last()) else { break };
             let mut line = Line::new(first.at, last.at);
             rest.iter().for_each(|p| line.add(p));
@@ -90,10 +91,11 @@ pub(super) fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
     (end / weight).sqrt()
 }
 
-/// What a polyline has more to turn than a cone: two for each piece and one for each joint, and the cone has three.
+/// Number of parameters that a polyline has more than a cone: two for each piece and one for each joint, minus the
+/// three of the cone.
 pub(super) const PARAMETERS: f64 = (2 * PIECES + PIECES - 1 - 3) as f64;
 
-/// Weighted RMS distance of the points from the best straight line, in pixels.
+/// Returns the weighted RMS distance of the points from the best straight line, in pixels.
 pub(super) fn straight_rms<T: Real>(shape: &Shape<T>) -> T {
     let (Some(first), Some(last)) = (shape.first(), shape.last()) else { return T::ZERO };
     let mut line = Line::new(first.at, last.at);
@@ -101,7 +103,7 @@ pub(super) fn straight_rms<T: Real>(shape: &Shape<T>) -> T {
     (line.cost() / line.n.max(T::from_f64(1e-20))).sqrt()
 }
 
-/// A piece of this cost from one place to another, after every number of pieces before it.
+/// Adds a piece of this cost from one place to another, for every number of pieces before it.
 fn relax<T: Real>(best: &mut [[T; PLACES + 1]; PIECES + 1], from: usize, to: usize, cost: T) {
     let before: [Option<T>; PIECES] = core::array::from_fn(|k| best.get(k).and_then(|row| row.get(from)).copied());
     for (row, before) in best.iter_mut().skip(1).zip(before) {
@@ -121,7 +123,7 @@ mod tests {
         (0..MOST).map(place).collect()
     }
 
-    /// Along the corners of a polyline, by the share of its length.
+    /// Returns the point of a polyline at the share `t` of its length.
     fn along(corners: &[[f64; 2]], t: f64) -> [f64; 2] {
         let pieces = corners.len() - 1;
         let k = ((t * pieces as f64) as usize).min(pieces - 1);
@@ -134,7 +136,7 @@ mod tests {
         let corners = [[100.0, 300.0], [180.0, 120.0], [400.0, 60.0], [620.0, 150.0], [700.0, 340.0]];
         for pieces in 1..=4 {
             let found = rms::<f32>(&shape(|t| along(&corners[..=pieces], t)), 50.0);
-            // Corners between the places cost a little.
+            // Corners between the places increase the residual a little.
             assert!(found < 0.6, "{pieces}: {found}");
         }
         let circle = |t: f64| {

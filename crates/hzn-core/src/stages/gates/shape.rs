@@ -1,4 +1,4 @@
-//! The inliers as points of the picture with their residuals: what the rival shapes are fitted to.
+//! The inliers as points of the picture with their residuals. The rival shapes are fitted to them.
 
 use crate::base::linalg::V3;
 use crate::base::median;
@@ -9,24 +9,24 @@ use crate::geometry::cone::Azimuth;
 use crate::geometry::frames::UnitVec3;
 use crate::stages::fit::Fit;
 
-/// Most inliers that are looked at, evenly along the edge: the ratio of two residuals is then known to some 10 %.
+/// Largest number of inliers that are used, evenly along the edge. It gives the ratio of two residuals to about 10 %.
 pub(super) const MOST: usize = 128;
 
 /// An inlier.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place<T> {
-    /// Image point, pixels.
+    /// Image point (u, v), in pixels.
     pub(super) at: [T; 2],
-    /// Signed distance from the fitted cone in pixels.
+    /// Signed distance from the fitted cone, in pixels; positive outside.
     pub(super) r: T,
-    /// The weight that it has in the fit.
+    /// Weight of the point in the fit.
     pub(super) w: T,
 }
 
 /// Inliers in the order of the edge.
 pub(super) type Shape<T> = heapless::Vec<Place<T>, MOST>;
 
-/// The cone that residuals are measured from.
+/// The cone from which the residuals are measured.
 pub(super) struct Curve<T> {
     e: V3<T>,
     k: T,
@@ -39,15 +39,15 @@ impl<T: Real> Curve<T> {
         let east_along = azimuth.as_ref().map_or(T::ZERO, |a| a.east.dot(&fit.e));
         Self { e: fit.e, k: fit.k, azimuth, east_along }
     }
-    /// The axis of the cone.
+    /// Returns the axis of the cone.
     pub(super) fn axis(&self) -> &V3<T> {
         &self.e
     }
-    /// Signed distance of a point in pixels, positive outside of the cone.
+    /// Returns the signed distance of a point in pixels, positive outside of the cone.
     pub(super) fn distance(&self, block: &Block<T>, lane: usize) -> T {
         let s = block.ray(lane);
         let off = s - self.e;
-        // 1 − s·e, as in `estimate`: it keeps its digits for a small disc.
+        // 1 − s·e is computed as in the fit, which keeps its precision for a small disc.
         let mut r = off.dot(&off) * T::from_f64(0.5) - self.k;
         if let Some(a) = &self.azimuth {
             r += a.offset([s.x, s.y, s.z], s.dot(&self.e), self.east_along);
@@ -57,7 +57,7 @@ impl<T: Real> Curve<T> {
     }
 }
 
-/// The inliers, thinned to [`MOST`].
+/// Returns the inliers, thinned to [`MOST`].
 pub(super) fn inliers<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, curve: &Curve<T>, camera: &Camera<T>) -> Shape<T> {
     let every = fit.inliers.div_ceil(MOST as u32).max(1);
     let (mut shape, mut passed) = (Shape::new(), every / 2);
@@ -81,7 +81,7 @@ pub(super) fn inliers<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, curve: &Curve<
     shape
 }
 
-/// Weighted RMS of the residuals in pixels.
+/// Returns the weighted RMS of the residuals, in pixels.
 pub(super) fn rms<T: Real>(shape: &Shape<T>) -> T {
     let (mut cost, mut weight) = (T::ZERO, T::ZERO);
     for p in shape {
@@ -91,8 +91,8 @@ pub(super) fn rms<T: Real>(shape: &Shape<T>) -> T {
     (cost / weight.max(T::from_f64(1e-20))).sqrt()
 }
 
-/// Noise from point to point in pixels, which does not see a misfit: the median of |r_i − (r_{i−1} + r_{i+1})/2|, which
-/// is 0.6745 √1.5 times the sigma of independent errors.
+/// Returns the noise from point to point, in pixels; a misfit does not contribute. The noise comes from the median of
+/// |r_i − (r_{i−1} + r_{i+1})/2|, which is 0.6745 √1.5 times the sigma of independent errors.
 pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
     let half = T::from_f64(0.5);
     let mut all = heapless::Vec::<T, MOST>::new();
@@ -107,7 +107,8 @@ pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
     median::of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
 }
 
-/// Arc over which the residuals stay alike, in points of the shape: 1 + 2 Σ ρ_k up to the first below 0.05.
+/// Returns the arc over which the residuals are correlated, in points of the shape: 1 + 2 Σ ρ_k up to the first below
+/// 0.05.
 pub(super) fn correlated_points<T: Real>(shape: &Shape<T>) -> T {
     let products = |lag: usize| {
         let (mut sum, mut count) = (T::ZERO, 0);
@@ -129,7 +130,7 @@ pub(super) fn correlated_points<T: Real>(shape: &Shape<T>) -> T {
     sum + sum
 }
 
-/// Residuals that count as independent, 3 at least.
+/// Returns the number of independent residuals, at least 3.
 pub(super) fn independent<T: Real>(shape: &Shape<T>) -> T {
     (T::from_i32(shape.len() as i32) / correlated_points(shape).max(T::one())).max(T::from_f64(3.0))
 }

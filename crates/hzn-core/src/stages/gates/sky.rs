@@ -1,4 +1,4 @@
-//! What lies beyond the fitted limb: the sky, but for what stands before it.
+//! Sky gate: the sky is beyond the fitted limb, except where an object is in front of it.
 
 use crate::base::linalg::V3;
 use crate::base::median;
@@ -10,22 +10,22 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Distance of the nearest look in pixels; each next is twice as far.
+/// Distance of the nearest look from the limb, in pixels; each further look is twice as far.
 const NEAREST_PX: f64 = 16.0;
-/// Looks outwards of each inlier.
+/// Number of looks outwards from each inlier.
 const OUTWARDS: usize = 11;
 
 /// The sky beyond a limb.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sky<T> {
-    /// The part of it that is lit, 0 to 1. Air that fades outwards from the limb is sky, however bright it begins.
+    /// Part of the sky that is lit, 0 to 1. Air that fades outwards from the limb is sky, even if it begins bright.
     pub(super) lit: T,
-    /// Median of its brightness, and median distance from it, counts.
+    /// Median of the brightness of the sky. `spread` is the median distance from it. Both are in counts.
     pub(super) median: T,
     pub(super) spread: T,
 }
 
-/// Looks from the limb outwards to the border of the region.
+/// Reads the brightness from the limb outwards to the border of the region.
 pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],

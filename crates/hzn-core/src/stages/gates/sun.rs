@@ -1,12 +1,13 @@
-//! The Sun's direction: what it does not light is not seen in its light.
+//! Sun gate: a part of the limb that the Sun does not light cannot be seen in its light.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::model::body::Expected;
 
-/// The part of the inliers over which the Sun stands lower than `elevation_deg`, 0 to 1; 0 where its direction is
-/// unknown or the body shines by itself. The normal where the ray s touches the limb is (s cos α − e)/sin α.
+/// Returns the part of the inliers where the Sun is lower than `elevation_deg`, 0 to 1. The result is 0 if the
+/// direction of the Sun is unknown or the body shines by itself. The surface normal where the ray s touches the limb is
+/// (s cos α − e)/sin α.
 pub(super) fn unlit<T: Real>(e: &V3<T>, c: T, blocks: &[Block<T>], expected: &Expected<T>, elevation_deg: f64) -> T {
     let Some(sun) = &expected.sun_seen else { return T::ZERO };
     let sin = (T::one() - c * c).max(T::from_f64(1e-12)).sqrt();

@@ -1,4 +1,4 @@
-//! How much of a fitted limb lies in the picture.
+//! Length of a fitted limb in the picture, and the length that its inliers cover.
 
 use crate::base::linalg::{V3, basis};
 use crate::base::real::Real;
@@ -8,8 +8,8 @@ use crate::geometry::frames::UnitVec3;
 use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
 
-/// Length in pixels that the inliers cover along the limb about `e`: a step from one to the next counts as far as it
-/// leads along it, forth and back. The way along a noisy edge is many times as long.
+/// Returns the length that the inliers cover along the limb about `e`, in pixels. Each step from one inlier to the next
+/// counts with its component along the limb, forwards or backwards. The path along a noisy edge is many times longer.
 pub(super) fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
     let mut length = T::ZERO;
     let mut before: Option<V3<T>> = None;
@@ -29,16 +29,16 @@ pub(super) fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
     length.abs()
 }
 
-/// Most steps along the limb to each side.
+/// Largest number of steps along the limb to each side.
 const STEPS: usize = 48;
 
-/// Length in pixels of the limb of the cone (e, c) in the picture, walked to both sides from the inlier `seen` until
-/// it leaves the region or comes around. What a mask covers is not counted.
+/// Returns the length of the limb of the cone (e, c) in the picture, in pixels. The function walks to both sides from
+/// the inlier `seen`, until the limb leaves the region or the walk has gone around. Masked parts do not count.
 pub(super) fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Camera<T>, region: &Region<T>) -> T {
     let sin = (T::one() - c * c).max(T::ZERO).sqrt();
     let (b1, b2) = basis(e);
     let (fx, fy) = camera.focal_px();
-    // A step of about a sixteenth of the picture, and at least eight around.
+    // A step is about a sixteenth of the picture; there are at least eight steps around the cone.
     let wide = T::from_i32(i32::from(region.width().max(region.height())));
     let step = (wide / (T::from_f64(16.0) * (fx + fy) * T::from_f64(0.5) * sin.max(T::from_f64(1e-6))))
         .min(T::from_f64(0.785))
@@ -70,7 +70,7 @@ pub(super) fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Came
             direction = (x * cs - y * turn, x * turn + y * cs);
             let now = at(direction);
             let (Some(a), Some(b)) = (before, now) else {
-                // The last piece, cut by the border, counts half a step.
+                // The last piece, which the border cuts, counts as half a step.
                 if let (Some(a), None) = (before, now)
                     && !masked(&a)
                 {
@@ -92,7 +92,8 @@ pub(super) fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Came
 mod tests {
     use super::*;
 
-    /// Points about a circle of 30° at every half degree, every other `off` radians aside; 600 pixels are a radian.
+    /// Makes points about a circle of 0.5 rad at every half degree; every other point is `off` radians aside. 600
+    /// pixels are one radian.
     fn edge(off: f64) -> [Block<f64>; 4] {
         let mut blocks = [Block::EMPTY; 4];
         let mut before: Option<V3<f64>> = None;
