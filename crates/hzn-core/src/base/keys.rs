@@ -151,7 +151,7 @@ pub trait Value: Clone + PartialEq {
     /// Checks every number of the value, or that its word is in this build.
     ///
     /// # Errors
-    /// Names the number that is out of its limits, or the feature that is missing.
+    /// Returns the number that is out of its limits, or the feature that is missing.
     fn check(&self, _path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {
         Ok(())
     }
@@ -181,7 +181,7 @@ pub trait Section: Sized {
     /// Checks each key on its own.
     ///
     /// # Errors
-    /// Names the first value that is out of its limits.
+    /// Returns the first value that is out of its limits.
     fn check_keys(&self) -> Result<(), ConfigError>;
     /// Returns the path of the key that has this number in flight.
     fn path(id: u16) -> Option<&'static str>;

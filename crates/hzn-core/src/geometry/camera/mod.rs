@@ -97,8 +97,8 @@ impl<T: Real> Camera<T> {
     /// Checks the calibration and prepares the lens.
     ///
     /// # Errors
-    /// Names a field that is out of its limits. A lens that is not monotone up to `min(theta_max_deg, the farthest
-    /// corner)` is refused as well.
+    /// Returns the first field that is out of its limits. A lens that is not monotone up to `min(theta_max_deg, the
+    /// farthest corner)` is refused as well.
     pub fn try_new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
         let c = config;
