@@ -3,8 +3,10 @@
 //! The fit is a least-squares solution of x² + y² = 2 x_c x + 2 y_c y + (r² − x_c² − y_c²), which is linear in the
 //! three unknowns. First the centre of the points is subtracted and the coordinates are divided by the spread. The sums
 //! of x and y are then zero, and two equations remain. Without this step the closed form loses nearly all precision in
-//! f32. The paper's closed form has one denominator for all three unknowns; in the one for B it prints Q, a sum of the
-//! right-hand side. The solution here has no denominator of that kind.
+//! f32.
+//!
+//! The paper's closed form has one denominator for all three unknowns. In the denominator of B it prints Q, a sum of
+//! the right-hand side. The solution here has no denominator of that kind.
 
 use crate::base::linalg::invert_spd2;
 use crate::base::real::Real;

@@ -32,9 +32,9 @@ impl<T: Real> LimbCone<T> {
     /// Returns the cone of the ellipsoid with semi-axes `a_m` (equator) and `b_m` (pole) seen from `position_m` (ECEF,
     /// metres). `None` when the position is not outside the ellipsoid or not finite.
     ///
-    /// The matrix of the cone is that of the polar form. In the meridian plane its axis stands at ψ = ½ atan2(2 p z, P
-    /// − Q) with P = p² − a², Q = z² − b². tan² of the half-angles is a²/μ₁ and −μ₂/μ₁ with μ = (P + Q)/2 ± √(((P −
-    /// Q)/2)² + p² z²). Differences of squares are computed as products, in units of a.
+    /// The matrix of the cone is that of the polar form. In the meridian plane its axis lies at the angle
+    /// ψ = ½ atan2(2 p z, P − Q) with P = p² − a², Q = z² − b². tan² of the half-angles is a²/μ₁ and −μ₂/μ₁ with
+    /// μ = (P + Q)/2 ± √(((P − Q)/2)² + p² z²). Differences of squares are computed as products, in units of a.
     pub fn try_new(position_m: [T; 3], a_m: T, b_m: T) -> Option<Self> {
         let one = T::one();
         let [x, y, z] = position_m.map(|v| v / a_m);

@@ -1,8 +1,8 @@
 //! The limb as a conic section of the plane z = 1, which a pinhole camera sees (Braun & Barf 2022, section 2).
 //!
 //! With the unit axis e in the camera frame, c = cos α and Δ = e_x² + e_y² − c², the picture of the cone s·e = c is an
-//! ellipse for Δ < 0 and a hyperbola for Δ > 0. In its principal frame, whose x points along (e_x, e_y), the curve is Δ
-//! x² − c² y² = c² sin²α/Δ. Lengths are in focal lengths.
+//! ellipse for Δ < 0 and a hyperbola for Δ > 0. In its principal frame, whose x points along (e_x, e_y), the curve is
+//! Δ x² − c² y² = c² sin²α/Δ. Lengths are in focal lengths.
 
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, UnitVec3};
@@ -30,9 +30,9 @@ pub struct Section<T> {
 }
 
 impl<T: Real> Section<T> {
-    /// Returns the limb of a body in the direction `axis` whose half-angle has the cosine `cos`, 0 to 1. `None` when
-    /// the camera sees no limb on its side of the plane: the axis points behind the camera and the cone does not reach
-    /// around it. The equations still give an ellipse there, but it belongs to the other nappe.
+    /// Returns the limb of a body in the direction `axis` whose half-angle has the cosine `cos`, between 0 and 1.
+    /// `None` when there is no limb in front of the camera: the axis points behind the camera and the cone does not
+    /// reach around it. The equations still give an ellipse there, but it belongs to the other nappe.
     pub fn new(axis: &UnitVec3<Cam, T>, cos: T) -> Option<Self> {
         let [x, y, z] = axis.xyz();
         let one = T::one();

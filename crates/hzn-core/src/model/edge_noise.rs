@@ -45,13 +45,13 @@ section! {
         @101 correlation_px: f64 = 60.0, [0.0 to 1e6];
         /// 1σ of a shift that all points of an edge have in common, px.
         ///
-        /// Its causes are threshold, blur, and the profile of a limb that is no wider than a pixel. The shift adds to
-        /// the variance of the half-angle, which therefore has less weight against the expected one.
+        /// Threshold, blur, and the profile of a limb that is no wider than a pixel cause it. It widens the variance of
+        /// the fitted half-angle, which then has less weight against the expected one.
         @103 bias_px: f64 = 0.3, [0.0 to 1e4];
         /// 1σ of a tilt that the whole edge has in common, px: an error that goes from −1 to 1 times this value along
         /// the edge.
         ///
-        /// Its cause is light that fades along the limb. The tilt adds to the variance of the axis.
+        /// Light that fades along the limb causes it. It widens the covariance of the axis.
         @104 tilt_px: f64 = 0.1, [0.0 to 1e4];
         /// For `braun-barf`: whether the largest variance is used in every direction.
         ///

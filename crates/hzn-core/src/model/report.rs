@@ -18,7 +18,7 @@ pub type Reports<T> = heapless::Vec<Report<T>, MAX_BODIES>;
 pub struct Report<T> {
     /// Outcome of the picture.
     pub status: Status,
-    /// The last stage that was entered.
+    /// The furthest stage that was entered.
     pub stage: Stage,
     /// Threshold in the picture's own counts; 0 when there is none.
     pub level: u16,

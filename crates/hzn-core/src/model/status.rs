@@ -25,8 +25,7 @@ pub enum Status {
     Truncated = 7,
     /// The picture could not be read (host only).
     Unreadable = 8,
-    /// No altitude is known, although the cone of the body follows from it, or the altitude is not above the limb
-    /// height (host only).
+    /// The altitude, which determines the cone of the body, is unknown or not above the limb height (host only).
     NoAltitude = 9,
 }
 

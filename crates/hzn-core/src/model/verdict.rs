@@ -29,9 +29,9 @@ verdicts! {
     Chosen = 0, "chosen";
     /// The candidate passed every gate, but another one fits better.
     Passed = 1, "passed";
-    /// No cone goes through enough of its points.
+    /// No cone goes through enough of the candidate's points.
     NoConsensus = 2, "no-consensus";
-    /// It has fewer inliers than `select.min_inliers`.
+    /// The candidate has fewer inliers than `select.min_inliers`.
     FewInliers = 3, "few-inliers";
     /// The inliers cover less than `select.min_arc_px`.
     ShortArc = 4, "short-arc";

@@ -1,4 +1,5 @@
-//! Gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28), 7.3).
+//! Preset and gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28),
+//! 7.3).
 
 use super::{told, trust_every_fit};
 use crate::base::linalg::{V3, basis};

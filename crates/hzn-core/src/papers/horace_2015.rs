@@ -14,10 +14,10 @@ use crate::stages::{consensus, contour, edge_points, fit, threshold};
 /// Sets the chain of HORACE: brightness gate, dynamic threshold, a smaller copy, outer borders of the whole picture, a
 /// circle through each, the radius check, and halves of the picture if there is no answer.
 ///
-/// The numbers of HORACE are: a threshold of 0.75 times the mean; the limb's radius for altitudes from 100 to 20 km, ±
-/// 5000 px of its picture of 768 rows; γ = 5, where a pixel is edge if at most γ of its eight neighbours are lit. The
-/// last one applies only to `contour.method = "erode"`, where the pixel itself counts and the limit is exclusive: fewer
-/// than 7. The numbers of `hzn` are: the copy's height, the brightness gate, the shortest edge.
+/// HORACE's own numbers are: a threshold of 0.75 times the mean; the limb's radius for altitudes from 100 to 20 km,
+/// ± 5000 px in its picture of 768 rows; γ = 5, where a pixel is edge if at most γ of its eight neighbours are lit. γ
+/// applies only to `contour.method = "erode"`. There the pixel itself counts too and the limit is exclusive, so the key
+/// is 7. The copy's height, the brightness gate and the shortest edge are numbers of `hzn`.
 pub(super) fn preset(config: &mut Config) {
     told(config);
     config.gate.min_mean = 0.02;

@@ -46,8 +46,8 @@ pub(crate) fn symmetric_eigen<T: Real, const N: usize>(mut m: [[T; N]; N]) -> ([
     (values, vectors)
 }
 
-/// The triangle R of the QR decomposition of a tall matrix that arrives row by row. RᵀR is the sum over the rows of row
-/// rowᵀ. The rows themselves are never squared, so single precision is enough.
+/// The triangle R of the QR decomposition of a tall matrix A that arrives row by row: RᵀR = AᵀA. The product AᵀA is
+/// never computed, so single precision is enough.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Triangle<T, const N: usize>([[T; N]; N]);
 

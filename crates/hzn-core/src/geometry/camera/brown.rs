@@ -19,8 +19,8 @@ impl<T: Real> Brown<T> {
     pub(super) fn try_new(config: &Config, rho_corner: f64) -> Result<(Self, f64, f64), ConfigError> {
         let k = |i| config.coefficient(i);
         let lens = Brown { k1: k(0), k2: k(1), p1: k(2), p2: k(3), k3: k(4) };
-        // The distorted radius as a function of the undistorted one, and its slope. The lens ends where the slope is
-        // not positive.
+        // `radius` is the distorted radius as a function of the undistorted one, and `slope` is its derivative. The
+        // lens ends where the slope is not positive.
         let radius = |t: f64| t * lens.factor(t * t);
         let slope = |t: f64| {
             let q = t * t;

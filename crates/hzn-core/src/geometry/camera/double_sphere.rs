@@ -1,8 +1,8 @@
 //! The double sphere lens of Kalibr (`ds`) and Basalt (Usenko, Demmel & Cremers 2018, (40) to (42)).
 //!
 //! A ray is projected onto a unit sphere, then onto a second one that is shifted by ξ along the axis, then into a plane
-//! that is shifted by α/(1 − α). For a unit ray (sin θ, cos θ): z₁ = ξ + cos θ, d₂ = √(sin² θ + z₁²), r = sin θ/(α d₂ +
-//! (1 − α) z₁).
+//! that is shifted by α/(1 − α). For a unit ray (sin θ, cos θ): z₁ = ξ + cos θ, d₂ = √(sin² θ + z₁²),
+//! r = sin θ/(α d₂ + (1 − α) z₁).
 //!
 //! r'(0) is 1/(1 + ξ) and not 1: the focal length of this model differs from the scale in the middle of the picture.
 

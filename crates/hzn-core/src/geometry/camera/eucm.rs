@@ -1,7 +1,7 @@
 //! The enhanced unified camera model of Kalibr (`eucm`) (Khomutenko, Garcia & Martinet 2016, (1)).
 //!
-//! A ray is projected onto an ellipsoid of revolution, then into a plane. For a unit ray (sin θ, cos θ) this gives r =
-//! sin θ/(α d + (1 − α) cos θ) with d = √(β sin² θ + cos² θ).
+//! A ray is projected onto an ellipsoid of revolution, then into a plane. For a unit ray (sin θ, cos θ) this gives
+//! r = sin θ/(α d + (1 − α) cos θ) with d = √(β sin² θ + cos² θ).
 
 use crate::base::real::Real;
 

@@ -97,8 +97,8 @@ impl<T: Real> Camera<T> {
     /// Checks the calibration and prepares the lens.
     ///
     /// # Errors
-    /// Returns the first field that is out of its limits. A lens that is not monotone up to `min(theta_max_deg, the
-    /// farthest corner)` is refused as well.
+    /// Returns the first field that is out of its limits. A lens that is not monotone up to
+    /// `min(theta_max_deg, the farthest corner)` is refused as well.
     pub fn try_new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
         let c = config;
@@ -324,8 +324,8 @@ impl<T: Real> Camera<T> {
     }
 }
 
-/// Returns the ray and its derivative for a radially symmetric lens: `scale` = sin θ / ρ, `cos` = cos θ, `dtheta` =
-/// dθ/dρ.
+/// Returns the ray and its derivative for a radially symmetric lens: `scale` = sin θ / ρ, `cos` = cos θ,
+/// `dtheta` = dθ/dρ.
 ///
 /// In the tangent basis of [`tangent`] the derivative by (x, y) is `scale`·I + (`dtheta` − `scale`)·u uᵀ with u the
 /// unit vector of (x, y) (math: J = t_r dθ/dρ uᵀ + t_φ (sin θ/ρ) u⊥ᵀ, and the basis turns t_r to u, t_φ to u⊥).

@@ -78,7 +78,7 @@ impl<T: Real> Radial<T> {
         let limit = monotonic_limit(&curve).unwrap_or(core::f64::consts::PI);
         let margin = 2f64.to_radians();
         let usable = limit - margin;
-        // The angle of the corner, if the lens reaches it before the end of monotony.
+        // `corner` is the angle of the corner, if the lens reaches it before the end of monotony.
         let corner = (curve.forward(usable).0 >= rho_corner)
             .then(|| invert(&curve, rho_corner, usable, curve.forward(usable).0));
         let theta_max = match (config.theta_max_deg.map(f64::to_radians), corner) {

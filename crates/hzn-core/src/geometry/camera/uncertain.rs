@@ -116,7 +116,7 @@ impl<T: Real> Camera<T> {
     pub(crate) fn moves(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
         let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
         let h2 = s.x * s.x + s.y * s.y;
-        // The image point in focal lengths, and its derivative by the coefficients.
+        // These are the image point in focal lengths and its derivatives by the coefficients.
         let (x, y, by_k): (T, T, [[T; 2]; 5]) = match &self.lens {
             Lens::Radial(lens) => {
                 let h = h2.sqrt();

@@ -10,7 +10,7 @@ use super::{
     PriorError, SUN_RADIUS_KM, shape,
 };
 
-/// From this 1-sigma on, a prior attitude is not used, because it is no better than none: 30 degrees
+/// From this 1-sigma on, a prior attitude is no better than none and does not correct the shape of the limb: 30 degrees
 /// (book/theory/math.md, ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude without a sigma in the prior: 5 degrees.
@@ -27,7 +27,7 @@ pub struct Expected<T> {
     pub(crate) cos: T,
     /// sin α₀.
     pub(crate) sin: T,
-    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
+    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius. It is not used when the half-angle is free.
     pub(crate) sigma_cos: T,
     /// Contributions to `sigma_cos` as 1-sigmas of the limb height: limb, altitude, unknown radius, clipping; metres.
     pub(crate) sigma_parts: [T; 4],
@@ -393,7 +393,7 @@ mod tests {
             assert!(same(clipped.sigma_cos, higher.sigma_cos) && same(clipped.limb_m, higher.limb_m), "{part}");
             assert_eq!(clipped.uneven_cos[0] > 0.0, part > 0.0);
         }
-        // The apparent size of the Moon is not expected.
+        // No apparent size of the Moon is expected, so clipping changes nothing.
         let moon = at(0.0, 0.0, Kind::Moon);
         assert_eq!(moon.clipped(1.0).cos, moon.cos);
     }
@@ -414,7 +414,7 @@ mod tests {
         assert!(none > 1e-5);
         assert_eq!(sigma(0.0), 0.0);
         assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);
-        // From 30 degrees on the attitude is no better than none, and is not used.
+        // From 30 degrees on, the attitude is no better than none and does not correct the shape.
         assert_eq!(sigma(40.0), none);
         assert_eq!(Expected::new(&body, &frame).unwrap().uneven_cos[1], sigma(5.0));
         for deg in [f64::NAN, -1.0, f64::INFINITY] {

@@ -221,13 +221,13 @@ impl Config {
 pub struct Prior<T> {
     /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. It must be above the limb height.
     pub altitude_m: Option<T>,
-    /// Position of the camera in ECEF, metres. If both are known, it replaces the altitude.
+    /// Position of the camera in ECEF, metres. A known position replaces the altitude.
     pub position_m: Option<[T; 3]>,
     /// A prior attitude, camera to ECEF; an accuracy of a few degrees is enough. It gives the azimuth for the
     /// ellipsoid's correction. With a position it is also a gate, see `select.max_attitude_sigma`.
     pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
-    /// Threshold that the previous picture proposes, in counts: the `next_level` of its report, for `binarize.method =
-    /// "track"`. A [`Horizon`](crate::Horizon) stores this value between pictures.
+    /// Threshold that the previous picture proposes, in counts: the `next_level` of its report, for
+    /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) stores this value between pictures.
     pub level: Option<u16>,
     /// Direction to the Sun in the camera frame. It is used by a gate, see `select.max_unlit`.
     pub sun: Option<UnitVec3<Cam, T>>,

@@ -1,9 +1,9 @@
 //! The difference between the flattened Earth and a sphere, for a camera with a known height but an unknown position.
 //!
 //! A plane that touches the ellipsoid, with its normal at latitude φ', lies R − k P₂(sin φ') from the centre to first
-//! order in the flattening f, k = ⅔ a f. The limb seen from latitude φ has these normals on a circle about the nadir.
-//! By the addition theorem, their mean along the circle is P₂(sin φ) P₂(s), with s = sin α. Their second harmonic in
-//! azimuth is ¾ cos²φ cos²α. The first harmonic tilts the axis, which is already the limb axis. Therefore
+//! order in the flattening f, with k = ⅔ a f. The limb seen from latitude φ has these normals on a circle about the
+//! nadir. By the addition theorem, their mean along the circle is P₂(sin φ) P₂(s), with s = sin α. Their second
+//! harmonic in azimuth is ¾ cos²φ cos²α. The first harmonic tilts the axis, which is already the limb axis. Therefore:
 //!
 //! - the sphere with this half-angle at this height above the ellipsoid has the radius R + k P₂(sin φ) (3 s + 1)/2,
 //! - the limb is uneven by a second harmonic of height with the amplitude ¾ k cos²φ cos²α.
@@ -23,14 +23,14 @@ const RADIUS_RMS: f64 = 0.586_301_969_977_929_6;
 /// RMS of cos²φ over the globe: √(8/15).
 const SECOND_RMS: f64 = 0.730_296_743_340_221_5;
 
-/// Returns the 1-sigma about the mean radius of the sphere that looks the same, metres: 16.7 km at low altitude, 6 km
-/// far away.
+/// Returns the 1-sigma of the radius of the equivalent sphere (with the same half-angle) about the mean radius, metres:
+/// 16.7 km at low altitude, 6 km far away.
 pub(super) fn radius_sigma_m<T: Real>(sin: T) -> T {
     (T::from_f64(3.0) * sin + T::one()) * T::from_f64(0.5 * K_M * RADIUS_RMS)
 }
 
-/// Returns the 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km, 1.3
-/// km at 600 km.
+/// Returns the 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km,
+/// 1.3 km at 600 km.
 pub(super) fn second_harmonic_m<T: Real>(sin: T) -> T {
     (T::one() - sin * sin) * T::from_f64(0.75 * K_M * SECOND_RMS)
 }
@@ -41,8 +41,7 @@ mod tests {
     use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone};
     use std::vec::Vec;
 
-    /// Returns the radius of the sphere that looks the same, and the amplitude of the second harmonic, from the exact
-    /// cone.
+    /// Returns the radius of the equivalent sphere, and the amplitude of the second harmonic, from the exact cone.
     fn exact(latitude_deg: f64, altitude_m: f64) -> (f64, f64) {
         let (s, c) = libm::sincos(latitude_deg.to_radians());
         let e2 = 1.0 - (WGS84_B_M / WGS84_A_M) * (WGS84_B_M / WGS84_A_M);
