@@ -27,7 +27,8 @@ pub struct Expected<T> {
     pub(crate) cos: T,
     /// sin α₀.
     pub(crate) sin: T,
-    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius. It is not used when the half-angle is free.
+    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; without the altitude when the half-angle is
+    /// free.
     pub(crate) sigma_cos: T,
     /// Contributions to `sigma_cos` as 1-sigmas of the limb height: limb, altitude, unknown radius, clipping; metres.
     pub(crate) sigma_parts: [T; 4],
