@@ -1,10 +1,10 @@
 //! The horizon sensor's core: from a picture of a limb to the direction of the body, with a covariance for a
 //! navigation filter.
 //!
-//! The crate uses no heap, a fixed amount of memory and no unsafe code. `process` gives a report for every picture, and
-//! never a number that is NaN or infinite. Functions that IEEE 754 does not round correctly come from one library, and
-//! sums have one order, so that the answer does not depend on the machine. A picture goes one way, through one module
-//! for each stage:
+//! The crate uses no heap, a fixed amount of memory and no unsafe code. `process` returns a report for every picture
+//! and never reports NaN or infinity. Functions that IEEE 754 does not round correctly come from one library, and every
+//! sum has a fixed order. Therefore the answer does not depend on the machine. A picture passes through these stages in
+//! order; each stage is one module:
 //!
 //! ```text
 //! image → threshold → contour → edge points → rays → consensus → fit → covariance → gates → Report
@@ -21,12 +21,12 @@
 //! | [`covariance`] | [`covariance::Config`] | the fit, the noise model | the covariance, prior fused |
 //! | [`gates`] | [`gates::Config`] | the answer | a verdict; the best of all candidates |
 //!
-//! Each module begins with its equations and their source; the page book/theory/math.md of the repository has all of
-//! them. Tests compare them with data of other programs.
+//! The documentation of each module begins with its equations and their source. The page book/theory/math.md of the
+//! repository has all equations. Tests compare the equations with data from other programs.
 //!
-//! [`Sensor`] holds a checked configuration, [`Horizon`] holds a sensor with its memory. Frames and units: [`frames`]
-//! (camera x right, y down, z forward), [`pixel`] (pixel centres at integers). Lengths are metres and angles radians
-//! inside, kilometres and degrees in [`Config`].
+//! [`Sensor`] holds a checked configuration, and [`Horizon`] holds a sensor with its memory. [`frames`] describes the
+//! coordinate frames (camera: x right, y down, z forward), [`pixel`] the image coordinates (pixel centres at integers).
+//! Inside the crate, lengths are in metres and angles in radians. In [`Config`] they are in kilometres and degrees.
 //!
 //! ```
 //! use hzn_core::camera::{self, Model};
@@ -55,7 +55,7 @@
 //! # Features
 //!
 //! A feature adds code and never changes a type. `std`: the square root comes from the standard library (the same bits,
-//! vectorised). `serde`: [`Config`] is read from files and written to them. `dlr`, `zju`, `horace`: the methods of
+//! vectorised). `serde`: [`Config`] can be read from files and written to files. `dlr`, `zju`, `horace`: the methods of
 //! Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`]. `erf`: the most accurate sub-pixel points.
 //! `reml`: edge noise by restricted maximum likelihood.
 
@@ -65,7 +65,8 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
-// Each folder knows those above it in this list and none below it; `tests/architecture.rs` holds that.
+// Each folder imports only from the folders above it in the table of ARCHITECTURE.md; `tests/architecture.rs` checks
+// this.
 mod base;
 pub mod config;
 mod geometry;

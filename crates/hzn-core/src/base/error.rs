@@ -1,22 +1,24 @@
-//! What can be wrong with a configuration, said by field, value and limit.
+//! Errors of a configuration: the field, its value and its limit.
 
 use core::fmt;
 
-/// A configuration was refused. Nothing after [`crate::Horizon::new`] can fail on it.
+/// The error of a configuration that is refused. After [`crate::Horizon::new`] accepts a configuration, nothing can
+/// fail on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfigError {
-    /// The field as it is written in sensor.toml, such as `camera.fx_px`.
+    /// The field as it is written in sensor.toml, for example `camera.fx_px`.
     pub field: &'static str,
-    /// The value that was given.
+    /// The refused value.
     pub value: f64,
     /// What the value must be.
     pub limit: Limit,
-    /// Which of several `[[bodies]]` the field belongs to, from 0.
+    /// Index of the `[[bodies]]` entry that the field belongs to, from 0.
     pub body: Option<u8>,
 }
 
 impl ConfigError {
-    /// A value that needs a feature which this build does not have: a `word`, or any value but the default.
+    /// Makes the error for a value that needs a feature which is not in this build: a `word`, or any value but the
+    /// default.
     pub(crate) const fn lacks(field: &'static str, word: Option<&'static str>, feature: &'static str) -> Self {
         Self { field, value: f64::NAN, limit: Limit::Feature { word, feature }, body: None }
     }
@@ -28,23 +30,23 @@ impl ConfigError {
 pub enum Limit {
     /// A finite number.
     Finite,
-    /// Greater than this.
+    /// A number greater than this.
     Above(f64),
-    /// This or greater.
+    /// This number or a greater one.
     AtLeast(f64),
-    /// This or smaller.
+    /// This number or a smaller one.
     AtMost(f64),
-    /// Within both, ends included.
+    /// A number between the two, ends included.
     Between(f64, f64),
-    /// The lens is monotone only up to this angle in degrees; the image circle must end 2° below it.
+    /// The lens is monotone only up to this angle in degrees; the image circle must end at least 2° below it.
     Monotone(f64),
     /// A rule in words.
     Rule(&'static str),
     /// The value needs a feature of this crate that is not built in.
     Feature {
-        /// The word that was given; `None` for a value that is no word.
+        /// The refused word; `None` for a value that is not a word.
         word: Option<&'static str>,
-        /// The feature.
+        /// The name of the feature.
         feature: &'static str,
     },
 }
@@ -88,18 +90,18 @@ impl fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-/// Checks of one field, used by every stage's `check`.
+/// Checks one field; the `check` of every stage uses it.
 pub(crate) fn require(ok: bool, field: &'static str, value: f64, limit: Limit) -> Result<(), ConfigError> {
     if ok { Ok(()) } else { Err(ConfigError { field, value, limit, body: None }) }
 }
 
-/// A finite number within `[low, high]`.
+/// Checks that the value is finite and within `[low, high]`.
 pub(crate) fn between(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), ConfigError> {
     require(value.is_finite(), field, value, Limit::Finite)?;
     require(value >= low && value <= high, field, value, Limit::Between(low, high))
 }
 
-/// A finite number above `low`.
+/// Checks that the value is finite and above `low`.
 pub(crate) fn above(field: &'static str, value: f64, low: f64) -> Result<(), ConfigError> {
     require(value.is_finite(), field, value, Limit::Finite)?;
     require(value > low, field, value, Limit::Above(low))

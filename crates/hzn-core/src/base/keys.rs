@@ -1,9 +1,9 @@
-//! The keys of sensor.toml: one entry each, next to the code that reads it.
+//! The keys of sensor.toml. Each key has one entry, next to the code that reads it.
 //!
-//! The macro `section!` declares a section's structure, its defaults and its table of keys together, and
-//! `choices!` an enumeration whose variants are words in sensor.toml. Everything else comes from these entries: the
-//! checks and their messages, the parameters that a flight computer knows by number, and, on the ground, the table in
-//! the documentation, the commented template, the JSON schema, the sliders of the viewer.
+//! The macro `section!` declares the structure of a section, its defaults and its table of keys together. The macro
+//! `choices!` declares an enumeration whose variants are words in sensor.toml. Everything else comes from these
+//! entries: the checks and their messages, the parameters of a flight computer by number, and, on the ground, the table
+//! in the documentation, the commented template, the JSON schema and the sliders of the viewer.
 //!
 //! ```text
 //! section! {
@@ -17,56 +17,56 @@
 //! }
 //! ```
 //!
-//! A line holds the number in flight (`@-` for a key of the ground only), the name, the type, the default and the
-//! limits.
+//! Each line has the number in flight (`@-` for a key that exists on the ground only), the name, the type, the default
+//! and the limits.
 
 use crate::base::error::{ConfigError, Limit, require};
 
 /// One key of sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Key {
-    /// The key with its section, such as `reject.threshold_px`.
+    /// The key with its section, for example `reject.threshold_px`.
     pub path: &'static str,
-    /// The meaning: a sentence, and after an empty line the details.
+    /// The meaning: one sentence, then an empty line and the details.
     pub doc: &'static str,
     /// The form of the value.
     pub form: Form,
-    /// The values that are taken.
+    /// The values that are accepted.
     pub limits: Limits,
-    /// The words that a value may be; empty where it is not a word.
+    /// The words that the value may be; empty for a value that is not a word.
     pub choices: &'static [Choice],
-    /// The feature of this crate that reads the key. Without it only the default is taken.
+    /// The feature of this crate that reads the key. Without the feature only the default is accepted.
     pub feature: Option<&'static str>,
-    /// What stands for a value that is left out, where no number does.
+    /// The text that the documentation shows for a missing value when there is no default number.
     pub unset: Option<&'static str>,
-    /// A value to show where there is no default, as TOML.
+    /// An example value in TOML, for a key without a default.
     pub example: Option<&'static str>,
-    /// The first of its numbers among the parameters of a flight computer; `None` on the ground only.
+    /// The first number of the key among the parameters of a flight computer; `None` for a key on the ground only.
     pub flight: Option<u16>,
 }
 
 impl Key {
-    /// The section, such as `reject`.
+    /// Returns the section, for example `reject`.
     pub fn section(&self) -> &'static str {
         self.path.split_once('.').map_or("", |(section, _)| section)
     }
-    /// The name without its section, such as `threshold_px`.
+    /// Returns the name without its section, for example `threshold_px`.
     pub fn name(&self) -> &'static str {
         self.path.split_once('.').map_or(self.path, |(_, name)| name)
     }
-    /// The meaning in one sentence; its lines are those of the source.
+    /// Returns the meaning in one sentence; its lines are those of the source.
     pub fn sentence(&self) -> &'static str {
         self.doc.split("\n\n").next().unwrap_or_default().trim()
     }
 }
 
 impl Key {
-    /// The unit that the name ends in, such as `px`, `km`, `deg`, `deg/s`; empty for plain numbers.
+    /// Returns the unit that the name ends in, for example `px`, `km`, `deg`, `deg/s`; empty for plain numbers.
     pub fn unit(&self) -> &'static str {
         let ends = [("_deg_s", "deg/s"), ("_px", "px"), ("_km", "km"), ("_deg", "deg"), ("_percent", "%"), ("_s", "s")];
         ends.into_iter().find(|(end, _)| self.path.ends_with(end)).map_or("", |(_, unit)| unit)
     }
-    /// The choice of its section's `method` for which the key counts; `None` for a key that always counts.
+    /// Returns the choice of the section's `method` to which the key applies; `None` for a key that always applies.
     pub fn method(&self) -> Option<&'static str> {
         self.doc.trim_start().strip_prefix("For `")?.split('`').next().filter(|word| *word != "earth")
     }
@@ -75,11 +75,11 @@ impl Key {
 /// A section with its keys.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
-    /// Its name, such as `reject`.
+    /// The name of the section, for example `reject`.
     pub name: &'static str,
-    /// What it is for.
+    /// The purpose of the section.
     pub doc: &'static str,
-    /// Its keys, in the order of the documentation.
+    /// The keys of the section, in the order of the documentation.
     pub keys: &'static [Key],
 }
 
@@ -105,7 +105,7 @@ pub enum Form {
     Table,
 }
 
-/// The values that a key takes.
+/// The values that a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Limits {
@@ -113,61 +113,61 @@ pub enum Limits {
     Number {
         /// The smallest value.
         low: f64,
-        /// The smallest value itself is excluded.
+        /// Whether the smallest value itself is excluded.
         above: bool,
-        /// The largest value; infinite where there is none.
+        /// The largest value; infinite when there is no upper limit.
         high: f64,
     },
     /// One of the key's choices.
     Choice,
-    /// A rule in words, which is checked where the section is checked.
+    /// A rule in words; the code of the section checks it.
     Rule(&'static str),
 }
 
-/// A word that a key takes.
+/// A word that a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Choice {
     /// The word in sensor.toml.
     pub name: &'static str,
-    /// The meaning: a sentence, and after an empty line the details.
+    /// The meaning: one sentence, then an empty line and the details.
     pub doc: &'static str,
     /// The feature of this crate that the choice needs.
     pub feature: Option<&'static str>,
-    /// Whether this build has it.
+    /// Whether the choice is in this build.
     pub built: bool,
-    /// Its number in flight; `None` on the ground only.
+    /// The number of the choice in flight; `None` for a choice on the ground only.
     pub flight: Option<u16>,
 }
 
 /// The type of a key's value.
 pub trait Value: Clone + PartialEq {
-    /// Its form in a file.
+    /// Form of the value in a file.
     const FORM: Form;
-    /// The words that it may be.
+    /// The words that the value may be.
     const CHOICES: &'static [Choice] = &[];
-    /// How many numbers it is in flight.
+    /// How many numbers the value has in flight.
     const NUMBERS: u16 = 1;
 
-    /// Checks every number in it, or that a word is built in.
+    /// Checks every number of the value, or that its word is in this build.
     ///
     /// # Errors
-    /// The number that is out of its limits, or the feature that is missing.
+    /// Returns the number that is out of its limits, or the feature that is missing.
     fn check(&self, _path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {
         Ok(())
     }
-    /// Its number `place`, from 0, in flight; NaN where it has none.
+    /// Returns the number at `place` (from 0) in flight; NaN if there is none.
     fn number(&self, _place: u16) -> f64 {
         f64::NAN
     }
-    /// Takes its number `place`; `None` when the value cannot be that.
+    /// Sets the number at `place`; `None` when the value cannot have this number.
     fn set_number(&mut self, _place: u16, _number: f64) -> Option<()> {
         None
     }
-    /// Whether a file leaves it out.
+    /// Returns whether a file leaves the value out.
     fn is_absent(&self) -> bool {
         false
     }
-    /// A value that [`Self::set_number`] fills; `None` where it does not fly.
+    /// Returns a value for [`Self::set_number`] to fill; `None` for a type that is not in flight.
     fn blank() -> Option<Self> {
         None
     }
@@ -175,28 +175,28 @@ pub trait Value: Clone + PartialEq {
 
 /// A section of sensor.toml.
 pub trait Section: Sized {
-    /// Its name and its keys.
+    /// The name and the keys of the section.
     const TABLE: Table;
 
-    /// Checks every key by itself.
+    /// Checks each key on its own.
     ///
     /// # Errors
-    /// The first value out of its limits.
+    /// Returns the first value that is out of its limits.
     fn check_keys(&self) -> Result<(), ConfigError>;
-    /// The path of the key with a number in flight.
+    /// Returns the path of the key that has this number in flight.
     fn path(id: u16) -> Option<&'static str>;
-    /// The value of a number in flight.
+    /// Returns the value of a number in flight.
     fn number(&self, id: u16) -> Option<f64>;
-    /// Sets the value of a number in flight: `None` when no key has the number, `Some(false)` when its key cannot have
+    /// Sets the value of a number in flight. `None` when no key has the number, `Some(false)` when its key cannot have
     /// the value.
     fn set_number(&mut self, id: u16, number: f64) -> Option<bool>;
-    /// The first key of the ground only whose value differs from another configuration's.
+    /// Returns the first key on the ground only whose value differs from that of another configuration.
     fn differing_on_ground(&self, other: &Self) -> Option<&'static str>;
-    /// The first number in flight of each key, and how many numbers it has.
+    /// The first number in flight of each key, and how many numbers the key has.
     const NUMBERS: &'static [(Option<u16>, u16)];
 }
 
-/// Checks one number. It stands once in flash: every key calls it.
+/// Checks one number. Every key calls this one copy in flash.
 #[inline(never)]
 pub(crate) fn check_number(path: &'static str, x: f64, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
     require(x.is_finite(), path, x, Limit::Finite)?;
@@ -295,7 +295,7 @@ impl<const N: usize> Value for heapless::Vec<f64, N> {
     fn check(&self, path: &'static str, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
         self.iter().try_for_each(|x| check_number(path, *x, low, above, high))
     }
-    /// 0 where the list ends before it.
+    /// Returns 0 when the list ends before `place`.
     fn number(&self, place: u16) -> f64 {
         self.get(usize::from(place)).copied().unwrap_or(0.0)
     }
@@ -323,9 +323,9 @@ impl<const C: usize, const N: usize> Value for heapless::Vec<heapless::Vec<[f64;
     const FORM: Form = Form::Polygons;
 }
 
-/// An enumeration whose variants are words in sensor.toml, the default first. Each line: `@` and the number in flight
-/// or `-`, the variant, the word, and the feature that it needs. A variant is there in every build; a build without the
-/// feature refuses it by name.
+/// Declares an enumeration whose variants are words in sensor.toml; the first variant is the default. Each line has `@`
+/// and the number in flight or `-`, the variant, the word, and the feature that the variant needs. Every variant exists
+/// in every build; a build without the feature refuses the variant and names the feature.
 macro_rules! choices {
     (
         $(#[doc = $about:literal])+
@@ -347,17 +347,17 @@ macro_rules! choices {
         }
 
         impl $name {
-            /// Every variant, in the order of its declaration.
+            /// All variants, in the order of their declaration.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
-            /// The word in sensor.toml.
+            /// Returns the word in sensor.toml.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $word,)+
                 }
             }
 
-            /// The feature that this build lacks for it.
+            /// Returns the feature that the variant needs and this build does not have.
             #[allow(unused, reason = "some enumerations need no feature")]
             const fn lacking(self) -> Option<&'static str> {
                 match self {
@@ -418,10 +418,10 @@ macro_rules! choices {
     };
 }
 
-/// A section of sensor.toml as a structure with its defaults and its table of keys. A field's line: `@` and the number
-/// in flight or `-`, name, type, default, limits in brackets, and in braces what else there is to say (`needs` a
-/// feature, `unset` and `example` for a value without default). Fields without a default (`serde(...)` instead) are for
-/// a section without defaults.
+/// Declares a section of sensor.toml: a structure with its defaults and its table of keys. The line of a field has `@`
+/// and the number in flight or `-`, name, type, default, limits in brackets, and options in braces (`needs` a feature,
+/// `unset` and `example` for a value without default). A section `without defaults` has `serde(...)` in place of the
+/// default.
 macro_rules! section {
     (
         $(#[doc = $about:literal])+
@@ -486,7 +486,7 @@ macro_rules! section {
     };
 }
 
-/// [`Section`] for a structure.
+/// Implements [`Section`] for a structure.
 macro_rules! table {
     (
         ($($about:literal)+) $section:literal $name:ident {
@@ -566,7 +566,7 @@ macro_rules! table {
     };
 }
 
-/// A number in flight, or `None` for `-`.
+/// Gives a number in flight, or `None` for `-`.
 macro_rules! flight {
     (-) => {
         None::<u16>
@@ -576,7 +576,7 @@ macro_rules! flight {
     };
 }
 
-/// Which of a key's numbers `id` is.
+/// Gives the place of the number `id` among the numbers of a key.
 macro_rules! place {
     (-, $ty:ty, $id:ident) => {{
         let _ = $id;
@@ -587,7 +587,7 @@ macro_rules! place {
     };
 }
 
-/// The feature of a choice.
+/// Gives the feature of a choice.
 macro_rules! feature_name {
     () => {
         None
@@ -597,7 +597,7 @@ macro_rules! feature_name {
     };
 }
 
-/// The text of one option among several.
+/// Gives the text of one option among several.
 macro_rules! option {
     ($wanted:ident) => { None };
     (needs needs $text:literal $($rest:tt)*) => { Some($text) };
@@ -606,7 +606,7 @@ macro_rules! option {
     ($wanted:ident $other:ident $text:literal $($rest:tt)*) => { $crate::base::keys::option!($wanted $($rest)*) };
 }
 
-/// [`Limits`] from their notation.
+/// Gives [`Limits`] from their notation.
 macro_rules! limits {
     ([choice]) => {
         $crate::base::keys::Limits::Choice
@@ -628,7 +628,7 @@ macro_rules! limits {
     };
 }
 
-/// The check of one value; a rule in words is checked by the section's own code.
+/// Checks one value; the section's own code checks a rule in words.
 macro_rules! check {
     ($value:expr, $path:expr, [$rule:literal]) => {};
     ($value:expr, $path:expr, [choice]) => {
@@ -648,7 +648,7 @@ macro_rules! check {
     };
 }
 
-/// A key of a feature that is not built in keeps its default.
+/// Checks that a key keeps its default when its feature is not in this build.
 macro_rules! needs {
     ($value:expr, $default:tt, $path:expr, needs $feature:literal $($rest:tt)*) => {
         if !cfg!(feature = $feature) && $value != $default {

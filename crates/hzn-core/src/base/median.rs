@@ -1,8 +1,8 @@
-//! Medians by halving the range: sorting would need a panic path, and would change the order.
+//! Medians by bisection of the range. A sort would need a panic path and would change the order of the values.
 
 use crate::base::real::Real;
 
-/// The median of values from 0 to `most`, to a part in 4096 of `most`.
+/// Returns the median of values from 0 to `most`, with an error of at most `most`/4096.
 pub(crate) fn of_reals<T: Real>(values: &[T], most: T) -> T {
     let (mut low, mut high) = (T::ZERO, most);
     for _ in 0..12 {
@@ -13,7 +13,7 @@ pub(crate) fn of_reals<T: Real>(values: &[T], most: T) -> T {
     high
 }
 
-/// The smallest value that half of the values do not exceed, by halving; 0 of none.
+/// Returns the smallest value that at least half of the values do not exceed, by bisection; 0 for no values.
 pub(crate) fn of_counts(values: &[u16]) -> u16 {
     let (mut low, mut high) = (0u32, values.iter().fold(0, |most, &v| most.max(v)).into());
     while low < high {

@@ -1,4 +1,4 @@
-//! Numbers: what has nothing to do with pictures.
+//! Numerical tools that do not depend on pictures, the errors, and the macros of the keys.
 
 pub mod error;
 #[macro_use]

@@ -1,8 +1,8 @@
-//! The scalar of every computation: `f32` or `f64`, and nothing else.
+//! The scalar type of every computation: `f32` or `f64`.
 //!
-//! Functions that IEEE 754 does not round correctly come from the `libm` crate on every target, so that a
-//! desktop and a flight computer give the same bits. The square root is correctly rounded everywhere and may use
-//! the hardware (feature `std`).
+//! Functions that IEEE 754 does not round correctly come from the `libm` crate on every target, so that a desktop and a
+//! flight computer give the same bits. The square root is correctly rounded everywhere, so it may use the hardware
+//! (feature `std`).
 
 use core::fmt::{Debug, Display};
 use core::ops::Neg;
@@ -13,7 +13,7 @@ mod sealed {
     impl Sealed for f64 {}
 }
 
-/// `f32` or `f64`, with the functions the pipeline needs.
+/// `f32` or `f64`, with the functions that the pipeline needs.
 pub trait Real:
     sealed::Sealed
     + nalgebra::Scalar
@@ -27,64 +27,64 @@ pub trait Real:
     + Neg<Output = Self>
     + num_traits::NumAssign
 {
-    /// The nearest value of this type to `x`.
+    /// Converts `x` to the nearest value of this type.
     fn from_f64(x: f64) -> Self;
-    /// Exact for small integers such as pixel coordinates.
+    /// Converts an integer; exact for small integers, for example pixel coordinates.
     fn from_i32(x: i32) -> Self;
-    /// As `f64`, exactly.
+    /// Converts to `f64`, exactly.
     fn to_f64(self) -> f64;
-    /// Correctly rounded square root; NaN below zero.
+    /// Returns the correctly rounded square root; NaN below zero.
     fn sqrt(self) -> Self;
-    /// Sine and cosine of an angle in radians.
+    /// Returns sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
-    /// Angle of the point `(x, self)` in radians, -π to π.
+    /// Returns the angle of the point `(x, self)` in radians, -π to π.
     fn atan2(self, x: Self) -> Self;
-    /// Arc sine in radians.
+    /// Returns the arc sine in radians.
     fn asin(self) -> Self;
-    /// Arc cosine in radians.
+    /// Returns the arc cosine in radians.
     fn acos(self) -> Self;
-    /// Tangent of an angle in radians.
+    /// Returns the tangent of an angle in radians.
     fn tan(self) -> Self;
-    /// Exponential function.
+    /// Returns the exponential function.
     fn exp(self) -> Self;
-    /// Natural logarithm.
+    /// Returns the natural logarithm.
     fn ln(self) -> Self;
-    /// Error function.
+    /// Returns the error function.
     fn erf(self) -> Self;
-    /// Largest integer not above.
+    /// Returns the largest integer that is not above the number.
     fn floor(self) -> Self;
-    /// Absolute value.
+    /// Returns the absolute value.
     fn abs(self) -> Self;
-    /// Neither NaN nor infinite.
+    /// Returns whether the number is neither NaN nor infinite.
     fn is_finite(self) -> bool;
-    /// Truncated to an integer; saturates, and NaN is 0.
+    /// Truncates to an integer; it saturates, and NaN gives 0.
     fn to_i32(self) -> i32;
     /// The distance from 1 to the next larger number.
     const EPSILON: Self;
     /// 0.
     const ZERO: Self;
-    /// Up to here [`Self::exp_neg_series`] holds.
+    /// Largest x for which [`Self::exp_neg_series`] is accurate.
     const EXP_SERIES: Self;
 
-    /// The smaller of two numbers; `other` when `self` is NaN.
+    /// Returns the smaller of two numbers; `other` when `self` is NaN.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         if self < other { self } else { other }
     }
-    /// The larger of two numbers; `other` when `self` is NaN.
+    /// Returns the larger of two numbers; `other` when `self` is NaN.
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         if self > other { self } else { other }
     }
-    /// `exp(-x)` for `x >= 0`.
+    /// Returns `exp(-x)` for `x >= 0`.
     #[inline]
     fn exp_neg(self) -> Self {
         if self > Self::EXP_SERIES { (-self).exp() } else { self.exp_neg_series() }
     }
-    /// `exp(-x)` for `0 <= x <= EXP_SERIES`.
+    /// Returns `exp(-x)` for `0 <= x <= EXP_SERIES`.
     #[inline(always)]
     fn exp_neg_series(self) -> Self {
-        // Taylor to the ninth power: below 3e-16 relative at 1/8, 3e-8 at 3/4.
+        // Taylor series to the ninth power: the relative error is below 3e-16 at 1/8 and below 3e-8 at 3/4.
         let y = -self;
         let mut sum = Self::from_f64(1.0 / 362_880.0);
         for c in [1.0 / 40_320.0, 1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
@@ -94,7 +94,7 @@ pub trait Real:
     }
 }
 
-/// The floating-point unit's where there is one: correctly rounded, so the same bits.
+/// The square root of the floating-point unit, where there is one. It is correctly rounded, so it gives the same bits.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 use hzn_fpu::sqrt_f32;
 #[cfg(not(any(feature = "std", all(target_arch = "arm", target_abi = "eabihf"))))]

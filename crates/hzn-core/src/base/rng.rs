@@ -1,10 +1,11 @@
-//! A small generator: the same seed gives the same numbers on every target.
+//! A small random number generator: the same seed gives the same numbers on every target.
 
 /// PCG32 with a 64-bit state (O'Neill 2014, XSH-RR).
 #[derive(Debug, Clone)]
 pub(crate) struct Rng(u64);
 
 impl Rng {
+    /// Seeds the generator.
     pub(crate) fn new(seed: u32) -> Self {
         let mut rng = Self(u64::from(seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B);
         rng.next();
@@ -18,7 +19,7 @@ impl Rng {
         xorshifted.rotate_right((old >> 59) as u32)
     }
 
-    /// A number below `n`, even to within n/2³²; 0 when `n` is 0.
+    /// Returns a random number below `n`; 0 when `n` is 0. The probabilities are equal to within n/2³².
     pub(crate) fn below(&mut self, n: u32) -> u32 {
         ((u64::from(self.next()) * u64::from(n)) >> 32) as u32
     }

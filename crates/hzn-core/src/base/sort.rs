@@ -1,9 +1,9 @@
-//! Sorting without a panic: that of the standard library has one for orders that are none.
+//! Sorting that cannot panic. The sort of the standard library can panic when the comparison is not a total order.
 
 use core::mem::swap;
 
-/// Sorts in place by `less` (heap sort: no memory, n log n steps whatever the order). Alike items may change places;
-/// where `less` is no order, so is the result.
+/// Sorts in place by `less` with a heap sort: it needs no extra memory and n log n steps for every input order. Equal
+/// items may change places. If `less` is not an order, the result is some permutation of the items.
 pub(crate) fn by<X>(items: &mut [X], less: impl Fn(&X, &X) -> bool) {
     let n = items.len();
     for root in (0..n / 2).rev() {
@@ -15,7 +15,7 @@ pub(crate) fn by<X>(items: &mut [X], less: impl Fn(&X, &X) -> bool) {
     }
 }
 
-/// Takes the item at `root` down among the first `end` until none below it is larger.
+/// Moves the item at `root` down the heap of the first `end` items until no item below it is larger.
 fn sink<X>(items: &mut [X], mut root: usize, end: usize, less: &impl Fn(&X, &X) -> bool) {
     loop {
         let left = 2 * root + 1;

@@ -1,4 +1,4 @@
-//! Everything that describes a sensor, as plain values: sensor.toml without the file.
+//! The whole configuration of a sensor as plain values: sensor.toml without the file.
 
 mod numbers;
 pub mod retry;
@@ -21,28 +21,28 @@ use crate::stages::fit;
 use crate::stages::gates;
 use crate::stages::threshold;
 
-/// A sensor: the camera, the body it looks for, and every stage's parameters.
+/// The configuration of a sensor: the camera, the body that it searches for, and the parameters of every stage.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Config {
     /// The calibration.
     pub camera: camera::Config,
-    /// How the camera sits in the vehicle.
+    /// How the camera is mounted in the vehicle.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub mount: Option<Mount>,
     /// The body.
     #[cfg_attr(feature = "serde", serde(default))]
     pub body: body::Config,
-    /// Several bodies in one picture, instead of `body`, in the order in which they are looked for.
+    /// Several bodies in one picture, instead of `body`, in the order of the search.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "heapless::Vec::is_empty"))]
     pub bodies: heapless::Vec<body::Config, MAX_BODIES>,
-    /// How a pixel becomes one brightness.
+    /// Conversion of a pixel to one brightness.
     #[cfg_attr(feature = "serde", serde(default))]
     pub input: Input,
     /// Brightness gate.
     #[cfg_attr(feature = "serde", serde(default))]
     pub gate: threshold::Gate,
-    /// Level between dark and lit.
+    /// Threshold between dark and lit.
     #[cfg_attr(feature = "serde", serde(default))]
     pub binarize: threshold::Config,
     /// Parts of the picture that never count.
@@ -51,10 +51,10 @@ pub struct Config {
     /// Search and border following.
     #[cfg_attr(feature = "serde", serde(default))]
     pub contour: contour::Config,
-    /// Edges that are looked at, and their sub-pixel points.
+    /// Edges that are examined, and their sub-pixel points.
     #[cfg_attr(feature = "serde", serde(default))]
     pub candidates: edge_points::Config,
-    /// Outlier rejection.
+    /// Consensus and outlier rejection.
     #[cfg_attr(feature = "serde", serde(default))]
     pub reject: consensus::Config,
     /// The fit.
@@ -66,62 +66,62 @@ pub struct Config {
     /// Gates of an answer.
     #[cfg_attr(feature = "serde", serde(default))]
     pub select: gates::Config,
-    /// When the whole picture gives no answer.
+    /// Further looks and subdivision, for a picture without an answer.
     #[cfg_attr(feature = "serde", serde(default))]
     pub recover: retry::Config,
-    /// What a picture may cost.
+    /// Work budget of a picture.
     #[cfg_attr(feature = "serde", serde(default))]
     pub limits: work::Config,
 }
 
 section! {
-    /// `[mount]` of sensor.toml: how the camera sits in the vehicle.
+    /// `[mount]` of sensor.toml: how the camera is mounted in the vehicle.
     "mount" pub struct Mount: Copy without defaults {
-        /// Quaternion that takes camera coordinates to vehicle coordinates, scalar first; it gives roll and pitch in
-        /// the results.
+        /// Quaternion that converts camera coordinates to vehicle coordinates, scalar first; with it the results have
+        /// roll and pitch.
         @20 q_body_from_camera_wxyz: [f64; 4], serde(), ["unit quaternion"]
             { unset: "no mounting", example: "[1.0, 0.0, 0.0, 0.0]" };
     }
 }
 
 section! {
-    /// `[input]` of sensor.toml: how a pixel becomes one brightness.
+    /// `[input]` of sensor.toml: conversion of a pixel to one brightness.
     "input" pub struct Input: Copy {
-        /// Which brightness a colour pixel has.
+        /// The brightness of a colour pixel.
         @- channel: Channel = Channel::Mean, [choice];
-        /// Significant bits of a sample, where the file's words have room for more.
+        /// Significant bits of a sample, if the file's words have room for more.
         ///
-        /// A camera of 12 bits whose values stand in the lower bits of 16-bit words has 12. Programs that read files
-        /// put it into the picture's [`Layout`](crate::image::Layout).
+        /// It is 12 for a 12-bit camera whose values are in the lower bits of 16-bit words. Programs that read files
+        /// copy it to the picture's [`Layout`](crate::image::Layout).
         @- bits: Option<u8> = None, [8.0 to 16.0]
             { unset: "as the file says; for words of 16 bits found from the pictures", example: "12" };
-        /// How a picture is turned before it is processed; the camera's size and calibration are those of the turned
+        /// Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
         /// picture.
         @- orient: Orient = Orient::AsStored, [choice];
-        /// Rows of a smaller copy of the picture that is processed instead; from there on, lengths are in pixels of the
-        /// copy.
+        /// Number of rows of a smaller copy of the picture, which is processed instead; lengths are then in pixels of
+        /// the copy.
         @- scale_to_height: Option<u16> = None, ["16 to `height`"] { needs: "horace", unset: "none", example: "540" };
     }
 }
 
 choices! {
-    /// How a picture is turned between its file and the sensor.
+    /// Rotation of a picture between its file and the sensor.
     pub enum Orient {
-        /// Pixels stay where the file has them, as the detector gave them.
+        /// The picture is not rotated: pixels stay as in the file, as the detector delivered them.
         @- AsStored = "as-stored";
-        /// The picture is turned as its EXIF orientation says; photograph viewers and OpenCV's `imread` do the same.
+        /// The picture is rotated as its EXIF orientation says; photograph viewers and OpenCV's `imread` do the same.
         @- Exif = "exif";
-        /// By 90 degrees clockwise.
+        /// The picture is rotated by 90 degrees clockwise.
         @- Rotate90 = "rotate-90";
-        /// By 180 degrees.
+        /// The picture is rotated by 180 degrees.
         @- Rotate180 = "rotate-180";
-        /// By 90 degrees counter-clockwise.
+        /// The picture is rotated by 90 degrees counter-clockwise.
         @- Rotate270 = "rotate-270";
     }
 }
 
 impl Config {
-    /// A sensor with this camera and every other value at its default.
+    /// Makes a sensor with this camera and every other value at its default.
     pub fn new(camera: camera::Config) -> Self {
         Self {
             camera,
@@ -143,12 +143,13 @@ impl Config {
         }
     }
 
-    /// The bodies that are looked for, one or several.
+    /// Returns the bodies that the sensor searches for, one or several.
     pub fn each_body(&self) -> &[body::Config] {
         if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
     }
-    /// How body number `which`, from 0, is split from the dark: its own values, or those of all; of a Sun among several
-    /// the level of the preset `sun`, as what is brighter than the dark beside another body is that body.
+    /// Returns the threshold parameters of body number `which`, from 0: those of the body, or else those of the sensor.
+    /// A Sun among several bodies without its own parameters has those of the preset `sun`, because every other body in
+    /// the picture is brighter than the dark as well.
     pub fn levels_of(&self, which: u8) -> &threshold::Config {
         let body = self.each_body().get(usize::from(which));
         match body.and_then(|b| b.binarize.as_ref()) {
@@ -157,27 +158,28 @@ impl Config {
             None => &self.binarize,
         }
     }
-    /// The errors of body number `which`'s edge points: its own values, or those of all.
+    /// Returns the noise model of body number `which`: that of the body, or else that of the sensor.
     pub(crate) fn noise_of(&self, which: u8) -> &covariance::Config {
         let own = self.each_body().get(usize::from(which)).and_then(|b| b.covariance.as_ref());
         own.unwrap_or(&self.covariance)
     }
-    /// Whether a body's level, or a gate, comes from the picture before, so that pictures must come in order.
+    /// Returns whether the threshold of a body, or a gate, depends on the previous picture. Pictures must then come in
+    /// order.
     pub fn tracks(&self) -> bool {
         if self.select.max_rate_deg_s.is_some() {
             return true;
         }
         (0..self.each_body().len()).any(|which| self.levels_of(which as u8).method == threshold::Method::Track)
     }
-    /// As [`Self::each_body`], to be changed.
+    /// Returns the same bodies as [`Self::each_body`], for changes.
     pub fn each_body_mut(&mut self) -> &mut [body::Config] {
         if self.bodies.is_empty() { core::slice::from_mut(&mut self.body) } else { &mut self.bodies }
     }
 
-    /// Checks every field but the lens, which [`camera::Camera::try_new`] checks.
+    /// Checks every field except the lens, which [`camera::Camera::try_new`] checks.
     ///
     /// # Errors
-    /// The first field out of its limits.
+    /// Returns the first field that is out of its limits.
     pub fn check(&self) -> Result<(), ConfigError> {
         if let Some(mount) = &self.mount {
             let q = mount.q_body_from_camera_wxyz;

@@ -8,14 +8,14 @@ use crate::model::threshold::Gate;
 use crate::model::{body, edge_noise, threshold, work};
 use crate::stages::{consensus, contour, edge_points, fit, gates};
 
-/// What concerns every section: its field in [`Config`], and its type.
+/// Lists every section: its field in [`Config`], and its type.
 macro_rules! sections {
     ($($field:ident: $section:ty),+ $(,)?) => {
         /// The sections of sensor.toml with their keys.
         pub const SECTIONS: &[Table] = &[$(<$section>::TABLE),+, Mount::TABLE];
 
         impl Config {
-            /// The key that a number in flight stands for, such as `reject.threshold_px` for 81.
+            /// Returns the key of a number in flight, for example `reject.threshold_px` for 81.
             pub fn path(id: u16) -> Option<&'static str> {
                 $(
                     if let Some(path) = <$section>::path(id) {
@@ -25,14 +25,15 @@ macro_rules! sections {
                 Mount::path(id)
             }
 
-            /// The numbers in flight of every key that has one, in the order in which they must be set.
+            /// Returns the numbers in flight of all keys that have one, in the order in which they must be set.
             pub fn numbers() -> impl Iterator<Item = u16> {
                 const SECTIONS: &[&[(Option<u16>, u16)]] = &[$(<$section>::NUMBERS),+, Mount::NUMBERS];
                 let keys = SECTIONS.iter().copied().flatten();
                 keys.filter_map(|(first, count)| first.map(|first| first..first + count)).flatten()
             }
 
-            /// The value of a number in flight: NaN for a value that is left out, `None` for a number that no key has.
+            /// Returns the value of a number in flight: NaN for a value that is left out, `None` for a number that no
+            /// key has.
             pub fn number(&self, id: u16) -> Option<f64> {
                 $(
                     if let Some(number) = self.$field.number(id) {
@@ -44,7 +45,7 @@ macro_rules! sections {
             }
 
             /// Sets the value of a number in flight: `None` for a number that no key has, `Some(false)` for a value
-            /// that its key cannot have. Whether the values go together is for [`Config::check`].
+            /// that its key cannot have. [`Config::check`] checks whether the values agree with each other.
             pub fn set_number(&mut self, id: u16, number: f64) -> Option<bool> {
                 $(
                     if let Some(taken) = self.$field.set_number(id, number) {
@@ -59,7 +60,7 @@ macro_rules! sections {
                 self.mount.get_or_insert(Mount { q_body_from_camera_wxyz: [0.0; 4] }).set_number(id, number)
             }
 
-            /// The first key without a number in flight whose value differs from that of `other`.
+            /// Returns the first key without a number in flight whose value differs from that of `other`.
             pub fn differing_on_ground(&self, other: &Self) -> Option<&'static str> {
                 $(
                     if let Some(path) = self.$field.differing_on_ground(&other.$field) {

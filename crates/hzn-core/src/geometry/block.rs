@@ -1,7 +1,7 @@
-//! Edge points in blocks of eight lanes: what the numerical stages loop over.
+//! Edge points in blocks of eight lanes, over which the numerical stages loop.
 //!
-//! A block is a structure of arrays, so that each loop over its lanes becomes vector instructions where there are
-//! any; a slice of blocks is a view without a capacity, so that stages are compiled once. Sums are kept by lane and
+//! A block is a structure of arrays, so that each loop over its lanes becomes vector instructions on targets that have
+//! them. A slice of blocks has no capacity in its type, so that stages are compiled once. Sums are kept by lane and
 //! added at the end, in the same order on every target.
 
 use crate::base::linalg::V3;
@@ -9,28 +9,29 @@ use crate::base::real::Real;
 use crate::geometry::camera::Ray;
 use crate::geometry::pixel::ImagePoint;
 
-/// Lanes of a block.
+/// Number of lanes of a block.
 pub(crate) const LANES: usize = 8;
-/// Lanes in which many sums are kept at once: eight of each would not stay in registers.
+/// Number of lanes for loops with many sums: eight lanes of each sum would not stay in registers.
 pub(crate) const HALF: usize = LANES / 2;
 
-/// Where the lit side lies: the direction of the brightness gradient along the axis on which the edge was located.
+/// The side of an edge point that is lit: the direction of the brightness gradient along the axis (u or v) on which the
+/// edge was located.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Lit {
-    /// At larger u.
+    /// The lit side is at larger u.
     Right = 0,
-    /// At smaller u.
+    /// The lit side is at smaller u.
     Left = 1,
-    /// At larger v.
+    /// The lit side is at larger v.
     Below = 2,
-    /// At smaller v.
+    /// The lit side is at smaller v.
     Above = 3,
 }
 
 #[cfg(any(test, feature = "_edges"))]
 impl Lit {
-    /// The side on which a direction (u, v) in the picture lies.
+    /// Returns the side to which a direction (u, v) in the picture points.
     pub(crate) fn towards<T: Real>(g: [T; 2]) -> Self {
         match (g[0].abs() >= g[1].abs(), g[0] > T::ZERO, g[1] > T::ZERO) {
             (true, true, _) => Self::Right,
@@ -39,7 +40,7 @@ impl Lit {
             (false, _, false) => Self::Above,
         }
     }
-    /// The other way: a step of one pixel (u, v) towards the light.
+    /// Returns the step of one pixel (u, v) towards the light.
     pub(crate) fn step(self) -> [i8; 2] {
         let (dx, dy) = self.towards_dark();
         [-dx as i8, -dy as i8]
@@ -47,7 +48,7 @@ impl Lit {
 }
 
 impl Lit {
-    /// The step (dx, dy) away from the light.
+    /// Returns the step (dx, dy) away from the light.
     #[inline(always)]
     pub(crate) fn towards_dark(self) -> (i32, i32) {
         match self {
@@ -62,15 +63,16 @@ impl Lit {
 /// Eight edge points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Block<T> {
-    /// Unit rays, x, y, z. Between the stages `candidates` and `undistort` the first two hold the image point (u, v).
+    /// Unit rays, x, y, z, in the camera frame. Between the stages edge points and rays, the first two components hold
+    /// the image point (u, v).
     pub(crate) s: [[T; LANES]; 3],
-    /// Their derivatives, as in [`Ray`].
+    /// Derivatives of the rays, as in [`Ray`].
     pub(crate) m: [[T; LANES]; 4],
-    /// Distance in pixels from the point before along the edge.
+    /// Distance along the edge from the previous point, in pixels.
     pub(crate) step_px: [T; LANES],
-    /// 1 for a point that may count and 0 for one that may not; after the fit the weight it had.
+    /// 1 for a point that may count and 0 for a point that may not; after the fit, the weight of the point in the fit.
     pub(crate) weight: [T; LANES],
-    /// Two bits a lane: [`Lit`].
+    /// The [`Lit`] side, two bits for each lane.
     lit: u16,
 }
 
@@ -81,7 +83,7 @@ impl<T: Real> Default for Block<T> {
 }
 
 impl<T: Real> Block<T> {
-    /// No points.
+    /// A block without points.
     pub(crate) const EMPTY: Self = Self {
         s: [[T::ZERO; LANES]; 3],
         m: [[T::ZERO; LANES]; 4],
@@ -115,7 +117,7 @@ impl<T: Real> Block<T> {
             self.m[k][l] = ray.m[k];
         }
     }
-    /// A point that cannot count: weight 0, and no distance from any limb that is finite.
+    /// Clears a point so that it cannot count: its weight is 0, and its distance from every limb is not finite.
     pub(crate) fn clear(&mut self, lane: usize) {
         let l = lane & 7;
         (self.s[0][l], self.s[1][l], self.s[2][l]) = (T::ZERO, T::ZERO, T::one());
@@ -127,7 +129,7 @@ impl<T: Real> Block<T> {
         V3::new(self.s[0][l], self.s[1][l], self.s[2][l])
     }
 
-    /// The derivative of s·e by (u, v), in radians a pixel, lane by lane.
+    /// Returns the derivative of s·e by (u, v) for each lane, in radians per pixel.
     #[inline(always)]
     pub(crate) fn gradient(&self, e: &V3<T>) -> [[T; LANES]; 2] {
         let mut g = [[T::ZERO; LANES]; 2];
@@ -141,18 +143,18 @@ impl<T: Real> Block<T> {
     #[inline(always)]
     pub(crate) fn gradient_at(&self, l: usize, e: &V3<T>) -> [T; 2] {
         let (x, y, z) = (self.s[0][l & 7], self.s[1][l & 7], self.s[2][l & 7]);
-        // The tangent basis of `camera::tangent` times e.
+        // This is the tangent basis of `camera::tangent` times e.
         let w = (x * e.x + y * e.y) / (T::one() + z) + e.z;
         let (a, b) = (e.x - x * w, e.y - y * w);
         [self.m[0][l & 7] * a + self.m[2][l & 7] * b, self.m[1][l & 7] * a + self.m[3][l & 7] * b]
     }
 
-    /// Whether the lit side lies towards `e`, as it does on the limb of a body.
+    /// Returns whether the lit side lies towards `e`, as it does on the limb of a body.
     #[inline]
     pub(crate) fn faces(&self, l: usize, e: &V3<T>) -> bool {
         self.faces_along(l, self.gradient_at(l, e))
     }
-    /// As [`Self::faces`], from the gradient.
+    /// Does the same as [`Self::faces`], from the gradient.
     #[inline(always)]
     pub(crate) fn faces_along(&self, l: usize, [gu, gv]: [T; 2]) -> bool {
         match (self.lit >> (2 * (l & 7))) & 3 {
@@ -164,14 +166,15 @@ impl<T: Real> Block<T> {
     }
 }
 
-/// Sum of the lanes, in a fixed order.
+/// Adds the lanes in a fixed order.
 #[inline(always)]
 pub(crate) fn sum<T: Real>(lanes: &[T; LANES]) -> T {
     let [a, b, c, d, e, f, g, h] = *lanes;
     ((a + b) + (c + d)) + ((e + f) + (g + h))
 }
 
-/// exp(−x) for each lane, x ≥ 0. Together where all are small, as they are between neighbouring points of an edge.
+/// Returns exp(−x) for each lane, x ≥ 0. The lanes are computed together when all x are small, which is usual between
+/// neighbouring points of an edge.
 #[inline(always)]
 pub(crate) fn exp_neg<T: Real>(lanes: &[T; LANES]) -> [T; LANES] {
     if lanes.iter().any(|&x| !(x <= T::EXP_SERIES)) {

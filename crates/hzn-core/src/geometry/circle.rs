@@ -1,15 +1,17 @@
 //! A circle through points of a plane, in closed form (Barf 2014, (2.17) to (2.22); Kåsa 1976).
 //!
-//! Least squares of x² + y² = 2 x_c x + 2 y_c y + (r² − x_c² − y_c²), which is linear in the three unknowns. The
-//! points' centre is subtracted first and the spread divided out, which makes the sums of x and y zero and leaves two
-//! equations; without, the closed form loses nearly everything in single precision. The paper's closed form has one
-//! denominator for all three unknowns and prints a sum of the right-hand side (Q) in that of its B; solved as here
-//! there is none.
+//! The fit is a least-squares solution of x² + y² = 2 x_c x + 2 y_c y + (r² − x_c² − y_c²), which is linear in the
+//! three unknowns. First the centre of the points is subtracted and the coordinates are divided by the spread. The sums
+//! of x and y are then zero, and two equations remain. Without this step the closed form loses nearly all precision in
+//! f32.
+//!
+//! The paper's closed form has one denominator for all three unknowns. In the denominator of B it prints Q, a sum of
+//! the right-hand side. The solution here has no denominator of that kind.
 
 use crate::base::linalg::invert_spd2;
 use crate::base::real::Real;
 
-/// A circle.
+/// A circle in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Circle<T> {
     pub(crate) centre: [T; 2],
@@ -17,7 +19,7 @@ pub(crate) struct Circle<T> {
 }
 
 impl<T: Real> Circle<T> {
-    /// The circle closest to the points. `None` with fewer than three, or when they lie on a line.
+    /// Fits a circle to the points. `None` with fewer than three points, or when they lie on a line.
     pub(crate) fn through(points: impl Iterator<Item = [T; 2]> + Clone) -> Option<Self> {
         let (mut n, mut x, mut y) = (T::ZERO, T::ZERO, T::ZERO);
         for p in points.clone() {
@@ -49,7 +51,8 @@ impl<T: Real> Circle<T> {
             u3 += u * r2;
             v3 += v * r2;
         }
-        // On a line the lesser spread is rounding of the coordinates: the determinant over the trace, which is n.
+        // For points on a line, the smaller spread is only rounding of the coordinates. The smaller spread is the
+        // determinant over the trace, and the trace is n.
         let rounding = T::EPSILON * T::from_f64(16.0) * (T::one() + (middle[0].abs() + middle[1].abs()) * per);
         if !((uu * vv - uv * uv) / n > n * rounding * rounding) {
             return None;
@@ -69,7 +72,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// An arc of a circle, `from` to `to` in radians.
+    /// Returns points on an arc of a circle, `from` to `to` in radians.
     fn arc(centre: [f64; 2], radius: f64, from: f64, to: f64, count: i32) -> Vec<[f64; 2]> {
         (0..count)
             .map(|i| {
@@ -88,14 +91,14 @@ mod tests {
             prop_assert!((found.radius - r).abs() < 1e-7 * r.max(x.abs()));
             let off = (found.centre[0] - x).abs() + (found.centre[1] - y).abs();
             prop_assert!(off < 1e-6 * r.max(x.abs()).max(y.abs()));
-            // In single precision as well: the centre is subtracted first.
+            // The fit also works in single precision, because the centre is subtracted first.
             let found = Circle::through(points.iter().map(|p| [p[0] as f32, p[1] as f32])).unwrap();
             let limit = 0.02 * r + 0.05 * x.abs().max(y.abs()) / span;
             prop_assert!((f64::from(found.radius) - r).abs() < limit, "{}", found.radius);
         }
     }
 
-    /// (2.20) to (2.22): with the sums K to U of the paper, the denominator of B with Q where P belongs.
+    /// (2.20) to (2.22) with the sums K to U of the paper: the denominator of B has Q where P belongs.
     #[test]
     fn the_printed_denominator_gives_another_circle() {
         let points = arc([40.0, -30.0], 100.0, 0.3, 2.0, 50);
@@ -105,7 +108,7 @@ mod tests {
         let (q, r) = (sum(&|x, y| x * (x * x + y * y)), sum(&|x, y| y * (x * x + y * y)));
         let s = sum(&|x, y| x * x + y * y);
         let denominator = |p: f64| l * l * n - 2.0 * l * m * o + k * o * o + m * m * p - k * n * p;
-        // Cramer's rule for y_c, the paper's B up to sign: the middle column replaced.
+        // Cramer's rule for y_c, which is the paper's B up to the sign, with the middle column replaced.
         let numerator = -(k * (r * n - s * o) - q * (l * n - o * m) + m * (l * s - r * m)) / 2.0;
         let ours = Circle::through(points.iter().copied()).unwrap();
         assert!((ours.centre[1] + 30.0).abs() < 1e-9 && (numerator / denominator(p) + 30.0).abs() < 1e-6);

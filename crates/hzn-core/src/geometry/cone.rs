@@ -1,10 +1,10 @@
-//! The cone of limb rays: s·e = cos α. What rejection, fit and choice share.
+//! The cone of limb rays, s·e = cos α, which the stages consensus, fit and gates share.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 
-/// The axes of the two cones of half-angle α (cos α = `c`) through two unit rays; `None` when the rays are more than
-/// 2α apart, or the same.
+/// Returns the axes of the two cones of half-angle α (cos α = `c`) through two unit rays. `None` when the rays are more
+/// than 2α apart, or equal.
 ///
 /// e = a (s₁ + s₂) ± √((1 − 2a²(1 + s₁·s₂))/|n|²) n with a = c/(1 + s₁·s₂), n = s₁ × s₂.
 #[inline]
@@ -25,7 +25,8 @@ pub(crate) fn through_two<T: Real>(s1: &V3<T>, s2: &V3<T>, c: T) -> Option<[V3<T
     Some([mid + off, mid - off])
 }
 
-/// Axis and cos α of the cone through three unit rays: the normal of their plane, turned towards them.
+/// Returns axis and cos α of the cone through three unit rays. The axis is the normal of the plane through their tips,
+/// turned towards the rays.
 #[inline]
 pub(crate) fn through_three<T: Real>(s1: &V3<T>, s2: &V3<T>, s3: &V3<T>) -> Option<(V3<T>, T)> {
     let n = (s2 - s1).cross(&(s3 - s1));
@@ -38,10 +39,10 @@ pub(crate) fn through_three<T: Real>(s1: &V3<T>, s2: &V3<T>, s3: &V3<T>) -> Opti
     Some(if c < T::zero() { (-e, -c) } else { (e, c) })
 }
 
-/// cos α as a function of azimuth, for an ellipsoid whose east is known in the camera.
+/// cos α as a function of azimuth, for an ellipsoid whose east direction is known in the camera frame.
 ///
-/// cot²α(φ) = cot²α_E cos²φ + cot²α_M sin²φ, written as an offset from the mean cone, so that a free half-angle
-/// shifts both alike.
+/// cot²α(φ) = cot²α_E cos²φ + cot²α_M sin²φ, written as an offset from the mean cone, so that a free half-angle shifts
+/// both in the same way.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Azimuth<T> {
     pub(crate) east: V3<T>,
@@ -50,24 +51,25 @@ pub(crate) struct Azimuth<T> {
     /// cos of the mean half-angle.
     pub(crate) mean_cos: T,
     pub(crate) north: V3<T>,
-    /// First and second harmonic of cos α about the axis, from north, on top: a limb height that varies with latitude.
+    /// First and second harmonic of cos α in azimuth, counted from north. They are added to the ellipsoid and describe
+    /// a limb height that varies with latitude.
     pub(crate) harmonics_cos: [T; 2],
 }
 
 impl<T: Real> Azimuth<T> {
-    /// cos α(φ) − cos ᾱ for a ray `s` about the axis `e` with d = s·e.
+    /// Returns cos α(φ) − cos ᾱ for a ray `s` about the axis `e`, with d = s·e and `east_along` = east·e.
     #[inline(always)]
     pub(crate) fn offset(&self, s: [T; 3], d: T, east_along: T) -> T {
         let one = T::one();
         let transverse = (one - d * d).max(T::EPSILON);
-        // Component of the ray's transverse part along east; east itself is transverse to the axis.
+        // The component of the ray's transverse part along east; east itself is transverse to the axis.
         let along = s[0] * self.east.x + s[1] * self.east.y + s[2] * self.east.z - d * east_along;
         let cos2 = (along * along / transverse).min(one);
         let cot2 = self.cot2_meridian + (self.cot2_east - self.cot2_meridian) * cos2;
         let [first, second] = self.harmonics_cos;
         let mut height = second * (one - cos2 - cos2);
         if first != T::ZERO {
-            // That north may lie some degrees off the tangent plane makes a small part of a small term.
+            // North may lie some degrees off the tangent plane. This changes only a small part of a small term.
             let along = s[0] * self.north.x + s[1] * self.north.y + s[2] * self.north.z;
             height += first * along / transverse.sqrt();
         }

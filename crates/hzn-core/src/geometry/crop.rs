@@ -1,24 +1,25 @@
-//! A rectangle of a picture, or of a smaller copy of it: the parts that the division of a picture looks at.
+//! A rectangle of a picture or of a smaller copy of it. The subdivision of a picture examines these rectangles.
 
 use crate::base::real::Real;
 use crate::geometry::pixel::{ImagePoint, Pixel};
 
-/// A rectangle of the picture's smaller copy, and how much smaller that is.
+/// A rectangle of a smaller copy of the picture, with the scale of the copy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Crop {
     /// First column and row in the copy.
     pub(crate) x0: u16,
     pub(crate) y0: u16,
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub(crate) width: u16,
     pub(crate) height: u16,
-    /// The picture's columns and rows, and the copy's.
+    /// Columns and rows of the picture, and those of the copy.
     pub(crate) full: [u16; 2],
     pub(crate) copy: [u16; 2],
 }
 
 impl Crop {
-    /// All of a copy of `height` rows (all of the picture itself, when it has no more).
+    /// Returns the whole of a copy with `height` rows; the whole picture itself when the picture has no more rows than
+    /// that.
     pub(crate) fn whole(picture: [u16; 2], height: Option<u16>) -> Self {
         let copy = match height {
             Some(h) if h < picture[1] => {
@@ -30,17 +31,17 @@ impl Crop {
         Self { x0: 0, y0: 0, width: copy[0], height: copy[1], full: picture, copy }
     }
 
-    /// Whether it is the picture itself.
+    /// Returns whether the rectangle is the picture itself.
     pub(crate) fn is_all(&self) -> bool {
         [self.width, self.height] == self.full
     }
 
-    /// Pixels.
+    /// Returns the number of pixels.
     pub(crate) fn area(&self) -> u32 {
         u32::from(self.width) * u32::from(self.height)
     }
 
-    /// Its halves across the longer side; `None` when there is only a pixel.
+    /// Cuts the rectangle into halves across the longer side; `None` when it is a single pixel.
     pub(crate) fn halves(&self) -> Option<[Self; 2]> {
         let (mut a, mut b) = (*self, *self);
         if self.width >= self.height {
@@ -55,12 +56,12 @@ impl Crop {
         (a.area() > 0).then_some([a, b])
     }
 
-    /// Pixels of the picture a pixel of the crop, in x and y.
+    /// Returns the number of picture pixels per pixel of the crop, in x and y.
     pub(crate) fn scale<T: Real>(&self) -> [T; 2] {
         [0, 1].map(|k| T::from_f64(f64::from(self.full[k]) / f64::from(self.copy[k])))
     }
 
-    /// A place of the crop in the picture.
+    /// Converts a point of the crop to a point of the picture.
     pub(crate) fn in_picture<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
         let ([sx, sy], half) = (self.scale(), T::from_f64(0.5));
         ImagePoint {
@@ -69,7 +70,7 @@ impl Crop {
         }
     }
 
-    /// A place of the picture in the crop.
+    /// Converts a point of the picture to a point of the crop.
     pub(crate) fn of_picture<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
         let ([sx, sy], half) = (self.scale(), T::from_f64(0.5));
         ImagePoint {
@@ -78,7 +79,7 @@ impl Crop {
         }
     }
 
-    /// The picture's pixel in which the centre of a pixel of the crop lies.
+    /// Returns the pixel of the picture that contains the centre of a pixel of the crop.
     pub(crate) fn pixel(&self, x: u16, y: u16) -> Pixel {
         let place = |at: u16, first: u16, k: usize| {
             let at = 2 * (u64::from(at) + u64::from(first)) + 1;

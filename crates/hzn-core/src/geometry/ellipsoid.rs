@@ -1,8 +1,8 @@
 //! The limb of an ellipsoid of revolution.
 //!
-//! The rays that touch an ellipsoid form an elliptic cone. Its axis and its two half-angles follow in closed form
-//! from the position alone; no attitude is needed. The **limb axis** is what a horizon sensor measures: in low orbit
-//! it is within 0.02° of the geodetic vertical and up to 0.19° from the direction to the Earth's centre.
+//! The rays that touch an ellipsoid form an elliptic cone. The axis and the two half-angles of the cone follow in
+//! closed form from the position alone; no attitude is needed. A horizon sensor measures the **limb axis**. In low
+//! orbit it is within 0.02° of the geodetic vertical and up to 0.19° from the direction to the Earth's centre.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -29,12 +29,12 @@ pub struct LimbCone<T> {
 }
 
 impl<T: Real> LimbCone<T> {
-    /// The cone of the ellipsoid with semi-axes `a_m` (equator) and `b_m` (pole) seen from `position_m` (ECEF,
-    /// metres); `None` when the position is not outside the ellipsoid or not finite.
+    /// Returns the cone of the ellipsoid with semi-axes `a_m` (equator) and `b_m` (pole) seen from `position_m` (ECEF,
+    /// metres). `None` when the position is not outside the ellipsoid or not finite.
     ///
-    /// The cone's matrix is that of the polar form; in the meridian plane its axis stands at
-    /// ψ = ½ atan2(2 p z, P − Q) with P = p² − a², Q = z² − b², and tan² of the half-angles are a²/μ₁ and −μ₂/μ₁
-    /// with μ = (P + Q)/2 ± √(((P − Q)/2)² + p² z²). Differences of squares are formed as products, in units of a.
+    /// The matrix of the cone is that of the polar form. In the meridian plane its axis lies at the angle
+    /// ψ = ½ atan2(2 p z, P − Q) with P = p² − a², Q = z² − b². tan² of the half-angles is a²/μ₁ and −μ₂/μ₁ with
+    /// μ = (P + Q)/2 ± √(((P − Q)/2)² + p² z²). Differences of squares are computed as products, in units of a.
     pub fn try_new(position_m: [T; 3], a_m: T, b_m: T) -> Option<Self> {
         let one = T::one();
         let [x, y, z] = position_m.map(|v| v / a_m);
@@ -66,18 +66,18 @@ impl<T: Real> LimbCone<T> {
         })
     }
 
-    /// Half-angle in radians whose cot² is the mean of the two: the best single cone.
+    /// Returns the half-angle in radians whose cot² is the mean of the two: the best single cone.
     pub fn mean_half_angle_rad(&self) -> T {
         T::one().atan2(((self.cot2_east + self.cot2_meridian) * T::from_f64(0.5)).sqrt())
     }
-    /// Half-angles in the east-west and in the meridian plane, radians.
+    /// Returns the half-angles in the east-west and in the meridian plane, radians.
     pub fn half_angles_rad(&self) -> (T, T) {
         (T::one().atan2(self.cot2_east.sqrt()), T::one().atan2(self.cot2_meridian.sqrt()))
     }
 }
 
-/// Height above the ellipsoid and geodetic latitude of an ECEF position in metres: (height in metres, latitude in
-/// radians), by Bowring's method with two iterations.
+/// Converts an ECEF position in metres to (height above the ellipsoid in metres, geodetic latitude in radians), by
+/// Bowring's method with two iterations.
 pub fn geodetic<T: Real>([x, y, z]: [T; 3], a_m: T, b_m: T) -> (T, T) {
     let one = T::one();
     let (p, z, b) = ((x * x + y * y).sqrt() / a_m, z / a_m, b_m / a_m);
@@ -99,7 +99,7 @@ pub fn geodetic<T: Real>([x, y, z]: [T; 3], a_m: T, b_m: T) -> (T, T) {
     (h * a_m, lat)
 }
 
-/// ECEF position in metres of a geodetic latitude and longitude (radians) and height (metres).
+/// Converts a geodetic latitude and longitude (radians) and height (metres) to an ECEF position in metres.
 pub fn from_geodetic<T: Real>(lat_rad: T, lon_rad: T, height_m: T, a_m: T, b_m: T) -> [T; 3] {
     let (sl, cl) = lat_rad.sin_cos();
     let (so, co) = lon_rad.sin_cos();

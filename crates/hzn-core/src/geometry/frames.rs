@@ -1,4 +1,4 @@
-//! Coordinate frames as types: a direction, a covariance and a rotation carry the frame they are written in, so
+//! Coordinate frames as types. A direction, a covariance and a rotation carry the frame in which they are written, so
 //! that a wrong product does not compile.
 //!
 //! ```text
@@ -8,8 +8,8 @@
 //!   z forward      WGS-84, rotating
 //! ```
 //!
-//! All frames are right-handed. The types do not protect against a wrong *time* (an ECEF attitude of another
-//! instant) or another camera's rays.
+//! All frames are right-handed. The types do not protect against a wrong *time* (an ECEF attitude of another instant)
+//! or against rays of another camera.
 
 use core::marker::PhantomData;
 
@@ -19,10 +19,10 @@ use crate::base::real::Real;
 /// Camera frame: x right, y down, z along the optical axis, out of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cam {}
-/// Earth-centred, Earth-fixed (WGS-84): x to Greenwich on the equator, z to the north pole.
+/// Earth-centred, Earth-fixed frame (WGS-84): x to Greenwich on the equator, z to the north pole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ecef {}
-/// The vehicle's body frame, tied to the camera by the mounting rotation.
+/// The vehicle's body frame; the mounting rotation ties it to the camera frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Body {}
 
@@ -52,22 +52,22 @@ impl<F, T: Real> UnitVec3<F, T> {
         let n2 = v.dot(&v);
         (n2 > T::from_f64(1e-30) && n2.is_finite()).then(|| Self::assume_unit(v * (T::one() / n2.sqrt())))
     }
-    /// The caller vouches that `v` has unit length.
+    /// Wraps `v` without a check: the caller guarantees that it has unit length.
     pub(crate) fn assume_unit(v: V3<T>) -> Self {
         Self { v, frame: PhantomData }
     }
     pub(crate) fn v(&self) -> &V3<T> {
         &self.v
     }
-    /// The three components.
+    /// Returns the three components.
     pub fn xyz(&self) -> [T; 3] {
         [self.v.x, self.v.y, self.v.z]
     }
-    /// Cosine of the angle between two directions of the same frame.
+    /// Returns the cosine of the angle between two directions of the same frame.
     pub fn dot(&self, other: &Self) -> T {
         self.v.dot(&other.v)
     }
-    /// Angle between two directions of the same frame in radians; exact for small angles too.
+    /// Returns the angle between two directions of the same frame in radians; it is accurate for small angles too.
     pub fn angle_rad(&self, other: &Self) -> T {
         let c = self.v.cross(&other.v);
         c.dot(&c).sqrt().atan2(self.v.dot(&other.v))
@@ -76,22 +76,22 @@ impl<F, T: Real> UnitVec3<F, T> {
 
 #[cfg(feature = "horace")]
 impl<T: Real> UnitVec3<Cam, T> {
-    /// Where it lies in the picture: a unit vector (right, down) from the principal point towards the body's centre,
+    /// Returns the unit vector (right, down) in the picture from the principal point towards the body's centre. This is
     /// HORACE's two-dimensional direction (Barf 2014, (2.37)). `None` straight ahead and straight behind.
     pub fn in_picture(&self) -> Option<[T; 2]> {
         let flat = (self.v.x * self.v.x + self.v.y * self.v.y).sqrt();
         (flat > T::from_f64(1e-12)).then(|| [self.v.x / flat, self.v.y / flat])
     }
-    /// Angles in radians by which the camera has to be turned, first about its own y axis (positive: to the right, −π
-    /// to π), then about its x axis (positive: up, −π/2 to π/2), until it looks there (Barf 2014, 2.2.4). A turn about
-    /// the direction itself cannot be told from one direction.
+    /// Returns the angles in radians by which the camera must turn to look in this direction (Barf 2014, 2.2.4). The
+    /// first turn is about the camera's y axis (positive: to the right, −π to π), the second about the turned x axis
+    /// (positive: up, −π/2 to π/2). One direction does not determine the rotation about itself.
     pub fn euler_yx_rad(&self) -> [T; 2] {
         let level = (self.v.x * self.v.x + self.v.z * self.v.z).sqrt();
         [self.v.x.atan2(self.v.z), (-self.v.y).atan2(level)]
     }
 }
 
-/// Covariance of a direction in frame `F`, rad²: symmetric 3×3 of rank 2, its null space along the direction.
+/// Covariance of a direction in frame `F`, rad²: symmetric 3×3 of rank 2; its null space is the direction.
 #[derive(Debug)]
 pub struct Cov3<F, T> {
     /// The upper triangle: xx, xy, xz, yy, yz, zz, in rad².
@@ -111,21 +111,21 @@ impl<F, T: PartialEq> PartialEq for Cov3<F, T> {
 }
 
 impl<F, T: Real> Cov3<F, T> {
-    /// From the upper triangle xx, xy, xz, yy, yz, zz in rad².
+    /// Makes a covariance from the upper triangle xx, xy, xz, yy, yz, zz in rad².
     pub fn from_upper(upper_rad2: [T; 6]) -> Self {
         Self { upper_rad2, frame: PhantomData }
     }
-    /// From a 2×2 covariance (xx, xy, yy) on the tangent plane spanned by `b1`, `b2`.
+    /// Makes a covariance from a 2×2 covariance (xx, xy, yy) on the tangent plane spanned by `b1`, `b2`.
     pub(crate) fn from_tangent(b1: &V3<T>, b2: &V3<T>, [p11, p12, p22]: [T; 3]) -> Self {
         let at = |i: usize, j: usize| b1[i] * b1[j] * p11 + (b1[i] * b2[j] + b2[i] * b1[j]) * p12 + b2[i] * b2[j] * p22;
         Self::from_upper([at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)])
     }
-    /// Rows of the full matrix in rad².
+    /// Returns the rows of the full matrix in rad².
     pub fn rows(&self) -> [[T; 3]; 3] {
         let [xx, xy, xz, yy, yz, zz] = self.upper_rad2;
         [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
     }
-    /// Variance along the direction `d`, rad².
+    /// Returns the variance along the direction `d`, rad².
     pub fn along(&self, d: &UnitVec3<F, T>) -> T {
         let rows = self.rows();
         let d = d.xyz();
@@ -137,9 +137,9 @@ impl<F, T: Real> Cov3<F, T> {
         }
         sum
     }
-    /// The larger of the two standard deviations in radians.
+    /// Returns the larger of the two standard deviations in radians.
     ///
-    /// Of a rank-2 matrix the two eigenvalues follow from the trace and the sum of the principal minors.
+    /// The two eigenvalues of a rank-2 matrix follow from the trace and the sum of the principal minors.
     pub fn sigma_max_rad(&self) -> T {
         let [xx, xy, xz, yy, yz, zz] = self.upper_rad2;
         let half = (xx + yy + zz) * T::from_f64(0.5);
@@ -148,7 +148,7 @@ impl<F, T: Real> Cov3<F, T> {
     }
 }
 
-/// A rotation that takes coordinates from frame `A` to frame `B`.
+/// A rotation that converts coordinates from frame `A` to frame `B`.
 #[derive(Debug)]
 pub struct Rotation<A, B, T> {
     rows: [V3<T>; 3],
@@ -162,8 +162,8 @@ impl<A, B, T: Clone> Clone for Rotation<A, B, T> {
 impl<A, B, T: Copy> Copy for Rotation<A, B, T> {}
 
 impl<A, B, T: Real> Rotation<A, B, T> {
-    /// From a quaternion, scalar first, that takes coordinates **from A to B**; the caller vouches for the direction.
-    /// It is normalised; `None` when it has no length or is not finite.
+    /// Makes a rotation from a quaternion, scalar first, that converts coordinates **from A to B**; the caller
+    /// guarantees this direction. The quaternion is normalised; `None` when its length is about 0 or not finite.
     pub fn assume_from_quaternion([w, x, y, z]: [T; 4]) -> Option<Self> {
         let n2 = w * w + x * x + y * y + z * z;
         if !(n2 > T::from_f64(1e-12) && n2.is_finite()) {
@@ -180,12 +180,12 @@ impl<A, B, T: Real> Rotation<A, B, T> {
             frames: PhantomData,
         })
     }
-    /// The direction in the new frame.
+    /// Converts a direction to the new frame.
     pub fn apply(&self, d: &UnitVec3<A, T>) -> UnitVec3<B, T> {
         let [a, b, c] = &self.rows;
         UnitVec3::assume_unit(V3::new(a.dot(&d.v), b.dot(&d.v), c.dot(&d.v)))
     }
-    /// The rotation back.
+    /// Returns the inverse rotation.
     pub fn inverse(&self) -> Rotation<B, A, T> {
         let [a, b, c] = &self.rows;
         Rotation { rows: [V3::new(a.x, b.x, c.x), V3::new(a.y, b.y, c.y), V3::new(a.z, b.z, c.z)], frames: PhantomData }
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn quaternion_turns_from_a_to_b_and_back() {
         let half = core::f64::consts::FRAC_1_SQRT_2;
-        // +90° about z takes x to y.
+        // A turn of +90° about z converts x to y.
         let r = Rotation::<Cam, Body, f64>::assume_from_quaternion([half, 0.0, 0.0, half]).unwrap();
         let x = UnitVec3::try_new([1.0, 0.0, 0.0]).unwrap();
         let y = r.apply(&x);
@@ -225,7 +225,7 @@ mod tests {
         for v in [[0.3, -0.5, 0.8], [-0.9, 0.1, -0.3], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
             let d = UnitVec3::<Cam, f64>::try_new(v).unwrap();
             let [y, x] = d.euler_yx_rad();
-            // The camera's z axis after a turn about y, then about the new x.
+            // The camera's z axis after a turn about y and then about the new x.
             let ((sy, cy), (sx, cx)) = (libm::sincos(y), libm::sincos(x));
             let z = UnitVec3::<Cam, f64>::try_new([sy * cx, -sx, cy * cx]).unwrap();
             assert!(z.angle_rad(&d) < 1e-15, "{v:?}");

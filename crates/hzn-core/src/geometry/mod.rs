@@ -1,4 +1,4 @@
-//! Directions, places in a picture, and the shapes that they make.
+//! Directions, points in a picture, lenses, and the shapes of the limb.
 
 pub(crate) mod block;
 pub mod camera;

@@ -1,7 +1,7 @@
-//! Places in a picture. **The pixel-centre rule**, written once: the centre of the top-left pixel is (0, 0), x runs
-//! right, y down; the centre of a w×h picture is ((w − 1)/2, (h − 1)/2).
+//! Image coordinates. **The pixel-centre rule** is written once, here: the centre of the top-left pixel is (0, 0), x
+//! points right and y down. The centre of a w×h picture is ((w − 1)/2, (h − 1)/2).
 
-/// An integer cell of the picture.
+/// A pixel of the picture, with integer coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Pixel {
     /// Column, from 0 at the left.
@@ -10,11 +10,11 @@ pub struct Pixel {
     pub y: u16,
 }
 
-/// A point of the picture, finer than a pixel.
+/// A point of the picture with sub-pixel coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ImagePoint<T> {
-    /// Right, in pixels.
+    /// Coordinate to the right, in pixels.
     pub u: T,
-    /// Down, in pixels.
+    /// Coordinate downwards, in pixels.
     pub v: T,
 }

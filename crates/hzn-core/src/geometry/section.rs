@@ -1,38 +1,38 @@
-//! The limb as a conic section of the plane z = 1, where a pinhole camera sees it (Braun & Barf 2022, section 2).
+//! The limb as a conic section of the plane z = 1, which a pinhole camera sees (Braun & Barf 2022, section 2).
 //!
-//! With the unit axis e, c = cos α and Δ = e_x² + e_y² − c² the picture of the cone s·e = c is an ellipse for Δ < 0 and
-//! a hyperbola for Δ > 0. In its principal frame, x along (e_x, e_y), it is Δ x² − c² y² = c² sin²α/Δ. Lengths are in
-//! focal lengths.
+//! With the unit axis e in the camera frame, c = cos α and Δ = e_x² + e_y² − c², the picture of the cone s·e = c is an
+//! ellipse for Δ < 0 and a hyperbola for Δ > 0. In its principal frame, whose x points along (e_x, e_y), the curve is
+//! Δ x² − c² y² = c² sin²α/Δ. Lengths are in focal lengths.
 
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, UnitVec3};
 
-/// What kind of curve the limb is on the plane.
+/// The kind of curve that the limb is on the plane z = 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A closed curve.
     Ellipse,
-    /// One branch of an open one (or a parabola, the border case).
+    /// One branch of an open curve (or a parabola, the limiting case).
     Hyperbola,
 }
 
 /// The limb of one cone on the plane z = 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Section<T> {
-    /// Δ.
+    /// Δ of the module's equations.
     delta: T,
     /// Unit vector along the projected axis.
     along: [T; 2],
-    /// e_z √(e_x² + e_y²), which is Δ times how far the principal frame's origin lies off.
+    /// e_z √(e_x² + e_y²): Δ times the offset of the principal frame's origin along its x axis.
     offset: T,
     cos: T,
     sin: T,
 }
 
 impl<T: Real> Section<T> {
-    /// The limb of a body in the direction `axis` whose half-angle has the cosine `cos`, 0 to 1. `None` where there is
-    /// none on this side of the camera: for an axis behind it and a cone that does not reach around (the ellipse that
-    /// the equations give then belongs to the other nappe).
+    /// Returns the limb of a body in the direction `axis` whose half-angle has the cosine `cos`, between 0 and 1.
+    /// `None` when there is no limb in front of the camera: the axis points behind the camera and the cone does not
+    /// reach around it. The equations still give an ellipse there, but it belongs to the other nappe.
     pub fn new(axis: &UnitVec3<Cam, T>, cos: T) -> Option<Self> {
         let [x, y, z] = axis.xyz();
         let one = T::one();
@@ -45,42 +45,44 @@ impl<T: Real> Section<T> {
         if z < T::ZERO && delta <= T::ZERO {
             return None;
         }
-        // Straight ahead any direction will do.
+        // Straight ahead, any direction will do.
         let along = if flat > T::from_f64(1e-12) { [x / flat, y / flat] } else { [one, T::ZERO] };
         Some(Self { delta, along, offset: z * flat, cos, sin: (one - cos * cos).sqrt() })
     }
 
-    /// Ellipse or hyperbola.
+    /// Returns whether the limb is an ellipse or a hyperbola.
     pub fn kind(&self) -> Kind {
         if self.delta < T::ZERO { Kind::Ellipse } else { Kind::Hyperbola }
     }
 
-    /// Semi-axes (along the projected axis, across it) in focal lengths: c sin α/|Δ| and sin α/√|Δ|. The paper's figure
-    /// 16 leaves out the absolute value in the second, which makes it imaginary for hyperbolae. Infinite for a
-    /// parabola.
+    /// Returns the semi-axes (along the projected axis, across it) in focal lengths: c sin α/|Δ| and sin α/√|Δ|. Figure
+    /// 16 of the paper leaves out the absolute value in the second one, which makes it imaginary for hyperbolae. Both
+    /// are infinite for a parabola.
     pub fn semi_axes(&self) -> [T; 2] {
         let d = self.delta.abs();
         [self.cos * self.sin / d, self.sin / d.sqrt()]
     }
 
-    /// A point (x, y) of the plane in the principal frame. (27) prints the shift as a stack of three; it is the
-    /// fraction e_z √(e_x² + e_y²)/Δ along x. Not finite for a parabola, whose frame lies at infinity.
+    /// Converts a point (x, y) of the plane to the principal frame. The paper's (27) prints the shift as a stack of
+    /// three terms; it is the fraction e_z √(e_x² + e_y²)/Δ along x. The result is not finite for a parabola, whose
+    /// frame lies at infinity.
     pub fn principal(&self, [x, y]: [T; 2]) -> [T; 2] {
         let [a, b] = self.along;
         [a * x + b * y + self.offset / self.delta, a * y - b * x]
     }
 
-    /// Distance of a point of the plane from the limb along the principal x axis, in focal lengths, outwards of the
-    /// hyperbola's opening positive: (28) for one point. The paper takes the absolute value of x, which lets points of
-    /// the wrong branch pass, and adds up, which lets short edges pass.
+    /// Returns the distance of a point of the plane from the limb along the principal x axis, in focal lengths: (28)
+    /// for one point. For a hyperbola it is positive on the side to which the branch opens. The paper takes the
+    /// absolute value of x, so that points of the wrong branch pass. It also adds up the distances, so that short edges
+    /// pass.
     ///
-    /// x − a √(1 ± y²/b²) is a difference of large numbers for a nearly parabolic limb; extended by the sum it is the
-    /// conic's value over a sum, which is well-behaved there too. Where an ellipse has no point at this height the
-    /// distance from its end is what is left of x.
+    /// x − a √(1 ± y²/b²) is a difference of large numbers for a nearly parabolic limb. Multiplied and divided by the
+    /// sum of the two terms, it is the value of the conic over that sum, which is well-behaved there too. Where an
+    /// ellipse has no point at this principal y, the distance is the principal x itself: the ellipse ends at x = 0.
     pub fn distance(&self, [x, y]: [T; 2]) -> T {
         let [a, b] = self.along;
         let (u, v) = (a * x + b * y, a * y - b * x);
-        // Δ x in the principal frame.
+        // Δ times the principal x.
         let lever = self.delta * u + self.offset;
         let radicand = self.sin * self.sin + self.delta * v * v;
         if radicand < T::ZERO {
@@ -88,30 +90,30 @@ impl<T: Real> Section<T> {
         }
         let root = self.cos * radicand.sqrt();
         if self.delta > T::ZERO && lever < T::ZERO {
-            // Beside the branch that is not seen.
+            // The point lies near the branch that the camera does not see.
             return (lever - root) / self.delta;
         }
         let root = if lever < T::ZERO { -root } else { root };
         let c2 = self.cos * self.cos;
-        // (p·e)² − c² |p|² as Δ u² + 2 offset u + (e_z² − c²) − c² v², with e_z² − c² = sin²α − c² − Δ.
+        // (p·e)² − c² |p|² is Δ u² + 2 offset u + (e_z² − c²) − c² v², with e_z² − c² = sin²α − c² − Δ.
         let value =
             self.delta * (u * u - T::one()) + (self.offset + self.offset) * u + self.sin * self.sin - c2 - c2 * v * v;
         value / (lever + root)
     }
 }
 
-/// Whether a camera with this field of view (full angle, radians) can see an elliptic limb of this half-angle at all,
-/// whichever way it looks: γ > 4α − π. The paper's section 2.7 has this and the next condition exchanged.
+/// Returns whether a camera with this field of view (full angle, radians) can see an elliptic limb of this half-angle
+/// (radians) in any attitude: γ > 4α − π. The paper's section 2.7 exchanges this condition and the next one.
 pub fn ellipse_can_be_seen<T: Real>(field_of_view_rad: T, half_angle_rad: T) -> bool {
     field_of_view_rad > half_angle_rad * T::from_f64(4.0) - T::from_f64(core::f64::consts::PI)
 }
 
-/// Whether a hyperbolic limb can be seen: γ > π − 4α.
+/// Returns whether a hyperbolic limb can be seen: γ > π − 4α. Both angles are in radians.
 pub fn hyperbola_can_be_seen<T: Real>(field_of_view_rad: T, half_angle_rad: T) -> bool {
     field_of_view_rad > T::from_f64(core::f64::consts::PI) - half_angle_rad * T::from_f64(4.0)
 }
 
-/// Whether the whole disc can be seen: γ > 2α.
+/// Returns whether the whole disc can be seen: γ > 2α. Both angles are in radians.
 pub fn disc_can_be_seen<T: Real>(field_of_view_rad: T, half_angle_rad: T) -> bool {
     field_of_view_rad > half_angle_rad + half_angle_rad
 }
@@ -123,7 +125,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Points of the limb in front of the camera, on the plane, `off` radians outside.
+    /// Returns points of the limb in front of the camera, on the plane, `off` radians outside.
     fn limb(axis: &UnitVec3<Cam, f64>, alpha: f64, off: f64) -> Vec<[f64; 2]> {
         let (b1, b2) = basis(axis.v());
         let (sin, cos) = libm::sincos(alpha + off);
@@ -138,7 +140,7 @@ mod tests {
     }
 
     proptest! {
-        /// Limb points are on the section, in both forms of the equation, whichever way the camera looks.
+        /// Limb points lie on the section, in both forms of the equation, in every attitude of the camera.
         #[test]
         fn limb_points_lie_on_the_section(
             x in -1.0..1.0f64, y in -1.0..1.0f64, z in -0.3..1.0f64, alpha in 0.1..1.5f64,
@@ -155,14 +157,14 @@ mod tests {
                     let sign = if section.kind() == Kind::Ellipse { 1.0 } else { -1.0 };
                     let value = (px / a).powi(2) + sign * (py / b).powi(2) - 1.0;
                     prop_assert!(value.abs() < 1e-4 * (1.0 + (px / a).powi(2)), "{value}");
-                    // The visible branch of a hyperbola is that of positive x.
+                    // The visible branch of a hyperbola has positive x.
                     prop_assert!(section.kind() == Kind::Ellipse || px > 0.0);
                 }
             }
         }
     }
 
-    /// (28) as printed, with |x|: on the branch that no camera sees it is zero, where the distance is large.
+    /// With |x|, as printed, (28) is zero on the branch that no camera sees; the correct distance there is large.
     #[test]
     fn the_other_branch_is_far_away() {
         let axis = UnitVec3::try_new([0.0, 0.94, 0.34]).unwrap();
@@ -172,7 +174,7 @@ mod tests {
         let shift = 0.94 * 0.34 / (0.94 * 0.94 + 0.34 * 0.34) / (0.94 * 0.94 / (0.94 * 0.94 + 0.34 * 0.34) - 0.04);
         let y = 0.3;
         let x = a * libm::sqrt(1.0 + y * y / (b * b));
-        // Along the projected axis (down) by −x − shift: principal x is −x.
+        // The point lies along the projected axis (down) by −x − shift: its principal x is −x.
         let wrong = [-y, -x - shift];
         let printed = section.principal(wrong)[0].abs() - x;
         assert!(printed.abs() < 1e-9, "{printed}");
@@ -195,7 +197,7 @@ mod tests {
             assert!(value(right[0]).abs() < 1e-9 * (1.0 + (right[0] / a).powi(2)));
             assert!(value(printed).abs() > 1e-3, "{}", value(printed));
         }
-        // Figure 16: b² without the absolute value is negative for this hyperbola: −F'/C' with C' = −c².
+        // Figure 16: without the absolute value, b² = −F'/C' with C' = −c² is negative for this hyperbola.
         assert!(section.kind() == Kind::Hyperbola && b.is_finite());
     }
 
@@ -215,7 +217,7 @@ mod tests {
         assert!((a - libm::tan(0.4)).abs() < 1e-12 && (b - a).abs() < 1e-12);
     }
 
-    /// Distances have the size that they should: half a degree outside the limb.
+    /// Distances have the right size: here half a degree outside the limb.
     #[test]
     fn distance_is_signed_and_of_the_right_size() {
         for axis in [[0.0, 0.94, 0.34], [0.1, 0.3, 0.95]] {
@@ -229,8 +231,8 @@ mod tests {
         }
     }
 
-    /// The three conditions against brute force over all tilts: a limb point within half the field of view of the
-    /// boresight while the section is of the kind.
+    /// Compares the conditions with brute force over all tilts: a limb point lies within half the field of view of the
+    /// boresight while the section is of the given kind.
     #[test]
     fn visibility_by_brute_force() {
         for altitude_km in [80.0, 238.0, 800.0, 6000.0] {
@@ -259,7 +261,8 @@ mod tests {
                 }
             }
         }
-        // The paper's example: at 238 km an ellipse needs 118.3°; its printed condition says that any camera sees one.
+        // The paper's example: at 238 km an ellipse needs 118.3°. The printed condition says that every camera sees an
+        // ellipse.
         let alpha = libm::asin(6371.0f64 / 6609.0);
         assert!(
             !ellipse_can_be_seen(118.2f64.to_radians(), alpha) && ellipse_can_be_seen(118.4f64.to_radians(), alpha)

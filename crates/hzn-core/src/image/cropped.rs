@@ -1,9 +1,9 @@
-//! A part of a picture, or a smaller copy of it, read from the picture itself: nothing is stored.
+//! A rectangle of a picture, or a smaller copy of it, read from the picture itself; nothing is stored.
 
 use super::Pixels;
 use crate::geometry::crop::Crop;
 
-/// A picture seen through a crop: four pixels are interpolated on reading, unless the crop is of the same scale.
+/// A picture read through a crop. If the scale differs, each read interpolates between four pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cropped<'a, P> {
     picture: &'a P,
@@ -15,7 +15,8 @@ impl<'a, P: Pixels> Cropped<'a, P> {
         Self { picture, crop }
     }
 
-    /// Bilinear: the centre of the crop's pixel (x, y) in the picture, in 1/65536 of a pixel, from the four around.
+    /// Interpolates bilinearly between the four pixels around the centre of the crop's pixel (x, y), which is computed
+    /// in 1/65536 of a pixel of the picture.
     fn between(&self, x: u16, y: u16) -> u16 {
         let place = |at: u16, first: u16, k: usize| -> (u16, u16, u64) {
             let (full, copy) = (i64::from(self.crop.full[k]), i64::from(self.crop.copy[k].max(1)));
@@ -90,7 +91,7 @@ mod tests {
                 }
             }
         }
-        // A half is not a whole pixel beside: four pixels' mean.
+        // At half the size, each pixel is the mean of four pixels and not a copy of one.
         let four: [u8; 16] = [0, 40, 80, 120, 8, 48, 88, 128, 0, 0, 0, 0, 0, 0, 0, 0];
         let picture = Grey::try_new(&four, Layout::packed(4, 4, 1, 8)).unwrap();
         let part = Cropped::new(&picture, Crop::whole([4, 4], Some(2)));
@@ -98,7 +99,7 @@ mod tests {
     }
 
     proptest! {
-        /// Halves down to the smallest cover the picture once, and read the same pixels.
+        /// The smallest halves together cover the picture exactly once and read the same pixels.
         #[test]
         fn halves_cover_the_picture_once(w in 1u16..70, h in 1u16..70) {
             let data: Vec<u16> = (0..u32::from(w) * u32::from(h)).map(|i| i as u16).collect();

@@ -1,8 +1,8 @@
-//! The picture at the door: checked once, after which no read can fail.
+//! The input picture. It is checked once; after that no read can fail.
 //!
-//! A picture is a borrowed slice of 8- or 16-bit samples, grey or interleaved colour, with any row stride. The
-//! pipeline is generic over [`Pixels`], so each kind gets its own compiled copy and a flight computer links only
-//! the one it uses.
+//! A picture is a borrowed slice of 8- or 16-bit samples, grey or interleaved colour, with any row stride. The pipeline
+//! is generic over [`Pixels`]. Each kind of picture gets its own compiled copy, and a flight computer links only the
+//! one that it uses.
 
 #[cfg(feature = "horace")]
 mod cropped;
@@ -16,58 +16,60 @@ use crate::geometry::block::Lit;
 #[cfg(feature = "horace")]
 pub(crate) use cropped::Cropped;
 
-/// What the pipeline reads: one brightness per pixel.
+/// The input of the pipeline: one brightness per pixel.
 pub trait Pixels {
-    /// The picture is gone, and of its edges only [`Self::streamed_point`] is left.
+    /// Whether the picture arrived row by row and is no longer in memory. Only [`Self::streamed_point`] then has its
+    /// edges.
     const STREAMED: bool = false;
-    /// Columns, 1 to 65535.
+    /// Returns the number of columns, 1 to 65535.
     fn width(&self) -> u16;
-    /// Rows, 1 to 65535.
+    /// Returns the number of rows, 1 to 65535.
     fn height(&self) -> u16;
-    /// The largest value a sample can have, such as 255 or 4095.
+    /// Returns the largest value that a sample can have, for example 255 or 4095.
     fn full_scale(&self) -> u16;
-    /// Where column `x`, row `y` stands in memory, for [`Self::read`].
+    /// Returns the index of column `x`, row `y` in memory, for [`Self::read`].
     fn index(&self, x: u16, y: u16) -> usize;
-    /// Index distance from a column to the next.
+    /// Returns the index distance from a column to the next.
     fn across(&self) -> usize;
-    /// Index distance from a row to the next.
+    /// Returns the index distance from a row to the next.
     fn down(&self) -> usize;
-    /// Brightness at an index; 0 beyond the end.
+    /// Returns the brightness at an index; 0 beyond the end.
     fn read(&self, index: usize) -> u16;
-    /// Brightness at an index and at the two columns to the right of it.
+    /// Returns the brightness at an index and at the two columns to the right of it.
     #[inline(always)]
     fn three(&self, index: usize) -> [u16; 3] {
         [0, 1, 2].map(|k| self.read(index + k * self.across()))
     }
-    /// Of `count` pixels from an index to the right, how many before the first that is not as `lit` says: at `level` or
-    /// brighter.
+    /// Counts pixels from an index to the right, up to `count`, before the first that is not as `lit` says. A pixel is
+    /// lit at `level` or above.
     #[inline(always)]
     fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
         (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()
     }
-    /// The edge point of a border pixel, of a picture that came row by row: it was measured when the rows around it
-    /// were there.
+    /// Returns the edge point of a border pixel, for a picture that arrived row by row. The point was measured while
+    /// the rows around it were in memory.
     fn streamed_point(&self, _x: u16, _y: u16) -> Option<StreamedPoint> {
         None
     }
-    /// Brightness at column `x`, row `y`. The caller stays within the picture: beyond, it is some pixel or 0.
+    /// Returns the brightness at column `x`, row `y`. The caller must stay within the picture; beyond it, the result is
+    /// some other pixel or 0.
     #[inline(always)]
     fn at(&self, x: u16, y: u16) -> u16 {
         self.read(self.index(x, y))
     }
 }
 
-/// An edge point as it is kept beside its border pixel, see [`Pixels::streamed_point`].
+/// An edge point that is stored with its border pixel, see [`Pixels::streamed_point`].
 #[derive(Debug, Clone, Copy)]
 pub struct StreamedPoint {
-    /// From the pixel's centre, away from the light.
+    /// Distance from the pixel's centre, away from the light, px.
     pub(crate) towards_dark_px: f32,
     pub(crate) lit: Lit,
-    /// It stands at the global level.
+    /// Whether the point is located at the picture's threshold, because no local mid-level was found.
     pub(crate) fallback: bool,
-    /// Its lit side is clipped at full scale.
+    /// Whether its lit side is clipped at full scale.
     pub(crate) clipped: bool,
-    /// Its plateaus were not within what was held.
+    /// Whether its plateaus were not within the rows that were held.
     pub(crate) cut: bool,
 }
 
@@ -118,11 +120,11 @@ pub enum ImageError {
     Size,
     /// The stride is shorter than a row of samples.
     Stride,
-    /// The slice ends before the last row does.
+    /// The slice ends before the end of the last row.
     TooShort,
-    /// No channel of that number, or a channel count of zero.
+    /// There is no channel with that number, or the number of channels is zero.
     Channel,
-    /// Bits per sample must be 8 for bytes, 9 to 16 for words.
+    /// Bits per sample are not 8 for bytes, or not 8 to 16 for words.
     Bits,
 }
 
@@ -142,7 +144,7 @@ impl core::error::Error for ImageError {}
 choices! {
     /// The brightness of a colour pixel.
     pub enum Channel {
-        /// The mean of the first three channels (of all, where there are fewer), rounded down.
+        /// The mean of the first three channels, rounded down; with fewer than three channels, the first one.
         @- Mean = "mean";
         /// The first channel (red, in RGB order).
         @- Red = "red";
@@ -162,14 +164,14 @@ pub struct Layout {
     pub height: u32,
     /// Samples from the start of a row to the start of the next; at least `width * channels`.
     pub stride: usize,
-    /// Interleaved samples a pixel: 1 grey, 3 RGB, 4 RGBA.
+    /// Interleaved samples per pixel: 1 grey, 3 RGB, 4 RGBA.
     pub channels: u8,
     /// Significant bits of a sample: 8 for bytes, 8 to 16 for words.
     pub bits: u8,
 }
 
 impl Layout {
-    /// A picture without padding.
+    /// Makes the layout of a picture without padding.
     pub const fn packed(width: u32, height: u32, channels: u8, bits: u8) -> Self {
         Self { width, height, stride: width as usize * channels as usize, channels, bits }
     }
@@ -181,7 +183,7 @@ pub trait Sample: Copy + Into<u16> {
     const BITS: u8;
     /// 0.
     const ZERO: Self;
-    /// How many samples stand before the first that is not as `lit` says: at `level` or above.
+    /// Counts the samples before the first that is not as `lit` says. A sample is lit at `level` or above.
     #[inline(always)]
     fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
         samples.iter().take_while(|&&s| (s.into() >= level) == lit).count()
@@ -190,8 +192,9 @@ pub trait Sample: Copy + Into<u16> {
 impl Sample for u8 {
     const BITS: u8 = 8;
     const ZERO: Self = 0;
-    /// Eight at once. Whether a byte is at the level or above stands in its high bit: its own high bit and that of the
-    /// rest of it less the rest of the level, both of them for a level with a high bit, either for one without.
+    /// Compares eight bytes at once. The high bit of `rest` says whether the low seven bits of a byte are at least
+    /// those of the level. For a level with a high bit, a byte is at the level or above if both its own high bit and
+    /// that of `rest` are set. For a level without a high bit, one of the two is enough.
     #[inline(always)]
     fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
         const EACH: u64 = 0x0101_0101_0101_0101;
@@ -222,7 +225,7 @@ impl Sample for u16 {
     const ZERO: Self = 0;
 }
 
-/// A picture with one sample a pixel.
+/// A picture with one sample per pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct Grey<'a, S> {
     data: &'a [S],
@@ -232,7 +235,7 @@ pub struct Grey<'a, S> {
     full_scale: u16,
 }
 
-/// A picture with interleaved colours, read as one brightness a pixel.
+/// A picture with interleaved colours, read as one brightness per pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct Colour<'a, S> {
     grey: Grey<'a, S>,
@@ -264,7 +267,7 @@ fn check<S: Sample>(data: &[S], l: Layout) -> Result<Grey<'_, S>, ImageError> {
 }
 
 impl<'a, S: Sample> Grey<'a, S> {
-    /// A grey picture; `layout.channels` must be 1.
+    /// Makes a grey picture; `layout.channels` must be 1.
     pub fn try_new(data: &'a [S], layout: Layout) -> Result<Self, ImageError> {
         if layout.channels != 1 {
             return Err(ImageError::Channel);
@@ -274,7 +277,7 @@ impl<'a, S: Sample> Grey<'a, S> {
 }
 
 impl<'a, S: Sample> Colour<'a, S> {
-    /// An interleaved colour picture, or grey with alpha (2 channels, of which the mean is the first).
+    /// Makes an interleaved colour picture, or grey with alpha (2 channels, where the mean is the first channel).
     pub fn try_new(data: &'a [S], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
         let grey = check(data, layout)?;
         let colours: usize = match layout.channels {
@@ -368,21 +371,21 @@ impl<S: Sample> Pixels for Colour<'_, S> {
     }
 }
 
-/// A picture whose kind is known only when the program runs, as on a workstation.
+/// A picture whose kind is known only at run time, as on a workstation.
 #[derive(Debug, Clone, Copy)]
 pub enum ImageView<'a> {
-    /// One byte a pixel.
+    /// One byte per pixel.
     Grey8(Grey<'a, u8>),
-    /// One word a pixel.
+    /// One word per pixel.
     Grey16(Grey<'a, u16>),
-    /// Several bytes a pixel.
+    /// Several bytes per pixel.
     Colour8(Colour<'a, u8>),
-    /// Several words a pixel.
+    /// Several words per pixel.
     Colour16(Colour<'a, u16>),
 }
 
 impl<'a> ImageView<'a> {
-    /// A picture of bytes.
+    /// Makes a picture from bytes.
     pub fn from_bytes(data: &'a [u8], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
         Ok(if layout.channels == 1 {
             Self::Grey8(Grey::try_new(data, layout)?)
@@ -390,7 +393,7 @@ impl<'a> ImageView<'a> {
             Self::Colour8(Colour::try_new(data, layout, channel)?)
         })
     }
-    /// A picture of 16-bit words.
+    /// Makes a picture from 16-bit words.
     pub fn from_words(data: &'a [u16], layout: Layout, channel: Channel) -> Result<Self, ImageError> {
         Ok(if layout.channels == 1 {
             Self::Grey16(Grey::try_new(data, layout)?)
@@ -441,7 +444,7 @@ mod tests {
 
     #[test]
     fn eight_pixels_at_once_are_as_one_by_one() {
-        // Every level, and one that no byte reaches, beside samples at it, around it and far from it.
+        // This tests every threshold and some that no byte reaches, with samples at it, around it and far from it.
         for level in 0..=300u16 {
             for seed in 0..64u32 {
                 let near = |k: usize| match seed.wrapping_mul(0x9E37_79B1).rotate_left(5 * k as u32) % 64 {
@@ -456,7 +459,7 @@ mod tests {
                 }
             }
         }
-        // Beyond the picture's end nothing is said.
+        // If the pixels reach beyond the picture's end, the count is 0.
         let picture = Grey::try_new(&[9u8; 10], Layout::packed(10, 1, 1, 8)).unwrap();
         assert_eq!([0, 2, 3, 10].map(|i| picture.alike(i, 8, 5, true)), [8, 8, 0, 0]);
     }

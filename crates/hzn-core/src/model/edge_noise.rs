@@ -1,15 +1,16 @@
-//! The errors of edge points: for all bodies, or for one of them.
+//! The noise model of edge points, for all bodies or for one body.
 
 use crate::base::error::ConfigError;
 use crate::base::keys::{Form, Section, Value, choices, section};
 
 choices! {
-    /// Where the noise model of an edge comes from.
+    /// Source of the noise model of an edge.
     pub enum Noise {
-        /// Sigma, common shift and the RMS of a common tilt are the RMS of the edge's own residuals, and the
-        /// correlation length is a twelfth of the edge's length; the values of `[covariance]` are their floor.
+        /// The RMS of the edge's own residuals is the sigma, the common shift and the RMS of a common tilt. The
+        /// correlation length is a twelfth of the edge's length. The values of `[covariance]` are the floor of all of
+        /// them.
         @1 Rms = "rms";
-        /// The values of `[covariance]` hold; only the sigma is raised to the RMS of the residuals where that is
+        /// The values of `[covariance]` are used; only the sigma is raised to the RMS of the residuals if that is
         /// larger.
         ///
         /// This is for values that were measured with the same camera and in the same kind of scene.
@@ -21,12 +22,12 @@ choices! {
 }
 
 choices! {
-    /// How the covariance is found.
+    /// Method that computes the covariance.
     pub enum Method {
         /// N⁻¹ X N⁻¹ of the fit, where X holds the correlated errors of the edge; the expected half-angle is fused.
         @- Sandwich = "sandwich";
-        /// The covariance of the direct nadir, whatever the fit; the expected half-angle is not fused, and the
-        /// residuals raise nothing (Braun & Barf 2022, (33)).
+        /// The covariance of the direct nadir, whichever fit is used; the expected half-angle is not fused, and the
+        /// residuals do not raise it (Braun & Barf 2022, (33)).
         @- BraunBarf = "braun-barf" needs "dlr";
     }
 }
@@ -34,24 +35,25 @@ choices! {
 section! {
     /// `[covariance]` of sensor.toml: the errors of edge points as a Gauss-Markov process along the limb.
     "covariance" pub struct Config: Copy {
-        /// How the covariance is found.
+        /// Method that computes the covariance.
         @- method: Method = Method::Sandwich, [choice];
-        /// Whether the values below hold as they are, or are the floor of values that are measured in each picture.
+        /// Whether the values below are used as they are, or are the floor of values that are measured in each picture.
         @102 noise: Noise = Noise::Rms, [choice];
-        /// 1σ of an edge point, px; raised to the RMS of the residuals where that is larger.
+        /// 1σ of an edge point, px; raised to the RMS of the residuals if that is larger.
         @100 sigma_px: f64 = 0.1, [above 0.0 to 1e4];
-        /// Length along the edge over which the errors of edge points stay alike, px; 0 for white errors.
+        /// Correlation length of edge point errors along the edge, px; 0 for white errors.
         @101 correlation_px: f64 = 60.0, [0.0 to 1e6];
-        /// 1σ of a shift that all points of an edge share, px.
+        /// 1σ of a shift that all points of an edge have in common, px.
         ///
-        /// Threshold, blur, and the profile of a limb that is no wider than a pixel cause it. It counts against the
-        /// expected half-angle.
+        /// Threshold, blur, and the profile of a limb that is no wider than a pixel cause it. It widens the variance of
+        /// the fitted half-angle, which then has less weight against the expected one.
         @103 bias_px: f64 = 0.3, [0.0 to 1e4];
-        /// 1σ of a tilt that the whole edge shares, px: an error from −1 to 1 times it along the edge.
+        /// 1σ of a tilt that the whole edge has in common, px: an error that goes from −1 to 1 times this value along
+        /// the edge.
         ///
-        /// Light that fades along the limb causes it. It counts against the axis.
+        /// Light that fades along the limb causes it. It widens the covariance of the axis.
         @104 tilt_px: f64 = 0.1, [0.0 to 1e4];
-        /// For `braun-barf`: the largest variance holds in every direction.
+        /// For `braun-barf`: whether the largest variance is used in every direction.
         ///
         /// Braun & Barf 2022, (37); it is about twenty times too large.
         @- overbound: bool = false, ["true or false"] { needs: "dlr" };
@@ -59,13 +61,13 @@ section! {
 }
 
 impl Config {
-    /// A known noise model: these values, and no error that the points of an edge share.
+    /// Makes a known noise model from these values, without a common shift or tilt.
     pub fn told(sigma_px: f64, correlation_px: f64) -> Self {
         Self { noise: Noise::Told, sigma_px, correlation_px, bias_px: 0.0, tilt_px: 0.0, ..Self::default() }
     }
 }
 
-/// A body has a table of its own with these keys.
+/// Each body may have its own table with these keys.
 impl Value for Config {
     const FORM: Form = Form::Table;
     fn check(&self, _path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {

@@ -1,4 +1,5 @@
-//! What each source of error adds to an answer's covariance, for those who ask.
+//! The error budget: the contribution of each source of error to the covariance of an answer. It is computed on
+//! request.
 
 use crate::base::linalg::{M3, V3};
 use crate::base::real::Real;
@@ -11,9 +12,9 @@ use crate::model::body::Expected;
 pub enum Term {
     /// Errors of the edge points, correlated along the edge.
     EdgeNoise = 0,
-    /// What shifts every point of the edge alike.
+    /// An equal shift of all points of the edge.
     CommonShift = 1,
-    /// What tilts the whole edge.
+    /// A tilt of the whole edge.
     CommonTilt = 2,
     /// The limb's azimuthal harmonics, whose direction or size is unknown.
     UnknownAzimuth = 3,
@@ -21,16 +22,16 @@ pub enum Term {
     Lens = 4,
     /// The height of the limb, through the expected half-angle.
     LimbHeight = 5,
-    /// The altitude, likewise.
+    /// The altitude, through the expected half-angle.
     Altitude = 6,
-    /// The local radius of the body, likewise.
+    /// The local radius of the body, through the expected half-angle.
     Radius = 7,
-    /// The height of a limb that is clipped at full scale, likewise.
+    /// The height of a limb that is clipped at full scale, through the expected half-angle.
     Clipping = 8,
 }
 
 impl Term {
-    /// Every term in the order of its number.
+    /// All terms in the order of their numbers.
     pub const ALL: [Self; 9] = [
         Self::EdgeNoise,
         Self::CommonShift,
@@ -44,23 +45,23 @@ impl Term {
     ];
 }
 
-/// Terms that are known before the expected half-angle is fused; the rest come through it.
+/// Number of terms that are known before the expected half-angle is fused. The other terms come from the fusion.
 const OF_THE_FIT: usize = 5;
 
-/// The covariance of an answer's axis, term by term. The terms add up to the whole.
+/// The covariance of an answer's axis, term by term. The sum of the terms is the whole covariance.
 #[derive(Debug, Clone, Copy)]
 pub struct ErrorBudget<T> {
-    /// Of (δ₁₂, δc) before the expected half-angle is fused.
+    /// Covariances of (δ₁₂, δc) by term, before the expected half-angle is fused.
     fit: [M3<T>; OF_THE_FIT],
-    /// Of the axis, rad², by term.
+    /// Covariances of the axis in the camera frame by term, rad².
     axis: [Cov3<Cam, T>; Term::ALL.len()],
-    /// The part of the axis' error along the vertical that the expected half-angle takes away or adds: how far the axis
-    /// moves, rad, for a change of 1 in the difference of the cosines.
+    /// Gain of the fusion with the expected half-angle: the shift of the axis in the camera frame, rad, for a change of
+    /// 1 in the difference of the cosines, expected − fitted. It is 0 when the half-angle is not fused.
     pub axis_by_cos: [T; 3],
 }
 
 impl<T: Real> ErrorBudget<T> {
-    /// Of nothing yet.
+    /// Makes an empty error budget.
     pub(crate) fn new() -> Self {
         Self {
             fit: [M3::zeros(); OF_THE_FIT],
@@ -69,15 +70,15 @@ impl<T: Real> ErrorBudget<T> {
         }
     }
 
-    /// Notes what a term adds to the covariance of (δ₁₂, δc).
+    /// Records the contribution of a term to the covariance of (δ₁₂, δc).
     pub(crate) fn record(&mut self, term: Term, p: &M3<T>) {
         if let Some(place) = self.fit.get_mut(term as usize) {
             *place = *p;
         }
     }
 
-    /// Carries the terms over to the axis, δ₁₂ − k δc, and divides the expected half-angle's part, `prior` σ_c, by its
-    /// sources.
+    /// Converts the terms to the axis, δ₁₂ − k δc. The part of the expected half-angle, `prior` (a gain times σ_c), is
+    /// divided among its sources.
     pub(crate) fn project(&mut self, b1: &V3<T>, b2: &V3<T>, [k1, k2]: [T; 2], prior: [T; 2], expected: &Expected<T>) {
         for (axis, p) in self.axis.iter_mut().zip(&self.fit) {
             let p13 = p.m13 - k1 * p.m33;
@@ -99,13 +100,13 @@ impl<T: Real> ErrorBudget<T> {
         self.axis_by_cos = (b1 * k1 + b2 * k2).into();
     }
 
-    /// What a term adds to the covariance of (δ₁₂, δc) before the expected half-angle is fused.
+    /// Returns the contribution of a term to the covariance of (δ₁₂, δc) before the expected half-angle is fused.
     #[cfg(test)]
     pub(crate) fn of_fit(&self, term: Term) -> &M3<T> {
         &self.fit[term as usize]
     }
 
-    /// What a term adds to the covariance of the axis, rad².
+    /// Returns the contribution of a term to the covariance of the axis in the camera frame, rad².
     pub fn of(&self, term: Term) -> Cov3<Cam, T> {
         self.axis.get(term as usize).copied().unwrap_or(Cov3::from_upper([T::ZERO; 6]))
     }

@@ -1,4 +1,4 @@
-//! What the stages and the whole talk about: the body, its limb, errors, the answer.
+//! Types that the stages and the pipeline share: the body, its limb, errors, the answer.
 
 pub mod body;
 pub mod edge_noise;

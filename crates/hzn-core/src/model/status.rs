@@ -1,8 +1,8 @@
-//! What became of a picture, in numbers that never change.
+//! The outcome of a picture. The numbers never change.
 
 use core::fmt;
 
-/// Outcome of one picture. The numbers are frozen: they stand in files and telemetry.
+/// Outcome of one picture. The numbers are frozen, because files and telemetry contain them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Status {
@@ -21,16 +21,16 @@ pub enum Status {
     Ambiguous = 5,
     /// A direction was fitted but failed a gate (residual, half-angle, arc length).
     Rejected = 6,
-    /// Lists overflowed and no answer came of it.
+    /// Lists overflowed or the work budget was used up, and there is no answer.
     Truncated = 7,
     /// The picture could not be read (host only).
     Unreadable = 8,
-    /// Nothing gives the altitude that the body's cone follows from, or it is below the limb height (host only).
+    /// The altitude, which determines the cone of the body, is unknown or not above the limb height (host only).
     NoAltitude = 9,
 }
 
 impl Status {
-    /// Every status in the order of its number.
+    /// All statuses in the order of their numbers.
     pub const ALL: [Self; 10] = [
         Self::Ok,
         Self::NoLimb,
@@ -44,7 +44,7 @@ impl Status {
         Self::NoAltitude,
     ];
 
-    /// The name used in files, such as `no-limb`.
+    /// Returns the name used in files, for example `no-limb`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -67,11 +67,11 @@ impl fmt::Display for Status {
     }
 }
 
-/// The stages in the order in which a picture goes through them.
+/// The stages, in the order in which a picture passes through them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[repr(u8)]
 pub enum Stage {
-    /// Brightness gate and level.
+    /// Brightness gate and threshold.
     #[default]
     Binarize = 0,
     /// Search along the border and border following.
@@ -80,18 +80,18 @@ pub enum Stage {
     Candidates = 2,
     /// Rays of the edge points.
     Undistort = 3,
-    /// Outlier rejection.
+    /// Consensus: the cone that most rays agree on, and the outliers.
     Reject = 4,
     /// Fit of the cone.
     Estimate = 5,
     /// Covariance of the fit.
     Covariance = 6,
-    /// Gates and choice.
+    /// Gates, and the choice of the best candidate.
     Select = 7,
 }
 
 impl Stage {
-    /// Every stage in order.
+    /// All stages in order.
     pub const ALL: [Self; 8] = [
         Self::Binarize,
         Self::Contour,
@@ -102,7 +102,7 @@ impl Stage {
         Self::Covariance,
         Self::Select,
     ];
-    /// The name used in files and messages.
+    /// Returns the name used in files and messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Binarize => "binarize",

@@ -1,19 +1,19 @@
-//! How the threshold between dark and lit is chosen: for all bodies, or for one of them.
+//! The threshold between dark and lit, for all bodies or for one body.
 
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::keys::{Form, Section, Value, choices, section};
 
 choices! {
-    /// How the threshold is found.
+    /// Method that finds the threshold.
     pub enum Method {
-        /// The threshold separates the histogram of a sparse sample best (Otsu 1979).
+        /// The threshold separates the histogram of a sparse sample into two classes as well as possible (Otsu 1979).
         @0 Otsu = "otsu";
         /// The threshold is `level`.
         @1 Fixed = "fixed";
         /// The threshold is `factor` times the mean of the sample.
         @2 Dynamic = "dynamic";
-        /// The threshold is halfway between the brightness on both sides of the limb in the previous picture; `otsu`
-        /// stands in where that picture had no answer.
+        /// The threshold is halfway between the brightness on both sides of the limb in the previous picture; if that
+        /// picture had no answer, `otsu` is used.
         @- Track = "track";
     }
 }
@@ -21,21 +21,21 @@ choices! {
 section! {
     /// `[binarize]` of sensor.toml: the threshold between dark and lit.
     "binarize" pub struct Config: Copy {
-        /// How the threshold is found.
+        /// Method that finds the threshold.
         @50 method: Method = Method::Otsu, [choice];
         /// For `fixed`: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a
         /// fraction of full scale.
         @51 level: f64 = 64.0, [above 0.0 to 65535.0];
         /// For `dynamic`: the threshold is this factor times the mean of the sample.
         @52 factor: f64 = 1.0, [above 0.0 to 100.0];
-        /// For `otsu`: the threshold that was found is multiplied by this.
+        /// For `otsu`: factor by which the threshold is multiplied.
         ///
-        /// It shows how much an answer depends on the threshold.
+        /// Use it to test how much an answer depends on the threshold.
         @53 scale: f64 = 1.0, [0.1 to 10.0];
     }
 }
 
-/// How the Sun is split from everything else.
+/// Threshold that separates the Sun from everything else, at 0.9 of full scale.
 pub(crate) static SUN: Config = Config { method: Method::Fixed, level: 0.9, factor: 1.0, scale: 1.0 };
 
 section! {
@@ -56,7 +56,7 @@ impl Gate {
     }
 }
 
-/// A body has a table of its own with these keys.
+/// Each body may have its own table with these keys.
 impl Value for Config {
     const FORM: Form = Form::Table;
     fn check(&self, _path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {

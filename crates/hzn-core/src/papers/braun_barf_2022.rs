@@ -1,4 +1,5 @@
-//! Gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28), 7.3).
+//! Preset and gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28),
+//! 7.3).
 
 use super::{told, trust_every_fit};
 use crate::base::linalg::{V3, basis};
@@ -15,8 +16,8 @@ use crate::stages::fit::Fit;
 use crate::stages::gates;
 use crate::stages::{consensus, covariance, edge_points, fit, threshold};
 
-/// Braun & Barf 2022 as flown on ATEK: fixed threshold, whole pixels, RANSAC on three points, the direct nadir, the
-/// overbound of its covariance, and none of the gates that came with `hzn`.
+/// Sets the chain of Braun & Barf 2022 as flown on ATEK: fixed threshold, whole pixels, RANSAC on three points, the
+/// direct nadir, the overbound of its covariance, and none of the gates of `hzn`.
 pub(super) fn preset(config: &mut Config) {
     told(config);
     config.binarize.method = threshold::Method::Fixed;
@@ -29,11 +30,12 @@ pub(super) fn preset(config: &mut Config) {
     config.covariance.overbound = true;
     trust_every_fit(config);
     config.select.limb_in_view = true;
-    // Section 7.3, for the Earth. Ours is the mean and not the sum, in focal lengths squared.
+    // The value of section 7.3, for the Earth. This limit applies to the mean and not to the sum, in focal lengths
+    // squared.
     config.select.max_section_residual = Some(0.025);
 }
 
-/// `Passed`, or the gate that the fit fails.
+/// Returns `Passed`, or the gate that the fit fails.
 pub(super) fn verdict<T: Real>(
     fit: &Fit<T>,
     expected: &Expected<T>,
@@ -54,11 +56,11 @@ pub(super) fn verdict<T: Real>(
     }
 }
 
-/// Places around the limb that are looked at.
+/// Number of points around the limb that are tested.
 const PLACES: i32 = 128;
 
-/// Whether any of the limb of the cone (e, c) lies in the region: a nadir from the edge of something else puts it
-/// elsewhere (Braun & Barf 2022, 3.5).
+/// Returns whether any part of the limb of the cone (e, c) lies in the region. A nadir that was fitted to the edge of
+/// something else puts the limb elsewhere (Braun & Barf 2022, 3.5).
 fn in_view<T: Real>(e: &V3<T>, c: T, camera: &Camera<T>, region: &Region<T>) -> bool {
     let (b1, b2) = basis(e);
     let sin = (T::one() - c * c).max(T::ZERO).sqrt();
@@ -72,9 +74,9 @@ fn in_view<T: Real>(e: &V3<T>, c: T, camera: &Camera<T>, region: &Region<T>) -> 
     })
 }
 
-/// Mean square of the points' distances from the conic section of the cone (e, c), along its principal x axis, in
-/// focal lengths squared: (28) as a mean, so that it does not grow with the edge. `None` where there is no section or
-/// no point.
+/// Returns the mean square of the points' distances from the conic section of the cone (e, c), along its principal x
+/// axis, in focal lengths squared. This is (28) as a mean, so that it does not grow with the edge. `None` if there is
+/// no section or no point.
 fn section_residual<T: Real>(e: &V3<T>, c: T, blocks: &[Block<T>]) -> Option<T> {
     let section = Section::new(&UnitVec3::assume_unit(*e), c)?;
     let (mut total, mut count) = (T::ZERO, T::ZERO);

@@ -1,4 +1,4 @@
-//! HORACE's gate: the radius of the circle (Barf 2014, (2.31) to (2.36)).
+//! HORACE: preset, and gate on the radius of the circle (Barf 2014, (2.31) to (2.36)).
 
 use super::{told, trust_every_fit};
 use crate::base::real::Real;
@@ -11,19 +11,20 @@ use crate::stages::fit::Fit;
 use crate::stages::gates;
 use crate::stages::{consensus, contour, edge_points, fit, threshold};
 
-/// HORACE: brightness gate, dynamic threshold, a smaller copy, outer borders of the whole picture, a circle through
-/// each, the radius check, and halves of the picture where that gives nothing.
+/// Sets the chain of HORACE: brightness gate, dynamic threshold, a smaller copy, outer borders of the whole picture, a
+/// circle through each, the radius check, and halves of the picture if there is no answer.
 ///
-/// Its own numbers: 0.75 times the mean; the limb's radius from 100 to 20 km, give or take 5000 px of its picture of
-/// 768 rows; a pixel that at most γ = 5 of its eight neighbours light is edge, for whom chooses `erode` (counted here
-/// with the pixel itself, and from 0: fewer than 7). Ours: the copy's height, the brightness gate, the shortest edge.
+/// HORACE's own numbers are: a threshold of 0.75 times the mean; the limb's radius for altitudes from 100 to 20 km,
+/// ± 5000 px in its picture of 768 rows; γ = 5, where a pixel is edge if at most γ of its eight neighbours are lit. γ
+/// applies only to `contour.method = "erode"`. There the pixel itself counts too and the limit is exclusive, so the key
+/// is 7. The copy's height, the brightness gate and the shortest edge are numbers of `hzn`.
 pub(super) fn preset(config: &mut Config) {
     told(config);
     config.gate.min_mean = 0.02;
     config.gate.max_mean = 0.9;
     config.binarize.method = threshold::Method::Dynamic;
     config.binarize.factor = 0.75;
-    // Lengths are in pixels of the copy.
+    // All lengths are in pixels of the copy.
     let rows = config.camera.height.min(HORACE_ROWS);
     config.input.scale_to_height = (rows < config.camera.height).then_some(rows);
     config.contour.method = contour::Method::Raster;
@@ -41,10 +42,10 @@ pub(super) fn preset(config: &mut Config) {
     config.select.radius_margin_px = 5000.0 * f64::from(rows) / 768.0;
 }
 
-/// Rows of the copy that `horace-2015` looks at.
+/// Number of rows of the copy that `horace-2015` processes.
 const HORACE_ROWS: u16 = 240;
 
-/// `Passed`, or that the circle is too small or too large.
+/// Returns `Passed`, or `Radius` if the circle is too small or too large.
 pub(super) fn verdict<T: Real>(
     fit: &Fit<T>,
     expected: &Expected<T>,
@@ -62,15 +63,15 @@ pub(super) fn verdict<T: Real>(
     }
 }
 
-/// By how much a radius may lie beyond its limits: a part of them, and a length.
+/// Tolerance of the radius beyond its limits: a fraction of the limit, and a length.
 struct Margin<T> {
     part: T,
     focal_lengths: T,
 }
 
-/// Whether a circle of half-angle α, cos α = `c`, has a radius between those of the limb at the highest and the lowest
-/// altitude (Barf 2014, (2.31) to (2.36)), give or take `margin`. Radii are tangents, in focal lengths; compared
-/// without a division, as that at altitude 0 is infinite.
+/// Returns whether a circle of half-angle α, cos α = `c`, has a radius between those of the limb at the highest and the
+/// lowest altitude (Barf 2014, (2.31) to (2.36)), within `margin`. Radii are tangents of half-angles, in focal lengths.
+/// They are compared without a division, because the radius at altitude 0 is infinite.
 fn is_wide_enough<T: Real>(c: T, expected: &Expected<T>, [low, high]: [T; 2], margin: &Margin<T>) -> bool {
     let (one, km) = (T::one(), T::from_f64(1000.0));
     let sin_cos = |altitude: T| {

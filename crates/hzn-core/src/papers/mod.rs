@@ -1,4 +1,4 @@
-//! Named starting values, and what published systems have of their own: a preset, and gates.
+//! The presets of whole sensors, and the gates of published systems.
 
 mod braun_barf_2022;
 mod horace_2015;
@@ -21,11 +21,11 @@ use crate::stages::gates;
 use crate::stages::threshold;
 
 choices! {
-    /// Starting values of a whole sensor; keys that are written in sensor.toml count instead of them.
+    /// Starting values of a whole sensor; keys in sensor.toml replace them.
     pub enum Preset {
-        /// The best chain that is known: every value is the default.
+        /// The best known chain: every value is the default.
         @- Hzn = "hzn";
-        /// The Sun: a disc whose apparent size is no measure, because it blooms.
+        /// The Sun: a disc that blooms, so that its apparent size is not a measurement.
         @- Sun = "sun";
         /// The Moon, lit from any side.
         @- Moon = "moon";
@@ -39,7 +39,7 @@ choices! {
 }
 
 impl Preset {
-    /// The preset of that name.
+    /// Returns the preset with that name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|p| p.name() == name)
     }
@@ -47,23 +47,23 @@ impl Preset {
     /// Checks that this build has the methods of the preset.
     ///
     /// # Errors
-    /// The feature that is missing.
+    /// Returns the feature that is missing.
     pub fn check(self) -> Result<(), ConfigError> {
         Value::check(&self, "preset", 0.0, false, 0.0)
     }
 }
 
 impl Config {
-    /// A sensor with this camera and every other value as the preset has it.
+    /// Makes a sensor with this camera and every other value from the preset.
     pub fn preset(preset: Preset, camera: camera::Config) -> Self {
         let mut config = Self::new(camera);
         match preset {
             Preset::Hzn => {}
-            // It saturates any camera that was not made for it; the sky beside it does not.
+            // The Sun saturates every camera that was not made for it; the sky next to it does not.
             Preset::Sun => disc(&mut config, Kind::Sun, threshold::SUN.level),
             Preset::Moon => {
                 disc(&mut config, Kind::Moon, 0.25);
-                // Half of its limb is lit at most, and less of it bright.
+                // At most half of the Moon's limb is lit, and less than that is bright.
                 config.select.min_support = 0.25;
             }
             Preset::Dlr2022 => braun_barf_2022::preset(&mut config),
@@ -74,15 +74,16 @@ impl Config {
     }
 }
 
-/// A disc with a level (fraction of full scale) that it stands above: its histogram is nearly all sky. The edge of a
-/// blooming disc stands within 3 px, alike all around (Braun & Barf 2022, section 5).
+/// Sets a disc with a fixed threshold (fraction of full scale), because its histogram is nearly all sky. The edge of a
+/// blooming disc lies within 3 px, by the same amount in all directions (Braun & Barf 2022, section 5).
 fn disc(config: &mut Config, kind: Kind, level: f64) {
     config.body.kind = kind;
     config.binarize = threshold::Config { method: threshold::Method::Fixed, level, ..config.binarize };
     config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, bias_px: 0.0, ..config.covariance };
 }
 
-/// The noise model and limb height that the published systems' presets have always had: told values, for comparison.
+/// Sets the noise model and limb height that the published systems' presets have always had: given values, for
+/// comparison.
 fn told(config: &mut Config) {
     config.body.limb_height_km = 10.0;
     config.body.limb_height_sigma_km = 2.0;
@@ -91,10 +92,11 @@ fn told(config: &mut Config) {
     config.reject.noise_sigma = 0.0;
 }
 
-/// Only what every fit must have, and what these methods cost, of which some look at every pixel and every point.
+/// Leaves only the gates that every fit must pass, and raises the work budget: some of these methods examine every
+/// pixel and every point.
 fn trust_every_fit(config: &mut Config) {
     config.limits.max_work = Some(200_000_000);
-    // They looked once.
+    // The published systems look only once.
     config.recover.levels.clear();
     config.recover.frame_px = 0;
     config.select.min_arc_px = Some(0.0);
@@ -106,7 +108,8 @@ fn trust_every_fit(config: &mut Config) {
     config.select.trust_every_shape();
 }
 
-/// The gates of published systems, which come after those of every fit: `Passed`, or the first that the fit fails.
+/// Applies the gates of published systems, which follow the gates of every fit. Returns `Passed`, or the first gate
+/// that the fit fails.
 pub(crate) fn verdict<T: Real>(
     fit: &Fit<T>,
     expected: &Expected<T>,

@@ -4,10 +4,11 @@ use super::{told, trust_every_fit};
 use crate::config::Config;
 use crate::stages::{consensus, contour, edge_points, fit};
 
-/// Wang et al. 2022 as flown on Tianping-2B: Zernike moments on every Sobel edge pixel, RANSAC with pre-verification,
-/// an elliptic cone by total least squares, weighed where the limb leaves the picture, and no gates.
+/// Sets the chain of Wang et al. 2022 as flown on Tianping-2B: Zernike moments on every Sobel edge pixel, RANSAC with
+/// pre-verification, an elliptic cone by total least squares, weighted if the limb leaves the picture, and no gates.
 ///
-/// Their threshold is 1°, which is 1.6 px with their lens (384×288, 92 px/rad); for another it is to be set.
+/// Their threshold is 1°, which is 1.6 px with their lens (384×288, 92 px/rad). For another lens, set
+/// `reject.threshold_px` accordingly.
 pub(super) fn preset(config: &mut Config) {
     told(config);
     config.contour.method = contour::Method::Sobel;

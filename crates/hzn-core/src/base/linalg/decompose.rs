@@ -1,14 +1,15 @@
-//! Decompositions of small matrices by rotations: of a symmetric one by Jacobi's, of a tall one row by row by Givens'.
+//! Decompositions of small matrices by rotations: Jacobi's for a symmetric matrix, Givens' row by row for a tall one.
 
 use crate::base::real::Real;
 
-/// Most sweeps over all pairs. Convergence is quadratic: six are enough for 6×6 in double precision.
+/// Maximum number of sweeps over all pairs. Convergence is quadratic: six are enough for 6×6 in double precision.
 const SWEEPS: usize = 16;
 
-/// Eigenvalues of a symmetric N×N matrix, smallest first, and the unit eigenvectors as rows in the same order.
+/// Returns the eigenvalues of a symmetric N×N matrix, smallest first, and the unit eigenvectors as rows in the same
+/// order.
 ///
-/// Cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, 8.5). Total: a matrix that is not finite gives
-/// values that are not finite, in a bounded time.
+/// The method is cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, 8.5). The function is total: a matrix
+/// that is not finite gives values that are not finite, in a bounded time.
 pub(crate) fn symmetric_eigen<T: Real, const N: usize>(mut m: [[T; N]; N]) -> ([T; N], [[T; N]; N]) {
     let mut vectors = identity();
     for _ in 0..SWEEPS {
@@ -25,7 +26,7 @@ pub(crate) fn symmetric_eigen<T: Real, const N: usize>(mut m: [[T; N]; N]) -> ([
         }
         for p in 0..N {
             for q in p + 1..N {
-                // The rotation that makes m[p][q] zero.
+                // This rotation makes m[p][q] zero.
                 let Some((c, s)) = rotation(m[p][p], m[q][q], m[p][q]) else { continue };
                 for row in &mut m {
                     (row[p], row[q]) = turned(row[p], row[q], c, s);
@@ -45,18 +46,18 @@ pub(crate) fn symmetric_eigen<T: Real, const N: usize>(mut m: [[T; N]; N]) -> ([
     (values, vectors)
 }
 
-/// The triangle R of a tall matrix's QR decomposition, fed row by row: RᵀR is the sum of the rows' squares, without
-/// ever squaring, so that single precision is enough.
+/// The triangle R of the QR decomposition of a tall matrix A that arrives row by row: RᵀR = AᵀA. The product AᵀA is
+/// never computed, so single precision is enough.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Triangle<T, const N: usize>([[T; N]; N]);
 
 impl<T: Real, const N: usize> Triangle<T, N> {
-    /// No rows.
+    /// Creates the triangle of a matrix without rows.
     pub(crate) fn new() -> Self {
         Self([[T::ZERO; N]; N])
     }
 
-    /// One more row, turned into the triangle by Givens rotations.
+    /// Adds a row by Givens rotations.
     pub(crate) fn push(&mut self, mut row: [T; N]) {
         for i in 0..N {
             let (a, b) = (self.0[i][i], row[i]);
@@ -74,15 +75,16 @@ impl<T: Real, const N: usize> Triangle<T, N> {
         }
     }
 
-    /// Its rows.
+    /// Returns the rows of R.
     pub(crate) fn rows(&self) -> &[[T; N]; N] {
         &self.0
     }
 
-    /// Singular values of the fed rows, smallest first, and the right singular vectors as rows in the same order: one
-    /// column of R after another is made orthogonal to the rest (Hestenes 1958), which keeps small values exact.
+    /// Returns the singular values of the rows so far, smallest first, and the right singular vectors as rows in the
+    /// same order. Rotations make the columns of R orthogonal to each other (one-sided Jacobi, Hestenes 1958), which
+    /// keeps small values exact.
     pub(crate) fn singular(&self) -> ([T; N], [[T; N]; N]) {
-        // Columns of R as rows of `u`.
+        // The columns of R are the rows of `u`.
         let mut u = [[T::ZERO; N]; N];
         for i in 0..N {
             for j in 0..N {
@@ -115,8 +117,8 @@ impl<T: Real, const N: usize> Triangle<T, N> {
         (values, v)
     }
 
-    /// The least-squares solution: x with last component 1 for which the rows' products with it are smallest; `None`
-    /// where the rows do not determine it in this precision.
+    /// Returns the x with last component 1 that minimises the sum of (row · x)² over the rows. `None` when the rows do
+    /// not determine x in this precision.
     pub(crate) fn kernel(&self) -> Option<[T; N]> {
         let floor = self.floor(N.saturating_sub(1))?;
         let mut x = [T::ZERO; N];
@@ -133,13 +135,14 @@ impl<T: Real, const N: usize> Triangle<T, N> {
         Some(x)
     }
 
-    /// What an element of the diagonal must exceed among the first `n`; `None` when nothing was fed, or not finite.
+    /// Returns the limit that the first `n` elements of the diagonal must exceed. `None` when there were no rows, or
+    /// when a row is not finite.
     fn floor(&self, n: usize) -> Option<T> {
         let largest = (0..n.min(N)).fold(T::ZERO, |l, i| l.max(self.0[i][i].abs()));
         (largest > T::ZERO && largest.is_finite()).then(|| largest * T::EPSILON * T::from_f64(N as f64))
     }
 
-    /// x with RᵀR x = b; `None` where the rows do not determine it in this precision.
+    /// Returns x with RᵀR x = b; `None` when the rows do not determine x in this precision.
     pub(crate) fn solve(&self, b: [T; N]) -> Option<[T; N]> {
         let floor = self.floor(N)?;
         if (0..N).any(|i| !(self.0[i][i].abs() > floor)) {
@@ -162,7 +165,8 @@ impl<T: Real, const N: usize> Triangle<T, N> {
     }
 }
 
-/// Cosine and sine of the turn that makes [[a, d], [d, b]] diagonal; `None` when it is.
+/// Returns the cosine and sine of the rotation that makes [[a, d], [d, b]] diagonal; `None` when it is diagonal
+/// already.
 fn rotation<T: Real>(a: T, b: T, d: T) -> Option<(T, T)> {
     if d == T::ZERO {
         return None;
@@ -180,7 +184,7 @@ fn turned<T: Real>(x: T, y: T, c: T, s: T) -> (T, T) {
     (c * x - s * y, s * x + c * y)
 }
 
-/// Product of two vectors.
+/// Returns the dot product of two vectors.
 pub(crate) fn dot<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
     a.iter().zip(b).fold(T::ZERO, |sum, (x, y)| sum + *x * *y)
 }
@@ -193,7 +197,7 @@ fn identity<T: Real, const N: usize>() -> [[T; N]; N] {
     m
 }
 
-/// Smallest first, by insertion.
+/// Sorts the values, smallest first, and the vectors with them, by insertion.
 fn sort<T: Real, const N: usize>(values: &mut [T; N], vectors: &mut [[T; N]; N]) {
     for end in 1..N {
         for i in (1..=end).rev() {
@@ -291,14 +295,14 @@ mod tests {
 
     #[test]
     fn small_singular_values_survive_single_precision() {
-        // Nearly dependent columns: squaring would leave nothing of 1e-5 beside 1 in f32.
+        // The columns are nearly dependent: after squaring, nothing of 1e-5 would be left next to 1 in f32.
         let mut triangle = Triangle::<f32, 2>::new();
         for i in 0..100 {
             let x = (i as f32 * 0.37).sin();
             triangle.push([x, x + 1e-5 * (i as f32 * 1.7).cos()]);
         }
         let ([small, _], [v, _]) = triangle.singular();
-        // |noise| / √2 over the root of a hundred points of 1/2.
+        // The expected value is |noise| / √2, where |noise| is the root of the sum of a hundred points of 1/2.
         assert!((small / (1e-5 * 7.07 / 1.414) - 1.0).abs() < 0.1, "{small}");
         assert!((v[0] + v[1]).abs() < 1e-4);
         assert!(Triangle::<f32, 2>::new().solve([1.0, 1.0]).is_none());

@@ -1,4 +1,4 @@
-//! Private names for nalgebra's types, and the small decompositions that nalgebra only has with panic paths.
+//! Private names for nalgebra's types, and small decompositions that in nalgebra have panic paths.
 
 #[cfg(any(feature = "dlr", feature = "zju"))]
 #[allow(dead_code, reason = "each method takes what it needs")]
@@ -10,14 +10,15 @@ pub(crate) use decompose::{Triangle, dot, symmetric_eigen};
 
 use crate::base::real::Real;
 
-/// Three components.
+/// Vector of three components.
 pub(crate) type V3<T> = nalgebra::Vector3<T>;
-/// Three by three.
+/// Matrix of three by three.
 pub(crate) type M3<T> = nalgebra::Matrix3<T>;
 
-/// Two unit vectors that complete the unit vector `e` to a right-handed basis (b1, b2, e).
+/// Returns two unit vectors that complete the unit vector `e` to a right-handed basis (b1, b2, e).
 ///
-/// Duff et al. 2017, "Building an orthonormal basis, revisited": no square root, no branch but the sign.
+/// Duff et al. 2017, "Building an orthonormal basis, revisited": there is no square root, and the sign is the only
+/// branch.
 pub(crate) fn basis<T: Real>(e: &V3<T>) -> (V3<T>, V3<T>) {
     let one = T::one();
     let sign = if e.z < T::zero() { -one } else { one };
@@ -26,14 +27,15 @@ pub(crate) fn basis<T: Real>(e: &V3<T>) -> (V3<T>, V3<T>) {
     (V3::new(one + sign * e.x * e.x * a, sign * b, -sign * e.x), V3::new(b, sign + e.y * e.y * a, -e.y))
 }
 
-/// `v` scaled to unit length, or `None` when it has none.
+/// Scales `v` to unit length; `None` when its length is about 0 or not finite.
 pub(crate) fn unit<T: Real>(v: &V3<T>) -> Option<V3<T>> {
     let n2 = v.dot(v);
     (n2 > T::from_f64(1e-30) && n2.is_finite()).then(|| v * (T::one() / n2.sqrt()))
 }
 
-/// Inverse of a symmetric positive definite 3×3 matrix given by its upper triangle (xx, xy, xz, yy, yz, zz), by
-/// Cholesky after scaling the diagonal to one; `None` when it is not safely positive definite in this precision.
+/// Inverts a symmetric positive definite 3×3 matrix, given by its upper triangle (xx, xy, xz, yy, yz, zz). The method
+/// is Cholesky after the diagonal is scaled to one. `None` when the matrix is not safely positive definite in this
+/// precision.
 pub(crate) fn invert_spd3<T: Real>(m: &[T; 6]) -> Option<M3<T>> {
     let [a, b, c, d, e, f] = *m;
     if !(a > T::zero() && d > T::zero() && f > T::zero()) {
@@ -69,7 +71,7 @@ pub(crate) fn invert_spd3<T: Real>(m: &[T; 6]) -> Option<M3<T>> {
     Some(M3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
 
-/// Inverse of a symmetric positive definite 2×2 matrix (xx, xy, yy), or `None`.
+/// Inverts a symmetric positive definite 2×2 matrix (xx, xy, yy); `None` when it is not safely positive definite.
 pub(crate) fn invert_spd2<T: Real>([a, b, d]: [T; 3]) -> Option<[T; 3]> {
     let det = a * d - b * b;
     if !(a > T::zero() && d > T::zero() && det > T::EPSILON * T::from_f64(16.0) * a * d) {

@@ -1,4 +1,4 @@
-//! Brown-Conrady: a pinhole with radial and tangential distortion, coefficients in OpenCV's order.
+//! Brown-Conrady: a pinhole with radial and tangential distortion, with the coefficients in OpenCV's order.
 
 use super::config::Config;
 use crate::base::error::{ConfigError, Limit};
@@ -15,11 +15,12 @@ pub(super) struct Brown<T> {
 }
 
 impl<T: Real> Brown<T> {
-    /// The lens, ρ_max (distorted) and θ_max in radians.
+    /// Returns the lens, ρ_max (distorted) and θ_max in radians.
     pub(super) fn try_new(config: &Config, rho_corner: f64) -> Result<(Self, f64, f64), ConfigError> {
         let k = |i| config.coefficient(i);
         let lens = Brown { k1: k(0), k2: k(1), p1: k(2), p2: k(3), k3: k(4) };
-        // The undistorted radius at which the distorted one first stops growing.
+        // `radius` is the distorted radius as a function of the undistorted one, and `slope` is its derivative. The
+        // lens ends where the slope is not positive.
         let radius = |t: f64| t * lens.factor(t * t);
         let slope = |t: f64| {
             let q = t * t;
@@ -27,7 +28,7 @@ impl<T: Real> Brown<T> {
         };
         let end = config.theta_max_deg.map_or(1.5, |deg| deg.to_radians().min(1.5));
         let mut theta = 0.0;
-        // Tangential terms move the corner a little: they get one percent.
+        // The tangential terms move the corner a little; a margin of 1 % allows for this.
         while theta < end && radius(libm::tan(theta)) < rho_corner * 1.01 {
             if slope(libm::tan(theta + 2f64.to_radians())) <= 0.0 {
                 let limit = theta.to_degrees() + 2.0;
@@ -53,7 +54,7 @@ impl<T: Real> Brown<T> {
         T::one() + q * (self.k1 + q * (self.k2 + q * self.k3))
     }
 
-    /// Distorted coordinates of the pinhole point (x, y).
+    /// Returns the distorted coordinates of the pinhole point (x, y).
     pub(super) fn distort(&self, x: T, y: T) -> (T, T) {
         let two = T::from_f64(2.0);
         let q = x * x + y * y;
@@ -64,7 +65,7 @@ impl<T: Real> Brown<T> {
         )
     }
 
-    /// Derivative of [`Self::distort`]: xx, xy, yx, yy.
+    /// Returns the derivative of [`Self::distort`]: xx, xy, yx, yy.
     fn slope(&self, x: T, y: T) -> [T; 4] {
         let (two, six) = (T::from_f64(2.0), T::from_f64(6.0));
         let q = x * x + y * y;
@@ -79,8 +80,9 @@ impl<T: Real> Brown<T> {
         ]
     }
 
-    /// The ray of the distorted point and its derivative in the tangent basis; `None` where Newton does not arrive.
-    // Once in flash, not at every caller.
+    /// Returns the ray of the distorted point and its derivative in the tangent basis; `None` if Newton's method does
+    /// not converge.
+    // One copy in flash, not one for every caller.
     #[inline(never)]
     pub(super) fn ray(&self, xd: T, yd: T) -> Option<(V3<T>, [T; 4])> {
         let (mut x, mut y) = (xd, yd);

@@ -7,13 +7,13 @@ use crate::base::keys::{Form, Section, Value, choices, section};
 choices! {
     /// The projection of the lens.
     pub enum Model {
-        /// r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸); OpenCV calls it `fisheye`, Kalibr `equidistant`.
+        /// r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸); OpenCV calls this model `fisheye`, Kalibr `equidistant`.
         @0 KannalaBrandt = "kannala-brandt";
         /// r = θ, without coefficients.
         @1 Equidistant = "equidistant";
         /// r = tan θ, without coefficients.
         @2 Pinhole = "pinhole";
-        /// Pinhole with radial and tangential distortion: k = [k1, k2, p1, p2, k3], in OpenCV's order.
+        /// Pinhole with radial and tangential distortion; k = [k1, k2, p1, p2, k3], in OpenCV's order.
         @3 BrownConrady = "brown-conrady";
         /// Kalibr's `ds`: k = [ξ, α].
         @- DoubleSphere = "double-sphere" needs "kalibr";
@@ -23,7 +23,7 @@ choices! {
 }
 
 impl Model {
-    /// The names of its coefficients, in the order of `camera.k`.
+    /// Returns the names of the coefficients, in the order of `camera.k`.
     pub const fn coefficients(self) -> &'static [&'static str] {
         match self {
             Self::KannalaBrandt => &["k1", "k2", "k3", "k4"],
@@ -34,13 +34,14 @@ impl Model {
         }
     }
 
-    /// Whether the image radius grows with tan θ, so that the lens ends before 90° off axis; else it grows with θ.
+    /// Returns whether the image radius grows with tan θ, so that the lens ends before 90° off axis. Otherwise it grows
+    /// with θ.
     pub const fn is_planar(self) -> bool {
         matches!(self, Self::Pinhole | Self::BrownConrady)
     }
 }
 
-/// An intrinsic parameter, by its name in sensor.toml.
+/// An intrinsic parameter, with its name in sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[allow(missing_docs, reason = "the names are those of the keys")]
@@ -60,15 +61,15 @@ pub enum Intrinsic {
     Beta,
 }
 
-/// `[camera.covariance]`: covariance of the intrinsic parameters, as a calibration program gives it.
+/// `[camera.covariance]`: covariance of the intrinsic parameters, as a calibration program reports it.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Covariance {
     /// The parameters of the rows and columns: `fx_px`, `fy_px`, `cx_px`, `cy_px`, and the coefficients by their names,
-    /// `k1` to `k4` of `kannala-brandt`, `k1, k2, p1, p2, k3` of `brown-conrady`. What is left out counts as known
-    /// exactly.
+    /// `k1` to `k4` of `kannala-brandt`, `k1, k2, p1, p2, k3` of `brown-conrady`. Parameters that are left out count as
+    /// exact.
     pub order: heapless::Vec<Intrinsic, INTRINSICS>,
-    /// The matrix row by row, symmetric and positive semidefinite, in px² and the coefficients' own unit.
+    /// The matrix row by row, symmetric and positive semidefinite; in px² and the units of the coefficients.
     pub rows: heapless::Vec<heapless::Vec<f64, INTRINSICS>, INTRINSICS>,
 }
 
@@ -94,13 +95,13 @@ section! {
         /// Coefficients: k1 to k4 of `kannala-brandt`, k1, k2, p1, p2, k3 of `brown-conrady`, ξ, α of `double-sphere`,
         /// α, β of `eucm`.
         ///
-        /// Coefficients that are left out are 0. The other models have none. The factor 1 of the first power of the
-        /// angle is not among them.
+        /// Coefficients that are left out are 0. The other models have none. The list does not contain the factor 1 of
+        /// the first power of the angle.
         @8 k: heapless::Vec<f64, 5>, serde(default), ["as many as the model has; the lens is monotone"]
             { unset: "none", example: "[-0.055, 0.011, -0.0035, 0.0002]" };
         /// Radius of the image circle, degrees off the optical axis; pixels beyond it count as masked.
         ///
-        /// The lens must be monotone up to the smaller of this and the farthest corner, with 2° to spare.
+        /// The lens must be monotone up to 2° beyond the smaller of this angle and the farthest corner.
         @13 theta_max_deg: Option<f64>, serde(default, skip_serializing_if = "Option::is_none"), [0.1 to 175.0]
             { unset: "none", example: "54.0" };
         /// 1σ of the focal length, the same for both axes, in percent; it widens the covariance.
@@ -109,16 +110,16 @@ section! {
         /// 1σ of each coordinate of the principal point, px; it widens the covariance.
         @15 centre_sigma_px: f64, serde(default, skip_serializing_if = "is_zero"), [0.0 to 1e6]
             { unset: "0", example: "0.5" };
-        /// Covariance of the intrinsic parameters, which counts instead of the two sigmas; `order` names rows and
-        /// columns (`fx_px`, `fy_px`, `cx_px`, `cy_px`, `k1` ...), `rows` is the matrix.
+        /// Covariance of the intrinsic parameters, used instead of the two sigmas; `order` names rows and columns
+        /// (`fx_px`, `fy_px`, `cx_px`, `cy_px`, `k1` ...), `rows` is the matrix.
         @- covariance: Option<Covariance>, serde(default, skip_serializing_if = "Option::is_none"),
             ["symmetric, positive semidefinite"]
             { unset: "none", example: "{ order = [\"fx_px\", \"fy_px\"], rows = [[1.0, 0.9], [0.9, 1.0]] }" };
         /// Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,
-        /// negative where the last row comes first.
+        /// negative if the last row comes first.
         ///
-        /// It counts where the prior of a picture holds the camera's rate of rotation: the rays of each row are turned
-        /// to the time of the middle row.
+        /// It has an effect only if the prior of the picture has the camera's rate of rotation. The rays of each row
+        /// are then turned to the time of the middle row.
         @16 readout_s: f64, serde(default, skip_serializing_if = "is_zero"), [-10.0 to 10.0]
             { unset: "0", example: "0.03" };
     }
@@ -128,14 +129,14 @@ impl Value for Covariance {
     const FORM: Form = Form::Table;
 }
 
-/// What a lens that is known exactly leaves out.
+/// Returns whether a value is 0; zero sigmas and a zero readout time are not written to files.
 #[cfg(feature = "serde")]
 fn is_zero(x: &f64) -> bool {
     *x == 0.0
 }
 
 impl Config {
-    /// An ideal lens with its principal point in the middle and equal focal lengths.
+    /// Makes an ideal lens with its principal point in the middle and equal focal lengths.
     pub fn ideal(model: Model, width: u16, height: u16, focal_px: f64) -> Self {
         Self {
             width,
@@ -154,14 +155,14 @@ impl Config {
         }
     }
 
-    /// Coefficient `i` (from 0), or 0 where the list ends before it.
+    /// Returns coefficient `i` (from 0), or 0 if the list ends before it.
     pub fn coefficient(&self, i: usize) -> f64 {
         self.k.get(i).copied().unwrap_or(0.0)
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         self.check_keys()?;
-        // A principal point far outside the picture is a mistake of units or order, not a lens.
+        // A principal point far outside the picture is an error in units or order.
         let (w, h) = (f64::from(self.width), f64::from(self.height));
         between("camera.cx_px", self.cx_px, -w, 2.0 * w)?;
         between("camera.cy_px", self.cy_px, -h, 2.0 * h)?;

@@ -1,7 +1,7 @@
-//! The image radius of a radially symmetric lens: r(θ) in focal lengths, with its derivative.
+//! Image radius of a radially symmetric lens: r(θ) in focal lengths, with its derivative.
 //!
-//! A lens of this kind is an entry of `Curve` and a file with its equations; everything else (the inverse, its series,
-//! the check that it is monotone, rays, projection) is the same for all of them.
+//! A lens of this kind is a variant of `Curve` and a file with its equations. Everything else (the inverse, its series,
+//! the check that the lens is monotone, rays, projection) is the same for all of them.
 
 #[cfg(feature = "kalibr")]
 use super::{double_sphere, eucm};
@@ -24,7 +24,7 @@ pub(super) enum Curve<T> {
 }
 
 impl Curve<f64> {
-    /// The curve of a calibration.
+    /// Makes the curve of a calibration.
     pub(super) fn new(config: &Config) -> Self {
         let k = |i| config.coefficient(i);
         match config.model {
@@ -36,7 +36,7 @@ impl Curve<f64> {
         }
     }
 
-    /// The same in another precision.
+    /// Converts the curve to another precision.
     pub(super) fn cast<T: Real>(&self) -> Curve<T> {
         match self {
             Self::KannalaBrandt(k) => Curve::KannalaBrandt(k.map(T::from_f64)),
@@ -49,7 +49,7 @@ impl Curve<f64> {
 }
 
 impl<T: Real> Curve<T> {
-    /// r(θ) and r'(θ).
+    /// Returns r(θ) and r'(θ).
     #[inline(always)]
     pub(super) fn forward(&self, theta: T) -> (T, T) {
         match self {
@@ -61,7 +61,7 @@ impl<T: Real> Curve<T> {
         }
     }
 
-    /// ∂r/∂k at θ, for every coefficient, times `per`.
+    /// Returns ∂r/∂k at θ for every coefficient, times `per`.
     pub(super) fn by_coefficients(&self, theta: T, per: T) -> [T; 5] {
         let mut by = [T::ZERO; 5];
         match self {

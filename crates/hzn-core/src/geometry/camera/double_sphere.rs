@@ -1,14 +1,14 @@
 //! The double sphere lens of Kalibr (`ds`) and Basalt (Usenko, Demmel & Cremers 2018, (40) to (42)).
 //!
 //! A ray is projected onto a unit sphere, then onto a second one that is shifted by ξ along the axis, then into a plane
-//! that is shifted by α/(1 − α). Of a unit ray (sin θ, cos θ): z₁ = ξ + cos θ, d₂ = √(sin² θ + z₁²),
+//! that is shifted by α/(1 − α). For a unit ray (sin θ, cos θ): z₁ = ξ + cos θ, d₂ = √(sin² θ + z₁²),
 //! r = sin θ/(α d₂ + (1 − α) z₁).
 //!
-//! r'(0) is 1/(1 + ξ) and not 1: the focal length of this model is not that of the picture's middle.
+//! r'(0) is 1/(1 + ξ) and not 1: the focal length of this model differs from the scale in the middle of the picture.
 
 use crate::base::real::Real;
 
-/// r(θ) and r'(θ).
+/// Returns r(θ) and r'(θ).
 pub(super) fn forward<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
     let [xi, alpha] = *k;
     let one = T::one();
@@ -21,7 +21,7 @@ pub(super) fn forward<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
     (sin / below, (cos * below - sin * below_slope) / (below * below))
 }
 
-/// ∂r/∂ξ and ∂r/∂α.
+/// Returns ∂r/∂ξ and ∂r/∂α.
 pub(super) fn by_coefficients<T: Real>(k: &[T; 2], theta: T) -> [T; 2] {
     let [xi, alpha] = *k;
     let one = T::one();

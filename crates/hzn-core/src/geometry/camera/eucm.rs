@@ -1,11 +1,11 @@
 //! The enhanced unified camera model of Kalibr (`eucm`) (Khomutenko, Garcia & Martinet 2016, (1)).
 //!
-//! A ray is projected onto an ellipsoid of revolution, then into a plane. Of a unit ray (sin θ, cos θ):
-//! d = √(β sin² θ + cos² θ), r = sin θ/(α d + (1 − α) cos θ).
+//! A ray is projected onto an ellipsoid of revolution, then into a plane. For a unit ray (sin θ, cos θ) this gives
+//! r = sin θ/(α d + (1 − α) cos θ) with d = √(β sin² θ + cos² θ).
 
 use crate::base::real::Real;
 
-/// r(θ) and r'(θ).
+/// Returns r(θ) and r'(θ).
 pub(super) fn forward<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
     let [alpha, beta] = *k;
     let one = T::one();
@@ -17,7 +17,7 @@ pub(super) fn forward<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
     (sin / below, (cos * below - sin * below_slope) / (below * below))
 }
 
-/// ∂r/∂α and ∂r/∂β.
+/// Returns ∂r/∂α and ∂r/∂β.
 pub(super) fn by_coefficients<T: Real>(k: &[T; 2], theta: T) -> [T; 2] {
     let [alpha, beta] = *k;
     let one = T::one();

@@ -1,7 +1,7 @@
 //! Lens models: from a pixel to a unit ray with its derivative, and back.
 //!
-//! Unit rays, never the plane z = f: the plane cannot represent 90° and more off axis, and is badly conditioned in
-//! single precision. Radial lenses share one code path; Brown-Conrady has its own.
+//! The module uses unit rays and never the plane z = f. The plane cannot represent 90° and more off axis, and is badly
+//! conditioned in single precision. Radial lenses share one code path; Brown-Conrady has a separate one.
 
 mod brown;
 mod config;
@@ -26,7 +26,7 @@ use crate::geometry::crop::Crop;
 use crate::geometry::frames::{Cam, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
 
-/// A lens, checked and ready: every function on it is total.
+/// A lens that is checked and ready. All of its functions are total.
 #[derive(Debug, Clone)]
 pub struct Camera<T> {
     width: u16,
@@ -39,13 +39,13 @@ pub struct Camera<T> {
     cy: T,
     /// Largest distance from the principal point, in units of the focal length, that has a ray.
     rho_max: T,
-    /// Largest angle off axis that the lens is used for.
+    /// Largest angle off axis at which the lens is used, radians.
     theta_max: T,
     circle: bool,
     lens: Lens<T>,
-    /// What the calibration leaves open.
+    /// Uncertainty of the calibration, as 1-sigma modes.
     modes: uncertain::Modes<T>,
-    /// From one row to the next, seconds, and the row that is exposed at the picture's time.
+    /// Time from one row to the next in seconds, and the row that is exposed at the picture's time.
     row_s: T,
     middle_row: T,
     /// How the camera turns while this picture is read out.
@@ -59,18 +59,18 @@ enum Lens<T> {
     Brown(brown::Brown<T>),
 }
 
-/// The ray of a pixel and how it moves with the pixel.
+/// The ray of a pixel and its derivative by the pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray<T> {
     /// Unit vector in the camera frame.
     pub(crate) s: V3<T>,
-    /// `[∂a/∂u, ∂a/∂v, ∂b/∂u, ∂b/∂v]`, where a and b are the coordinates of the ray's change in the tangent basis
-    /// that [`tangent`] spans at `s`; radians a pixel.
+    /// `[∂a/∂u, ∂a/∂v, ∂b/∂u, ∂b/∂v]`, where a and b are the coordinates of the ray's change in the tangent basis that
+    /// [`tangent`] spans at `s`; radians per pixel.
     pub(crate) m: [T; 4],
 }
 
-/// The tangent basis at `s`: the images of x and y under the rotation that takes z to `s` the short way. It is
-/// smooth everywhere but at `s` = −z, which no lens sees.
+/// Returns the tangent basis at `s`: the images of x and y under the shortest rotation that takes z to `s`. It is
+/// smooth everywhere except at `s` = −z, which no lens sees.
 #[inline(always)]
 pub(crate) fn tangent<T: Real>(s: &V3<T>) -> [V3<T>; 2] {
     let one = T::one();
@@ -80,11 +80,11 @@ pub(crate) fn tangent<T: Real>(s: &V3<T>) -> [V3<T>; 2] {
 }
 
 impl<T: Real> Ray<T> {
-    /// The direction.
+    /// Returns the direction.
     pub fn direction(&self) -> UnitVec3<Cam, T> {
         UnitVec3::assume_unit(self.s)
     }
-    /// The derivative of the ray by (u, v): rows x, y, z; radians a pixel.
+    /// Returns the derivative of the ray by (u, v): rows x, y, z; radians per pixel.
     pub fn jacobian(&self) -> [[T; 2]; 3] {
         let [a, b] = tangent(&self.s);
         let [au, av, bu, bv] = self.m;
@@ -97,7 +97,8 @@ impl<T: Real> Camera<T> {
     /// Checks the calibration and prepares the lens.
     ///
     /// # Errors
-    /// A field out of its limits, or a lens that is not monotone up to `min(theta_max_deg, the farthest corner)`.
+    /// Returns the first field that is out of its limits. A lens that is not monotone up to
+    /// `min(theta_max_deg, the farthest corner)` is refused as well.
     pub fn try_new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
         let c = config;
@@ -125,7 +126,7 @@ impl<T: Real> Camera<T> {
                 let (lens, rho, theta) = brown::Brown::try_new(c, rho_corner)?;
                 (Lens::Brown(lens), rho, theta)
             }
-            // `Config::check` refuses a model that is not built in.
+            // `Config::check` has refused a model that is not built in.
             _ => {
                 let (lens, rho, theta) = radial::Radial::try_new(c, rho_corner)?;
                 (Lens::Radial(lens), rho, theta)
@@ -151,7 +152,7 @@ impl<T: Real> Camera<T> {
         })
     }
 
-    /// The camera that takes a part of this one's pictures, or smaller ones.
+    /// Returns the camera for a rectangle of this camera's pictures, or for smaller copies.
     #[cfg(feature = "horace")]
     pub(crate) fn through(&self, crop: &Crop) -> Self {
         let ([sx, sy], centre) = (crop.scale::<T>(), crop.of_picture(self.principal_point()));
@@ -170,33 +171,33 @@ impl<T: Real> Camera<T> {
         }
     }
 
-    /// Columns of the picture.
+    /// Returns the number of columns of the picture.
     pub fn width(&self) -> u16 {
         self.width
     }
-    /// Rows of the picture.
+    /// Returns the number of rows of the picture.
     pub fn height(&self) -> u16 {
         self.height
     }
-    /// Largest angle off axis in use, radians: the image circle or the farthest corner; of `brown-conrady` 1 % of the
-    /// radius beyond the corner, which tangential terms move.
+    /// Returns the largest angle off axis in use, radians: the image circle or the farthest corner. For `brown-conrady`
+    /// the limit lies 1 % of the radius beyond the corner, because the tangential terms move the corner.
     pub fn theta_max_rad(&self) -> T {
         self.theta_max
     }
-    /// The image circle when it cuts the picture: centre (u, v) and semi-axes along x and y, in pixels.
+    /// Returns the image circle when it cuts the picture: centre (u, v) and semi-axes along x and y, in pixels.
     pub fn image_circle_px(&self) -> Option<(ImagePoint<T>, T, T)> {
         self.circle.then(|| (ImagePoint { u: self.cx, v: self.cy }, self.rho_max * self.fx, self.rho_max * self.fy))
     }
-    /// Focal lengths (fx, fy) in pixels.
+    /// Returns the focal lengths (fx, fy) in pixels.
     pub fn focal_px(&self) -> (T, T) {
         (self.fx, self.fy)
     }
-    /// Where the optical axis meets the picture.
+    /// Returns the principal point, where the optical axis meets the picture.
     pub fn principal_point(&self) -> ImagePoint<T> {
         ImagePoint { u: self.cx, v: self.cy }
     }
 
-    /// The ray of an image point with its derivative; `None` beyond the image circle.
+    /// Returns the ray of an image point with its derivative; `None` beyond the image circle.
     #[inline]
     pub fn ray(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
         let ray = self.ray_at_its_row(p)?;
@@ -206,7 +207,7 @@ impl<T: Real> Camera<T> {
         })
     }
 
-    /// As [`Self::ray`], in the camera as it stands when the point's row is exposed.
+    /// Does the same as [`Self::ray`], in the camera frame at the time when the point's row is exposed.
     #[inline(always)]
     fn ray_at_its_row(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
         let x = (p.u - self.cx) * self.inv_fx;
@@ -226,7 +227,8 @@ impl<T: Real> Camera<T> {
         Some(Ray { s, m: [a * self.inv_fx, b * self.inv_fy, c * self.inv_fx, d * self.inv_fy] })
     }
 
-    /// Rays of a block of image points in place, as [`Self::ray`]; a point beyond the image circle is cleared.
+    /// Replaces the image points of a block by their rays, as [`Self::ray`]. A point beyond the image circle is
+    /// cleared.
     #[inline(always)]
     pub(crate) fn rays(&self, block: &mut Block<T>) {
         if let (Lens::Radial(lens), None) = (&self.lens, &self.turning) {
@@ -239,7 +241,7 @@ impl<T: Real> Camera<T> {
                 for l in 0..LANES {
                     let within = x[l] * x[l] + y[l] * y[l] <= self.rho_max * self.rho_max;
                     let counts = within && block.weight[l] > T::ZERO;
-                    // As `Block::clear`.
+                    // This has the same effect as `Block::clear`.
                     let or_zero = |value: T| if counts { value } else { T::ZERO };
                     block.s[0][l] = or_zero(s[0][l]);
                     block.s[1][l] = or_zero(s[1][l]);
@@ -256,8 +258,8 @@ impl<T: Real> Camera<T> {
         self.rays_one_by_one(block);
     }
 
-    /// As [`Self::rays`], for lenses without series and pictures whose rows have a time of their own.
-    // Once in flash: inlined it would stand there for every lane.
+    /// Does the same as [`Self::rays`], for lenses without series and for cameras that turn during the readout.
+    // One copy in flash: inlined, the code would stand there for every lane.
     #[inline(never)]
     fn rays_one_by_one(&self, block: &mut Block<T>) {
         for l in 0..LANES {
@@ -268,15 +270,15 @@ impl<T: Real> Camera<T> {
         }
     }
 
-    /// An image point from the principal point on, in focal lengths.
+    /// Converts an image point to its offset from the principal point, in focal lengths.
     #[cfg(feature = "horace")]
     pub(crate) fn in_focal_lengths(&self, p: ImagePoint<T>) -> [T; 2] {
         [(p.u - self.cx) * self.inv_fx, (p.v - self.cy) * self.inv_fy]
     }
 
-    /// The direction of a point so far from the principal point, in focal lengths, also beyond the picture and the
-    /// image circle: a radial lens goes on as it ends there, up to 180° off axis, and others go on as a pinhole. `None`
-    /// for what is not finite.
+    /// Returns the direction of a point that lies (x, y) focal lengths from the principal point. The point may lie
+    /// beyond the picture and the image circle. Beyond its largest radius, a radial lens is continued along the tangent
+    /// of its curve, up to 180° off axis. All other lenses count as a pinhole. `None` when the direction is not finite.
     #[cfg(feature = "horace")]
     pub(crate) fn continued(&self, [x, y]: [T; 2]) -> Option<UnitVec3<Cam, T>> {
         let rho2 = x * x + y * y;
@@ -289,12 +291,12 @@ impl<T: Real> Camera<T> {
         UnitVec3::try_new([x / rho * s, y / rho * s, c])
     }
 
-    /// The direction of an image point; `None` beyond the image circle.
+    /// Returns the direction of an image point; `None` beyond the image circle.
     pub fn unproject(&self, p: ImagePoint<T>) -> Option<UnitVec3<Cam, T>> {
         self.ray(p).map(|r| r.direction())
     }
 
-    /// The image point of a direction; `None` beyond the image circle. It may lie outside the picture.
+    /// Returns the image point of a direction; `None` beyond the image circle. The point may lie outside the picture.
     pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
         match &self.turning {
             None => self.project_at_its_row(d.v()),
@@ -302,7 +304,8 @@ impl<T: Real> Camera<T> {
         }
     }
 
-    /// As [`Self::project`], of a direction in the camera as it stands when the point's row is exposed.
+    /// Does the same as [`Self::project`], for a direction in the camera frame at the time when the point's row is
+    /// exposed.
     fn project_at_its_row(&self, s: &V3<T>) -> Option<ImagePoint<T>> {
         let h = (s.x * s.x + s.y * s.y).sqrt();
         let theta = h.atan2(s.z);
@@ -321,7 +324,8 @@ impl<T: Real> Camera<T> {
     }
 }
 
-/// A ray and its derivative for a radially symmetric lens: `scale` = sin θ / ρ, `cos` = cos θ, `dtheta` = dθ/dρ.
+/// Returns the ray and its derivative for a radially symmetric lens: `scale` = sin θ / ρ, `cos` = cos θ,
+/// `dtheta` = dθ/dρ.
 ///
 /// In the tangent basis of [`tangent`] the derivative by (x, y) is `scale`·I + (`dtheta` − `scale`)·u uᵀ with u the
 /// unit vector of (x, y) (math: J = t_r dθ/dρ uᵀ + t_φ (sin θ/ρ) u⊥ᵀ, and the basis turns t_r to u, t_φ to u⊥).
@@ -334,7 +338,7 @@ fn radial_ray<T: Real>(x: T, y: T, scale: T, cos: T, dtheta: T) -> (V3<T>, [T; 4
     (s, [scale + k * x * x, xy, xy, scale + k * y * y])
 }
 
-/// `hypot` for the load-time checks, from the same library on every target.
+/// `hypot` for the checks at load time, from the same library on every target.
 trait Hypot {
     fn hypot_(self, other: f64) -> f64;
 }

@@ -1,9 +1,9 @@
 //! Radially symmetric lenses.
 //!
-//! The inverse θ(ρ) has no closed form. On loading it is solved by Newton's method at Chebyshev nodes, and what a
-//! ray needs (sin θ/ρ, cos θ, dθ/dρ) is kept as three polynomials in ρ², made from Chebyshev series. They are checked
-//! against Newton between the nodes; where they do not reach the precision of `T` (close to the end of monotony), rays
-//! are solved by Newton instead.
+//! The inverse θ(ρ) has no closed form. At load time Newton's method solves it at Chebyshev nodes. The quantities of a
+//! ray (sin θ/ρ, cos θ, dθ/dρ) are then kept as three polynomials in ρ², made from Chebyshev series. They are checked
+//! against Newton's method between the nodes. If they do not reach the precision of `T` (close to the end of monotony),
+//! Newton's method computes every ray.
 
 use super::config::Config;
 use super::curve::Curve;
@@ -13,7 +13,7 @@ use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::LANES;
 
-/// Most terms of each series; as many are used as the precision of `T` asks for.
+/// Maximum number of terms of each series; the number in use depends on the precision of `T`.
 const TERMS: usize = 24;
 
 #[derive(Debug, Clone)]
@@ -27,8 +27,8 @@ pub(super) struct Radial<T> {
 #[derive(Debug, Clone)]
 enum Inverse<T> {
     Newton,
-    /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds one power's coefficients of the three polynomials
-    /// (sin θ/ρ, cos θ, dθ/dρ), lowest first; the first `used` count.
+    /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds the coefficients of one power for the three polynomials
+    /// (sin θ/ρ, cos θ, dθ/dρ), lowest power first. The first `used` entries count.
     Series {
         scale: T,
         used: usize,
@@ -36,10 +36,11 @@ enum Inverse<T> {
     },
 }
 
-/// Eight unit vectors, and eight derivatives in the tangent basis.
+/// Eight unit vectors, and their eight derivatives in the tangent basis.
 pub(super) type Lanes<T> = ([[T; LANES]; 3], [[T; LANES]; 4]);
 
-/// First root of r'(θ) below 180°, or the first pole of r(θ), in radians: bracketed on a fine grid, then halved.
+/// Returns the first root of r'(θ) below 180°, or the first pole of r(θ), in radians. It is bracketed on a fine grid
+/// and found by bisection. `None` if there is neither.
 pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
     const STEPS: i32 = 1800;
     let at = |i: i32| core::f64::consts::PI * f64::from(i) / f64::from(STEPS);
@@ -55,7 +56,7 @@ pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
     Some(low)
 }
 
-/// θ with r(θ) = ρ: Newton clamped to 0…θ_max from ρ θ_max/r(θ_max).
+/// Returns θ with r(θ) = ρ, by Newton's method from ρ θ_max/r(θ_max), clamped to 0…θ_max.
 #[inline(never)]
 fn invert<T: Real>(curve: &Curve<T>, rho: T, theta_max: T, r_max: T) -> T {
     let mut theta = rho * theta_max / r_max;
@@ -71,13 +72,13 @@ fn invert<T: Real>(curve: &Curve<T>, rho: T, theta_max: T, r_max: T) -> T {
 }
 
 impl<T: Real> Radial<T> {
-    /// The lens, ρ_max and θ_max in radians.
+    /// Returns the lens, ρ_max and θ_max in radians.
     pub(super) fn try_new(config: &Config, rho_corner: f64) -> Result<(Self, f64, f64), ConfigError> {
         let curve = Curve::new(config);
         let limit = monotonic_limit(&curve).unwrap_or(core::f64::consts::PI);
         let margin = 2f64.to_radians();
         let usable = limit - margin;
-        // Where the corner is reached, if it is reached before the lens folds back.
+        // `corner` is the angle of the corner, if the lens reaches it before the end of monotony.
         let corner = (curve.forward(usable).0 >= rho_corner)
             .then(|| invert(&curve, rho_corner, usable, curve.forward(usable).0));
         let theta_max = match (config.theta_max_deg.map(f64::to_radians), corner) {
@@ -103,7 +104,7 @@ impl<T: Real> Radial<T> {
         Ok((Self { curve: curve.cast(), theta_max: tt, r_max: rt, inverse }, r_max, theta_max))
     }
 
-    /// The three series, or Newton where they are not good enough.
+    /// Returns the three series, or Newton's method if the series are not accurate enough.
     fn series(curve: &Curve<f64>, theta_max: f64, r_max: f64) -> Inverse<T> {
         let values = |rho: f64| -> [f64; 3] {
             if rho == 0.0 {
@@ -128,7 +129,7 @@ impl<T: Real> Radial<T> {
             }
         }
         let scale = 2.0 / (r_max * r_max);
-        // Direction to the working precision; the derivative only weighs points, so 1e-6 is ample.
+        // The direction has the working precision. The derivative only weights points, so 1e-6 is enough.
         let tolerance = (T::EPSILON.to_f64() * 2.0).max(1e-14);
         let good = |powers: &[[f64; 3]]| {
             (0..=64).all(|i| {
@@ -151,7 +152,8 @@ impl<T: Real> Radial<T> {
         Inverse::Newton
     }
 
-    /// Rays of eight points (x, y) at once, where there are series: unit vectors and derivatives in the tangent basis.
+    /// Returns the rays of eight points (x, y) at once: unit vectors and derivatives in the tangent basis. `None`
+    /// without series.
     #[inline(always)]
     pub(super) fn rays(&self, x: &[T; LANES], y: &[T; LANES]) -> Option<Lanes<T>> {
         let Inverse::Series { scale, used, terms } = &self.inverse else { return None };
@@ -185,7 +187,7 @@ impl<T: Real> Radial<T> {
         Some((s, m))
     }
 
-    /// The ray of (x, y) in units of the focal length and its derivative in the tangent basis.
+    /// Returns the ray of (x, y), in units of the focal length, and its derivative in the tangent basis.
     #[inline(always)]
     pub(super) fn ray(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
         match &self.inverse {
@@ -197,44 +199,44 @@ impl<T: Real> Radial<T> {
         }
     }
 
-    /// As [`Self::ray`], where there are no series.
-    // Once in flash, not at every caller.
+    /// Does the same as [`Self::ray`], without series.
+    // One copy in flash, not one for every caller.
     #[inline(never)]
     fn ray_by_newton(&self, x: T, y: T, rho2: T) -> (V3<T>, [T; 4]) {
         let rho = rho2.sqrt();
         let theta = invert(&self.curve, rho, self.theta_max, self.r_max);
         let (sin, cos) = theta.sin_cos();
         let dtheta = T::one() / self.curve.forward(theta).1;
-        // At the centre sin θ/ρ is dθ/dρ.
+        // At the centre, sin θ/ρ equals dθ/dρ.
         let s = if rho > T::from_f64(1e-12) { sin / rho } else { dtheta };
         radial_ray(x, y, s, cos, dtheta)
     }
 
-    /// θ beyond the largest radius, along the tangent there.
+    /// Returns θ beyond the largest radius, along the tangent of the curve there, up to π.
     #[cfg(feature = "horace")]
     pub(super) fn beyond(&self, rho: T) -> T {
         let (r, d) = self.curve.forward(self.theta_max);
         (self.theta_max + (rho - r) / d).min(T::from_f64(core::f64::consts::PI))
     }
 
-    /// ∂r/∂k at θ, for every coefficient, times `per`.
+    /// Returns ∂r/∂k at θ for every coefficient, times `per`.
     pub(super) fn by_coefficients(&self, theta: T, per: T) -> [T; 5] {
         self.curve.by_coefficients(theta, per)
     }
 
-    /// r(θ) in units of the focal length.
+    /// Returns r(θ) in units of the focal length.
     pub(super) fn radius(&self, theta: T) -> T {
         self.curve.forward(theta).0
     }
 }
 
-/// The three polynomials at t.
+/// Evaluates the three polynomials at t.
 #[inline(always)]
 fn horner<T: Real>(terms: &[[T; 3]], t: T) -> [T; 3] {
     terms.iter().rev().fold([T::zero(); 3], |sum, term| core::array::from_fn(|i| sum[i] * t + term[i]))
 }
 
-/// The coefficients by powers of t of three Chebyshev series, by T₀ = 1, T₁ = t, Tₙ₊₁ = 2 t Tₙ − Tₙ₋₁.
+/// Converts three Chebyshev series to coefficients of powers of t, by T₀ = 1, T₁ = t, Tₙ₊₁ = 2 t Tₙ − Tₙ₋₁.
 fn powers(series: &[[f64; 3]]) -> [[f64; 3]; TERMS] {
     let mut sums = [[0.0; 3]; TERMS];
     let (mut before, mut this) = ([0.0; TERMS], [0.0; TERMS]);

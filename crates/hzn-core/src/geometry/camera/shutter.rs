@@ -1,29 +1,31 @@
-//! A rolling shutter: rows are exposed one after the other, while the camera turns.
+//! Rolling shutter: the rows are exposed one after the other while the camera turns.
 //!
-//! The picture's time is that of its middle row. A direction that stands still is seen at the ray s_t in the camera as
-//! it stands t later; with the camera's rate ω in its own axes it lies at exp([ω t]×) s_t in the camera of the
-//! picture's time, t = readout · (row/(h − 1) − ½). Rays are handed out in that camera.
+//! The picture's time is that of its middle row. At the time t after it, the camera sees a static direction along the
+//! ray s_t in its current frame. With the camera's rate ω in its own axes, the same direction is exp([ω t]×) s_t in the
+//! camera frame at the picture's time, where t = readout · (row/(h − 1) − ½). All rays are returned in that frame.
 
 use super::{Camera, Ray, tangent};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::pixel::ImagePoint;
 
-/// How the camera turns from row to row.
+/// The rotation of the camera from row to row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Turning<T> {
-    /// Angle from one row to the next, radians, in the camera's axes.
+    /// Rotation from one row to the next, radians, in the camera's axes.
     per_row: V3<T>,
     /// The row that is exposed at the picture's time.
     middle: T,
 }
 
-/// Times that the row of a direction is looked up: each leaves a twentieth or less of the error, of some 50 px.
+/// Number of iterations that find the row of a direction. Each reduces the error, about 50 px at first, to a twentieth
+/// or less.
 const LOOKS: usize = 4;
 
 impl<T: Real> Camera<T> {
-    /// This camera while it turns: rays and image points are those of the time of the middle row, where the rows have
-    /// times of their own. `rate_rad_s` is its rate of rotation against the stars or the ground in its own axes, rad/s.
+    /// Returns this camera with a rate of rotation. With a rolling shutter, rays and projected directions then refer to
+    /// the camera frame at the time of the middle row. `rate_rad_s` is the camera's rate of rotation against the stars
+    /// or the ground, in its own axes, rad/s. Without a rolling shutter the rate has no effect.
     pub fn turning(&self, rate_rad_s: Option<[T; 3]>) -> Self {
         let turning = rate_rad_s
             .filter(|_| self.has_rolling_shutter())
@@ -31,20 +33,21 @@ impl<T: Real> Camera<T> {
         Self { turning, ..self.clone() }
     }
 
-    /// Whether rows are exposed one after the other, so that a rate of rotation counts.
+    /// Returns whether rows are exposed one after the other, so that a rate of rotation has an effect.
     pub fn has_rolling_shutter(&self) -> bool {
         self.row_s != T::ZERO
     }
 }
 
 impl<T: Real> Turning<T> {
-    /// A ray of row `v` in the camera of the picture's time.
-    // Once in flash.
+    /// Converts a ray of row `v` to the camera frame at the picture's time.
+    // One copy in flash.
     #[inline(never)]
     pub(super) fn to_frame_time(self, ray: &Ray<T>, v: T) -> Ray<T> {
         let angle = self.per_row * (v - self.middle);
         let s = turned(&ray.s, &angle);
-        // The derivative, from the tangent basis at the one to that at the other, and by the row the turn itself.
+        // The derivative is converted from the tangent basis at the one ray to that at the other. The turn itself adds
+        // a derivative by the row.
         let [[a, b], [c, d]] = [tangent(&ray.s), tangent(&s)];
         let (a, b) = (turned(&a, &angle), turned(&b, &angle));
         let by_row = self.per_row.cross(&s);
@@ -53,7 +56,8 @@ impl<T: Real> Turning<T> {
         Ray { s, m: [c.dot(&du), c.dot(&dv), d.dot(&du), d.dot(&dv)] }
     }
 
-    /// The image point of a direction in the camera of the picture's time, at the row that sees it.
+    /// Returns the image point of a direction in the camera frame at the picture's time, at the row that sees the
+    /// direction.
     pub(super) fn project(&self, camera: &Camera<T>, s: &V3<T>) -> Option<ImagePoint<T>> {
         let mut p = camera.project_at_its_row(s)?;
         for _ in 0..LOOKS {
@@ -63,7 +67,7 @@ impl<T: Real> Turning<T> {
     }
 }
 
-/// `s` turned by the vector `angle`, with tan(φ/2) to its third order: below 1e-6 rad of error up to 15°.
+/// Turns `s` by the rotation vector `angle`, with tan(φ/2) to third order: the error is below 1e-6 rad up to 15°.
 fn turned<T: Real>(s: &V3<T>, angle: &V3<T>) -> V3<T> {
     let square = angle.dot(angle);
     let half = angle * (T::from_f64(0.5) + square * T::from_f64(1.0 / 24.0));
@@ -86,7 +90,7 @@ mod tests {
         for (u, v) in [(10.0, 0.0), (600.0, 479.5), (1200.0, 959.0)] {
             let p = ImagePoint { u, v };
             let ray = camera.ray(p).unwrap();
-            // By the rotation's own definition.
+            // The expected ray follows from the definition of the rotation.
             let t = 0.03 * (v / 959.0 - 0.5);
             let turn = nalgebra::Rotation3::new(V3::from(rate) * t);
             let want = turn * V3::from(still.ray(p).unwrap().direction().xyz());

@@ -39,7 +39,7 @@ fn with(model: Model, k: &[f64], focal_px: f64) -> Config {
     }
 }
 
-/// The papers' equations in space, for a ray of any length.
+/// Compares the lenses with the papers' equations in space, for rays of any length.
 #[cfg(feature = "kalibr")]
 #[test]
 fn kalibr_lenses_project_as_their_papers_say() {

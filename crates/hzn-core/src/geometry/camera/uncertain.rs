@@ -1,8 +1,8 @@
-//! What a wrong calibration does: 1-sigma modes of the intrinsic parameters, and how each parameter moves the image
-//! point of a ray.
+//! The effect of calibration errors: 1-sigma modes of the intrinsic parameters, and the motion of a ray's image point
+//! with each parameter.
 //!
-//! Parameters are relative: focal lengths as parts of themselves, the principal point in focal lengths. In these units
-//! a part of the picture and a scaled one have the same numbers.
+//! Parameters are relative: focal lengths as fractions of themselves, the principal point in focal lengths. In these
+//! units a rectangle of the picture and a scaled picture have the same numbers.
 
 use super::config::{Config, Intrinsic, Model};
 use super::{Camera, Lens};
@@ -10,14 +10,16 @@ use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 
-/// Most intrinsic parameters: two focal lengths, two of the principal point, five coefficients.
+/// Maximum number of intrinsic parameters: two focal lengths, two coordinates of the principal point, five
+/// coefficients.
 pub(crate) const INTRINSICS: usize = 9;
 
-/// 1-sigma changes of all parameters at once that are independent of each other; their outer products add up to the
-/// covariance.
+/// 1-sigma changes of all parameters at once. The modes are independent of each other; their outer products add up to
+/// the covariance.
 pub(super) type Modes<T> = heapless::Vec<[T; INTRINSICS], INTRINSICS>;
 
-/// The modes of a calibration: those of its covariance, else those of its scalar sigmas; none when all are 0.
+/// Returns the modes of a calibration, from its covariance or, without one, from its scalar sigmas. There are none when
+/// all sigmas are 0.
 pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
     let mut modes = Modes::new();
     if let Some(given) = &config.covariance {
@@ -41,7 +43,7 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
                     *slot = T::from_f64(value / intrinsic.unit(config));
                 }
             }
-            // There is room for as many as there are parameters.
+            // There is room for one mode per parameter.
             let _ = modes.push(mode);
         }
         return Ok(modes);
@@ -54,17 +56,18 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
             }));
         }
     };
-    // Both focal lengths alike: a scale, as a distance or a temperature makes it.
+    // Both focal lengths change by the same factor: a distance or a temperature causes a change of scale.
     push([(0, focal), (1, focal)]);
     push([(2, config.centre_sigma_px / config.fx_px), (2, 0.0)]);
     push([(3, config.centre_sigma_px / config.fy_px), (3, 0.0)]);
     Ok(modes)
 }
 
-/// A number is 0 to rounding when it is below this part of what it was subtracted from.
+/// A difference counts as 0 when it is below this fraction of the number that it was subtracted from.
 const ROUNDING: f64 = 1e-9;
 
-/// Columns of the lower triangle L with L Lᵀ = `rows`, refusing what is not symmetric and positive semidefinite.
+/// Returns the columns of the lower triangle L with L Lᵀ = `rows`. A matrix that is not symmetric or not positive
+/// semidefinite is refused.
 fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS]; INTRINSICS], ConfigError> {
     let field = "camera.covariance.rows";
     let at = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0.0);
@@ -103,17 +106,17 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
 }
 
 impl<T: Real> Camera<T> {
-    /// 1-sigma modes of the intrinsic parameters; `None` of a lens that is known exactly.
+    /// Returns the 1-sigma modes of the intrinsic parameters; `None` for a lens that is known exactly.
     pub(crate) fn uncertain(&self) -> Option<&[[T; INTRINSICS]]> {
         (!self.modes.is_empty()).then_some(&self.modes)
     }
 
-    /// How far the image point of the ray `s` moves, in pixels (u, v), when each parameter grows by 1, in the
-    /// parameters' relative units.
+    /// Returns the motion of the image point of the ray `s` (camera frame), in pixels (u, v), when each parameter grows
+    /// by 1 in the relative units.
     pub(crate) fn moves(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
         let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
         let h2 = s.x * s.x + s.y * s.y;
-        // Where it falls, in focal lengths, and how the coefficients move it.
+        // These are the image point in focal lengths and its derivatives by the coefficients.
         let (x, y, by_k): (T, T, [[T; 2]; 5]) = match &self.lens {
             Lens::Radial(lens) => {
                 let h = h2.sqrt();
@@ -144,7 +147,7 @@ impl<T: Real> Camera<T> {
 }
 
 impl Intrinsic {
-    /// Its place among the parameters of a model; `None` where the model has no such parameter.
+    /// Returns the parameter's place among those of a model; `None` if the model does not have the parameter.
     fn place(self, model: Model) -> Option<usize> {
         match self {
             Self::FxPx => Some(0),
@@ -155,7 +158,7 @@ impl Intrinsic {
         }
     }
 
-    /// Its name in sensor.toml.
+    /// Returns the parameter's name in sensor.toml.
     const fn name(self) -> &'static str {
         match self {
             Self::FxPx => "fx_px",
@@ -174,7 +177,7 @@ impl Intrinsic {
         }
     }
 
-    /// One relative unit in its own.
+    /// Returns the size of one relative unit in the parameter's own unit.
     fn unit(self, config: &Config) -> f64 {
         match self {
             Self::FxPx | Self::CxPx => config.fx_px,

@@ -1,4 +1,4 @@
-//! The part of the picture that counts: the picture itself, cut by the image circle and by masked polygons.
+//! The region of a picture that counts: the picture, cut by the image circle and by masked polygons.
 
 mod ring;
 
@@ -13,12 +13,12 @@ use crate::geometry::crop::Crop;
 #[cfg(feature = "horace")]
 use crate::geometry::pixel::ImagePoint;
 
-/// Most corners of one polygon.
+/// Maximum number of corners of one polygon.
 pub const MAX_CORNERS: usize = 16;
-/// Most polygons.
+/// Maximum number of polygons.
 pub const MAX_POLYGONS: usize = 8;
 
-/// Rim of the image circle that does not count, in pixels: blur makes it neither lit nor dark.
+/// Width of the rim of the image circle that does not count, in pixels: blur makes the rim neither lit nor dark.
 const RIM_PX: f64 = 3.0;
 
 /// Corners (x, y) of a polygon in pixels; the last is joined to the first.
@@ -27,8 +27,8 @@ pub type Polygon = heapless::Vec<[f64; 2], MAX_CORNERS>;
 section! {
     /// `[mask]` of sensor.toml: parts of the vehicle in view.
     "mask" pub struct Config {
-        /// Areas that never count, as polygons of corners [x, y], px; nothing in them is lit, and their outline is no
-        /// edge.
+        /// Areas that never count, as polygons of corners [x, y], px; no pixel in them is lit, and their outline is not
+        /// an edge.
         @- polygons_px: heapless::Vec<Polygon, MAX_POLYGONS> = heapless::Vec::new(),
             ["up to 8 polygons of 3 to 16 corners"]
             { unset: "none", example: "[[[1500, 0], [1919, 0], [1919, 1079], [1450, 1079]]]" };
@@ -50,9 +50,9 @@ impl Config {
     }
 }
 
-/// The picture cut by the image circle, and the polygons that lie over it.
+/// The picture cut by the image circle, with the polygons of the mask.
 ///
-/// Beyond the region an edge ends; under a polygon nothing is lit, and the polygon's outline is no edge.
+/// An edge ends where the region ends. Under a polygon no pixel is lit, and the outline of the polygon is not an edge.
 #[derive(Debug, Clone)]
 pub struct Region<T> {
     width: u16,
@@ -63,7 +63,7 @@ pub struct Region<T> {
     polygons: heapless::Vec<Outline<T>, MAX_POLYGONS>,
 }
 
-/// An ellipse along the axes: the image circle, seen through fx and fy.
+/// The image circle: an ellipse along the axes, because fx and fy may differ.
 #[derive(Debug, Clone, Copy)]
 struct Circle<T> {
     cx: T,
@@ -81,7 +81,7 @@ struct Outline<T> {
 }
 
 impl<T: Real> Region<T> {
-    /// The region of a checked configuration.
+    /// Makes the region of a checked configuration.
     pub fn new(config: &Config, camera: &Camera<T>) -> Self {
         let circle = camera
             .image_circle_px()
@@ -90,7 +90,8 @@ impl<T: Real> Region<T> {
             .map(|(c, x, y)| Circle { cx: c.u, cy: c.v, semi_x: x, inv_x: T::one() / x, inv_y: T::one() / y });
         let mut polygons = heapless::Vec::new();
         for polygon in &config.polygons_px {
-            // Pushed one by one: both lists are as long as the configuration's, and `collect` could panic.
+            // The items are pushed one by one: both lists have the capacity of the configuration's lists, and `collect`
+            // could panic.
             let mut outline =
                 Outline { low: [T::from_f64(1e9); 2], high: [T::from_f64(-1e9); 2], corners: heapless::Vec::new() };
             for &[x, y] in polygon {
@@ -106,17 +107,17 @@ impl<T: Real> Region<T> {
         Self { width: camera.width(), height: camera.height(), frame: 0, circle, polygons }
     }
 
-    /// A whole picture without mask.
+    /// Makes the region of a whole picture without mask.
     pub fn whole(width: u16, height: u16) -> Self {
         Self { width, height, frame: 0, circle: None, polygons: heapless::Vec::new() }
     }
 
-    /// The region without a frame of `px` pixels along each side of the picture, which must be narrower than half of
-    /// it.
+    /// Returns the region without a frame of `px` pixels along each side of the picture. The frame must be narrower
+    /// than half of the picture.
     pub(crate) fn within(&self, px: u16) -> Self {
         Self { frame: px, ..self.clone() }
     }
-    /// First and last column, or row, that counts on a side of `length` pixels.
+    /// Returns the first and last column, or row, that counts on a side of `length` pixels.
     #[inline(always)]
     fn ends(&self, length: u16) -> (u16, u16) {
         (self.frame, length.saturating_sub(1).saturating_sub(self.frame))
@@ -130,12 +131,12 @@ impl<T: Real> Region<T> {
         self.ends(self.height)
     }
 
-    /// The part of it in the first rows of the picture.
+    /// Returns the part of the region in the first rows of the picture.
     pub(crate) fn above(&self, rows: u16) -> Self {
         Self { height: rows.min(self.height), ..self.clone() }
     }
 
-    /// The region as it lies in a part of the picture, or in a smaller copy.
+    /// Returns the region in the coordinates of a rectangle of the picture or of a smaller copy.
     #[cfg(feature = "horace")]
     pub(crate) fn through(&self, crop: &Crop) -> Self {
         let [sx, sy] = crop.scale::<T>();
@@ -161,16 +162,16 @@ impl<T: Real> Region<T> {
         }
     }
 
-    /// Columns of the picture.
+    /// Returns the number of columns of the picture.
     pub fn width(&self) -> u16 {
         self.width
     }
-    /// Rows of the picture.
+    /// Returns the number of rows of the picture.
     pub fn height(&self) -> u16 {
         self.height
     }
 
-    /// Whether the pixel lies in the picture and in the image circle.
+    /// Returns whether the pixel lies in the picture and in the image circle.
     #[inline(always)]
     pub fn contains(&self, x: u16, y: u16) -> bool {
         let ((left, right), (top, bottom)) = (self.columns(), self.rows());
@@ -179,7 +180,7 @@ impl<T: Real> Region<T> {
             && self.circle.as_ref().is_none_or(|c| c.contains(x, y))
     }
 
-    /// Whether every pixel up to `margin` away in x and y is in the region. (Polygons are not looked at.)
+    /// Returns whether every pixel up to `margin` away in x and y is in the region. Polygons are not tested.
     #[inline(always)]
     pub(crate) fn is_inside_by(&self, x: u16, y: u16, margin: u16) -> bool {
         let (w, h) = (u32::from(self.width), u32::from(self.height));
@@ -192,8 +193,9 @@ impl<T: Real> Region<T> {
             && self.circle.as_ref().is_none_or(|c| c.clear(x, y, T::from_i32(i32::from(margin))))
     }
 
-    /// Pixels, up to `most`, that can be walked from here in any direction without leaving the region or coming to a
-    /// masked polygon. Less where that takes longer to find out than to walk.
+    /// Returns the number of pixels, up to `most`, that can be walked from here in any direction without leaving the
+    /// region or meeting a masked polygon. It may be lower than the true number, where a test would take longer than
+    /// the walk.
     #[inline(always)]
     pub(crate) fn clearance(&self, x: u16, y: u16, most: u16) -> u16 {
         let sides = x
@@ -210,23 +212,24 @@ impl<T: Real> Region<T> {
         [most, most / 4].into_iter().find(|&n| clear(n)).unwrap_or(0)
     }
 
-    /// Whether there is a polygon.
+    /// Returns whether there is a polygon.
     pub(crate) fn has_mask(&self) -> bool {
         !self.polygons.is_empty()
     }
-    /// What it costs at most to see whether a pixel is masked, in the unit of [`crate::model::work`], which is four
-    /// sides.
+    /// Returns the largest cost to test whether a pixel is masked, in the unit of [`crate::model::work`]. One unit is
+    /// four sides of a polygon.
     pub(crate) fn mask_cost(&self) -> u32 {
         self.polygons.iter().map(|p| 1 + p.corners.len() as u32 / 4).sum()
     }
 
-    /// Whether a polygon covers the pixel.
+    /// Returns whether a polygon covers the pixel.
     #[inline(always)]
     pub fn masked(&self, x: u16, y: u16) -> bool {
         self.has_mask() && self.covered(x, y)
     }
 
-    /// Whether there is such a pixel, in the region and not masked. For reads that need it seldom: once in flash.
+    /// Returns whether the pixel exists, is in the region and is not masked. It is for reads that need this seldom: one
+    /// copy in flash.
     #[inline(never)]
     pub(crate) fn counts(&self, x: i32, y: i32) -> bool {
         let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
@@ -239,7 +242,7 @@ impl<T: Real> Region<T> {
         self.polygons.iter().any(|polygon| polygon.covers(p))
     }
 
-    /// First and last column of a row; `None` when the circle leaves nothing of it.
+    /// Returns the first and last column of a row; `None` if the image circle leaves nothing of the row.
     pub fn span(&self, y: u16) -> Option<(u16, u16)> {
         let ((first, last), (top, bottom)) = (self.columns(), self.rows());
         if !(top..=bottom).contains(&y) {
@@ -252,9 +255,9 @@ impl<T: Real> Region<T> {
             return None;
         }
         let half = c.semi_x * left.sqrt();
-        // A region has columns; said once more, so that `clamp` is seen not to fail.
+        // A region always has columns. The `max` repeats this, so that the compiler sees that `clamp` cannot fail.
         let (first, last) = (i32::from(first), i32::from(last.max(first)));
-        // Start one pixel inside and grow while the exact test holds: the ring and `contains` must agree.
+        // The search starts one pixel inside and grows while the exact test holds: the ring and `contains` must agree.
         let mut x0 = ((c.cx - half).floor().to_i32() + 2).clamp(first, last);
         let mut x1 = ((c.cx + half).floor().to_i32() - 1).clamp(first, last);
         if x0 > x1 {
@@ -281,7 +284,7 @@ impl<T: Real> Circle<T> {
     fn contains(&self, x: u16, y: u16) -> bool {
         self.clear(x, y, T::ZERO)
     }
-    /// The square of `margin` pixels to each side lies within.
+    /// Returns whether the square of `margin` pixels to each side lies within the circle.
     #[inline(always)]
     fn clear(&self, x: u16, y: u16, margin: T) -> bool {
         let dx = ((T::from_i32(i32::from(x)) - self.cx).abs() + margin) * self.inv_x;
@@ -291,12 +294,13 @@ impl<T: Real> Circle<T> {
 }
 
 impl<T: Real> Outline<T> {
-    /// Whether it lies outside of the square of `margin` pixels to each side.
+    /// Returns whether the polygon lies outside the square of `margin` pixels to each side of the pixel.
     fn clear(&self, x: u16, y: u16, margin: T) -> bool {
         let p = [T::from_i32(i32::from(x)), T::from_i32(i32::from(y))];
         (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k]) || self.clear_within(p, margin)
     }
-    /// As [`Self::clear`], where the bounding box does not tell: no side crosses the square, and its centre is outside.
+    /// Does the same as [`Self::clear`], if the bounding box does not decide: no side crosses the square, and its
+    /// centre is outside the polygon.
     #[inline(never)]
     fn clear_within(&self, p: [T; 2], margin: T) -> bool {
         let Some(&last) = self.corners.last() else { return true };
@@ -308,7 +312,7 @@ impl<T: Real> Outline<T> {
             });
             let d = [b[0] - a[0], b[1] - a[1]];
             let off = (d[0] * (p[1] - a[1]) - d[1] * (p[0] - a[0])).abs();
-            // Half a pixel more, for rounding.
+            // The limit is half a pixel larger, for rounding.
             if !apart && !(off > (d[0].abs() + d[1].abs()) * (margin + T::from_f64(0.5))) {
                 return false;
             }
@@ -316,7 +320,7 @@ impl<T: Real> Outline<T> {
         }
         !self.covers(p)
     }
-    /// Even-odd rule.
+    /// Returns whether the polygon covers a point, by the even-odd rule.
     fn covers(&self, [x, y]: [T; 2]) -> bool {
         if x < self.low[0] || x > self.high[0] || y < self.low[1] || y > self.high[1] {
             return false;
@@ -357,7 +361,8 @@ mod tests {
                 assert!(n == 0 || !region.masked(x + i - n, y + j - n), "{x} {y}: {n}");
             }
         }
-        // Also between the corners of their bounding boxes, which cover most of the picture.
+        // There is clearance also between the polygons and the corners of their bounding boxes, which cover most of the
+        // picture.
         assert!(clear > 400, "{clear}");
     }
 

@@ -1,21 +1,22 @@
-//! The way around a region along its outermost pixels.
+//! The ring: the closed path of the outermost pixels of a region.
 
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
 
 use super::Region;
 
-/// Rows of the ring taken at once along the picture's sides.
+/// Number of rows of the ring that are taken at once along the picture's sides.
 const LEAP: u16 = 64;
 
 impl<T: Real> Region<T> {
-    /// Gives the outermost pixels of the region once around as straight runs, clockwise as seen on the screen, from
-    /// the left end of the top row, until `visit` says to stop. They are the pixels with an outer 4-neighbour.
+    /// Passes the outermost pixels of the region to `visit` as straight runs, once around, until it returns false. The
+    /// order is clockwise on the screen, from the left end of the top row. The outermost pixels are those with a
+    /// 4-neighbour outside the region.
     pub(crate) fn each_run(&self, mut visit: impl FnMut(Run) -> bool) {
         let _ = if self.circle.is_none() { self.sides(&mut visit) } else { self.around(&mut visit) };
     }
 
-    /// [`Self::each_run`] of a rectangle. `None`: it was stopped.
+    /// Does the work of [`Self::each_run`] for a rectangle. `None` means that `visit` stopped it.
     #[inline(always)]
     fn sides(&self, visit: &mut impl FnMut(Run) -> bool) -> Option<()> {
         let ((first, last), (upper, lower)) = (self.columns(), self.rows());
@@ -34,12 +35,13 @@ impl<T: Real> Region<T> {
         Some(())
     }
 
-    /// [`Self::each_run`] of a region that the image circle cuts. `None`: it was stopped.
+    /// Does the work of [`Self::each_run`] for a region that the image circle cuts. `None` means that `visit` stopped
+    /// it.
     #[inline(always)]
     fn around(&self, visit: &mut impl FnMut(Run) -> bool) -> Option<()> {
         let (upper, lower) = self.rows();
         let (top, (left, right)) = (upper..=lower).find_map(|y| self.span(y).map(|s| (y, s)))?;
-        // The rows of a convex region follow each other.
+        // The rows of a convex region are contiguous.
         let (bottom, (low, _)) = (top..=lower).rev().find_map(|y| self.span(y).map(|s| (y, s)))?;
         if !visit(run(left, top, 1, 0, right - left + 1)) {
             return None;
@@ -52,15 +54,15 @@ impl<T: Real> Region<T> {
             return None;
         }
         let x = self.up_the_left(low, top, bottom, visit)?;
-        // Up to the left end of the top row, along the second row where the top row is shorter.
+        // The path closes at the left end of the top row, along the second row where the top row is shorter.
         if x + 1 < left {
             visit(run(x + 1, top + 1, 1, 0, left - x - 1));
         }
         Some(())
     }
 
-    /// The right side from the row below `top` on; gives the last row's end. The end of each row is found from that of
-    /// the row above.
+    /// Walks down the right side from the row below `top` and returns the end of the last row. The end of each row is
+    /// found from that of the row above.
     #[inline(always)]
     fn down_the_right(&self, right: u16, top: u16, bottom: u16, visit: &mut impl FnMut(Run) -> bool) -> Option<u16> {
         let (first, last) = self.columns();
@@ -77,9 +79,9 @@ impl<T: Real> Region<T> {
                 }
             }
             if end == x {
-                // As far down as the column goes on as it is.
+                // This run goes down as long as the column continues unchanged.
                 let from = y;
-                // Along the picture's side the region is convex: what holds at both ends holds between.
+                // Along the picture's side the region is convex: a property of both ends holds between them.
                 while x == last && y + LEAP <= bottom && self.contains(x, y + LEAP) {
                     y += LEAP;
                 }
@@ -91,7 +93,7 @@ impl<T: Real> Region<T> {
                 }
                 continue;
             }
-            // Inwards along the row above, then outwards along this one.
+            // The path goes inwards along the row above, then outwards along this one.
             if x > end + 1 && !visit(run(x - 1, y - 1, -1, 0, x - end - 1)) {
                 return None;
             }
@@ -105,7 +107,7 @@ impl<T: Real> Region<T> {
         Some(x)
     }
 
-    /// The left side from the row above `bottom` up to that below `top`, as [`Self::down_the_right`].
+    /// Walks up the left side from the row above `bottom` to the row below `top`, as [`Self::down_the_right`].
     #[inline(always)]
     fn up_the_left(&self, low: u16, top: u16, bottom: u16, visit: &mut impl FnMut(Run) -> bool) -> Option<u16> {
         let (first, last) = self.columns();
@@ -152,7 +154,7 @@ fn run(x: u16, y: u16, dx: i32, dy: i32, len: u16) -> Run {
     Run { x, y, dx, dy, len }
 }
 
-/// A straight piece of the ring: `len` pixels from (x, y) on, each (dx, dy) further.
+/// A straight run of the ring: `len` pixels from (x, y), each one (dx, dy) further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Run {
     x: u16,
@@ -168,7 +170,7 @@ impl Run {
         let i = i32::from(i);
         Pixel { x: (i32::from(self.x) + self.dx * i) as u16, y: (i32::from(self.y) + self.dy * i) as u16 }
     }
-    /// From a pixel to the next, (dx, dy).
+    /// Returns the step from a pixel to the next, (dx, dy).
     pub(crate) fn step(&self) -> (i32, i32) {
         (self.dx, self.dy)
     }
@@ -191,7 +193,8 @@ mod tests {
         ring
     }
 
-    /// Closed, without repeats, and exactly the pixels of the region with a 4-neighbour outside it.
+    /// Checks that the ring is closed, without repeats, and has exactly the pixels of the region with a 4-neighbour
+    /// outside it.
     fn check(region: &Region<f64>) {
         let ring = ring(region);
         let set: HashSet<_> = ring.iter().copied().collect();

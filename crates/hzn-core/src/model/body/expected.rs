@@ -1,4 +1,4 @@
-//! The cone that is expected, from what is known about one picture.
+//! The cone that is expected from the prior of one picture.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -10,65 +10,66 @@ use super::{
     PriorError, SUN_RADIUS_KM, shape,
 };
 
-/// An attitude that is known no better than this is worth no more than none: 30 degrees (book/theory/math.md,
-/// ellipsoid).
+/// From this 1-sigma on, a prior attitude is no better than none and does not correct the shape of the limb: 30 degrees
+/// (book/theory/math.md, ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
-/// 1-sigma of an attitude that comes without one: 5 degrees.
+/// 1-sigma of an attitude without a sigma in the prior: 5 degrees.
 const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
 
-/// Nothing that takes pictures turns faster.
+/// Largest plausible rate of rotation of a camera, rad/s.
 const MAX_RATE_RAD_S: f64 = 1000.0;
 
-/// The cone that is expected: cosine of its half-angle with its sigma, and what turns a half-angle into an altitude.
+/// The cone that is expected: the cosine of its half-angle with its sigma, and the lengths that convert a half-angle to
+/// an altitude.
 #[derive(Debug, Clone, Copy)]
 pub struct Expected<T> {
     /// cos α₀ of the best single cone.
     pub(crate) cos: T,
     /// sin α₀.
     pub(crate) sin: T,
-    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; infinite when the half-angle is free.
+    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; without the altitude when the half-angle is
+    /// free.
     pub(crate) sigma_cos: T,
-    /// 1-sigmas of the limb height that this comes of: of the limb itself, of the altitude, of the unknown radius, of
-    /// clipping; metres.
+    /// Contributions to `sigma_cos` as 1-sigmas of the limb height: limb, altitude, unknown radius, clipping; metres.
     pub(crate) sigma_parts: [T; 4],
-    /// What clipping adds to the height of a limb that is clipped all along, and its 1-sigma; metres.
+    /// Height that clipping adds to a limb that is clipped everywhere, and its 1-sigma; metres.
     pub(crate) clipped_m: [T; 2],
-    /// The limb cone of the ellipsoid, when the position is known.
+    /// The limb cone of the ellipsoid (ECEF), when the position is known.
     pub(crate) ellipsoid: Option<LimbCone<T>>,
     /// Prior attitude, camera to ECEF.
     pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
-    /// How the limb differs from the mean cone by azimuth about the axis: first and second harmonic of cos α, from
-    /// north.
+    /// Difference of the limb from the mean cone as a function of azimuth about the axis: first and second harmonic of
+    /// cos α, counted from north.
     pub(crate) harmonics_cos: [T; 2],
-    /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct: because the azimuth of north
-    /// is unknown, or because the position is.
+    /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct, because the azimuth of north
+    /// or the position is unknown.
     pub(crate) uneven_cos: [T; 2],
-    /// Level that the picture before asks for, counts.
+    /// Threshold that the previous picture proposes, counts.
     pub(crate) level: Option<u16>,
-    /// Direction to the Sun in the camera, where only the limb that it lights is limb.
+    /// Direction to the Sun in the camera frame, if only the sunlit limb of the body counts as limb.
     pub(crate) sun: Option<V3<T>>,
-    /// The Sun's direction for the gate of what it does not light, where the body is seen in its light.
+    /// Direction to the Sun in the camera frame for the gate on unlit limbs, if the body is seen in sunlight.
     pub(crate) sun_seen: Option<V3<T>>,
-    /// The axis in the camera by the given attitude and position, and its 1-sigma in radians.
+    /// The axis in the camera frame that the prior attitude and position predict, and its 1-sigma in radians.
     pub(crate) predicted: Option<(V3<T>, T)>,
-    /// The last answer.
+    /// The last answer before this picture.
     pub(crate) last: Option<Last<T>>,
     /// The camera's rate of rotation in its own axes, rad/s.
     pub(crate) rate_rad_s: Option<[T; 3]>,
-    /// Radius of the sphere with this half-angle at this altitude, limb height not included, metres.
+    /// Radius of the sphere with this half-angle at this altitude, without the limb height, metres.
     pub(crate) radius_m: T,
     /// Limb height in metres and its sigma.
     pub(crate) limb_m: T,
     pub(crate) limb_sigma_m: T,
-    /// The half-angle says nothing about the distance (Sun, Moon).
+    /// Whether the half-angle says nothing about the distance (Sun, Moon).
     pub(crate) free: bool,
-    /// It may be seen as a crescent.
+    /// Whether the body may be seen as a crescent.
     pub(crate) phases: bool,
-    /// Which of the sensor's bodies it is, from 0.
+    /// Number of the body among those of the sensor, from 0.
     pub(crate) which: u8,
 }
 
-/// Refuses numbers of a prior that cannot be; gives the 1-sigma of its attitude in radians.
+/// Refuses impossible numbers of a prior, and returns the 1-sigma of its attitude in radians.
 fn check<T: Real>(frame: &Prior<T>) -> Result<T, PriorError> {
     if frame.altitude_m.is_some_and(|h| !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite())) {
         return Err(PriorError::Altitude);
@@ -90,7 +91,7 @@ fn below<T: Real>(altitude: T, limb: T) -> PriorError {
     PriorError::BelowLimb { altitude_m: rounded_m(altitude), limb_m: rounded_m(limb) }
 }
 
-/// The body as it is seen from where the camera is; lengths in metres.
+/// The body as it appears from the position of the camera; lengths in metres.
 struct Seen<T> {
     /// Radius of the sphere with this half-angle at this altitude.
     radius: T,
@@ -101,7 +102,7 @@ struct Seen<T> {
     limb: T,
     harmonics: [T; 2],
     ellipsoid: Option<LimbCone<T>>,
-    /// 1-sigma of the local radius, and of its second harmonic, where the latitude is unknown.
+    /// 1-sigma of the local radius, and of the second harmonic, if the latitude is unknown.
     unknown_m: T,
     unknown_second_m: T,
 }
@@ -114,7 +115,7 @@ impl<T: Real> Seen<T> {
         }
     }
 
-    /// The Earth from a position in ECEF.
+    /// Describes the Earth as seen from an ECEF position in metres.
     fn ellipsoid(body: &Config, p: [T; 3]) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let (mut limb, mut harmonics) = (T::from_f64(body.limb_height_km) * km, [T::zero(); 2]);
@@ -128,7 +129,8 @@ impl<T: Real> Seen<T> {
         }
         let mut cone = raised(limb);
         if !body.limb_height_by_latitude_km.is_empty() {
-            // Below the limb height the limb is all around at the camera's own latitude.
+            // Below the limb height there is no cone. The limb then counts as being at the camera's own latitude
+            // everywhere.
             let sin = cone.as_ref().map_or(T::one(), |cone| cone.mean_half_angle_rad().sin_cos().0);
             let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
             (limb, harmonics) = (mean * km, [first * km, second * km]);
@@ -151,7 +153,7 @@ impl<T: Real> Seen<T> {
         })
     }
 
-    /// A sphere, from a position or an altitude.
+    /// Describes a sphere, as seen from a position or an altitude.
     fn sphere(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let limb = T::from_f64(body.limb_height_km) * km;
@@ -173,7 +175,7 @@ impl<T: Real> Seen<T> {
         let sin = (r + limb) / (r + altitude);
         let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
         if body.kind == Kind::Earth {
-            // A height above the ellipsoid rises with the local radius: most of its error cancels.
+            // A height above the ellipsoid rises with the local radius, so most of the error of the radius cancels.
             let counts = match body.altitude_reference {
                 AltitudeReference::Ellipsoid => (altitude - limb) / (r + altitude),
                 AltitudeReference::Sphere => T::one(),
@@ -185,7 +187,7 @@ impl<T: Real> Seen<T> {
         Ok(Self { radius: r, altitude, sin, limb, harmonics, ellipsoid: None, unknown_m, unknown_second_m })
     }
 
-    /// The limb axis that the position leads to.
+    /// Returns the limb axis in ECEF that follows from the position; `None` without a position.
     fn axis_ecef(&self, body: &Config, frame: &Prior<T>) -> Option<UnitVec3<Ecef, T>> {
         match (&self.ellipsoid, frame.position_m, body.kind) {
             (Some(cone), ..) => Some(cone.axis),
@@ -196,19 +198,19 @@ impl<T: Real> Seen<T> {
 }
 
 impl<T> Expected<T> {
-    /// As [`Config::blooms`].
+    /// Returns the same as [`Config::blooms`].
     pub(crate) fn blooms(&self) -> bool {
         self.free && !self.phases
     }
 }
 
 impl<T: Real> Expected<T> {
-    /// Expected half-angle in radians.
+    /// Returns the expected half-angle in radians.
     pub fn half_angle_rad(&self) -> T {
         self.sin.atan2(self.cos)
     }
 
-    /// sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    /// Computes the expected cone: sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
     pub(crate) fn new(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
         let attitude_sigma = check(frame)?;
         let km = T::from_f64(1000.0);
@@ -226,15 +228,15 @@ impl<T: Real> Expected<T> {
         let tan = sin / cos;
         let scale = tan / (seen.radius + seen.altitude);
         let known = frame.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
-        // A higher limb is a wider cone. The ellipsoid's own shape adds half the difference of its half-angles'
-        // cosines.
+        // A higher limb makes the cone wider. The shape of the ellipsoid adds half the difference between the cosines
+        // of its two half-angles.
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);
         let own = seen.ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
             let (east, meridian) = cone.half_angles_rad();
             (meridian.sin_cos().1 - east.sin_cos().1) * T::from_f64(0.5)
         });
         let uneven = |k: f64, amplitude: T| match known {
-            // An attitude that is off by ψ leaves k ψ of the k-th harmonic.
+            // An attitude error ψ leaves k ψ of the k-th harmonic.
             Some(_) => amplitude.abs() * (attitude_sigma * T::from_f64(k)).min(T::one()),
             None => amplitude.abs(),
         };
@@ -268,16 +270,19 @@ impl<T: Real> Expected<T> {
         })
     }
 
-    /// 1-sigma of the half-angle from the limb's own height alone, radians: over the way to the limb, (R + d)/tan α.
+    /// Returns the 1-sigma of the half-angle from the limb height alone, radians: its sigma over the distance to the
+    /// limb, (R + d)/tan α.
     pub(crate) fn limb_sigma_rad(&self) -> T {
         self.sigma_parts[0] * self.sin / (self.cos.max(T::from_f64(1e-6)) * (self.radius_m + self.limb_m))
     }
 
-    /// The cone that is expected where `part` of the limb, 0 to 1, is clipped at full scale. Full scale cuts its light
-    /// off at 1/B of the peak. Half of full scale then lies h ln B above half of the light; over the height h the air
-    /// thins out to 1/e. B is not known and differs along the limb. What differs counts as a first harmonic of the
-    /// azimuth: between points that are clipped and such that are not, part (1 − part) of the height squared; and of
-    /// two ends whose heights differ independently, each by σ, half the difference is σ/√2.
+    /// Returns the expected cone for a limb of which the fraction `part`, 0 to 1, is clipped at full scale.
+    ///
+    /// Full scale cuts the light off at 1/B of its peak. Half of full scale then lies h ln B above half of the light,
+    /// where h is the height over which the air thins out to 1/e. B is unknown and varies along the limb. The variation
+    /// counts as a first harmonic in azimuth with two contributions. The difference between clipped and unclipped
+    /// points has the variance part (1 − part) times the height squared. If the heights at the two ends vary
+    /// independently by σ each, half of their difference has the sigma σ/√2.
     pub(crate) fn clipped(&self, part: T) -> Self {
         if self.free || !(part > T::zero()) {
             return *self;
@@ -309,42 +314,42 @@ impl<T: Real> Expected<T> {
         }
     }
 
-    /// Altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle says
-    /// nothing about the distance.
+    /// Returns the altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle
+    /// says nothing about the distance.
     pub(crate) fn altitude(&self, cos: T, var_cos: T) -> Option<(T, T)> {
         let sin = (T::one() - cos * cos).sqrt();
         if self.free || !(sin > T::zero() && cos > T::zero()) {
             return None;
         }
         let distance = (self.radius_m + self.limb_m) / sin;
-        // dH/dcos = (R + d) cos/sin³, dH/dd = 1/sin − 1 + 1 for a shift of the limb at fixed radius.
+        // dH/dcos = (R + d) cos/sin³; dH/dd = 1/sin for a shift of the limb at fixed radius.
         let by_cos = distance * cos / (sin * sin);
         let by_limb = T::one() / sin;
         let variance = by_cos * by_cos * var_cos + by_limb * by_limb * self.limb_sigma_m * self.limb_sigma_m;
         Some((distance - self.radius_m, variance.sqrt()))
     }
 
-    /// Limb height in metres that a measured cos α asks for at the expected altitude, and how it changes with cos α:
-    /// d = (R + H) sin α − R, ∂d/∂cos = −(R + H) cot α, m. With the body's limb raised to d, the expected half-angle is
-    /// the measured one. `None` when the half-angle says nothing about the distance.
+    /// Returns the limb height in metres that explains a measured cos α at the expected altitude, and its derivative by
+    /// cos α: d = (R + H) sin α − R, ∂d/∂cos = −(R + H) cot α, m. If the body's limb height is set to d, the expected
+    /// half-angle is the measured one. `None` when the half-angle says nothing about the distance.
     pub fn limb_height_m(&self, cos: T) -> Option<(T, T)> {
         let sin = (T::one() - cos * cos).sqrt();
         if self.free || !(sin > T::zero() && cos > T::zero()) {
             return None;
         }
         let distance = (self.radius_m + self.limb_m) / self.sin;
-        // The difference of the sines, so that single precision keeps the metres.
+        // The difference of the sines is rewritten as a product, so that f32 keeps the metres.
         let height = self.limb_m + distance * (self.cos - cos) * (self.cos + cos) / (sin + self.sin);
         Some((height, -distance * cos / sin))
     }
 
-    /// The axis in ECEF, when the position is known.
+    /// Returns the limb axis in ECEF, when the position is known.
     pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
         self.ellipsoid.as_ref().map(|c| c.axis)
     }
 }
 
-/// A length to the nearest metre, for messages.
+/// Rounds a length to the nearest metre, for messages.
 fn rounded_m<T: Real>(m: T) -> i32 {
     (m + T::from_f64(0.5)).floor().to_i32()
 }
@@ -389,7 +394,7 @@ mod tests {
             assert!(same(clipped.sigma_cos, higher.sigma_cos) && same(clipped.limb_m, higher.limb_m), "{part}");
             assert_eq!(clipped.uneven_cos[0] > 0.0, part > 0.0);
         }
-        // Nothing is expected of how large a Moon looks.
+        // No apparent size of the Moon is expected, so clipping changes nothing.
         let moon = at(0.0, 0.0, Kind::Moon);
         assert_eq!(moon.clipped(1.0).cos, moon.cos);
     }
@@ -410,7 +415,7 @@ mod tests {
         assert!(none > 1e-5);
         assert_eq!(sigma(0.0), 0.0);
         assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);
-        // No better than none, and then it is not used.
+        // From 30 degrees on, the attitude is no better than none and does not correct the shape.
         assert_eq!(sigma(40.0), none);
         assert_eq!(Expected::new(&body, &frame).unwrap().uneven_cos[1], sigma(5.0));
         for deg in [f64::NAN, -1.0, f64::INFINITY] {
@@ -440,7 +445,7 @@ mod tests {
         let sphere = with(Kind::EarthSphere);
         let near = Prior { position_m: Some([0.0, 6371.0088e3 + 3200.0, 0.0]), ..Prior::default() };
         assert_eq!(at(&sphere, near), told);
-        // The pad may stand below the ellipsoid. At the limb height itself nothing is seen either.
+        // The launch pad may be below the ellipsoid. At the limb height itself there is no limb either.
         assert!(matches!(at(&body, altitude(-20.0)), PriorError::BelowLimb { altitude_m: -20, .. }));
         assert!(at(&body, altitude(17_000.0)).to_string().contains("is not above the limb height"));
         assert_eq!(at(&body, altitude(-1000.0)), PriorError::Altitude);

@@ -1,4 +1,4 @@
-//! The body whose limb is looked for, and what a position and an altitude say about its cone.
+//! The body whose limb the sensor searches for, and its cone for a given position and altitude.
 
 mod expected;
 mod shape;
@@ -22,18 +22,19 @@ pub const AU_KM: f64 = 149_597_870.7;
 /// Mean distance of the Moon in kilometres.
 pub const MOON_DISTANCE_KM: f64 = 384_400.0;
 
-/// No camera stands lower than this above its body, in metres: the lowest dry land is 0.4 km below WGS-84.
+/// Lowest altitude of a camera above its body, in metres: the lowest dry land is 0.4 km below WGS-84.
 pub const LOWEST_ALTITUDE_M: f64 = -1000.0;
 
-/// Most rows of a limb height by latitude.
+/// Maximum number of rows of a limb height by latitude.
 pub const MAX_LATITUDES: usize = 16;
-/// Places on one half of the limb at which a height by latitude is looked up.
+/// Number of points on one half of the limb at which a height by latitude is evaluated.
 const PLACES: usize = 8;
 
 choices! {
-    /// Which body.
+    /// The kind of body.
     pub enum Kind {
-        /// WGS-84. Without a position it is a sphere of the mean radius, and the covariance holds the unknown latitude.
+        /// The Earth as the WGS-84 ellipsoid. Without a position it is a sphere of the mean radius, and the covariance
+        /// includes the unknown latitude.
         @0 Earth = "earth";
         /// A sphere of 6371.0088 km.
         @1 EarthSphere = "earth-sphere";
@@ -47,33 +48,34 @@ choices! {
 }
 
 choices! {
-    /// The surface that an altitude without a position is measured from.
+    /// The surface from which an altitude without a position is measured.
     pub enum AltitudeReference {
-        /// The WGS-84 ellipsoid, as satellite navigation gives it.
+        /// The WGS-84 ellipsoid, as in satellite navigation.
         ///
-        /// A local radius that differs from the mean one moves the camera with the surface, and shows in the half-angle
-        /// by only (H − d)/(R + H) of itself.
+        /// If the local radius differs from the mean one, the camera moves with the surface. The half-angle then shows
+        /// only (H − d)/(R + H) of the difference.
         @0 Ellipsoid = "ellipsoid";
-        /// A sphere of 6371 km, such as orbit radius minus 6371 km; the local radius stays unknown by about 17 km (1σ).
+        /// A sphere of 6371 km, for example for an orbit radius minus 6371 km; the local radius is then unknown by
+        /// about 17 km (1σ).
         @1 Sphere = "sphere";
     }
 }
 
 section! {
-    /// `[body]` of sensor.toml: the body that is looked for; each of several `[[bodies]]` has the same keys.
+    /// `[body]` of sensor.toml: the body that the sensor searches for; each of several `[[bodies]]` has the same keys.
     "body" pub struct Config {
-        /// Which body is looked for.
+        /// The body that the sensor searches for.
         @30 kind: Kind = Kind::Earth, [choice];
-        /// Radius of a `sphere`, km; other bodies take none.
+        /// Radius of a `sphere`, km; not allowed for other bodies.
         @31 radius_km: Option<f64> = None, ["above 0, for `sphere` only"] { unset: "none", example: "1188.3" };
-        /// Altitude of the camera where a picture's prior gives none, km; above WGS-84 for `earth`, else above the
-        /// radius.
+        /// Altitude of the camera for pictures without an altitude in their prior, km; above WGS-84 for `earth`, else
+        /// above the radius.
         ///
-        /// `sun` and `moon` do not use it. For a camera in orbit about the Moon the body is a `sphere` of 1737.4 km.
+        /// `sun` and `moon` do not use it. For a camera in orbit about the Moon, use a `sphere` of 1737.4 km.
         @32 altitude_km: Option<f64> = None, [above 0.0] { unset: "none", example: "400.0" };
         /// 1σ of the altitude, km.
         @33 altitude_sigma_km: f64 = 0.5, [0.0 to 1e6];
-        /// For `earth`: the surface that an altitude without a position is measured from.
+        /// For `earth`: the surface from which an altitude without a position is measured.
         @36 altitude_reference: AltitudeReference = AltitudeReference::Ellipsoid, [choice];
         /// Height of the visible limb above the surface, km; 17 km is a cloudless limb in sunlight at 550 nm.
         ///
@@ -82,30 +84,31 @@ section! {
         @34 limb_height_km: f64 = 17.0, [-50.0 to 500.0];
         /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds.
         ///
-        /// Wavelengths: 24 km at 440 nm, 12 km at 650 nm. Thresholds: a quarter to three quarters of the limb's
-        /// brightness. The larger the sigma, the less the expected half-angle counts.
+        /// The height is 24 km at 440 nm and 12 km at 650 nm. The range of thresholds is a quarter to three quarters of
+        /// the limb's brightness. The larger the sigma is, the less weight the expected half-angle has.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
-        /// Height that overexposure adds to the limb, km; it counts by the part of the limb that is clipped at full
-        /// scale.
+        /// Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped
+        /// at full scale.
         ///
         /// Half of full scale lies h ln B above half of the light, where h = 7.5 km is the scale height of the air and
-        /// the light exceeds full scale by the factor B. The default is the mean for B from 1 to 8, even in ln B.
+        /// the light exceeds full scale by the factor B. The default is the mean for B from 1 to 8, with a uniform
+        /// distribution of ln B.
         @37 clipped_height_km: f64 = 7.8, [0.0 to 500.0];
         /// 1σ of `clipped_height_km`, km; the height varies along the limb.
         @38 clipped_sigma_km: f64 = 4.5, [0.0 to 1e4];
         /// Limb height by latitude instead of `limb_height_km`: rows of [geodetic latitude in degrees, height in km],
         /// with rising latitudes.
         ///
-        /// It is for `earth` with a position. Heights are linear between rows and constant beyond them. Without an
-        /// attitude the variation along the limb widens the covariance.
+        /// It applies to `earth` with a position. Heights are linear between rows and constant beyond the first and
+        /// last row. Without an attitude, the variation along the limb widens the covariance.
         @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
-        /// Whether only the sunlit part of the limb is a limb, where the direction to the Sun is known.
+        /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun.
         @- sunlit: Option<bool> = None, ["true or false"] { unset: "true for `moon` and `sphere`", example: "true" };
-        /// The body's own threshold, as a table with the keys of `[binarize]`.
+        /// Threshold for this body, as a table with the keys of `[binarize]`.
         @- binarize: Option<threshold::Config> = None, ["the keys of `[binarize]`"]
             { unset: "`[binarize]`; for a `sun` among several bodies `fixed` at 0.9" };
-        /// The body's own errors of edge points, as a table with the keys of `[covariance]`.
+        /// Noise model of edge points for this body, as a table with the keys of `[covariance]`.
         @- covariance: Option<edge_noise::Config> = None, ["the keys of `[covariance]`"] { unset: "`[covariance]`" };
     }
 }
@@ -141,7 +144,7 @@ impl Config {
         self.covariance.map_or(Ok(()), |c| c.check_keys())
     }
 
-    /// Radius of the sphere that stands for the body where no position is known, kilometres.
+    /// Returns the radius of the sphere that represents the body when no position is known, kilometres.
     pub fn mean_radius_km(&self) -> f64 {
         match self.kind {
             Kind::Earth | Kind::EarthSphere => EARTH_MEAN_RADIUS_M / 1e3,
@@ -151,7 +154,7 @@ impl Config {
         }
     }
 
-    /// Limb height in kilometres at a geodetic latitude in degrees.
+    /// Returns the limb height in kilometres at a geodetic latitude in degrees.
     fn limb_height_km(&self, latitude_deg: f64) -> f64 {
         let rows = &self.limb_height_by_latitude_km;
         let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return self.limb_height_km };
@@ -168,8 +171,9 @@ impl Config {
         last[1]
     }
 
-    /// Mean height along the limb seen from a geodetic latitude, and the first and second harmonic of its azimuth from
-    /// north, kilometres. `sin` of the half-angle is the cosine of the limb's distance from the nadir on the ground.
+    /// Returns the mean height along the limb seen from a geodetic latitude, and its first and second harmonic in
+    /// azimuth from north, kilometres. `sin` is the sine of the half-angle; it equals the cosine of the angle at the
+    /// body's centre between the limb and the nadir.
     fn limb_harmonics_km<T: Real>(&self, latitude_rad: T, sin: T) -> [T; 3] {
         let (one, cos) = (T::one(), (T::one() - sin * sin).max(T::zero()).sqrt());
         let (here, across) = latitude_rad.sin_cos();
@@ -189,85 +193,88 @@ impl Config {
         sums.map(|s| s / T::from_f64(PLACES as f64))
     }
 
-    /// Sun and Moon bloom or show phases: their apparent radius is no prior.
+    /// Returns whether the half-angle is always free. This holds for Sun and Moon: they bloom or show phases, so their
+    /// apparent radius cannot be a prior.
     pub fn half_angle_is_free(&self) -> bool {
         matches!(self.kind, Kind::Sun | Kind::Moon)
     }
 
-    /// Whether it is a whole disc in a glare of its own: the Sun.
+    /// Returns whether the body is a whole disc with its own glare: the Sun.
     pub fn blooms(&self) -> bool {
         self.kind == Kind::Sun
     }
 
-    /// Whether it is seen in the Sun's light, as far as is known: not where `sunlit = false` says that it shines by
-    /// itself, as in the thermal infrared.
+    /// Returns whether the body is seen in sunlight, as far as is known. This is false for `sunlit = false`, which
+    /// means that the body itself emits the light, as in the thermal infrared.
     pub fn is_seen_in_sunlight(&self) -> bool {
         self.sunlit != Some(false) && self.kind != Kind::Sun
     }
 
-    /// Whether only the limb that the Sun lights is limb, where its direction is known.
+    /// Returns whether only the sunlit limb counts as limb, when the Sun's direction is known.
     pub fn is_sunlit(&self) -> bool {
         self.sunlit.unwrap_or(matches!(self.kind, Kind::Moon | Kind::Sphere))
     }
 }
 
-/// What is known about one picture besides the picture itself. Everything may be missing.
+/// What is known about one picture before it is processed. Every field may be missing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Prior<T> {
-    /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. Above the limb height.
+    /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. It must be above the limb height.
     pub altitude_m: Option<T>,
-    /// Position of the camera in ECEF, metres. It beats the altitude.
+    /// Position of the camera in ECEF, metres. A known position replaces the altitude.
     pub position_m: Option<[T; 3]>,
-    /// A prior attitude, camera to ECEF; a few degrees are good enough. It serves the ellipsoid's azimuth correction,
-    /// and is a gate where the position is known, see `select.max_attitude_sigma`.
+    /// A prior attitude, camera to ECEF; an accuracy of a few degrees is enough. It gives the azimuth for the
+    /// ellipsoid's correction. With a position it is also a gate, see `select.max_attitude_sigma`.
     pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
-    /// Level between dark and lit that the picture before asks for, in counts: its report's `next_level`, for
-    /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) remembers it itself.
+    /// Threshold that the previous picture proposes, in counts: the `next_level` of its report, for
+    /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) stores this value between pictures.
     pub level: Option<u16>,
-    /// Direction to the Sun in the camera. It is a gate, see `select.max_unlit`.
+    /// Direction to the Sun in the camera frame. It is used by a gate, see `select.max_unlit`.
     pub sun: Option<UnitVec3<Cam, T>>,
-    /// 1-sigma of that attitude about the axis in radians, 0 or more; 5 degrees when it is left out. It widens the
-    /// covariance by what the ellipsoid's shape then leaves open; above 30 degrees the attitude is not used.
+    /// 1-sigma of the prior attitude about the axis in radians, 0 or more; 5 degrees if it is left out. It widens the
+    /// covariance by the part of the ellipsoid's shape that then remains uncertain. From 30 degrees on, the attitude
+    /// does not correct the shape at all.
     pub attitude_sigma_rad: Option<T>,
     /// The last answer, for `select.max_rate_deg_s`.
     pub last: Option<Last<T>>,
-    /// The camera's rate of rotation in its own axes, rad/s, up to 1000: for a camera with a rolling shutter
-    /// (`camera.readout_s`), whose rows are taken at different times. The frame's time is that of its middle row.
+    /// The camera's rate of rotation in its own axes, rad/s, up to 1000. It is for a camera with a rolling shutter
+    /// (`camera.readout_s`), whose rows are exposed at different times. The picture's time is that of its middle row.
     pub rate_rad_s: Option<[T; 3]>,
 }
 
-/// An answer to a picture before.
+/// The answer to an earlier picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Last<T> {
-    /// Its axis in the camera.
+    /// The axis in the camera frame.
     pub axis: UnitVec3<Cam, T>,
-    /// Its 1-sigma in radians, 0 or more.
+    /// The 1-sigma of the axis in radians, 0 or more.
     pub sigma_rad: T,
-    /// How long ago its picture was taken, seconds.
+    /// Time since that picture was taken, seconds.
     pub age_s: T,
 }
 
-/// Why a frame's own data were refused.
+/// Why the prior of a picture was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PriorError {
-    /// The altitude is not a finite number, or no camera is that low.
+    /// The altitude is not a finite number, or is too low for any camera.
     Altitude,
     /// The position is not finite, or inside the body.
     Position,
-    /// The camera is not above the limb height, where the limb encloses it and no cone is seen. A rocket begins there.
+    /// The camera is not above the limb height, so that the limb surrounds it and there is no cone. A rocket flight
+    /// begins there.
     BelowLimb {
         /// Altitude of the camera in metres.
         altitude_m: i32,
         /// Limb height in metres.
         limb_m: i32,
     },
-    /// Neither the frame nor the configuration gives an altitude.
+    /// Neither the prior nor the configuration has an altitude.
     NoAltitude,
-    /// The sigma of the attitude is not a finite number of 0 or more.
+    /// The sigma of the attitude is not a finite number, or is negative.
     AttitudeSigma,
-    /// The rate of rotation is not finite, or absurd.
+    /// The rate of rotation is not finite, or is too large.
     Rate,
-    /// The sensor has no body of that number.
+    /// The sensor has no body with that number.
     NoBody,
 }
 
@@ -304,8 +311,8 @@ mod tests {
         for (latitude, height) in [(-90.0, 20.0), (-45.0, 22.5), (0.0, 25.0), (45.0, 32.5), (90.0, 40.0)] {
             assert_eq!(body.limb_height_km(latitude), height);
         }
-        // Where the height is linear in latitude, the limb to the north is as much higher as that to the south is
-        // lower.
+        // Where the height is linear in latitude, the limb to the north is higher by the same amount by which the limb
+        // to the south is lower.
         let sin = 66f64.to_radians().sin();
         let [mean, first, second] = body.limb_harmonics_km(45f64.to_radians(), sin);
         assert!(

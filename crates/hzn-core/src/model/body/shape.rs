@@ -1,16 +1,17 @@
-//! How far the flattened Earth is from a sphere for a camera that knows its height but not its position.
+//! The difference between the flattened Earth and a sphere, for a camera with a known height but an unknown position.
 //!
-//! To first order in the flattening f a plane that touches the ellipsoid, with its normal at latitude φ', lies
-//! R − k P₂(sin φ') from the centre, k = ⅔ a f. The limb seen from latitude φ has these normals on a circle about the
-//! nadir; by the addition theorem their mean along it is P₂(sin φ) P₂(s), with s = sin α, and their second harmonic in
-//! azimuth ¾ cos²φ cos²α. The first harmonic tilts the axis, which is the limb's own. So
+//! A plane that touches the ellipsoid, with its normal at latitude φ', lies R − k P₂(sin φ') from the centre to first
+//! order in the flattening f, with k = ⅔ a f. The limb seen from latitude φ has these normals on a circle about the
+//! nadir. By the addition theorem, their mean along the circle is P₂(sin φ) P₂(s), with s = sin α. Their second
+//! harmonic in azimuth is ¾ cos²φ cos²α. The first harmonic tilts the axis, which is already the limb axis. Therefore:
 //!
 //! - the sphere with this half-angle at this height above the ellipsoid has the radius R + k P₂(sin φ) (3 s + 1)/2,
 //! - the limb is uneven by a second harmonic of height with the amplitude ¾ k cos²φ cos²α.
 //!
-//! What remains is how latitudes are distributed. A polar orbit spends as much time at each, which leaves the radius
-//! widest open (RMS of P₂ 0.586, against 0.447 for places evenly distributed over the globe); places on the globe lie
-//! nearer to the equator, which leaves the second harmonic widest open (RMS of cos²φ 0.730, against 0.612).
+//! The result depends on the distribution of latitudes. A polar orbit spends equal times at all latitudes, which gives
+//! the largest uncertainty of the radius (RMS of P₂ 0.586, compared with 0.447 for places evenly distributed over the
+//! globe). Places evenly distributed over the globe lie nearer to the equator, which gives the largest uncertainty of
+//! the second harmonic (RMS of cos²φ 0.730, compared with 0.612).
 
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M};
@@ -22,13 +23,14 @@ const RADIUS_RMS: f64 = 0.586_301_969_977_929_6;
 /// RMS of cos²φ over the globe: √(8/15).
 const SECOND_RMS: f64 = 0.730_296_743_340_221_5;
 
-/// 1-sigma of the radius of the sphere that looks alike, about the mean radius, metres: 16.7 km low down, 6 km far off.
+/// Returns the 1-sigma of the radius of the equivalent sphere (with the same half-angle) about the mean radius, metres:
+/// 16.7 km at low altitude, 6 km far away.
 pub(super) fn radius_sigma_m<T: Real>(sin: T) -> T {
     (T::from_f64(3.0) * sin + T::one()) * T::from_f64(0.5 * K_M * RADIUS_RMS)
 }
 
-/// 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km, 1.3 km at 600
-/// km.
+/// Returns the 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km,
+/// 1.3 km at 600 km.
 pub(super) fn second_harmonic_m<T: Real>(sin: T) -> T {
     (T::one() - sin * sin) * T::from_f64(0.75 * K_M * SECOND_RMS)
 }
@@ -39,7 +41,7 @@ mod tests {
     use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone};
     use std::vec::Vec;
 
-    /// The radius of the sphere that looks alike, and the amplitude of the second harmonic, from the exact cone.
+    /// Returns the radius of the equivalent sphere, and the amplitude of the second harmonic, from the exact cone.
     fn exact(latitude_deg: f64, altitude_m: f64) -> (f64, f64) {
         let (s, c) = libm::sincos(latitude_deg.to_radians());
         let e2 = 1.0 - (WGS84_B_M / WGS84_A_M) * (WGS84_B_M / WGS84_A_M);
