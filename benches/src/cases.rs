@@ -1,4 +1,4 @@
-//! The frames: rendered once, kept as bytes without a header, so that both programs read the same.
+//! Renders the frames once and keeps them as bytes without a header, so that both programs read the same data.
 
 use std::fs;
 use std::path::Path;
@@ -8,28 +8,28 @@ use hzn_sim::flight::rocket;
 use hzn_sim::{Disc, Flight, FlightFrame, Samples, Sky};
 use serde::{Deserialize, Serialize};
 
-/// A case that may still have to be rendered.
+/// Case whose frames may still have to be rendered.
 pub(crate) struct Plan {
     pub(crate) name: String,
     flight: Flight,
 }
 
-/// A case in memory.
+/// Case in memory.
 pub(crate) struct Case {
     pub(crate) name: String,
     pub(crate) sensor: Config,
     pub(crate) frames: Vec<Picture>,
 }
 
-/// One frame with what is known and what is true about it.
+/// Frame with its prior and its truth.
 pub(crate) struct Picture {
     pub(crate) bytes: Vec<u8>,
     pub(crate) known: Prior<f64>,
-    /// Limb axis in the camera frame.
+    /// True limb axis in the camera frame.
     pub(crate) truth: [f64; 3],
 }
 
-/// What stands beside the frames, for the other program and for the next run.
+/// Description next to the frames, for the other program and for the next run.
 #[derive(Serialize, Deserialize, PartialEq)]
 struct Manifest {
     camera: camera::Config,
@@ -38,18 +38,18 @@ struct Manifest {
 #[derive(Serialize, Deserialize, PartialEq)]
 struct Entry {
     file: String,
-    /// The scene, so that frames of other scenes are not taken for these.
+    /// Scene of the frame, so that frames of other scenes are not used by mistake.
     scene: hzn_sim::Scene,
 }
 
 const SIZES: [(u16, u16); 3] = [(640, 480), (1920, 1080), (4096, 3072)];
 
-/// Clean and cloudy frames in three sizes.
+/// Returns the cases: clean and cloudy frames in three sizes.
 pub(crate) fn plans(frames: usize) -> Vec<Plan> {
     let mut plans = Vec::new();
     for (width, height) in SIZES {
         for kind in ["clean", "cloudy"] {
-            // More than needed, as a tumbling rocket sometimes shows little limb.
+            // Twice the number is made, because a tumbling rocket sometimes shows little limb.
             let mut flight = rocket(width, height, frames * 2, 7);
             let camera = whole_chip(width, height);
             flight.sensor.camera = camera.clone();
@@ -69,8 +69,8 @@ pub(crate) fn plans(frames: usize) -> Vec<Plan> {
     plans
 }
 
-/// The rocket's lens, scaled by the diagonal: the image circle, of which the recipe knows nothing, stays outside of
-/// the picture in every format.
+/// Returns the rocket's lens, scaled by the diagonal of the picture. With this scale the image circle stays outside the
+/// picture in every format; the recipe does not know of image circles.
 fn whole_chip(width: u16, height: u16) -> camera::Config {
     let (w, h) = (f64::from(width), f64::from(height));
     let focal_px = 1233.0 * w.hypot(h) / 1920f64.hypot(1080.0);
@@ -79,7 +79,7 @@ fn whole_chip(width: u16, height: u16) -> camera::Config {
 }
 
 impl Plan {
-    /// Reads the frames, rendering them first where needed.
+    /// Reads the frames. Renders them first if `render` is set or the stored frames do not match.
     pub(crate) fn prepare(self, folder: &Path, render: bool) -> Result<Case, String> {
         let folder = folder.join(&self.name);
         let text = |e: std::io::Error| format!("{}: {e}", folder.display());
@@ -99,7 +99,7 @@ impl Plan {
                 let Samples::Bytes(bytes) = picture.samples() else { return Err("frames of 8 bits expected".into()) };
                 fs::write(folder.join(&entry.file), bytes).map_err(text)?;
             }
-            // Last, so that half a case is rendered again.
+            // The description is written last, so that an incomplete case is rendered again.
             fs::write(&path, serde_json::to_string(&manifest).map_err(|e| e.to_string())?).map_err(text)?;
         }
         let mut frames = Vec::new();
@@ -116,7 +116,7 @@ impl Plan {
 }
 
 impl Case {
-    /// Pixels of a frame.
+    /// Returns the number of pixels of a frame.
     pub(crate) fn pixels(&self) -> u64 {
         u64::from(self.sensor.camera.width) * u64::from(self.sensor.camera.height)
     }

@@ -1,11 +1,11 @@
-//! What hzn-core wants to reach, beside what was measured.
+//! Compares the measured times with the goals of hzn-core.
 
 use std::fmt::Write;
 
 use crate::sensors::FEWER;
 use crate::table::{CaseResult, median};
 
-/// How many times as fast as the recipe.
+/// Cases, each with the goal for its speed: how many times as fast as the recipe.
 const FACTORS: [(&str, f64); 5] = [
     ("clean-640x480", 10.0),
     ("clean-1920x1080", 20.0),
@@ -13,12 +13,12 @@ const FACTORS: [(&str, f64); 5] = [
     ("clean-4096x3072", 60.0),
     ("cloudy-4096x3072", 60.0),
 ];
-/// How many times as long a picture with six times the pixels may take.
+/// Two cases, and the goal for the ratio of their times. The second picture has six times the pixels of the first.
 const GROWTH: (&str, &str, f64) = ("clean-1920x1080", "clean-4096x3072", 2.0);
-/// Nanoseconds a point and percent of the pixels, of this case.
+/// Case, with the goals for nanoseconds per edge point and for the percentage of pixels that are read.
 const OF_CLEAN: (&str, f64, f64) = ("clean-1920x1080", 30.0, 1.0);
 
-/// The table of goals; of cases that were not measured there is no row.
+/// Returns the table of goals. Cases that were not measured have no row.
 pub(crate) fn table(cases: &[CaseResult]) -> String {
     let case = |name: &str| cases.iter().find(|c| c.name == name);
     let mut s = format!("| goal | reached | with {FEWER} points kept |\n|---|---|---|\n");

@@ -1,8 +1,9 @@
-//! hzn-core beside the OpenCV recipe: the same frames, the same level, taking turns in one run.
+//! Compares hzn-core with the OpenCV recipe: both process the same frames with the same threshold and take turns in one
+//! run.
 //!
 //! Frames are distinct and the caches are flushed before each, because a sensor sees every picture for the first time.
-//! Total times are taken without an observer; stages and pixels in further runs with one.
-//! `cargo xtask bench` prepares Python and starts this; `--help` lists the options.
+//! Total times are measured without an observer; stages and pixels are measured in further runs with one.
+//! `cargo xtask bench` prepares Python and starts this program; `--help` lists the options.
 #![forbid(unsafe_code)]
 
 mod cases;
@@ -26,7 +27,7 @@ const HELP: &str = "usage: cargo xtask bench [OPTION]...
   --only WORD  cases whose name contains WORD (clean, cloudy, 640x480, ...); book/results/benchmarks.md is left alone
   --render     render the frames again even if they are there";
 
-/// What the command line says.
+/// Options of the command line.
 struct Options {
     python: PathBuf,
     frames: usize,
@@ -89,7 +90,7 @@ fn run(options: &Options) -> Result<(), String> {
     Ok(())
 }
 
-/// One case: every frame by every program in turn, round after round.
+/// Measures one case: in each round, every program processes every frame in turn.
 fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<table::CaseResult, String> {
     let mut single = sensors::flight(&case.sensor)?;
     let mut fewer = sensors::fewer_points(&case.sensor)?;

@@ -1,4 +1,4 @@
-//! What watches the pipeline: a clock, and a map of the pixels that were read.
+//! Observers of the pipeline: a clock, and a map of the pixels that were read.
 
 use std::cell::{Cell, RefCell};
 use std::time::Instant;
@@ -6,7 +6,7 @@ use std::time::Instant;
 use hzn_core::Observer;
 use hzn_core::status::Stage;
 
-/// Time in each stage.
+/// Clock for the time in each stage.
 pub(crate) struct Clock {
     since: Cell<Instant>,
     stage: Cell<Option<Stage>>,
@@ -25,7 +25,7 @@ impl Clock {
         self.since.set(now);
         self.stage.set(next);
     }
-    /// Microseconds by stage, of the stages that were entered.
+    /// Returns the time in microseconds of every stage that was entered.
     pub(crate) fn stages(&self) -> Vec<(&'static str, f64)> {
         Stage::ALL.iter().zip(&self.us).map(|(s, us)| (s.name(), us.get())).filter(|(_, us)| *us > 0.0).collect()
     }
@@ -40,7 +40,7 @@ impl<T> Observer<T> for Clock {
     }
 }
 
-/// The pixels that were read, each counted once.
+/// Map of the pixels that were read; each counts once.
 pub(crate) struct Touched {
     width: usize,
     bits: RefCell<Vec<u64>>,

@@ -1,4 +1,4 @@
-//! The other program, a Python process that takes turns with this one.
+//! Runs the OpenCV recipe, a Python process that takes turns with this program.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
@@ -8,7 +8,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use serde::Deserialize;
 use serde_json::json;
 
-/// A running recipe.
+/// Running process of the recipe.
 pub(crate) struct Recipe {
     child: Child,
     requests: Option<ChildStdin>,
@@ -17,7 +17,7 @@ pub(crate) struct Recipe {
     pub(crate) versions: String,
 }
 
-/// What the recipe answers to one frame.
+/// Answer of the recipe to one frame.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Answer {
     pub(crate) stages_us: BTreeMap<String, f64>,
@@ -36,7 +36,7 @@ impl Recipe {
         let mut child = Command::new(python)
             .arg("benches/opencv_recipe.py")
             .arg(folder)
-            // One thread in the linear algebra as well.
+            // The linear algebra uses one thread as well.
             .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"].map(|name| (name, "1")))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -56,7 +56,7 @@ impl Recipe {
         serde_json::from_str(&line).map_err(|e| format!("the OpenCV recipe ended or answered nonsense: {e}"))
     }
 
-    /// One frame with flushed caches.
+    /// Measures one frame with flushed caches.
     pub(crate) fn measure(&mut self, case: &str, frame: usize, level: u16) -> Result<Answer, String> {
         let requests = self.requests.as_mut().ok_or("the recipe takes no requests")?;
         writeln!(requests, "{}", json!({ "case": case, "frame": frame, "level": level })).map_err(|e| e.to_string())?;
@@ -67,7 +67,7 @@ impl Recipe {
 
 impl Drop for Recipe {
     fn drop(&mut self) {
-        // Without requests it ends by itself.
+        // The recipe ends by itself when it gets no more requests.
         self.requests = None;
         let _ = self.child.wait();
     }

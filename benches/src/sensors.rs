@@ -1,4 +1,4 @@
-//! hzn-core in both precisions, measured in the ways the table needs.
+//! Measures hzn-core in both precisions, as the table needs it.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -11,21 +11,21 @@ use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior};
 use crate::cases::{Case, Picture};
 use crate::observers::{Clock, Touched};
 
-/// More than the caches hold.
+/// Number of bytes that are touched to flush the caches; more than the caches hold.
 const FLUSH_BYTES: usize = 64 << 20;
-/// Repetitions of a warm measurement, of which the median counts.
+/// Repetitions of a warm measurement; their median counts.
 const WARM_RUNS: usize = 9;
 
-/// Points that are kept where they are to be fewer.
+/// Value of `keep_points` in the measurement with fewer points.
 pub(crate) const FEWER: u16 = 200;
 
-/// A sensor and the memory that flushes the caches.
+/// Sensor, with the memory that flushes the caches.
 pub(crate) struct Sensor<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
     horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>,
     flush: Vec<u8>,
 }
 
-/// One run.
+/// Result of one run.
 pub(crate) struct Timed {
     pub(crate) elapsed_us: f64,
     pub(crate) level: u16,
@@ -34,24 +34,24 @@ pub(crate) struct Timed {
     pub(crate) axis: Option<[f64; 3]>,
 }
 
-/// f32 with the lists of a flight computer.
+/// Makes a sensor in f32 with the lists of a flight computer.
 pub(crate) fn flight(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
     Ok(Sensor::on(Box::new(FlightHorizon::new(config).map_err(|e| e.to_string())?)))
 }
 
-/// The same with fewer points, as for a flight computer that is short of time.
+/// Makes the same sensor with fewer points, as for a flight computer that is short of time.
 pub(crate) fn fewer_points(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
     let mut config = config.clone();
     config.candidates.keep_points = FEWER;
     flight(&config)
 }
 
-/// f64 with the lists of a workstation.
+/// Makes a sensor in f64 with the lists of a workstation.
 pub(crate) fn host(config: &Config) -> Result<Sensor<f64, 16384, 2048, 65536>, String> {
     Ok(Sensor::on(Box::new(HostHorizon::new(config).map_err(|e| e.to_string())?)))
 }
 
-/// f32 that keeps every point of an edge.
+/// Makes a sensor in f32 that keeps every point of an edge.
 pub(crate) fn every_point(config: &Config) -> Result<Sensor<f32, 16384, 2048, 16384>, String> {
     let mut config = config.clone();
     config.candidates.keep_points = 0;
@@ -84,7 +84,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
     fn once(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
         let picture = picture(case, frame)?;
         let known = known(frame);
-        // Where the body is expected does not depend on the picture.
+        // The expected limb does not depend on the picture, so its time is not measured.
         let expected = self.horizon.expect(&known).map_err(|e| e.to_string())?;
         let start = Instant::now();
         let report = black_box(self.horizon.process(black_box(&picture), &expected));
@@ -98,25 +98,25 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         })
     }
 
-    /// With flushed caches.
+    /// Measures one run with flushed caches.
     pub(crate) fn cold(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
         self.flush_caches();
         self.once(case, frame)
     }
 
-    /// Microseconds when the same frame was just processed.
+    /// Returns the time in microseconds when the same frame has just been processed.
     pub(crate) fn warm(&mut self, case: &Case, frame: &Picture) -> Result<f64, String> {
         Ok(self.warm_points(case, frame)?.elapsed_us)
     }
 
-    /// As [`Self::warm`], with everything the run gives.
+    /// Measures as [`Self::warm`] does, and returns the whole result of the run.
     pub(crate) fn warm_points(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
         let mut runs = (0..WARM_RUNS).map(|_| self.once(case, frame)).collect::<Result<Vec<_>, _>>()?;
         runs.sort_by(|a, b| a.elapsed_us.total_cmp(&b.elapsed_us));
         Ok(runs.swap_remove(WARM_RUNS / 2))
     }
 
-    /// Microseconds by stage, with flushed caches.
+    /// Returns the time of each stage in microseconds, with flushed caches.
     pub(crate) fn stages(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
         self.flush_caches();
         let picture = picture(case, frame)?;
@@ -126,7 +126,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         Ok(clock.stages())
     }
 
-    /// Pixels read at least once.
+    /// Returns the number of pixels that are read at least once.
     pub(crate) fn distinct_pixels(&mut self, case: &Case, frame: &Picture) -> Result<u64, String> {
         let picture = picture(case, frame)?;
         let expected = self.horizon.expect(&known(frame)).map_err(|e| e.to_string())?;

@@ -1,4 +1,4 @@
-//! Medians, and the tables made of them.
+//! Computes medians and makes the tables.
 
 use std::fmt::Write;
 
@@ -10,19 +10,19 @@ use crate::goals;
 use crate::opencv::{Answer, Recipe};
 use crate::sensors::{FEWER, Timed};
 
-/// Everything that was measured.
+/// All measurements.
 #[derive(Serialize)]
 pub(crate) struct Results {
     machine: String,
     versions: String,
-    /// Processes that wanted to run, over the last minute.
+    /// Load of the machine: mean number of runnable processes over the last minute.
     load: String,
     frames: usize,
     rounds: usize,
     cases: Vec<CaseResult>,
 }
 
-/// One case.
+/// Measurements of one case.
 #[derive(Serialize)]
 pub(crate) struct CaseResult {
     pub(crate) name: String,
@@ -35,16 +35,16 @@ pub(crate) struct CaseResult {
     answered: [usize; 4],
     error_deg: [Vec<f64>; 4],
     pub(crate) pixels_percent: Vec<f64>,
-    /// Nanoseconds a point, warm, with every point kept.
+    /// Nanoseconds per edge point, warm, with every point kept.
     pub(crate) ns_a_point: Vec<f64>,
 }
 
-/// Times of one program, microseconds: of each frame the best of its rounds. On a busy machine a longer run is
-/// interrupted more often, so that a median over rounds would flatter the faster program.
+/// Times of one program in microseconds: the best round of each frame. On a busy machine a longer run is interrupted
+/// more often, so a median over rounds would favour the faster program.
 #[derive(Serialize, Default)]
 pub(crate) struct Times {
     total_us: Vec<f64>,
-    /// In the order of first appearance.
+    /// Stages in the order of first appearance.
     stages_us: Vec<(String, Vec<f64>)>,
 }
 
@@ -97,7 +97,7 @@ pub(crate) fn median(list: &[f64]) -> f64 {
     }
 }
 
-/// Angle between two directions in degrees; exact for small ones.
+/// Returns the angle between two directions in degrees; the result is accurate for small angles too.
 fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
@@ -121,7 +121,7 @@ impl CaseResult {
         }
     }
 
-    /// What was answered to a frame: hzn in f32, with fewer points, in f64, and the recipe.
+    /// Records the answers to a frame: hzn in f32, in f32 with fewer points, in f64, and the recipe.
     pub(crate) fn answers(&mut self, frame: &Picture, hzn: [&Timed; 3], theirs: &Answer) {
         let [single, fewer, double] = hzn.map(|t| t.axis.filter(|_| t.status == Status::Ok));
         let axes = [single, fewer, double, theirs.axis];
@@ -165,7 +165,7 @@ impl Results {
         self.cases.push(case);
     }
 
-    /// The tables.
+    /// Returns the tables as Markdown.
     pub(crate) fn markdown(&self) -> String {
         let mut s = String::from("# Benchmarks\n\n");
         let _ = writeln!(

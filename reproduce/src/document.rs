@@ -1,4 +1,4 @@
-//! Sections of documents between marks, so that one study can be measured again alone.
+//! Puts sections into documents, between marks, so that one study can be measured again alone.
 
 use std::path::Path;
 
@@ -24,24 +24,25 @@ nowhere near it. Values that were measured on other seeds of the same scene stan
 noise, the same air and detector. Sections without these words are calculations.
 ";
 
-/// A file that holds sections.
+/// Document that contains sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Document {
-    /// book/results/reproduction.md, which is nothing but sections.
+    /// The file book/results/reproduction.md, which consists of sections only.
     Reproduction,
-    /// book/theory/methods.md, which has places for some.
+    /// The file book/theory/methods.md, which has marked places for some sections.
     Methods,
 }
 
 impl Document {
-    /// Its place in the book.
+    /// Returns its path in the book.
     pub(crate) const fn file(self) -> &'static str {
         match self {
             Self::Reproduction => "results/reproduction.md",
             Self::Methods => "theory/methods.md",
         }
     }
-    /// Its text with the section of `study` in its place.
+    /// Returns the text of the document with the section of `study` in its place. In `Methods`, the marks of the
+    /// section must exist.
     pub(crate) fn put(self, text: &str, study: &Study, section: &str) -> anyhow::Result<String> {
         match self {
             Self::Reproduction => Ok(put(text, study.name, section)),
@@ -55,7 +56,7 @@ impl Document {
     }
 }
 
-/// What a study found.
+/// Result of a study.
 #[derive(Debug, Default)]
 pub(crate) struct Section {
     parts: Vec<Part>,
@@ -73,7 +74,7 @@ impl Section {
     pub(crate) fn text(&mut self, text: impl Into<String>) {
         self.parts.push(Part::Text(text.into()));
     }
-    /// Adds a table; the first column stands to the left, the others to the right.
+    /// Adds a table; the first column is left-aligned, the others are right-aligned.
     pub(crate) fn table<H: Into<String>>(
         &mut self,
         head: impl IntoIterator<Item = H>,
@@ -89,7 +90,7 @@ impl Section {
         Ok(())
     }
 
-    /// The section as Markdown, with its marks.
+    /// Returns the section as Markdown, with its marks.
     pub(crate) fn markdown(&self, name: &str, title: &str) -> String {
         let mut out = format!("{}\n## {title}\n\n`cargo xtask reproduce {name}`\n", begin(name));
         for part in &self.parts {
@@ -128,7 +129,7 @@ fn end(name: &str) -> String {
     format!("<!-- end of {name} -->\n")
 }
 
-/// The section of a study in a document.
+/// Returns the section of a study in a document, if its marks are there.
 fn find<'a>(document: &'a str, name: &str) -> Option<&'a str> {
     let from = document.find(&begin(name))?;
     let rest = &document[from..];
@@ -136,7 +137,8 @@ fn find<'a>(document: &'a str, name: &str) -> Option<&'a str> {
     Some(&rest[..to])
 }
 
-/// book/results/reproduction.md with this section in its place; the others stay, in the order of the studies.
+/// Returns book/results/reproduction.md with this section in its place. The other sections stay, in the order of the
+/// studies.
 fn put(document: &str, name: &str, section: &str) -> String {
     let mut out = HEAD.to_owned();
     for study in ALL.iter().filter(|s| s.document == Document::Reproduction) {

@@ -1,4 +1,4 @@
-//! Flights through sensors: every picture is rendered once and seen by each.
+//! Runs flights through sensors: every picture is rendered once and processed by each sensor.
 
 use std::time::Instant;
 
@@ -9,39 +9,39 @@ use hzn_sim::evaluate::{Answer, Case, Evaluation, MeasuredDirection, pair};
 use hzn_sim::{Flight, FlightFrame, Picture, Truth};
 use rayon::prelude::*;
 
-/// A sensor with what it is told.
+/// Sensor, with the parts of the prior that it gets.
 #[derive(Debug, Clone)]
 pub(crate) struct Sensor {
-    /// As tables name it.
+    /// Name in tables.
     pub(crate) name: String,
-    /// Its configuration.
+    /// Configuration of the sensor.
     pub(crate) config: Config,
-    /// Error of the prior attitude (1-sigma about each axis) in degrees; without it, the position only.
+    /// Error of the prior attitude (1-sigma about each axis) in degrees; `None` means a prior without an attitude.
     pub(crate) attitude_sigma_deg: Option<f64>,
-    /// Told the altitude instead of the position.
+    /// Whether the prior has the altitude but no position.
     pub(crate) altitude_only: bool,
-    /// Not told the rates of rotation.
+    /// Whether the prior has no rates of rotation.
     pub(crate) without_rates: bool,
 }
 
 impl Sensor {
-    /// Told the position only.
+    /// Makes a sensor whose prior has the position and the rates of rotation, but no attitude.
     pub(crate) fn new(name: &str, config: Config) -> Self {
         Self { name: name.into(), config, attitude_sigma_deg: None, altitude_only: false, without_rates: false }
     }
-    /// Told an attitude too.
+    /// Adds an attitude to the prior.
     pub(crate) fn with_attitude(self, sigma_deg: f64) -> Self {
         Self { attitude_sigma_deg: Some(sigma_deg), ..self }
     }
-    /// Told the altitude, and neither position nor attitude.
+    /// Gives the prior the altitude, but neither position nor attitude.
     pub(crate) fn with_altitude_only(self) -> Self {
         Self { attitude_sigma_deg: None, altitude_only: true, ..self }
     }
-    /// Told no rates of rotation.
+    /// Removes the rates of rotation from the prior.
     pub(crate) fn without_rates(self) -> Self {
         Self { without_rates: true, ..self }
     }
-    /// What it is told about a picture.
+    /// Returns the prior of a picture for this sensor.
     pub(crate) fn known(&self, frame: &FlightFrame) -> hzn_core::Prior<f64> {
         let known = match self.attitude_sigma_deg {
             Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
@@ -55,28 +55,28 @@ impl Sensor {
     }
 }
 
-/// What came of a flight through one sensor.
+/// Results of a flight through one sensor.
 pub(crate) struct Flown {
-    /// Every picture.
+    /// One case per picture and body.
     pub(crate) cases: Vec<Case>,
-    /// Processing of every picture, µs, while all cores are busy.
+    /// Processing time of every picture in µs, while all cores are busy.
     pub(crate) elapsed_us: Vec<f64>,
 }
 
-/// Of one picture: the truth of each body, and for each sensor an answer a body with the time they took in µs.
+/// Results of one picture: the truth of each body, and for each sensor one answer per body with the time in µs.
 type Seen = (Vec<Truth>, Vec<(Vec<Answer>, f64)>);
 
-/// The pictures of a flight through sensors: cases, one list a sensor.
+/// Runs the pictures of a flight through sensors. Returns one list of cases per sensor.
 pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec<Case>>> {
     Ok(fly_timed(flight, sensors)?.into_iter().map(|flown| flown.cases).collect())
 }
 
-/// As [`fly`], with times.
+/// Does the same as [`fly`] and returns the processing times too.
 pub(crate) fn fly_timed(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Flown>> {
     look_at_all(flight, sensors, &|frame| Ok(std::borrow::Cow::Owned(frame.render()?)))
 }
 
-/// As [`fly`], of pictures that are rendered already, in the order of the flight's frames.
+/// Does the same as [`fly`] with pictures that are rendered already, in the order of the flight's frames.
 pub(crate) fn fly_rendered(
     flight: &Flight,
     pictures: &[Picture],
@@ -90,14 +90,14 @@ pub(crate) fn fly_rendered(
     Ok(look_at_all(flight, sensors, &rendered)?.into_iter().map(|flown| flown.cases).collect())
 }
 
-/// Every picture, from wherever it comes, through every sensor.
+/// Runs every picture through every sensor; `picture` renders or finds a picture.
 fn look_at_all<'a>(
     flight: &Flight,
     sensors: &[Sensor],
     picture: &(dyn Fn(&FlightFrame) -> anyhow::Result<std::borrow::Cow<'a, Picture>> + Sync),
 ) -> anyhow::Result<Vec<Flown>> {
     let make = || sensors.iter().map(|s| HostHorizon::boxed(&s.config)).collect::<Result<Vec<_>, _>>();
-    // Refused here, not in a thread.
+    // An invalid configuration is refused here, not in a thread.
     make()?;
     let kinds: Vec<Kind> = flight.sensor.each_body().iter().map(|b| b.kind).collect();
     let seen: Vec<Seen> = flight
@@ -124,7 +124,7 @@ fn look_at_all<'a>(
     (0..sensors.len()).map(of).collect()
 }
 
-/// One picture through one sensor: an answer a body.
+/// Runs one picture through one sensor. Returns one answer per body and the processing time in µs.
 fn look(
     horizon: &mut HostHorizon,
     sensor: &Sensor,
@@ -151,12 +151,12 @@ fn look(
     Ok((reports.iter().zip(truths).map(answer).collect(), elapsed_us))
 }
 
-/// The one evaluation of cases of one body.
+/// Returns the evaluation of cases of one body.
 pub(crate) fn evaluate(cases: &[Case]) -> Evaluation {
     Evaluation::new(&cases.iter().collect::<Vec<_>>())
 }
 
-/// Cells of an evaluation: answered, false answers, RMS, 95 %, worst, NEES with its interval.
+/// Returns the cells of an evaluation: answered, false answers, RMS, 95 %, worst, NEES with its interval.
 pub(crate) fn cells(e: &Evaluation) -> Vec<String> {
     let none = || "–".to_owned();
     let error = |of: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or_else(none, |x| deg(of(x)));
@@ -173,10 +173,10 @@ pub(crate) fn cells(e: &Evaluation) -> Vec<String> {
     ]
 }
 
-/// Heads of [`cells`].
+/// Column heads of [`cells`].
 pub(crate) const HEADS: [&str; 6] = ["answered", "false", "RMS", "95 %", "worst", "NEES (95 % if honest)"];
 
-/// An angle to three digits.
+/// Formats an angle in degrees to three digits.
 pub(crate) fn deg(x: f64) -> String {
     if !x.is_finite() {
         return "–".into();
@@ -185,13 +185,14 @@ pub(crate) fn deg(x: f64) -> String {
     format!("{x:.*}°", decimals as usize)
 }
 
-/// A number to two digits, without an exponent.
+/// Formats a number to two digits, without an exponent.
 pub(crate) fn two_digits(x: f64) -> String {
     let decimals = if x > 0.0 { (1 - x.log10().floor() as i32).clamp(0, 6) } else { 1 };
     format!("{x:.*}", decimals as usize)
 }
 
-/// Answers that are not of this limb: above [`GROSS_DEG`], or without one in view; empty when there are none.
+/// Lists the answers that are not of this limb: their error is above [`GROSS_DEG`], or no limb is in view. The text is
+/// empty if there are none.
 pub(crate) fn wrong(cases: &[Case]) -> String {
     let wrong = cases.iter().filter_map(|c| {
         let m = c.miss?;
@@ -218,8 +219,8 @@ pub(crate) fn wrong(cases: &[Case]) -> String {
     wrong.join(", ")
 }
 
-/// Wrong answers that are told one by one.
+/// Number of wrong answers that are listed one by one.
 const SHOWN: usize = 4;
 
-/// Larger errors are another curve than the limb, not a limb that is measured badly.
+/// Limit of gross errors in degrees. With a larger error the sensor has fitted another curve than the limb.
 pub(crate) const GROSS_DEG: f64 = 2.0;

@@ -1,7 +1,9 @@
-//! Our numbers beside the published ones, and accuracy and honesty on rendered flights: `cargo xtask reproduce`.
+//! Measures our numbers to compare them with the published ones, and measures accuracy and honesty on rendered flights:
+//! `cargo xtask reproduce`. A sensor is honest if its errors are as large as its covariance says (NEES).
 //!
-//! A [`studies::Study`] is a name, a title and a function that measures and gives a [`document::Section`]; the list of
-//! them is `book/results/reproduction.md`. To add one: a function in `studies`, a line in [`studies::ALL`].
+//! A [`studies::Study`] has a name, a title and a function that measures and returns a [`document::Section`]. The
+//! sections make up `book/results/reproduction.md`. To add a study, write a function in `studies` and a line in
+//! [`studies::ALL`].
 #![forbid(unsafe_code)]
 
 mod document;
@@ -15,20 +17,20 @@ use clap::Parser;
 
 use studies::{ALL, Effort};
 
-/// Measures again what book/results/reproduction.md and parts of book/theory/methods.md say, and writes it.
+/// Measures the numbers of book/results/reproduction.md and of parts of book/theory/methods.md again, and writes them
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask reproduce")]
 struct Args {
-    /// Studies; without one, all
+    /// Studies to run; all studies if none is named
     #[arg(value_name = "STUDY")]
     studies: Vec<String>,
-    /// Frames a scene instead of each study's own number, for a quick look; no document is written then
+    /// Frames per scene instead of each study's own number, for a quick look; no document is written then
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Name the studies
+    /// List the names and titles of the studies
     #[arg(long)]
     list: bool,
-    /// The folder of the book
+    /// Folder of the book
     #[arg(long, value_name = "DIR", default_value = "book")]
     docs: PathBuf,
 }
@@ -57,7 +59,7 @@ fn main() -> anyhow::Result<()> {
             continue;
         }
         section.write_figures(&args.docs.join("results"))?;
-        // After each: what was measured is not lost when a later one is stopped.
+        // The document is written after each study, so that no result is lost when a later study is stopped.
         let path = args.docs.join(study.document.file());
         let document = std::fs::read_to_string(&path).unwrap_or_default();
         let document = study.document.put(&document, study, &text)?;

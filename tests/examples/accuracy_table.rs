@@ -1,4 +1,4 @@
-//! Prints the table of accuracy: altitude × noise × visible arc × lens.
+//! Prints the accuracy table: altitude × noise × visible arc × lens.
 
 fn main() {
     print!("{}", hzn_tests::table::markdown());

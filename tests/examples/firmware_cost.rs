@@ -1,6 +1,7 @@
-//! What the firmware costs in QEMU: instructions by stage, memory. Prints book/results/firmware-cost.md; `--check FILE`
-//! compares with an earlier one and fails when instructions, flash, static RAM or stack grew by more than 5 %.
-//! `--search FROM TO`: the most expensive of the pictures made with these seeds.
+//! Measures what the firmware costs in QEMU: instructions by stage, and memory. It prints
+//! book/results/firmware-cost.md. `--check FILE` compares the result with an earlier one and fails if instructions,
+//! flash, static RAM or stack grew by more than 5 %. `--search FROM TO` prints the most expensive of the pictures made
+//! with these seeds.
 
 use std::process::{Command, ExitCode};
 
@@ -32,10 +33,10 @@ leads to
 is worked out in double precision, once a picture; nothing else on a picture's way is (`cargo xtask test` looks for it).
 ";
 
-/// Frames of a rocket's flight: clean or cloudy.
+/// Returns frames of a rocket's flight, clean or cloudy.
 fn frames(width: u16, height: u16, clean: bool, count: usize) -> Vec<Case> {
     let mut flight = rocket(width, height, count * 2, 7);
-    // The lens scaled by the diagonal, as in the benchmarks: the image circle stays outside of the picture.
+    // The lens is scaled by the diagonal, as in the benchmarks, so the image circle stays outside the picture.
     let (w, h) = (f64::from(width), f64::from(height));
     let lens = lens(width, height);
     let sensor = Config { camera: lens.clone(), ..flight.sensor.clone() };
@@ -52,7 +53,7 @@ fn frames(width: u16, height: u16, clean: bool, count: usize) -> Vec<Case> {
     flight.frames.iter().filter(shown).take(count).map(named).collect()
 }
 
-/// What a flight computer that is short of time keeps.
+/// Sets the number of points that a flight computer keeps when it is short of time.
 fn with_fewer_points(mut case: Case) -> Case {
     case.sensor.candidates.keep_points = 200;
     Case { name: format!("{}, keep_points = 200", case.name), ..case }
@@ -65,8 +66,8 @@ fn lens(width: u16, height: u16) -> camera::Config {
     camera::Config { k, ..camera::Config::ideal(camera::Model::KannalaBrandt, width, height, focal_px) }
 }
 
-/// A picture that is made to be expensive: much edge, and none of it a limb. Edges of many kinds, sharp and soft, thin
-/// and wide, over noise.
+/// Makes a picture that is expensive on purpose: it has many edges, and none of them is a limb. The edges are of many
+/// kinds, sharp and soft, thin and wide, over noise.
 fn adversary(seed: u32, sensors: &Sensors) -> Case {
     let mut draws = 0;
     let mut draw = |n: u32| {
@@ -74,13 +75,13 @@ fn adversary(seed: u32, sensors: &Sensors) -> Case {
         scrambled(seed, draws) % n
     };
     let pattern = PATTERNS[draw(PATTERNS.len() as u32) as usize];
-    // Pixels of one light and one dark stripe, from 2 to 200, and their direction.
+    // Width of one light and one dark stripe together, from 2 to 200 pixels, and their direction.
     let period = f64::from(2 * (1 + draw(10)) * [1, 1, 3, 10][draw(4) as usize]);
     let (sin, cos) = (f64::from(draw(64)) * std::f64::consts::TAU / 64.0).sin_cos();
     let soft = draw(3) == 0;
     let noise = [0, 0, 20, 90][draw(4) as usize];
     let top = [0, 0, 20, 300][draw(4) as usize];
-    // Arches about a limb's own centre, or any.
+    // The arches lie about the centre of a limb, or about another point.
     let below = [2100, 2100, 600, 9000][draw(4) as usize];
     let (sensor, known_by) = if draw(8) == 0 { &sensors.seldom } else { &sensors.mostly };
     let bytes = (0..W * H)
@@ -142,7 +143,7 @@ const PATTERNS: [Pattern; 8] = [
     Pattern::Sea,
 ];
 
-/// Two numbers to one that has nothing to do with them.
+/// Hashes two numbers to one number that looks random.
 fn scrambled(a: u32, b: u32) -> u32 {
     let n = a.wrapping_mul(0x9E37_79B1) ^ b.wrapping_mul(0x85EB_CA77).rotate_left(13);
     let n = (n ^ n >> 15).wrapping_mul(0x2C1B_3C6D);
@@ -150,19 +151,19 @@ fn scrambled(a: u32, b: u32) -> u32 {
     n ^ n >> 15
 }
 
-/// The sensors that see them, and what is said of them in a picture's name.
+/// Sensors for these pictures, each with a suffix for the picture's name.
 struct Sensors {
     mostly: (Config, &'static str),
-    /// One time in eight.
+    /// Sensor for one picture in eight.
     seldom: (Config, &'static str),
 }
 
-/// An ordinary sensor, and one with the mask of a payload.
+/// Returns an ordinary sensor, and one with the mask of a payload.
 fn usual_sensors() -> Sensors {
     let mut bare = Config::new(lens(W as u16, H as u16));
     bare.body.altitude_km = Some(150.0);
     let mut masked = bare.clone();
-    // A payload in two corners, and an antenna across.
+    // The mask is a payload in two corners and an antenna across the picture.
     for polygon in [
         vec![[1500.0, 0.0], [1919.0, 0.0], [1919.0, 1079.0], [1450.0, 1079.0]],
         vec![[0.0, 800.0], [300.0, 900.0], [350.0, 1079.0], [0.0, 1079.0]],
@@ -173,7 +174,8 @@ fn usual_sensors() -> Sensors {
     Sensors { mostly: (bare, ""), seldom: (masked, ", masked") }
 }
 
-/// As many polygons as there can be, of as many corners: stars over most of the picture, with much border.
+/// Returns a sensor with the largest number of polygons and corners in the mask: stars over most of the picture, with a
+/// long border.
 fn crowded() -> Sensors {
     let mut sensor = usual_sensors().mostly.0;
     for k in 0..8 {
@@ -187,25 +189,25 @@ fn crowded() -> Sensors {
     Sensors { mostly: (sensor.clone(), ", eight stars masked"), seldom: (sensor, ", eight stars masked") }
 }
 
-/// The Moon, whose crescent may be so narrow that every row is a search line.
+/// Returns a sensor for the Moon, whose crescent may be so narrow that every row is a search line.
 fn moon() -> Sensors {
     let sensor = Config::preset(Preset::Moon, lens(W as u16, H as u16));
     Sensors { mostly: (sensor.clone(), ", Moon"), seldom: (sensor, ", Moon") }
 }
 
-/// The search over them: pictures by seed.
+/// Makes the expensive pictures of these seeds.
 fn adversaries(seeds: std::ops::Range<u32>, sensors: &Sensors) -> Vec<Case> {
     seeds.map(|seed| adversary(seed, sensors)).collect()
 }
 
-/// A dark sky, and the Moon at the bottom of it.
+/// Makes a picture of a dark sky with the Moon at the bottom.
 fn moon_at_the_bottom() -> Case {
     let disc = |x: f64, y: f64| ((6.0 - (x - 1500.0).hypot(y - 1000.0)).clamp(0.0, 1.0) * 200.0) as u8 + 20;
     let bytes = (0..W * H).map(|i| disc((i % W) as f64, (i / W) as f64)).collect();
     Case { name: "1920×1080 Moon at the bottom".into(), sensor: moon().mostly.0, known: Prior::default(), bytes }
 }
 
-/// A line of the table: instructions in thousands.
+/// Line of the table, with instructions and work in thousands.
 struct Line {
     name: String,
     total: f64,
@@ -231,7 +233,7 @@ fn lines(cases: &[Case], measured: &[Measured]) -> Vec<Line> {
     out
 }
 
-/// text + data, and data + bss, of an image.
+/// Returns text + data, and data + bss, of an image in bytes.
 fn sizes(board: Board, image: &str) -> Option<[u64; 2]> {
     let out = Command::new("arm-none-eabi-size").arg(board.image(image)).output().ok()?;
     let text = String::from_utf8(out.stdout).ok()?;
@@ -240,10 +242,10 @@ fn sizes(board: Board, image: &str) -> Option<[u64; 2]> {
     Some([text + data, data + bss])
 }
 
-/// Pictures of the search that the table is made from; `--search` looks at others.
+/// Number of expensive pictures for the table; `--search` takes others.
 const SEARCHED: u32 = 64;
 
-/// The most expensive of many pictures, on the M7.
+/// Prints the most expensive of many pictures, on the M7.
 fn search(seeds: std::ops::Range<u32>, sensors: &Sensors) {
     let mut found = Vec::new();
     for from in seeds.clone().step_by(16) {
@@ -330,7 +332,7 @@ fn report() -> Result<String, String> {
     Ok(out)
 }
 
-/// Figures by place: a heading, the first cell of a row, and the column.
+/// Returns the figures of a report. The key of each figure is the heading, the first cell of its row, and the column.
 fn figures(text: &str) -> Vec<(String, f64)> {
     let mut out: Vec<(String, f64)> = Vec::new();
     let (mut heading, mut columns) = ("", Vec::new());
@@ -346,11 +348,11 @@ fn figures(text: &str) -> Vec<(String, f64)> {
         if columns.is_empty() {
             columns = values.to_vec();
         }
-        // Of the worst pictures the first: which one it is may change.
+        // Of the worst pictures only the first counts, because another one may become the worst.
         let name = name.split(": ").next().unwrap_or(name);
         for (value, column) in values.iter().zip(&columns) {
             let key = format!("{heading}, {name}, {column}");
-            // Of a picture the whole: its work and its stages are for reading.
+            // Only the total of a picture is compared; its work and its stages are for information.
             let read_only = *column == "work, thousand" || Stage::ALL.iter().any(|s| s.name() == *column);
             if let (Ok(n), false) = (value.parse(), read_only || out.iter().any(|(k, _)| *k == key)) {
                 out.push((key, n));

@@ -1,4 +1,4 @@
-//! Discs of Sun and Moon, painted with a blurred edge where they are known to stand.
+//! Paints discs of Sun and Moon with a blurred edge at known positions.
 
 use hzn_core::Config;
 use hzn_core::camera::Camera;
@@ -6,33 +6,35 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use nalgebra::Vector3;
 
-/// A disc in a dark sky.
+/// Disc in a dark sky.
 #[derive(Debug, Clone, Copy)]
 pub struct Disc {
-    /// Direction of the centre in the camera, unit length.
+    /// Direction of the centre in the camera frame, unit vector.
     pub axis: [f64; 3],
-    /// Half-angle as it is seen, bloom included, radians.
+    /// Apparent half-angle in radians, with bloom.
     pub half_angle_rad: f64,
-    /// Direction to the Sun in the camera, by which it is lit as dust is; without it the disc is evenly bright.
+    /// Direction to the Sun in the camera frame. The Sun lights the disc from there by the law of Lommel and Seeliger,
+    /// as it lights dust. With `None` the disc is evenly bright.
     pub sun: Option<[f64; 3]>,
-    /// Brightness when it is full, counts; what is above 255 saturates.
+    /// Brightness of the full disc in counts; pixels above 255 saturate.
     pub brightness: f64,
-    /// Halo around it: brightness at the edge, falling with the square of the distance.
+    /// Brightness of the halo at the edge of the disc, in counts. It falls with the square of the distance from the
+    /// centre.
     pub halo: f64,
     /// Standard deviation of the blur, pixels.
     pub blur_px: f64,
-    /// Standard deviation of the noise, counts.
+    /// Standard deviation of the noise in counts.
     pub noise: f64,
 }
 
-/// Samples of a pixel along each side.
+/// Number of samples per pixel along each side.
 const FINE: usize = 4;
 
 impl Disc {
-    /// The picture, 8 bits, row by row; `seed` for the noise.
+    /// Returns the picture with 8 bits, row by row; `seed` is for the noise.
     ///
     /// # Panics
-    /// The lens is refused.
+    /// Panics if the lens is refused.
     pub fn paint(&self, config: &Config, seed: u32) -> Vec<u8> {
         let camera = Camera::<f64>::try_new(&config.camera).expect("the lens is valid");
         let (w, h) = (usize::from(config.camera.width), usize::from(config.camera.height));
@@ -47,10 +49,11 @@ impl Disc {
                 return halo;
             }
             let Some(sun) = self.sun else { return self.brightness };
-            // The point of the sphere that is seen: the normal leans from −e outwards to the limb.
+            // Normal at the visible point of the sphere: it is −e at the centre of the disc and turns outwards to the
+            // limb.
             let across = (s - e * s.dot(&e)).try_normalize(1e-12).unwrap_or_default();
             let normal = across * ratio - e * (1.0 - ratio * ratio).sqrt();
-            // Lommel and Seeliger: bright to the limb, as the Moon is; a full one is even.
+            // Lommel and Seeliger: the disc is bright up to the limb, as the Moon is, and a full disc is even.
             let (lit, seen) = (normal.dot(&Vector3::from(sun)).max(0.0), -normal.dot(&s));
             halo.max(self.brightness * 2.0 * lit / (lit + seen.max(0.0)).max(1e-9))
         };
@@ -59,7 +62,7 @@ impl Disc {
             .map(|i| {
                 let (x, y) = ((i % w) as f64, (i / w) as f64);
                 let centre = light(x, y);
-                // Even places need no more than one look.
+                // One sample is enough where the brightness is even.
                 let flat = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)]
                     .iter()
                     .all(|(dx, dy)| (light(x + dx, y + dy) - centre).abs() < 0.5);
@@ -100,19 +103,19 @@ impl Disc {
     }
 }
 
-/// The direction of a place in the picture.
+/// Returns the direction of a place in the picture (pixels) as a unit vector in the camera frame.
 ///
 /// # Panics
-/// The lens is refused or the place lies beyond it.
+/// Panics if the lens is refused or the place lies outside the lens.
 pub fn direction(config: &Config, u: f64, v: f64) -> [f64; 3] {
     let camera = Camera::<f64>::try_new(&config.camera).expect("the lens is valid");
     camera.unproject(ImagePoint { u, v }).expect("within the lens").xyz()
 }
 
-/// How far a direction is from another in the picture, pixels.
+/// Returns the distance of two directions in the picture, in pixels; NaN if one of them is not in the lens.
 ///
 /// # Panics
-/// The lens is refused.
+/// Panics if the lens is refused.
 pub fn apart_px(config: &Config, a: [f64; 3], b: [f64; 3]) -> f64 {
     let camera = Camera::<f64>::try_new(&config.camera).expect("the lens is valid");
     let place = |d| UnitVec3::try_new(d).and_then(|d| camera.project(&d));

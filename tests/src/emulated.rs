@@ -1,4 +1,4 @@
-//! The firmware in QEMU: frames go in, answers with every bit and instruction counts come out.
+//! Runs the firmware in QEMU. The input is pictures; the output is answers with every bit, and instruction counts.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,7 +9,7 @@ use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::{Parameters, table};
 
-/// A board that QEMU emulates.
+/// Board that QEMU emulates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Board {
     /// Cortex-M4F, single precision.
@@ -19,10 +19,10 @@ pub enum Board {
 }
 
 impl Board {
-    /// Both.
+    /// Both boards.
     pub const ALL: [Self; 2] = [Self::An386, Self::An500];
 
-    /// The name that QEMU and the images' folders have.
+    /// Returns the name that QEMU and the folders of the images use.
     pub fn name(self) -> &'static str {
         match self {
             Self::An386 => "an386",
@@ -30,7 +30,7 @@ impl Board {
         }
     }
 
-    /// The core, for people.
+    /// Returns the name of the core, for messages.
     pub fn core(self) -> &'static str {
         match self {
             Self::An386 => "Cortex-M4F",
@@ -38,10 +38,10 @@ impl Board {
         }
     }
 
-    /// An image that `cargo xtask firmware` has built.
+    /// Returns the path of an image that `cargo xtask firmware` has built.
     ///
     /// # Panics
-    /// It was not built.
+    /// Panics if the image was not built.
     pub fn image(self, name: &str) -> PathBuf {
         let target = std::env::var_os("CARGO_TARGET_DIR")
             .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../target"), PathBuf::from);
@@ -50,8 +50,9 @@ impl Board {
         path
     }
 
-    /// QEMU for this board, with an exact clock: an instruction takes `2^shift` ns. Ten count instructions to one; with
-    /// none the board's clock is slower than this machine's, so that a line is in time however busy this machine is.
+    /// Returns a call of QEMU for this board with an exact clock: an instruction takes `2^shift` ns. With `shift` = 10
+    /// the timer counts single instructions. With 0 the board's clock is slower than that of this machine, so serial
+    /// input arrives in time even on a busy machine.
     pub fn qemu(self, image: &Path, shift: u32) -> Command {
         let mut command = Command::new("qemu-system-arm");
         command
@@ -63,37 +64,37 @@ impl Board {
     }
 }
 
-/// A frame with everything that is known about it.
+/// Picture with its sensor and its prior.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// For people.
+    /// Name in messages.
     pub name: String,
-    /// What the sensor is told.
+    /// Configuration of the sensor.
     pub sensor: Config,
-    /// What is known about the picture.
+    /// Prior of the picture.
     pub known: Prior<f32>,
-    /// The picture, a byte a pixel, of the size that the sensor expects.
+    /// The picture, one byte per pixel, in the size that the sensor expects.
     pub bytes: Vec<u8>,
 }
 
-/// What one frame gave.
+/// Result of one picture.
 #[derive(Debug, Clone)]
 pub struct Measured {
     /// The answer.
     pub answer: PictureAnswer,
-    /// Instructions of `FlightHorizon::new`, of `expect`, of `process`.
+    /// Instructions of `FlightHorizon::new`, `expect` and `process`.
     pub calls: [u64; 3],
-    /// Instructions by stage; together a few more than `process`, for the looks at the timer.
+    /// Instructions of each stage. Their sum is a little above `process`, because reading the timer costs instructions.
     pub stages: [u64; 8],
-    /// Most bytes of stack so far.
+    /// Largest stack so far, in bytes.
     pub stack_bytes: u32,
 }
 
 impl Case {
-    /// A rendered scene.
+    /// Renders a scene.
     ///
     /// # Panics
-    /// It cannot be rendered, or not as bytes.
+    /// Panics if the scene cannot be rendered, or not as bytes.
     pub fn rendered(name: String, sensor: &Config, frame: &hzn_sim::FlightFrame) -> Self {
         let picture = frame.render().expect("the scene can be rendered");
         let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: 8 bits are expected") };
@@ -106,10 +107,10 @@ impl Case {
         Self { name, sensor: sensor.clone(), known, bytes: bytes.clone() }
     }
 
-    /// What the same sensor answers here.
+    /// Returns the answer of the same sensor on this machine.
     ///
     /// # Panics
-    /// The configuration or what is known is refused.
+    /// Panics if the configuration or the prior is refused.
     pub fn here(&self) -> PictureAnswer {
         let mut horizon = Box::new(FlightHorizon::new(&self.sensor).expect("the configuration is valid"));
         let camera = &self.sensor.camera;
@@ -136,7 +137,7 @@ impl Case {
     }
 }
 
-/// The bytes of an answer: equal when every bit is.
+/// Returns the bytes of an answer. Two answers have equal bytes if every bit is equal.
 pub fn bits(answer: &PictureAnswer) -> Vec<u8> {
     let mut bytes = vec![0; 640];
     let mut out = Writer::new(&mut bytes);
@@ -149,24 +150,25 @@ pub fn bits(answer: &PictureAnswer) -> Vec<u8> {
 /// Runs cases through the image `measure` of a board.
 ///
 /// # Panics
-/// QEMU or the image fails.
+/// Panics if QEMU or the image fails.
 pub fn measure(board: Board, cases: &[Case]) -> Vec<Measured> {
     run(board, "measure", cases)
 }
 
-/// Runs cases of 640×480 pixels through the image `rows` of a board, row by row. The calls are those of making the
-/// sensor, of taking all rows, and of the end of the picture.
+/// Runs cases of 640×480 pixels through the image `rows` of a board, row by row. Here `calls` counts making the sensor,
+/// taking all rows, and the end of the picture.
 ///
 /// # Panics
-/// QEMU or the image fails.
+/// Panics if QEMU or the image fails.
 pub fn measure_rows(board: Board, cases: &[Case]) -> Vec<Measured> {
     run(board, "rows", cases)
 }
 
-/// What the image `chain` of a board answers to a picture: its eleven words, as that image describes them.
+/// Runs a picture through the image `chain` of a board and returns the eleven words of its answer. The source of the
+/// image describes them.
 ///
 /// # Panics
-/// QEMU or the image fails.
+/// Panics if QEMU or the image fails.
 pub fn chain(board: Board, picture: &[u8]) -> [u32; 11] {
     let dir = tempfile::tempdir().expect("a temporary folder can be made");
     std::fs::write(dir.path().join("picture.bin"), picture).expect("the folder is writable");
@@ -196,7 +198,7 @@ fn run(board: Board, image: &str, cases: &[Case]) -> Vec<Measured> {
 fn read(from: &mut Reader<'_>) -> Option<Measured> {
     let magic = from.u32()?;
     assert_eq!(magic.to_be_bytes(), *b"DONE");
-    // Ticks of 40 ns, instructions of 1024 ns; reading the timer costs one.
+    // A tick takes 40 ns, an instruction 1024 ns. Reading the timer costs one instruction.
     let instructions = |ticks: u64| ((ticks * 40 + 512) / 1024).saturating_sub(1);
     let mut calls = [0; 3];
     for n in &mut calls {
@@ -206,7 +208,8 @@ fn read(from: &mut Reader<'_>) -> Option<Measured> {
     for n in &mut stages {
         *n = instructions(from.u64()?);
     }
-    // The timer wraps after 168 million instructions: stages, read in parts, tell how often it did.
+    // The timer wraps after 168 million instructions. The stages are read in parts, so their sum shows how often it
+    // did.
     const WRAP: u64 = (1 << 32) * 40 / 1024;
     let sum: u64 = stages.iter().sum();
     calls[2] += (sum.saturating_sub(calls[2]) + WRAP / 2) / WRAP * WRAP;

@@ -1,5 +1,5 @@
-//! What the tests of the whole chain share: sensors in both precisions, answers beside their truth, tallies, the
-//! table of accuracy, and real pictures.
+//! Shared code for the tests of the whole chain: sensors in both precisions, comparison of answers with the truth,
+//! tallies, the accuracy table, and photographs.
 //!
 //! | module | idea |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Photographs with their sensor.toml, and the fitted limb drawn over them.
+//! Loads photographs with their sensor.toml, and draws the fitted limb over them.
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -15,22 +15,22 @@ use nalgebra::Vector3;
 
 use crate::Answer;
 
-/// A photograph and the sensor that is said to have taken it.
+/// Photograph, with the sensor that is assumed to have taken it.
 #[derive(Debug, Clone)]
 pub struct Photograph {
-    /// Name of the picture without its ending.
+    /// Name of the file, with `-` instead of `/` and `.`.
     pub name: String,
-    /// What sensor.toml says.
+    /// Configuration from the `.toml` of the picture.
     pub sensor: Config,
     /// The picture.
     pub rgb: RgbImage,
 }
 
 impl Photograph {
-    /// The picture `file` of the folder `tests/data/real`, and the `.toml` of the same name beside it.
+    /// Loads the picture `file` of the folder `tests/data/real`, and the `.toml` of the same name next to it.
     ///
     /// # Panics
-    /// Either cannot be read.
+    /// Panics if one of them cannot be read.
     pub fn load(file: &str) -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/real").join(file);
         let sensor = hzn_calib::sensor::load(&path.with_extension("toml")).unwrap_or_else(|e| panic!("{e}"));
@@ -38,25 +38,25 @@ impl Photograph {
         Self { name: file.replace('/', "-").replace(['.'], "-"), sensor: sensor.config, rgb }
     }
 
-    /// As hzn-core reads it.
+    /// Returns the picture as hzn-core reads it.
     ///
     /// # Panics
-    /// Never: a decoded picture is as large as it says.
+    /// Never panics: a decoded picture has as many bytes as its size needs.
     pub fn view(&self) -> ImageView<'_> {
         let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);
         ImageView::from_bytes(self.rgb.as_raw(), layout, Channel::Mean).expect("a decoded picture is whole")
     }
 
-    /// Mean of the colours at a pixel.
+    /// Returns the mean of the colours at a pixel, 0 to 255.
     pub fn brightness(&self, x: u32, y: u32) -> f64 {
         self.rgb.get_pixel(x, y).0.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
     }
 
-    /// Writes the picture with the fitted limb (red) and the edge points (inliers green, rejected yellow) drawn over
-    /// it to `target/overlays`, for the eye.
+    /// Writes the picture to `target/overlays` with the fitted limb (red) and the edge points (inliers green, outliers
+    /// yellow) drawn over it, for visual inspection.
     ///
     /// # Panics
-    /// The folder cannot be written.
+    /// Panics if the folder cannot be written.
     pub fn overlay(&self, answer: Option<&Answer>, points: &Points) {
         let dir = overlays();
         std::fs::create_dir_all(&dir).expect("the target folder is writable");
@@ -84,8 +84,9 @@ impl Photograph {
     }
 }
 
-/// How far above (negative) or below the fitted limb the picture is steepest, pixels: the median over each eighth of
-/// the width, NaN where there is no limb. It knows nothing of levels, candidates or inliers.
+/// Returns how far above (negative) or below the fitted limb the picture is steepest, in pixels. Each value is the
+/// median over an eighth of the width; it is NaN where there is no limb. The search goes `reach` pixels up and down,
+/// and does not depend on thresholds, candidates or inliers.
 pub fn steepest(photograph: &Photograph, answer: &Answer, reach: u32) -> [f64; 8] {
     let mut found: [Vec<f64>; 8] = Default::default();
     let (w, h) = photograph.rgb.dimensions();
@@ -94,7 +95,7 @@ pub fn steepest(photograph: &Photograph, answer: &Answer, reach: u32) -> [f64; 8
         if row < reach + 6 || row + reach + 6 >= h || column < 3 || column + 4 > w {
             continue;
         }
-        // Five columns and five rows on each side, so that noise and grain do not count.
+        // The mean of five columns and of five rows on each side suppresses noise and grain.
         let mean = |y: u32| (column - 2..=column + 2).map(|x| photograph.brightness(x, y)).sum::<f64>();
         let step = |y: u32| (1..=5).map(|d| mean(y + d) - mean(y - d)).sum::<f64>();
         let best = (row - reach..=row + reach).max_by(|&a, &b| step(a).total_cmp(&step(b))).unwrap_or(row);
@@ -106,15 +107,15 @@ pub fn steepest(photograph: &Photograph, answer: &Answer, reach: u32) -> [f64; 8
     })
 }
 
-/// Where overlays are written.
+/// Returns the folder that overlays are written to.
 pub fn overlays() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/overlays")
 }
 
-/// Points (x, y) of the fitted limb in the picture, less than a pixel apart.
+/// Returns points (x, y) of the fitted limb in the picture in pixels, less than a pixel apart.
 ///
 /// # Panics
-/// The lens is refused.
+/// Panics if the lens is refused.
 pub fn limb(sensor: &Config, answer: &Answer) -> Vec<[f64; 2]> {
     let camera = Camera::<f64>::try_new(&sensor.camera).expect("the lens is valid");
     let e = Vector3::from(answer.axis);
@@ -134,15 +135,15 @@ pub fn limb(sensor: &Config, answer: &Answer) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// The edge points of the last candidate that passed every gate, with their weights.
+/// Edge points of the last candidate that passed every gate, with their weights.
 #[derive(Debug, Clone, Default)]
 pub struct Points {
-    /// (x, y) and weight.
+    /// Position (x, y) in pixels and weight of each point; inliers have a weight above 0.
     pub chosen: Vec<([f64; 2], f64)>,
 }
 
 impl Points {
-    /// The share of the picture's width along which there are inliers: in strips of 16 pixels.
+    /// Returns the share of the picture's width that has inliers, in strips of 16 pixels.
     pub fn along(&self, width: u32) -> f64 {
         let mut held = vec![false; (width as usize).div_ceil(16)];
         for &([x, _], weight) in &self.chosen {
@@ -154,7 +155,7 @@ impl Points {
     }
 }
 
-/// Collects the points of candidates.
+/// Observer that collects the points of candidates.
 #[derive(Debug, Default)]
 pub struct Watch {
     all: RefCell<Vec<([f64; 2], f64)>>,
@@ -162,7 +163,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// What was collected.
+    /// Returns the collected points.
     pub fn points(self) -> Points {
         self.best.into_inner()
     }

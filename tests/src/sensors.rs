@@ -1,4 +1,4 @@
-//! Both precisions of the sensor behind one call.
+//! Runs both precisions of the sensor with one call.
 
 use hzn_core::body::Kind;
 use hzn_core::image::Pixels;
@@ -9,43 +9,44 @@ use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior, Report};
 use hzn_sim::{Globe, Scene};
 use nalgebra::{Matrix3, Vector3};
 
-/// The sensor of a workstation (f64) and that of a flight computer (f32), from one configuration.
+/// Sensor of a workstation (f64) and sensor of a flight computer (f32), from one configuration.
 #[derive(Debug)]
 pub struct Sensors {
-    /// f64, 16384 border pixels.
+    /// Sensor in f64 with 16384 border pixels.
     pub host: Box<HostHorizon>,
-    /// f32, 2048 border pixels.
+    /// Sensor in f32 with 2048 border pixels.
     pub flight: Box<FlightHorizon>,
 }
 
-/// An answer in double precision, of either sensor.
+/// Answer of either sensor, in double precision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answer {
-    /// Direction to the body in the camera frame.
+    /// Limb axis in the camera frame, unit vector.
     pub axis: [f64; 3],
-    /// Its covariance in rad².
+    /// Covariance of the axis in rad², camera frame.
     pub covariance_rad2: [[f64; 3]; 3],
-    /// Half-angle of the answer in radians.
+    /// Half-angle in radians, fused with the expected one.
     pub half_angle_rad: f64,
-    /// Half-angle fitted freely, before the expected one is fused.
+    /// Half-angle of the free fit in radians, before the expected one is fused.
     pub free_half_angle_rad: f64,
-    /// RMS distance of the inliers from the limb.
+    /// RMS residual of the inliers in pixels.
     pub rms_px: f64,
-    /// Edge points that carry the answer.
+    /// Number of inliers.
     pub inliers: u32,
-    /// Edge points of the chosen edge.
+    /// Number of edge points of the chosen edge.
     pub points: u32,
-    /// Border pixels left out because lists were full.
+    /// Number of border pixels that were left out because lists were full.
     pub dropped: u32,
 }
 
 impl Sensors {
-    /// Both sensors.
+    /// Makes both sensors.
     ///
     /// # Panics
-    /// The configuration is refused.
+    /// Panics if the configuration is refused.
     pub fn new(config: &Config) -> Self {
-        // A host sensor is some megabytes, and made on the stack before it is moved: more than a test's thread has.
+        // A host sensor has some megabytes. It is made on the stack before it is moved, and a test's thread has not
+        // enough stack for that.
         let config = config.clone();
         let make = move || Self {
             host: Box::new(HostHorizon::new(&config).expect("the configuration is valid")),
@@ -55,13 +56,14 @@ impl Sensors {
         thread.join().expect("the configuration is valid")
     }
 
-    /// The answers of both, with the status where there is none.
+    /// Returns the answers of both sensors (f64, f32), or the status if there is no answer.
     pub fn both(&mut self, picture: &impl Pixels, scene: &Scene) -> (Result<Answer, Status>, Result<Answer, Status>) {
         (look(&mut self.host, picture, &known(scene)), look(&mut self.flight, picture, &known(scene)))
     }
 }
 
-/// What a navigation system would tell about a scene: the position for `earth`, else the altitude; no attitude.
+/// Returns the prior that a navigation system would give for a scene: the altitude, for `earth` also the position, and
+/// no attitude.
 pub fn known<T: Real>(scene: &Scene) -> Prior<T> {
     let position_m = scene.pose.position_m;
     let altitude_m = Globe::new(&scene.body).altitude_m(position_m);
@@ -72,10 +74,10 @@ pub fn known<T: Real>(scene: &Scene) -> Prior<T> {
     }
 }
 
-/// One picture through one sensor.
+/// Runs one picture through one sensor.
 ///
 /// # Errors
-/// The status, where it is not `ok`.
+/// Returns the status if it is not `ok`.
 pub fn look<T: Real, const P: usize, const B: usize, const W: usize>(
     horizon: &mut Horizon<T, P, B, W>,
     picture: &impl Pixels,
@@ -84,13 +86,13 @@ pub fn look<T: Real, const P: usize, const B: usize, const W: usize>(
     look_observed(horizon, picture, known, &Unobserved)
 }
 
-/// As [`look`], watched.
+/// Does the same as [`look`] with an observer.
 ///
 /// # Errors
-/// The status, where it is not `ok`.
+/// Returns the status if it is not `ok`.
 ///
 /// # Panics
-/// What is known cannot be, or the report contradicts itself.
+/// Panics if the prior is impossible or the report contradicts itself.
 pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
     horizon: &mut Horizon<T, P, B, W>,
     picture: &impl Pixels,
@@ -101,7 +103,7 @@ pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
     let report = horizon.process_observed(picture, &expected, observer);
     assert_eq!(report.status == Status::Ok, report.solution.is_some(), "a solution with `ok`, and only there");
     if report.solution.is_none() {
-        // Seen only where the test fails.
+        // Test output is shown only if the test fails.
         let verdicts = report.candidates.iter().map(|c| format!("{} points {:?}", c.points, c.verdict));
         println!("{:?}: {}", report.status, verdicts.collect::<Vec<_>>().join(", "));
     }
@@ -109,7 +111,7 @@ pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
 }
 
 impl Answer {
-    /// The answer in a report, if there is one.
+    /// Returns the answer in a report, if there is one.
     pub fn from_report<T: Real>(report: &Report<T>) -> Option<Self> {
         let s = report.solution.as_ref()?;
         Some(Self {
@@ -124,20 +126,21 @@ impl Answer {
         })
     }
 
-    /// Angle to another direction (unit vector, camera frame) in degrees.
+    /// Returns the angle to another direction (unit vector, camera frame) in degrees.
     pub fn error_deg(&self, axis: [f64; 3]) -> f64 {
         let (a, b) = (Vector3::from(self.axis), Vector3::from(axis));
         a.cross(&b).norm().atan2(a.dot(&b)).to_degrees()
     }
 
-    /// Largest standard deviation in degrees.
+    /// Returns the largest standard deviation in degrees.
     pub fn sigma_deg(&self) -> f64 {
         self.covariance().symmetric_eigenvalues().max().max(0.0).sqrt().to_degrees()
     }
 
-    /// Squared error over the covariance: two degrees of freedom.
+    /// Returns the NEES for a true axis (unit vector, camera frame); it has two degrees of freedom.
     pub fn nees(&self, axis: [f64; 3]) -> f64 {
-        // The covariance has no extent along the axis; given one there, it can be inverted, and the error has none.
+        // The covariance is singular along the axis. A variance along the axis makes it invertible. This does not
+        // change the result, because the error has no part along the axis.
         let e = Vector3::from(self.axis);
         let p = self.covariance();
         let d = Vector3::from(axis) - e;

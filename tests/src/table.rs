@@ -1,4 +1,4 @@
-//! Accuracy by altitude, noise, visible arc and lens, as text.
+//! Measures accuracy by altitude, noise, visible arc and lens, and writes it as text.
 
 use core::fmt::Write;
 
@@ -11,24 +11,24 @@ use hzn_sim::{Band, Clouds, Detector, Disc, Foreground, Look, Pose, Profile, Sce
 use crate::sensors::look;
 use crate::{Sensors, Tally};
 
-/// Pictures of a cell.
+/// Number of pictures per cell.
 pub const FRAMES: usize = 8;
 const SIZE: (u16, u16) = (640, 480);
 const ALTITUDES_KM: [f64; 3] = [70.0, 240.0, 800.0];
 const NOISE: [f64; 3] = [0.005, 0.02, 0.08];
-/// Share of the picture's width that is not behind the vehicle.
+/// Share of the picture's width that the vehicle does not cover.
 const OPEN: [f64; 2] = [1.0, 0.3];
-/// What is true less what the sensor is told, in standard deviations: the middles of eight equally likely parts of a
-/// normal distribution, shuffled.
+/// Difference of the true value and the told value in standard deviations. The numbers are the middles of eight equally
+/// likely parts of a normal distribution, shuffled.
 const SIGMAS: [f64; FRAMES] = [0.49, -1.53, 0.89, -0.16, -0.49, 1.53, 0.16, -0.89];
 const HEIGHT_SIGMA_KM: f64 = 1.0;
 const ATTITUDE_SIGMA_DEG: f64 = 5.0;
 
-/// Name, lens, and what an edge point is wrong by with it: sigma and correlation along the edge, both in pixels. Fitted
-/// to the table, as an engineer fits them to a camera's own pictures.
+/// Returns name, lens and edge noise of each camera. The edge noise is sigma and correlation length along the edge,
+/// both in pixels. It was fitted to the table, as an engineer fits it to the pictures of a camera.
 fn lenses() -> [(&'static str, camera::Config, [f64; 2]); 3] {
     let (w, h) = SIZE;
-    // 180° across: clouds shine through more of an edge the larger the pixels are.
+    // 180° across. The larger the pixels, the longer the part of an edge where clouds shine through.
     let wide = camera::Config { theta_max_deg: Some(90.0), ..camera::Config::ideal(Model::Equidistant, w, h, 203.0) };
     [
         // 60° across.
@@ -38,7 +38,7 @@ fn lenses() -> [(&'static str, camera::Config, [f64; 2]); 3] {
     ]
 }
 
-/// The sensor and the scenes of one cell.
+/// Returns the sensor and the scenes of one cell.
 pub fn cell(
     camera: &camera::Config,
     [sigma_px, correlation_px]: [f64; 2],
@@ -56,7 +56,7 @@ pub fn cell(
     };
     sensor.covariance = covariance::Config { bias_px: 0.25, ..covariance::Config::told(sigma_px, correlation_px) };
     let edge = (1.0 - open) * w;
-    // Four pixels more in the mask than the vehicle covers, as its edge is blurred.
+    // The mask is four pixels larger than the vehicle, because the vehicle's edge is blurred.
     let part = |grow: f64| [[-20.0, -20.0], [edge + grow, -20.0], [edge + grow, h + 20.0], [-20.0, h + 20.0]];
     if open < 1.0 {
         let polygon: Polygon = part(4.0).into_iter().collect();
@@ -65,8 +65,8 @@ pub fn cell(
     let scenes = (0..FRAMES)
         .map(|i| {
             let x = i as f64 / FRAMES as f64;
-            // The dip of the horizon, so that the limb crosses the picture's middle at every altitude.
-            // libm: the same bits on every machine.
+            // This dip of the horizon puts the limb across the picture's middle at every altitude. libm gives the same
+            // bits on every machine.
             let dip_rad = libm::acos(6381.0 / (6371.0 + altitude_km));
             let look = Look {
                 azimuth_rad: core::f64::consts::TAU * x,
@@ -94,11 +94,11 @@ pub fn cell(
     (sensor, scenes)
 }
 
-/// The sensor of a workstation over one cell: told position and an attitude that is wrong by some 5°, and told the
-/// position only.
+/// Runs the sensor of a workstation over one cell twice: with the position and an attitude that is wrong by about 5°,
+/// and with the position only.
 ///
 /// # Panics
-/// A scene cannot be rendered.
+/// Panics if a scene cannot be rendered.
 pub fn measure((sensor, scenes): &(Config, Vec<Scene>)) -> [Tally; 2] {
     let mut sensors = Sensors::new(sensor);
     let mut tallies = [Tally::default(), Tally::default()];
@@ -116,7 +116,7 @@ pub fn measure((sensor, scenes): &(Config, Vec<Scene>)) -> [Tally; 2] {
     tallies
 }
 
-/// The whole table as Markdown, numbers to two digits. The last three columns are without an attitude.
+/// Returns the whole table as Markdown, with numbers to two digits. The last three columns are without an attitude.
 pub fn markdown() -> String {
     let mut out = String::from(
         "| lens | altitude | noise | open | answered | RMS error | median sigma | NEES | answered | RMS error | NEES \
@@ -150,7 +150,7 @@ pub fn markdown() -> String {
     out
 }
 
-/// A number to two significant digits, without an exponent; `–` where there is none.
+/// Formats a number to two significant digits, without an exponent; returns `–` if it is not finite.
 pub(crate) fn two_digits(x: f64) -> String {
     if !x.is_finite() {
         return "–".into();

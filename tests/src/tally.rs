@@ -1,24 +1,24 @@
-//! Errors, sigmas and NEES of many answers.
+//! Collects errors, sigmas and NEES of many answers.
 
 use core::fmt;
 
 use crate::Answer;
 
-/// What became of a number of pictures with truth.
+/// Statistics of the answers to pictures with known truth.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
-    /// Pictures.
+    /// Number of pictures.
     pub frames: usize,
-    /// Angles between answer and truth in degrees, one an answer.
+    /// Angles between answer and truth in degrees, one per answer.
     pub errors_deg: Vec<f64>,
-    /// Standard deviations that the answers claim, in degrees.
+    /// Largest claimed standard deviation of each answer in degrees.
     pub sigmas_deg: Vec<f64>,
-    /// Squared errors over covariances, two degrees of freedom.
+    /// NEES of each answer, with two degrees of freedom.
     pub nees: Vec<f64>,
 }
 
 impl Tally {
-    /// Counts a picture, answered or not.
+    /// Adds a picture, with or without an answer.
     pub fn add(&mut self, answer: Option<&Answer>, truth: [f64; 3]) {
         self.frames += 1;
         if let Some(a) = answer {
@@ -27,25 +27,25 @@ impl Tally {
             self.nees.push(a.nees(truth));
         }
     }
-    /// Pictures with an answer.
+    /// Returns the number of pictures with an answer.
     pub fn answered(&self) -> usize {
         self.errors_deg.len()
     }
-    /// Root of the mean squared angle; NaN without answers.
+    /// Returns the root of the mean squared angle in degrees; NaN without answers.
     pub fn rms_deg(&self) -> f64 {
         mean(self.errors_deg.iter().map(|e| e * e)).sqrt()
     }
-    /// The largest angle; 0 without answers.
+    /// Returns the largest angle in degrees; 0 without answers.
     pub fn worst_deg(&self) -> f64 {
         self.errors_deg.iter().fold(0.0, |m, &e| e.max(m))
     }
-    /// The middle of the claimed standard deviations; NaN without answers.
+    /// Returns the median of the claimed standard deviations in degrees; NaN without answers.
     pub fn median_sigma_deg(&self) -> f64 {
         let mut sorted = self.sigmas_deg.clone();
         sorted.sort_by(f64::total_cmp);
         sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
     }
-    /// Mean of the squared errors over covariances; 2 when errors are as large as they are said to be.
+    /// Returns the mean NEES; it is 2 when the covariance is right.
     pub fn mean_nees(&self) -> f64 {
         mean(self.nees.iter().copied())
     }

@@ -1,19 +1,20 @@
-//! Dark skies with artefacts instead of a limb are not answered, and limbs next to artefacts are. The campaign with ten
-//! times as many pictures is `cargo xtask reproduce artefacts`.
+//! Tests that dark skies with artefacts instead of a limb are not answered, and that limbs next to artefacts are
+//! answered. `cargo xtask reproduce artefacts` is the campaign with about ten times as many pictures.
 
 use hzn_core::observer::Unobserved;
 use hzn_core::{Config, HostHorizon, camera};
 use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, look};
 
-/// Pictures of each kind, and the first seed: others than those of the campaign.
+/// Number of pictures of each kind.
 const OF_EACH: u64 = 15;
+/// First seed; the campaign has other seeds.
 const FIRST_SEED: u64 = 5_000_000;
 
 fn horizon() -> Box<HostHorizon> {
     HostHorizon::boxed(&Config::new(camera::Config::ideal(camera::Model::Pinhole, 64, 48, 60.0))).unwrap()
 }
 
-/// The picture of a trial at each threshold, `None` for the default.
+/// Returns the outcomes of a trial at each consensus threshold in pixels; `None` is the default.
 fn outcomes(
     horizon: &mut HostHorizon,
     trial: &Trial,

@@ -1,9 +1,9 @@
-//! The order of the crates: each imports from those below it alone.
+//! Tests the order of the crates: each crate imports only from those below it.
 
 use std::fs;
 use std::path::Path;
 
-/// Every crate below `crates/`, with those of ours that it may import from.
+/// Every crate in `crates/`, with the crates of this project that it may import from.
 const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("hzn-fpu", &[]),
     ("hzn-core", &["hzn-fpu"]),
@@ -18,7 +18,8 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("hzn-viewer", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run"]),
 ];
 
-/// The crates of ours that a Cargo.toml names among its dependencies, those for tests and builds left out.
+/// Returns the crates of this project that a Cargo.toml lists in `[dependencies]`. Dependencies for tests and builds
+/// are left out.
 fn imports(manifest: &Path) -> Vec<String> {
     let text = fs::read_to_string(manifest).unwrap();
     let table = text.split("\n[").find(|table| table.starts_with("dependencies]")).unwrap_or_default();
@@ -40,7 +41,7 @@ fn crates_import_from_below() {
         }
     }
     assert!(seen > 20, "{seen} imports were read");
-    // Nothing that parses arguments, catches signals or draws progress is linked into the library.
+    // The library must not link crates that parse arguments, catch signals or draw progress bars and charts.
     let run = fs::read_to_string(crates.join("hzn-run/Cargo.toml")).unwrap();
     for theirs in ["clap", "ctrlc", "indicatif", "plotters"] {
         assert!(!run.contains(theirs), "hzn-run imports {theirs}");

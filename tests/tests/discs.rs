@@ -1,4 +1,4 @@
-//! Sun and Moon: discs inside and at the edge of the picture, blooming, lit from the side, beside the Earth.
+//! Tests Sun and Moon: discs inside and at the edge of the picture, blooming, lit from the side, and next to the Earth.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera, Model};
@@ -22,7 +22,7 @@ fn frame<T: Real>(sun: Option<[f64; 3]>) -> Prior<T> {
     Prior { sun: sun.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))), ..Prior::default() }
 }
 
-/// What both precisions say.
+/// Returns the answers of both precisions.
 fn both(sensors: &mut Sensors, data: &[u8], sun: Option<[f64; 3]>) -> [Result<Answer, Status>; 2] {
     let picture = Grey::try_new(data, Layout::packed(640, 480, 1, 8)).unwrap();
     [look(&mut sensors.host, &picture, &frame(sun)), look(&mut sensors.flight, &picture, &frame(sun))]
@@ -34,7 +34,7 @@ fn sun(axis: [f64; 3], half_angle_rad: f64) -> Disc {
 
 #[test]
 fn the_sun_blooms() {
-    // Its own 3.7 px and up to ten times that, in the picture.
+    // The radius in the picture is 3.7 px without bloom, and up to ten times that with bloom.
     let config = config(Preset::Sun, 800.0);
     let mut sensors = Sensors::new(&config);
     let mut squares = [0.0; 2];
@@ -61,7 +61,7 @@ fn the_sun_blooms() {
 fn the_sun_at_the_edge_of_the_picture() {
     let config = config(Preset::Sun, 800.0);
     let mut sensors = Sensors::new(&config);
-    // The radius is 19 px; the centre stands from 12 px within to 8 px outside.
+    // The radius is 19 px. The centre lies from 12 px inside to 8 px outside the picture.
     let mut worst = 0.0f64;
     let mut squares = 0.0;
     for n in 0..12 {
@@ -81,7 +81,7 @@ fn the_sun_at_the_edge_of_the_picture() {
 
 #[test]
 fn single_precision_holds_a_twentieth_of_a_pixel_through_a_long_lens() {
-    // As the real picture: 203 px of radius, so that cos α differs from 1 by 1e-5.
+    // As in the real picture, the radius is 203 px, so cos α differs from 1 by 1e-5.
     let config = config(Preset::Sun, 43_600.0);
     let mut sensors = Sensors::new(&config);
     for (u, v) in [(320.4, 240.3), (250.9, 260.1), (390.2, 220.7)] {
@@ -107,7 +107,7 @@ fn the_moon_is_lit_from_the_side() {
     let half_angle_rad = 0.2589f64.to_radians();
     let mut squares = [0.0; 2];
     let mut count = 0.0;
-    // Phase angles from a thick crescent to full; the Sun from several sides.
+    // The phase angles go from a thick crescent to full, with the Sun on several sides.
     for phase_deg in [10.0f64, 50.0, 80.0, 100.0, 120.0] {
         for turn_deg in [0.0f64, 70.0, 200.0] {
             let (sp, cp) = phase_deg.to_radians().sin_cos();
@@ -142,7 +142,7 @@ fn the_moon_is_lit_from_the_side() {
 
 #[test]
 fn the_moon_is_no_larger_than_it_blooms() {
-    // By a few pixels, whatever the lens: a disc of twice its size is a glare, a ghost or the Sun.
+    // Bloom adds a few pixels with any lens. A disc of twice the Moon's size is glare, a ghost or the Sun.
     for (focal_px, times, is_moon) in
         [(6000.0, 1.0, true), (6000.0, 1.2, true), (6000.0, 2.0, false), (800.0, 2.0, true)]
     {
@@ -163,8 +163,8 @@ fn the_level_follows_the_limb_of_the_picture_before() {
     config.binarize.method = hzn_core::threshold::Method::Track;
     let mut sensors = Sensors::new(&config);
     let axis = direction(&config, 310.2, 250.4);
-    // Two thirds of the brightness from picture to picture: no fixed level would do, and the disc is too small for
-    // otsu's sample to hold its own.
+    // Each picture has two thirds of the brightness of the one before. No fixed threshold fits all of them, and the
+    // disc is too small for the sample of `otsu`.
     let mut levels = Vec::new();
     for brightness in [240.0, 160.0, 107.0, 71.0, 47.0] {
         let disc = Disc { brightness, halo: 0.0, noise: 1.0, ..sun(axis, 0.2666f64.to_radians() * 10.0) };
@@ -173,14 +173,14 @@ fn the_level_follows_the_limb_of_the_picture_before() {
         let expected = sensors.host.expect(&Prior::default()).unwrap();
         let report = sensors.host.process(&picture, &expected);
         assert_eq!(report.status, Status::Ok, "{brightness}");
-        // Halfway between the sky at 8 counts and the disc.
+        // The next threshold is halfway between the sky at 8 counts and the disc.
         let next = report.next_level.unwrap();
         assert!(f64::from(next).mul_add(1.0, -(8.0 + brightness / 2.0)).abs() < 6.0, "{brightness}: {next}");
         levels.push((report.level, next));
     }
-    // Each is cut at what the one before asked for.
+    // Each picture uses the threshold that the picture before it gave.
     assert!(levels.windows(2).all(|w| w[1].0 == w[0].1), "{levels:?}");
-    // Forgotten with another configuration, and with a picture without an answer.
+    // Another configuration resets the threshold, and so does a picture without an answer.
     sensors.host.reconfigure(&config).unwrap();
     let dark = vec![8u8; 640 * 480];
     let expected = sensors.host.expect(&Prior::default()).unwrap();
@@ -188,7 +188,7 @@ fn the_level_follows_the_limb_of_the_picture_before() {
     assert_eq!((report.status, report.next_level), (Status::NoLimb, None));
 }
 
-/// The Moon above the Earth's limb, half lit as the Earth below it: both are answered, from one picture.
+/// Tests the Moon above the Earth's limb, half lit like the Earth below it. The sensor answers both from one picture.
 #[test]
 fn earth_and_moon_in_one_picture() {
     let camera = camera::Config::ideal(Model::Pinhole, 1280, 960, 3600.0);
@@ -201,7 +201,7 @@ fn earth_and_moon_in_one_picture() {
         ..body::Config::default()
     };
     let mut moon = of(Kind::Moon, Preset::Moon);
-    // The Moon's ground is dark beside clouds and air.
+    // The Moon's ground is dark compared with clouds and air.
     if let Some(own) = &mut moon.binarize {
         own.level = 0.06;
     }
@@ -216,7 +216,7 @@ fn earth_and_moon_in_one_picture() {
         let mut scene = Scene::new(camera.clone(), pose);
         scene.world = World::Visible(Box::new(Visible { sun_in_view: false, ..Visible::default() }));
         scene.body.limb_height_km = 18.7;
-        // To the right of the camera, behind it and above.
+        // The Sun is to the right of the camera, behind it and above.
         let sun = [0.5, -0.7, -0.5];
         scene.light = Light::Sun { direction: ecef(sun), twilight_rad: 0.01 };
         scene.moon_ecef_m = Some([0, 1, 2].map(|i| pose.position_m[i] + 3.844e8 * moon[i]));

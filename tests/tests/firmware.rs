@@ -1,5 +1,6 @@
-//! The firmware in QEMU beside this machine: the same bits; a scripted exchange over the line; a power cut. They need
-//! the images that `cargo xtask firmware` builds, and run there.
+//! Tests the firmware in QEMU: the same bits as on this machine, a scripted exchange over the serial line, a power cut,
+//! and the watchdog. The tests need the images that `cargo xtask firmware` builds; `cargo xtask test firmware` builds
+//! the images and runs the tests.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -14,7 +15,8 @@ use hzn_sim::flight::{leo_infrared, rocket};
 use hzn_tests::emulated::{Board, Case, bits, chain, measure, measure_rows};
 use hzn_tests::real::Photograph;
 
-/// Rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and pictures that are none.
+/// Returns the pictures: rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and patterns
+/// that show nothing.
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for flight in [rocket(640, 480, 14, 1), rocket(960, 540, 12, 2).with_payload(), rocket(1280, 720, 8, 3)] {
@@ -82,7 +84,8 @@ fn same_bits_as_here() {
     assert!(ok as usize >= cases.len(), "most pictures have an answer: {ok} of {}", 2 * cases.len());
 }
 
-/// Row by row, without a frame in memory: the answers of the same pictures in this machine's memory.
+/// Tests that pictures taken row by row, without a picture in memory, give the answers of the same pictures in this
+/// machine's memory.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn rows_have_the_bits_of_the_picture() {
@@ -101,7 +104,7 @@ fn rows_have_the_bits_of_the_picture() {
         for (case, there) in cases.iter().zip(measure_rows(board, &cases)) {
             let here = case.here();
             assert_eq!((here.status, here.level), (there.answer.status, there.answer.level), "{}", case.name);
-            // Where no list was full the direction has every bit.
+            // If both dropped equally many pixels, the directions agree in every bit.
             if there.answer.dropped == here.dropped {
                 whole += 1;
                 assert_eq!(here.direction, there.answer.direction, "{} on {}", case.name, board.core());
@@ -114,7 +117,7 @@ fn rows_have_the_bits_of_the_picture() {
     }
 }
 
-/// The flight image with its files.
+/// Flight image of a board, with its files.
 struct Bench {
     board: Board,
     dir: tempfile::TempDir,
@@ -143,11 +146,11 @@ impl Bench {
         }
         std::fs::write(self.path("frames.bin"), out).unwrap();
     }
-    /// Runs until the image ends by itself; gives its exit status and what it sent.
+    /// Runs the image until it ends by itself and returns its exit status. What the image sends is in `sent.bin`.
     fn run(&self, line: &[u8]) -> i32 {
         self.run_at(line, 0)
     }
-    /// With an instruction that takes `2^shift` ns.
+    /// Does the same as `run`, with an instruction that takes `2^shift` ns.
     fn run_at(&self, line: &[u8], shift: u32) -> i32 {
         std::fs::write(self.path("line.bin"), line).unwrap();
         let sent = std::fs::File::create(self.path("sent.bin")).unwrap();
@@ -161,7 +164,7 @@ impl Bench {
             .unwrap();
         let mut stdin = child.stdin.take().unwrap();
         let line = line.to_vec();
-        // The line stays open until the image ends: QEMU would end with it.
+        // The line stays open until the image ends, because QEMU would end with the line.
         let feed = std::thread::spawn(move || {
             use std::io::Write;
             let _ = stdin.write_all(&line);
@@ -184,7 +187,7 @@ impl Bench {
     }
 }
 
-/// `hzn` as the tests have built it.
+/// Returns a call of the `hzn` that the tests have built.
 fn hzn() -> Command {
     let mut path = std::env::current_exe().unwrap();
     path.pop();
@@ -199,7 +202,7 @@ fn hzn_run(dir: &Path, args: &[&str]) -> String {
     text
 }
 
-/// Cells of a table by column, without those that name the picture or the clock.
+/// Returns the cells of a table, row by row, without the columns that name the picture or the clock.
 fn answers(path: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
@@ -212,12 +215,13 @@ fn answers(path: &Path) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Ten pictures on command after a change of parameters: the telemetry, decoded, is what `hzn run --flight` writes.
+/// Tests ten pictures on command after a change of parameters: the decoded telemetry must equal what `hzn run --flight`
+/// writes.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn an_exchange_over_the_line() {
     let mut flight = rocket(640, 480, 10, 5);
-    // The position changes from picture to picture; one altitude for all is what both are told here.
+    // The position changes from picture to picture, so both get one altitude for all pictures here.
     flight.sensor.body.altitude_km = Some(180.0);
     flight.sensor.body.altitude_sigma_km = 60.0;
     for board in Board::ALL {
@@ -231,7 +235,7 @@ fn an_exchange_over_the_line() {
             let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("8 bits") };
             pictures.push((bytes.clone(), 0));
         }
-        // One of the wrong size, and three lost, in between.
+        // In between, one picture has the wrong size and three are lost.
         pictures.insert(4, (vec![7; 1000], 3));
         bench.frames(&pictures);
         let mut before = flight.sensor.clone();
@@ -241,7 +245,7 @@ fn an_exchange_over_the_line() {
         let mut commands =
             vec!["set reject.threshold_px 2.5 covariance.sigma_px 0.2", "read reject.threshold_px", "dump-edges"];
         commands.extend(["process-once"; 11]);
-        // More than gate.max_mean, which only the flight computer knows.
+        // This is more than `gate.max_mean`, whose value only the flight computer knows.
         commands.extend(["set gate.min_mean 0.99", "mode shut-down"]);
         let mut args = vec!["telecommand", "-o", "commands.bin"];
         args.extend(commands);
@@ -265,7 +269,7 @@ fn an_exchange_over_the_line() {
         let last: Vec<&str> = housekeeping.lines().last().unwrap().split(',').collect();
         let column = |name: &str| housekeeping.lines().next().unwrap().split(',').position(|c| c == name).unwrap();
         assert_eq!((last[column("pictures")], last[column("lost")], last[column("refused")]), ("10", "3", "1"));
-        // Beside the pictures: the lists, the buffers and the stack.
+        // Besides the pictures, RAM holds the lists, the buffers and the stack.
         let stack: usize = last[column("stack_bytes")].parse().unwrap();
         println!("{}: most stack {stack} bytes", board.name());
         assert!(size_of::<Lists>() + size_of::<Buffers>() + stack < 96 * 1024);
@@ -284,7 +288,8 @@ fn an_exchange_over_the_line() {
     }
 }
 
-/// Power is cut in the middle of writing the parameters: after the reset the old ones hold, and the ground is told.
+/// Tests a power cut in the middle of writing the parameters: after the reset the old parameters are in use, and the
+/// telemetry says so.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn a_power_cut_in_the_middle_of_a_parameter_write() {
@@ -308,7 +313,8 @@ fn a_power_cut_in_the_middle_of_a_parameter_write() {
     assert!(said.contains("parameter 32 body.altitude_km = NaN"), "{said}");
 }
 
-/// A turn that never ends: the watchdog starts the program anew, which says so and obeys again.
+/// Tests a turn of the flight loop that never ends: the watchdog restarts the program, which reports this and obeys
+/// commands again.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
@@ -317,12 +323,12 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
         bench.copy(1, &rocket(640, 480, 1, 1).sensor, 1);
         let hangs = [*b"HANG", [0; 4], [0; 4], [0; 4]].concat();
         std::fs::write(bench.path("frames.bin"), hangs).unwrap();
-        // What was received before the reset is lost with it.
+        // Commands that were received before the reset are lost with it.
         let mut args = vec!["telecommand", "-o", "commands.bin", "process-once"];
         args.extend(["mode shut-down"; 8]);
         hzn_run(bench.dir.path(), &args);
         let line = std::fs::read(bench.path("commands.bin")).unwrap();
-        // The watchdog's two seconds are 31 million instructions then.
+        // The watchdog's two seconds are 31 million instructions at this shift.
         assert_eq!(bench.run_at(&line, 6), 0);
         let said = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
         println!("{said}");
@@ -335,7 +341,7 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn the_sensor_alone_answers_with_the_same_bits() {
-    // The lens and the altitude that stand in the image.
+    // The image contains this lens and this altitude.
     let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
     let lens = camera::Config { k, ..camera::Config::ideal(camera::Model::KannalaBrandt, 1920, 1080, 1233.0) };
     let mut sensor = Config::new(lens.clone());
@@ -360,7 +366,8 @@ fn the_sensor_alone_answers_with_the_same_bits() {
         for board in Board::ALL {
             let words = chain(board, &case.bytes);
             assert_eq!((words[0], &words[1..10]), (report.status as u32, &direction[..]), "{} {board:?}", case.name);
-            // Beside the frame: its lists and its stack. The stack is painted, so that the number is a real one.
+            // The last word is the high-water mark of the stack in bytes. The stack is painted, so that the number is
+            // measured.
             assert!((4096..65536).contains(&words[10]), "{} bytes of stack", words[10]);
         }
         ok += u32::from(report.status == Status::Ok);

@@ -1,4 +1,4 @@
-//! Scenes that are hard for one reason each, with exact truth.
+//! Tests scenes that are hard for one reason each, with exact truth.
 
 use hzn_core::camera::{Config as Camera, Model};
 use hzn_core::image::{Channel, ImageView, Layout};
@@ -8,7 +8,7 @@ use hzn_sim::pose::position_m;
 use hzn_sim::{Band, Clouds, Detector, Disc, EdgeNoise, Foreground, Light, Look, Pose, Samples, Scene};
 use hzn_tests::{Answer, Sensors};
 
-/// A level camera at 240 km that sees the limb across the middle of its 640×480 picture.
+/// Returns the scene of a camera at 240 km that sees the limb across the middle of its 640×480 picture.
 fn scene(camera: Camera, seed: u64) -> Scene {
     let look = Look { azimuth_rad: 0.9 * seed as f64, depression_rad: 0.3, roll_rad: 0.15 * ((seed % 4) as f64 - 1.5) };
     let mut scene = Scene::new(camera, Pose::looking(position_m(50.0, 10.0 * seed as f64, 240.0), look));
@@ -33,12 +33,13 @@ fn truth(scene: &Scene) -> [f64; 3] {
     [t.axis_x, t.axis_y, t.axis_z]
 }
 
-/// Errors in degrees of both precisions, which must answer, and not be off by more than `limits_deg` or five sigma.
+/// Asserts that both precisions answer, with errors of at most `limits_deg` (f64, f32) and of at most five sigma.
 fn found(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]) {
     assert_eq!(found_or_refused(what, scene, sensor, limits_deg), 2, "{what}");
 }
 
-/// How many of both precisions answer, which must not be off by more than `limits_deg` or five sigma.
+/// Returns how many of both precisions answer. Asserts that their errors are at most `limits_deg` (f64, f32) and at
+/// most five sigma.
 fn found_or_refused(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]) -> usize {
     let (host, flight) = Sensors::new(sensor).both(&scene.render().unwrap().view(), scene);
     let mut answers = 0;
@@ -66,7 +67,7 @@ fn limb_lit_only_in_part() {
             let mut s = scene(pinhole(), seed);
             let limb = s.limb_points(201, EdgeNoise::None).unwrap();
             let (first, last) = (limb[0].azimuth_rad, limb[200].azimuth_rad);
-            // The lit part is at one end of what is in view, so that the dark one ends the edge within the picture.
+            // The lit part is at one end of the limb in view, so the dark part ends the edge within the picture.
             let half_width_rad = 0.5 * share * (last - first);
             s.light = Light::Sector { centre_rad: first + half_width_rad, half_width_rad, fade_rad: 0.03 };
             found(&format!("{share} lit, {seed}"), &s, &sensor(&s), [0.15; 2]);
@@ -74,9 +75,9 @@ fn limb_lit_only_in_part() {
     }
 }
 
-/// Clouds over a surface as dark as the sky: the edge is limb where they reach it and cloud where they do not.
-/// The sensor sees a bright band before the sky, as a flare is, or an edge that leaves the limb, and refuses some of
-/// them.
+/// Tests clouds over a surface that is as dark as the sky. The edge is the limb where the clouds reach the limb;
+/// elsewhere it is the edge of a cloud. The sensor sees a bright band next to the sky, like that of a flare, or an edge
+/// that leaves the limb, and it refuses some of the pictures.
 #[test]
 fn edge_half_cloud_half_limb() {
     let mut answers = 0;
@@ -84,8 +85,9 @@ fn edge_half_cloud_half_limb() {
         let mut s = scene(pinhole(), seed);
         let clouds = Clouds { cover: 0.6, largest_km: 900.0, seed, ..Clouds::default() };
         s.disc = Disc { surface: 0.03, clouds: Some(clouds), band: None };
-        // Clouds that end two pixels short of the limb would be inliers at the default of 3 px. Nearer ones stay, and
-        // are alike over hundreds of pixels: the noise model of the defaults, not that of a clean limb.
+        // At the default threshold of 3 px, clouds that end two pixels short of the limb would be inliers. Nearer
+        // clouds remain inliers, and their errors are alike over hundreds of pixels. The default noise model covers
+        // that, but not the noise model of a clean limb.
         let mut sensor = sensor(&s);
         sensor.reject.threshold_px = 1.0;
         sensor.covariance = covariance::Config::default();
@@ -96,8 +98,9 @@ fn edge_half_cloud_half_limb() {
     assert!(answers >= 12, "{answers} of 16");
 }
 
-/// 16 km at a distance of some 1700 km are 5 px here: the inner edge would be off by half a degree. Over ground as dark
-/// as the sky a band may as well be airglow or a flare, and is refused unless `select.max_band` says that it is none.
+/// Tests a bright band with two edges. At a distance of about 1700 km, 16 km are 5 px here, so the inner edge would be
+/// off by half a degree. Over ground as dark as the sky, a band may also be airglow or a flare. The sensor refuses it
+/// unless `select.max_band` allows bands.
 #[test]
 fn bright_band_has_two_edges() {
     for seed in 0..4 {
@@ -128,7 +131,7 @@ fn payload_in_front_without_a_mask() {
 #[test]
 fn image_circle() {
     for seed in 0..4 {
-        // A circle of 230 px in radius, cut by the limb.
+        // The image circle has a radius of 230 px and is cut by the limb.
         let camera = Camera {
             theta_max_deg: Some(40.0),
             ..Camera::ideal(Model::Equidistant, 640, 480, 230.0 / 40f64.to_radians())
@@ -138,7 +141,8 @@ fn image_circle() {
     }
 }
 
-/// Far from a body at the origin, on the x axis, looking at its centre with the camera turned by `off_rad`.
+/// Returns a pose on the x axis, far from a body at the origin. The camera looks at the centre of the body and is then
+/// turned by `off_rad` (radians).
 fn towards(distance_m: f64, off_rad: [f64; 3]) -> Pose {
     Pose::from_axes([distance_m, 0.0, 0.0], [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]).disturbed(off_rad)
 }
@@ -166,18 +170,18 @@ fn full_disc_inside_the_picture() {
     }
 }
 
-/// Half-angle free, a third of the disc beyond the picture's edge.
+/// Tests discs with a free half-angle and a third of the disc beyond the edge of the picture.
 #[test]
 fn moon_and_sun_at_the_edge_of_the_picture() {
     let disc = |kind| body::Config { kind, limb_height_km: 0.0, ..body::Config::default() };
     for (name, kind, distance_m) in [("Sun", body::Kind::Sun, 149_597_870.7e3), ("Moon", body::Kind::Moon, 384_400e3)] {
-        // 12 900 px/rad: a radius of 60 px. 0.0233 rad are 300 px: 20 px within the right or left edge.
+        // At 12 900 px/rad the radius is 60 px. 0.0233 rad is 300 px: 20 px within the right or left edge.
         for (i, off_rad) in
             [[0.0; 3], [0.0, 0.0233, 0.0], [0.003, -0.0233, 0.0], [0.017, 0.0, 0.0]].into_iter().enumerate()
         {
             let s = far_away(disc(kind), 12_900.0, distance_m, off_rad);
-            // 0.0044° are a pixel. Single precision knows cos α to 6e-8, which is 0.0008° of so small a half-angle, and
-            // a disc that is cut moves with its radius.
+            // A pixel is 0.0044°. Single precision resolves cos α to 6e-8, which is 0.0008° for a half-angle this
+            // small. The centre of a cut disc moves with its radius.
             found(&format!("{name} {i}"), &s, &sensor(&s), [0.0004, 0.002]);
         }
     }
@@ -202,7 +206,7 @@ fn all_lens_models() {
     }
 }
 
-/// The same light as bytes, as words, and as three equal colours.
+/// Tests the same light as bytes, as words, and as three equal colours.
 #[test]
 fn depth_and_colour_change_nothing() {
     let mut s = scene(pinhole(), 1);
@@ -211,7 +215,7 @@ fn depth_and_colour_change_nothing() {
     let Samples::Bytes(grey) = s.render().unwrap().samples().clone() else { panic!("8 bits are bytes") };
     let answer = |view: &ImageView<'_>, level: f64| -> [Result<Answer, Status>; 2] {
         let mut sensor = sensor(&s);
-        // Fixed, so that rounding of a level between two counts plays no part.
+        // The threshold is fixed, so that its rounding between two counts has no effect.
         sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level, ..threshold::Config::default() };
         let (host, flight) = Sensors::new(&sensor).both(view, &s);
         [host, flight]
@@ -228,8 +232,8 @@ fn depth_and_colour_change_nothing() {
         }
     }
 
-    // 257 × 255 = 65535: the same light to the last bit. Only the search for the plateaus on both sides of an edge
-    // rounds to counts: a thousandth of a degree here is a hundredth of a pixel.
+    // 257 × 255 = 65535, so the light is the same to the last bit. Only the search for the plateaus on both sides of an
+    // edge rounds to counts. A thousandth of a degree is a hundredth of a pixel here.
     let words: Vec<u16> = grey.iter().map(|&v| u16::from(v) * 257).collect();
     let deep =
         answer(&ImageView::from_words(&words, Layout::packed(640, 480, 1, 16), Channel::Mean).unwrap(), 40.0 * 257.0);

@@ -1,4 +1,4 @@
-//! Every link between the documents of the repository leads somewhere.
+//! Tests that every link between the documents of the repository leads to an existing path.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -7,7 +7,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// The documents: Markdown outside of folders that a build makes.
+/// Collects the documents: Markdown outside of folders that a build makes.
 fn pages(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
@@ -22,7 +22,8 @@ fn pages(dir: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// The targets of `[text](target)` outside of code, without what another site or a heading of the same page is.
+/// Returns the targets of `[text](target)` outside of code. Links to other sites and to headings of the same page are
+/// left out.
 fn targets(text: &str) -> Vec<String> {
     let mut fenced = false;
     let prose = text.lines().filter(|line| {

@@ -1,5 +1,5 @@
-//! What keeps a picture from being refused for the search's own sake: discs under an image circle, a dark frame, levels
-//! that follow the clouds, arrays of few pixels, words of which few bits are used.
+//! Tests that the search alone does not make the sensor refuse a picture: discs under an image circle, a dark frame,
+//! thresholds that follow the clouds, arrays of few pixels, words with few used bits.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
@@ -15,7 +15,7 @@ use hzn_tests::real::Photograph;
 use hzn_tests::sensors::look;
 use hzn_tests::{Sensors, Tally};
 
-/// A sensor at a level, told the disc's altitude.
+/// Returns the configuration of a sensor with a fixed threshold and with the disc's altitude.
 fn told(lens: &camera::Config, altitude_km: f64, level: f64) -> Config {
     let mut config = Config::new(lens.clone());
     config.body = body::Config {
@@ -36,8 +36,8 @@ fn seen(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report
     horizon.process(&picture, &expected)
 }
 
-/// A disc whose edge touches the image circle over fewer pixels than the border's strides was met by a search line,
-/// which gave a piece of it.
+/// Tests discs whose edge touches the image circle over fewer pixels than the strides along the border. Only a search
+/// line meets this edge at first, and it gives only a part of the edge. The sensor must find the disc all the same.
 #[test]
 fn no_disc_is_lost_under_an_image_circle() {
     let (mut count, mut lost) = (0, Vec::new());
@@ -61,8 +61,9 @@ fn no_disc_is_lost_under_an_image_circle() {
     assert!(count == 600 && lost.is_empty(), "{} of {count}: {lost:#?}", lost.len());
 }
 
-/// Demosaicing left one black pixel all around; the haze fades over a hundred pixels of the whole picture, 25 of this
-/// one, of which the answers may differ by four. (Through the whole picture they differ by 0.035° at most.)
+/// Tests a picture with a black frame of one pixel, which demosaicing left, and with wide haze. The haze fades over a
+/// hundred pixels of the full picture, which are 25 pixels of this one. The answers may differ by four of these. (In
+/// the full picture they differ by at most 0.035°.)
 #[test]
 fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let mut p = Photograph::load("opssat-2020-08-16.png");
@@ -97,7 +98,8 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
         assert!(apart_deg < found.sigma_deg(), "level {level}: {apart_deg}, sigma {}", found.sigma_deg());
         axes.push(found.axis);
     }
-    // With the frame, the picture's own outline belongs to the edge: fewer points, or none.
+    // If the frame is not left out, the picture's own outline belongs to the edge. The sensor then has fewer inliers or
+    // no answer.
     p.sensor.recover.frame_px = 0;
     p.sensor.binarize = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
     let with = look(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default());
@@ -107,7 +109,8 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     );
 }
 
-/// Seen from far above and lit from the side, bright clouds over dark ground: Otsu's level follows the clouds.
+/// Tests discs that are seen from far above and lit from the side, with bright clouds over dark ground: Otsu's
+/// threshold follows the clouds.
 #[test]
 fn half_lit_discs_are_looked_at_again() {
     let (mut answered, mut at_once) = (0, 0);
@@ -147,7 +150,7 @@ fn half_lit_discs_are_looked_at_again() {
             one.status, several.status, several.counters.looks, several.candidates
         );
         assert_eq!(one.counters.looks, 1);
-        // A look without need is not taken.
+        // The sensor takes no further look if the first gives an answer.
         assert!(one.status != Status::Ok || several.counters == one.counters);
         at_once += u32::from(one.status == Status::Ok);
         if let Some(s) = several.solution {
@@ -160,15 +163,16 @@ fn half_lit_discs_are_looked_at_again() {
     assert!(answered == count && at_once < count, "{at_once}, {answered}");
 }
 
-/// A limb through a lens of 55 degrees on an array of 32×24, 16 bits of which a range of 1200 counts is used above a
-/// sky at 7000: told nothing but the camera and the altitude.
+/// Tests a limb through a lens of 55 degrees on an array of 32×24. Of the 16 bits, a range of 1200 counts above a sky
+/// at 7000 is used. The sensor knows only the camera and the altitude.
 #[test]
 fn a_thermal_array_answers_by_default() {
     let camera = camera::Config::ideal(Model::Equidistant, 32, 24, 33.0);
     let mut sensor = Config::new(camera.clone());
     sensor.body.kind = Kind::EarthSphere;
     let mut known = sensor.clone();
-    // The bound: a known half-angle, independent points, each as wrong as those of the picture are.
+    // This sensor gives the bound: a known half-angle, and independent points with the errors of the points in the
+    // picture.
     known.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
     (known.covariance.sigma_px, known.covariance.correlation_px) = (1e-3, 0.0);
     let [mut sensor, mut known] = [sensor, known].map(|c| HostHorizon::boxed(&c).unwrap());

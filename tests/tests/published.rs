@@ -1,4 +1,4 @@
-//! The presets of published systems on rendered scenes: they answer what they should, as well as their methods can.
+//! Tests the presets of published systems on rendered scenes: they must answer as well as their methods can.
 
 use hzn_core::camera::{self, Camera, Model};
 use hzn_core::edge_points::SubPixel;
@@ -9,7 +9,8 @@ use hzn_sim::{Detector, Disc, EdgeNoise, Look, Pose, Scene};
 use hzn_tests::sensors::look;
 use hzn_tests::{Sensors, Tally};
 
-/// A flight through the f64 sensor of a preset, which is told the flight's camera, body and mask.
+/// Runs a flight through the f64 sensor of a preset with the flight's camera, body and mask; `change` alters the
+/// configuration.
 fn fly(flight: &Flight, preset: Preset, change: impl Fn(&mut Config)) -> Tally {
     let mut config = Config::preset(preset, flight.sensor.camera.clone());
     config.body = flight.sensor.body.clone();
@@ -29,8 +30,8 @@ fn fly(flight: &Flight, preset: Preset, change: impl Fn(&mut Config)) -> Tally {
     tally
 }
 
-/// Braun & Barf 2022 on what they built it for. Two thousand points make up for whole pixels and a free half-angle; the
-/// overbound is far too careful.
+/// Tests Braun & Barf 2022 on the kind of flight that they built it for. Two thousand points compensate for whole
+/// pixels and a free half-angle. The overbound makes the covariance far too large.
 #[test]
 fn braun_barf_on_a_rocket_flight() {
     let tally = fly(&rocket(1920, 1080, 8, 1), Preset::Dlr2022, |_| {});
@@ -39,8 +40,8 @@ fn braun_barf_on_a_rocket_flight() {
     assert!(tally.mean_nees() < 0.5, "{tally}");
 }
 
-/// With a part of the vehicle in view and masked, and half the pixels. Also the conic in place of the direct nadir,
-/// which has three unknowns more.
+/// Tests the same with a masked part of the vehicle in view, and half the resolution. It also tests the conic in place
+/// of the direct nadir; the conic has three more unknowns.
 #[test]
 fn braun_barf_with_payload_in_view() {
     let flight = rocket(960, 540, 6, 3).with_payload();
@@ -51,8 +52,8 @@ fn braun_barf_with_payload_in_view() {
     assert!(tally.answered() * 2 >= tally.frames && tally.worst_deg() < 20.0, "{tally}");
 }
 
-/// Wang et al. 2022 on what they built it for, by off-nadir angle. They report 0.04° with the whole Earth in view and
-/// 0.16° at 120°; here neither the altitude nor the size of the Earth is used.
+/// Tests Wang et al. 2022 on the kind of scene that they built it for, by off-nadir angle. They report 0.04° with the
+/// whole Earth in view and 0.16° at 120°. The preset uses neither the altitude nor the size of the Earth here.
 #[test]
 fn wang_on_an_infrared_earth() {
     let flight = leo_infrared(25, 1);
@@ -61,7 +62,7 @@ fn wang_on_an_infrared_earth() {
         let tally = fly(&part, Preset::Zju2022, |config| config.covariance = flight.sensor.covariance);
         assert_eq!(tally.answered(), tally.frames, "{tally}");
         assert!(tally.rms_deg() < rms_deg && tally.worst_deg() < 2.0 * rms_deg, "{tally}");
-        // What is known of the Earth's size, and the best points.
+        // The chain `hzn` uses the known size of the Earth, here with the best edge points.
         let best = fly(&part, Preset::Hzn, |config| {
             config.covariance = flight.sensor.covariance;
             config.candidates.sub_pixel = SubPixel::Erf;
@@ -70,19 +71,21 @@ fn wang_on_an_infrared_earth() {
         assert_eq!(best.answered(), best.frames, "{best}");
         assert!(best.rms_deg() < tally.rms_deg() && best.rms_deg() < 0.04, "{best} against {tally}");
         let _ = fly(&part, Preset::Hzn, |config| config.covariance = flight.sensor.covariance);
-        // The moments' bias from pixel to pixel counts as noise: too careful.
+        // The bias of the moments changes from pixel to pixel and counts as noise, so the covariance is too large.
         assert!((0.1..2.5).contains(&tally.mean_nees()), "{tally}");
     }
 }
 
-/// HORACE's own numbers are for its camera and rocket: here it may see the Earth from anywhere, in full size.
+/// Widens HORACE's own limits, which are for its camera and rocket: here it may see the Earth from 1 to 1000 km, and in
+/// full size.
 fn anywhere(config: &mut Config) {
     config.input.scale_to_height = None;
     config.select.altitude_limits_km = Some([1.0, 1000.0]);
     config.select.radius_margin = 0.5;
 }
 
-/// HORACE is right where the camera points at the Earth: the first frames of a swing from straight down.
+/// Tests HORACE where it is right: the camera points at the Earth. These are the first frames of a swing that starts
+/// straight down.
 #[test]
 fn horace_near_nadir() {
     let mut flight = leo_infrared(25, 1);
@@ -92,8 +95,8 @@ fn horace_near_nadir() {
     assert!(tally.rms_deg() < 1.0 && tally.worst_deg() < 2.0, "{tally}");
 }
 
-/// HORACE's own geometry: a side camera of a rocket at 80 km that looks at the horizon, a pinhole, the Earth bright.
-/// The circle's centre is not the nadir then, by up to some twenty degrees.
+/// Returns a flight with HORACE's own geometry: a pinhole camera on the side of a rocket at 80 km looks at the horizon,
+/// and the Earth is bright. The circle's centre then differs from the nadir by up to about 20°.
 fn horizon_camera(frames: usize) -> Flight {
     let mut flight = rocket(720, 576, frames, 1);
     let camera = camera::Config::ideal(Model::Pinhole, 720, 576, 600.0);
@@ -121,8 +124,8 @@ fn horace_at_the_horizon() {
     }
 }
 
-/// Rays beyond 90° off the optical axis, through a lens whose radius is an odd polynomial of the angle: a camera that
-/// looks 30° beside the nadir from 600 km sees the limb from 36° to 96°.
+/// Tests rays beyond 90° off the optical axis, through a lens whose image radius is an odd polynomial of the angle. A
+/// camera at 600 km that looks 30° off nadir sees the limb from 36° to 96° off its axis.
 #[test]
 fn a_limb_beyond_ninety_degrees() {
     let camera = camera::Config {

@@ -1,5 +1,6 @@
-//! Photographs. None has a surveyed calibration or attitude: judged is how well the fitted limb lies on the visible
-//! one, and how little it moves when it should not. Each test writes `target/overlays/*.png` to look at.
+//! Tests photographs. None of them has a surveyed calibration or attitude. The tests check how well the fitted limb
+//! lies on the visible one, and how little it moves when it should not. Each test writes `target/overlays/*.png` for
+//! visual inspection.
 
 use hzn_core::Prior;
 use hzn_core::status::Status;
@@ -13,9 +14,9 @@ struct Looked {
     points: Points,
 }
 
-/// The picture must be steepest within `limit_px` of the fitted limb, in these eighths of its width.
+/// Asserts that the picture is steepest within `limit_px` of the fitted limb, in these eighths of its width.
 fn lies_on_the_limb(photograph: &Photograph, answer: &Answer, eighths: std::ops::Range<usize>, limit_px: f64) {
-    // Twenty pixels: further off are clouds that are steeper than the haze.
+    // The search goes 20 px far. Farther off are clouds that are steeper than the haze.
     let off = steepest(photograph, answer, 20);
     assert!(off[eighths.clone()].iter().all(|px| px.abs() <= limit_px), "{off:.1?} in {eighths:?}");
 }
@@ -50,7 +51,7 @@ fn through(photograph: &Photograph) -> Looked {
     Looked { host, flight, points }
 }
 
-/// Largest change of the axis when the level is forced to 80 % and to 120 %.
+/// Returns the largest change of the axis in degrees when the threshold is forced to 80 % and to 120 %.
 fn change_with_level_deg(photograph: &Photograph, axis: [f64; 3]) -> f64 {
     let moved = [0.8, 1.2].map(|scale| {
         let mut sensor = photograph.sensor.clone();
@@ -67,10 +68,12 @@ fn iss_limb_over_broken_cloud_full_size() {
     let p = Photograph::load("full/iss-limb-2020-11-20.jpg");
     let l = through(&p);
     let a = l.host.expect("the limb is found");
-    // The limb spans the picture; required is 80 % of its width, 4000 points, 1.5 px, and 0.05°.
+    // The limb spans the picture. The test requires inliers along 80 % of the width, 4000 inliers, an RMS of at most
+    // 1.5 px, and a change of at most 0.05°.
     assert!(l.points.along(p.rgb.width()) >= 0.8);
     assert!(a.inliers >= 4000 && a.rms_px <= 1.5, "{a:?}");
-    // The haze is some 25 px thick here, and where clouds stand behind it it is steepest a few pixels further down.
+    // The haze is about 25 px thick here. Where clouds lie behind the haze, the picture is steepest a few pixels
+    // farther down.
     lies_on_the_limb(&p, &a, 0..8, 8.0);
     assert!(change_with_level_deg(&p, a.axis) <= 0.05);
 }
@@ -80,14 +83,15 @@ fn iss_limb_over_broken_cloud_reduced() {
     let p = Photograph::load("iss-limb-2020-11-20.jpg");
     let l = through(&p);
     let a = l.host.expect("the limb is found");
-    // A third of the size: a third of the points, and of the residuals at most half.
+    // At a third of the size the test requires a third of the inliers and at most half of the RMS.
     assert!(l.points.along(p.rgb.width()) >= 0.8);
     assert!(a.inliers >= 1300 && a.rms_px <= 0.75, "{a:?}");
     lies_on_the_limb(&p, &a, 0..8, 2.0);
-    // Haze fades over few pixels here: what the level moves is the haze's own, which sigma must hold.
+    // The haze fades over few pixels here. The threshold moves the limb only within the haze, and sigma must cover
+    // that.
     assert!(change_with_level_deg(&p, a.axis) <= 2.0 * a.sigma_deg());
     let f = l.flight.expect("the flight computer finds it too");
-    // 1598 border pixels fit into both lists: the same points.
+    // The 1598 border pixels fit into both lists, so both sensors use the same points.
     assert!(f.error_deg(a.axis) <= 1e-3, "{}°", f.error_deg(a.axis));
 }
 
@@ -97,7 +101,8 @@ fn iss_limb_is_the_same_at_both_sizes() {
         let p = Photograph::load(file);
         look(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default()).expect("the limb is found")
     });
-    // The same limb, within the claimed sigmas: haze of one width is read to another depth where it spans more pixels.
+    // Both answers must agree within the claimed sigmas. They differ, because haze that spans more pixels is cut at
+    // another depth.
     let apart_deg = answers[0].error_deg(answers[1].axis);
     let sigma_deg = answers[0].sigma_deg().hypot(answers[1].sigma_deg());
     println!("{apart_deg:.4}° between the sizes, sigma {sigma_deg:.4}°");
@@ -106,8 +111,9 @@ fn iss_limb_is_the_same_at_both_sizes() {
 
 #[test]
 fn limb_behind_the_solar_array() {
-    // A quarter of the limb is behind the array, so three quarters of the width can be inliers. Full size: the border
-    // of some 42 000 px does not fit, and every fourth point is taken; the last eighth has the Sun's glint below it.
+    // A quarter of the limb is behind the array, so three quarters of the width can have inliers. At full size, the
+    // border of about 42 000 px does not fit, and every fourth point is used. The last eighth has the Sun's glint below
+    // the limb.
     let cases = [
         ("full/iss064e002941-solar-array.jpg", 900, 1.8, 2..7, 5.0),
         ("iss064e002941-solar-array.jpg", 1100, 0.6, 2..8, 2.0),
@@ -119,12 +125,14 @@ fn limb_behind_the_solar_array() {
         assert!(a.inliers >= inliers && a.rms_px <= rms_px, "{a:?}");
         assert!(l.points.along(p.rgb.width()) >= 0.7);
         lies_on_the_limb(&p, &a, eighths, steep_px);
-        // The array's edges are rejected: left of it there are no inliers but a few by chance.
+        // The edges of the array must be outliers: in this left part of the picture only a few points are inliers, by
+        // chance.
         let beyond = p.rgb.width() as f64 * 0.22;
         let stray = l.points.chosen.iter().filter(|(at, weight)| at[0] < beyond && *weight > 0.0).count();
         assert!(stray * 20 <= a.inliers as usize, "{stray} of {} inliers on the station", a.inliers);
-        // Seven in eight points are the station's or a cloud's; at full size, where the flight computer's list keeps
-        // every 32nd border pixel, nine in ten, which is beyond its sampler: it may refuse there, but not be wrong.
+        // Seven of eight points belong to the station or to a cloud. At full size it is nine of ten, because the flight
+        // computer's list keeps every 32nd border pixel. That is too many for its sampler: it may refuse there, but
+        // must not be wrong.
         match l.flight {
             Ok(f) => assert!(f.error_deg(a.axis) <= a.sigma_deg(), "{}°", f.error_deg(a.axis)),
             Err(status) => assert!(file.starts_with("full/"), "{status}"),
@@ -149,22 +157,23 @@ fn pluto() {
     let p = Photograph::load("pluto-pia19948.jpg");
     let l = through(&p);
     let (a, f) = (l.host.expect("found in f64"), l.flight.expect("found in f32"));
-    // Mountains of a few kilometres are some pixels here (1.35 px/km): RMS below 2 px. A millidegree is 0.45 px.
+    // Mountains of a few kilometres are some pixels high here (1.35 px/km), so the RMS must be below 2 px. 0.001° is
+    // 0.45 px.
     assert!(a.inliers >= 250 && a.rms_px <= 2.0, "{a:?}");
     assert!(l.points.along(p.rgb.width()) >= 0.8);
     assert!(f.error_deg(a.axis) <= 1e-3, "{}°", f.error_deg(a.axis));
     // In the left quarter the crescent is as dim as the haze, and ridges are steeper than the limb.
     lies_on_the_limb(&p, &a, 2..8, 5.0);
-    // sin α = 1188.3 / (1188.3 + 18000): 3.5506°; 200 km of altitude are 0.037°.
+    // sin α = 1188.3 / (1188.3 + 18000) gives α = 3.5506°. 200 km of altitude change α by 0.037°.
     assert!((a.free_half_angle_rad.to_degrees() - 3.5506).abs() <= 0.037);
 }
 
-/// Centre and radius of the disc: least squares (Kåsa) over the crossings of the half level along every row and column
-/// near the middle. The disc is darker towards its limb, but equally so on all sides.
+/// Returns centre and radius of the disc in pixels: a least-squares fit (Kåsa) to the points where the rows and columns
+/// near the middle cross `level`. The disc is darker towards its limb, but equally on all sides.
 fn circle(p: &Photograph, level: f64) -> [f64; 3] {
     let n = p.rgb.width();
     let mut points: Vec<[f64; 2]> = Vec::new();
-    // Where rows and columns cross the limb at less than 60° from its normal.
+    // These rows and columns cross the limb at less than 60° from its normal.
     for i in n / 2 - 170..n / 2 + 170 {
         for along_row in [true, false] {
             let at = |j: u32| if along_row { p.brightness(j, i) } else { p.brightness(i, j) };
@@ -207,7 +216,7 @@ fn sun() {
             c.fx_px * answer.half_angle_rad.tan()
         );
         assert!(off <= limit_px, "{off}");
-        // The levels' own radii are 202.4 to 203.0 px.
+        // The circles of the three levels have radii of 202.4 to 203.0 px.
         let radius_px = c.fx_px * answer.half_angle_rad.tan();
         assert!((202.0 - 0.6..203.0 + 0.6).contains(&radius_px), "{radius_px}");
     }

@@ -1,4 +1,4 @@
-//! Rendered flights with exact truth, through both precisions of the sensor.
+//! Tests rendered flights with exact truth through both precisions of the sensor.
 
 use hzn_core::camera::{Config as Camera, Model};
 use hzn_core::image::{Channel, ImageView, Layout};
@@ -9,8 +9,9 @@ use hzn_sim::{Look, Pose, Sky};
 use hzn_tests::sensors::look;
 use hzn_tests::{Answer, Sensors, Tally};
 
-/// f32 and f64 over a flight: tallies, and the largest difference of the axes where both saw the same points, and
-/// where the flight computer had to thin more, in shares of sigma.
+/// Results of f64 and f32 over a flight: the tallies and the largest differences of the axes. `same_deg` (degrees) is
+/// for pictures where both sensors dropped equally many pixels and saw the same points. `thinned_sigmas` (shares of
+/// sigma) is for pictures where the flight computer had to thin more.
 struct Flown {
     host: Tally,
     flight: Tally,
@@ -47,8 +48,8 @@ fn fly(flight: &Flight) -> Flown {
 }
 
 fn known_limits(flown: &Flown) {
-    // Single precision costs a thousandth of a degree at most where both see the same points. Where the flight
-    // computer's shorter list makes it take other points of the same edge, their noise differs too: less than a sigma.
+    // With the same points, single precision costs at most a thousandth of a degree. The flight computer's shorter list
+    // can make it take other points of the same edge. The noise of these points differs too, but by less than a sigma.
     assert!(flown.same_deg <= 1e-3, "{:e}", flown.same_deg);
     assert!(flown.thinned_sigmas <= 1.0, "{}", flown.thinned_sigmas);
 }
@@ -57,8 +58,8 @@ fn known_limits(flown: &Flown) {
 fn rocket_flight() {
     let flown = fly(&rocket(1920, 1080, 12, 1));
     for tally in [&flown.host, &flown.flight] {
-        // All answered, 0.06° RMS, none above 2°; NEES of rendered scenes 1 to 4, less where the limb stands exactly as
-        // high as the sensor is told, and it is told ±1 km.
+        // The goals are: all answered, 0.06° RMS, none above 2°, and a NEES of 1 to 4 for rendered scenes. The NEES may
+        // be lower here: the limb is exactly as high as the sensor is told, and the sensor is told ±1 km.
         assert_eq!(tally.answered(), tally.frames);
         assert!(tally.rms_deg() <= 0.06 && tally.worst_deg() <= 2.0, "{tally}");
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
@@ -70,7 +71,8 @@ fn rocket_flight() {
 fn rocket_flight_with_payload_in_view() {
     let flown = fly(&rocket(1920, 1080, 12, 3).with_payload());
     for tally in [&flown.host, &flown.flight] {
-        // 98 % answered, which of twelve is all; none above 2°. Two thirds of the limb: twice the error.
+        // The goals are 98 % answered (all of twelve) and none above 2°. With two thirds of the limb, twice the error
+        // is allowed.
         assert_eq!(tally.answered(), tally.frames);
         assert!(tally.rms_deg() <= 0.12 && tally.worst_deg() <= 2.0, "{tally}");
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
@@ -78,19 +80,21 @@ fn rocket_flight_with_payload_in_view() {
     known_limits(&flown);
 }
 
-/// An evenly bright Earth with white noise, the same picture again and again: the scatter of the answers against the
-/// bound of Cramér and Rao for a known half-angle and independent edge points, each as wrong as the points of the
-/// picture are. Beyond the points' own errors noise moves the level and with it all points alike, and what is a border
-/// pixel is chosen by noise too: hundredths of a pixel, which the bound does not know of and `covariance.bias_px` is
-/// there for. They show the more the noisier the picture is. A level that is not halfway between dark and lit moves all
-/// pictures alike: a hundredth of a pixel, too, which no scatter shows.
+/// Compares the scatter of the answers with the bound of Cramér and Rao. The picture is an evenly bright Earth with
+/// white noise, rendered again and again. The bound is for a known half-angle and for independent edge points with the
+/// errors of the points in the picture.
+///
+/// Noise has two more effects, each of hundredths of a pixel: it moves the threshold and with it all points alike, and
+/// it decides which pixels are border pixels. The bound does not include these effects; `covariance.bias_px` exists for
+/// them. They grow with the noise of the picture. A threshold that is not halfway between dark and lit also moves all
+/// pictures alike, by a hundredth of a pixel, which no scatter shows.
 #[test]
 fn white_noise_against_the_bound() {
     let camera = Camera::ideal(Model::Pinhole, 320, 240, 277.0);
     let mut sensor = hzn_core::Config::new(camera.clone());
     sensor.body.kind = hzn_core::body::Kind::EarthSphere;
     sensor.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
-    // Less than any edge point is wrong by, so that the covariance goes by the residuals.
+    // This is less than the error of any edge point, so the covariance follows from the residuals.
     sensor.covariance = hzn_core::covariance::Config::told(1e-3, 0.0);
     let look = Look { azimuth_rad: 0.3, depression_rad: 0.25, roll_rad: 0.2 };
     let mut scene = hzn_sim::Scene::new(camera, Pose::looking(position_m(20.0, 10.0, 240.0), look));
@@ -127,7 +131,7 @@ fn white_noise_against_the_bound() {
     }
 }
 
-/// The frames of a flight that swings from 0° to 120° off nadir, up to 90° and beyond.
+/// Splits the frames of a flight that swings from 0° to 120° off nadir: up to 90° and beyond.
 fn halves(flight: Flight) -> [Flight; 2] {
     let (mut near, mut far) = (flight.clone(), flight);
     let middle = near.frames.len() * 3 / 4;
@@ -136,7 +140,7 @@ fn halves(flight: Flight) -> [Flight; 2] {
     [near, far]
 }
 
-/// RMS allowed up to 90° and up to 120° off nadir.
+/// Largest allowed RMS in degrees, up to 90° and up to 120° off nadir.
 const LEO_DEG: [f64; 2] = [0.04, 0.08];
 
 #[test]
@@ -152,8 +156,8 @@ fn low_orbit_infrared() {
     }
 }
 
-/// The limb's height varies by ±4.5 km between the poles, which the sensor is told; with an attitude good to 5° and
-/// without one.
+/// Tests a limb height that varies by ±4.5 km between the poles, which the sensor is told. The test runs without an
+/// attitude and with an attitude that has a sigma of 5°.
 #[test]
 fn low_orbit_infrared_with_limb_height_by_latitude() {
     let rows = [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
@@ -169,7 +173,7 @@ fn low_orbit_infrared_with_limb_height_by_latitude() {
     }
 }
 
-/// The sensor of a workstation over a flight, told an attitude that is good to 5°.
+/// Runs a flight through the sensor of a workstation, with a prior attitude that has a sigma of 5°.
 fn with_attitude(flight: &Flight) -> Tally {
     let mut sensors = Sensors::new(&flight.sensor);
     let mut tally = Tally::default();
@@ -185,17 +189,17 @@ fn with_attitude(flight: &Flight) -> Tally {
 
 #[test]
 fn low_orbit_infrared_with_attitude_prior() {
-    // The Earth's flattening turns the axis of a fitted circle; a prior good to 5° takes that away.
+    // The Earth's flattening turns the axis of a fitted circle; a prior attitude with a sigma of 5° removes that.
     for (flight, limit_deg) in halves(leo_infrared(25, 1)).iter().zip([0.015, 0.03]) {
         let tally = with_attitude(flight);
         assert_eq!(tally.answered(), tally.frames);
         assert!(tally.rms_deg() <= limit_deg, "{tally}");
-        // Below 2: the sensor is told ±1 km of limb height, and it is exactly as told.
+        // The NEES is below 2: the sensor is told ±1 km of limb height, and the limb height is exactly as told.
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
     }
 }
 
-/// What both sensors say to a picture, which must not be `ok`.
+/// Asserts that neither sensor answers a picture.
 fn refused(what: &str, answers: (Result<Answer, Status>, Result<Answer, Status>)) {
     println!("{what}: {:?} {:?}", answers.0.as_ref().err(), answers.1.as_ref().err());
     assert!(answers.0.is_err() && answers.1.is_err(), "{what}: {answers:?}");
@@ -206,7 +210,8 @@ fn sky_and_clouds_are_not_answered() {
     let flight = rocket(960, 540, 8, 4);
     let mut sensors = Sensors::new(&flight.sensor);
     for (i, frame) in flight.frames.iter().enumerate() {
-        // From the flight's height, 94° across: up into the stars, and straight down, where the limb is 70° away.
+        // The camera is at the flight's height and 94° wide. It looks up into the stars, or straight down, where the
+        // limb is 70° away.
         let position = position_m(67.9, 21.1, 100.0 + 20.0 * i as f64);
         for depression_deg in [-89.0, -50.0, 90.0] {
             let mut scene = frame.scene.clone();
@@ -227,7 +232,7 @@ fn pictures_of_nothing_are_not_answered() {
     for camera in [flight.sensor.camera.clone(), Camera::ideal(Model::Pinhole, w as u16, h as u16, 500.0)] {
         flight.sensor.camera = camera;
         let mut sensors = Sensors::new(&flight.sensor);
-        // A multiplicative hash for noise: every seed another picture.
+        // A multiplicative hash makes the noise: every seed gives another picture.
         let noise = |x: u32, y: u32, seed: u32| {
             let n = (x + 2000 * y + seed * 7_654_321).wrapping_mul(2_654_435_761);
             ((n ^ (n >> 15)).wrapping_mul(2_246_822_519) >> 24) as u8
@@ -246,7 +251,7 @@ fn pictures_of_nothing_are_not_answered() {
         for side in [1, 8, 40, 97] {
             add(format!("checkerboard of {side}"), &move |x, y| if (x / side + y / side) % 2 == 0 { 20 } else { 220 });
         }
-        // Straight edges are no limb of a body that is 140° wide seen through these lenses.
+        // Through these lenses a straight edge cannot be the limb of a body that is 140° wide.
         add("stripes".into(), &|x, _| if x % 80 < 40 { 20 } else { 220 });
         add("gradient".into(), &|x, _| (x * 255 / w) as u8);
         for (name, data) in pictures {

@@ -1,4 +1,4 @@
-//! Pictures that come row by row beside the same pictures in memory: rendered flights and photographs.
+//! Compares pictures that come row by row with the same pictures in memory: rendered flights and photographs.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -15,13 +15,14 @@ use hzn_core::{
 use hzn_sim::flight::{leo_infrared, rocket};
 use hzn_tests::real::Photograph;
 
-/// Lists for any of these pictures.
+/// Largest picture width in pixels that the row buffers take.
 const WIDEST: usize = 5568;
+/// Row buffers that are large enough for any of these pictures.
 type Large = RowBuffers<u8, { ROWS_HELD as usize * WIDEST }, 3712, 65535, 65535>;
-/// As the flight computer's, for one candidate of 600 points.
+/// Workspace in f32, as on a flight computer, with more border pixels. It is for one candidate of 600 points.
 type Lists = Workspace<f32, 16384, 256, 512>;
 
-/// The edge points of each candidate, with every bit.
+/// Edge points of each candidate, with every bit.
 #[derive(Default)]
 struct Seen(RefCell<BTreeMap<u32, Vec<[u32; 2]>>>);
 impl Observer<f32> for Seen {
@@ -85,12 +86,13 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
     let (mut ok, mut wide) = (0, 0);
     let cases = cases();
     for case in &cases {
-        // The level that the picture itself asks for, told beforehand to both.
+        // Both get the threshold that the picture itself gives.
         let own = case.whole(&Sensor::new(&case.sensor).unwrap(), &Seen::default()).level;
         let mut config = case.sensor.clone();
         config.binarize.method = Method::Fixed;
         config.binarize.level = own.max(1).into();
-        // Of rows that are gone no brightness is left, which these gates read; and nothing to look at again.
+        // These gates read brightness, and none is left of rows that are gone. A dark frame cannot be searched for
+        // either.
         (config.select.max_band, config.select.max_departure) = (1.0, 1e6);
         config.recover.frame_px = 0;
         let sensor = Sensor::new(&config).unwrap();
@@ -99,7 +101,7 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         assert_eq!((want.status, want.level), (got.status, got.level), "{}", case.name);
         let (there, here) = (there.0.into_inner(), here.0.into_inner());
         let beyond = got.counters.cut_points;
-        // An answer that other points make surer ends the search.
+        // With other points an answer can be more certain, which ends the search earlier.
         assert!(beyond > 0 || there.len() == here.len(), "{}: candidates", case.name);
         if beyond == 0 && got.counters.dropped == want.counters.dropped {
             assert_eq!(there, here, "{}", case.name);
@@ -117,15 +119,15 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         }
         let points: usize = there.values().map(Vec::len).sum();
         println!("{}: {}, {points} points, {beyond} cut, {apart_deg:.6} deg apart", case.name, got.status);
-        // Haze through a long lens, over many more rows than are held and with more pixels on its edges than fit, is
-        // another edge; still the same limb.
+        // Haze through a long lens covers many more rows than are held, and its edges have more pixels than fit. The
+        // edge is then another one, but the limb is the same.
         assert!(apart_deg < 0.1, "{}: {apart_deg}", case.name);
     }
     println!("{} pictures, {ok} answers, {wide} with edges wider than the rows held", cases.len());
     assert!(ok >= 18 && wide * 2 < cases.len() as u32, "{ok} {wide}");
 }
 
-/// What the lists of book/guide/porting.md take, with their share of a 640×480 picture and of a large one.
+/// Tests the memory of the lists in book/guide/porting.md, for a 640×480 picture and for a large one.
 #[test]
 fn memory_without_a_frame() {
     type Vga = RowBuffers<u8, { ROWS_HELD as usize * 640 }, 480, 8192, 2560>;
@@ -134,7 +136,7 @@ fn memory_without_a_frame() {
     let (vga, hd, lists) = (size_of::<Vga>(), size_of::<Hd>(), size_of::<Short>());
     println!("rows of 640×480: {vga} bytes; of 1920×1080: {hd} bytes; workspace for 600 points: {lists} bytes");
     assert!(vga <= 59_400 && hd <= 139_600 && lists <= 33_500);
-    // They suffice for a flight.
+    // These lists are large enough for a flight.
     let flight = rocket(640, 480, 8, 4);
     for frame in &flight.frames {
         let case = hzn_tests::emulated::Case::rendered(frame.file.clone(), &flight.sensor, frame);

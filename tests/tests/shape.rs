@@ -1,4 +1,4 @@
-//! The shape of the sources: short functions, short files, short lines.
+//! Tests the shape of the sources: short functions, short files, short lines.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ const LINES: usize = 450;
 /// Longest function in lines; only a few may be longer than [`USUAL`].
 const FUNCTION: usize = 100;
 const USUAL: usize = 60;
-/// So many functions are longer today. The number may only fall; 10 are the goal.
+/// Number of functions that are longer today. It may only fall; the goal is 10.
 const FEW: usize = 44;
-/// These files are longer today. The list may only shrink.
+/// Files that are longer today. The list may only shrink.
 const STILL_LONG: &[&str] = &[
     "crates/hzn-calib/src/camera_file/read.rs",
     "crates/hzn-calib/src/frames.rs",
@@ -66,7 +66,7 @@ fn lines_and_files_are_short() {
         if text.lines().count() > LINES && !STILL_LONG.contains(&name) {
             long.push(format!("{name}: {} lines", text.lines().count()));
         }
-        // A snapshot stands on one line as the program wrote it.
+        // A snapshot stays on one line, as the program wrote it.
         let is_wide = |line: &str| line.chars().count() > COLUMNS && !line.contains("assert_snapshot!");
         let wide = text.lines().enumerate().filter(|(_, line)| is_wide(line));
         if STILL_LONG.contains(&name) && text.lines().count() <= LINES {
@@ -77,7 +77,7 @@ fn lines_and_files_are_short() {
     assert!(long.is_empty(), "{} places: {long:#?}", long.len());
 }
 
-/// (line, lines, name) of every function of a file that rustfmt has formatted.
+/// Returns (line, number of lines, name) of every function of a file that rustfmt has formatted.
 fn functions(text: &str) -> Vec<(usize, usize, String)> {
     let lines: Vec<&str> = text.lines().collect();
     let mut found = Vec::new();

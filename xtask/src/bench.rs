@@ -1,5 +1,5 @@
-//! hzn-core beside the OpenCV recipe, `hzn run` beside decoding alone, samplers of outliers beside each other, and what
-//! Python costs beside the sensor.
+//! Runs the benchmarks: hzn-core against the OpenCV recipe, `hzn run` against decoding alone, samplers of outliers
+//! against each other, and the cost of Python compared with the sensor.
 
 use std::path::Path;
 use std::process::Command;
@@ -9,7 +9,8 @@ use crate::python;
 use crate::steps::{self, Trouble, cargo};
 use crate::wheel;
 
-/// Prepares both programs and runs them in one go; `args` go to the harness.
+/// Runs the benchmark `run`, `python` or `ransac` if `args` begins with that word. Otherwise compares hzn-core with the
+/// OpenCV recipe. The remaining arguments go to the harness.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let go = || -> Result<(), Trouble> {
         std::env::set_current_dir(root())?;
@@ -37,7 +38,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
 }
 
-/// `hzn run` on a sequence of PNGs beside nothing but decoding them.
+/// Compares `hzn run` on a sequence of PNGs with decoding alone.
 fn sequence(args: &[String]) -> Result<(), Trouble> {
     steps::run(&mut cargo(&["build", "--quiet", "--release", "--package", "hzn-cli", "--package", "hzn-benches"]))?;
     let release = target().join("release");

@@ -1,4 +1,4 @@
-//! The images of `firmware/`: built for both boards, looked into, and run in QEMU.
+//! Builds the images of `firmware/` for both boards, inspects them and runs them in QEMU.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,13 +10,13 @@ use crate::soft_double;
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
 use crate::test::built_with_the_tests;
 
-/// A board, and the flags of its core.
+/// Boards, each with the compiler flags for its core.
 const BOARDS: [(&str, &str); 2] = [("an386", ""), (M7, M7_FLAGS)];
 const M7: &str = "an500";
 const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
-/// The images of a board.
+/// Images of each board.
 const IMAGES: [&str; 4] = ["chain", "flight", "measure", "rows"];
-/// Where the costs are written down.
+/// Document with the costs.
 const COSTS: &str = "book/results/firmware-cost.md";
 
 /// Builds every image and puts it where the tests find it: `target/firmware/BOARD/images`.
@@ -37,20 +37,21 @@ pub(crate) fn build() -> Outcome {
     Ok(())
 }
 
-/// What the tests of the images need is built; then the tests, the costs and the C interface.
+/// Builds what the image tests need, then runs the tests and checks the costs and the C interface.
 pub(crate) fn test(steps: &mut Steps) -> Outcome {
     build()?;
     soft_double::look_into(&images("an386").join("measure"))?;
     linked_with(METHODS)?;
     looked_over()?;
     built_with_the_tests()?;
-    // The whole workspace, so that nothing is built a second time with other features.
+    // `--workspace` avoids a second build with other features.
     steps.cargo_test(&["--workspace", "--test", "firmware", "--", "--ignored"])?;
     steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
     c_interface()
 }
 
-/// Lints and documents of the workspace, and that the C header is what the library says.
+/// Runs the lints, the documentation build and the tests of the firmware workspace. A test checks that the C header
+/// agrees with the library.
 fn looked_over() -> Outcome {
     let dir = target().join("firmware/host");
     let here = ["--package", "hzn-c"];
@@ -78,7 +79,7 @@ fn looked_over() -> Outcome {
 /// Every feature that adds methods to hzn-core.
 const METHODS: &[&str] = &["dlr", "zju", "horace", "erf"];
 
-/// The flight image of an M7 with features of hzn-core. That none of its methods can panic is shown by the linker.
+/// Builds the flight image of an M7 with features of hzn-core. The linker shows that none of its methods can panic.
 fn linked_with(features: &[&str]) -> Result<PathBuf, Trouble> {
     let chosen: Vec<String> = features.iter().map(|f| format!("hzn-core/{f}")).chain([M7.to_owned()]).collect();
     let args = ["--package", "hzn-mps2", "--bin", "flight", "--features", &chosen.join(",")];
@@ -87,7 +88,7 @@ fn linked_with(features: &[&str]) -> Result<PathBuf, Trouble> {
     Ok(built.join("flight"))
 }
 
-/// What the methods of published systems take of flash, as the table of book/theory/methods.md.
+/// Prints how much flash the methods of published systems take, as the table of book/theory/methods.md.
 fn by_feature() -> Outcome {
     let mut table = "| features of hzn-core | flash, bytes |\n|---|---:|\n".to_owned();
     let each = METHODS.iter().map(core::slice::from_ref);
@@ -103,7 +104,7 @@ fn by_feature() -> Outcome {
     Ok(())
 }
 
-/// `cargo xtask firmware [--write | --by-feature]`: the images, and what they cost.
+/// `cargo xtask firmware [--write | --by-feature]`: builds the images and measures what they cost.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let go = || -> Outcome {
         std::env::set_current_dir(root())?;
@@ -121,7 +122,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
 fn in_firmware<'a>(command: &'a mut Command, flags: &str) -> &'a mut Command {
     command.current_dir(root().join("firmware"));
     if !flags.is_empty() {
-        // Beside those of `firmware/.cargo/config.toml`; RUSTFLAGS would stand in their place.
+        // This variable adds to the flags of `firmware/.cargo/config.toml`; RUSTFLAGS would replace them.
         command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS", flags);
     }
     command
@@ -131,8 +132,8 @@ fn images(board: &str) -> PathBuf {
     target().join("firmware").join(board).join("images")
 }
 
-/// Nothing in an image can panic: the linker has seen to that (the panic handler calls a function that does not exist),
-/// and no symbol says otherwise.
+/// Checks that nothing in an image can panic, and prints the size of the image. The linker ensures this already,
+/// because the panic handler calls a function that does not exist. The symbols must not contain a panic path either.
 fn look_into(board: &str, image: &str) -> Outcome {
     let path = images(board).join(image);
     let symbols = output(Command::new("arm-none-eabi-nm").arg(&path))
@@ -144,7 +145,7 @@ fn look_into(board: &str, image: &str) -> Outcome {
     steps::run(Command::new("arm-none-eabi-size").arg(&path))
 }
 
-/// The C example on this machine and in QEMU: the same bits.
+/// Checks that the C example gives the same bits on this machine and in QEMU.
 fn c_interface() -> Outcome {
     let toolchain = Toolchain::find()?;
     let library = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
@@ -196,7 +197,7 @@ fn c_interface() -> Outcome {
     Ok(())
 }
 
-/// What a program says, on either stream.
+/// Returns what a program prints on both streams; an error if the program fails.
 fn said(command: &mut Command) -> Result<String, Trouble> {
     steps::show(command);
     let out = command.stdin(std::process::Stdio::null()).output()?;

@@ -1,6 +1,6 @@
-//! A compiler for a flight computer. The compiled core library of the target comes from one of three places, tried in
-//! order: the toolchain has it; `rustup target add` fetches it (its server may be out of reach, so it gets a minute);
-//! Debian's Rust builds it from Debian's copy of the sources.
+//! Finds a compiler for a flight computer. The target needs a compiled core library, which comes from one of three
+//! places. They are tried in this order: the toolchain has the library; `rustup target add` fetches it (within one
+//! minute, because its server may be out of reach); Debian's Rust builds it from Debian's copy of the sources.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,20 +9,20 @@ use std::time::Duration;
 use crate::machine::{apt_install, has, output, run_within, target};
 use crate::steps::{Outcome, Trouble, cargo, run};
 
-/// Cortex-M4F and M7.
+/// Target of the Cortex-M4F and the Cortex-M7.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// A way to build for the target.
+/// Toolchain that builds for the target.
 #[derive(Clone, Copy)]
 pub(crate) enum Toolchain {
-    /// The one that runs this program.
+    /// Toolchain that runs this program.
     Own,
-    /// Debian's, with core built from its sources.
+    /// Debian's toolchain, which builds core from its sources.
     Debian,
 }
 
 impl Toolchain {
-    /// The first that works.
+    /// Returns the first toolchain that works.
     pub(crate) fn find() -> Result<Self, Trouble> {
         let add = || {
             has("rustup")
@@ -36,7 +36,8 @@ impl Toolchain {
         if !has_debian_rust() {
             return Err(Trouble::Missing(format!("needs `rustup target add {TARGET}`: Debian's Rust is not there")));
         }
-        // The linker of bare targets is a link into a package that nothing above depends on: `lld-22` and the like.
+        // The linker of bare targets, `rust-lld`, is a symbolic link into a package like `lld-22`. None of the packages
+        // above depends on that package.
         if !Path::new("/usr/bin/rust-lld").exists()
             && let Ok(to) = std::fs::read_link("/usr/bin/rust-lld")
             && let Some(lld) = to.file_name().and_then(|n| n.to_str()).filter(|n| n.starts_with("lld-"))
@@ -46,7 +47,8 @@ impl Toolchain {
         Ok(Self::Debian)
     }
 
-    /// `cargo build --release` (or `rustc`) for the target, and where it builds to: under `dir` of the target folder.
+    /// Returns `cargo build --release` (or another verb, for example `rustc`) for the target, and the folder that it
+    /// builds to. This folder is under `dir` of the target folder.
     pub(crate) fn cargo(self, verb: &str, dir: &str, args: &[&str]) -> (Command, PathBuf) {
         let dir = target().join(dir);
         let mut command = match self {
@@ -54,8 +56,8 @@ impl Toolchain {
             Self::Debian => {
                 let mut command = Command::new("/usr/bin/cargo");
                 command.args([verb, "--release", "--locked", "-Zbuild-std=core"]);
-                // RUSTC_BOOTSTRAP lets Debian's stable compiler build core from its own sources; flags and toolchain
-                // settings of the caller belong to another compiler.
+                // RUSTC_BOOTSTRAP lets Debian's stable compiler build core from its own sources. The caller's flags and
+                // toolchain settings belong to another compiler, so they are removed.
                 command.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
                 command
             }
@@ -78,7 +80,7 @@ fn needs(trouble: Trouble) -> Trouble {
     }
 }
 
-/// Has the toolchain on PATH a built core for the target?
+/// Returns whether the toolchain on PATH has a compiled core library for the target.
 fn installed() -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let dir = output(Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]));

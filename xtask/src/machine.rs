@@ -1,4 +1,4 @@
-//! What this machine has, and what can be added to it.
+//! Finds out what this machine has, and installs packages.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -6,29 +6,29 @@ use std::time::{Duration, Instant};
 
 use crate::steps::{Outcome, Trouble, run, show};
 
-/// The root of the repository.
+/// Returns the root folder of the repository.
 pub(crate) fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).to_path_buf()
 }
 
-/// Where cargo builds to.
+/// Returns the folder that cargo builds to.
 pub(crate) fn target() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
 }
 
-/// Can this program be started from PATH?
+/// Returns whether this program can be started from PATH.
 pub(crate) fn has(program: &str) -> bool {
     std::env::var_os("PATH").is_some_and(|path| std::env::split_paths(&path).any(|dir| dir.join(program).is_file()))
 }
 
-/// What a command prints; `None` when it fails.
+/// Returns what a command prints on standard output, or `None` if the command fails.
 pub(crate) fn output(command: &mut Command) -> Option<String> {
     let out = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_owned())
 }
 
-/// Installs Debian packages where that is possible without asking.
+/// Installs the missing Debian packages. Fails if apt-get is missing, the user is not root, or the installation fails.
 pub(crate) fn apt_install(packages: &[&str]) -> Outcome {
     let installed = |p: &&str| {
         output(Command::new("dpkg-query").args(["-W", "-f", "${Status}", p])).is_some_and(|s| s.ends_with(" installed"))
@@ -42,7 +42,7 @@ pub(crate) fn apt_install(packages: &[&str]) -> Outcome {
     if !has("apt-get") || !is_root {
         return Err(Trouble::Missing(format!("needs the Debian packages: {how}")));
     }
-    // Another apt may be running: wait for it, within bounds.
+    // Another apt may be running: wait for it, at most 300 s.
     let apt = || {
         let mut c = Command::new("apt-get");
         c.args(["-qq", "-o", "DPkg::Lock::Timeout=300"]).env("DEBIAN_FRONTEND", "noninteractive");
@@ -53,7 +53,7 @@ pub(crate) fn apt_install(packages: &[&str]) -> Outcome {
         .map_err(|_| Trouble::Missing(format!("could not be installed: {how}")))
 }
 
-/// Runs a command for at most `limit`; true when it ended well in time.
+/// Runs a command for at most `limit` and then kills it. Returns true if the command succeeds in time.
 pub(crate) fn run_within(command: &mut Command, limit: Duration) -> bool {
     show(command);
     let Ok(mut child) = command.stdin(Stdio::null()).spawn() else { return false };

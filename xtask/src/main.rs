@@ -1,12 +1,12 @@
-//! The project's chores.
+//! Runs the project's chores.
 //!
 //! ```text
-//! cargo xtask test     everything that must hold: format, lints, tests, documents, flight build, files, demo
-//! cargo xtask bench    hzn-core beside the OpenCV recipe, in one run
-//! cargo xtask reproduce  our numbers beside the published ones, into book/results/reproduction.md
-//! cargo xtask firmware the images for the flight computer, and what they cost in instructions
-//! cargo xtask keys     what is written from the keys of sensor.toml: table, template, JSON schema
-//! cargo xtask viewer   the picture of the viewer's window in the documents
+//! cargo xtask test       runs all checks: format, lints, tests, documents, flight build, files, demo
+//! cargo xtask bench      compares hzn-core with the OpenCV recipe, in one run
+//! cargo xtask reproduce  compares our numbers with the published ones and writes book/results/reproduction.md
+//! cargo xtask firmware   builds the images for the flight computer and counts their instructions
+//! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema
+//! cargo xtask viewer     makes the picture of the viewer's window in the documents
 //! ```
 #![forbid(unsafe_code)]
 

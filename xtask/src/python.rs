@@ -1,4 +1,4 @@
-//! Virtual environments with pinned packages, under the target folder.
+//! Makes virtual environments with pinned packages, under the target folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,8 @@ use std::process::Command;
 use crate::machine::{apt_install, output, target};
 use crate::steps::{Trouble, run};
 
-/// The Python of an environment that holds what `requirements` lists. It is made once and again when the list changes.
+/// Returns the Python of an environment with the packages that `requirements` lists. The environment is made once, and
+/// made again when the list changes.
 pub(crate) fn environment(name: &str, requirements: &Path) -> Result<PathBuf, Trouble> {
     let list = fs::read_to_string(requirements)?;
     let dir = target().join("venv").join(name);

@@ -1,9 +1,9 @@
-//! Campaigns: our numbers beside the published ones, into book/results/reproduction.md.
+//! Runs the campaigns: they compare our numbers with the published ones and write book/results/reproduction.md.
 
 use crate::machine::root;
 use crate::steps::{self, Trouble, cargo};
 
-/// Builds the campaigns and runs those that are named; `args` go to them.
+/// Builds the campaigns and runs those that `args` names.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let go = || -> Result<(), Trouble> {
         std::env::set_current_dir(root())?;

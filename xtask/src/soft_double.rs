@@ -1,5 +1,6 @@
-//! On a core without a double-precision unit, a double costs some sixty instructions a sum. The disassembly tells which
-//! functions of a picture's way compute with one: none in a loop over pixels or points.
+//! Checks that no loop over pixels or points computes in double precision. On a core without a double-precision unit, a
+//! sum of two doubles costs about sixty instructions. The disassembly shows which of the functions that process a
+//! picture use doubles.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,7 +9,7 @@ use std::process::Command;
 use crate::machine::output;
 use crate::steps::{Outcome, Trouble};
 
-/// Modules that a picture goes through.
+/// Modules that process a picture.
 const STAGES: [&str; 11] = [
     "geometry::block",
     "geometry::camera::Camera",
@@ -22,8 +23,8 @@ const STAGES: [&str; 11] = [
     "stages::rays",
     "stages::threshold",
 ];
-/// Functions that turn values of the configuration to single precision, once a picture or a candidate; with how many
-/// places where they do.
+/// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
+/// the number of places that may do so.
 const ONCE: [(&str, usize); 15] = [
     ("hzn_core::pipeline::search::Search<T,O>::candidate::{{closure}}", 34),
     ("hzn_core::pipeline::search::Search<T,O>::piece", 36),
@@ -41,10 +42,10 @@ const ONCE: [(&str, usize); 15] = [
     ("hzn_core::stages::threshold::Histogram::otsu", 3),
     ("hzn_core::stages::threshold::fixed_level", 4),
 ];
-/// Loops that must be found, or the check would say nothing.
+/// Loops that must be found in the image; without them the check would prove nothing.
 const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::pass"];
 
-/// Looks into an image for a core with single precision only.
+/// Checks an image for a core that has single precision only.
 pub(crate) fn look_into(image: &Path) -> Outcome {
     let text = output(Command::new("arm-none-eabi-objdump").args(["-d", "-C", "--no-show-raw-insn"]).arg(image))
         .ok_or_else(|| Trouble::Failed(format!("{} cannot be disassembled", image.display())))?;
@@ -70,7 +71,7 @@ pub(crate) fn look_into(image: &Path) -> Outcome {
     Ok(())
 }
 
-/// Every function, and in how many places it calls the double-precision routines.
+/// Returns every function with the number of its calls to double-precision routines.
 fn calls_by_function(disassembly: &str) -> BTreeMap<String, usize> {
     let mut calls = BTreeMap::new();
     let mut function = None;
@@ -87,7 +88,8 @@ fn calls_by_function(disassembly: &str) -> BTreeMap<String, usize> {
     calls
 }
 
-/// Routines of the run-time ABI with a double in their name: `__aeabi_dadd`, `__aeabi_f2d`, `__aeabi_cdcmple`.
+/// Returns whether this is a routine of the run-time ABI with a double in its name, for example `__aeabi_dadd`,
+/// `__aeabi_f2d` or `__aeabi_cdcmple`.
 fn is_double(target: &str) -> bool {
     target.strip_prefix("__aeabi_").is_some_and(|n| n.starts_with('d') || n.starts_with("cd") || n.ends_with("2d"))
 }

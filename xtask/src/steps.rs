@@ -1,15 +1,15 @@
-//! Steps with a name and a time, and a summary that leaves nothing out.
+//! Runs named steps, measures their time and prints a complete summary.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// How a step ended, other than well.
+/// Reason why a step did not succeed.
 pub(crate) enum Trouble {
-    /// It ran and something is wrong.
+    /// The step ran, and something is wrong.
     Failed(String),
-    /// It cannot run here; what would make it run.
+    /// The step cannot run here; the text says what it needs.
     Missing(String),
 }
 
@@ -23,9 +23,9 @@ pub(crate) type Outcome = Result<(), Trouble>;
 
 /// Runs steps and remembers how they ended.
 pub(crate) struct Steps {
-    /// Only steps whose name contains one of these; all when empty.
+    /// Words that select steps: a step runs if its name contains one of them. If the list is empty, all steps run.
     only: Vec<String>,
-    /// Nothing may be left out.
+    /// Whether a step that cannot run counts as a failure.
     strict: bool,
     began: Instant,
     done: Vec<(String, Duration, Outcome)>,
@@ -45,7 +45,7 @@ impl Steps {
         }
     }
 
-    /// Runs one step, unless it was not asked for.
+    /// Runs one step if it is selected.
     pub(crate) fn step(&mut self, name: &str, run: impl FnOnce(&mut Self) -> Outcome) {
         if !self.only.is_empty() && !self.only.iter().any(|word| name.contains(word.as_str())) {
             return;
@@ -88,7 +88,8 @@ impl Steps {
         }
     }
 
-    /// Prints what ran and what did not; an error when anything failed.
+    /// Prints which steps ran and which did not. Returns an error if a step failed, or if a step was left out with
+    /// `CI=true`.
     pub(crate) fn conclude(self) -> Result<(), String> {
         let mut wrong = 0;
         println!("\nsummary, {:.0} s in all", self.began.elapsed().as_secs_f64());
@@ -117,7 +118,7 @@ impl Steps {
     }
 }
 
-/// The numbers of a line such as `test result: ok. 12 passed; 0 failed; ...`.
+/// Returns the numbers of passed and failed tests in a line like `test result: ok. 12 passed; 0 failed; ...`.
 fn counts(line: &str) -> Option<(u64, u64)> {
     let rest = line.trim_start().strip_prefix("test result: ")?;
     let number = |word: &str| {
@@ -127,14 +128,14 @@ fn counts(line: &str) -> Option<(u64, u64)> {
     Some((number("passed")?, number("failed")?))
 }
 
-/// The cargo that runs this program, with the committed versions and no input.
+/// Returns a call of the cargo that runs this program, with the committed versions and without input.
 pub(crate) fn cargo(args: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(args).arg("--locked").stdin(Stdio::null());
     command
 }
 
-/// Prints a command as one would type it.
+/// Prints a command as a user would type it.
 pub(crate) fn show(command: &Command) {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     let line: Vec<_> = words.map(|w| w.to_string_lossy()).collect();

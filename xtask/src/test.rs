@@ -1,4 +1,4 @@
-//! Everything that must hold, in the order in which it is cheapest to find out.
+//! Runs all checks, the cheapest first.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("lints", |_| {
         steps::run(cargo(&["clippy", "--workspace", "--all-targets"]).args(["--", "-D", "warnings"]))
     });
-    // Video input needs a decoder; its tests pass over it where there is none, which would go unseen.
+    // Video input needs a decoder. Without one, its tests pass without a check, which would go unseen.
     all.step("ffmpeg", |_| if has("ffmpeg") { Ok(()) } else { apt_install(&["ffmpeg"]) });
     all.step("tests", |s| s.cargo_test(&["--workspace"]));
-    // Features add up over a workspace: alone, the core is built as it flies.
+    // A workspace build unites the features of all crates. Alone, the core is built as it flies.
     all.step("tests of hzn-core alone", |s| s.cargo_test(&["--package", "hzn-core"]));
     all.step("feature sets of hzn-core", |_| {
         ["std", "serde", "std,serde", "dlr", "zju", "horace", "erf", "_edges", "dlr,zju,horace,erf"]
@@ -60,23 +60,23 @@ fn run_cargo(args: &[&str]) -> Outcome {
     steps::run(&mut cargo(args))
 }
 
-/// Binaries and examples come out of the build of the tests. The same command again builds nothing a second time, as
-/// another selection of packages, with other features, would.
+/// Builds the tests, and with them the binaries and examples. Every step uses this same command, so nothing is built
+/// twice. Another selection of packages would have other features and would build again.
 pub(crate) fn built_with_the_tests() -> Outcome {
     run_cargo(&["test", "--workspace", "--no-run", "--quiet"])?;
     if target().join("debug/hzn").exists() {
         return Ok(());
     }
-    // Only a package's own tests bring its binary along.
+    // This build makes a binary only if the tests of its own package are built.
     run_cargo(&["build", "--profile", "test", "--workspace", "--bins"])
 }
 
-/// Where the demo's files go.
+/// Returns the folder for the demo's files.
 pub(crate) fn demo_dir() -> PathBuf {
     target().join("xtask").join("hzn-demo")
 }
 
-/// `hzn demo`, by the binary that the tests have built.
+/// Runs `hzn demo` with the binary that the test build has made.
 fn demo() -> Outcome {
     built_with_the_tests()?;
     let dir = demo_dir();
@@ -91,17 +91,17 @@ fn demo() -> Outcome {
     Ok(())
 }
 
-/// The lens models beside OpenCV's.
+/// Compares the lens models with those of OpenCV.
 fn lenses_beside_opencv() -> Outcome {
     compared_in_python("check_lenses.py", "debug/examples/rays", "lenses")
 }
 
-/// A simulated picture beside what NumPy and OpenCV make of the documented model.
+/// Compares a simulated picture with one that NumPy and OpenCV compute from the documented model.
 fn simulator_rendered_again() -> Outcome {
     compared_in_python("check_simulator.py", "debug/hzn", "simulator")
 }
 
-/// A script of tests/python that is given one of our programs and a folder to make.
+/// Runs a script of tests/python. Its arguments are one of our programs and a folder that the script makes.
 fn compared_in_python(script: &str, program: &str, folder: &str) -> Outcome {
     let python = python::environment("benches", Path::new("benches/requirements.txt"))?;
     built_with_the_tests()?;
@@ -114,7 +114,7 @@ fn compared_in_python(script: &str, program: &str, folder: &str) -> Outcome {
     steps::run(Command::new(python).arg(script).args([target().join(program), dir]))
 }
 
-/// The reference readers on a sample and on what the demo has written.
+/// Reads a sample and the recordings of the demo with the reference readers.
 fn files_read_by_others() -> Outcome {
     let python = python::environment("tests", Path::new("tests/python/requirements.txt"))?;
     let sample = target().join("xtask").join("sample.mcap");
@@ -126,7 +126,7 @@ fn files_read_by_others() -> Outcome {
     steps::run(Command::new(python).arg("tests/python/check_mcap.py").args(files))
 }
 
-/// The recordings in a folder and those below it.
+/// Returns the recordings in a folder and its subfolders.
 fn recordings(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(dir).into_iter().flatten().flatten() {

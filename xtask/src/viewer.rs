@@ -1,4 +1,4 @@
-//! The viewer's real window, on a display that nobody sees.
+//! Runs the viewer's real window on a virtual display.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -9,7 +9,8 @@ use crate::machine::{apt_install, has, root, target};
 use crate::steps::{Outcome, Trouble, show};
 use crate::test::{built_with_the_tests, demo_dir};
 
-/// A display without a screen, OpenGL without a graphics card, and what a window loads when it starts.
+/// Packages for a display without a screen, for OpenGL without a graphics card, and for the libraries that a window
+/// loads when it starts.
 const PACKAGES: &[&str] = &[
     "xvfb",
     "libgl1",
@@ -22,10 +23,10 @@ const PACKAGES: &[&str] = &[
     "libxkbcommon0",
     "libxkbcommon-x11-0",
 ];
-/// The demo's frame that is shown.
+/// Index of the demo's picture that is shown.
 const FRAME: usize = 33;
 
-/// A display without a screen; it ends when this is dropped.
+/// Display without a screen; its server ends when this value is dropped.
 struct Display {
     server: Child,
     name: String,
@@ -34,7 +35,7 @@ struct Display {
 impl Display {
     fn start() -> Result<Self, Trouble> {
         let mut command = Command::new("Xvfb");
-        // It chooses a free number and tells it.
+        // The server chooses a free display number and prints it.
         command.args(["-displayfd", "1", "-screen", "0", "1600x1000x24", "-nolisten", "tcp"]);
         let mut server = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
         let mut number = String::new();
@@ -53,11 +54,11 @@ impl Drop for Display {
     }
 }
 
-/// Starts the window with arguments and gives what it prints.
+/// Starts the window with arguments and returns what it prints.
 fn window(display: &Display, arguments: &[&str]) -> Result<String, Trouble> {
     let mut command = Command::new(target().join("debug/hzn"));
     command.arg("view").args(arguments).stdin(Stdio::null()).stderr(Stdio::inherit());
-    // Software rendering, so that it is the same on every machine.
+    // With software rendering the picture is the same on every machine.
     command.env("DISPLAY", &display.name).env("LIBGL_ALWAYS_SOFTWARE", "1").env_remove("WAYLAND_DISPLAY");
     show(&command);
     let out = command.output()?;
@@ -67,7 +68,8 @@ fn window(display: &Display, arguments: &[&str]) -> Result<String, Trouble> {
     Ok(String::from_utf8_lossy(&out.stdout).trim().to_owned())
 }
 
-/// The demo's recording in the window: its picture, and what it says, which must be what the file says.
+/// Shows the demo's recording in the window and returns the file of the screenshot. The window prints the result of the
+/// picture, which must be equal to the row in the demo's table.
 fn shot() -> Result<PathBuf, Trouble> {
     if !has("Xvfb") {
         apt_install(PACKAGES)?;
@@ -89,14 +91,15 @@ fn shot() -> Result<PathBuf, Trouble> {
     if said != expected {
         return Err(Trouble::Failed(format!("the file says {expected:?}")));
     }
-    // A window without content is a few kilobytes.
+    // A screenshot of a window without content has only a few kilobytes.
     match fs::metadata(&picture) {
         Ok(file) if file.len() > 60_000 => Ok(picture),
         _ => Err(Trouble::Failed(format!("{} holds no picture of the window", picture.display()))),
     }
 }
 
-/// What the window must say of the frame: picture, body, status, axis, as the table of the same run has them.
+/// Returns what the window must print for the picture: index, file, body, status and axis from the table of the same
+/// run.
 fn expected(table: &str) -> Option<String> {
     let column = |name: &str| table.lines().next()?.split(',').position(|c| c == name);
     let row: Vec<&str> = table.lines().nth(FRAME + 1)?.split(',').collect();
@@ -107,12 +110,12 @@ fn expected(table: &str) -> Option<String> {
     Some(format!("frame {}", cells?.join(" ")))
 }
 
-/// In `cargo xtask test`.
+/// Runs the check as a step of `cargo xtask test`.
 pub(crate) fn test() -> Outcome {
     shot().map(|_| ())
 }
 
-/// `cargo xtask viewer`: the picture in the documents, made anew.
+/// `cargo xtask viewer`: makes the viewer's picture in the documents again.
 pub(crate) fn run() -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
     let told = |t: Trouble| match t {

@@ -1,4 +1,4 @@
-//! The Python package: built, installed, tested as its users have it.
+//! Builds, installs and tests the Python package as its users have it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::steps::{self, Outcome, Trouble};
 
 const CRATE: &str = "crates/hzn-py";
 
-/// Builds the wheel, installs it into an environment of its own, checks stubs, behaviour, notebooks and documents.
+/// Builds the wheel, installs it into a separate environment, and checks stubs, behaviour, notebooks and documents.
 /// `hzn` is the program of the same build.
 pub(crate) fn run_step(hzn: &Path) -> Outcome {
     let folder = Path::new(CRATE);
@@ -26,7 +26,7 @@ pub(crate) fn run_step(hzn: &Path) -> Outcome {
     steps::run(module(&stubs).arg(tests.join("stubtest.txt")))?;
     steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
     steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider"]).arg(tests))?;
-    // The site, with the reference out of the docstrings; its notebooks are executed on the way.
+    // The site takes its reference from the docstrings. Its notebooks are executed during the build.
     let config = fs::canonicalize("mkdocs.yml")?;
     let mut site = module(&["mkdocs", "build", "--strict", "--quiet", "--config-file"]);
     site.env("NO_MKDOCS_2_WARNING", "1");
@@ -42,14 +42,14 @@ pub(crate) fn measure(args: &[String]) -> Outcome {
     steps::run(measure.args(args).current_dir(scratch()?))
 }
 
-/// A folder away from the sources, so that what was installed is what is imported.
+/// Returns a folder away from the sources, so that Python imports the installed package.
 fn scratch() -> Result<PathBuf, Trouble> {
     let scratch = target().join("xtask");
     fs::create_dir_all(&scratch)?;
     Ok(fs::canonicalize(scratch)?)
 }
 
-/// The Python that has the wheel of this profile.
+/// Builds and installs the wheel of this profile, and returns the Python that has it.
 fn installed(profile: &str) -> Result<PathBuf, Trouble> {
     let folder = Path::new(CRATE);
     let python = python::environment("wheel", &folder.join("tests/requirements.txt"))?;

@@ -1,5 +1,5 @@
-//! The comparison of Wang et al. 2022 (figures 5 and 6, table 2): samplers on simulated edge points, by the share of
-//! outliers. `cargo xtask bench ransac` starts it; the tables are Markdown.
+//! Repeats the comparison of Wang et al. 2022 (figures 5 and 6, table 2): samplers on simulated edge points, by the
+//! share of outliers. `cargo xtask bench ransac` starts this program; the tables are Markdown.
 #![forbid(unsafe_code)]
 
 use std::f64::consts::TAU;
@@ -17,14 +17,15 @@ use hzn_core::{Config, HostHorizon, Prior};
 const HELP: &str = "usage: cargo xtask bench ransac [--runs N]
   --runs N     sets of points a cell, 10 or more (default 200; a tenth of them for the Hough transform)";
 
-/// Points of a set, and their errors in pixels (1-sigma, each axis).
+/// Number of points in a set.
 const POINTS: usize = 400;
+/// Error of the points on the limb in pixels (1-sigma, each axis).
 const NOISE_PX: f64 = 0.3;
-/// An answer farther from the truth than this is a failure, degrees.
+/// Largest error of a success, in degrees; an answer farther from the truth is a failure.
 const SUCCESS_DEG: f64 = 2.0;
 const OUTLIERS: [f64; 8] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
 
-/// Repeatable numbers, good enough for scattering points: a linear congruence.
+/// Linear congruential generator. Its numbers are repeatable and good enough to scatter points.
 struct Rng(u64);
 
 impl Rng {
@@ -33,7 +34,7 @@ impl Rng {
         rng.uniform();
         rng
     }
-    /// 0 to 1.
+    /// Returns a number from 0 to 1.
     fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
@@ -43,20 +44,20 @@ impl Rng {
     }
 }
 
-/// A set of points with its truth.
+/// Set of points with its truth.
 struct Set {
     points: Vec<ImagePoint<f64>>,
     axis: UnitVec3<Cam, f64>,
 }
 
-/// One method under comparison.
+/// Method in the comparison; `None` is the Hough transform.
 struct Contender {
     name: &'static str,
     method: Option<consensus::Config>,
 }
 
 fn contenders() -> Vec<Contender> {
-    // 1° of their threshold is 1.6 px with 92 px/rad.
+    // Their threshold of 1° is 1.6 px at 92 px/rad.
     let sampler = |method, max_draws| {
         Some(consensus::Config { method, max_draws, threshold_px: 1.6, ..consensus::Config::default() })
     };
@@ -70,7 +71,7 @@ fn contenders() -> Vec<Contender> {
     ]
 }
 
-/// What came of a method with a share of outliers.
+/// Results of a method at one share of outliers.
 #[derive(Default, Clone)]
 struct Cell {
     runs: u32,
@@ -130,7 +131,7 @@ fn compare(runs: u32) -> Result<(), String> {
                     Some(method) => {
                         let method = consensus::Config { seed, ..*method };
                         let found = edges.reject(&expected, &method);
-                        // Without an answer all draws were made.
+                        // Without an answer, all draws were made.
                         (found.map(|a| a.axis), found.map_or(method.max_draws, |a| a.draws))
                     }
                     None => (hough(&camera, &set.points), 0),
@@ -145,7 +146,7 @@ fn compare(runs: u32) -> Result<(), String> {
 }
 
 impl Set {
-    /// Up to 60° off nadir; the outliers anywhere in the image circle.
+    /// Draws a set with the camera up to 60° off nadir. The outliers lie anywhere in the image circle.
     fn draw(rng: &mut Rng, camera: &Camera<f64>, half_angle_rad: f64, outliers: f64) -> Result<Self, String> {
         let (off, around) = (60f64.to_radians() * rng.uniform(), TAU * rng.uniform());
         let axis = UnitVec3::try_new([off.sin() * around.cos(), off.sin() * around.sin(), off.cos()])
@@ -230,11 +231,12 @@ fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
     }
 }
 
-/// The cone with the most votes, of axes on a grid and half-angles in bins: 2° and 1°, then 0.5° about the best. What
-/// the samplers are compared with, and nothing for a flight computer.
+/// Returns the axis of the cone with the most votes. First, axes lie on a grid of 2° and half-angles in bins of 1°;
+/// then both are refined to 0.5° about the best axis. This method is a reference for the samplers and is not meant for
+/// a flight computer.
 fn hough(camera: &Camera<f64>, points: &[ImagePoint<f64>]) -> Option<UnitVec3<Cam, f64>> {
     let rays: Vec<[f64; 3]> = points.iter().filter_map(|p| camera.unproject(*p)).map(|r| r.xyz()).collect();
-    // Every 2° from the optical axis to 120° off, and around.
+    // Axes are every 2° from the optical axis to 120° off it, and every 2° around it.
     let coarse = (0..=60).flat_map(|ring| {
         let (sin, cos) = (2.0 * f64::from(ring)).to_radians().sin_cos();
         let steps = (180.0 * sin).ceil().max(1.0) as u32;
@@ -252,7 +254,7 @@ fn hough(camera: &Camera<f64>, points: &[ImagePoint<f64>]) -> Option<UnitVec3<Ca
     fine.map(|e| (e, votes(&rays, &e.xyz(), 0.5))).max_by_key(|(_, n)| *n).map(|(e, _)| e)
 }
 
-/// Rays in the fullest bin of the angle to an axis, 20° to 90°.
+/// Returns the number of rays in the fullest bin of the angle to an axis; only angles from 20° to 90° count.
 fn votes(rays: &[[f64; 3]], e: &[f64; 3], bin_deg: f64) -> u32 {
     let mut bins = [0u32; 200];
     for s in rays {
@@ -264,7 +266,7 @@ fn votes(rays: &[[f64; 3]], e: &[f64; 3], bin_deg: f64) -> u32 {
     bins.into_iter().max().unwrap_or(0)
 }
 
-/// Two unit vectors across a unit vector.
+/// Returns two unit vectors that are perpendicular to a unit vector and to each other.
 fn basis(e: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

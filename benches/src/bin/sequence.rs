@@ -1,8 +1,8 @@
-//! `hzn run` on a sequence of PNGs beside nothing but decoding them: the same files, the same decoder, all cores,
-//! taking turns in one run.
+//! Compares `hzn run` on a sequence of PNGs with decoding alone. Both use the same files, the same decoder and all
+//! cores, and take turns in one run.
 //!
-//! `cargo xtask bench run` builds `hzn` and starts this. Each way is a process of its own, so that starting and ending
-//! count too; of its rounds the one with the least wall time is shown, and the least processor time.
+//! `cargo xtask bench run` builds `hzn` and starts this program. Each way is a separate process, so its start and end
+//! count too. The table shows the least wall time and the least processor time of all rounds.
 #![forbid(unsafe_code)]
 
 use std::fmt::Write as _;
@@ -57,7 +57,7 @@ impl Options {
     }
 }
 
-/// Decodes every picture of a folder on all cores, and nothing else.
+/// Decodes every picture of a folder on all cores, and does nothing else.
 fn decode(folder: &Path) -> Result<(), String> {
     let mut source = source::open(&[folder.to_owned()], None, None).map_err(|e| e.to_string())?;
     let mut items = Vec::new();
@@ -82,7 +82,7 @@ fn decode(folder: &Path) -> Result<(), String> {
 /// One way through the sequence with its best times in seconds.
 struct Way {
     name: &'static str,
-    /// At most this many times the time of decoding.
+    /// Goal for the wall time, as a multiple of the time of decoding alone.
     goal: Option<f64>,
     command: Command,
     output: Option<PathBuf>,
@@ -132,7 +132,7 @@ impl Way {
 
     fn measure(&mut self) -> Result<(), String> {
         if let Some(output) = &self.output {
-            // Writing over an old file is another thing than writing a new one.
+            // Overwriting an old file does not cost the same as writing a new one.
             let _ = fs::remove_file(output);
         }
         let before = children_s()?;
@@ -144,17 +144,18 @@ impl Way {
     }
 }
 
-/// Processor time of all children that have ended, seconds: fields 16 and 17 of /proc/self/stat.
+/// Returns the processor time of all children that have ended, in seconds: fields 16 and 17 of /proc/self/stat.
 fn children_s() -> Result<f64, String> {
     const TICKS_A_SECOND: f64 = 100.0;
     let stat = fs::read_to_string("/proc/self/stat").map_err(|e| format!("needs Linux's /proc: {e}"))?;
-    // The program's name, in brackets, may hold blanks.
+    // The program's name, in brackets, may contain spaces.
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).ok_or("/proc/self/stat is too short");
     Ok((ticks(13)? + ticks(14)?) / TICKS_A_SECOND)
 }
 
-/// A rocket flight as a folder: pictures, sensor.toml, frames.csv. Gives the size of the pictures in megabytes.
+/// Writes a rocket flight as a folder with pictures, sensor.toml and frames.csv. Returns the size of the pictures in
+/// megabytes.
 fn render(folder: &Path, frames: usize) -> Result<f64, String> {
     let text = |e: std::io::Error| format!("{}: {e}", folder.display());
     fs::create_dir_all(folder).map_err(text)?;

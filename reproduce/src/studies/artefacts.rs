@@ -1,5 +1,5 @@
-//! Pictures without a limb: how often an artefact is taken for one, and whether limbs next to artefacts are still
-//! found.
+//! Measures how often an artefact is taken for a limb in pictures without a limb, and whether limbs next to artefacts
+//! are still found.
 
 use std::collections::BTreeMap;
 
@@ -11,18 +11,18 @@ use rayon::prelude::*;
 use super::Effort;
 use crate::document::Section;
 
-/// Values of `reject.threshold_px` besides the default.
+/// Values of `reject.threshold_px` in addition to the default, in pixels.
 const THRESHOLDS_PX: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0];
-/// Error of the attitude that is told, 1σ about each axis in degrees.
+/// Error of the prior attitude, 1σ about each axis in degrees.
 const ATTITUDE_DEG: f64 = 5.0;
-/// Pictures of each kind.
+/// Number of pictures of each kind.
 const OF_EACH: usize = 200;
-/// The first seed: no gate was developed on these pictures.
+/// First seed; no gate was developed on these pictures.
 const FIRST_SEED: u64 = 8_000_000;
-/// False answers that are listed one by one.
+/// Number of false answers that are listed one by one.
 const LISTED: usize = 24;
 
-/// A sensor with default settings but for its threshold; `None` is the default.
+/// Returns a sensor with default settings except for its consensus threshold in pixels; `None` is the default.
 fn sensor(trial: &Trial, threshold_px: Option<f64>) -> Config {
     let mut config = Config::new(trial.scene.camera.clone());
     if let Some(px) = threshold_px {
@@ -31,10 +31,10 @@ fn sensor(trial: &Trial, threshold_px: Option<f64>) -> Config {
     config
 }
 
-/// A kind with what came of its limbs, next to artefacts and alone.
+/// Kind of artefact, with the outcomes of limbs next to artefacts and of limbs alone.
 type Beside = (Kind, Vec<Outcome>, Vec<Outcome>);
 
-/// What was told and how the sensor was set.
+/// Consensus threshold of the sensor in pixels, and whether the prior has an attitude.
 #[derive(Clone, Copy, PartialEq)]
 struct Setting {
     threshold_px: Option<f64>,
@@ -55,7 +55,7 @@ impl Setting {
     }
 }
 
-/// A picture through a sensor in several settings.
+/// Runs a picture through a sensor in several settings.
 fn seen(horizon: &mut HostHorizon, trial: &Trial, settings: &[Setting]) -> anyhow::Result<Vec<Outcome>> {
     let picture = trial.render()?;
     let one = |s: &Setting| {
@@ -65,7 +65,7 @@ fn seen(horizon: &mut HostHorizon, trial: &Trial, settings: &[Setting]) -> anyho
     settings.iter().map(one).collect()
 }
 
-/// Something of every trial, over all cores; trials that cannot be drawn are left out.
+/// Calls `of` for every trial on all cores and returns the results. Trials that cannot be drawn are left out.
 fn each<T: Send>(
     trials: Vec<(Kind, u64)>,
     of: impl Fn(&mut HostHorizon, Kind, u64) -> anyhow::Result<Option<T>> + Sync,
@@ -101,7 +101,7 @@ pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
     Ok(s)
 }
 
-/// Pictures without a limb.
+/// Measures pictures without a limb.
 fn skies(s: &mut Section, count: usize) -> anyhow::Result<()> {
     let settings = Setting::all();
     let all = each(seeds(count), |horizon, kind, seed| {
@@ -169,11 +169,11 @@ fn skies(s: &mut Section, count: usize) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Clean limbs next to the same artefacts.
+/// Measures clean limbs next to the same artefacts.
 fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
     let of_each = count.div_ceil(2);
     let settings = [Setting::DEFAULT, Setting { attitude: true, ..Setting::DEFAULT }];
-    // Not every seed has room for both: others are tried.
+    // Some seeds have no room for both limb and artefact, so 50 % more seeds are tried.
     let all = each(seeds(of_each + of_each / 2), |horizon, kind, seed| {
         let Some(trial) = Trial::beside_limb(kind, seed)? else { return Ok(None) };
         let with = seen(horizon, &trial, &settings)?;

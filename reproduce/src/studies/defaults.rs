@@ -1,4 +1,4 @@
-//! Honesty of a sensor that nobody tuned: what a user gets who knows the camera and where it is, and nothing else.
+//! Measures the honesty of a sensor that is not tuned: its user knows the camera and its position, and nothing else.
 
 use anyhow::{Context, anyhow};
 use hzn_calib::noise::{self, Calibration, Points, Sighting};
@@ -14,24 +14,25 @@ use super::Effort;
 use crate::document::Section;
 use crate::fly::{Sensor, deg, evaluate, fly_rendered, two_digits, wrong};
 
-/// Scenes whose numbers are to hold.
+/// Scenes that must meet the goals.
 const SCENES: [&str; 6] = ["rocket-clean", "rocket", "horace", "horace-wide", "leo-infrared", "full-disc"];
-/// A scene whose rolling shutter breaks the model of a still camera.
+/// Scene whose rolling shutter breaks the model of a still camera.
 const SKEWED: &str = "tumble";
-/// Seeds of the flights: none is a scene's own, and none measures the noise model of `hzn simulate`.
+/// Seeds of the flights. No scene has one of them as its own seed, and `hzn simulate` does not measure its noise model
+/// on them.
 const SEEDS: [u64; 3] = [404, 505, 606];
-/// Pictures a flight.
+/// Number of pictures per flight.
 const PICTURES: usize = 24;
 
-/// One flight with its pictures, and what they say of limb height and noise.
+/// Flight with its pictures, and with the limb height and noise that are measured on them.
 pub(super) struct Rendered {
     pub(super) flight: Flight,
     pub(super) pictures: Vec<Picture>,
-    /// With the truth, as `hzn simulate` measures them.
+    /// Limb height and noise measured with the truth, as `hzn simulate` does.
     pub(super) fit: Option<Fit>,
-    /// Without, as `hzn calibrate noise` does; or why not.
+    /// Limb height and noise measured without the truth, as `hzn calibrate noise` does; or the reason why this failed.
     pub(super) calibration: anyhow::Result<Calibration>,
-    /// Whether the sensor is told the rates of rotation.
+    /// Whether the prior has the rates of rotation.
     rates: bool,
 }
 
@@ -43,7 +44,7 @@ impl Rendered {
         Self::from_scenario(&scenario, scene == SKEWED).with_context(|| format!("{scene}, seed {seed}"))
     }
 
-    /// Every picture of a scenario, measured, with the rates of rotation told or not.
+    /// Renders every picture of a scenario and measures it, with or without the rates of rotation in the prior.
     pub(super) fn from_scenario(scenario: &Scenario, rates: bool) -> anyhow::Result<Self> {
         let flight = scenario.flight()?;
         let pictures: Vec<Picture> = flight.frames.par_iter().map(FlightFrame::render).collect::<Result<_, _>>()?;
@@ -54,7 +55,8 @@ impl Rendered {
         Ok(rendered)
     }
 
-    /// What `hzn calibrate noise` makes of the pictures with their positions, and their rates of rotation or not.
+    /// Calibrates as `hzn calibrate noise` does, from the pictures, their positions and, if `rates` is true, their
+    /// rates of rotation.
     fn calibrate(&self, rates: bool) -> anyhow::Result<Calibration> {
         let wide = noise::looks_with(&self.untold()).context("no body with a limb height")?;
         let camera = Camera::try_new(&wide.camera)?;
@@ -75,25 +77,26 @@ impl Rendered {
         Ok(Calibration::new(&wide.body, &sightings)?)
     }
 
-    /// A sensor that is told the rates of rotation where the flight has them told.
+    /// Makes a sensor that gets the rates of rotation if this flight has them.
     fn sensor(&self, name: &str, config: Config) -> Sensor {
         let sensor = Sensor::new(name, config);
         if self.rates { sensor } else { sensor.without_rates() }
     }
 
-    /// What a user has who knows the camera and its mask: every other key is the default.
+    /// Returns the configuration of a user who knows the camera and its mask: every other key is the default.
     pub(super) fn untold(&self) -> Config {
         Config { mask: self.flight.sensor.mask.clone(), ..Config::new(self.flight.sensor.camera.clone()) }
     }
 
-    /// The sensor that `hzn simulate` would write after looking at this flight with its truth.
+    /// Returns the sensor that `hzn simulate` would write after it has measured this flight with its truth.
     fn told(&self) -> Config {
         let mut sensor = self.flight.sensor.clone();
         self.fit.iter().for_each(|fit| fit.apply(&mut sensor));
         sensor
     }
 
-    /// The untold sensor after `hzn calibrate noise`; `None` where it refused or raised the alarm.
+    /// Returns the sensor of [`Self::untold`] after `hzn calibrate noise`; `None` if the calibration refused or raised
+    /// the alarm.
     fn calibrated(&self) -> Option<Config> {
         let calibration = self.calibration.as_ref().ok().filter(|c| c.alarm().is_none())?;
         let mut sensor = self.untold();
@@ -102,14 +105,14 @@ impl Rendered {
     }
 }
 
-/// What came of one way of telling the sensor, over all flights of a scene.
+/// Results for one choice of what the sensor is told, over all flights of a scene.
 pub(super) struct Outcome {
     pub(super) told: &'static str,
     pub(super) cases: Vec<Case>,
 }
 
 impl Outcome {
-    /// Squared errors over covariances of the answers with a limb in view.
+    /// Returns the NEES of the answers with a limb in view.
     fn nees(&self) -> Vec<f64> {
         self.cases.iter().filter(|c| c.limb).filter_map(|c| c.miss?.nees).collect()
     }
@@ -128,8 +131,8 @@ impl Outcome {
         evaluate(&self.cases).errors.map_or(f64::NAN, |e| e.rms_deg)
     }
 
-    /// What does not hold of: at most the share `beyond` beyond 3 sigma, none beyond 5, a mean NEES within limits, no
-    /// false answer.
+    /// Returns the goals that are missed. The goals are at most the share `beyond` of answers beyond 3 sigma, none
+    /// beyond 5 sigma, a mean NEES within the limits `nees`, and no false answer.
     fn fails(&self, nees: [f64; 2], beyond: f64) -> Vec<String> {
         let mut fails = Vec::new();
         let mut say = |fails_so: bool, what: String| fails.extend(fails_so.then_some(what));
@@ -162,23 +165,24 @@ impl Outcome {
 const HEADS: [&str; 10] =
     ["scene", "told", "answered", "false", "RMS", "worst", "NEES", "beyond 3σ", "beyond 5σ", "holds"];
 
-/// The share of answers that may lie beyond 3 sigma.
+/// Largest allowed share of answers beyond 3 sigma.
 const BEYOND: f64 = 0.02;
 /// Limits of the mean NEES with defaults.
 const NEES_UNTOLD: [f64; 2] = [0.4, 3.0];
-/// The same after a calibration.
+/// Limits of the mean NEES after a calibration.
 const NEES_CALIBRATED: [f64; 2] = [0.3, 3.0];
-/// With a wrong lens sigma may be as large as the lens makes it.
+/// Limits of the mean NEES with a wrong focal length. There is no lower limit: sigma may be as large as the error of
+/// the lens makes it.
 const NEES_LENS: [f64; 2] = [0.0, 3.0];
-/// The share of answers that may lie beyond 3 sigma then.
+/// Largest allowed share of answers beyond 3 sigma with a wrong focal length.
 const LENS_BEYOND: f64 = 0.01;
-/// How much larger the RMS with only an altitude may be than with the position.
+/// Largest allowed ratio of the RMS with only an altitude to the RMS with the position.
 const ALTITUDE_COSTS: f64 = 1.3;
 
-/// How much larger the RMS after a calibration may be than with the truth of the same flight.
+/// Largest allowed ratio of the RMS after a calibration on another flight to the RMS with the truth of that flight.
 const CALIBRATION_COSTS: f64 = 1.7;
 
-/// Ways of telling the sensor.
+/// What the sensor is told, one entry per row of a scene.
 const TOLD: [&str; 7] = [
     "camera, position",
     "camera, altitude",
@@ -189,10 +193,10 @@ const TOLD: [&str; 7] = [
     "lens 1 % short ± 1 %",
 ];
 
-/// Focal lengths of the last two as parts of the true one, and the sigmas that are told with them, percent.
+/// Focal lengths for the last two entries as parts of the true one, and their sigmas in percent.
 const LENSES: [(f64, f64); 2] = [(1.003, 0.3), (0.99, 1.0)];
 
-/// A sensor that is told another focal length, and how far it may be off.
+/// Returns a sensor with another focal length and with its sigma in percent.
 fn with_lens(mut config: Config, (part, sigma_percent): (f64, f64)) -> Config {
     config.camera.fx_px *= part;
     config.camera.fy_px *= part;
@@ -200,7 +204,7 @@ fn with_lens(mut config: Config, (part, sigma_percent): (f64, f64)) -> Config {
     config
 }
 
-/// Every way of telling the sensor, over the flights of a scene.
+/// Returns the results for every entry of [`TOLD`], over the flights of a scene.
 fn outcomes(flights: &[Rendered]) -> anyhow::Result<[Outcome; 7]> {
     let mut all = TOLD.map(|told| Outcome { told, cases: Vec::new() });
     for (i, flight) in flights.iter().enumerate() {
@@ -225,11 +229,11 @@ fn outcomes(flights: &[Rendered]) -> anyhow::Result<[Outcome; 7]> {
     Ok(all)
 }
 
-/// Heads of a calibration's row.
+/// Column heads of the calibrations.
 const CALIBRATION: [&str; 8] =
     ["scene, seed", "limb height found", "true", "off", "worst row by latitude", "edge noise", "χ²", "focal length"];
 
-/// One calibration against the truth of its flight.
+/// Returns the row that compares one calibration with the truth of its flight.
 fn calibration_cells(name: String, flight: &Rendered, found: &anyhow::Result<Calibration>) -> Vec<String> {
     let none = || "–".to_owned();
     let c = match found {
@@ -256,7 +260,7 @@ fn calibration_cells(name: String, flight: &Rendered, found: &anyhow::Result<Cal
     ]
 }
 
-/// Limb height at a latitude, as the sensor is told.
+/// Returns the limb height in km at a latitude in degrees, from the sensor's configuration.
 fn limb_height_km(body: &body::Config, deg: f64) -> f64 {
     let rows = &body.limb_height_by_latitude_km;
     let between = rows.windows(2).find_map(|w| match w {

@@ -1,4 +1,4 @@
-//! Braun & Barf 2022, figures 6 to 8 and 19 to 22: by calculation, without pictures.
+//! Calculates figures 6 to 8 and 19 to 22 of Braun & Barf 2022, without pictures.
 
 use hzn_cli::plot::{Chart, Series, Style};
 use hzn_core::camera::{self, Model};
@@ -8,7 +8,7 @@ use hzn_sim::sensitivity::{Design, Sigmas, reference};
 use super::Effort;
 use crate::document::Section;
 
-/// Level pinhole at 200 km, R = 1 px², L = 300 px, limb height 0.
+/// Returns the design of a level pinhole at 200 km: R = 1 px², L = 300 px, limb height 0.
 fn design(width: u16, height: u16, f_px: f64) -> Design {
     Design {
         camera: camera::Config::ideal(Model::Pinhole, width, height, f_px),
@@ -36,7 +36,7 @@ fn sigmas(d: &Design) -> anyhow::Result<Sigmas> {
     d.sigmas()?.ok_or_else(|| anyhow::anyhow!("no limb in view"))
 }
 
-/// Ours, the reference, and by how much they differ.
+/// Returns a cell with our 3-sigma value, the reference and their relative difference.
 fn beside(sigma_deg: f64, reference_3_sigma_deg: f64) -> String {
     let ours = 3.0 * sigma_deg;
     format!("{ours:.4}° / {reference_3_sigma_deg}° ({:+.1} %)", 100.0 * (ours / reference_3_sigma_deg - 1.0))

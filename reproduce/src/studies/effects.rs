@@ -1,4 +1,4 @@
-//! Which effect of a scene moves the limb: the scene with its effects switched off one at a time.
+//! Finds out which effect of a scene moves the limb: the effects are switched off one at a time.
 
 use anyhow::{Context, anyhow};
 use hzn_sim::detector::Tone;
@@ -15,12 +15,12 @@ use super::defaults::{Outcome, Rendered};
 use crate::document::Section;
 use crate::fly::{Sensor, deg, fly_rendered, two_digits};
 
-/// Pictures a variant.
+/// Number of pictures per variant.
 const PICTURES: usize = 24;
-/// Not a seed of another study.
+/// Seed of the flights; it is also the first of `SEEDS` in `defaults`.
 const SEED: u64 = 404;
 
-/// A name, and what it changes.
+/// Name of a variant, and the change that it makes.
 type Variant = (&'static str, fn(&mut Scenario));
 
 const ROCKET: &[Variant] = &[
@@ -162,8 +162,9 @@ fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
     ])
 }
 
-/// Weighted by the pictures' own errors: the mean true height of the edge points, and the mean of these heights by
-/// their shares in the fitted one.
+/// Returns two mean true heights of the edge points in km: their plain mean, and their mean weighted by the share of
+/// each point in the fitted height. The mean over the pictures is weighted by the inverse variance of each picture's
+/// height.
 fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
     let wide = noise::looks_with(&flight.untold()).context("no body with a limb height")?;
     let camera = Camera::try_new(&wide.camera)?;

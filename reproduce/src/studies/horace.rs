@@ -1,4 +1,4 @@
-//! Barf 2014 and Barf et al. 2015: HORACE's own criteria.
+//! Measures with HORACE's own criteria: Barf 2014 and Barf et al. 2015.
 
 use anyhow::{Context, anyhow};
 use hzn_core::Preset;
@@ -15,8 +15,8 @@ use super::{Effort, halton, preset, simulated};
 use crate::document::Section;
 use crate::fly::{Sensor, deg, evaluate, fly, two_digits, wrong};
 
-/// `count` pictures of a spinning rocket without rate control: azimuth and roll anywhere, the optical axis from 40°
-/// above the horizontal to 70° below, so that a part of them shows no limb.
+/// Returns `count` pictures of a spinning rocket without rate control. Azimuth and roll are arbitrary. The optical axis
+/// points from 40° above the horizontal to 70° below, so some of the pictures show no limb.
 fn pictures(count: usize) -> Flight {
     let mut flight = rocket(640, 480, 1, 31);
     let camera = camera::Config::ideal(Model::Pinhole, 640, 480, 560.0);
@@ -98,13 +98,13 @@ fn percent(x: f64) -> String {
     format!("{:.1} %", 100.0 * x)
 }
 
-/// A flight of HORACE's camera: turns a second, and whether the Sun is low enough to come into view.
+/// Flight of HORACE's camera: its turns per second, and whether the Sun is low enough to come into view.
 struct Turning {
     spin_hz: f64,
     low_sun: bool,
 }
 
-/// From the undisturbed to the most disturbed; the second is the scene as it is.
+/// Flights from the undisturbed to the most disturbed one; the second is the unchanged scene.
 const TURNING: [Turning; 4] = [
     Turning { spin_hz: 0.2, low_sun: false },
     Turning { spin_hz: 1.0, low_sun: false },
@@ -128,14 +128,14 @@ impl Turning {
     }
 }
 
-/// A sensor that is told the camera, the position and nothing else.
+/// Returns a sensor that knows the camera with its mask, the position, and nothing else.
 fn untold(flight: &Flight) -> Config {
     let own = Config::preset(Preset::Hzn, flight.sensor.camera.clone());
     let body = body::Config { altitude_sigma_km: flight.sensor.body.altitude_sigma_km, ..own.body };
     Config { body, mask: flight.sensor.mask.clone(), ..own }
 }
 
-/// The scene `horace` and its requirements: P-S-04, P-S-09, P-S-10.
+/// Measures the scene `horace` against its requirements: P-S-04, P-S-09, P-S-10.
 fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
     let count = effort.frames(60);
     let (scene, told) = simulated("horace", count)?;
@@ -182,7 +182,7 @@ fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
         ["turns", "sensor", "answered", "right", "false negatives", "false", "median", "RMS", "worst", "NEES"],
         rows,
     );
-    // Of each sensor the share of right answers in a flight, by its number in `TURNING`.
+    // Share of a sensor's right answers in a flight; `flight` is the flight's number in `TURNING`.
     let share = |name: &str, flight: usize| right.iter().filter(|r| r.0 == name).nth(flight).map_or(f64::NAN, |r| r.1);
     let requirement = |text: &str, value: &dyn Fn(&str) -> f64| {
         let cells = ["hzn", "hzn, told", "horace-2015"].map(|name| percent(value(name)));

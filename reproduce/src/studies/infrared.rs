@@ -1,4 +1,4 @@
-//! Wang, Wang & Jin 2022, figures 5 to 8, and the infrared flight in low orbit.
+//! Measures figures 5 to 8 of Wang, Wang & Jin 2022, and the infrared flight in low orbit.
 
 use hzn_cli::plot::{Chart, Series, Style};
 use hzn_core::Preset;
@@ -13,22 +13,24 @@ use super::{Effort, OTHER_SEEDS, halton, preset, simulated};
 use crate::document::Section;
 use crate::fly::{GROSS_DEG, HEADS, Sensor, cells, deg, evaluate, fly, two_digits};
 
-/// Half-level of the radiance by latitude: 25 km ± 4.5 km.
+/// Height of the half-level of the radiance, as rows of latitude in degrees and height in km: 25 km ± 4.5 km.
 const LIMB_KM: [[f64; 2]; 3] = [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
-/// What the sensor is told of it: the spread of the table over latitudes.
+/// Sigma of the limb height in km for a sensor with one height for all latitudes: the spread of the table over
+/// latitudes.
 const LIMB_SIGMA_KM: f64 = 2.6;
-/// What is left of it for who is told the table.
+/// Sigma of the limb height in km for a sensor that knows the table.
 const LEFT_KM: f64 = 0.2;
-/// What blur and noise cut off at black shift every edge point by, pixels: 30 km of limb to each. `hzn simulate`
-/// measures it.
+/// Common shift of all edge points in pixels, caused by blur and by noise that is cut off at black. A pixel is 30 km of
+/// limb height. `hzn simulate` measures the shift.
 const BIAS_PX: f64 = 0.05;
 const ATTITUDE_SIGMA_DEG: f64 = 5.0;
 
 const SCENE: &str = "384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb \
                      half-level 25 km ± 4.5 km over latitude with a scale of 5 km, blur 1 px, noise 2 %, 16 bits";
 
-/// `hzn` told one height for all latitudes, with an attitude, and told the height by latitude too: rows of latitude
-/// and height, and what is left to a sigma then.
+/// Returns `hzn` with one limb height for all latitudes, the same with an attitude, the same with an attitude and the
+/// height by latitude, and `zju-2022`. `by_latitude_km` has rows of latitude in degrees and height in km; `left_km` is
+/// the remaining sigma of the height.
 fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], left_km: f64) -> Vec<Sensor> {
     let one = body::Config {
         limb_height_sigma_km: LIMB_SIGMA_KM,
@@ -50,7 +52,7 @@ fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], left_km: f64) -> Vec<Se
     ]
 }
 
-/// `count` pictures this far off nadir, evenly over the globe, over azimuth and roll.
+/// Returns `count` pictures at this angle off nadir, spread evenly over the globe, azimuth and roll.
 fn at(off_nadir_deg: f64, count: usize) -> Flight {
     let mut flight = leo_infrared(2, 1).with_limb_height_by_latitude_km(&LIMB_KM);
     let Some(pattern) = flight.frames.first().cloned() else { return flight };
@@ -123,7 +125,8 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     Ok(s)
 }
 
-/// RMS of the errors up to [`GROSS_DEG`], what was not answered, what is above, NEES of the former; and the RMS itself.
+/// Returns a cell and the RMS of the errors up to [`GROSS_DEG`]. The cell has this RMS, the pictures without an answer
+/// by their status, the number of larger errors, and the NEES of the errors up to the limit.
 fn beside_gross(cases: &[Case]) -> (String, f64) {
     let gross = |c: &Case| c.miss.is_some_and(|m| m.angle_deg > GROSS_DEG);
     let (bad, good): (Vec<&Case>, Vec<&Case>) = cases.iter().partition(|c| gross(c));

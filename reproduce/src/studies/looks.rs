@@ -1,5 +1,5 @@
-//! What a picture was refused for in the search alone: discs under an image circle, levels that follow the clouds, and
-//! photographs at many settings.
+//! Measures pictures that can be refused because of the search alone: discs under an image circle, thresholds that
+//! follow the clouds, and photographs at many settings.
 
 use std::path::Path;
 
@@ -17,11 +17,12 @@ use super::Effort;
 use crate::document::Section;
 use crate::fly::{HEADS, Sensor, cells, evaluate, fly, wrong};
 
-/// Levels, as parts of the way from the sky to the disc, and discs under each circle.
+/// Number of brightness thresholds between the sky and the disc.
 const LEVELS: u32 = 20;
+/// Number of discs under each image circle.
 const DISCS: usize = 20;
 
-/// 10 000 combinations of level, image circle and pose.
+/// Measures 10 000 combinations of threshold, image circle and pose.
 pub(super) fn lost_discs(effort: &Effort) -> anyhow::Result<Section> {
     let circles = effort.frames(25) as u32;
     let outcomes: Vec<Vec<(bool, bool)>> =
@@ -50,7 +51,7 @@ pub(super) fn lost_discs(effort: &Effort) -> anyhow::Result<Section> {
     Ok(s)
 }
 
-/// Of each disc at each level: whether its whole outline is in view, and whether it was found.
+/// Returns for each disc at each threshold whether its whole outline is in view, and whether the disc was found.
 fn under_a_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
     let under = UnderCircle::new(number, DISCS);
     let mut out = Vec::new();
@@ -82,7 +83,7 @@ fn under_a_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
     Ok(out)
 }
 
-/// Scenes with one look and with several.
+/// Compares one look with several looks on scenes.
 pub(super) fn second_look(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(60);
     let mut s = Section::default();
@@ -116,15 +117,16 @@ pub(super) fn second_look(effort: &Effort) -> anyhow::Result<Section> {
     Ok(s)
 }
 
-/// Eight levels and five thresholds.
+/// Eight brightness thresholds, as parts of full scale.
 const EIGHT: [f64; 8] = [0.05, 0.08, 0.12, 0.16, 0.2, 0.3, 0.4, 0.5];
+/// Five consensus thresholds in pixels.
 const FIVE: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 5.0];
-/// Focal lengths of lenses that the aurora picture may have been taken with, millimetres, on a sensor 36 mm wide.
+/// Possible focal lengths of the lens of the aurora picture in millimetres, on a sensor 36 mm wide.
 const LENSES_MM: [f64; 4] = [24.0, 28.0, 35.0, 50.0];
-/// Direction to the Earth in iss030e102170-night.jpg, from its stars.
+/// Direction to the Earth in iss030e102170-night.jpg (unit vector in the camera frame), from its stars.
 const NIGHT: [f64; 3] = [0.022320, 0.942248, 0.334170];
 
-/// Photographs at many levels and thresholds.
+/// Measures photographs at many brightness thresholds and consensus thresholds.
 pub(super) fn real_pictures(_: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(
@@ -176,7 +178,7 @@ pub(super) fn real_pictures(_: &Effort) -> anyhow::Result<Section> {
     Ok(s)
 }
 
-/// A dark frame of one pixel, and haze: the axis must not hang on the level.
+/// Measures a photograph with a dark frame of one pixel and with haze: the axis must not depend on the threshold.
 fn opssat(s: &mut Section) -> anyhow::Result<()> {
     let photograph = Photograph::load("opssat-2020-08-16.png")?;
     let mut found: Vec<Found> = Vec::new();
@@ -227,7 +229,7 @@ impl Photograph {
         Ok(Self { sensor, rgb: image::open(&path).with_context(|| path.display().to_string())?.into_rgb8() })
     }
 
-    /// The answer at a fixed level and a threshold.
+    /// Returns the answer at a fixed brightness threshold (part of full scale) and a consensus threshold in pixels.
     fn at(&self, level: f64, threshold_px: f64) -> anyhow::Result<Option<Found>> {
         let mut config = self.sensor.clone();
         config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };

@@ -1,4 +1,4 @@
-//! The studies, in the order of the document.
+//! Lists the studies in the order of the document.
 
 mod artefacts;
 mod defaults;
@@ -19,36 +19,36 @@ use hzn_sim::{Flight, Scenario};
 
 use crate::document::{Document, Section};
 
-/// What the figures of sensors are worth that were told what [`simulated`] measures.
+/// Note on the results of sensors whose limb height and noise come from [`simulated`].
 const OTHER_SEEDS: &str = "**In-sample for the scene, out of sample for the pictures**: what is told was measured on \
                            other seeds of the same scene, with other clouds and noise, the same air and detector.";
 
-/// How much is done.
+/// Size of a campaign.
 pub(crate) struct Effort {
-    /// Frames a scene, instead of the study's own number.
+    /// Frames per scene instead of the study's own number.
     pub(crate) frames: Option<usize>,
 }
 
 impl Effort {
-    /// Frames a scene, where the study itself takes `own`.
+    /// Returns the number of frames per scene; `own` is the study's own number.
     pub(crate) fn frames(&self, own: usize) -> usize {
         self.frames.unwrap_or(own)
     }
 }
 
-/// One heading of the document.
+/// Study with its section of a document.
 pub(crate) struct Study {
-    /// On the command line and in marks.
+    /// Name on the command line and in marks.
     pub(crate) name: &'static str,
-    /// The heading.
+    /// Heading of the section.
     pub(crate) title: &'static str,
-    /// Where its section stands.
+    /// Document that contains the section.
     pub(crate) document: Document,
-    /// Measures.
+    /// Function that measures.
     pub(crate) run: fn(&Effort) -> anyhow::Result<Section>,
 }
 
-/// All of them.
+/// All studies.
 pub(crate) const ALL: &[Study] = &[
     reproduced("sensitivity", "Covariance by design: [BB] figures 19 to 22", design::sensitivity),
     reproduced("visibility", "Which conic is seen: [BB] figures 6 and 7", design::visibility),
@@ -71,7 +71,7 @@ const fn reproduced(name: &'static str, title: &'static str, run: fn(&Effort) ->
     Study { name, title, document: Document::Reproduction, run }
 }
 
-/// The radical inverse: points that fill 0…1 evenly, the same in every run.
+/// Returns the radical inverse. Its points fill 0…1 evenly and are the same in every run.
 fn halton(mut index: usize, base: usize) -> f64 {
     let (mut out, mut part) = (0.0, 1.0);
     while index > 0 {
@@ -82,12 +82,12 @@ fn halton(mut index: usize, base: usize) -> f64 {
     out
 }
 
-/// A published system on a flight: its own methods; the camera, mask and body that `hzn` is told too, and the edge
-/// noise where it is told.
+/// Returns the configuration of a published system for a flight. The system has its own methods, but the camera, mask
+/// and body of `hzn`. It also has the edge noise of `hzn`, if that is given.
 fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
     let own = Config::preset(preset, flight.sensor.camera.clone());
     let covariance::Config { noise, sigma_px, correlation_px, .. } = flight.sensor.covariance;
-    // Where the pictures' residuals tell the noise, nothing is told that a published system could use.
+    // If the noise comes from the residuals of the pictures, there is no given noise for a published system.
     let covariance = match noise {
         covariance::Noise::Told => covariance::Config { sigma_px, correlation_px, ..own.covariance },
         _ => own.covariance,
@@ -95,8 +95,8 @@ fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
     Config { body, mask: flight.sensor.mask.clone(), covariance, ..own }
 }
 
-/// A scene as `hzn simulate` makes it, JPEG where it is kept as such, with the sensor.toml that comes with it: limb
-/// height and noise measured on other seeds. What was measured, in a cell's words.
+/// Returns a scene as `hzn simulate` makes it, with JPEG if the scene is stored as JPEG, and the measured values as
+/// text for a cell. The sensor has the limb height and the noise that were measured on other seeds.
 fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
     let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
     scenario.capture.frames = u32::try_from(count)?;

@@ -1,4 +1,4 @@
-//! The presets on the same pictures.
+//! Compares the presets on the same pictures.
 
 use anyhow::anyhow;
 use hzn_core::HostHorizon;
@@ -12,10 +12,10 @@ use super::{Effort, OTHER_SEEDS, simulated};
 use crate::document::Section;
 use crate::fly::{Flown, GROSS_DEG, Sensor, deg, evaluate, fly_timed, two_digits};
 
-/// Pictures from which the fixed threshold is set.
+/// Number of pictures from which the fixed threshold is set.
 const LOOKED_AT: usize = 9;
 
-/// The four that are compared.
+/// The four presets that are compared.
 const PRESETS: [Preset; 4] = [Preset::Hzn, Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015];
 
 pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
@@ -43,7 +43,7 @@ pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
     Ok(s)
 }
 
-/// The scenes, each with the sensor that fits it.
+/// Returns the scenes, each with the sensor that fits it.
 fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     let [rocket, clean, horace, disc] =
         ["rocket", "rocket-clean", "horace-wide", "full-disc"].map(|name| anyhow::Ok(simulated(name, count)?.0));
@@ -66,7 +66,7 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     ])
 }
 
-/// A preset that is told what the scene's own sensor is told.
+/// Returns a preset that knows as much as the scene's own sensor.
 fn sensor(preset: Preset, flight: &Flight, level: f64) -> Sensor {
     let mut config = super::preset(preset, flight, flight.sensor.body.clone());
     match preset {
@@ -77,7 +77,8 @@ fn sensor(preset: Preset, flight: &Flight, level: f64) -> Sensor {
     Sensor::new(&format!("`{}`", preset.name()), config)
 }
 
-/// The level that `otsu` usually finds, or the one that the scene's sensor has: a fraction of full scale.
+/// Returns the threshold that `otsu` usually finds (the median), or for the Sun the threshold of the scene's sensor, as
+/// a fraction of full scale.
 fn usual_level(flight: &Flight) -> anyhow::Result<f64> {
     if flight.sensor.body.kind == Kind::Sun {
         return Ok(flight.sensor.binarize.level);

@@ -1,4 +1,4 @@
-//! The scenes of `hzn simulate`: accuracy and honesty as a user finds them with simulate, run and evaluate.
+//! Measures accuracy and honesty on the scenes of `hzn simulate`, as a user finds them with simulate, run and evaluate.
 
 use hzn_core::Preset;
 use hzn_sim::Flight;
@@ -9,7 +9,7 @@ use super::{Effort, OTHER_SEEDS, preset, simulated};
 use crate::document::Section;
 use crate::fly::{HEADS, Sensor, cells, evaluate, fly, wrong};
 
-/// Flies scenes through sensors: a row each, for each body where there are several.
+/// Runs scenes through sensors and adds a table with one row per scene, sensor and body.
 fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight) -> Vec<Sensor>) -> anyhow::Result<()> {
     let (mut rows, mut told, mut bad) = (Vec::new(), Vec::new(), Vec::new());
     for &name in names {
