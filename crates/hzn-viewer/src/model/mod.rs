@@ -1,4 +1,5 @@
-//! What the viewer knows and does, without a window: everything here is plain Rust and tested as such.
+//! The state and the decisions of the viewer, without a window. Everything here is plain Rust and is tested without a
+//! window.
 
 pub mod knob;
 pub mod mask;
