@@ -366,7 +366,7 @@ impl Report {
         parameters::to_python(py, &self.row)
     }
 
-    /// Pickle the report without its picture.
+    /// Pickles the report without its picture.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Reduced> {
         let (py, this) = (slf.py(), slf.get());
         let pickled = Pickled {
@@ -395,7 +395,7 @@ impl Report {
             ..Self::of_row(pickled.row)
         })
     }
-    /// Return the report itself, because it never changes.
+    /// Returns the report itself, because it never changes.
     fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
         slf
     }
@@ -416,7 +416,7 @@ impl Report {
         }
     }
 
-    /// Show the numbers in a notebook, next to the picture with all annotations.
+    /// Shows the numbers in a notebook, next to the picture with all annotations.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
         let mut html = String::from("<div style=\"display:flex;gap:1em;align-items:start\">");
         if let Some(image) = self.image.as_ref().and_then(|w| w.bind(py).upgrade()) {
