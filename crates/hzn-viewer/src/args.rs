@@ -36,7 +36,7 @@ pub struct Args {
     /// Compute with single precision and 2048 points, as on the flight computer
     #[arg(long)]
     pub flight: bool,
-    /// The picture to begin with, from 0
+    /// Index of the first picture to show, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: usize,
     /// Save a screenshot of the window, print status and axis of the shown picture, and exit

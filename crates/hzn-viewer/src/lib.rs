@@ -1,6 +1,6 @@
 //! The viewer: it shows what the sensor found in each picture, and its parameters can be tuned live.
 //!
-//! [`model`] holds the state and all decisions, without a window. [`work`] runs on its own threads. [`ui`] draws.
+//! [`model`] holds the state and all decisions, without a window. [`work`] runs on separate threads. [`ui`] draws.
 
 pub mod args;
 pub mod measure;

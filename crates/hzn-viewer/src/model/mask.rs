@@ -34,8 +34,8 @@ pub fn inside(polygon: &[Point], [x, y]: Point) -> bool {
 }
 
 impl MaskEdit {
-    /// Adds a corner at `p`. A click within `reach` of the first corner closes the polygon instead; so does the last
-    /// corner that fits. Returns all polygons if a polygon was closed.
+    /// Adds a corner at `p`. A click within `reach` of the first corner closes the polygon instead. The corner number
+    /// [`MAX_CORNERS`] closes the polygon, too. Returns all polygons if a polygon was closed.
     pub fn click(&mut self, polygons: &Polygons, p: Point, reach: f64) -> Option<Polygons> {
         if self.open.len() >= 3 && self.open.first().is_some_and(|first| apart(*first, p) <= reach) {
             return self.close(polygons);

@@ -1,5 +1,4 @@
-//! The state and the decisions of the viewer, without a window. Everything here is plain Rust and is tested without a
-//! window.
+//! The state and the decisions of the viewer. Everything here is plain Rust and works without a window, also in tests.
 
 pub mod knob;
 pub mod mask;

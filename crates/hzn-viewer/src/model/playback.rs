@@ -90,7 +90,7 @@ impl Playback {
         if self.spent_s < lasts {
             return false;
         }
-        // The next picture inherits at most the duration of one picture.
+        // At most the duration of one picture is carried over to the next one.
         let rest = (self.spent_s - lasts).min(lasts);
         if self.frame + 1 >= count {
             self.playing = false;

@@ -7,7 +7,7 @@ use hzn_run::source::{self, Payload, Source};
 
 use crate::model::Place;
 
-/// Reads pictures that are not decoded yet.
+/// Reader of pictures that are not decoded yet.
 #[derive(Default)]
 pub(super) struct Reader {
     /// Files and folders that were opened; a video is reopened from these.

@@ -16,7 +16,7 @@ const KEEP_BYTES: usize = 192 << 20;
 /// A decoded picture, or the reason why there is none.
 pub type Decoded = Result<Arc<Picture>, String>;
 
-/// Reads pictures and keeps those that were used last.
+/// Cache that reads pictures and keeps those that were used last.
 #[derive(Default)]
 pub struct Store {
     reader: Reader,

@@ -9,7 +9,7 @@ use hzn_run::source::{Item, Source, TimeSource};
 use super::reader::Reader;
 use crate::model::{Entry, Sequence};
 
-/// Goes through a sequence from its first picture.
+/// Iterator over the pictures of a sequence, from the first one.
 pub(super) struct Walk {
     entries: std::vec::IntoIter<Entry>,
     reader: Reader,
