@@ -69,8 +69,8 @@ impl ResultHistory {
         (1..=n).map(at).find(|&i| self.newest(i, body).is_some_and(|r| r.status != Status::Ok))
     }
 
-    /// Returns the pictures, the worst first: refused pictures, then the others in falling order of `badness`. Pictures without
-    /// a `badness` are left out.
+    /// Returns the pictures, the worst first: refused pictures, then the others in falling order of `badness`. Pictures
+    /// without a `badness` are left out.
     pub fn worst(&self, body: usize, badness: impl Fn(&Row) -> Option<f64>) -> Vec<usize> {
         let rate = |i: usize| {
             let row = self.newest(i, body)?;

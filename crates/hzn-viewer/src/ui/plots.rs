@@ -275,7 +275,7 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
     });
     named(&shown.response, RESIDUALS);
     let at = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
-    // This is the nearest point on the screen.
+    // The point that is nearest on the screen is returned.
     let apart = |r: &Residual| {
         let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px].into());
         p.distance_sq(at)
