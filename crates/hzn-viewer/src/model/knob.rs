@@ -15,7 +15,7 @@ pub struct Knob {
 
 impl Knob {
     /// Returns the slider of a value with these limits and the usual magnitude `usual`, or `None` if the value is no
-    /// number. A slider does not reach a limit that is far from the usual value; such a value can be typed.
+    /// number. A slider does not reach a limit that is far from the usual value; values beyond the slider can be typed.
     pub fn from_limits(limits: &Limits, usual: f64) -> Option<Self> {
         let Limits::Number { low, above, high } = *limits else { return None };
         let usual = if usual.abs() > 0.0 { usual.abs() } else { 1.0 };

@@ -114,7 +114,7 @@ mod tests {
     fn frames_last_as_long_as_they_did() {
         let mut p = Playback::default();
         p.toggle(10);
-        // 25 frames a second.
+        // The sequence has 25 pictures per second.
         let frames = (0..100).filter(|_| p.advance(ms(10), 100, |_| Some(0.04))).count();
         assert_eq!(frames, 25);
         p.set_speed(0.5);

@@ -18,7 +18,7 @@ pub struct Entry {
     pub place: Place,
 }
 
-/// Where a picture is.
+/// Place of a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Place {
     /// A picture file.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Number of recent files that are offered.
 const RECENT: usize = 8;
 
-/// How the picture is shown.
+/// Display of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Look {
@@ -96,7 +96,7 @@ impl Layer {
 pub struct Settings {
     /// Dark colours.
     pub dark: bool,
-    /// How the picture is shown.
+    /// Display of the picture.
     pub look: Look,
     /// The picture is shown without the distortion of the lens.
     pub undistorted: bool,

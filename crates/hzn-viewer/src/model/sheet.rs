@@ -42,7 +42,7 @@ impl Sheet {
     /// again.
     ///
     /// # Errors
-    /// The text is not TOML, or the section's name stands for something other than a section.
+    /// The text is not TOML, or the section is not a table.
     pub fn with(&self, key: Key<'_>, value: Option<Value>) -> Result<Self, String> {
         let mut document: DocumentMut = self.0.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
         let no_section = || format!("[{}] is no section", key.section);

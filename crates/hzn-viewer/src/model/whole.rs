@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// programs choose a format by it.
 ///
 /// # Errors
-/// Those of `write`. If the renaming fails, the message says why and what to do.
+/// An error of `write` is returned. If the renaming fails, the message says why and what to do.
 pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
     let part = part(path);
     let written =

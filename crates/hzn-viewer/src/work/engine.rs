@@ -39,7 +39,7 @@ pub struct Ask {
     pub setups: Vec<Setup>,
     /// Single precision and 2048 points, as on the flight computer.
     pub flight: bool,
-    /// How the picture is shown.
+    /// Display of the picture.
     pub look: Look,
     /// The picture is shown without the distortion of the lens.
     pub undistorted: bool,

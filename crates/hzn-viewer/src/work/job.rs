@@ -96,7 +96,7 @@ impl Job {
     pub fn stop(&self) {
         self.progress.stop.store(true, Ordering::Relaxed);
     }
-    /// Returns true if the job was told to stop.
+    /// Returns true if the job was asked to stop.
     pub fn is_stopping(&self) -> bool {
         self.progress.stop.load(Ordering::Relaxed)
     }

@@ -17,7 +17,7 @@ const DARK: Color32 = Color32::from_rgb(24, 30, 46);
 /// All properties that the shown picture depends on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recipe {
-    /// How the picture is shown.
+    /// Display of the picture.
     pub look: Look,
     /// Threshold, for [`Look::Level`].
     pub level: u16,

@@ -95,7 +95,7 @@ impl Sweep {
             }
         }
     }
-    /// Returns true if the sweep was told to stop.
+    /// Returns true if the sweep was asked to stop.
     pub fn is_stopping(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
