@@ -1,5 +1,5 @@
-//! What Python shows as help is written once, in `python/hzn/_hzn.pyi`: this takes the stubs' docstrings apart, one
-//! file each, for the classes and functions to include.
+//! The help texts of Python are written only once, in `python/hzn/_hzn.pyi`. This script extracts the docstrings of the
+//! stubs into one file each, which the classes and functions include.
 
 use std::path::Path;
 use std::{env, fs};

@@ -1,4 +1,6 @@
-"""What Python costs beside the sensor, in one run: `cargo xtask bench python` writes it into book/results/python-measured.md.
+"""Measures what Python costs in addition to the sensor. `cargo xtask bench python` runs it.
+
+It writes book/results/python-measured.md.
 
     measure.py OUTPUT [--frames N]
 """
@@ -21,11 +23,11 @@ from hzn.dask import process_archive
 
 
 SIZES = ((160, 120, 20_000), (640, 480, 10_000), (1920, 1080, 6_000), (4096, 3072, 3_000))
-"""Of pictures in memory, and how many of them."""
+"""Sizes of pictures in memory, and the number of pictures of each size."""
 
 
 def limb(width, height, seed=1):
-    """A bright body with a half-angle of 70 degrees, blurred, with noise, over a sixth of the picture."""
+    """Return a picture and a sensor: a bright body (half-angle 70 degrees, blurred, noise) covers a sixth of it."""
     f = width * 0.9375
     x, y = (np.arange(width) - (width - 1) / 2) / f, (np.arange(height)[:, None] - (height - 1) / 2) / f
     s = np.radians(68.0)
@@ -40,7 +42,7 @@ def limb(width, height, seed=1):
 
 
 def overhead(width, height, calls=400):
-    """Medians of a call from Python, of the Rust call within it, and of their difference, microseconds."""
+    """Return the medians of a call from Python, of the Rust call within it, and of the difference, microseconds."""
     image, sensor = limb(width, height)
     whole, within = [], []
     for _ in range(calls):
@@ -54,7 +56,7 @@ def overhead(width, height, calls=400):
 
 
 def rate(reports, frames):
-    """Frames a second."""
+    """Return the pictures per second."""
     start = time.perf_counter()
     for report in reports:
         assert report.ok
@@ -62,12 +64,12 @@ def rate(reports, frames):
 
 
 def threads():
-    """1, 2, 4 and so on, up to the cores."""
+    """Return 1, 2, 4 and so on, up to the number of cores."""
     return list(itertools.takewhile(lambda n: n <= (os.cpu_count() or 1), (1 << i for i in range(10))))
 
 
 def scaling(width, height, frames):
-    """Frames a second of a loop over `process`, and of `process_many` by threads. Eight pictures in turn."""
+    """Return pictures per second of a loop over `process`, and of `process_many` by threads; eight pictures in turn."""
     pictures = [limb(width, height, seed)[0] for seed in range(8)]
     sensor = limb(width, height)[1]
 
@@ -80,7 +82,7 @@ def scaling(width, height, frames):
 
 
 def scaling_of_files(width, height, frames):
-    """The same from PNG files, which are decoded too."""
+    """Return pictures per second of `process_many` by threads, from PNG files, with decoding."""
     sensor = limb(width, height)[1]
     with tempfile.TemporaryDirectory() as folder:
         kinds = []
@@ -96,7 +98,7 @@ def resident_mb():
 
 
 def memory(frames):
-    """Resident megabytes after a tenth of the frames and after all; each frame is a new array."""
+    """Return the resident megabytes after a tenth of the pictures and after all; each picture is a new array."""
     image, sensor = limb(160, 120)
     after = []
     for count, report in enumerate(sensor.process_many((image.copy() for _ in range(frames)), jobs=2), 1):
@@ -107,7 +109,7 @@ def memory(frames):
 
 
 def archive(frames, workers):
-    """Frames a second of `hzn.dask`, from files on this machine."""
+    """Return pictures per second of `hzn.dask`, from files on this machine."""
     image, sensor = limb(640, 480)
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.pgm"

@@ -27,7 +27,8 @@ impl Camera {
         Ok(Self { config, lens })
     }
 
-    /// What follows from the ray of each of n points; NaN where the lens does not see.
+    /// Returns `then` of the ray of each of n points. A row is NaN outside the field of view of the lens or if `then`
+    /// is `None`.
     fn each_ray<'py, const N: usize>(
         &self,
         py: Python<'py>,
@@ -187,7 +188,7 @@ impl Camera {
     }
 }
 
-/// Anything that NumPy makes an array of shape (n, `columns`) of.
+/// Converts an object to an array of shape (n, `columns`), as NumPy would.
 pub(crate) fn rows<'py>(
     object: &Bound<'py, PyAny>,
     columns: usize,
@@ -204,7 +205,7 @@ pub(crate) fn rows<'py>(
     }
 }
 
-/// N numbers of each row; NaN where there are none.
+/// Returns N numbers for each row, or NaN where `then` returns `None`.
 pub(crate) fn map_rows<const N: usize>(
     rows: ArrayView2<'_, f64>,
     then: impl Fn(&[f64]) -> Option<[f64; N]>,
@@ -220,7 +221,7 @@ pub(crate) fn map_rows<const N: usize>(
     out
 }
 
-/// (n, 6) as (n, 3, 2).
+/// Reshapes (n, 6) to (n, 3, 2).
 pub(crate) fn in_cubes(flat: &Array2<f64>) -> Array3<f64> {
     Array3::from_shape_fn((flat.len_of(Axis(0)), 3, 2), |(i, j, k)| flat[(i, 2 * j + k)])
 }

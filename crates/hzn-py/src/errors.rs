@@ -1,4 +1,4 @@
-//! One exception a family of errors, and the door through which no panic comes.
+//! The exceptions, one for each family of errors, and a wrapper that turns panics into exceptions.
 
 use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,29 +16,29 @@ create_exception!(
 );
 create_exception!(hzn, ImageError, HznError, "An array that is no picture, or not one of this camera.");
 
-/// A wrong configuration.
+/// Returns the exception for an invalid configuration.
 pub(crate) fn config(what: impl std::fmt::Display) -> PyErr {
     ConfigError::new_err(what.to_string())
 }
 
-/// A wrong picture.
+/// Returns the exception for an invalid picture.
 pub(crate) fn image(what: impl std::fmt::Display) -> PyErr {
     ImageError::new_err(what.to_string())
 }
 
-/// Anything else that went wrong, such as a file.
+/// Returns the exception for all other errors, for example of a file.
 pub(crate) fn other(what: impl std::fmt::Display) -> PyErr {
     HznError::new_err(what.to_string())
 }
 
-/// Something that stops nothing but that the user should look at.
+/// Issues a warning: work goes on, but the user should check something.
 pub(crate) fn warn(py: Python<'_>, what: impl std::fmt::Display) -> PyResult<()> {
     let text = CString::new(what.to_string()).unwrap_or_default();
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
-/// Works without holding the interpreter. A panic becomes an exception: whatever `work` held is gone, the process
-/// lives.
+/// Runs `work` without holding the interpreter. A panic becomes an exception: the values that `work` owned are lost,
+/// but the process goes on.
 pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| {
         let what = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
@@ -46,7 +46,7 @@ pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send)
     })
 }
 
-/// For the tests: a panic in the middle of the work.
+/// Panics within [`detached`], for the tests.
 #[pyfunction]
 #[pyo3(name = "_panic")]
 pub(crate) fn panic_within(py: Python<'_>) -> PyResult<()> {

@@ -1,4 +1,4 @@
-//! Arrays as pictures.
+//! NumPy arrays as pictures.
 
 use hzn_core::config::Input;
 use hzn_core::image::{Channel, ImageView, Layout, Pixels};
@@ -18,7 +18,7 @@ pub(crate) enum Array<'py> {
 }
 
 impl<'py> Array<'py> {
-    /// Takes an array of uint8 or uint16, height x width or height x width x 1 to 4.
+    /// Takes an array of uint8 or uint16 with the shape (height, width) or (height, width, 1 to 4).
     pub(crate) fn from_object(object: &Bound<'py, PyAny>) -> PyResult<Self> {
         let Ok(untyped) = object.cast::<PyUntypedArray>() else {
             let name = object.get_type().name().map(|n| n.to_string()).unwrap_or_default();
@@ -52,12 +52,12 @@ impl<'py> Array<'py> {
         }
     }
 
-    /// Width and height in pixels.
+    /// Returns width and height in pixels.
     pub(crate) fn size(&self) -> (usize, usize) {
         (self.shape()[1], self.shape()[0])
     }
 
-    /// The layout of the samples in C order. `bits` are the significant ones of uint16.
+    /// Returns the layout of the samples in C order. `bits` is the number of significant bits of uint16.
     pub(crate) fn layout(&self, bits: Option<u8>) -> PyResult<Layout> {
         let side = |n: usize| u32::try_from(n).map_err(errors::image);
         let (width, height) = self.size();
@@ -72,12 +72,13 @@ impl<'py> Array<'py> {
         Ok(Layout::packed(side(width)?, side(height)?, channels, bits))
     }
 
-    /// The bits of its samples that were given, else those of uint16 that the sensor says.
+    /// Returns the number of significant bits: the given one, or for uint16 the one of the sensor.
     pub(crate) fn bits(&self, given: Option<u8>, input: &Input) -> Option<u8> {
         given.or(input.bits.filter(|_| matches!(self, Self::Words(_))))
     }
 
-    /// What to try where nothing was found and the upper bits of uint16 are unused, of which nobody has told.
+    /// Returns advice for a picture without an answer: the upper bits of uint16 are unused, but no number of bits is
+    /// given.
     pub(crate) fn unused_bits(&self, bits: Option<u8>) -> Option<String> {
         match self {
             Self::Words(a) if bits.is_none() => picture::unused_bits(a.as_array().iter().copied().max()?),
@@ -85,7 +86,7 @@ impl<'py> Array<'py> {
         }
     }
 
-    /// The picture for the pipeline, without a copy.
+    /// Returns the picture for the pipeline, without a copy.
     pub(crate) fn view(&self, bits: Option<u8>, channel: Channel) -> PyResult<View<'_>> {
         let layout = self.layout(bits)?;
         let packed = match self {
@@ -98,7 +99,7 @@ impl<'py> Array<'py> {
         }
     }
 
-    /// A copy, for drawing on.
+    /// Returns a copy of the samples to draw on.
     pub(crate) fn to_samples(&self) -> picture::Samples {
         match self {
             Self::Bytes(a) => picture::Samples::Bytes(a.as_array().iter().copied().collect()),
@@ -107,11 +108,11 @@ impl<'py> Array<'py> {
     }
 }
 
-/// A picture where it stands in Python's memory.
+/// A picture in Python's memory.
 pub(crate) enum View<'a> {
-    /// In C order: as fast as anywhere.
+    /// Samples in C order, which are read fastest.
     Packed(ImageView<'a>),
-    /// In any other order.
+    /// Samples in any other order.
     Strided(Strided<'a>),
 }
 
@@ -120,21 +121,21 @@ enum Samples<'a> {
     Words(ArrayView3<'a, u16>),
 }
 
-/// A picture of any strides, such as part of another, transposed, upside down, or a colour alone. A pixel costs more
-/// than in a packed one, and few are read.
+/// A picture with any strides: part of an array, transposed, upside down, or a single colour. A pixel costs more than
+/// in a packed picture, but few pixels are read.
 pub(crate) struct Strided<'a> {
     samples: Samples<'a>,
     layout: Layout,
-    /// The channels that make up the brightness.
+    /// Channels that the brightness is computed from.
     channels: std::ops::Range<usize>,
 }
 
-/// Index distance between rows: wider than any picture.
+/// Index distance between rows, larger than the width of any picture.
 const DOWN: usize = 1 << 16;
 
 impl<'a> Strided<'a> {
     fn try_new(array: &'a Array<'_>, layout: Layout, channel: Channel) -> PyResult<Self> {
-        // The rules for channels are the packed picture's.
+        // The rules for channels are the same as for a packed picture.
         let pixel = [0u8; 4];
         let one = Layout { bits: 8, ..Layout::packed(1, 1, layout.channels, 8) };
         ImageView::from_bytes(&pixel, one, channel).map_err(errors::image)?;
@@ -193,7 +194,7 @@ impl Pixels for Strided<'_> {
     }
 }
 
-/// A decoded picture as an array: (height, width), or (height, width, channels) where there are several.
+/// Returns a decoded picture as an array: (height, width), or (height, width, channels) with several channels.
 pub(crate) fn to_array(py: Python<'_>, picture: picture::Picture) -> PyResult<Bound<'_, PyAny>> {
     let l = picture.layout;
     let shape = (l.height as usize, l.width as usize, usize::from(l.channels));

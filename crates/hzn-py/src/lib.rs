@@ -1,10 +1,10 @@
-//! The private half of the Python package `hzn`: classes over the sensor that the command line has too.
+//! The private half of the Python package `hzn`: classes that wrap the sensor of the command line.
 //!
-//! Arrays come in without a copy, and the interpreter is free while there is work.
+//! Arrays are read without a copy, and other Python threads can run during the work.
 
 #![allow(clippy::doc_lazy_continuation, reason = "docstrings are NumPy's, not Markdown")]
 
-/// The docstring of a class or function, as the stubs have it.
+/// Includes the docstring of a class or function from the stubs.
 macro_rules! doc {
     ($name:literal) => {
         include_str!(concat!(env!("OUT_DIR"), "/", $name))
@@ -23,7 +23,7 @@ mod sequence;
 mod simulation;
 mod stages;
 
-/// `hzn._hzn`.
+/// The module `hzn._hzn`.
 #[pyo3::pymodule(gil_used = false)]
 mod _hzn {
     #[pymodule_export]

@@ -24,7 +24,7 @@ pub(crate) fn overlay<'py>(
     Ok(Array3::from_shape_vec((height, width, 3), drawn.into_raw()).map_err(errors::image)?.into_pyarray(py))
 }
 
-/// A picture in colour with what the report stands on drawn over it.
+/// Returns the picture in colour with the annotations of the report.
 pub(crate) fn draw(py: Python<'_>, image: &Bound<'_, PyAny>, report: &Report, bits: Option<u8>) -> PyResult<RgbImage> {
     let array = Array::from_object(image)?;
     let picture = Picture::new(array.to_samples(), array.layout(bits)?);

@@ -1,4 +1,4 @@
-//! Sections and keys of a sensor.toml as Python has them.
+//! Conversion between sections and keys of a sensor.toml and Python data.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::camera::Camera;
 use crate::errors;
 
-/// Reads sections, checked as a sensor.toml would be. A `hzn.Camera` stands for its section.
+/// Reads sections and checks them like a sensor.toml. A `hzn.Camera` may replace its section.
 pub(crate) fn config(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
     let sections = sections.copy()?;
     if let Some(camera) = sections.get_item("camera")?.as_ref().and_then(|c| c.cast::<Camera>().ok()) {
@@ -21,13 +21,13 @@ pub(crate) fn config(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
     Ok(hzn_calib::sensor::parse(&text, Path::new("parameters")).map_err(errors::config)?.config)
 }
 
-/// Plain Python data: dicts, lists, numbers, text.
+/// Converts to plain Python data: dicts, lists, numbers, text.
 pub(crate) fn to_python<'py>(py: Python<'py>, data: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(data).map_err(errors::other)?;
     json(py)?.call_method1("loads", (text,))
 }
 
-/// The same the other way, without what is None; NumPy's numbers and arrays are taken too.
+/// Converts Python data to JSON and leaves out None. Numbers and arrays of NumPy are accepted.
 pub(crate) fn from_python(data: &Bound<'_, PyAny>) -> PyResult<Value> {
     let py = data.py();
     let options = PyDict::new(py);
@@ -41,7 +41,7 @@ fn json(py: Python<'_>) -> PyResult<Bound<'_, PyModule>> {
     py.import("json")
 }
 
-/// JSON has null where TOML leaves a key out.
+/// Removes nulls, because TOML leaves a key out where JSON has null.
 fn without_null(value: Value) -> Value {
     match value {
         Value::Object(map) => map

@@ -1,4 +1,4 @@
-//! Recordings: results as columns, frames one after another, and shards of an archive.
+//! Recordings: results as columns, one picture after another, and shards of an archive.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub(crate) fn read_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyD
         } else if name == "index" {
             numpy.call_method1("array", (cells.iter().map(|c| c.as_u64().unwrap_or(0)).collect::<Vec<_>>(), "u8"))?
         } else {
-            // Empty cells are NaN, as pandas and polars expect.
+            // Empty cells become NaN, as pandas and polars expect.
             let numbers: Vec<f64> = cells.iter().map(|c| c.as_f64().unwrap_or(f64::NAN)).collect();
             numpy.call_method1("array", (numbers, "f8"))?
         };
@@ -71,14 +71,14 @@ pub(crate) struct Recording {
 
 struct Open {
     reader: Reader,
-    /// The first record of the next frame.
+    /// First record of the next picture.
     ahead: Option<FrameRecord>,
-    /// It was told what is missing.
+    /// True if the user was warned about missing data.
     told: bool,
 }
 
 impl Open {
-    /// What is missing of a recording that was read to its end; once.
+    /// Returns which part is missing of a recording that was read to its end, but only once.
     fn lost(&mut self, path: &Path) -> Option<String> {
         if std::mem::replace(&mut self.told, true) {
             None
@@ -87,7 +87,7 @@ impl Open {
         }
     }
 
-    /// The records of a frame, one a body.
+    /// Returns the records of a picture, one for each body.
     fn next(&mut self) -> Result<Vec<FrameRecord>, hzn_mcap::Error> {
         let mut records: Vec<FrameRecord> = self.ahead.take().into_iter().collect();
         while let Some(record) = self.reader.next().transpose()? {
@@ -175,7 +175,7 @@ impl Frame {
     }
 }
 
-/// Writes reports into a recording, replacing it.
+/// Writes reports into a recording and replaces an existing file.
 #[pyfunction]
 #[pyo3(name = "_write_mcap")]
 pub(crate) fn write_mcap(py: Python<'_>, path: PathBuf, sensor: &Sensor, reports: Vec<Py<Report>>) -> PyResult<()> {

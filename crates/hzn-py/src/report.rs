@@ -20,10 +20,10 @@ use serde::{Deserialize, Serialize};
 use crate::camera::Camera;
 use crate::{errors, parameters};
 
-/// What pickle calls, and with what.
+/// Return type of `__reduce__` for pickle: a function and its arguments.
 type Reduced = (Py<PyAny>, (Py<PyBytes>, Vec<Py<Report>>));
 
-/// Longest side of a picture in a notebook, pixels.
+/// Longest side of a picture in a notebook, in pixels.
 const SHOWN_PX: u32 = 960;
 
 #[doc = doc!("Report")]
@@ -32,15 +32,15 @@ pub(crate) struct Report {
     pub(crate) row: Row,
     candidates: Vec<CandidateEdge>,
     camera: Option<Arc<Camera>>,
-    /// Of the limb that was fitted.
+    /// Half-angle of the limb that was fitted, in radians.
     half_angle_rad: Option<f64>,
-    /// Edges and points, where they were asked for or recorded.
+    /// Edges and points, if they were requested or recorded.
     detail: Option<Detail>,
-    /// What is drawn; the limb in it takes longer to follow than the picture took.
+    /// Annotations, computed on first use, because tracing the limb takes longer than processing the picture.
     drawing: OnceLock<Annotations>,
     stage: Cow<'static, str>,
     others: Vec<Py<Self>>,
-    /// The picture, as long as somebody else keeps it.
+    /// The picture, while another object keeps it alive.
     image: Option<Py<PyWeakrefReference>>,
     bits: Option<u8>,
 }
@@ -51,7 +51,7 @@ struct Detail {
     drawing: Annotations,
 }
 
-/// A report as pickle has it: everything but the picture and the other bodies.
+/// Contents of a report for pickle: everything except the picture and the other bodies.
 #[derive(Serialize, Deserialize)]
 struct Pickled {
     row: Row,
@@ -64,7 +64,7 @@ struct Pickled {
 }
 
 impl Report {
-    /// Of a picture that was processed.
+    /// Makes the report of a picture that was processed.
     pub(crate) fn new(row: Row, report: &hzn_core::Report<f64>, trace: Option<&Trace>, camera: &Arc<Camera>) -> Self {
         let detail = trace.map(|trace| Detail {
             stages_us: trace.times().into_iter().map(|(s, t)| (s.name().into(), t.as_nanos() as f64 / 1e3)).collect(),
@@ -80,7 +80,7 @@ impl Report {
         }
     }
 
-    /// Of a row alone, such as that of a picture that could not be read.
+    /// Makes a report from a row alone, for example of a picture that could not be read.
     pub(crate) fn of_row(row: Row) -> Self {
         Self {
             row,
@@ -96,7 +96,7 @@ impl Report {
         }
     }
 
-    /// As a recording holds it.
+    /// Makes the report of a record in a recording.
     pub(crate) fn recorded(record: FrameRecord, camera: Option<Arc<Camera>>) -> Self {
         let drawing = record.annotations;
         Self {
@@ -107,25 +107,25 @@ impl Report {
         }
     }
 
-    /// Whether its body was found.
+    /// Returns true if the body was found.
     pub(crate) fn is_answer(&self) -> bool {
         self.row.status == Status::Ok
     }
 
-    /// The report of the first body, with those of the others.
+    /// Makes the report of the first body and attaches the reports of the others.
     pub(crate) fn of_bodies(py: Python<'_>, reports: impl IntoIterator<Item = Self>) -> PyResult<Self> {
         let mut reports = reports.into_iter();
         let first = reports.next().ok_or_else(|| errors::config("bodies: there is none"))?;
         Ok(Self { others: reports.map(|r| Py::new(py, r)).collect::<PyResult<_>>()?, ..first })
     }
 
-    /// Remembers its picture, without keeping it.
+    /// Remembers the picture by a weak reference, so that the report does not keep it alive.
     pub(crate) fn with_image(self, image: &Bound<'_, PyAny>, bits: Option<u8>) -> Self {
         let image = PyWeakrefReference::new(image).ok().map(Bound::unbind);
         Self { image, bits, ..self }
     }
 
-    /// The first line of an overlay's legend.
+    /// Returns the first line of the legend of an overlay.
     pub(crate) fn title(&self) -> String {
         if self.others.is_empty() {
             return self.row.status.name().to_owned();
@@ -134,7 +134,7 @@ impl Report {
         each.join(", ")
     }
 
-    /// This one and the others.
+    /// Returns this report and those of the other bodies.
     pub(crate) fn each(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(self.others.iter().map(Py::get))
     }
@@ -152,14 +152,14 @@ impl Report {
         })
     }
 
-    /// What is drawn for all bodies.
+    /// Returns the annotations of all bodies.
     pub(crate) fn drawing_of_all(&self) -> Annotations {
         let mut all = Annotations::default();
         self.each().for_each(|r| all.add(r.drawing().clone()));
         all
     }
 
-    /// As a recording takes it.
+    /// Returns the record for a recording.
     pub(crate) fn record(&self) -> FrameRecord {
         FrameRecord {
             candidates: self.candidates.clone(),
@@ -366,7 +366,7 @@ impl Report {
         parameters::to_python(py, &self.row)
     }
 
-    /// The picture stays behind.
+    /// Pickles the report without its picture.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Reduced> {
         let (py, this) = (slf.py(), slf.get());
         let pickled = Pickled {
@@ -395,7 +395,7 @@ impl Report {
             ..Self::of_row(pickled.row)
         })
     }
-    /// It never changes.
+    /// Returns the report itself, because it never changes.
     fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
         slf
     }
@@ -416,7 +416,7 @@ impl Report {
         }
     }
 
-    /// What a notebook shows: the numbers beside the picture with everything drawn on it.
+    /// Shows the numbers in a notebook, next to the picture with all annotations.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
         let mut html = String::from("<div style=\"display:flex;gap:1em;align-items:start\">");
         if let Some(image) = self.image.as_ref().and_then(|w| w.bind(py).upgrade()) {
@@ -435,7 +435,7 @@ impl Report {
 }
 
 impl Report {
-    /// Names and values of what a notebook shows.
+    /// Returns names and values of the numbers for a notebook.
     fn shown(&self) -> Vec<(&'static str, String)> {
         let r = &self.row;
         let mut rows = vec![(

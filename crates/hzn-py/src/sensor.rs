@@ -18,7 +18,7 @@ use crate::report::Report;
 use crate::stages::Expected;
 use crate::{errors, parameters};
 
-/// What pickle calls, and with what.
+/// Return type of `__reduce__` for pickle: a function and its arguments.
 type Pickled = (Py<PyAny>, (Py<PyAny>, bool));
 
 #[doc = doc!("Sensor")]
@@ -27,14 +27,14 @@ pub(crate) struct Sensor {
     state: RwLock<Arc<State>>,
 }
 
-/// A configuration that was accepted, and what was made of it.
+/// A configuration that was accepted, and the objects made from it.
 pub(crate) struct State {
     pub(crate) config: Config,
     pub(crate) flight: bool,
     pub(crate) camera: Arc<Camera>,
-    /// The same in double precision, for the single stages.
+    /// Sensor in double precision, for the single stages.
     pub(crate) core: CoreSensor<f64>,
-    /// Sensors at rest: each call takes one or makes one, so that threads never wait for each other.
+    /// Idle sensors. Each call takes one or makes one, so threads never wait for each other.
     idle: Mutex<Vec<AnySensor>>,
 }
 
@@ -45,7 +45,7 @@ impl State {
         Ok(Arc::new(Self { config, flight, camera, core, idle: Mutex::default() }))
     }
 
-    /// Lends a sensor to `work`. One in which something panicked does not come back.
+    /// Lends a sensor to `work`. A sensor in which `work` panicked is dropped.
     pub(crate) fn lend<T>(&self, work: impl FnOnce(&mut AnySensor) -> T) -> PyResult<T> {
         let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut sensor = match idle {
@@ -63,7 +63,7 @@ impl Sensor {
         Ok(Self { state: RwLock::new(State::new(config, flight)?) })
     }
 
-    /// As it is now: a change of the parameters leaves calls under way alone.
+    /// Returns the current state. A later change of the parameters does not affect calls in progress.
     pub(crate) fn state(&self) -> Arc<State> {
         Arc::clone(&self.state.read().unwrap_or_else(PoisonError::into_inner))
     }
@@ -170,7 +170,8 @@ impl Sensor {
             };
             let found = match processed.report {
                 Ok(found) => found,
-                // Every rocket begins there: a flight goes on after it.
+                // Every rocket starts below the limb height, and its flight goes on, so this is a report and not an
+                // error.
                 Err(why @ PriorError::BelowLimb { .. }) => {
                     return Ok(Report::of_row(Row::unprocessed(&meta, Status::NoAltitude, why.to_string())));
                 }
@@ -200,7 +201,7 @@ impl Sensor {
     ) -> PyResult<Bound<'py, PyAny>> {
         let tracks = slf.get().state().config.tracks();
         let many = slf.py().import("hzn._many")?.getattr("process_many")?;
-        // One after another, where a picture's level comes from the one before.
+        // If the threshold of a picture comes from the previous one, the pictures are processed one after another.
         many.call1((slf, images, if tracks { Some(1) } else { jobs }, progress))
     }
 
@@ -225,7 +226,7 @@ impl Sensor {
     }
 }
 
-/// What is known about a picture, checked as far as the core cannot.
+/// Collects the prior of a picture, with the checks that the core cannot make.
 fn known(
     altitude_km: Option<f64>,
     position_km: Option<[f64; 3]>,

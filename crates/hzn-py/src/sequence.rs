@@ -1,4 +1,4 @@
-//! Pictures from files, as `hzn run` takes them.
+//! Pictures from files, in the same way as for `hzn run`.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,7 +15,7 @@ use crate::report::Report;
 use crate::sensor::{Sensor, State};
 use crate::stages::Expected;
 
-/// A folder, a pattern, a video, a recording, or picture files, in order and not yet decoded.
+/// Pictures of a folder, a pattern, a video, a recording, or picture files, in order and not yet decoded.
 #[pyclass(frozen, name = "_Sequence", module = "hzn._hzn")]
 pub(crate) struct Sequence {
     state: Arc<State>,
@@ -24,14 +24,14 @@ pub(crate) struct Sequence {
     next: AtomicU64,
 }
 
-/// One of its pictures.
+/// One picture of the sequence.
 #[pyclass(frozen, name = "_Item", module = "hzn._hzn")]
 pub(crate) struct Item {
     index: u64,
     item: Mutex<Option<source::Item>>,
 }
 
-/// Why a run cannot begin or ends early, as an exception.
+/// Converts the reason why a run cannot begin or ends early to an exception.
 pub(crate) fn stopped(error: Error) -> PyErr {
     match error.kind() {
         Kind::Unusable => errors::config(error),
@@ -69,7 +69,7 @@ impl Sequence {
         Ok(Self { state, plan, source: Mutex::new(source), next: AtomicU64::new(0) })
     }
 
-    /// Number of pictures, where it is known before.
+    /// Returns the number of pictures, if it is known in advance.
     fn total(&self) -> Option<u64> {
         self.source.lock().unwrap_or_else(PoisonError::into_inner).total()
     }
@@ -85,7 +85,7 @@ impl Sequence {
         let item = match errors::detached(py, next)? {
             Ok(item) => item,
             Err(lost) => {
-                // A recording or video that was cut off ends sooner than it should.
+                // A recording or video that was cut off ends too early.
                 lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
                 return Ok(None);
             }
@@ -94,7 +94,7 @@ impl Sequence {
         Ok(Some(Item { index: self.next.fetch_add(1, Ordering::Relaxed), item: Mutex::new(Some(item)) }))
     }
 
-    /// Decodes and processes one of the pictures; once each.
+    /// Decodes and processes a picture. Each picture can be processed only once.
     fn process(&self, py: Python<'_>, item: &Item) -> PyResult<Report> {
         let taken = item.item.lock().unwrap_or_else(PoisonError::into_inner).take();
         let taken = taken.ok_or_else(|| errors::other("this picture was processed already"))?;
@@ -102,7 +102,7 @@ impl Sequence {
     }
 }
 
-/// Decodes and processes the contents of a picture file; `None` stands for one that could not be had, for the reason
+/// Decodes and processes the contents of a picture file. `data` is `None` if the file could not be read, for the reason
 /// `why`.
 #[pyfunction]
 #[pyo3(name = "_process_encoded")]

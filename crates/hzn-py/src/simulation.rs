@@ -1,4 +1,4 @@
-//! Scenes with truth, answers beside their truth, and what a camera could reach.
+//! Scenes with truth, the evaluation of answers against the truth, and the attainable accuracy of a camera.
 
 use std::path::{Path, PathBuf};
 
@@ -38,7 +38,7 @@ impl Simulation {
             scene::load(&name.to_string_lossy(), frames, seed)
         } else {
             let text = toml::to_string(&parameters::from_python(scene)?).map_err(errors::config)?;
-            // JSON has no dates: in a scene.toml the time of the start is one, not text.
+            // JSON has no dates, but the start time in a scene.toml is a date and not text.
             scene::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
         };
         let scenario = scenario.map_err(stopped)?;
@@ -90,7 +90,7 @@ impl Simulation {
     }
 }
 
-/// What `Sensor.process` is told of a frame.
+/// Returns the keyword arguments of `Sensor.process` for a picture.
 fn known(scenario: &Scenario, frame: &FlightFrame) -> Value {
     let row = scenario.known_of(frame);
     let mut known = json!({
@@ -108,7 +108,7 @@ fn known(scenario: &Scenario, frame: &FlightFrame) -> Value {
     known
 }
 
-/// `utc = "2026-06-21T12:00:00Z"` without its quotes.
+/// Removes the quotes of a line like `utc = "2026-06-21T12:00:00Z"`.
 fn unquoted_date(text: &str) -> String {
     let line = |l: &str| if l.starts_with("utc = ") { l.replace('"', "") } else { l.to_owned() };
     text.lines().map(line).collect::<Vec<_>>().join("\n")
@@ -164,7 +164,7 @@ impl SimulatedFrame {
     }
 }
 
-/// Results beside their truth. Either may be a file; reports without a name stand in the order of the truth.
+/// Compares results with the truth. Both may be files. Reports without a name are in the order of the truth.
 #[pyfunction]
 #[pyo3(name = "_evaluate")]
 pub(crate) fn evaluate<'py>(
@@ -216,7 +216,7 @@ pub(crate) fn evaluate<'py>(
     parameters::to_python(py, &value)
 }
 
-/// Sigmas of one design; None where too little of a limb is in view.
+/// Returns the sigmas of one design, or None if too little of the limb is in view.
 #[pyfunction]
 #[pyo3(name = "_design")]
 #[pyo3(signature = (camera, *, radius_km, altitude_km, altitude_sigma_km, limb_height_km, limb_height_sigma_km,

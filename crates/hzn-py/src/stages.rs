@@ -1,4 +1,4 @@
-//! The stages one at a time: what `hzn.threshold` and its neighbours call.
+//! The single stages, which `hzn.threshold` and its neighbours call.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -155,7 +155,7 @@ impl Rays {
     }
 }
 
-/// Reads the array as a picture of this sensor and hands it on, packed or not.
+/// Reads the array as a picture of this sensor and passes it on, packed or strided.
 macro_rules! with_picture {
     ($image:expr, $state:expr, $bits:expr, |$picture:ident| $work:expr) => {{
         let array = Array::from_object($image)?;
@@ -177,7 +177,8 @@ pub(crate) fn level(sensor: &Sensor, image: &Bound<'_, PyAny>, expected: &Expect
     found.map(|l| l.level).map_err(|status| errors::other(format!("no level: {}", status.name())))
 }
 
-/// Every edge of a picture at a level, longer than `candidates.min_points`, in the order in which they are looked at.
+/// Returns every edge of a picture at a threshold, with at least `candidates.min_points` border pixels, in the order in
+/// which the sensor examines them.
 #[pyfunction]
 #[pyo3(name = "_borders", signature = (sensor, image, level, expected, bits = None))]
 pub(crate) fn borders<'py>(
@@ -270,7 +271,7 @@ pub(crate) fn fit(
     fitted.map(fit).transpose()
 }
 
-/// Axis, covariance, cos of the half-angle; None where the points do not determine them.
+/// Axis, covariance and cosine of the half-angle; None if the points do not determine them.
 type Fused<'py> = Option<(Bound<'py, PyArray1<f64>>, Two<'py>, f64)>;
 
 #[pyfunction]
@@ -294,7 +295,7 @@ pub(crate) fn fuse<'py>(
 }
 
 impl State {
-    /// The sensor in double precision.
+    /// Returns the sensor in double precision.
     fn core(&self) -> PyResult<&CoreSensor<f64>> {
         if self.flight {
             return Err(errors::config("flight: the single stages are those of the workstation, in double precision"));
@@ -302,7 +303,7 @@ impl State {
         Ok(&self.core)
     }
 
-    /// Is it a picture of this camera?
+    /// Returns an error if the array does not have the size of the camera's picture.
     pub(crate) fn check_size(&self, array: &Array<'_>) -> PyResult<()> {
         let camera = &self.config.camera;
         let (width, height) = array.size();

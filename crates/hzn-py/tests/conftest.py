@@ -11,7 +11,7 @@ PARAMETERS = {"camera": CAMERA, "body": {"kind": "earth-sphere", "altitude_km": 
 
 
 def limb(shift=0.0):
-    """A bright body with a half-angle of 70 degrees whose centre is 68 degrees below the optical axis."""
+    """Return a picture of a bright body: half-angle 70 degrees, centre 68 degrees below the optical axis."""
     y, x = np.mgrid[0:240, 0:320]
     u, v = (x - 159.5) / 300.0, (y - 119.5) / 300.0
     s = np.radians(68.0 + 0.05 * shift)
@@ -21,7 +21,7 @@ def limb(shift=0.0):
 
 
 def pgm(image):
-    """A picture file."""
+    """Return the contents of a picture file."""
     height, width = image.shape
     return b"P5\n%d %d\n255\n" % (width, height) + image.tobytes()
 
@@ -33,13 +33,13 @@ def sensor():
 
 @pytest.fixture
 def hzn_program():
-    """The command `hzn` of the same build: cargo xtask test names it."""
+    """Return the path of the command `hzn` of the same build, which cargo xtask test sets."""
     return os.environ["HZN_PROGRAM"]
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """Fifty pictures with their sensor.toml."""
+    """Return a folder of fifty pictures with their sensor.toml."""
     for i in range(50):
         (tmp_path / f"{i:02}.pgm").write_bytes(pgm(limb(i)))
     lines = ["[camera]"] + [f"{k} = {v!r}".replace("'", '"') for k, v in CAMERA.items()]
@@ -50,7 +50,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def recording(folder, hzn_program):
-    """What `hzn run` makes of them."""
+    """Return the recording that `hzn run` makes of the folder."""
     out = folder / "out.mcap"
     subprocess.run([hzn_program, "run", "-q", folder, "-o", out], check=True)
     return out

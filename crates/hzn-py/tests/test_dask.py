@@ -1,4 +1,4 @@
-"""An archive on a real cluster of two processes."""
+"""Tests of an archive on a real cluster of two processes."""
 
 import os
 import signal
@@ -32,7 +32,7 @@ def client():
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
-    """Small pictures of which two cannot be read; one is not there."""
+    """Return the URLs of small pictures. Two of them cannot be read; one file does not exist."""
     folder = tmp_path_factory.mktemp("archive")
     kinds = [pgm(np.ascontiguousarray(limb(i)[::4, ::4])) for i in range(50)]
     for i in range(FRAMES):
@@ -55,7 +55,7 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
     out = tmp_path / "out"
 
     def kill_one():
-        # When the first shards are written, so in the middle of others.
+        # The first shards are written, so others are in progress.
         while len(list(out.glob("*.parquet"))) < 3:
             time.sleep(0.02)
         os.kill(victim, signal.SIGKILL)
@@ -78,14 +78,14 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
         assert found[name][:-1] == [row[name] for row in serial], name
     assert found["status"].count("ok") > 0.9 * FRAMES
 
-    # A second run has nothing to do; a shard that is lost is made again, the same.
+    # A second run makes only the lost shard again, with the same contents.
     times = {p: p.stat().st_mtime_ns for p in out.iterdir()}
     lost = sorted(out.iterdir())[3]
-    lost.rename(f"{lost}.77.part")  # as a worker leaves it that died just before
+    lost.rename(f"{lost}.77.part")  # as left by a worker that died before the renaming
     again = process_archive(archive, small, client=client, out=str(out), shard_frames=50)
     assert again.skipped == 39 and columns(again)["axis_y"] == found["axis_y"]
     assert {p for p in out.iterdir() if p.stat().st_mtime_ns != times[p]} == {lost}
-    # Another sensor does not take these for its own.
+    # With another sensor these shards do not count.
     other = hzn.Sensor(**{**small.parameters, "reject": {"seed": 5}})
     assert process_archive(archive[:60], other, client=client, out=str(out), shard_frames=50).skipped == 0
 

@@ -1,4 +1,4 @@
-"""The package as a user meets it. Numbers are tested in Rust; here it is that they arrive, and what is refused."""
+"""Tests of the package as users see it. The numbers are tested in Rust; here, their transfer and the refused values."""
 
 import copy
 import csv
@@ -19,7 +19,7 @@ def test_an_answer_and_its_covariance(sensor):
     report = sensor.process(limb())
     assert report.ok and report.status == "ok" and report.detail == ""
     truth = np.array([0.0, np.sin(np.radians(68)), np.cos(np.radians(68))])
-    # The limb stands 7 km lower than the sensor takes it to.
+    # The limb is 7 km lower than the sensor assumes.
     assert np.degrees(np.arccos(min(1.0, report.axis @ truth))) < report.sigma_max_deg
     assert np.isclose(np.linalg.norm(report.axis), 1.0)
     assert np.allclose(report.covariance @ report.axis, 0.0, atol=1e-12)
@@ -155,7 +155,7 @@ def test_detail_and_overlay(sensor):
     report = sensor.process(image, detail=True)
     assert report.inliers.shape[1] == 2 and len(report.inliers) > 100
     assert set(report.stages_us) >= {"contour", "estimate"} and report.candidates[0]["verdict"] == "chosen"
-    # Inliers lie on the limb: that is where the projection of the rays is halfway.
+    # Inliers lie on the limb, where the brightness is halfway between dark and lit.
     column = report.inliers[np.argmin(abs(report.inliers[:, 0] - 160))]
     assert abs(image[int(round(column[1])), int(round(column[0]))].astype(int) - 110) < 100
     drawn = hzn.overlay(image, report)
@@ -173,7 +173,7 @@ def test_detail_and_overlay(sensor):
 
 
 def test_reports_are_pickled_and_copied(sensor):
-    """Every number and array, to the last bit; of several bodies all."""
+    """Copies have every number and array to the last bit, for all bodies."""
     image = limb()
     bodies = [{"kind": "earth-sphere", "altitude_km": 400.0}, {"kind": "moon"}]
     both = hzn.Sensor(camera=sensor.camera, bodies=bodies)
@@ -194,7 +194,7 @@ def test_reports_are_pickled_and_copied(sensor):
 
 
 def everything(report):
-    """What a report says, in a form that can be compared."""
+    """Return all values of a report in a form that can be compared."""
     found = {"repr": repr(report), "others": [everything(other) for other in report.others]}
     for name in set(dir(report)) - set(dir(object)) - {"others"}:
         if not name.startswith("_"):
@@ -229,7 +229,7 @@ FISHEYE = dict(width=640, height=480, model="kannala-brandt", fx_px=250.0, fy_px
 
 
 def test_camera_by_opencvs_rules():
-    """The same arithmetic in NumPy: OpenCV's fisheye and pinhole models as its documentation states them."""
+    """Compares with NumPy code of OpenCV's fisheye and pinhole models, as its documentation states them."""
     d = [-0.02, 0.003, -0.0005, 0.0001]
     k = np.array([[250.0, 0, 321.0], [0, 251.0, 238.0], [0, 0, 1]])
     camera = hzn.Camera.from_opencv(k, d, size=(640, 480), fisheye=True)
@@ -286,7 +286,7 @@ def test_calibrations_of_others(sensor, tmp_path):
 
 
 def test_any_strides_without_a_copy():
-    """400 MB of which a transposed, mirrored view is processed: only the pages that are looked at become resident."""
+    """Processes a transposed, mirrored view of 400 MB: only the pages that are read become resident."""
     side = 20_000
     sensor = hzn.Sensor(
         camera=dict(width=side, height=side, model="pinhole", fx_px=2e4, fy_px=2e4, cx_px=1e4, cy_px=1e4),

@@ -1,4 +1,4 @@
-"""Sequences: in order, with bounded memory, interruptible."""
+"""Tests of sequences: reports in order, bounded memory, interrupts."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from hzn._many import _TASK_ITEMS, _in_order
 
 @pytest.fixture
 def interruptible():
-    """Ctrl-C as a terminal's program has it; one that was started in the background ignores it."""
+    """Handle Ctrl-C like a program in a terminal; a program that was started in the background ignores it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -55,7 +55,7 @@ def test_no_more_is_taken_than_is_worked_on(side, most):
     reports = sensor.process_many(endless(), jobs=2)
     for given in range(1, 500 if most > 1 else 20):
         assert next(reports).status == "no-limb"
-        # Two tasks for each thread, and one more that is handed on.
+        # There are two tasks for each thread, and one more in transfer.
         assert given <= taken <= given + most * (2 * 2 + 1)
     reports.close()
     assert not threads_left()
@@ -97,12 +97,12 @@ def test_an_interrupt_waits_for_no_more_than_a_picture(interruptible):
     threading.Thread(target=interrupt).start()
     with pytest.raises(KeyboardInterrupt):
         list(_in_order(slow, range(10_000), 2))
-    # What the two threads had before them, and one more each until the caller wakes up.
+    # These are the tasks of the two threads, and one more each until the caller wakes up.
     assert at <= len(begun) <= at + 4 and not threads_left()
 
 
 def test_pictures_that_come_slowly_are_not_waited_for():
-    """A camera's reports come while it goes on, not when a task is full."""
+    """The reports of a camera come while it takes more pictures, not only when a task is full."""
     given = []
 
     def camera():
@@ -111,7 +111,7 @@ def test_pictures_that_come_slowly_are_not_waited_for():
             yield i
 
     for i in _in_order(lambda item: given.append(item) or item, camera(), 2):
-        # The one before was through when this one came.
+        # The item before was processed when this one came.
         assert len(given) <= i + 3
     assert given == list(range(12))
 
@@ -179,7 +179,7 @@ def test_a_tracked_level_goes_from_picture_to_picture():
 
 
 def test_bits_are_found_once_for_a_sequence(sensor, tmp_path):
-    # The first picture is dark: by itself it has 8 bits.
+    # The first picture is dark: its own samples would suggest 8 bits.
     for i, scale in enumerate((0.25, 16, 16)):
         words = (limb(i).astype(float) * scale).astype(">u2")
         (tmp_path / f"{i}.pgm").write_bytes(b"P5\n320 240\n65535\n" + words.tobytes())

@@ -1,4 +1,4 @@
-"""Recordings, frame by frame."""
+"""Tests of recordings, picture by picture."""
 
 import numpy as np
 import pytest

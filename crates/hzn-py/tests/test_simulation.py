@@ -1,4 +1,4 @@
-"""Scenes with truth, evaluation and sensitivity: the numbers of the command line."""
+"""Tests of scenes with truth, evaluation and sensitivity: the numbers equal those of the command line."""
 
 import csv
 import json
@@ -13,7 +13,7 @@ import hzn
 
 @pytest.fixture(scope="module")
 def small():
-    """An infrared sensor with a quarter of the pixels."""
+    """Return an infrared scene with a quarter of the pixels."""
     scene = hzn.simulate("leo-infrared").parameters
     camera = dict(scene["camera"], width=192, height=144, fx_px=46.0, fy_px=46.0, cx_px=95.5, cy_px=71.5)
     return hzn.simulate({**scene, "camera": camera}, frames=3)
@@ -37,7 +37,7 @@ def test_a_flight_is_answered_and_evaluated(small):
 
 
 def test_a_scene_is_the_command_lines(small, tmp_path, hzn_program):
-    """Pictures, truth, what is known, and the sensor with its measured noise: as `hzn simulate` writes them."""
+    """Pictures, truth, priors, and the sensor with its measured noise are the same as `hzn simulate` writes."""
     scene = tmp_path / "scene.toml"
     shown = subprocess.run([hzn_program, "simulate", "leo-infrared", "--show"], check=True, capture_output=True, text=True)
     text = shown.stdout

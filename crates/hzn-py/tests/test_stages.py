@@ -1,4 +1,4 @@
-"""The stages one at a time, and one step swapped for another."""
+"""Tests of the single stages, and of a stage that is replaced."""
 
 import importlib.metadata
 import re
@@ -19,7 +19,7 @@ def degrees(a, b):
 
 
 def test_the_stages_are_the_pipeline(sensor):
-    """Every number of the report, to the last bit; the fused answer to the last but few."""
+    """The stages give every number of the report to the last bit, and the fused answer to the last few bits."""
     image = limb()
     report = sensor.process(image, altitude_km=401.0, detail=True)
     expected = sensor.expect(altitude_km=401.0)
@@ -40,14 +40,14 @@ def test_the_stages_are_the_pipeline(sensor):
 
 
 def disc(image, u, v, radius_px, brightness):
-    """With a disc painted into it, its edge blurred over two pixels."""
+    """Return the picture with a disc painted into it; its edge is blurred over two pixels."""
     y, x = np.mgrid[0 : image.shape[0], 0 : image.shape[1]]
     cover = np.clip(0.5 + (radius_px - np.hypot(x - u, y - v)) / 2, 0, 1)
     return np.maximum(image, brightness * cover).astype(np.uint8)
 
 
 def test_the_stages_of_each_body():
-    """Of several bodies, each with its own level; the second's edges without those of the first."""
+    """With several bodies, each has its own threshold, and the second excludes the points on the limb of the first."""
     camera = dict(CAMERA, fx_px=3000.0, fy_px=3000.0)
     bodies = [
         {"radius_km": 100.0, "altitude_km": 3900.0, "binarize": {"method": "fixed", "level": 60}},
@@ -64,7 +64,7 @@ def test_the_stages_of_each_body():
         level = hzn.threshold.level(sensor, image, expected)
         assert level == report.level == (60, 90)[body]
         borders = hzn.contour.find(sensor, image, level, expected)
-        # Both discs are seen by either, and not only as far as the answer.
+        # The edges of both discs are found for either body: the search does not stop at the answer.
         assert len(borders) == 2
         answers = []
         for border in borders:
@@ -78,7 +78,7 @@ def test_the_stages_of_each_body():
             answers.append(fused)
             if fit and (fit.rms_px, fit.inliers) == (report.rms_px, len(report.inliers)):
                 assert isinstance(fit, hzn.consensus.Cone) and fit.draws == start.draws
-                # The report's axis was normalised once more.
+                # The axis of the report was normalised once more.
                 assert np.allclose(fused.axis, report.axis, rtol=0, atol=1e-15)
                 assert np.array_equal(fused.covariance, report.covariance)
                 own = fused
@@ -110,9 +110,9 @@ def test_other_strides_and_a_round_trip_through_arrays(sensor):
 
 
 def test_every_step_can_be_ones_own(sensor):
-    """A level, points, a consensus and a fit in NumPy, between the stages that stay."""
+    """Threshold, points, consensus and fit are in NumPy, between the stages that stay."""
     image = limb()
-    # Points: half-level crossings by column.
+    # The points are the crossings of the half level in each column.
     columns = np.arange(0, 320, 2)
     profile = image[:, columns].astype(float) - 110
     rows = np.argmax(profile > 0, axis=0)
@@ -120,14 +120,14 @@ def test_every_step_can_be_ones_own(sensor):
     points = np.column_stack([columns, rows - below / (below - above)])
     points[::10, 1] += 40.0
     rays = hzn.rays.of(sensor, points, np.tile([0.0, 1.0], (160, 1)))
-    # Consensus: the truth is known.
+    # The consensus is the known truth.
     start = hzn.consensus.Cone(TRUTH, np.cos(np.radians(70.38)))
     weights = np.ones(160)
     weights[::10] = 0.0
     rays.weights = weights
     fit = hzn.fit.cone(sensor, rays, start)
     assert fit.inliers == 144 and degrees(fit.axis, TRUTH) < 0.1
-    # Fit: a plane through the ends of the rays, s . n = 1.
+    # The fit is a plane through the ends of the rays, s . n = 1.
     chosen = rays.directions[weights > 0]
     n = np.linalg.lstsq(chosen, np.ones(len(chosen)), rcond=None)[0]
     rays.weights = weights
@@ -168,7 +168,7 @@ def test_old_names_of_stages_work_and_warn(old, new):
 def test_the_distribution_is_hzn_sensor():
     metadata = importlib.metadata.metadata("hzn-sensor")
     assert metadata["Name"] == "hzn-sensor" and metadata["Version"] == hzn.__version__
-    # On the Python index `hzn` belongs to another project: no page may tell anybody to install it.
+    # On the Python index `hzn` belongs to another project, so no page may say to install it.
     root = Path(__file__).parents[3]
     pages = [*root.glob("*.md"), *root.glob("book/**/*.md"), *root.glob("crates/hzn-py/python/**/*.py")]
     assert len(pages) > 20

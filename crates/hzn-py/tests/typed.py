@@ -1,4 +1,4 @@
-"""Use of the package that must pass a strict type check; it is not run."""
+"""Code that uses the package and must pass a strict type check; it is not run."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -8,47 +8,47 @@ use hzn_run::source::Raw;
 use crate::measure::Kind;
 use crate::work::open::Request;
 
-/// Sees what the sensor saw, and tunes it live.
+/// Shows what the sensor found in each picture, and tunes its parameters live.
 ///
-/// Opens what `hzn run` wrote (.mcap), a folder of pictures, pictures, or a video; without an argument, an empty window
-/// that takes files by menu or drag and drop.
+/// Opens a recording that `hzn run` wrote (.mcap), a folder of pictures, single pictures, or a video. Without an
+/// argument, the window is empty and takes files by menu or by drag and drop.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "hzn-viewer", version, max_term_width = 100)]
 pub struct Args {
     /// A recording, a folder, pictures, or a video
     #[arg(value_name = "INPUT")]
     pub input: Vec<PathBuf>,
-    /// The sensor.toml; without it, the one in the recording or beside the pictures
+    /// The sensor.toml; without it, the one in the recording or next to the pictures
     #[arg(short, long, value_name = "FILE")]
     pub sensor: Option<PathBuf>,
-    /// Table with time, altitude, position, attitude of the pictures; without it, frames.csv beside them
+    /// Table with time, altitude, position and attitude of the pictures; without it, frames.csv next to the pictures
     #[arg(long, value_name = "FILE")]
     pub frames: Option<PathBuf>,
-    /// The truth; without it, truth.csv beside the pictures
+    /// Table of the true directions; without it, truth.csv next to the pictures
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
-    /// Frames a second, where nothing else gives a time
+    /// Pictures per second; used where nothing else gives the times of the pictures
     #[arg(long, value_name = "RATE", default_value_t = 1.0)]
     pub fps: f64,
-    /// Pictures are headerless: their size and format, as for `hzn run`
+    /// Size and format of headerless pictures, as for `hzn run`
     #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
     pub raw: Option<Raw>,
-    /// Single precision and 2048 points, as on the flight computer
+    /// Compute with single precision and 2048 points, as on the flight computer
     #[arg(long)]
     pub flight: bool,
-    /// The frame to begin with, from 0
+    /// Index of the first picture to show, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: usize,
-    /// Save a picture of the window, print the frame's status and axis, and end
+    /// Save a screenshot of the window, print status and axis of the shown picture, and exit
     #[arg(long, value_name = "PNG")]
     pub screenshot: Option<PathBuf>,
     /// Size of the window in points
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     pub size: Option<[f32; 2]>,
-    /// Light colours
+    /// Use light colours
     #[arg(long)]
     pub light: bool,
-    /// Measure the window, print, and end
+    /// Measure the speed or the memory of the window, print the result, and exit
     #[arg(long, value_name = "WHAT", hide = true, conflicts_with = "screenshot")]
     pub measure: Option<Kind>,
 }
@@ -61,7 +61,7 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 }
 
 impl Args {
-    /// What is to be opened.
+    /// Returns the request to open the inputs of the command line.
     pub fn request(&self) -> Request {
         Request {
             inputs: self.input.clone(),

@@ -1,6 +1,6 @@
-//! The viewer: see what the sensor saw, and tune it live.
+//! The viewer: it shows what the sensor found in each picture, and its parameters can be tuned live.
 //!
-//! [`model`] is what is known and done, without a window; [`work`] happens on threads of its own; [`ui`] draws.
+//! [`model`] holds the state and all decisions, without a window. [`work`] runs on separate threads. [`ui`] draws.
 
 pub mod args;
 pub mod measure;

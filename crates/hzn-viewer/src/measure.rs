@@ -1,4 +1,4 @@
-//! How fast the real window is, and how much memory it takes: `hzn-viewer --measure`, for book/guide/viewer.md.
+//! Measures the speed and the memory of the real window: `hzn-viewer --measure`, for book/guide/viewer.md.
 
 use std::time::{Duration, Instant};
 
@@ -7,30 +7,30 @@ use clap::ValueEnum;
 use crate::model::Look;
 use crate::ui::{Command, Viewer};
 
-/// Changes of a parameter that are timed.
+/// Number of parameter changes that are timed.
 const CHANGES: usize = 200;
 
-/// What is measured.
+/// The quantity to measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
-    /// From the start of the program to the first frame on the screen, and until all frames are known.
+    /// Time from the start of the program to the first picture on the screen, and until all pictures are known.
     Start,
-    /// From a change of a parameter to the new picture.
+    /// Time from a change of a parameter to the new picture.
     Tune,
-    /// Memory while all frames are played as fast as they can be.
+    /// Memory while all pictures are played at the highest speed.
     Play,
 }
 
-/// One change, in parts; all but the last from the change on.
+/// Times of one parameter change. `answer` counts from the request, all others count from the change.
 #[derive(Debug, Clone, Copy, Default)]
 struct Times {
-    /// From the wish to the answer, on the engine's thread.
+    /// From the request to the answer, on the engine's thread.
     answer: Duration,
-    /// The window with the new picture is laid out and goes to the painter.
+    /// Until the window with the new picture is laid out and goes to the painter.
     handed: Duration,
-    /// It is on the screen.
+    /// Until the window with the new picture is on the screen.
     screen: Duration,
-    /// Frames of the window that still showed the answer of before.
+    /// Frames of the window that still showed the previous answer.
     late: u32,
     /// Processor time of the window's thread until it is laid out.
     layout_work: Duration,
@@ -47,10 +47,10 @@ pub struct Measure {
     changed: Option<Instant>,
     /// Processor time of the window's thread at the change.
     worked: Duration,
-    /// Seen in this pass of the window, which is not on the screen yet.
+    /// True if this pass of the window shows the answer; the pass is not on the screen yet.
     seen: bool,
     times: Vec<Times>,
-    /// What is known of the change that is on its way to the screen.
+    /// Times of the change that is on its way to the screen, as far as they are known.
     handed: Times,
     late: u32,
     frames: usize,
@@ -58,14 +58,15 @@ pub struct Measure {
 }
 
 impl Measure {
-    /// Begins; `began` is the start of the program.
+    /// Begins a measurement. `began` is the start of the program.
     pub fn new(kind: Kind, began: Instant) -> Self {
         let (look, times) = (Look::Colour, Vec::new());
         let (worked, handed) = (Duration::ZERO, Times::default());
         Self { kind, began, look, changed: None, worked, seen: false, times, handed, late: 0, frames: 0, shown: None }
     }
 
-    /// Before the window is drawn: what was drawn last is on the screen now. True when the measurement is through.
+    /// Runs before the window is drawn, when the last drawing is on the screen. Returns true when the measurement is
+    /// finished.
     pub fn before(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
         match self.kind {
             Kind::Start => self.start(viewer),
@@ -74,10 +75,10 @@ impl Measure {
         }
     }
 
-    /// After the window is drawn.
+    /// Runs after the window is drawn.
     pub fn after(&mut self, viewer: &Viewer, ctx: &egui::Context) {
         self.seen = match self.kind {
-            // A recording is on the screen before all of its frames are known.
+            // A recording is on the screen before all of its pictures are known.
             Kind::Start => viewer.sight().is_some(),
             _ => viewer.is_settled(),
         };
@@ -134,7 +135,7 @@ impl Measure {
             let in_time = self.times.iter().filter(|t| t.late == 0).count();
             let latest = self.times.iter().map(|t| t.late).max().unwrap_or(0);
             println!("  in the frame of the change: {in_time} of {CHANGES}, {latest} frames later at most");
-            // The system counts in steps as long as a frame: only the mean of many is exact.
+            // The system counts processor time in steps of about a frame, so only the mean over many changes is exact.
             let mean = |part: fn(&Times) -> Duration| {
                 self.times.iter().map(part).sum::<Duration>().as_secs_f64() * 1e3 / CHANGES as f64
             };
@@ -154,7 +155,7 @@ impl Measure {
         }
         (self.changed, self.late) = (Some(Instant::now()), 0);
         self.worked = processor_time();
-        // A little to and fro, so that every change is one.
+        // Every step sets another scale, so that every step is a change.
         let scale = 1.0 + 0.002 * (self.times.len() % 100) as f64 + 0.001;
         if let Some(session) = viewer.session_mut() {
             session.set("binarize", "scale", 0, Some(scale.into()));
@@ -194,13 +195,13 @@ impl Measure {
     }
 }
 
-/// Processor time of this thread so far; nothing where the system does not say.
+/// Returns the processor time of this thread so far, or zero if the system does not report it.
 fn processor_time() -> Duration {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     told.split(' ').next().and_then(|ns| ns.parse().ok()).map_or(Duration::ZERO, Duration::from_nanos)
 }
 
-/// Of this process, in megabytes; 0 where the system does not say.
+/// Returns a memory size of this process in megabytes, or 0 if the system does not report it.
 fn memory(field: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix(field)?.strip_prefix(':'));

@@ -12,22 +12,22 @@ use crate::measure::Measure;
 use crate::model::Settings;
 use crate::ui::Viewer;
 
-/// A screenshot that has not come by then will not come.
+/// Longest time to wait for the screenshot.
 const SHOT_LIMIT: Duration = Duration::from_secs(60);
-/// Passes of the window before its picture is taken: plots find their bounds, panels their sizes.
+/// Passes of the window before the screenshot is taken; plots find their bounds and panels their sizes in these passes.
 const PASSES: u32 = 6;
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// There is no display or no OpenGL; with `--screenshot`, nothing to be shown.
+/// There is no display or no OpenGL. With `--screenshot`, it is also an error if there is nothing to show.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let began = Instant::now();
     if !(args.fps > 0.0 && args.fps.is_finite()) {
         bail!("--fps: must be above 0");
     }
     let shot = args.screenshot.clone();
-    // A picture for documents does not depend on what somebody set before.
+    // A screenshot for documents must not depend on the settings of an earlier run.
     let store = if shot.is_some() || args.measure.is_some() { None } else { Settings::place() };
     let mut settings = store.as_deref().map(Settings::load).unwrap_or_default();
     if args.light {
@@ -69,11 +69,11 @@ type RunResult = Arc<Mutex<Option<anyhow::Result<()>>>>;
 
 struct Window {
     viewer: Viewer,
-    /// Where a picture of the window goes.
+    /// File for the screenshot of the window; `None` without `--screenshot`.
     shot: Option<PathBuf>,
     measure: Option<Measure>,
     begin: Instant,
-    /// Passes since the frame is there.
+    /// Passes of the window since the picture is shown.
     passes: u32,
     told: bool,
     taken: RunResult,
@@ -146,7 +146,7 @@ impl Window {
     }
 }
 
-/// Says what the window shows: a line for each body.
+/// Prints what the window shows, one line for each body.
 fn tell(viewer: &Viewer) {
     let Some(sight) = viewer.sight() else { return };
     let rows = sight.answers.first().into_iter().flat_map(|o| &o.bodies).map(|b| &b.row);

@@ -4,7 +4,7 @@
 >>> report = sensor.process(image, altitude_km=230.0)
 >>> report.status, report.axis, report.covariance
 
-Everything is in the camera frame (x right, y down, z forward) unless its name says otherwise; pixel centres are at
+Vectors are in the camera frame (x right, y down, z forward) unless their name says otherwise; pixel centres are at
 integers, as in OpenCV. Names end with their unit.
 """
 
@@ -35,7 +35,7 @@ from ._simulation import simulate as simulate
 
 
 def __getattr__(name: str) -> object:
-    """Give the stages under their old names, with a warning."""
+    """Import the stages under their old names, with a warning."""
     if name in ("binarize", "contours", "ransac"):
         import importlib
 

@@ -1,4 +1,4 @@
-"""Classes over the sensor that the command line has too. Their docstrings are written here, and compiled into the module."""
+"""Classes that wrap the sensor of the command line. Their docstrings are written here and compiled into the module."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
@@ -27,17 +27,17 @@ _Status: TypeAlias = Literal[
 __version__: str
 
 class HznError(ValueError):
-    """Base of hzn's exceptions."""
+    """Base class of hzn's exceptions."""
 
 class ConfigError(HznError):
-    """A sensor, a calibration or a frame's own data that cannot be; the message names the field."""
+    """An impossible sensor, calibration or prior of a picture; the message names the field."""
 
 class ImageError(HznError):
     """An array that is no picture, or not one of this camera."""
 
 @final
 class Camera:
-    """A lens: from directions to pixels and back.
+    """A camera with its lens; it converts directions to pixels and back.
 
     Directions are in the camera frame (x right, y down, z forward); pixel centres are at integers, as in OpenCV.
     ``Camera(width=..., height=..., model=..., fx_px=..., fy_px=..., cx_px=..., cy_px=..., k=[...])`` takes the keys of
@@ -52,7 +52,7 @@ class Camera:
         Raises
         ------
         ConfigError
-            The first thing wrong with the file: file, line, field, limit.
+            The file has an error; the message names file, line, field and limit of the first one.
         """
 
     @staticmethod
@@ -64,12 +64,12 @@ class Camera:
         path
             The YAML file.
         camera
-            Which camera of the chain, such as ``"cam1"``; without it the first.
+            Name of the camera in the chain, for example ``"cam1"``; without it, the first camera.
 
         Raises
         ------
         ConfigError
-            A file or a lens that is not known.
+            The file or the lens model is not known.
         """
 
     @staticmethod
@@ -80,40 +80,41 @@ class Camera:
         size: tuple[int, int] | None = None,
         fisheye: bool = False,
     ) -> Camera:
-        """Take an OpenCV calibration: its YAML file, or camera matrix and coefficients.
+        """Take an OpenCV calibration: its YAML file, or the camera matrix and the coefficients.
 
         Parameters
         ----------
         source
             Path of the YAML file, or the camera matrix K, shape (3, 3), pixels.
         distortion
-            D: 4 or 5 coefficients k1, k2, p1, p2, k3; with ``fisheye`` k1 to k4. Without it an ideal pinhole.
+            D: 4 or 5 coefficients k1, k2, p1, p2, k3; with ``fisheye`` k1 to k4. Without it, the lens is an ideal
+            pinhole.
         size
-            Width and height of the picture, pixels; K does not say it.
+            Width and height of the picture, pixels; required with K, which does not contain them.
         fisheye
             K and D are of ``cv2.fisheye``.
 
         Raises
         ------
         ConfigError
-            A file or a lens that is not known; which argument.
+            The file or the lens model is not known; the message names the argument.
         """
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """The keys of ``[camera]`` in sensor.toml. A copy."""
+        """Copy of the keys of ``[camera]`` in sensor.toml."""
 
     @property
     def width(self) -> int:
-        """Columns of the picture."""
+        """Width of the picture, pixels."""
 
     @property
     def height(self) -> int:
-        """Rows of the picture."""
+        """Height of the picture, pixels."""
 
     @property
     def model(self) -> Literal["kannala-brandt", "equidistant", "pinhole", "brown-conrady"]:
-        """The projection."""
+        """Projection model."""
 
     @property
     def matrix(self) -> NDArray[np.float64]:
@@ -121,10 +122,10 @@ class Camera:
 
     @property
     def k(self) -> list[float]:
-        """Coefficients of the lens, as sensor.toml has them."""
+        """Coefficients of the lens, as in sensor.toml."""
 
     def project(self, rays: ArrayLike) -> NDArray[np.float64]:
-        """Pixels of directions.
+        """Project directions to pixels.
 
         Parameters
         ----------
@@ -134,16 +135,16 @@ class Camera:
         Returns
         -------
         numpy.ndarray
-            Points (u, v) in pixels, shape (n, 2); NaN where the lens does not see.
+            Points (u, v) in pixels, shape (n, 2); NaN outside the field of view of the lens.
 
         Raises
         ------
         ImageError
-            Another shape.
+            The array has another shape.
         """
 
     def unproject(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Directions of pixels.
+        """Convert pixels to directions.
 
         Parameters
         ----------
@@ -153,16 +154,16 @@ class Camera:
         Returns
         -------
         numpy.ndarray
-            Unit vectors in the camera frame, shape (n, 3); NaN outside of the image circle.
+            Unit vectors in the camera frame, shape (n, 3); NaN outside the image circle.
 
         Raises
         ------
         ImageError
-            Another shape.
+            The array has another shape.
         """
 
     def undistort_points(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Points on the plane z = 1, as ``cv2.undistortPoints`` and ``cv2.fisheye.undistortPoints`` give them.
+        """Map points to the plane z = 1, like ``cv2.undistortPoints`` and ``cv2.fisheye.undistortPoints``.
 
         Parameters
         ----------
@@ -172,17 +173,17 @@ class Camera:
         Returns
         -------
         numpy.ndarray
-            (x / z, y / z) of their rays, shape (n, 2); NaN outside of the image circle and from 90 degrees off axis on,
-            where there is no such point: `unproject` has no such limit.
+            (x / z, y / z) of their rays, shape (n, 2). NaN outside the image circle, and at 90 degrees off axis or
+            more, where the plane has no such point; `unproject` does not have this limit.
 
         Raises
         ------
         ImageError
-            Another shape.
+            The array has another shape.
         """
 
     def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Derivatives of the unit rays by (u, v).
+        """Compute the derivatives of the unit rays with respect to (u, v).
 
         Parameters
         ----------
@@ -192,12 +193,12 @@ class Camera:
         Returns
         -------
         numpy.ndarray
-            Shape (n, 3, 2), radians a pixel: rows x, y, z of the ray, columns u, v. NaN outside of the image circle.
+            Shape (n, 3, 2), radians per pixel: rows x, y, z of the ray, columns u, v. NaN outside the image circle.
 
         Raises
         ------
         ImageError
-            Another shape.
+            The array has another shape.
         """
 
     def __eq__(self, other: object, /) -> bool: ...
@@ -206,12 +207,13 @@ class Camera:
 class Sensor:
     """A horizon sensor.
 
-    ``Sensor(camera=..., body=..., preset=...)`` takes the sections of a sensor.toml as dictionaries; for ``camera`` a
-    `Camera` will do, and only it must be there. ``preset`` is ``"hzn"``, ``"dlr-2022"``, ``"zju-2022"``,
-    ``"horace-2015"``, ``"sun"`` or ``"moon"``. ``flight=True`` calculates in single precision with 2048 points, as on the
-    flight computer. A key or value that is refused is a `ConfigError` with its name and limit.
+    ``Sensor(camera=..., body=..., preset=...)`` takes the sections of a sensor.toml as dictionaries. Only ``camera`` is
+    required; it may also be a `Camera`. ``preset`` is ``"hzn"``, ``"dlr-2022"``, ``"zju-2022"``, ``"horace-2015"``,
+    ``"sun"`` or ``"moon"``. ``flight=True`` computes in single precision with 2048 points, as on the flight computer. A
+    key or value that is refused raises `ConfigError` with its name and limit.
 
-    One sensor may be used from many threads at once: the answers are the same as from one. It can be copied and pickled.
+    A sensor may be used from several threads at the same time; the answers are the same as with one thread. It can be
+    copied and pickled.
 
     Examples
     --------
@@ -226,15 +228,15 @@ class Sensor:
         Raises
         ------
         ConfigError
-            The first thing wrong with the file: file, line, field, limit.
+            The file has an error; the message names file, line, field and limit of the first one.
         """
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Every parameter, as sections and keys of sensor.toml.
+        """All parameters, as sections and keys of sensor.toml.
 
-        What is read is a copy: change it and set it again. A set that is refused (`ConfigError`) leaves everything as it
-        was; calls under way in other threads end with the parameters that they began with.
+        Reading returns a copy: change the copy and set it again. If the new parameters are refused (`ConfigError`),
+        nothing changes. Calls that other threads have begun end with the parameters that they began with.
 
         Examples
         --------
@@ -247,11 +249,11 @@ class Sensor:
     def parameters(self, sections: dict[str, Any], /) -> None: ...
     @property
     def camera(self) -> Camera:
-        """The lens."""
+        """The camera with its lens."""
 
     @property
     def flight(self) -> bool:
-        """Single precision, as on the flight computer?"""
+        """True if the sensor computes in single precision, as on the flight computer."""
 
     def expect(
         self,
@@ -264,20 +266,20 @@ class Sensor:
         rate_rad_s: Sequence[float] | None = None,
         time_s: float | None = None,
     ) -> Expected:
-        """Work out the cone to expect, for the single stages (`hzn.consensus` and its neighbours).
+        """Compute the expected cone, for the single stages (`hzn.consensus` and its neighbours).
 
         Parameters
         ----------
         body
-            Of a sensor of several bodies the number of one, from 0: the stages that are told so work for this one, with its
-            own level and edge errors.
+            Number of the body for a sensor of several bodies, from 0. Stages that get the result work for this body,
+            with its threshold and its edge errors.
         altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s
             As in `process`.
 
         Raises
         ------
         ConfigError
-            A body that the sensor does not have; an altitude, position or attitude that cannot be.
+            The sensor does not have this body, or an altitude, position or attitude is impossible.
         """
 
     def process(
@@ -298,38 +300,39 @@ class Sensor:
         Parameters
         ----------
         image
-            Shape (height, width) or (height, width, channels), uint8 or uint16, of any strides. It is not copied; in C
-            order it is read fastest.
+            Shape (height, width) or (height, width, channels), uint8 or uint16, with any strides. It is not copied; C
+            order is fastest.
         altitude_km
-            Above WGS-84 for ``earth``, else above the radius; without it, that of the parameters.
+            Above WGS-84 for ``earth``, otherwise above the radius. Without it, the parameters' altitude is used.
         position_km
-            Position of the camera in ECEF, shape (3,); it beats the altitude.
+            Position of the camera in ECEF, km, shape (3,). It overrides the altitude.
         attitude
-            Prior attitude, quaternion (w, x, y, z) that takes the camera frame to ECEF.
+            Prior attitude: unit quaternion (w, x, y, z) from the camera frame to ECEF.
         attitude_sigma_deg
-            1-sigma of that attitude; without it, 5.
+            1-sigma of the prior attitude, degrees; without it, 5.
         rate_rad_s
-            Rate of rotation of the camera in its own axes, rad/s, shape (3,); with a rolling shutter (`camera.readout_s`).
+            Rotation rate of the camera in the camera frame, rad/s, shape (3,). It corrects a rolling shutter
+            (`camera.readout_s`).
         time_s
-            UTC in seconds since 1970. With a position it gives `Report.axis_ecef` of Sun and Moon.
+            UTC in seconds since 1970. With a position, Sun and Moon get `Report.axis_ecef`.
         bits
-            Significant bits of uint16, 8 to 16; without it, the sensor's `input.bits`, else 16. Where nothing is found and the
-            upper bits are unused, a warning says so.
+            Number of significant bits of uint16, 8 to 16. Without it, the sensor's `input.bits` is used, else 16. If
+            nothing is found and the upper bits are unused, a warning says so.
         detail
-            Keep edges, points and times of the stages.
+            Keep edges, points and the times of the stages.
 
         Returns
         -------
         Report
-            Of a sensor of several bodies that of the first; `Report.others` has the rest. Below the limb height, where every
-            rocket begins, its status is ``no-altitude``.
+            Report of the first body; `Report.others` has the reports of further bodies. Below the limb height, where
+            every rocket starts, the status is ``no-altitude``.
 
         Raises
         ------
         ImageError
-            Another dtype, shape or size than the camera's.
+            The array has another dtype, shape or size than the camera's picture.
         ConfigError
-            An altitude, position or attitude that cannot be.
+            An altitude, position or attitude is impossible.
         """
 
     def process_many(
@@ -339,47 +342,47 @@ class Sensor:
         jobs: int | None = None,
         progress: bool = False,
     ) -> Iterator[Report]:
-        """Process a sequence on all cores. Reports come in order while it runs; memory does not grow with its length.
+        """Process a sequence on all cores. Reports come in order while it runs; memory does not grow with the length.
 
         Parameters
         ----------
         images
-            A folder, a pattern, a video or an MCAP, taken as ``hzn run`` takes it, with the frames.csv beside it; or paths
-            of pictures; or arrays; or pairs of an array and a dictionary of what `process` is told besides
-            (``altitude_km`` and so on). Of an iterable no more is taken than is being worked on: by each thread some
-            milliseconds' work or 8 MB, a picture at least.
+            A folder, a pattern, a video or an MCAP, as for ``hzn run``, with the frames.csv next to it; or paths of
+            pictures; or arrays; or pairs of an array and a dictionary of keyword arguments of `process`
+            (``altitude_km`` and so on). An iterable is read only as fast as it is processed: each thread takes some
+            milliseconds' work or 8 MB at a time, and at least one picture.
         jobs
-            Threads; without it, one a core. With ``binarize.method = "track"`` there is only one.
+            Number of threads; without it, one per core. With ``binarize.method = "track"`` there is only one.
         progress
-            Show a bar (needs the package tqdm).
+            Show a progress bar (needs the package tqdm).
 
         Yields
         ------
         Report
-            One a picture. A picture file that cannot be read has the status ``unreadable`` and its reason in
-            `Report.detail`; an array that is refused raises as in `process`, after the reports before it.
+            One per picture. A picture file that cannot be read has the status ``unreadable`` and the reason in
+            `Report.detail`. An array that is refused raises as in `process`, after the reports before it.
 
         Raises
         ------
         ConfigError
-            Nothing there, or a frames.csv that is wrong.
+            There are no pictures, or the frames.csv has an error.
         KeyboardInterrupt
-            Within a frame's time; the pictures that were begun are finished first.
+            Comes within about the time of one picture; the pictures in progress are finished first.
         """
 
     def __eq__(self, other: object, /) -> bool: ...
 
 @final
 class Report:
-    """What was found in one picture. Without an answer the properties of the answer are None.
+    """Result of one picture. Without an answer, the properties of the answer are None.
 
-    A notebook shows it with the picture (the array that was processed, as it is now) and everything drawn over it. It can
-    be pickled; the picture stays behind.
+    A notebook shows it with the picture and all annotations; the picture is the processed array with its present
+    contents. A report can be pickled, but without the picture.
     """
 
     @property
     def index(self) -> int:
-        """Place in the sequence, from 0."""
+        """Index of the picture in the sequence, from 0."""
 
     @property
     def file(self) -> str:
@@ -387,7 +390,7 @@ class Report:
 
     @property
     def time_s(self) -> float | None:
-        """Time of the picture, seconds; None where frames.csv gives times, but none of this picture."""
+        """Time of the picture, seconds; None if frames.csv has times, but none for this picture."""
 
     @property
     def body(self) -> str:
@@ -395,19 +398,19 @@ class Report:
 
     @property
     def status(self) -> _Status:
-        """Outcome."""
+        """Outcome of the picture."""
 
     @property
     def ok(self) -> bool:
-        """Is there an answer?"""
+        """True if there is an answer."""
 
     @property
     def stage(self) -> str:
-        """The stage that was reached; empty when it was read from a recording."""
+        """Stage that was reached; empty for a report from a recording."""
 
     @property
     def detail(self) -> str:
-        """Why there is no answer, in words; empty beside ``ok``."""
+        """Reason why there is no answer, in words; empty with the status ``ok``."""
 
     @property
     def axis(self) -> NDArray[np.float64] | None:
@@ -415,11 +418,11 @@ class Report:
 
     @property
     def axis_ecef(self) -> NDArray[np.float64] | None:
-        """The same direction in ECEF, shape (3,), when the position is known."""
+        """The same direction in ECEF, shape (3,), if the position is known."""
 
     @property
     def covariance(self) -> NDArray[np.float64] | None:
-        """Covariance of the axis on its tangent plane, shape (3, 3) of rank 2, rad²."""
+        """Covariance of the axis on its tangent plane in the camera frame, shape (3, 3) of rank 2, rad²."""
 
     @property
     def sigma_max_deg(self) -> float | None:
@@ -431,15 +434,15 @@ class Report:
 
     @property
     def altitude_km(self) -> float | None:
-        """The altitude that was given, or that of the position, kilometres."""
+        """The given altitude, or the altitude of the position, kilometres."""
 
     @property
     def altitude_est_km(self) -> float | None:
-        """The altitude that follows from the free fit, kilometres."""
+        """Altitude from the free fit, kilometres."""
 
     @property
     def altitude_est_sigma_km(self) -> float | None:
-        """Its standard deviation, kilometres."""
+        """Standard deviation of `altitude_est_km`, kilometres."""
 
     @property
     def rms_px(self) -> float | None:
@@ -447,40 +450,39 @@ class Report:
 
     @property
     def roll_deg(self) -> float | None:
-        """Roll of the vehicle, degrees; with a mounting."""
+        """Roll of the vehicle, degrees; needs a mounting."""
 
     @property
     def pitch_deg(self) -> float | None:
-        """Pitch of the vehicle, degrees; with a mounting."""
+        """Pitch of the vehicle, degrees; needs a mounting."""
 
     @property
     def edge_points(self) -> int | None:
-        """Sub-pixel edge points that were measured."""
+        """Number of edge points that were located with sub-pixel accuracy."""
 
     @property
     def dropped(self) -> int | None:
-        """Border pixels dropped because a list was full."""
+        """Number of border pixels that were dropped because a list was full."""
 
     @property
     def level(self) -> int | None:
-        """Level between dark and lit in the picture's own counts."""
+        """Threshold between dark and lit, in counts of the picture."""
 
     @property
     def elapsed_us(self) -> float | None:
-        """Time of processing, microseconds."""
+        """Processing time, microseconds."""
 
     @property
     def others(self) -> list[Report]:
-        """Of a sensor of several bodies, the reports of those after the first."""
+        """Reports of the bodies after the first, for a sensor of several bodies."""
 
     @property
     def candidates(self) -> list[dict[str, Any]]:
-        """The first 16 edges that were looked at, the chosen one always among them: length_px, points, inliers, rms_px,
-        verdict."""
+        """The first 16 examined edges, always with the chosen one: length_px, points, inliers, rms_px, verdict."""
 
     @property
     def limb(self) -> list[NDArray[np.float64]]:
-        """The fitted limb in the picture as lines of points (u, v), each of shape (n, 2), pixels."""
+        """The fitted limb in the picture, as lines of points (u, v), each of shape (n, 2), pixels."""
 
     @property
     def edges(self) -> list[NDArray[np.float64]]:
@@ -488,7 +490,7 @@ class Report:
 
     @property
     def inliers(self) -> NDArray[np.float64]:
-        """Edge points (u, v) that carry the answer, shape (n, 2), pixels. Needs ``detail=True`` (`HznError`)."""
+        """Inliers: edge points (u, v) of the answer, shape (n, 2), pixels. Needs ``detail=True`` (`HznError`)."""
 
     @property
     def rejected(self) -> NDArray[np.float64]:
@@ -503,22 +505,22 @@ class Report:
         """Time of each stage, microseconds. Needs ``detail=True`` (`HznError`)."""
 
     def to_dict(self) -> dict[str, Any]:
-        """The row that ``hzn run`` would write, by its columns; None for an empty cell."""
+        """Return the row that ``hzn run`` would write, by column; None for an empty cell."""
 
     def __copy__(self) -> Report: ...
     def __deepcopy__(self, _memo: Any, /) -> Report: ...
 
 def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:
-    """Draw what a report stands on over its picture: limb and axis, with ``detail=True`` edges and points too.
+    """Draw limb and axis of a report over its picture; with ``detail=True`` also edges and points.
 
     Parameters
     ----------
     image
         The picture, as for `Sensor.process`.
     report
-        Its report.
+        Report of the picture.
     bits
-        Significant bits of uint16.
+        Number of significant bits of uint16.
 
     Returns
     -------
@@ -528,7 +530,7 @@ def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArra
     Raises
     ------
     ImageError
-        An array that is no picture.
+        The array is no picture.
     """
 
 def read_mcap(path: _Path) -> dict[str, NDArray[Any]]:
@@ -537,7 +539,7 @@ def read_mcap(path: _Path) -> dict[str, NDArray[Any]]:
     Returns
     -------
     dict
-        One array a column, of equal length; NaN in empty cells. Columns and units: book/reference/files.md.
+        One array per column, of equal length; NaN in empty cells. Columns and units: book/reference/files.md.
 
     Raises
     ------
@@ -546,7 +548,7 @@ def read_mcap(path: _Path) -> dict[str, NDArray[Any]]:
     """
 
 def open_mcap(path: _Path) -> Recording:
-    """Open a recording to go through its frames, one after another; memory does not grow with its length.
+    """Open a recording to read its pictures one after another; memory does not grow with its length.
 
     Raises
     ------
@@ -562,27 +564,27 @@ def open_mcap(path: _Path) -> Recording:
 
 @final
 class Recording:
-    """A recording that is being read, from `open_mcap`. It is an iterator of its frames, and a context manager."""
+    """A recording that is being read, from `open_mcap`. It is an iterator of its pictures and a context manager."""
 
     @property
     def sensor_toml(self) -> str | None:
-        """Text of the sensor.toml that it was made with."""
+        """Text of the sensor.toml that the recording was made with."""
 
     @property
     def metadata(self) -> dict[str, str]:
         """Versions and settings of the run."""
 
     def sensor(self) -> Sensor:
-        """Make the sensor that it was made with.
+        """Make the sensor that the recording was made with.
 
         Raises
         ------
         HznError
-            It holds no sensor.toml.
+            The recording holds no sensor.toml.
         """
 
     def close(self) -> None:
-        """Close the file. To read on is an `HznError`."""
+        """Close the file. Reading on raises `HznError`."""
 
     def __iter__(self) -> Recording: ...
     def __next__(self) -> Frame: ...
@@ -594,38 +596,38 @@ class Recording:
 
 @final
 class Frame:
-    """A frame of a recording."""
+    """A picture of a recording with its report."""
 
     @property
     def image(self) -> _Image | None:
-        """The picture, shape (height, width) or (height, width, channels), decoded anew at each access; None when it was
-        left out.
+        """The picture, shape (height, width) or (height, width, channels), decoded at each access; None if the
+        recording was made without it.
 
         Raises
         ------
         ImageError
-            It cannot be decoded.
+            The picture cannot be decoded.
         """
 
     @property
     def report(self) -> Report:
-        """What was found in it."""
+        """Result of the picture."""
 
 @final
 class Simulation:
-    """A flight that is rendered frame by frame when it is looked at, from `simulate`. A sequence of `SimulatedFrame`."""
+    """A simulated flight, from `simulate`: a sequence of `SimulatedFrame`, each rendered when it is accessed."""
 
     def __new__(
         cls, scene: _Path | Mapping[str, Any], *, frames: int | None = None, seed: int | None = None
     ) -> Simulation: ...
     @property
     def parameters(self) -> dict[str, Any]:
-        """Sections and keys of the scene.toml: change a copy and give it to `simulate`."""
+        """Sections and keys of the scene.toml: change a copy and pass it to `simulate`."""
 
     @property
     def sensor(self) -> Sensor:
-        """The sensor that took the pictures, with limb height and noise model measured on 32 other pictures of the scene.
-        That takes as long as to render them, once."""
+        """The sensor that took the pictures. Its limb height and noise model are measured on 32 other pictures of the
+        scene; this takes as long as to render them, but only once."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, index: int, /) -> SimulatedFrame: ...
@@ -641,11 +643,11 @@ class SimulatedFrame:
 
     @property
     def image(self) -> _Image:
-        """The picture, shape (height, width) or (height, width, 3); rendered once."""
+        """The picture, shape (height, width) or (height, width, 3); it is rendered only once."""
 
     @property
     def known(self) -> dict[str, Any]:
-        """What `Sensor.process` is told of it: ``sensor.process(frame.image, **frame.known)``."""
+        """Keyword arguments of `Sensor.process`: ``sensor.process(frame.image, **frame.known)``."""
 
     @property
     def truth(self) -> list[dict[str, Any]]:
@@ -653,15 +655,15 @@ class SimulatedFrame:
 
 @final
 class Expected:
-    """The cone that follows from what is known about a picture, from `Sensor.expect`."""
+    """The expected cone of a picture, from `Sensor.expect`."""
 
     @property
     def half_angle_deg(self) -> float:
-        """Its half-angle, degrees."""
+        """Half-angle of the cone, degrees."""
 
 @disjoint_base
 class Cone:
-    """A cone of directions: what a method of rejection finds. ``Cone(axis, cos_half_angle)`` makes one's own."""
+    """A cone of directions, as the consensus finds it. ``Cone(axis, cos_half_angle)`` makes one from given values."""
 
     def __new__(cls, axis: Sequence[float] | NDArray[np.float64], cos_half_angle: float) -> Cone: ...
     @property
@@ -670,15 +672,15 @@ class Cone:
 
     @property
     def cos_half_angle(self) -> float:
-        """cos of the half-angle."""
+        """Cosine of the half-angle."""
 
     @property
     def draws(self) -> int:
-        """Draws that were made to find it."""
+        """Number of random draws of the consensus."""
 
 @final
 class Fit(Cone):
-    """A cone that was fitted, from `hzn.fit.cone`."""
+    """A fitted cone, from `hzn.fit.cone`."""
 
     @property
     def rms_px(self) -> float:
@@ -686,7 +688,7 @@ class Fit(Cone):
 
     @property
     def inliers(self) -> int:
-        """Points with a weight."""
+        """Number of points with a weight above 0."""
 
 @final
 class Rays:
@@ -698,7 +700,7 @@ class Rays:
 
     @property
     def lit(self) -> NDArray[np.float64]:
-        """On which side of each point the light is: a step of a pixel along u or v, shape (n, 2)."""
+        """Direction from each point to its lit side: a step of one pixel along u or v, shape (n, 2)."""
 
     @property
     def directions(self) -> NDArray[np.float64]:
@@ -706,8 +708,8 @@ class Rays:
 
     @property
     def weights(self) -> NDArray[np.float64]:
-        """Weights from 0 (does not count) to 1, shape (n,). A copy: set it to choose the points. After a fit, what each point
-        counted. Points that the lens does not see stay at 0.
+        """Weights from 0 (ignored) to 1, shape (n,). Reading returns a copy; set the property to choose the points.
+        After a fit, it has the weights of the fit. Points outside the field of view of the lens stay at 0.
         """
 
     @weights.setter

@@ -1,7 +1,7 @@
-"""Many pictures on all cores: the threads are Python's, the work is done without the interpreter.
+"""Processing of many pictures on all cores: the threads are Python's, but they work without holding the interpreter.
 
-Pictures go to the threads in tasks of several, so that handing them over costs little beside them. The caller's thread
-waits in `queue.SimpleQueue` alone: an interrupt leaves no lock behind, as it would in those that are written in Python.
+A task for a thread has several pictures, so that its transfer costs little compared with the work. The caller's thread
+waits only in `queue.SimpleQueue`: there an interrupt leaves no lock behind, unlike in the queues written in Python.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _TASK_ITEMS = 32
 
 
 def process_many(sensor: Sensor, images: Any, jobs: int | None, progress: bool) -> Iterator[Report]:
-    """What `Sensor.process_many` does."""
+    """Implement `Sensor.process_many`."""
     if jobs is not None and jobs < 1:
         raise ConfigError(f"jobs: {jobs} is refused: must be 1 or more")
     work, items, total = _work(sensor, images)
@@ -33,7 +33,7 @@ def process_many(sensor: Sensor, images: Any, jobs: int | None, progress: bool) 
 
 
 def _work(sensor: Sensor, images: Any) -> tuple[Callable[[Any], Report], Iterable[Any], int | None]:
-    """What is to be done with each item, the items, and their number where it is known."""
+    """Return the function for each item, the items, and their number if it is known."""
     if isinstance(images, str | os.PathLike):
         return _files(sensor, [images])
     iterator = iter(images)
@@ -57,34 +57,34 @@ def _files(
 
 
 class _Task:
-    """Some items, what comes after them, and in time what came of them."""
+    """Some items, the error that follows them, and later their reports."""
 
     def __init__(self) -> None:
         self.items: list[Any] = []
         self.error: BaseException | None = None
-        """Raised when the reports before it are through."""
+        """Raised after the reports of the task."""
         self.through: SimpleQueue[list[Report]] = SimpleQueue()
 
     def reports(self) -> Iterator[Report]:
-        """Waits for them."""
+        """Wait for the reports."""
         yield from self.through.get()
         if self.error is not None:
             raise self.error
 
 
 class _Pace:
-    """What the threads tell each other."""
+    """State that the threads share."""
 
     stopped = False
     item_s = _TASK_S
-    """What an item took of late; at first as long as a task may."""
+    """Recent time per item, seconds; at first the longest time of a task."""
 
 
 def _in_order(work: Callable[[Any], Report], items: Iterable[Any], threads: int) -> Iterator[Report]:
     tasks: SimpleQueue[_Task | None] = SimpleQueue()
     pending: deque[_Task] = deque()
     pace = _Pace()
-    # Daemons: when a second interrupt comes while they end, the program waits for none of them.
+    # Daemon threads: if a second interrupt comes while they end, the program does not wait for them.
     workers = [
         threading.Thread(target=_serve, args=(work, tasks, pace), name=f"hzn-{i}", daemon=True) for i in range(threads)
     ]
@@ -99,7 +99,7 @@ def _in_order(work: Callable[[Any], Report], items: Iterable[Any], threads: int)
         while pending:
             yield from pending.popleft().reports()
     finally:
-        # Also when the caller has had enough, or presses Ctrl-C: what was begun is finished, the rest forgotten.
+        # Also runs if the caller stops early or presses Ctrl-C: items in progress are finished, all others are dropped.
         pace.stopped = True
         for _ in workers:
             tasks.put(None)
@@ -108,7 +108,7 @@ def _in_order(work: Callable[[Any], Report], items: Iterable[Any], threads: int)
 
 
 def _taken(items: Iterable[Any], pace: _Pace) -> Iterator[_Task]:
-    """Tasks of some milliseconds; of one item when items take longer to come or to be done."""
+    """Yield tasks of some milliseconds, or of a single item if an item takes longer to arrive or to process."""
     iterator = iter(items)
     while True:
         task, held, begun = _Task(), 0, perf_counter()
@@ -132,7 +132,7 @@ def _taken(items: Iterable[Any], pace: _Pace) -> Iterator[_Task]:
 
 
 def _serve(work: Callable[[Any], Report], tasks: SimpleQueue[_Task | None], pace: _Pace) -> None:
-    """What each thread does."""
+    """Run the tasks; the function of each thread."""
     while (task := tasks.get()) is not None:
         reports: list[Report] = []
         begun = perf_counter()

@@ -1,4 +1,4 @@
-"""Before there are pictures: scenes with truth, answers beside their truth, and what a camera could reach."""
+"""Simulated scenes with truth, evaluation of answers against the truth, and the attainable accuracy of a camera."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ._hzn import Camera, ConfigError, Report, Simulation, _design, _evaluate
 def simulate(
     scene: str | PathLike[str] | Mapping[str, Any], *, frames: int | None = None, seed: int | None = None
 ) -> Simulation:
-    """Simulate a flight: pictures with exact truth, and the sensor that fits them.
+    """Simulate a flight: pictures with exact truth, and the matching sensor.
 
     Parameters
     ----------
@@ -25,19 +25,19 @@ def simulate(
         A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``horace``, ``horace-wide``,
         ``full-disc``, ``sun-moon``, ``tumble``), the path of a scene.toml, or its sections and keys as a dictionary.
     frames
-        Number of pictures, instead of the scene's.
+        Number of pictures; it replaces the number in the scene.
     seed
-        Seed of everything random, instead of the scene's.
+        Seed of all random numbers; it replaces the seed in the scene.
 
     Returns
     -------
     Simulation
-        A sequence of frames, each rendered when its picture is asked for.
+        A sequence of pictures, each rendered when it is accessed.
 
     Raises
     ------
     ConfigError
-        No such scene, or the first key or value that is refused.
+        The scene does not exist, or a key or value is refused; the message names the first one.
 
     Examples
     --------
@@ -54,28 +54,28 @@ def evaluate(
     *,
     camera: Camera | None = None,
 ) -> dict[str, Any]:
-    """Put results beside the truth: shares, errors, honesty of the covariances. Every picture counts.
+    """Compare results with the truth: shares, errors, consistency of the covariances. Every picture counts.
 
     Parameters
     ----------
     results
-        What ``hzn run`` wrote (.mcap, .csv, .jsonl), or reports; those of arrays, which have no name, in the order of the
-        truth.
+        A file that ``hzn run`` wrote (.mcap, .csv, .jsonl), or reports. Reports of arrays have no name, so they must be
+        in the order of the truth.
     truth
         A truth.csv or its folder, a `Simulation`, or rows of truth (`SimulatedFrame.truth`).
     camera
-        For the length of limb in view; an MCAP and a `Simulation` know it.
+        Camera for the length of limb in view; not needed with an MCAP or a `Simulation`, which contain it.
 
     Returns
     -------
     dict
-        ``evaluations``: a dictionary a body, as ``hzn evaluate -o report.json`` writes it (book/guide/evaluation.md; angles in
-        degrees). ``frames``: a dictionary a frame, ready for ``pandas.json_normalize``.
+        ``evaluations``: a dictionary per body, as ``hzn evaluate -o report.json`` writes it (book/guide/evaluation.md;
+        angles in degrees). ``frames``: a dictionary per picture, ready for ``pandas.json_normalize``.
 
     Raises
     ------
     HznError
-        Results and truth that do not belong together, a file that cannot be read.
+        Results and truth do not belong together, or a file cannot be read.
     """
     if isinstance(truth, Simulation):
         camera = camera or Camera(**truth.parameters["camera"])
@@ -100,44 +100,44 @@ def sensitivity(
     sigma_px: float | Sequence[float] = 1.0,
     correlation_px: float | Sequence[float] = 300.0,
 ) -> dict[str, NDArray[np.float64]]:
-    """Say how well a camera would do, without rendering, for every combination of the values given.
+    """Compute the accuracy that a camera would have, without rendering, for every combination of the given values.
 
     Parameters
     ----------
     altitude_km
-        Altitude above the sphere.
+        Altitude above the sphere, km.
     camera
-        A lens, instead of ``fov_deg``, ``size`` and ``lens``.
+        Camera; it replaces ``fov_deg``, ``size`` and ``lens``.
     fov_deg
-        Field of view across the width.
+        Field of view across the width, degrees.
     size
         Width and height of the picture, pixels.
     lens
         Projection.
     depression_deg
-        Angle of the optical axis below the horizontal; 90 looks straight down.
+        Angle of the optical axis below the horizontal, degrees; 90 looks straight down.
     roll_deg
-        Turn of the camera about its optical axis.
+        Rotation of the camera about its optical axis, degrees.
     radius_km
-        Radius of the body.
+        Radius of the body, km.
     limb_height_km, limb_height_sigma_km
-        Height of the visible limb, and its 1-sigma.
+        Height of the visible limb and its 1-sigma, km.
     altitude_sigma_km
-        1-sigma of the altitude.
+        1-sigma of the altitude, km.
     sigma_px, correlation_px
-        1-sigma of an edge point, and the length along the edge over which errors stay alike.
+        1-sigma of an edge point, and the correlation length of the errors along the edge, pixels.
 
     Returns
     -------
     dict
-        Columns of equal length, ready for a data frame: the values of each combination, then sigmas in degrees (1 sigma;
-        pitch in the plane of optical axis and body, roll across it) with the half-angle ``free``, ``fused`` with what
-        altitude and limb height say, and ``known``. NaN where too little of a limb is in view.
+        Columns of equal length, ready for a data frame: the values of each combination, then 1-sigma values in degrees
+        (pitch in the plane of optical axis and body, roll perpendicular to it) with the half-angle ``free``, ``fused``
+        with the half-angle from altitude and limb height, and ``known``. NaN if too little of the limb is in view.
 
     Raises
     ------
     ConfigError
-        A value that is refused, by name.
+        A value is refused; the message names it.
     """
     grid: dict[str, float | Sequence[float]] = {
         "altitude_km": altitude_km,
@@ -173,7 +173,7 @@ _SIGMAS = {
 
 
 def _ideal(lens: str, size: tuple[int, int], fov_deg: float) -> Camera:
-    """An ideal lens with this field of view across the width."""
+    """Return a camera with an ideal lens and this field of view across the width."""
     most = {"pinhole": 175.0, "equidistant": 350.0}.get(lens)
     if most is None:
         raise ConfigError(f"lens: {lens!r} is refused: pinhole or equidistant")
@@ -182,7 +182,7 @@ def _ideal(lens: str, size: tuple[int, int], fov_deg: float) -> Camera:
     width, height = size
     half = math.radians(fov_deg / 2)
     f_px = width / 2 / (math.tan(half) if lens == "pinhole" else half)
-    # Beyond 175 degrees off axis the corners of an equidistant picture hold nothing.
+    # The image circle of an equidistant lens ends at 175 degrees off axis; corners beyond it are not used.
     circle = {"theta_max_deg": 175.0} if math.degrees(math.hypot(width, height) / 2 / f_px) > 175 else {}
     if lens == "pinhole":
         circle = {}

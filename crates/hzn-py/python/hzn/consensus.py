@@ -14,20 +14,20 @@ def keep(sensor: Sensor, rays: Rays, expected: Expected | None = None) -> Cone |
     sensor
         Its parameters are used.
     rays
-        Points that cannot count get the weight 0.
+        Points that are rejected get the weight 0.
     expected
         From `hzn.Sensor.expect`; without it, from the parameters alone.
 
     Returns
     -------
     Cone or None
-        None when there is no such cone.
+        None if no cone is found.
     """
     return _keep(sensor, rays, expected or sensor.expect())
 
 
 def withdraw(sensor: Sensor, rays: Rays, found: Cone) -> int:
-    """Leave out the points on the limb of another body, which was found before in the same picture.
+    """Exclude the points on the limb of another body that was found before in the same picture.
 
     Parameters
     ----------
@@ -36,11 +36,11 @@ def withdraw(sensor: Sensor, rays: Rays, found: Cone) -> int:
     rays
         Points within three times ``reject.threshold_px`` of that limb get the weight 0.
     found
-        The other body's cone: ``Cone(fused.axis, fused.cos_half_angle)``.
+        Cone of the other body: ``Cone(fused.axis, fused.cos_half_angle)``.
 
     Returns
     -------
     int
-        How many points these were. With more than half of them there `hzn.Sensor.process` tries the edge no further.
+        Number of these points. If they are more than half of all, `hzn.Sensor.process` gives up the edge.
     """
     return _withdraw(sensor, rays, found)

@@ -1,4 +1,4 @@
-"""Edges between dark and lit, and sub-pixel points on them."""
+"""Edges between dark and lit pixels, and sub-pixel edge points."""
 
 from __future__ import annotations
 
@@ -27,21 +27,22 @@ def find(
     level
         A pixel is lit at this value or above, in counts.
     expected
-        Sets how far search lines are apart; without it, from the parameters alone, for the first body.
+        The distance of the search lines depends on it. From `hzn.Sensor.expect`; without it, from the parameters alone,
+        for the first body.
     bits
-        Significant bits of uint16.
+        Number of significant bits of uint16.
 
     Returns
     -------
     list of numpy.ndarray
-        Border pixels (x, y) of each edge in order along it, the lit side on the left, each of shape (n, 2); the edges in
-        the order in which `hzn.Sensor.process` looks at them, the likeliest first. It stops at none: neither at the limb
-        nor at ``[limits]``.
+        Border pixels (x, y) of each edge in order along it, the lit side on the left, each of shape (n, 2). The edges
+        are in the order in which `hzn.Sensor.process` examines them, the most likely first. All edges are returned: the
+        search does not stop at the limb or at ``[limits]``.
 
     Raises
     ------
     ImageError
-        An array that is no picture, or not one of this camera.
+        The array is no picture, or not one of this camera.
     """
     return _borders(sensor, image, level, expected or sensor.expect(), bits)
 
@@ -54,7 +55,7 @@ def points(
     *,
     bits: int | None = None,
 ) -> Rays:
-    """Locate the edge to a part of a pixel, by the method of the sensor's ``[candidates]``.
+    """Locate the edge with sub-pixel accuracy, by the method of the sensor's ``[candidates]``.
 
     Parameters
     ----------
@@ -67,16 +68,16 @@ def points(
     border
         Border pixels (x, y) in order along the edge, shape (n, 2).
     bits
-        Significant bits of uint16.
+        Number of significant bits of uint16.
 
     Returns
     -------
     Rays
-        ``candidates.keep_points`` of them at most, evenly along the edge.
+        At most ``candidates.keep_points`` points, evenly along the edge.
 
     Raises
     ------
     ImageError
-        A picture or a border that cannot be.
+        The picture or the border is invalid.
     """
     return _pick(sensor, image, level, border, bits)

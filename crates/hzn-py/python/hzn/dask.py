@@ -1,7 +1,7 @@
 """An archive of pictures on a Dask cluster: `pip install "hzn-sensor[dask]"`.
 
-One task a shard; the engine does the work, on one core a task. A shard is written under another name and then renamed, so
-whatever has its name is whole; a second run passes over shards that are there.
+Each shard is one task, which the engine processes on one core. A shard is written under another name and then renamed,
+so a file with the name of a shard is always complete. A second run skips the shards that exist.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _COUNTS = ("index", "edge_points", "inliers", "candidates", "dropped", "level")
 
 @dataclass
 class Archive:
-    """What became of an archive."""
+    """Result of an archive."""
 
     shards: list[str]
     """URLs of the shards, in the order of the pictures."""
     frames: int
-    """Pictures in them."""
+    """Number of pictures in the shards."""
     skipped: int
-    """Shards that were there already."""
+    """Number of shards that existed already."""
     failed: list[dict[str, Any]] = field(repr=False)
     """Pictures that were not processed: ``file`` and ``detail``. They have a row with status ``unreadable`` or
     ``no-altitude`` in their shard."""
@@ -59,26 +59,26 @@ def process_archive(
     shard_frames: int = 500,
     retries: int = 2,
 ) -> Archive:
-    """Process pictures wherever fsspec finds them, into shards of results.
+    """Process pictures from any place that fsspec can read, into shards of results.
 
     Parameters
     ----------
     urls
-        URLs or paths of picture files; or pairs of one and a dictionary of what `hzn.Sensor.process` is told besides
-        (``altitude_km`` and so on).
+        URLs or paths of picture files; or pairs of a URL or path and a dictionary of keyword arguments of
+        `hzn.Sensor.process` (``altitude_km`` and so on).
     sensor
-        The sensor. One with ``binarize.method = "track"`` is refused: its levels go from picture to picture.
+        The sensor. ``binarize.method = "track"`` is refused, because its threshold depends on the picture before.
     client
-        A Dask client; without it the one at hand.
+        A Dask client; without it, the current one.
     out
         URL or path of a folder for the shards.
     format
-        Of the shards: Parquet with the columns of book/reference/files.md, or MCAP without pictures.
+        Format of the shards: Parquet with the columns of book/reference/files.md, or MCAP without pictures.
     shard_frames
-        Pictures a shard; another number makes other shards.
+        Number of pictures per shard. Another number makes other shards.
     retries
-        How often a shard is tried again when its task fails. A worker that dies is not counted: Dask gives its tasks to
-        others.
+        Number of times that a shard is tried again if its task fails. The death of a worker does not count: Dask gives
+        its tasks to others.
 
     Returns
     -------
@@ -88,9 +88,9 @@ def process_archive(
     Raises
     ------
     ConfigError
-        No pictures, or a sensor or option that cannot be.
+        There are no pictures, or the sensor or an option is invalid.
     Exception
-        What a shard failed with in the end; the others are written, and the next run begins with what is missing.
+        A shard failed after all retries. The other shards are written, and the next run makes the missing ones.
     """
     pictures = [(url, {}) if isinstance(url, str) else (url[0], dict(url[1])) for url in urls]
     if not pictures:
@@ -112,7 +112,7 @@ def process_archive(
         name = f"{folder}/part-{first // shard_frames:06}-{_digest(sensor, first, shard)}.{format}"
         names.append(name)
         if not any(path.endswith(name.lstrip("/")) for path in there):
-            # Not pure: what a task returns is on the disk, not in its key.
+            # The task is not pure: its result is the file on the disk, not its return value.
             tasks.append(client.submit(_shard, sensor, first, shard, out, name, retries=retries, pure=False))
     for _ in as_completed(tasks):
         pass
@@ -127,26 +127,26 @@ def process_archive(
 
 
 def _sweep(filesystem: Any, folder: str, names: Sequence[str]) -> None:
-    """Removes what workers left that died between writing a shard and giving it its name."""
+    """Remove the files of workers that died between writing a shard and renaming it."""
     own = {os.path.basename(name) for name in names}
     filesystem.invalidate_cache()
     for path in filesystem.ls(folder, detail=False):
-        # NAME.PROCESS.part
+        # The file name is NAME.PROCESS.part.
         if path.endswith(".part") and os.path.basename(path).rsplit(".", 2)[0] in own:
             filesystem.rm(path)
 
 
 def _digest(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
-    """What a shard depends on: the same name is the same result."""
+    """Return a digest of everything that a shard depends on, so that the same name means the same result."""
     told = json.dumps([__version__, sensor.parameters, sensor.flight, first, shard], default=list, sort_keys=True)
     return hashlib.sha256(told.encode()).hexdigest()[:12]
 
 
 def _shard(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]], out: str, name: str) -> None:
-    """The task: runs on a worker."""
+    """Process a shard; this is the task of a worker."""
     filesystem, _ = fsspec.core.url_to_fs(out)
     if filesystem.exists(name):
-        # A worker that died had written it, or a second one was given the same task.
+        # A worker wrote it and then died, or a second worker got the same task.
         return
     reports = [_picture(sensor, first + i, url, known) for i, (url, known) in enumerate(shard)]
     part = f"{name}.{os.getpid()}.part"

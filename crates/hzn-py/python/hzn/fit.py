@@ -1,4 +1,4 @@
-"""The cone fitted to rays."""
+"""The fit of a cone to rays."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ def cone(sensor: Sensor, rays: Rays, start: Cone, expected: Expected | None = No
     sensor
         Its parameters are used.
     rays
-        Those with a weight are fitted; afterwards each has the weight that it had in the fit.
+        Points with a weight above 0 are fitted. Afterwards the rays have the weights of the fit.
     start
-        From `hzn.consensus.keep`, or one's own.
+        From `hzn.consensus.keep`, or any other cone.
     expected
         From `hzn.Sensor.expect`; without it, from the parameters alone.
 
     Returns
     -------
     Fit or None
-        None when the points do not determine a cone.
+        None if the points do not determine a cone.
     """
     return _fit(sensor, rays, start, expected or sensor.expect())

@@ -9,7 +9,7 @@ from ._hzn import Sensor, _rays
 
 
 def of(sensor: Sensor, points: ArrayLike, lit: ArrayLike) -> Rays:
-    """Take the lens away from points that were located elsewhere.
+    """Convert edge points that were located elsewhere to rays.
 
     Parameters
     ----------
@@ -18,16 +18,16 @@ def of(sensor: Sensor, points: ArrayLike, lit: ArrayLike) -> Rays:
     points
         Points (u, v) in order along their edge, shape (n, 2), pixels.
     lit
-        For each the direction towards the light (u, v), of any length, shape (n, 2).
+        Direction (u, v) from each point to its lit side, of any length, shape (n, 2).
 
     Returns
     -------
     Rays
-        With weight 1 where the lens sees the point, else 0.
+        Rays with weight 1 inside the field of view of the lens, and weight 0 outside.
 
     Raises
     ------
     ImageError
-        Shapes that do not fit.
+        The shapes do not match.
     """
     return _rays(sensor, points, lit)

@@ -1,4 +1,4 @@
-"""The level between dark and lit."""
+"""The threshold between dark and lit pixels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def level(
     *,
     bits: int | None = None,
 ) -> int:
-    """Find the level by the method of the sensor's ``[binarize]``.
+    """Find the threshold by the method of the sensor's ``[binarize]``.
 
     Parameters
     ----------
@@ -26,18 +26,18 @@ def level(
     expected
         From `hzn.Sensor.expect`; without it, from the parameters alone.
     bits
-        Significant bits of uint16.
+        Number of significant bits of uint16.
 
     Returns
     -------
     int
-        A pixel is lit at this value or above, in counts.
+        Threshold in counts; a pixel is lit at this value or above.
 
     Raises
     ------
     HznError
-        No level: too-dark, too-bright, or no-limb when there are no two sides.
+        There is no threshold: too-dark, too-bright, or no-limb if the picture has no dark and bright part.
     ImageError
-        An array that is no picture, or not one of this camera.
+        The array is no picture, or not one of this camera.
     """
     return _level(sensor, image, expected or sensor.expect(), bits)

@@ -1,29 +1,29 @@
-//! How far a slider goes.
+//! The ranges of sliders.
 
 use hzn_calib::keys::Limits;
 
-/// A slider: from, to, and whether its way is logarithmic.
+/// Range of a slider, and whether its scale is logarithmic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knob {
     /// Left end.
     pub low: f64,
     /// Right end.
     pub high: f64,
-    /// Logarithmic.
+    /// The scale is logarithmic.
     pub logarithmic: bool,
 }
 
 impl Knob {
-    /// For a value with these limits that usually is about `usual`; `None` for what is no number. A slider does not
-    /// reach limits that are far from what is usual; they can be typed.
+    /// Returns the slider of a value with these limits and the usual magnitude `usual`, or `None` if the value is no
+    /// number. A slider does not reach a limit that is far from the usual value; values beyond the slider can be typed.
     pub fn from_limits(limits: &Limits, usual: f64) -> Option<Self> {
         let Limits::Number { low, above, high } = *limits else { return None };
         let usual = if usual.abs() > 0.0 { usual.abs() } else { 1.0 };
         let far = low + usual * 30.0;
         if high - low <= 40.0 * usual || (high - low <= 1.0) {
-            // A limit that itself is refused is not offered.
+            // A limit that the value may not take itself is not offered.
             let low = if above { low + (high - low) * 1e-3 } else { low };
-            // On a straight way, what is usual would stand at the very end.
+            // On a linear scale, the usual value would be at the very end.
             let logarithmic = !above && low > 0.0 && high >= 50.0 * low;
             return Some(Self { low, high, logarithmic });
         }
@@ -32,7 +32,7 @@ impl Knob {
         Some(Self { low, high, logarithmic: low >= 0.0 })
     }
 
-    /// A value to begin with, where none counts.
+    /// Returns the value that the slider starts with when no value is in effect.
     pub fn middle(&self) -> f64 {
         if self.logarithmic && self.low > 0.0 { (self.low * self.high).sqrt() } else { (self.low + self.high) / 2.0 }
     }

@@ -2,13 +2,13 @@
 
 use super::view::Point;
 
-/// Most corners of a polygon, as sensor.toml allows.
+/// Largest number of corners of a polygon that sensor.toml allows.
 pub const MAX_CORNERS: usize = 16;
 
-/// Polygons, corner by corner.
+/// Polygons as lists of corners.
 pub type Polygons = Vec<Vec<Point>>;
 
-/// A polygon being drawn, or a corner being moved.
+/// Editing state: a polygon that is being drawn, or a corner that is being moved.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MaskEdit {
     /// Corners of the polygon that is being drawn.
@@ -26,7 +26,7 @@ fn corner_at(polygons: &Polygons, p: Point, reach: f64) -> Option<(usize, usize)
     all.min_by(|a, b| near(a).total_cmp(&near(b))).filter(|at| near(at) <= reach)
 }
 
-/// Is the point inside, by the even-odd rule?
+/// Returns true if the point is inside the polygon, by the even-odd rule.
 pub fn inside(polygon: &[Point], [x, y]: Point) -> bool {
     let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
     edges.filter(|(a, b)| (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0]).count() % 2
@@ -34,8 +34,8 @@ pub fn inside(polygon: &[Point], [x, y]: Point) -> bool {
 }
 
 impl MaskEdit {
-    /// A corner is set at `p`; on the first one, within `reach`, the polygon is closed. Gives the polygons when one
-    /// came.
+    /// Adds a corner at `p`. A click within `reach` of the first corner closes the polygon instead. The corner number
+    /// [`MAX_CORNERS`] closes the polygon, too. Returns all polygons if a polygon was closed.
     pub fn click(&mut self, polygons: &Polygons, p: Point, reach: f64) -> Option<Polygons> {
         if self.open.len() >= 3 && self.open.first().is_some_and(|first| apart(*first, p) <= reach) {
             return self.close(polygons);
@@ -43,36 +43,38 @@ impl MaskEdit {
         self.open.push(p);
         if self.open.len() == MAX_CORNERS { self.close(polygons) } else { None }
     }
-    /// Closes the polygon, when it is one.
+    /// Closes the polygon if it has at least three corners; otherwise it is dropped. Returns all polygons if it was
+    /// closed.
     pub fn close(&mut self, polygons: &Polygons) -> Option<Polygons> {
         let new = std::mem::take(&mut self.open);
         (new.len() >= 3).then(|| polygons.iter().cloned().chain([new]).collect())
     }
-    /// Takes the last corner back.
+    /// Removes the last corner of the polygon that is being drawn.
     pub fn back(&mut self) {
         self.open.pop();
     }
-    /// Takes hold of the corner at `p`, when there is one.
+    /// Grabs the corner within `reach` of `p`. Returns false if there is none.
     pub fn grab(&mut self, polygons: &Polygons, p: Point, reach: f64) -> bool {
         self.grabbed = corner_at(polygons, p, reach);
         self.grabbed.is_some()
     }
-    /// Moves the corner that is held.
+    /// Returns the polygons with the grabbed corner moved to `p`; `None` if no corner is grabbed.
     pub fn drag(&self, polygons: &Polygons, p: Point) -> Option<Polygons> {
         let (i, j) = self.grabbed?;
         let mut moved = polygons.clone();
         *moved.get_mut(i)?.get_mut(j)? = p;
         Some(moved)
     }
-    /// Lets the corner go.
+    /// Releases the grabbed corner.
     pub fn release(&mut self) {
         self.grabbed = None;
     }
-    /// Is a corner held?
+    /// Returns true if a corner is grabbed.
     pub fn holds(&self) -> bool {
         self.grabbed.is_some()
     }
-    /// Removes the corner at `p`, or else the polygon around it. A polygon with fewer than three corners goes.
+    /// Returns the polygons without the corner at `p`, or else without the polygon around `p`. A polygon with fewer
+    /// than three corners is removed.
     pub fn remove(&self, polygons: &Polygons, p: Point, reach: f64) -> Option<Polygons> {
         let mut left = polygons.clone();
         if let Some((i, j)) = corner_at(polygons, p, reach) {
@@ -106,7 +108,7 @@ mod tests {
         assert_eq!(polygons.len(), 2);
         assert_eq!(polygons[1], [[20.0, 20.0], [30.0, 20.0], [30.0, 30.0]]);
         assert!(edit.open.is_empty());
-        // Two corners are no polygon.
+        // A polygon needs three corners.
         edit.click(&square(), [1.0, 1.0], 2.0);
         edit.click(&square(), [9.0, 1.0], 2.0);
         assert_eq!(edit.close(&square()), None);

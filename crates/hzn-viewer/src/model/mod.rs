@@ -1,4 +1,4 @@
-//! What the viewer knows and does, without a window: everything here is plain Rust and tested as such.
+//! The state and the decisions of the viewer. Everything here is plain Rust and works without a window, also in tests.
 
 pub mod knob;
 pub mod mask;

@@ -1,4 +1,4 @@
-//! What plane the picture is shown in: the camera's own, or one without the lens's distortion.
+//! The plane that the picture is shown in: the camera's plane, or a plane without the distortion of the lens.
 
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
@@ -6,7 +6,7 @@ use hzn_core::pixel::ImagePoint;
 
 use super::view::Point;
 
-/// A pinhole cannot show more: half of its field of view in radians.
+/// Largest half of the field of view that a pinhole can show, in radians.
 const MAX_HALF_FIELD_RAD: f64 = 75.0 * std::f64::consts::PI / 180.0;
 
 /// The plane that is shown.
@@ -15,7 +15,7 @@ pub enum Plane {
     /// The camera's picture as it is.
     #[default]
     Camera,
-    /// What a pinhole with the same optical axis would have seen: straight lines are straight.
+    /// The picture of a pinhole with the same optical axis, where straight lines are straight.
     Pinhole(Pinhole),
 }
 
@@ -24,12 +24,12 @@ pub enum Plane {
 pub struct Pinhole {
     /// Focal length in pixels.
     pub focal_px: f64,
-    /// Principal point.
+    /// Principal point in pixels, in the shown picture.
     pub centre: Point,
 }
 
 impl Pinhole {
-    /// The pinhole whose picture, of the same size, shows as much of the camera's as it can.
+    /// Returns the pinhole whose picture has the same size and shows the largest possible part of the camera's picture.
     pub fn new(camera: &Camera<f64>) -> Self {
         let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
         let ImagePoint { u, v } = camera.principal_point();
@@ -41,7 +41,8 @@ impl Pinhole {
 }
 
 impl Plane {
-    /// Where a point of the camera's picture is shown; `None` where the plane has no place for it.
+    /// Returns where a point of the camera's picture is shown, in pixels of the shown picture; `None` if the plane has
+    /// no place for the point.
     pub fn show(&self, camera: &Camera<f64>, p: Point) -> Option<Point> {
         match self {
             Self::Camera => Some(p),
@@ -54,7 +55,7 @@ impl Plane {
         }
     }
 
-    /// Which point of the camera's picture is shown here; `None` outside of what the lens sees.
+    /// Returns the point of the camera's picture that is shown at `p`; `None` outside the field of view of the lens.
     pub fn of(&self, camera: &Camera<f64>, p: Point) -> Option<Point> {
         match self {
             Self::Camera => Some(p),
@@ -90,7 +91,8 @@ mod tests {
     fn straight_lines_become_straight() {
         let camera = camera(Model::Equidistant, 280.0);
         let plane = Plane::Pinhole(Pinhole::new(&camera));
-        // Rays in one plane through the camera: a straight line to a pinhole, a curve to this lens.
+        // These rays lie in one plane through the camera. They form a straight line for a pinhole and a curve for this
+        // lens.
         let shown: Vec<Point> = [-0.6, 0.0, 0.6]
             .iter()
             .map(|&x| {

@@ -1,21 +1,21 @@
-//! Which frame is shown, and playing.
+//! The picture that is shown, and playing.
 
 use std::time::Duration;
 
-/// Speeds that can be chosen, times the sequence's own.
+/// Speeds that can be chosen, as multiples of the speed of the sequence.
 pub const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0];
-/// A sequence without times, or with pauses, is played at this rate at least.
+/// Lowest rate of playing in pictures per second. It holds where the sequence has no times or has pauses.
 const SLOWEST_FPS: f64 = 1.0;
-/// Frames a second, at most: more cannot be seen.
+/// Highest rate of playing in pictures per second; a higher rate cannot be seen.
 const FASTEST_FPS: f64 = 60.0;
 
-/// The frame that is shown, and how time goes on.
+/// The picture that is shown, and the state of playing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Playback {
     frame: usize,
     playing: bool,
     speed: f64,
-    /// Time shown of the frame so far, in the sequence's seconds.
+    /// Time for which the picture has been shown, in seconds of the sequence.
     spent_s: f64,
 }
 
@@ -26,36 +26,36 @@ impl Default for Playback {
 }
 
 impl Playback {
-    /// The frame, from 0.
+    /// Returns the index of the picture, from 0.
     pub fn frame(&self) -> usize {
         self.frame
     }
-    /// Does time go on by itself?
+    /// Returns true while the sequence is played.
     pub fn is_playing(&self) -> bool {
         self.playing
     }
-    /// Times the sequence's own speed.
+    /// Returns the speed, as a multiple of the speed of the sequence.
     pub fn speed(&self) -> f64 {
         self.speed
     }
-    /// Goes to a frame; beyond the ends, to the first or last of `count`.
+    /// Goes to a picture. An index beyond the end goes to the last of `count` pictures.
     pub fn go(&mut self, frame: usize, count: usize) {
         self.frame = frame.min(count.saturating_sub(1));
         self.spent_s = 0.0;
     }
-    /// Steps by some frames, back with a negative number. Playing stops.
+    /// Steps by some pictures, backwards with a negative number, and stops playing.
     pub fn step(&mut self, by: isize, count: usize) {
         self.playing = false;
         self.go(self.frame.saturating_add_signed(by), count);
     }
-    /// Starts or stops; at the end it starts over.
+    /// Starts or stops playing. At the end of the sequence it starts again at the first picture.
     pub fn toggle(&mut self, count: usize) {
         self.playing = !self.playing && count > 1;
         if self.playing && self.frame + 1 >= count {
             self.go(0, count);
         }
     }
-    /// Takes the next faster or slower of [`SPEEDS`].
+    /// Sets the next faster or slower speed of [`SPEEDS`].
     pub fn change_speed(&mut self, faster: bool) {
         let mut speeds = SPEEDS.iter().copied();
         let next = if faster { speeds.find(|s| *s > self.speed) } else { speeds.rfind(|s| *s < self.speed) };
@@ -66,20 +66,21 @@ impl Playback {
         self.speed = speed;
     }
 
-    /// How long the frame is shown, in the sequence's seconds.
+    /// Returns how long the picture is shown, in seconds of the sequence.
     fn lasts_s(&self, duration_s: impl Fn(usize) -> Option<f64>) -> f64 {
         let known = duration_s(self.frame).filter(|d| *d > 0.0 && d.is_finite());
         known.unwrap_or(1.0).clamp(0.0, self.speed / SLOWEST_FPS).max(self.speed / FASTEST_FPS)
     }
 
-    /// Time until the next frame is due; `None` when nothing is played.
+    /// Returns the time until the next picture is due; `None` if the sequence is not played.
     pub fn due(&self, duration_s: impl Fn(usize) -> Option<f64>) -> Option<Duration> {
         let left_s = (self.lasts_s(duration_s) - self.spent_s).max(0.0);
         self.playing.then(|| Duration::from_secs_f64(left_s / self.speed))
     }
 
-    /// Time goes on by `elapsed`. `duration_s` gives how long a frame lasts in the sequence's seconds, as far as it is
-    /// known. At most one frame a call: a slow computer plays slower, and shows every frame.
+    /// Advances the time by `elapsed` and returns true if the next picture is shown. `duration_s` returns the duration
+    /// of a picture in seconds of the sequence, if it is known. A call advances by at most one picture, so a slow
+    /// computer plays more slowly and still shows every picture.
     pub fn advance(&mut self, elapsed: Duration, count: usize, duration_s: impl Fn(usize) -> Option<f64>) -> bool {
         if !self.playing {
             return false;
@@ -89,7 +90,7 @@ impl Playback {
         if self.spent_s < lasts {
             return false;
         }
-        // Not more than a frame is owed to the next one.
+        // At most the duration of one picture is carried over to the next one.
         let rest = (self.spent_s - lasts).min(lasts);
         if self.frame + 1 >= count {
             self.playing = false;
@@ -113,7 +114,7 @@ mod tests {
     fn frames_last_as_long_as_they_did() {
         let mut p = Playback::default();
         p.toggle(10);
-        // 25 frames a second.
+        // The sequence has 25 pictures per second.
         let frames = (0..100).filter(|_| p.advance(ms(10), 100, |_| Some(0.04))).count();
         assert_eq!(frames, 25);
         p.set_speed(0.5);
@@ -128,7 +129,7 @@ mod tests {
         assert!((0..101).any(|_| p.advance(ms(10), 10, |_| Some(3600.0))));
         assert!((0..101).any(|_| p.advance(ms(10), 10, |_| None)));
         assert!((0..101).any(|_| p.advance(ms(10), 10, |_| Some(-5.0))));
-        // Thousands of frames a second: one a call, and a slow call does not make up for it.
+        // At thousands of pictures per second, a call advances by one picture, and a slow call does not catch up.
         p.go(0, 1000);
         p.advance(ms(5000), 1000, |_| Some(1e-6));
         assert_eq!(p.frame(), 1);

@@ -1,4 +1,4 @@
-//! Results over time: what can be plotted, and which frames are worth a look.
+//! Results over time: the quantities that can be plotted, and the search for conspicuous pictures.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use hzn_core::status::Status;
 use hzn_mcap::Row;
 use hzn_sim::truth::Truth;
 
-/// Results by frame and body: those of the file, and those of the parameters as they are now.
+/// Results by picture and body: those of the file, and those of the current parameters.
 #[derive(Debug, Clone, Default)]
 pub struct ResultHistory {
     recorded: Vec<Vec<Row>>,
@@ -14,7 +14,7 @@ pub struct ResultHistory {
 }
 
 impl ResultHistory {
-    /// Appends what the file says about a body of frame `index`; frames may lack results.
+    /// Appends the file's result for a body of picture `index`. Pictures may lack results.
     pub fn record(&mut self, index: usize, row: Row) {
         if self.recorded.len() <= index {
             self.recorded.resize(index + 1, Vec::new());
@@ -23,38 +23,38 @@ impl ResultHistory {
             rows.push(row);
         }
     }
-    /// What the parameters as they are now make of a frame.
+    /// Stores the results of a picture with the current parameters.
     pub fn refresh(&mut self, index: usize, rows: Vec<Row>) {
         self.fresh.insert(index, rows);
     }
-    /// The parameters have changed.
+    /// Drops the results of the current parameters, because the parameters have changed.
     pub fn forget(&mut self) {
         self.fresh.clear();
     }
-    /// Frames that the parameters as they are now were applied to.
+    /// Returns the number of pictures with results of the current parameters.
     pub fn fresh(&self) -> usize {
         self.fresh.len()
     }
-    /// Number of frames that something is known of.
+    /// Returns the number of pictures, up to the last one with a result.
     pub fn len(&self) -> usize {
         self.fresh.keys().map(|i| i + 1).max().unwrap_or(0).max(self.recorded.len())
     }
-    /// Nothing is known.
+    /// Returns true if there are no results.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// The file's result.
+    /// Returns the file's result for a body of a picture.
     pub fn recorded(&self, index: usize, body: usize) -> Option<&Row> {
         self.recorded.get(index)?.get(body)
     }
-    /// The newest result: of the parameters as they are now, or else of the file.
+    /// Returns the newest result: the one of the current parameters, or else the file's.
     pub fn newest(&self, index: usize, body: usize) -> Option<&Row> {
         match self.fresh.get(&index) {
             Some(rows) => rows.get(body),
             None => self.recorded(index, body),
         }
     }
-    /// All newest results, of all bodies, in order.
+    /// Returns the newest results of all pictures and bodies, in order.
     pub fn all(&self) -> impl Iterator<Item = &Row> {
         (0..self.len()).flat_map(|i| match self.fresh.get(&i) {
             Some(rows) => rows.iter(),
@@ -62,14 +62,15 @@ impl ResultHistory {
         })
     }
 
-    /// The next frame after `from` (before it with `back`), going around, that has a result other than `ok`.
+    /// Returns the next picture after `from` (before it with `back`) whose status is not `ok`. The search wraps around.
     pub fn next_refused(&self, from: usize, back: bool, body: usize) -> Option<usize> {
         let n = self.len();
         let at = |k: usize| if back { (from + n - k % n) % n } else { (from + k) % n };
         (1..=n).map(at).find(|&i| self.newest(i, body).is_some_and(|r| r.status != Status::Ok))
     }
 
-    /// Frames from the worst on: refused ones first, then by `badness`, the largest first; frames without are left out.
+    /// Returns the pictures, the worst first: refused pictures, then the others in falling order of `badness`. Pictures
+    /// without a `badness` are left out.
     pub fn worst(&self, body: usize, badness: impl Fn(&Row) -> Option<f64>) -> Vec<usize> {
         let rate = |i: usize| {
             let row = self.newest(i, body)?;
@@ -82,21 +83,21 @@ impl ResultHistory {
     }
 }
 
-/// What can be plotted over time.
+/// A quantity that can be plotted over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quantity {
-    /// Its name.
+    /// Name of the quantity.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit of the quantity.
     pub unit: &'static str,
-    /// Its lines: a name each, and the value.
+    /// Lines of the plot: the name and the value of each.
     pub lines: &'static [(&'static str, Of)],
 }
 
-/// A value of a result, or of a result beside the truth.
+/// Function that returns a value of a result, possibly compared with the truth.
 pub type Of = fn(&Row, Option<&Truth>) -> Option<f64>;
 
-/// Everything that can be plotted.
+/// All quantities that can be plotted.
 pub const QUANTITIES: &[Quantity] = &[
     Quantity {
         name: "Axis",
@@ -126,12 +127,12 @@ pub const QUANTITIES: &[Quantity] = &[
     Quantity { name: "Time", unit: "µs", lines: &[("processing", |r, _| r.elapsed_us)] },
 ];
 
-/// Angle between an answer and the truth in degrees.
+/// Returns the angle between an answer and the truth, in degrees.
 pub fn error_deg(row: &Row, truth: Option<&Truth>) -> Option<f64> {
     Some(angle_deg(row.axis()?, truth?.axis()?.xyz()))
 }
 
-/// Angle between two directions in degrees, also when it is small.
+/// Returns the angle between two directions, in degrees. It is also accurate for small angles.
 pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();

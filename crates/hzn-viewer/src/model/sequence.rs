@@ -1,66 +1,66 @@
-//! The frames that are there, with what is known about each; it grows while a long recording is still being read.
+//! The pictures of a sequence, with the data known about each. The list grows while a long recording is being read.
 
 use std::path::PathBuf;
 
 use hzn_calib::FrameData;
 use hzn_run::source::Raw;
 
-/// One frame.
+/// One picture of the sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Name of its picture.
+    /// Name of the picture.
     pub name: String,
-    /// Time in seconds, where it is known.
+    /// Time in seconds, if it is known.
     pub time_s: Option<f64>,
-    /// What frames.csv or the recording says about it.
+    /// Data of the picture from frames.csv or the recording.
     pub data: Option<FrameData>,
-    /// Where its picture is.
+    /// Place of the picture.
     pub place: Place,
 }
 
-/// Where a picture is.
+/// Place of a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Place {
     /// A picture file.
     File(PathBuf),
     /// A headerless file.
     RawFile(PathBuf, Raw),
-    /// In the recording.
+    /// A picture in the recording.
     Recorded(hzn_mcap::Place),
     /// The picture of this number in a video.
     Video(u64),
-    /// The recording was made without pictures, or this one could not be read then.
+    /// There is no picture: the recording was made without pictures, or this picture could not be read at that time.
     Nowhere,
 }
 
-/// All frames.
+/// All pictures.
 #[derive(Debug, Clone, Default)]
 pub struct Sequence {
-    /// What it is called: a file's or folder's name.
+    /// Title: the name of a file or folder.
     pub title: String,
-    /// What was opened.
+    /// Files and folders that were opened.
     pub inputs: Vec<PathBuf>,
     /// The recording that holds the pictures.
     pub recording: Option<PathBuf>,
     /// Folder in which sensor.toml, frames.csv and truth.csv may lie.
     pub folder: PathBuf,
-    /// Frames, in order.
+    /// Pictures, in order.
     pub entries: Vec<Entry>,
-    /// All frames are there.
+    /// True if the list is complete.
     pub complete: bool,
 }
 
 impl Sequence {
-    /// Number of frames so far.
+    /// Returns the number of pictures so far.
     pub fn len(&self) -> usize {
         self.entries.len()
     }
-    /// No frame yet.
+    /// Returns true if there is no picture yet.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
-    /// Where a file that is made of it goes, unless another place is named: beside it. In a folder of pictures, a
-    /// further picture would be a further frame.
+    /// Returns the default path of a file that is made from the sequence: next to the sequence. For a folder of
+    /// pictures, the path is next to the folder, because a picture in the folder would become part of the sequence.
     pub fn beside(&self, name: &str) -> PathBuf {
         let folder = match self.inputs.as_slice() {
             [one] if one.is_dir() => std::path::absolute(one).ok().and_then(|p| Some(p.parent()?.to_owned())),
@@ -68,15 +68,15 @@ impl Sequence {
         };
         folder.as_deref().unwrap_or(&self.folder).join(name)
     }
-    /// Its name without the ending of a recording.
+    /// Returns the title without the ending of a recording.
     pub fn stem(&self) -> &str {
         self.title.trim_end_matches(".part").trim_end_matches(".mcap")
     }
-    /// How long a frame lasts in seconds, until the next one.
+    /// Returns the time in seconds until the next picture, if both times are known.
     pub fn duration_s(&self, frame: usize) -> Option<f64> {
         Some(self.entries.get(frame + 1)?.time_s? - self.entries.get(frame)?.time_s?)
     }
-    /// Index of the frame nearest in time.
+    /// Returns the index of the picture that is nearest in time.
     pub fn nearest(&self, time_s: f64) -> Option<usize> {
         let apart = |(i, e): (usize, &Entry)| Some((i, (e.time_s? - time_s).abs()));
         let best = self.entries.iter().enumerate().filter_map(apart).min_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn what_is_made_of_it_lies_beside_it() {
-        // Any folder that is there.
+        // Any existing folder serves.
         let pictures = Path::new(env!("CARGO_MANIFEST_DIR"));
         let parent = pictures.parent().unwrap();
         let folder = Sequence { inputs: vec![pictures.into()], folder: pictures.into(), ..Sequence::default() };

@@ -1,4 +1,4 @@
-//! The sensor that is being tuned: its text, what it means, and the way back.
+//! The sensor that is being tuned: its text, the configuration that the text yields, and undo.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -13,37 +13,37 @@ use toml_edit::Value;
 use super::sheet::{self, Sheet};
 use super::whole;
 
-/// Steps that can be undone.
+/// Largest number of steps that can be undone.
 const MAX_UNDO: usize = 500;
 
-/// A sensor.toml in the making. The text is the truth: a change of a parameter is a change of the text, which is then
-/// read as any sensor.toml is.
+/// A sensor.toml that is being edited. Only the text is kept: a change of a parameter changes the text, and the text is
+/// then read like every sensor.toml.
 #[derive(Debug, Clone)]
 pub struct Session {
-    /// The file that is written by [`Session::save`]; `None` where the text came out of a recording.
+    /// File that [`Session::save`] last wrote or that the text was read from; `None` if the text came from a recording.
     path: Option<PathBuf>,
-    /// Named in messages, and a camera `file` is looked for beside it.
+    /// Path that messages name. A camera `file` is looked for in the same folder.
     home: PathBuf,
     saved: Sheet,
     sheet: Sheet,
     undo: Vec<Sheet>,
     redo: Vec<Sheet>,
-    /// The key whose changes are one step, as long as they follow one another.
+    /// Key whose consecutive changes count as one step.
     gesture: Option<String>,
     config: Option<Arc<Config>>,
     values: toml::Table,
-    /// Those of the saved text.
+    /// Values of the saved text.
     saved_values: toml::Table,
-    /// The preset that the text names, or else the one that counts without.
+    /// Preset that the text names, or else the default preset.
     preset: String,
-    /// Keys about which the text says something else than the saved one, as (section, name, body).
+    /// Keys whose values differ from the saved text, as (section, name, body).
     differing: HashSet<(&'static str, &'static str, usize)>,
     problem: Option<Problem>,
     changes: u64,
 }
 
 impl Session {
-    /// Begins with a text. `home` is the file that it stands in, or would stand in.
+    /// Begins with a text. `home` is the file that contains the text, or its default path.
     pub fn new(text: &str, home: &Path, is_file: bool) -> Self {
         let sheet = Sheet::new(text);
         let mut session = Self {
@@ -66,63 +66,63 @@ impl Session {
         session
     }
 
-    /// Reads a file.
+    /// Reads a sensor.toml.
     ///
     /// # Errors
-    /// It cannot be read; what is wrong with its text is a [`Session::problem`].
+    /// The file cannot be read. An error in its text is not an error here but a [`Session::problem`].
     pub fn open(path: &Path) -> Result<Self, Problem> {
         let text = std::fs::read_to_string(path).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
         Ok(Self::new(&text, path, true))
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn sheet(&self) -> &Sheet {
         &self.sheet
     }
-    /// The text as it was read or last saved.
+    /// Returns the text as it was read or last saved.
     pub fn saved(&self) -> &Sheet {
         &self.saved
     }
-    /// The file that it belongs to.
+    /// Returns the file of the text.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
     }
-    /// Where it is saved unless another place is named.
+    /// Returns the default path for saving.
     pub fn home(&self) -> &Path {
         &self.home
     }
-    /// The last configuration that was accepted.
+    /// Returns the last configuration that was accepted.
     pub fn config(&self) -> Option<&Arc<Config>> {
         self.config.as_ref()
     }
-    /// What is wrong with the text; the configuration is then that of before.
+    /// Returns the error in the text. While there is one, the configuration is the last one that was accepted.
     pub fn problem(&self) -> Option<&Problem> {
         self.problem.as_ref()
     }
-    /// Number of this version of the configuration: no two have the same, in any session.
+    /// Returns the number of this version of the configuration. Every version of every session has a different number.
     pub fn changes(&self) -> u64 {
         self.changes
     }
-    /// Are there changes that are not saved?
+    /// Returns true if there are changes that are not saved.
     pub fn is_changed(&self) -> bool {
         self.sheet != self.saved
     }
-    /// Can a change be taken back?
+    /// Returns true if a change can be undone.
     pub fn can_undo(&self) -> bool {
         !self.undo.is_empty()
     }
-    /// Can a change that was taken back be made again?
+    /// Returns true if an undone change can be made again.
     pub fn can_redo(&self) -> bool {
         !self.redo.is_empty()
     }
 
-    /// The preset that counts.
+    /// Returns the name of the preset in effect.
     pub fn preset(&self) -> &str {
         &self.preset
     }
 
-    /// The value that counts: the text's, or else the preset's; `None` where there is none. Of a body, its own level
-    /// and edge errors come before the sensor's.
+    /// Returns the value in effect: the one of the text, or else the one of the preset; `None` if there is no value.
+    /// The threshold and the edge errors of a body override those of the sensor.
     pub fn value(&self, section: &str, name: &str, body: usize) -> Option<&toml::Value> {
         Self::find(&self.values, section, name, body)
     }
@@ -139,13 +139,14 @@ impl Session {
         own.or_else(|| values.get(section))?.get(name)
     }
 
-    /// A number that counts.
+    /// Returns the value in effect if it is a number.
     pub fn number(&self, section: &str, name: &str, body: usize) -> Option<f64> {
         number(self.value(section, name, body)?)
     }
 
-    /// About what a number usually is, a power of ten: a slider's reach. It follows what was saved, so that it stays
-    /// while the slider is moved; a key that had no value then goes by the one that counts.
+    /// Returns the usual magnitude of a number, a power of ten; it sets the range of a slider. It follows the saved
+    /// value, so that it stays the same while the slider is moved. Without a saved value it follows the value in
+    /// effect.
     pub fn usual(&self, section: &str, name: &str, body: usize) -> f64 {
         let saved = Self::find(&self.saved_values, section, name, body).and_then(number);
         match saved.or_else(|| self.number(section, name, body)) {
@@ -154,8 +155,8 @@ impl Session {
         }
     }
 
-    /// Changes a value, or takes it out of the text. Changes of the same key in a row, without [`Session::settle`]
-    /// between them, are one step.
+    /// Changes a value, or removes it from the text (`None`). Consecutive changes of the same key are one step, unless
+    /// [`Session::settle`] is called between them.
     pub fn set(&mut self, section: &str, name: &str, body: usize, value: Option<Value>) {
         let key = format!("{section}.{name}.{body}");
         match self.sheet.with(sheet::Key { section, name, body }, value) {
@@ -164,7 +165,7 @@ impl Session {
         }
     }
 
-    /// Sets a number as the key holds it: whole where the value that counts is whole.
+    /// Sets a number. It is rounded to a whole number if the value in effect is whole.
     pub fn set_number(&mut self, key: &Key, body: usize, x: f64) {
         let whole = matches!(self.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)))
             || (self.value(key.section(), key.name(), body).is_none() && key.form == Form::Whole);
@@ -172,32 +173,33 @@ impl Session {
         self.set(key.section(), key.name(), body, Some(value));
     }
 
-    /// Does the text say something else about a key than the saved one?
+    /// Returns true if the value of a key differs from the saved text.
     pub fn differs(&self, section: &str, name: &str, body: usize) -> bool {
-        // The sets are small, and their keys live longer than the question.
+        // The set is small. A lookup would need keys with the static lifetime.
         self.differing.iter().any(|d| *d == (section, name, body))
     }
 
-    /// What the saved text says about a key, which may be nothing.
+    /// Restores the saved value of a key. If the saved text has no value for the key, the key is removed.
     pub fn restore(&mut self, section: &str, name: &str, body: usize) {
         let value = self.saved.get(sheet::Key { section, name, body });
         self.set(section, name, body, value.and_then(|v| v.parse().ok()));
     }
 
-    /// The mask's polygons in pixels.
+    /// Sets the polygons of the mask, in pixels.
     pub fn set_polygons(&mut self, polygons: &[Vec<[f64; 2]>]) {
         let corner = |[x, y]: &[f64; 2]| Value::from_iter([tidy_px(*x), tidy_px(*y)]);
         let polygon = |p: &Vec<[f64; 2]>| Value::from_iter(p.iter().map(corner));
         self.set("mask", "polygons_px", 0, Some(Value::from_iter(polygons.iter().map(polygon))));
     }
 
-    /// The mask's polygons in pixels.
+    /// Returns the polygons of the mask, in pixels.
     pub fn polygons(&self) -> Vec<Vec<[f64; 2]>> {
         let config = self.config.iter();
         config.flat_map(|c| c.mask.polygons_px.iter().map(|p| p.iter().copied().collect())).collect()
     }
 
-    /// The same camera, body and mask, under another preset; what else the text says is left out.
+    /// Returns a session with the same camera, mount, bodies, mask and input under another preset. All other keys are
+    /// left out.
     pub fn under_preset(&self, preset: Preset) -> Self {
         const KEPT: [&str; 6] = ["camera", "mount", "body", "bodies", "mask", "input"];
         let mut table: toml::Table = self.sheet.text().parse().unwrap_or_default();
@@ -206,12 +208,12 @@ impl Session {
         Self::new(&text, &self.home, false)
     }
 
-    /// Ends a step: a slider was let go.
+    /// Ends a step, for example when a slider is released.
     pub fn settle(&mut self) {
         self.gesture = None;
     }
 
-    /// Takes the last step back.
+    /// Undoes the last step.
     pub fn undo(&mut self) {
         if let Some(sheet) = self.undo.pop() {
             self.redo.push(std::mem::replace(&mut self.sheet, sheet));
@@ -220,7 +222,7 @@ impl Session {
         }
     }
 
-    /// Makes the step again that was taken back last.
+    /// Makes the step again that was undone last.
     pub fn redo(&mut self) {
         if let Some(sheet) = self.redo.pop() {
             self.undo.push(std::mem::replace(&mut self.sheet, sheet));
@@ -229,15 +231,15 @@ impl Session {
         }
     }
 
-    /// Back to the text that was read or last saved; this can be undone.
+    /// Goes back to the text that was read or last saved. This can be undone.
     pub fn reset(&mut self) {
         self.replace(self.saved.clone(), None);
     }
 
-    /// Writes the text to `path`, which is then its file. The file is replaced at once, or not at all.
+    /// Writes the text to `path`, which becomes the file of the session. The file is written completely or not at all.
     ///
     /// # Errors
-    /// What the disk says, and what to do.
+    /// The file cannot be written; the message says why and what to do.
     pub fn save(&mut self, path: &Path) -> Result<(), String> {
         whole::write(path, self.sheet.text().as_bytes())?;
         self.saved = self.sheet.clone();
@@ -264,7 +266,7 @@ impl Session {
         self.read();
     }
 
-    /// Reads what the text says; once a change, as panels ask in every frame of the window.
+    /// Parses the text, once per change, because the panels read the result in every frame of the window.
     fn read(&mut self) {
         let table: Option<toml::Table> = self.sheet.text().parse().ok();
         let named = table.as_ref().and_then(|t| t.get("preset")?.as_str());
@@ -279,7 +281,8 @@ impl Session {
         }
         match hzn_calib::sensor::parse(self.sheet.text(), &self.home) {
             Ok(sensor) => {
-                // What was accepted is TOML again; a table that is not would only leave the sliders without values.
+                // An accepted configuration can be written as TOML. If it could not, only the sliders would lack their
+                // values.
                 self.values = toml::Table::try_from(&sensor.config).unwrap_or_default();
                 if !self.is_changed() {
                     self.saved_values = self.values.clone();
@@ -302,7 +305,7 @@ fn number(value: &toml::Value) -> Option<f64> {
     }
 }
 
-/// A number as one would write it: five significant digits.
+/// Rounds a number to five significant digits, as a person would write it.
 fn tidy(x: f64) -> f64 {
     if x == 0.0 || !x.is_finite() {
         return x;
@@ -312,7 +315,7 @@ fn tidy(x: f64) -> f64 {
     (x * scale).round() / scale
 }
 
-/// A corner of a mask: tenths of a pixel are enough.
+/// Rounds a coordinate of a mask corner to tenths of a pixel, which is fine enough.
 fn tidy_px(x: f64) -> f64 {
     (x * 10.0).round() / 10.0
 }
@@ -410,7 +413,7 @@ mod tests {
         assert_eq!((s.number("binarize", "scale", 0), usual(&s)), (Some(0.15), 1.0));
         s.save(&dir.path().join("sensor.toml")).unwrap();
         assert_eq!(usual(&s), 0.1);
-        // Without a value there, the one that counts.
+        // Without a saved value, the value in effect sets the magnitude.
         assert_eq!(s.usual("select", "min_arc_px", 0), 1.0);
         s.set("select", "min_arc_px", 0, Some(120.0.into()));
         assert_eq!(s.usual("select", "min_arc_px", 0), 100.0);

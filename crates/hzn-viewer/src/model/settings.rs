@@ -1,29 +1,29 @@
-//! What is remembered from one run to the next.
+//! Settings that are kept from one run to the next.
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-/// Files that are offered again.
+/// Number of recent files that are offered.
 const RECENT: usize = 8;
 
-/// How the picture is shown.
+/// Display of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Look {
-    /// As the camera saw it.
+    /// Colours as in the camera's picture.
     #[default]
     Colour,
-    /// The brightness that is compared with the level.
+    /// Brightness, which is compared with the threshold.
     Grey,
-    /// Lit or dark.
+    /// Lit or dark pixels.
     Level,
 }
 
 impl Look {
-    /// All of them.
+    /// All looks.
     pub const ALL: [Self; 3] = [Self::Colour, Self::Grey, Self::Level];
-    /// Its name on the screen.
+    /// Returns the name on the screen.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Colour => "Colour",
@@ -33,23 +33,23 @@ impl Look {
     }
 }
 
-/// What is drawn over the picture.
+/// Something that is drawn over the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layer {
     /// Pixels that were read: search lines and edges.
     Touched,
-    /// All candidate edges, each in its colour.
+    /// All candidate edges, each in a different colour.
     Edges,
-    /// Points that do not belong to the limb.
+    /// Edge points that do not belong to the limb.
     Rejected,
-    /// Points that carry the answer.
+    /// Edge points that the answer is computed from.
     Inliers,
     /// The fitted limb.
     Limb,
     /// The axis with its 3-sigma ellipse.
     Axis,
-    /// Sun and Moon where they should be.
+    /// Expected places of the Sun and the Moon.
     Sky,
     /// Masked parts.
     Mask,
@@ -60,7 +60,7 @@ pub enum Layer {
 }
 
 impl Layer {
-    /// All of them, in the order in which they are listed.
+    /// All layers, in the order in which they are listed.
     pub const ALL: [Self; 10] = [
         Self::Touched,
         Self::Edges,
@@ -73,7 +73,7 @@ impl Layer {
         Self::Circle,
         Self::Truth,
     ];
-    /// Its name on the screen.
+    /// Returns the name on the screen.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Touched => "Touched pixels",
@@ -90,17 +90,17 @@ impl Layer {
     }
 }
 
-/// What is remembered.
+/// The settings that are kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
     /// Dark colours.
     pub dark: bool,
-    /// How the picture is shown.
+    /// Display of the picture.
     pub look: Look,
-    /// Without the lens's distortion.
+    /// The picture is shown without the distortion of the lens.
     pub undistorted: bool,
-    /// What is drawn over the picture.
+    /// Layers that are drawn over the picture.
     pub layers: Vec<Layer>,
     /// The panel of stages is shown.
     pub stages: bool,
@@ -108,9 +108,9 @@ pub struct Settings {
     pub plots: bool,
     /// Names of the quantities that are plotted.
     pub plotted: Vec<String>,
-    /// What was opened last, the newest first.
+    /// Files and folders that were opened last, the newest first.
     pub recent: Vec<PathBuf>,
-    /// Width and height of the window.
+    /// Width and height of the window, in points.
     pub window: [f32; 2],
     /// Width of the column with the answer.
     pub side_width: f32,
@@ -149,40 +149,41 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Is this drawn?
+    /// Returns true if the layer is drawn.
     pub fn shows(&self, layer: Layer) -> bool {
         self.layers.contains(&layer)
     }
-    /// Draws it, or not.
+    /// Switches the layer on or off.
     pub fn show(&mut self, layer: Layer, on: bool) {
         self.layers.retain(|l| *l != layer);
         if on {
             self.layers.push(layer);
         }
     }
-    /// Puts a file first among those opened last.
+    /// Puts a file first in the list of recent files.
     pub fn opened(&mut self, path: &Path) {
-        // Relative names mean something else in another folder.
+        // A relative path names another file in another folder.
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         self.recent.retain(|p| *p != path);
         self.recent.insert(0, path);
         self.recent.truncate(RECENT);
     }
 
-    /// Where they are kept; `None` where the system names no place.
+    /// Returns the path of the settings file; `None` if the system names no place for it.
     pub fn place() -> Option<PathBuf> {
         let config = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
         let home = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".config"));
         Some(config.or_else(home)?.join("hzn").join("viewer.json"))
     }
-    /// Reads them. What is missing or cannot be read is as at first.
+    /// Reads the settings. A missing setting has its default. If the file cannot be read, all settings have their
+    /// defaults.
     pub fn load(place: &Path) -> Self {
         std::fs::read_to_string(place).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default()
     }
-    /// Writes them.
+    /// Writes the settings.
     ///
     /// # Errors
-    /// What the disk says.
+    /// The file cannot be written.
     pub fn store(&self, place: &Path) -> std::io::Result<()> {
         if let Some(folder) = place.parent() {
             std::fs::create_dir_all(folder)?;

@@ -1,4 +1,4 @@
-//! A sensor.toml as text, changed value by value: comments, order and spacing stay as they are.
+//! The text of a sensor.toml, in which single values are changed. Comments, order and spacing stay as they are.
 
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
@@ -6,42 +6,43 @@ use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Sheet(String);
 
-/// A key: its section (empty for the top) and its name. With several bodies, `body` says which of them is meant.
+/// A key: its section (empty at the top level) and its name. With several bodies, `body` is the index of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Key<'a> {
-    /// Section, such as `reject`.
+    /// Section, for example `reject`.
     pub section: &'a str,
-    /// Name, such as `threshold_px`.
+    /// Name, for example `threshold_px`.
     pub name: &'a str,
-    /// Which of several bodies, from 0.
+    /// Index of the body, from 0.
     pub body: usize,
 }
 
 impl Sheet {
-    /// From text.
+    /// Returns a sheet with this text.
     pub fn new(text: impl Into<String>) -> Self {
         Self(text.into())
     }
-    /// The text.
+    /// Returns the text.
     pub fn text(&self) -> &str {
         &self.0
     }
 
-    /// What the text says about a key, as it is written; `None` where it says nothing.
+    /// Returns the value of a key as it is written in the text; `None` if the text has no value for the key.
     pub fn get(&self, key: Key<'_>) -> Option<String> {
         written(&mut self.0.parse().ok()?, key)
     }
 
-    /// Those of some keys about which two texts say something different.
+    /// Returns the keys whose values differ between the two texts.
     pub fn differing<'k>(&self, other: &Self, keys: impl Iterator<Item = Key<'k>>) -> Vec<Key<'k>> {
         let [mut ours, mut theirs] = [self, other].map(|s| s.0.parse::<DocumentMut>().unwrap_or_default());
         keys.filter(|key| written(&mut ours, *key) != written(&mut theirs, *key)).collect()
     }
 
-    /// The text with a value written, or taken out (`None`), so that the preset's counts again.
+    /// Returns the text with another value for the key. `None` removes the key, so that the value of the preset applies
+    /// again.
     ///
     /// # Errors
-    /// The text is not TOML, or a section is something else than a section.
+    /// The text is not TOML, or the section is not a table.
     pub fn with(&self, key: Key<'_>, value: Option<Value>) -> Result<Self, String> {
         let mut document: DocumentMut = self.0.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
         let no_section = || format!("[{}] is no section", key.section);
@@ -68,8 +69,8 @@ impl Sheet {
         Ok(Self(document.to_string()))
     }
 
-    /// Lines that differ from `other`, with a `-` for those of `other` and a `+` for ours, and no line for what is
-    /// equal.
+    /// Returns the lines that differ from `other`: the lines of `other` with a `-`, and the lines of this text with a
+    /// `+`.
     pub fn diff(&self, other: &Self) -> Vec<String> {
         let (old, new): (Vec<&str>, Vec<&str>) = (other.0.lines().collect(), self.0.lines().collect());
         let mut out = Vec::new();
@@ -83,7 +84,7 @@ impl Sheet {
     }
 }
 
-/// The places of a longest common subsequence of lines, in both.
+/// Returns the indices of a longest common subsequence of lines, in both texts.
 fn common(old: &[&str], new: &[&str]) -> Vec<(usize, usize)> {
     let width = new.len() + 1;
     let mut longest = vec![0u32; (old.len() + 1) * width];
@@ -115,7 +116,7 @@ fn written(document: &mut DocumentMut, key: Key<'_>) -> Option<String> {
     Some(value.clone().decorated("", "").to_string())
 }
 
-/// The table that a key belongs into.
+/// Returns the table that a key belongs to.
 fn table<'a>(document: &'a mut DocumentMut, key: Key<'_>, create: bool) -> Option<&'a mut dyn TableLike> {
     let root = document.as_table_mut();
     if key.section.is_empty() {
@@ -124,7 +125,7 @@ fn table<'a>(document: &'a mut DocumentMut, key: Key<'_>, create: bool) -> Optio
     let several = root.get("bodies").is_some_and(Item::is_array_of_tables);
     let of_body = match key.section {
         "body" => true,
-        // A body's own level and edge errors come before those of the sensor.
+        // The threshold and the edge errors of a body override those of the sensor.
         "binarize" | "covariance" => own_section(root, key, several),
         _ => false,
     };
@@ -139,7 +140,7 @@ fn table<'a>(document: &'a mut DocumentMut, key: Key<'_>, create: bool) -> Optio
     if key.section == "body" { Some(body) } else { body.get_mut(key.section)?.as_table_like_mut() }
 }
 
-/// Has the body a section of this name of its own?
+/// Returns true if the body has a section of this name.
 fn own_section(root: &Table, key: Key<'_>, several: bool) -> bool {
     let body: Option<&dyn TableLike> = if several {
         root.get("bodies").and_then(Item::as_array_of_tables).and_then(|a| a.get(key.body)).map(|t| t as &dyn TableLike)
@@ -189,7 +190,7 @@ mod tests {
         assert!(sheet.text().ends_with("kind = \"earth\"\n\n[gate]\nmax_mean = 0.5\n"), "{}", sheet.text());
         let sheet = sheet.with(key("gate", "max_mean"), None).unwrap();
         assert!(!sheet.text().contains("max_mean"));
-        // What is not there cannot be taken out, and nothing is put in for it.
+        // Removing a missing value changes nothing and inserts nothing.
         assert_eq!(Sheet::new(TEXT).with(key("mask", "polygons_px"), None).unwrap().text(), TEXT);
     }
 

@@ -3,22 +3,23 @@
 /// A point on the screen or in the picture, (x, y).
 pub type Point = [f64; 2];
 
-/// Screen points a picture pixel, at most: single pixels are large squares then.
+/// Largest scale in screen points per picture pixel; single pixels are then large squares.
 const MAX_SCALE: f64 = 64.0;
 
-/// How the picture is placed on the part of the screen that it has.
+/// Placement of the picture in its area of the screen.
 ///
 /// Pixel centres are at integers: the picture reaches from -0.5 to its width - 0.5.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Picture point in the middle of the screen area; `None` shows the whole picture.
+    /// Picture point in the middle of the screen area, and the scale in screen points per pixel; `None` shows the whole
+    /// picture.
     centre: Option<(Point, f64)>,
 }
 
-/// The area on the screen: its left top corner and its size, in screen points.
+/// An area of the screen: its top left corner and its size, in screen points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Area {
-    /// Left top corner.
+    /// Top left corner.
     pub min: Point,
     /// Width and height.
     pub size: Point,
@@ -37,15 +38,15 @@ impl Default for View {
 }
 
 impl View {
-    /// The whole picture, as large as fits.
+    /// Shows the whole picture, as large as it fits.
     pub const FIT: Self = Self { centre: None };
 
-    /// Is the whole picture shown, as large as fits?
+    /// Returns true if the whole picture is shown, as large as it fits.
     pub fn is_fit(&self) -> bool {
         self.centre.is_none()
     }
 
-    /// Screen points a pixel, for a picture of this size.
+    /// Returns the scale in screen points per pixel, for a picture of this size.
     pub fn scale(&self, area: Area, picture: Point) -> f64 {
         match self.centre {
             Some((_, scale)) => scale,
@@ -53,22 +54,22 @@ impl View {
         }
     }
 
-    /// Where a picture point is on the screen.
+    /// Returns the screen point of a picture point.
     pub fn to_screen(&self, area: Area, picture: Point, p: Point) -> Point {
         let (centre, scale) = self.placed(area, picture);
         let middle = area.middle();
         [middle[0] + (p[0] - centre[0]) * scale, middle[1] + (p[1] - centre[1]) * scale]
     }
 
-    /// Which picture point a point of the screen shows.
+    /// Returns the picture point of a screen point.
     pub fn to_picture(&self, area: Area, picture: Point, s: Point) -> Point {
         let (centre, scale) = self.placed(area, picture);
         let middle = area.middle();
         [centre[0] + (s[0] - middle[0]) / scale, centre[1] + (s[1] - middle[1]) / scale]
     }
 
-    /// Larger by `factor`, with the picture point under `at` (on the screen) staying where it is. Not smaller than the
-    /// whole picture, which is then shown as such.
+    /// Enlarges the picture by `factor` and keeps the picture point under `at` (a screen point) in place. The picture
+    /// does not get smaller than the whole picture; at this limit the view becomes [`View::FIT`].
     pub fn zoom(&mut self, area: Area, picture: Point, at: Point, factor: f64) {
         let before = self.to_picture(area, picture, at);
         let smallest = fit(area, picture);
@@ -82,7 +83,7 @@ impl View {
         self.centre = Some((hold(centre, picture), scale));
     }
 
-    /// Moved by `by` screen points. The middle stays within the picture.
+    /// Moves the picture by `by` screen points. The middle of the area stays within the picture.
     pub fn pan(&mut self, area: Area, picture: Point, by: Point) {
         let (centre, scale) = self.placed(area, picture);
         if self.centre.is_some() {
@@ -90,13 +91,13 @@ impl View {
         }
     }
 
-    /// A point of the picture comes into the middle, with `scale` screen points a pixel or more.
+    /// Moves a point of the picture into the middle, with at least `scale` screen points per pixel.
     pub fn look_at(&mut self, picture: Point, p: Point, scale: f64) {
         let scale = self.centre.map_or(scale, |(_, now)| now.max(scale));
         self.centre = Some((hold(p, picture), scale));
     }
 
-    /// One screen point a pixel (or `scale` of them), about the middle of what is shown.
+    /// Sets the scale to `scale` screen points per pixel and keeps the middle in place.
     pub fn set_scale(&mut self, area: Area, picture: Point, scale: f64) {
         let factor = scale / self.scale(area, picture);
         self.zoom(area, picture, area.middle(), factor);
@@ -176,7 +177,7 @@ mod tests {
         view.look_at(PICTURE, [300.0, 200.0], 8.0);
         near(view.to_screen(AREA, PICTURE, [300.0, 200.0]), AREA.middle());
         assert_eq!(view.scale(AREA, PICTURE), 8.0);
-        // What is shown larger already stays so; what lies outside is not gone to.
+        // A larger scale is kept. A point outside the picture moves to the nearest point of the picture.
         view.set_scale(AREA, PICTURE, 20.0);
         view.look_at(PICTURE, [9999.0, 100.0], 8.0);
         near(view.to_picture(AREA, PICTURE, AREA.middle()), [1919.5, 100.0]);
@@ -189,7 +190,7 @@ mod tests {
         view.set_scale(AREA, PICTURE, 4.0);
         view.pan(AREA, PICTURE, [1e6, -1e6]);
         near(view.to_picture(AREA, PICTURE, [500.0, 350.0]), [-0.5, 1079.5]);
-        // A picture far smaller than the area can be shown larger than its pixels from the start.
+        // A picture that is far smaller than the area can exceed the largest scale from the start.
         assert!(View::FIT.scale(AREA, [4.0, 3.0]) > MAX_SCALE);
         let mut small = View::FIT;
         small.zoom(AREA, [4.0, 3.0], [400.0, 300.0], 2.0);

@@ -1,12 +1,13 @@
-//! Files that are written whole or not at all.
+//! Writing of files, completely or not at all.
 
 use std::path::{Path, PathBuf};
 
-/// Lets `write` fill a file beside `path`, which then takes its name. When that fails, nothing is left and what had the
-/// name before is as it was. The ending stays: there are programs that choose a format by it.
+/// Lets `write` fill a temporary file next to `path` and then renames it to `path`. If this fails, the temporary file
+/// is removed and an earlier file at `path` stays as it was. The temporary file has the same ending, because some
+/// programs choose a format by it.
 ///
 /// # Errors
-/// Those of `write`, or what the disk says and what to do.
+/// An error of `write` is returned. If the renaming fails, the message says why and what to do.
 pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
     let part = part(path);
     let written =
@@ -17,15 +18,15 @@ pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result
     written
 }
 
-/// As [`replace`], with what is at hand already.
+/// Writes `bytes` to `path` in the same way as [`replace`].
 ///
 /// # Errors
-/// What the disk says and what to do.
+/// The file cannot be written; the message says why and what to do.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
     replace(path, |part| std::fs::write(part, bytes).map_err(|e| hzn_run::sink::advice(path, &e)))
 }
 
-/// `NAME.part.ENDING`.
+/// Returns `NAME.part.ENDING`.
 fn part(path: &Path) -> PathBuf {
     match path.extension() {
         Some(ending) => path.with_extension(format!("part.{}", ending.to_string_lossy())),

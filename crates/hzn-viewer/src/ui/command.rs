@@ -1,87 +1,87 @@
-//! What can be done with a key: one table for keys, menus and the help.
+//! The commands of the window: one table for keys, menus and the help.
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-/// Something that can be done.
+/// A command of the user.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
-    /// Asks what to open.
+    /// Asks for a path and opens it.
     Open,
     /// Saves the sensor.toml.
     Save,
-    /// Saves the sensor.toml in another place.
+    /// Saves the sensor.toml under another path.
     SaveAs,
-    /// Takes a change back.
+    /// Undoes the last change.
     Undo,
-    /// Makes it again.
+    /// Makes the change again that was undone last.
     Redo,
-    /// Back to what is saved.
+    /// Goes back to the saved text.
     Reset,
-    /// Shows what differs from the file.
+    /// Shows the differences from the saved file.
     Diff,
-    /// Plays or stops.
+    /// Starts or stops playing.
     Play,
-    /// One frame on.
+    /// Goes to the next picture.
     Next,
-    /// One frame back.
+    /// Goes to the previous picture.
     Back,
-    /// Ten frames on.
+    /// Goes ten pictures forward.
     Next10,
-    /// Ten frames back.
+    /// Goes ten pictures back.
     Back10,
-    /// To the first frame.
+    /// Goes to the first picture.
     First,
-    /// To the last frame.
+    /// Goes to the last picture.
     Last,
-    /// To the next frame without an answer.
+    /// Goes to the next picture without an answer.
     NextRefused,
-    /// To the one before.
+    /// Goes to the previous picture without an answer.
     BackRefused,
-    /// To the worst frame, then the second worst, and so on.
+    /// Goes to the worst picture, then to the second worst, and so on.
     Worst,
     /// Plays faster.
     Faster,
     /// Plays slower.
     Slower,
-    /// The whole picture.
+    /// Shows the whole picture.
     Fit,
-    /// One screen point a pixel.
+    /// Shows one pixel of the picture per pixel of the screen.
     Actual,
-    /// Larger.
+    /// Enlarges the picture.
     ZoomIn,
-    /// Smaller.
+    /// Makes the picture smaller.
     ZoomOut,
-    /// Colour.
+    /// Shows the picture in colour.
     Colour,
-    /// Brightness.
+    /// Shows the brightness.
     Grey,
-    /// Lit or dark.
+    /// Shows lit and dark pixels.
     Level,
-    /// Without the lens's distortion.
+    /// Shows the picture with or without the distortion of the lens.
     Undistorted,
-    /// Draws the mask.
+    /// Starts or ends the drawing of the mask.
     Mask,
-    /// Nothing over the picture, or everything again.
+    /// Hides or shows all overlays.
     Layers,
     /// Compares with another sensor.
     Compare,
-    /// Processes all frames.
+    /// Processes all pictures.
     ProcessAll,
-    /// Processes all frames into a new recording.
+    /// Processes all pictures into a new recording.
     Rerun,
-    /// Saves the picture with what is drawn over it.
+    /// Saves the picture with its overlays.
     ExportPicture,
     /// Shows or hides the stages.
     Stages,
     /// Shows or hides the plots.
     Plots,
-    /// Dark or light.
+    /// Switches between dark and light colours.
     Theme,
     /// Shows or hides the help.
     Help,
 }
 
-/// The table: what, its name, its key.
+/// The table: command, name and key.
 pub(super) const ALL: &[(Command, &str, Modifiers, Key)] = &[
     (Command::Open, "Open", Modifiers::COMMAND, Key::O),
     (Command::Save, "Save sensor.toml", Modifiers::COMMAND, Key::S),
@@ -123,18 +123,19 @@ pub(super) const ALL: &[(Command, &str, Modifiers, Key)] = &[
 ];
 
 impl Command {
-    /// Its name.
+    /// Returns the name of the command.
     pub fn name(self) -> &'static str {
         ALL.iter().find(|(c, ..)| *c == self).map_or("", |(_, name, ..)| name)
     }
-    /// Its key, as it is written for people.
+    /// Returns the key of the command, as text for the user.
     pub fn key(self, ctx: &egui::Context) -> String {
         let entry = ALL.iter().find(|(c, ..)| *c == self);
         entry.map_or_else(String::new, |(_, _, m, k)| ctx.format_shortcut(&KeyboardShortcut::new(*m, *k)))
     }
 }
 
-/// What the keys pressed since the last frame ask for. Keys with more modifiers are looked at first.
+/// Returns the commands of the keys that were pressed since the last frame of the window. Keys with more modifiers are
+/// checked first.
 pub(super) fn pressed(ctx: &egui::Context) -> Vec<Command> {
     if ctx.text_edit_focused() {
         return Vec::new();
@@ -143,7 +144,7 @@ pub(super) fn pressed(ctx: &egui::Context) -> Vec<Command> {
     let mut table: Vec<_> = ALL.iter().collect();
     table.sort_by_key(|(_, _, m, _)| std::cmp::Reverse(weight(m)));
     ctx.input_mut(|i| {
-        // The plus is on the same key as the equals sign, and may need shift.
+        // The plus sign is on the same key as the equals sign, and may need the shift key.
         let plus = i.consume_key(Modifiers::NONE, Key::Equals) || i.consume_key(Modifiers::SHIFT, Key::Plus);
         let hit = table.into_iter().filter(|(_, _, m, k)| i.consume_shortcut(&KeyboardShortcut::new(*m, *k)));
         let hit: Vec<Command> = hit.map(|(c, ..)| *c).collect();

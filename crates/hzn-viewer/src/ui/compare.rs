@@ -1,4 +1,4 @@
-//! Two configurations on the same frame: what their answers differ in, above their pictures.
+//! Two configurations on the same picture: a table of their answers and the differences, above their pictures.
 
 use egui::{RichText, Ui, vec2};
 
@@ -6,10 +6,10 @@ use super::viewer::Viewer;
 use crate::model::rows;
 use crate::work::frame_view::BodyResult;
 
-/// A line of the table: what it shows of a column.
+/// Function that returns the text of a column in one line of the table.
 type Line = fn(&Column) -> &str;
 
-/// A value of both answers, and their difference.
+/// One value of both answers, and the difference.
 struct Column {
     name: &'static str,
     session: String,
@@ -64,7 +64,7 @@ fn table(ui: &mut Ui, name: &str, columns: &[Column]) {
     });
 }
 
-/// With its sign, but where no digit differs.
+/// Formats a difference with its sign, or as 0 if it rounds to zero.
 fn difference(x: f64, digits: usize) -> String {
     if x.abs() < 0.5 * 0.1f64.powi(digits as i32) { "0".into() } else { format!("{x:+.digits$}") }
 }

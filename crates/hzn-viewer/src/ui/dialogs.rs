@@ -1,4 +1,4 @@
-//! Where to: a line to type a path into, with the system's own dialog behind a button.
+//! The dialog for paths: a line to type a path into, and a button that opens the dialog of the system.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use egui::{Key, RichText};
 use super::viewer::Viewer;
 use crate::model::sheet::Sheet;
 
-/// What a path is asked for.
+/// Purpose of the path that the user enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     Open,
@@ -48,11 +48,11 @@ impl Purpose {
     }
 }
 
-/// A path is being asked for.
+/// The dialog while the user enters a path.
 pub(super) struct Asking {
     purpose: Purpose,
     text: String,
-    /// The system's dialog is open.
+    /// Receives the answer of the system's dialog while that is open.
     browsing: Option<Receiver<Option<PathBuf>>>,
     focus: bool,
 }
@@ -62,7 +62,7 @@ impl Asking {
         Self { purpose, text: start.display().to_string(), browsing: None, focus: true }
     }
 
-    /// The system's dialog, on a thread of its own: it may take as long as the user does.
+    /// Opens the system's dialog on a separate thread, because it stays open as long as the user wants.
     fn browse(&mut self, folder: bool) {
         let (send, receive) = bounded(1);
         let (purpose, text) = (self.purpose, PathBuf::from(&self.text));
@@ -86,14 +86,15 @@ impl Asking {
     }
 }
 
-/// What the system's dialog has come to.
+/// Takes the answer of the system's dialog.
 pub(super) fn poll(viewer: &mut Viewer) {
     let Some(asking) = &mut viewer.asking else { return };
     let Some(answer) = asking.browsing.as_ref().and_then(|b| b.try_recv().ok()) else { return };
     asking.browsing = None;
     if let Some(path) = answer {
         asking.text = path.display().to_string();
-        // A file that is picked is opened; a name to write to can still be looked at.
+        // A file that is chosen for reading is opened at once. A path for writing is shown first, so that the user can
+        // check it.
         if !asking.purpose.writes() {
             accept(viewer);
         }
@@ -163,7 +164,7 @@ fn accept(viewer: &mut Viewer) {
     }
 }
 
-/// What differs from the file.
+/// Shows the differences from the saved file.
 fn diff(viewer: &mut Viewer, ctx: &egui::Context) {
     if !viewer.showing_diff {
         return;
@@ -192,7 +193,7 @@ mod tests {
     use super::*;
     use crate::model::Settings;
 
-    /// As if the system's dialog had given this.
+    /// Returns a viewer in which the system's dialog has given this answer.
     fn browsed(purpose: Purpose, answer: Option<PathBuf>) -> Viewer {
         let mut viewer = Viewer::new(Settings::default(), None, Arc::new(|| {}));
         let (send, receive) = bounded(1);

@@ -1,11 +1,11 @@
-//! What each stage did, in short lines.
+//! Short lines about the work of each stage.
 
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, body};
 
 use crate::work::frame_view::{BodyResult, FrameView, Outcome};
 
-/// A card of the stages' column: its title, the stage that it shows, the sections of sensor.toml that belong to it.
+/// A card in the column of stages: its title, its stage, and the sections of sensor.toml that belong to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Card {
     pub(super) title: &'static str,
@@ -18,7 +18,7 @@ const fn card(title: &'static str, stage: Option<Stage>, sections: &'static [&'s
     Card { title, stage, sections, open }
 }
 
-/// All cards, in the order of a picture's way.
+/// All cards, in the order in which a picture is processed.
 pub(super) const CARDS: &[Card] = &[
     card("Picture", None, &["input", "gate"], false),
     card("Body", None, &["body"], false),
@@ -35,7 +35,7 @@ pub(super) const CARDS: &[Card] = &[
     card("Limits", None, &["limits"], false),
 ];
 
-/// What went in, what came out, what was dropped.
+/// Returns lines about the input of a stage, its output, and the points that it dropped.
 pub(super) fn lines(card: &Card, sight: &FrameView, outcome: &Outcome, answer: &BodyResult) -> Vec<String> {
     let Ok(report) = &answer.report else { return Vec::new() };
     let (c, config) = (report.counters, &outcome.config);
@@ -151,8 +151,8 @@ fn level(answer: &BodyResult, config: &Config) -> Vec<String> {
     }
 }
 
-/// What a row says of a frame without an answer, such as `ended at select: short-arc, short-arc`, with the verdicts
-/// that many edges share said once.
+/// Shortens the detail of a row without an answer, for example `ended at select: short-arc, short-arc`: a verdict of
+/// several edges appears once, with its count.
 pub(super) fn in_short(detail: &str) -> String {
     let Some((stage, verdicts)) = detail.split_once(": ") else { return detail.to_owned() };
     let mut counted: Vec<(&str, usize)> = Vec::new();

@@ -1,4 +1,4 @@
-//! The help: every key.
+//! The help: a list of all keys.
 
 use egui::{RichText, vec2};
 

@@ -1,4 +1,4 @@
-//! The window. [`Viewer`] holds the state and decides; every panel has a file of its own and only draws.
+//! The window. [`Viewer`] holds the state and decides. Every panel has a separate file and only draws.
 
 mod command;
 mod compare;

@@ -1,4 +1,4 @@
-//! Plots over time, and the residuals along the limb of the frame that is shown.
+//! Plots over time, and the residuals along the limb of the shown picture.
 
 use std::ops::RangeInclusive;
 
@@ -10,17 +10,17 @@ use super::{picture, theme};
 use crate::model::rows::{Of, QUANTITIES, Quantity};
 use crate::work::frame_view::Residual;
 
-/// Name of the residuals among what can be plotted.
+/// Name of the plot of residuals.
 pub(super) const RESIDUALS: &str = "Residuals";
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let height = viewer.settings.plots_height;
     let panel = egui::Panel::bottom("plots").resizable(true).default_size(height).size_range(110.0..=600.0);
     let shown = panel.show(ui, |ui| {
-        // All of the panel is used: one that its contents do not fill shrinks a little with every frame.
+        // The contents fill the whole panel. Otherwise the panel would shrink a little with every frame of the window.
         ui.expand_to_include_rect(ui.max_rect());
         ui.add_space(4.0);
-        // A single picture has no course of time.
+        // A single picture has no plot over time.
         let single = viewer.sequence.complete && viewer.sequence.len() == 1;
         let chosen = if single {
             vec![RESIDUALS.to_owned()]
@@ -81,7 +81,7 @@ fn title(quantity: &Quantity) -> String {
     if quantity.unit.is_empty() { quantity.name.to_owned() } else { format!("{} [{}]", quantity.name, quantity.unit) }
 }
 
-/// What is plotted, and which line is which. A legend within the plot would cover what it explains.
+/// Draws title and legend of a plot above it, because a legend inside would cover the lines.
 fn head(ui: &mut Ui, title: &str, lines: &[(&str, Color32)]) {
     ui.horizontal(|ui| {
         ui.label(RichText::new(title).size(12.5));
@@ -93,15 +93,15 @@ fn head(ui: &mut Ui, title: &str, lines: &[(&str, Color32)]) {
     });
 }
 
-/// Says which plot this is, to who does not see it.
+/// Names the plot for screen readers.
 fn named(response: &Response, name: &str) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Plot {name}")));
 }
 
-/// A quantity of all frames; gives the frame that was clicked.
+/// Plots a quantity of all pictures; returns the picture that was clicked.
 fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize> {
     let entries = &viewer.sequence.entries;
-    // Times of the day are large numbers: the first frame is zero.
+    // Times may be large numbers, so the plot starts at the first picture with time zero.
     let start = entries.iter().find_map(|e| e.time_s).unwrap_or(0.0);
     let dark = ui.visuals().dark_mode;
     let value = |i: usize, of: Of, fresh: bool| {
@@ -119,7 +119,7 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
     }
     head(ui, &title(quantity), &lines);
     let plot = framed(("plot", quantity.name), ui.available_height())
-        // All of the sequence, whatever part of it has a value.
+        // The plot covers the whole sequence, also where there are no values.
         .include_x(0.0)
         .include_x(entries.iter().rev().find_map(|e| e.time_s).map_or(1.0, |t| (t - start).max(1e-3)))
         .link_cursor(Id::unique("time"), [true, false])
@@ -140,7 +140,7 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
         };
         for (n, (name, of)) in quantity.lines.iter().enumerate() {
             let colour = theme::line(n, dark);
-            // What the file says, faint, where the parameters have changed since.
+            // Where the parameters have changed, the file's results are drawn faintly.
             if changed {
                 for part in line(*of, false) {
                     ui.line(Line::new("file", part).color(colour.gamma_multiply(0.35)).width(1.0).allow_hover(false));
@@ -155,7 +155,7 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
             }
         }
         if let Some(now_s) = entries.get(viewer.playback.frame()).and_then(|e| e.time_s) {
-            // Another colour than the grid's.
+            // This colour differs from the grid's.
             let ink = if dark { theme::LIMB } else { theme::REJECTED };
             ui.vline(VLine::new("", now_s - start).color(ink).width(1.5).allow_hover(false));
         }
@@ -165,12 +165,12 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
     viewer.sequence.nearest(response.inner?.x + start)
 }
 
-/// What all plots have in common.
+/// Returns a plot with the properties that all plots share.
 fn framed<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
     Plot::new(id)
         .height(height)
         .allow_scroll(false)
-        // Few lines, so all of them faint: the curve is what counts.
+        // There are few grid lines, and all of them are faint, so that the curve stands out.
         .grid_spacing(Rangef::new(8.0, 1500.0))
         .x_grid_spacer(|input| ticks(input, 8.0))
         .y_grid_spacer(|input| ticks(input, 4.0))
@@ -178,7 +178,7 @@ fn framed<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
         .y_axis_min_width(44.0)
 }
 
-/// Labels along a plot; none at its very end, where the window's border would cut it.
+/// Returns the labels along an axis. The very end has none, because the border of the window would cut it.
 fn along(unit: &'static str) -> impl Fn(GridMark, &RangeInclusive<f64>) -> String {
     move |mark, range| {
         let room = 0.04 * (range.end() - range.start());
@@ -187,7 +187,7 @@ fn along(unit: &'static str) -> impl Fn(GridMark, &RangeInclusive<f64>) -> Strin
     }
 }
 
-/// Lines across a plot where a person would put them: some `count`, at 1, 2 or 5 times a power of ten.
+/// Returns about `count` grid lines, at 1, 2 or 5 times a power of ten.
 fn ticks(input: GridInput, count: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let rough = (high - low) / count;
@@ -204,16 +204,16 @@ fn ticks(input: GridInput, count: f64) -> Vec<GridMark> {
         .collect()
 }
 
-/// A tick's value with the digits that tell it from its neighbours.
+/// Formats the value of a tick with enough digits to differ from its neighbours.
 fn tick_label(value: f64, step: f64) -> String {
     let digits = (-(step * 1.000_001).log10().floor()).clamp(0.0, 12.0) as usize;
-    // No minus before a zero.
+    // A zero has no minus sign.
     let value = if value.abs() < step * 1e-6 { 0.0 } else { value };
     format!("{value:.digits$}")
 }
 
-/// Points in a row, broken where one is missing. Of those within the same `column` (a width, 0 for none) the lowest and
-/// the highest stay: more cannot be seen, and a sequence may have thousands of frames a column.
+/// Returns rows of points; a missing point starts a new row. Within the same `column` (a width; 0 for none) only about
+/// the lowest and the highest points are kept. More cannot be seen, and a column may have thousands of pictures.
 fn parts(count: usize, column: f64, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
     let mut out: Vec<Vec<[f64; 2]>> = Vec::new();
     let (mut open, mut last, mut in_last) = (false, f64::NAN, 0);
@@ -247,7 +247,7 @@ fn parts(count: usize, column: f64, point: impl Fn(usize) -> Option<[f64; 2]>) -
     out
 }
 
-/// Distance of the edge's points from the fitted limb, along it; gives the point that was clicked.
+/// Plots the residuals of the edge points along the fitted limb; returns the picture point that was clicked.
 fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
     let threshold = viewer.sight.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.reject.threshold_px);
     let all = viewer.answer().map(|a| &*a.residuals).unwrap_or_default();
@@ -275,7 +275,7 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
     });
     named(&shown.response, RESIDUALS);
     let at = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
-    // The point that is nearest on the screen.
+    // The point that is nearest on the screen is returned.
     let apart = |r: &Residual| {
         let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px].into());
         p.distance_sq(at)

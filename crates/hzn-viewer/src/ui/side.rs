@@ -1,4 +1,4 @@
-//! The left column: the answer, how the picture is shown, what is drawn over it.
+//! The left column: the answer, how the picture is shown, and which overlays are drawn.
 
 use egui::{Color32, RichText, Ui, vec2};
 use hzn_core::status::Status;
@@ -77,7 +77,7 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
     });
 }
 
-/// How far the answer is from that of the file.
+/// Returns the angle between the answer and the file's answer as text, or whether only one of them is an answer.
 fn change(recorded: &hzn_mcap::Row, answer: &BodyResult) -> Option<String> {
     match (recorded.axis(), answer.row.axis()) {
         (Some(a), Some(b)) => {
@@ -90,7 +90,7 @@ fn change(recorded: &hzn_mcap::Row, answer: &BodyResult) -> Option<String> {
     }
 }
 
-/// Why there is no answer, and what to try first.
+/// Returns why there is no answer, and the first advice.
 fn detail(sight: &FrameView, answer: Option<&BodyResult>) -> Vec<String> {
     match (&sight.picture, answer) {
         (Err(why), _) => vec![why.clone()],
@@ -130,7 +130,7 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
             }
             ui.horizontal(|ui| {
                 let mut on = viewer.settings.shows(layer);
-                // These two have a place in the camera's own plane alone.
+                // These two layers can only be drawn in the plane of the camera.
                 let own_plane = matches!(layer, Layer::Touched | Layer::Circle);
                 let drawn = !(own_plane && viewer.settings.undistorted);
                 let switch = ui.add_enabled(drawn, egui::Checkbox::new(&mut on, layer.name()));

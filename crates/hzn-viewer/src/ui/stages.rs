@@ -1,4 +1,4 @@
-//! The column of stages: what each did to the frame, and its parameters.
+//! The column of stages: the result of each stage for the picture, and its parameters.
 
 use egui::{Color32, ComboBox, RichText, Slider, SliderClamping, Ui, vec2};
 use hzn_calib::keys::{self, Key, Limits};
@@ -11,7 +11,7 @@ use super::{Command, theme};
 use crate::model::{Knob, Session};
 use crate::work::frame_view::{BodyResult, Outcome};
 
-/// Width of the parameters' names.
+/// Width of the names of parameters.
 const NAME_WIDTH: f32 = 136.0;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
@@ -23,14 +23,14 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             return without(viewer, ui);
         }
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            // Shared, not copied: an answer holds thousands of points.
+            // The answer is shared, not copied, because it holds thousands of points.
             let outcome = viewer.sight.as_ref().and_then(|s| s.answers.first().cloned());
             for card in CARDS {
                 one(viewer, ui, card, outcome.as_deref());
             }
             ui.add_space(8.0);
         });
-        // A slider that was let go ends its step.
+        // Releasing a slider ends its step.
         if ui.input(|i| i.pointer.any_released())
             && let Some(session) = &mut viewer.session
             && viewer.mask.is_none()
@@ -41,7 +41,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     viewer.settings.stages_width = shown.response.rect.width();
 }
 
-/// There is no sensor: how to come by one.
+/// Says how to get a sensor.toml if there is none.
 fn without(viewer: &mut Viewer, ui: &mut Ui) {
     ui.label("What the sensor does with a picture, stage by stage, stands here once there is a sensor.toml.");
     ui.add_space(4.0);
@@ -52,7 +52,7 @@ fn without(viewer: &mut Viewer, ui: &mut Ui) {
     ui.weak("hzn init writes one to start from; it can be dropped on the window, too.");
 }
 
-/// Preset, undo, redo, reset, save; and what is wrong.
+/// Draws preset, undo, redo, reset and save, and the error in the text.
 fn head(viewer: &mut Viewer, ui: &mut Ui) {
     ui.add_space(5.0);
     let Some(session) = &mut viewer.session else {
@@ -107,7 +107,7 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
     }
 }
 
-/// Which of several bodies is looked at.
+/// Draws the choice between several bodies.
 fn bodies(viewer: &mut Viewer, ui: &mut Ui) {
     let names: Vec<(&str, Status)> = viewer
         .sight
@@ -163,7 +163,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>)
             state.toggle(ui);
         }
         state.store(ui.ctx());
-        // What happened is always there; the parameters unfold.
+        // The results are always visible; the parameters unfold.
         if let (Some(sight), Some(outcome), Some(answer)) = (&viewer.sight, outcome, answer) {
             for line in facts::lines(card, sight, outcome, answer) {
                 ui.add(egui::Label::new(RichText::new(line).size(12.5)).wrap());
@@ -189,7 +189,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>)
     ui.add_space(2.0);
 }
 
-/// The colour of a card's dot: whether the frame came as far as this.
+/// Returns the colour of a card's dot, which shows whether the picture reached the stage.
 fn reached(card: &Card, answer: Option<&BodyResult>) -> Color32 {
     let grey = Color32::from_rgb(110, 115, 124);
     let Some(Ok(report)) = answer.map(|a| a.report.as_ref()) else { return grey };
@@ -201,7 +201,7 @@ fn reached(card: &Card, answer: Option<&BodyResult>) -> Color32 {
     }
 }
 
-/// The candidate edges: pointing at one shows it in the picture.
+/// Lists the candidate edges. The picture highlights the one under the pointer.
 fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
     let Ok(report) = &answer.report else { return };
     viewer.pointed = None;
@@ -254,7 +254,7 @@ fn mask(viewer: &mut Viewer, ui: &mut Ui) {
     });
 }
 
-/// One key of sensor.toml: a slider, a choice or a switch.
+/// Draws one key of sensor.toml: a slider, a choice or a switch.
 fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
     let body = viewer.body;
     let Some(session) = &mut viewer.session else { return };
@@ -263,7 +263,7 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
     }
     let value = session.value(key.section(), key.name(), body).cloned();
     let method = session.value(key.section(), "method", body).and_then(|m| m.as_str().map(str::to_owned));
-    // A key of another method changes nothing: it is not in the way.
+    // A key of another method has no effect, so it is hidden.
     if key.method().is_some() && method.is_some() && key.method() != method.as_deref() {
         return;
     }
@@ -305,7 +305,7 @@ fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
                 number(session, ui, key, body, limits, name.id, &hint);
             }
             (Limits::Number { .. }, None) => {
-                // Left out: a click gives it a value to begin with.
+                // The key is not in the text; a click sets a first value.
                 if ui.button("automatic").on_hover_text(format!("{hint}\nClick to set it.")).clicked()
                     && let Some(knob) = Knob::from_limits(&key.limits, session.usual(key.section(), key.name(), body))
                 {
@@ -360,7 +360,7 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
     }
 }
 
-/// A value that the text holds can be taken out, so that the preset's counts.
+/// Draws the button that restores the saved file's value of a key.
 fn restore(session: &mut Session, ui: &mut Ui, key: &Key, body: usize) {
     let differs = session.differs(key.section(), key.name(), body);
     if differs && ui.small_button("file").on_hover_text("Back to the file's value").clicked() {

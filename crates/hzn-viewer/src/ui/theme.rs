@@ -1,13 +1,13 @@
-//! Colours and sizes. Data colours are those of Okabe and Ito, which stay apart for colour-blind eyes.
+//! Colours and sizes. The data colours are those of Okabe and Ito, which colour-blind people can tell apart.
 
 use egui::{Color32, CornerRadius, Stroke, Theme, Visuals};
 use hzn_core::status::Status;
 
 /// The fitted limb.
 pub(super) const LIMB: Color32 = Color32::from_rgb(240, 228, 66);
-/// Points that carry the answer.
+/// Edge points that the answer is computed from.
 pub(super) const INLIER: Color32 = Color32::from_rgb(0, 178, 130);
-/// Points that do not belong to the limb.
+/// Edge points that do not belong to the limb.
 pub(super) const REJECTED: Color32 = Color32::from_rgb(213, 94, 0);
 /// The axis.
 pub(super) const AXIS: Color32 = Color32::from_rgb(230, 140, 190);
@@ -22,7 +22,7 @@ pub(super) const CIRCLE: Color32 = Color32::from_rgb(140, 170, 200);
 /// Pixels that were read.
 pub(super) const TOUCHED: Color32 = Color32::from_rgb(204, 121, 167);
 
-/// Candidate edges, one after the other.
+/// Candidate edges, in turn.
 const EDGES: [Color32; 6] = [
     Color32::from_rgb(86, 180, 233),
     Color32::from_rgb(204, 121, 167),
@@ -32,12 +32,12 @@ const EDGES: [Color32; 6] = [
     Color32::from_rgb(213, 94, 0),
 ];
 
-/// The colour of a candidate edge, by its number.
+/// Returns the colour of a candidate edge, by its number.
 pub(super) fn edge(candidate: u32) -> Color32 {
     EDGES.get(candidate as usize % EDGES.len()).copied().unwrap_or(Color32::WHITE)
 }
 
-/// The colour of the line number `n` of a plot.
+/// Returns the colour of the line number `n` of a plot.
 pub(super) fn line(n: usize, dark: bool) -> Color32 {
     let [a, b, c] = if dark {
         [Color32::from_rgb(86, 180, 233), Color32::from_rgb(230, 159, 0), Color32::from_rgb(0, 178, 130)]
@@ -47,7 +47,7 @@ pub(super) fn line(n: usize, dark: bool) -> Color32 {
     [a, b, c].get(n % 3).copied().unwrap_or(a)
 }
 
-/// The colour of a status.
+/// Returns the colour of a status.
 pub(super) fn status(status: Status) -> Color32 {
     match status {
         Status::Ok => Color32::from_rgb(0, 158, 115),
@@ -63,13 +63,13 @@ pub(super) fn status(status: Status) -> Color32 {
     }
 }
 
-/// Black or white, whatever can be read on a colour.
+/// Returns black or white, whichever can be read better on a colour.
 pub(super) fn on(colour: Color32) -> Color32 {
     let [r, g, b, _] = colour.to_array().map(f32::from);
     if 0.299 * r + 0.587 * g + 0.114 * b > 140.0 { Color32::BLACK } else { Color32::WHITE }
 }
 
-/// Sets both looks up; called once.
+/// Sets up the dark and the light theme; it is called once.
 pub(super) fn apply(ctx: &egui::Context) {
     let mut dark = Visuals::dark();
     dark.panel_fill = Color32::from_rgb(24, 26, 31);

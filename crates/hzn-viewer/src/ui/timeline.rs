@@ -1,4 +1,4 @@
-//! The time line: a colour a frame, the place in it, playing.
+//! The time line: the status of every picture as a colour, the position in the sequence, and the player.
 
 use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Shape, Stroke, Ui, pos2, vec2};
 use hzn_core::status::Status;
@@ -7,7 +7,7 @@ use super::viewer::Viewer;
 use super::{Command, theme};
 use crate::model::playback::SPEEDS;
 
-/// Room for work on the whole sequence.
+/// Width that is kept free for the progress of work on the whole sequence.
 const WORK_WIDTH: f32 = 260.0;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
@@ -66,7 +66,7 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
     }
 }
 
-/// What is drawn on a button of the player.
+/// Symbol on a button of the player.
 #[derive(Clone, Copy)]
 enum Icon {
     First,
@@ -77,7 +77,7 @@ enum Icon {
     Last,
 }
 
-/// Drawn, because fonts do not have them all.
+/// Draws a button with a symbol. It is painted, because not all fonts have these symbols.
 fn icon_button(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(vec2(28.0, 20.0), Sense::click());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, name));
@@ -107,7 +107,7 @@ fn icon_button(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     response
 }
 
-/// Which frame this is.
+/// Shows number, time and name of the picture.
 fn place(viewer: &Viewer, ui: &mut Ui) {
     let count = viewer.sequence.len();
     if count == 0 {
@@ -119,7 +119,7 @@ fn place(viewer: &Viewer, ui: &mut Ui) {
     if let Some(entry) = viewer.sequence.entries.get(frame) {
         let time = entry.time_s.map_or("no time".to_owned(), |t| format!("{t:.3} s"));
         ui.label(RichText::new(time).monospace().size(12.0));
-        // A long name leaves room for what stands at the right.
+        // A long name leaves room for the progress on the right.
         let room = vec2((ui.available_width() - WORK_WIDTH).max(0.0), 18.0);
         let layout = egui::Layout::left_to_right(egui::Align::Center);
         ui.allocate_ui_with_layout(room, layout, |ui| {
@@ -128,7 +128,7 @@ fn place(viewer: &Viewer, ui: &mut Ui) {
     }
 }
 
-/// Work on the whole sequence, with progress.
+/// Shows the progress of work on the whole sequence.
 fn work(viewer: &mut Viewer, ui: &mut Ui) {
     if let Some(sweep) = &viewer.sweep {
         if ui.add_enabled(!sweep.is_stopping(), egui::Button::new("Cancel")).clicked() {
@@ -154,7 +154,7 @@ fn work(viewer: &mut Viewer, ui: &mut Ui) {
     }
 }
 
-/// The worst status among some frames, by how much it needs a look.
+/// Returns the status that most needs attention among some pictures.
 fn worst(statuses: impl Iterator<Item = Status>) -> Option<Status> {
     let weight = |s: &Status| match s {
         Status::Ok => 0,
@@ -181,7 +181,7 @@ fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     let width = band.width() / columns as f32;
     let status = |i: usize| viewer.rows.newest(i, viewer.body).map(|r| r.status);
     let mut first: Option<(usize, Status)> = None;
-    // Neighbours of one colour are one rectangle.
+    // Neighbours with the same colour are drawn as one rectangle.
     let flush = |first: &mut Option<(usize, Status)>, end: usize| {
         if let Some((from, status)) = first.take() {
             let x = |c: usize| band.left() + c as f32 * width;

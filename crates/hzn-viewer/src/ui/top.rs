@@ -1,4 +1,4 @@
-//! The bar on top: menus, what is open, and what has to be said.
+//! The bar at the top: menus, the title of the sequence, and messages.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use super::Command;
 use super::dialogs::{Asking, Purpose};
 use super::viewer::{Message, Viewer};
 
-/// What takes no longer needs no bar: it would only make the window jump.
+/// Age from which a job gets a bar. A bar for a shorter job would only make the window jump.
 const NOTICED: Duration = Duration::from_millis(200);
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
@@ -159,7 +159,7 @@ fn messages(viewer: &mut Viewer, ui: &mut Ui) {
     }
 }
 
-/// Work on files that takes longer than a moment.
+/// Shows the progress of jobs that take longer than [`NOTICED`].
 fn jobs(viewer: &Viewer, ui: &mut Ui) {
     for job in &viewer.jobs {
         ui.ctx().request_repaint_after(NOTICED);

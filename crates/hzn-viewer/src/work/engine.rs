@@ -1,5 +1,5 @@
-//! The thread that looks: it takes the newest wish, forgets older ones, and answers with a [`FrameView`]. While nothing
-//! is wished for it decodes the frames that will come next.
+//! The thread that processes the shown picture. It takes the newest request, drops older ones, and answers with a
+//! [`FrameView`]. Without a request it decodes the pictures that come next.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -19,35 +19,35 @@ use super::paint::{self, Recipe, Warp};
 use super::store::Store;
 use crate::model::{Entry, Look, Plane, plane::Pinhole};
 
-/// A configuration, with a number that tells versions apart.
+/// A configuration with its version number.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The configuration.
     pub config: Arc<Config>,
-    /// Its version.
+    /// Version number of the configuration.
     pub changes: u64,
 }
 
-/// What is to be seen.
+/// Request to process and show a picture.
 #[derive(Debug, Clone)]
 pub struct Ask {
-    /// The frame's place in the sequence.
+    /// Index of the picture in the sequence.
     pub index: usize,
-    /// The frame.
+    /// The picture.
     pub entry: Entry,
-    /// The session, and what it is compared with.
+    /// Configuration of the session, and the one that it is compared with.
     pub setups: Vec<Setup>,
     /// Single precision and 2048 points, as on the flight computer.
     pub flight: bool,
-    /// How the picture is shown.
+    /// Display of the picture.
     pub look: Look,
-    /// Without the lens's distortion.
+    /// The picture is shown without the distortion of the lens.
     pub undistorted: bool,
-    /// Pixels that were read are wanted.
+    /// The answer has to list the pixels that were read.
     pub touched: bool,
-    /// Frames that will be asked for next.
+    /// Pictures that are likely to be requested next.
     pub ahead: Vec<(usize, Entry)>,
-    /// When it was wished for.
+    /// Time of the request.
     pub since: Instant,
 }
 
@@ -57,7 +57,7 @@ enum Message {
     Look(Box<Ask>),
 }
 
-/// The thread, from outside. It ends when this is dropped.
+/// Handle of the thread. The thread ends when the handle is dropped.
 pub struct Engine {
     send: Sender<Message>,
     receive: Receiver<FrameView>,
@@ -71,23 +71,23 @@ impl Engine {
         std::thread::spawn(move || Looker::default().run(&messages, &sights, &wake));
         Self { send, receive }
     }
-    /// Another sequence.
+    /// Starts another sequence.
     pub fn open(&self, inputs: Vec<std::path::PathBuf>) {
         let _ = self.send.send(Message::Open(inputs));
     }
-    /// How pictures of the recording are read.
+    /// Sets the reader for the pictures of the recording.
     pub fn recording(&self, pictures: hzn_mcap::Pictures) {
         let _ = self.send.send(Message::Recording(pictures));
     }
-    /// Wishes to see a frame; wishes of before that have not been met are forgotten.
+    /// Requests a picture. Earlier requests that have not been answered are dropped.
     pub fn ask(&self, ask: Ask) {
         let _ = self.send.send(Message::Look(Box::new(ask)));
     }
-    /// The newest answer that has come since the last call, with those before it.
+    /// Returns the answers that have come since the last call, the newest last.
     pub fn answers(&self) -> impl Iterator<Item = FrameView> {
         self.receive.try_iter()
     }
-    /// Waits for an answer; `None` when the time is up.
+    /// Waits for an answer; returns `None` when the time is up.
     pub fn wait(&self, limit: std::time::Duration) -> Option<FrameView> {
         self.receive.recv_timeout(limit).ok()
     }
@@ -102,7 +102,7 @@ struct Looker {
     ahead: VecDeque<(usize, Entry)>,
 }
 
-/// The picture with as many bits as the sensor says, and turned as it says.
+/// Returns the picture with the number of bits and the orientation that `input` names.
 fn told(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
     match (&picture.samples, input.bits) {
         (Samples::Words(_), Some(bits)) if bits != picture.layout.bits => {
@@ -117,7 +117,7 @@ impl Looker {
     fn run(&mut self, messages: &Receiver<Message>, sights: &Sender<FrameView>, wake: &Wake) {
         loop {
             let mut newest = None;
-            // Wait only when there is nothing to decode beforehand.
+            // The thread waits only if there is nothing to decode in advance.
             let first = if self.ahead.is_empty() { messages.recv().map_err(drop) } else { Err(()) };
             if first.is_err() && self.ahead.is_empty() {
                 return;
@@ -206,7 +206,7 @@ impl Looker {
         sight
     }
 
-    /// The sensor number `which`, with this configuration.
+    /// Returns the camera and the sensor number `which` with this configuration.
     fn sensor(
         &mut self,
         which: usize,
@@ -214,7 +214,8 @@ impl Looker {
         flight: bool,
     ) -> Result<(Arc<Camera<f64>>, &mut AnySensor), String> {
         match self.sensors.get_mut(which).filter(|(_, own, _)| *own == flight) {
-            // A sensor that tracks the level remembers the frame before, which may be any one here: it begins anew.
+            // A sensor that tracks the threshold remembers the picture before, which may be any picture here. So it
+            // starts anew.
             Some((config, _, sensor)) if *config != setup.config || config.tracks() => {
                 sensor.reconfigure(&setup.config).map_err(|e| e.to_string())?;
                 *config = Arc::clone(&setup.config);
@@ -232,7 +233,7 @@ impl Looker {
         }
     }
 
-    /// The picture for the screen, painted only when it is another one.
+    /// Returns the picture for the screen. It is painted only if something that it depends on has changed.
     fn show(&mut self, ask: &Ask, picture: &hzn_run::source::Picture, sight: &FrameView) -> Arc<Shown> {
         let config = ask.setups.first().map(|s| &s.config);
         let camera = sight.camera.as_deref();
@@ -241,7 +242,7 @@ impl Looker {
             _ => Plane::Camera,
         };
         let reached = || sight.answers.first()?.bodies.first()?.row.level;
-        // Only what is painted counts: another level is no other picture in colour.
+        // Only painted properties count: in colour, another threshold does not change the picture.
         let level = if ask.look == Look::Level { reached().unwrap_or(0) } else { 0 };
         let channel = match config {
             Some(config) if ask.look != Look::Colour => config.input.channel,

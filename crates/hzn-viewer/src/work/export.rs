@@ -1,4 +1,4 @@
-//! Files of what is shown: a picture, a video, a table; and a recording that is made whole again.
+//! Writes what the window shows to files: a picture, a video or a table. It also recovers a recording that was cut off.
 
 use std::io::Write;
 use std::path::Path;
@@ -18,7 +18,7 @@ use super::walk::Walk;
 use crate::model::settings::Layer;
 use crate::model::{Sequence, whole};
 
-/// What is drawn over a picture, as far as it is shown.
+/// Returns the annotations of the layers that are switched on.
 pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
     let on = |layer| layers.contains(&layer);
     let mut out = Annotations::default();
@@ -58,10 +58,10 @@ fn draw(picture: &Picture, outcome: Option<&Outcome>, layers: &[Layer]) -> image
     }
 }
 
-/// Writes the picture that is shown, with what is drawn over it, as PNG in its own size.
+/// Writes the shown picture with its annotations as PNG, in the size of the picture.
 ///
 /// # Errors
-/// There is no picture, the name is not that of a PNG, or the disk says no.
+/// There is no picture, the name does not end in `.png`, or the file cannot be written.
 pub fn picture(sight: &FrameView, layers: &[Layer], path: &Path) -> Result<Done, Halt> {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         return Err(Halt::Failed(format!("{}: the picture's ending must be .png", path.display())));
@@ -73,10 +73,10 @@ pub fn picture(sight: &FrameView, layers: &[Layer], path: &Path) -> Result<Done,
     Ok(Done::Written(path.to_owned()))
 }
 
-/// Writes results as CSV or JSON Lines, by the ending.
+/// Writes results as CSV or JSON Lines, depending on the ending.
 ///
 /// # Errors
-/// Another ending, or the disk says no.
+/// The ending is another one, or the file cannot be written.
 pub fn table(rows: &[Row], path: &Path, progress: &Progress) -> Result<Done, Halt> {
     let told = |error: hzn_run::Error| error.to_string();
     let mut table = Table::create(path, Existing::Replace).map_err(told)?;
@@ -92,10 +92,10 @@ pub fn table(rows: &[Row], path: &Path, progress: &Progress) -> Result<Done, Hal
     Ok(Done::Written(path.to_owned()))
 }
 
-/// Makes a recording that was cut off whole again, in a file beside it that is not there yet.
+/// Recovers a recording that was cut off, into a new file next to it. Existing files stay as they are.
 ///
 /// # Errors
-/// It cannot be read, or the disk says no.
+/// The recording cannot be read, or the new file cannot be written.
 pub fn recover(path: &Path, progress: &Progress) -> Result<Done, Halt> {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let stem = name.trim_end_matches(".part").trim_end_matches(".mcap");
@@ -109,25 +109,25 @@ pub fn recover(path: &Path, progress: &Progress) -> Result<Done, Halt> {
     }
 }
 
-/// A video of all frames, each with what is drawn over it.
+/// A video of all pictures with their annotations.
 pub struct Film {
-    /// The frames.
+    /// The pictures.
     pub sequence: Sequence,
-    /// What they are processed with.
+    /// Configuration that the pictures are processed with.
     pub config: Arc<Config>,
-    /// As on the flight computer.
+    /// Single precision and 2048 points, as on the flight computer.
     pub flight: bool,
-    /// What is drawn.
+    /// Layers that are drawn.
     pub layers: Vec<Layer>,
-    /// Frames a second.
+    /// Pictures per second.
     pub fps: f64,
 }
 
 impl Film {
-    /// Writes it, by ffmpeg.
+    /// Writes the video with ffmpeg.
     ///
     /// # Errors
-    /// There is no ffmpeg, it cannot write this, or the sequence cannot be read to its end.
+    /// There is no ffmpeg, ffmpeg fails, or the sequence cannot be read to its end.
     pub fn write(self, path: &Path, progress: &Progress) -> Result<Done, Halt> {
         whole::replace(path, |part| self.shoot(part, path, progress))?;
         Ok(Done::Written(path.to_owned()))
@@ -164,7 +164,7 @@ impl Film {
             progress.at(index as u64, total)?;
             let item = walk.next().ok_or_else(|| "the sequence ends before its last frame".to_owned())?;
             let item = item.map_err(|e| format!("{e:#}"))?;
-            // A picture that cannot be read, or has another size, is a black frame: times stay right.
+            // A picture that cannot be read or has another size becomes a black picture, so that the times stay right.
             let image = match item.payload.decode(Some(&self.config)) {
                 Ok((picture, _)) => {
                     let (name, time_s) = (&*item.name, item.data.as_ref().and_then(|d| d.time_s));
@@ -176,7 +176,7 @@ impl Film {
             };
             let input = pipe.stdin.as_mut().ok_or_else(|| "ffmpeg takes no input".to_owned())?;
             if input.write_all(image.as_raw()).is_err() {
-                // Why, it says itself.
+                // ffmpeg itself says why, on its error output.
                 break;
             }
         }
@@ -188,7 +188,7 @@ fn start_ffmpeg(path: &Path, (width, height): (u32, u32), fps: f64) -> Result<Ch
     Command::new("ffmpeg")
         .args(["-v", "error", "-nostdin", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"])
         .args(["-s", &format!("{width}x{height}"), "-r", &format!("{fps}"), "-i", "-"])
-        // Most players want even sides.
+        // Most players need even widths and heights.
         .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"])
         .arg(path)
         .stdin(Stdio::piped())

@@ -1,4 +1,4 @@
-//! Everything that is known about one frame: what the window draws and says.
+//! All facts about one picture that the window draws and prints.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -24,101 +24,101 @@ use hzn_run::{explain, sink};
 use super::paint::Recipe;
 use crate::model::view::Point;
 
-/// One frame as the parameters make it.
+/// One picture, processed with the current parameters.
 #[derive(Debug, Clone)]
 pub struct FrameView {
-    /// Its place in the sequence.
+    /// Index of the picture in the sequence.
     pub index: usize,
-    /// Name of its picture.
+    /// Name of the picture.
     pub name: String,
-    /// Time in seconds, where it is known.
+    /// Time in seconds, if it is known.
     pub time_s: Option<f64>,
-    /// What was known about it.
+    /// Data of the picture that were known before it was processed.
     pub data: Option<FrameData>,
-    /// The picture, or why there is none.
+    /// The picture, or the reason why there is none.
     pub picture: Result<Arc<Picture>, String>,
-    /// The picture as it is shown; the same `Arc` as before when it has not changed.
+    /// The picture as it is shown. It is the same `Arc` as before if it has not changed.
     pub image: Option<Arc<Shown>>,
-    /// The lens, when there is a sensor.
+    /// The camera, if there is a sensor.
     pub camera: Option<Arc<Camera<f64>>>,
-    /// What was made of it: by the session, and by what it is compared with.
+    /// Results: of the session, then of the configuration that it is compared with.
     pub answers: Vec<Arc<Outcome>>,
-    /// Which version of the session this is.
+    /// Version number of the session's configuration.
     pub changes: u64,
-    /// Time to read and decode, when it was not at hand.
+    /// Time to read and decode the picture; `None` if it was already decoded.
     pub decoding: Option<Duration>,
-    /// From the wish to the answer.
+    /// Time from the request to the answer.
     pub latency: Duration,
 }
 
-/// A picture on its way to the screen.
+/// A picture for the screen.
 #[derive(Debug)]
 pub struct Shown {
-    /// Which frame, and how it is shown.
+    /// Index of the picture, and how it is shown.
     pub of: (usize, Recipe),
     /// The pixels.
     pub image: Arc<ColorImage>,
 }
 
-/// What one configuration made of a frame.
+/// Result of one configuration for a picture.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The configuration.
     pub config: Arc<Config>,
-    /// Each body, in order.
+    /// Results of the bodies, in order.
     pub bodies: Vec<BodyResult>,
-    /// Why nothing was made of it: the picture has another size, or the like.
+    /// Reason why the picture was not processed, for example because it has another size.
     pub refused: Option<String>,
-    /// Pixels that were read, white in a transparent picture; only when it was asked for.
+    /// Pixels that were read, white in a transparent picture; only on request.
     pub touched: Option<Arc<ColorImage>>,
     /// Number of different pixels that were read.
     pub touched_pixels: Option<usize>,
 }
 
-/// What was made of one body.
+/// Result for one body.
 #[derive(Debug, Clone)]
 pub struct BodyResult {
-    /// Which body.
+    /// Kind of the body.
     pub kind: body::Kind,
-    /// The result as files hold it.
+    /// The result as it is written to files.
     pub row: Row,
-    /// The report, or why there is none.
+    /// The report, or the reason why there is none.
     pub report: Result<Report<f64>, String>,
     /// Candidate edges, in the order in which they were followed.
     pub edges: Vec<Edge>,
-    /// Mean and number of pixels of the sample that gave the level.
+    /// Mean and number of the sampled pixels that the threshold was computed from.
     pub sample: Option<(f64, u32)>,
-    /// Time of each stage while watched.
+    /// Time of each stage while an observer watches.
     pub times: Vec<(Stage, Duration)>,
-    /// Time without being watched.
+    /// Total time, without an observer unless the sensor tracks the threshold.
     pub elapsed: Duration,
-    /// Half-angle that was expected, radians; or why nothing could be.
+    /// Expected half-angle in radians; `None` if none can be computed.
     pub expected_rad: Option<f64>,
-    /// The fitted limb, in lines that end where the picture does.
+    /// The fitted limb, as lines that end at the border of the picture.
     pub limb: Vec<Vec<Point>>,
-    /// Where the axis meets the picture.
+    /// Picture point of the limb axis.
     pub axis: Option<Point>,
-    /// Outline of the axis's 3-sigma ellipse in the picture.
+    /// Outline of the 3-sigma ellipse of the axis, in the picture.
     pub ellipse: Vec<Point>,
-    /// Distance of the chosen edge's points from the fitted limb.
+    /// Residuals of the chosen edge's points.
     pub residuals: Vec<Residual>,
 }
 
-/// One edge point beside the fitted limb.
+/// Residual of one edge point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
-    /// Angle about the axis in degrees, -180 to 180, from image x towards image y.
+    /// Angle about the limb axis in degrees, -180 to 180, from image x towards image y.
     pub azimuth_deg: f64,
-    /// Distance in pixels, positive outside of the fitted limb.
+    /// Distance from the fitted limb in pixels, positive outside.
     pub distance_px: f64,
     /// Weight in the fit, 0 to 1.
     pub weight: f64,
-    /// The point.
+    /// The edge point, in pixels.
     pub at: Point,
 }
 
 impl Residual {
-    /// The rejected one that is nearest to a point of the picture, within `reach_px`.
+    /// Returns the rejected point that is nearest to a point of the picture, within `reach_px`.
     pub fn rejected_at(all: &[Self], p: Point, reach_px: f64) -> Option<&Self> {
         let apart = |r: &&Self| (r.at[0] - p[0]).hypot(r.at[1] - p[1]);
         let rejected = all.iter().filter(|r| r.weight <= 0.0 && apart(r) <= reach_px);
@@ -127,18 +127,18 @@ impl Residual {
 }
 
 impl BodyResult {
-    /// The solution, when there is one.
+    /// Returns the solution, if there is one.
     pub fn solution(&self) -> Option<&Solution<f64>> {
         self.report.as_ref().ok()?.solution.as_ref()
     }
-    /// The edge that gave the answer.
+    /// Returns the edge that the answer was computed from.
     pub fn chosen(&self) -> Option<&Edge> {
         let candidate = self.solution()?.candidate;
         self.edges.iter().find(|e| e.candidate == candidate)
     }
 }
 
-/// Pixels that were read, beside everything else that is watched.
+/// Observer that records the pixels that were read, in addition to the traces.
 struct PixelTraces {
     traces: Traces,
     pixels: Option<RefCell<HashSet<(u16, u16)>>>,
@@ -182,22 +182,22 @@ impl<T: Real + Into<f64>> Observer<T> for PixelTraces {
     }
 }
 
-/// A frame before a sensor looks at it.
+/// A picture before a sensor processes it.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameInput<'a> {
-    /// Place in the sequence.
+    /// Index of the picture in the sequence.
     pub index: usize,
     /// Name of the picture.
     pub name: &'a str,
-    /// Time in seconds, where it is known.
+    /// Time in seconds, if it is known.
     pub time_s: Option<f64>,
-    /// What is known about it.
+    /// Data of the picture that are known.
     pub data: Option<&'a FrameData>,
     /// The picture.
     pub picture: &'a Picture,
 }
 
-/// Processes a frame and gathers what there is to see. With `touched`, the pixels that were read too.
+/// Processes a picture and returns all facts to show. With `touched`, the result includes the pixels that were read.
 pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySensor, touched: bool) -> Outcome {
     let FrameInput { index, name, time_s, data, picture } = subject;
     let mut outcome =
@@ -221,7 +221,8 @@ pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySenso
     let bodies = config.each_body();
     let watch = PixelTraces { traces: Traces::new(bodies.len()), pixels: touched.then(RefCell::default) };
     let watched = sensor.process_watched(&view, data, &watch);
-    // Again for the time alone; but not where the level would come from the first look.
+    // A second run measures the time without the observer. It is left out if the sensor tracks the threshold, because
+    // the threshold would then come from the first run.
     let plain = if config.tracks() { watched } else { sensor.process(&view, data, None) };
     let finished = Finished {
         index: index as u64,
@@ -237,7 +238,7 @@ pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySenso
     };
     let rows = sink::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(data);
-    // Drawn where each row sees it.
+    // The drawing takes the rotation rate into account, so every row is drawn where the sensor saw it.
     let camera = &sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
     let each = bodies.iter().zip(finished.found).zip(rows).zip(half_angles).zip(&watch.traces.each);
     for ((((body, found), row), expected), trace) in each {
@@ -284,7 +285,8 @@ fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorIma
     image
 }
 
-/// Image x and y carried to the axis the short way: two unit vectors across it.
+/// Returns two unit vectors perpendicular to the axis (camera frame): image x and y, turned with the optical axis onto
+/// the limb axis by the shortest rotation.
 fn across([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
     let q = 1.0 / (1.0 + z).max(1e-9);
     [[1.0 - x * x * q, -x * y * q, -x], [-x * y * q, 1.0 - y * y * q, -y]]
@@ -294,7 +296,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A direction `angle_rad` from the axis, at an azimuth from image x towards image y.
+/// Returns the direction at `angle_rad` from the axis (camera frame). The azimuth counts from image x towards image y.
 fn beside(axis: [f64; 3], angle_rad: f64, azimuth_rad: f64) -> Option<UnitVec3<hzn_core::frames::Cam, f64>> {
     let [b1, b2] = across(axis);
     let ((s, c), (sa, ca)) = (angle_rad.sin_cos(), azimuth_rad.sin_cos());

@@ -1,4 +1,4 @@
-//! Work on a file that takes a while: on a thread of its own, with progress and a way to stop.
+//! Longer work on a file, on a separate thread, with progress and a way to stop.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,26 +9,26 @@ use crossbeam_channel::{Receiver, bounded};
 
 use super::Wake;
 
-/// What came of it.
+/// Result of a job.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Done {
     /// A file was written.
     Written(PathBuf),
     /// A recording was recovered.
     Recovered {
-        /// The whole one.
+        /// Path of the recovered recording.
         path: PathBuf,
-        /// Frames in it.
+        /// Number of pictures in the recovered recording.
         frames: u64,
     },
 }
 
-/// Why nothing came of it. In either case no file is left.
+/// Reason why a job has no result. In both cases no file is left.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Halt {
-    /// It was stopped.
+    /// The job was stopped.
     Stopped,
-    /// It could not be done.
+    /// The job failed, for this reason.
     Failed(String),
 }
 
@@ -38,7 +38,7 @@ impl From<String> for Halt {
     }
 }
 
-/// How far the work is, and whether it is still wanted.
+/// Progress of a job, and whether the job has to stop.
 #[derive(Debug, Default)]
 pub struct Progress {
     stop: AtomicBool,
@@ -47,10 +47,10 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// `done` of `total` parts are done.
+    /// Records that `done` of `total` parts are finished.
     ///
     /// # Errors
-    /// The work is not wanted any more.
+    /// The job was stopped.
     pub fn at(&self, done: u64, total: u64) -> Result<(), Halt> {
         self.done.store(done, Ordering::Relaxed);
         self.total.store(total, Ordering::Relaxed);
@@ -58,9 +58,9 @@ impl Progress {
     }
 }
 
-/// Work under way. Dropped, it stops.
+/// A job in progress. It stops when the handle is dropped.
 pub struct Job {
-    /// What is done.
+    /// Name of the job for the user.
     pub name: &'static str,
     progress: Arc<Progress>,
     end: Receiver<Result<Done, Halt>>,
@@ -68,7 +68,7 @@ pub struct Job {
 }
 
 impl Job {
-    /// Begins; `wake` is called at the end.
+    /// Starts a job. `wake` is called at its end.
     pub fn start(
         name: &'static str,
         wake: &Wake,
@@ -83,29 +83,29 @@ impl Job {
         });
         Self { name, progress, end, began: Instant::now() }
     }
-    /// The part that is done, 0 to 1.
+    /// Returns the finished fraction, 0 to 1.
     pub fn fraction(&self) -> f32 {
         let [done, total] = [&self.progress.done, &self.progress.total].map(|n| n.load(Ordering::Relaxed));
         done as f32 / total.max(1) as f32
     }
-    /// Time since it began.
+    /// Returns the time since the start.
     pub fn age(&self) -> Duration {
         self.began.elapsed()
     }
-    /// Asks it to stop.
+    /// Asks the job to stop.
     pub fn stop(&self) {
         self.progress.stop.store(true, Ordering::Relaxed);
     }
-    /// Is it asked to stop?
+    /// Returns true if the job was asked to stop.
     pub fn is_stopping(&self) -> bool {
         self.progress.stop.load(Ordering::Relaxed)
     }
-    /// Stops it and waits until what it had begun is removed, but not for ever.
+    /// Stops the job and waits until its unfinished file is removed, but at most 3 s.
     pub fn abandon(&self) {
         self.stop();
         let _ = self.end.recv_timeout(Duration::from_secs(3));
     }
-    /// How it ended, once it has.
+    /// Returns the result once the job has ended, and only once.
     pub fn end(&self) -> Option<Result<Done, Halt>> {
         self.end.try_recv().ok()
     }

@@ -1,4 +1,4 @@
-//! What happens beside the window, on threads of its own: opening, decoding, processing, exporting.
+//! Work on separate threads, so that the window does not wait: opening, decoding, processing and exporting.
 
 pub mod engine;
 pub mod export;
@@ -17,5 +17,5 @@ pub use job::Job;
 
 use std::sync::Arc;
 
-/// Called by a thread that has something new to show.
+/// Wakes the window. A thread calls it when there is something new to show.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;

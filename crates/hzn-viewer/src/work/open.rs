@@ -1,4 +1,4 @@
-//! Opening: what is there is told piece by piece, so that a long recording is on the screen at once.
+//! Opening of a sequence. Pictures are reported as they are found, so that a long recording is on the screen at once.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -12,22 +12,22 @@ use hzn_sim::truth::{self, Truth};
 use super::Wake;
 use crate::model::{Entry, Place};
 
-/// What is to be opened, and what belongs to it.
+/// Request to open a sequence, with the files that belong to it.
 #[derive(Debug, Clone)]
 pub struct Request {
     /// A folder, pictures, a video or a recording.
     pub inputs: Vec<PathBuf>,
-    /// The sensor.toml; without it, the one in the recording or beside the pictures.
+    /// The sensor.toml; without it, the one in the recording or next to the pictures.
     pub sensor: Option<PathBuf>,
-    /// frames.csv; without it, the one beside the pictures.
+    /// The frames.csv; without it, the one next to the pictures.
     pub frames: Option<PathBuf>,
-    /// truth.csv; without it, the one beside the pictures.
+    /// The truth.csv; without it, the one next to the pictures.
     pub truth: Option<PathBuf>,
-    /// Frames a second, where nothing else gives a time.
+    /// Pictures per second; used where nothing else gives the times of the pictures.
     pub fps: f64,
-    /// Form of headerless pictures.
+    /// Size and format of headerless pictures.
     pub raw: Option<Raw>,
-    /// The frame to begin with, from 0.
+    /// Index of the picture to begin with, from 0.
     pub frame: usize,
 }
 
@@ -40,50 +40,50 @@ impl Default for Request {
 /// A sensor.toml.
 #[derive(Debug, Clone)]
 pub struct SensorText {
-    /// Its text.
+    /// Text of the file.
     pub text: String,
-    /// The file it stands in; of one out of a recording, the file it would be.
+    /// Path of the file. A text from a recording has the path at which it would be saved.
     pub home: PathBuf,
-    /// It stands in a file.
+    /// True if the text comes from a file.
     pub is_file: bool,
 }
 
-/// What there is besides pictures.
+/// Everything that was opened except the pictures.
 #[derive(Debug, Default)]
 pub struct Opened {
-    /// What it is called.
+    /// Title: the name of the file or folder.
     pub title: String,
-    /// Folder in which it lies.
+    /// Folder of the opened files.
     pub folder: PathBuf,
-    /// The sensor, when there is one.
+    /// The sensor, if there is one.
     pub sensor: Option<SensorText>,
-    /// The truth, by name of picture.
+    /// The truth by name of the picture.
     pub truth: HashMap<String, Vec<Truth>>,
-    /// Things to be said.
+    /// Messages for the user.
     pub notes: Vec<String>,
 }
 
-/// What opening tells.
+/// An event of the opening.
 #[derive(Debug)]
 pub enum Event {
-    /// It could be opened.
+    /// The sequence is open.
     Opened(Box<Opened>),
-    /// Further frames, with the results that the file holds.
+    /// Further pictures, with the results from the file.
     Frames(Vec<(Entry, Vec<Row>)>),
-    /// How pictures of the recording are read, as far as it is known by now.
+    /// Reader for the pictures of the recording, as far as its channels are known.
     Pictures(hzn_mcap::Pictures),
-    /// That was all.
+    /// All pictures were reported.
     End {
-        /// The recording was not closed: it can be recovered.
+        /// The recording was not closed, so it can be recovered.
         cut_off: bool,
-        /// Something else to be said.
+        /// Another message for the user.
         note: Option<String>,
     },
-    /// It cannot be opened.
+    /// The sequence cannot be opened, for this reason.
     Failed(String),
 }
 
-/// Begins to open.
+/// Starts to open a sequence and returns the events.
 pub fn start(request: Request, wake: Wake) -> Receiver<Event> {
     let (send, receive) = unbounded();
     std::thread::spawn(move || {
@@ -101,7 +101,7 @@ struct Teller {
 }
 
 impl Teller {
-    /// False when nobody listens any more.
+    /// Sends an event. Returns false if the receiver is gone.
     fn tell(&self, event: Event) -> bool {
         let heard = self.send.send(event).is_ok();
         (self.wake)();
@@ -126,13 +126,13 @@ fn is_table(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "csv" || e == "jsonl")
 }
 
-/// Name of a file or folder for the title.
+/// Returns the name of a file or folder for the title.
 fn title(path: &Path) -> String {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     whole.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-/// Reads what lies beside the pictures.
+/// Reads the files next to the pictures.
 fn companions(request: &Request, folder: &Path, own: Option<SensorText>) -> (Opened, Option<Frames>) {
     let mut opened = Opened { folder: folder.to_owned(), ..Opened::default() };
     let file =
@@ -172,10 +172,10 @@ fn companions(request: &Request, folder: &Path, own: Option<SensorText>) -> (Ope
     (opened, frames)
 }
 
-/// Says what looks wrong about the sensor, and puts in what the pictures tell about their samples.
+/// Adds the warnings about the sensor.toml, and adds `bits` if the pictures show the number of bits of their samples.
 fn settle(opened: &mut Opened, source: &dyn Source) {
     let Some(sensor) = &mut opened.sensor else { return };
-    // What is wrong with it, the session says.
+    // The session reports errors of the sensor.toml.
     let Ok(parsed) = hzn_calib::sensor::parse(&sensor.text, &sensor.home) else { return };
     opened.notes.extend(parsed.warnings.iter().map(ToString::to_string));
     if parsed.config.input.bits.is_some() {
@@ -187,7 +187,7 @@ fn settle(opened: &mut Opened, source: &dyn Source) {
     }
 }
 
-/// A recording: of our own, with results and sensor; or of another program, with pictures only.
+/// Opens a recording: one of ours with results and sensor, or one of another program with pictures only.
 fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
     let folder = path.parent().map(Path::to_owned).unwrap_or_default();
@@ -196,7 +196,7 @@ fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), Stri
         home: folder.join("sensor.toml"),
         is_file: false,
     });
-    // The truth of simulated pictures stays with the pictures: `flight.mcap` beside `flight/truth.csv`.
+    // The truth of simulated pictures stays with the pictures: `flight.mcap` next to `flight/truth.csv`.
     let mut request = request.clone();
     let of_folder = path.with_extension("").join("truth.csv");
     if request.truth.is_none() && !folder.join("truth.csv").exists() && of_folder.exists() {
@@ -240,15 +240,15 @@ fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), Stri
     Ok(())
 }
 
-/// Puts pictures and results together to frames.
+/// Joins pictures and their results.
 struct Gather {
     name: String,
     frames: Option<Frames>,
-    /// Pictures whose results have not come yet, by sequence number.
+    /// Pictures whose results have not been read yet, by sequence number.
     pending: HashMap<u32, hzn_mcap::Place>,
-    /// Frames so far of a recording without results.
+    /// Number of pictures so far, in a recording without results.
     pictures_only: u64,
-    /// The last frame: results of further bodies may follow.
+    /// The last picture; results of further bodies may follow.
     last: Option<(Entry, Vec<Row>)>,
 }
 
@@ -290,7 +290,7 @@ impl Gather {
     }
 }
 
-/// Pictures that are files of their own, or a video.
+/// Opens pictures in separate files, or a video.
 fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
     let open = || source::open(&request.inputs, request.raw, None);
     let mut source = open().map_err(|e| e.to_string())?;
@@ -328,7 +328,8 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
         let time_s = time.time_s(data.as_ref(), exif, index, request.fps);
         let takes_long = time == TimeSource::Exif || matches!(place, Place::Video(_));
         batch.push((Entry { name, time_s, data, place }, Vec::new()));
-        // A video is decoded, and a file opened, to know its time: what is known by now can be looked at.
+        // To know the times, a video is decoded and a file is opened. This takes long, so the pictures found so far are
+        // sent.
         if takes_long && batch.len() >= 25 && !teller.tell(Event::Frames(std::mem::take(&mut batch))) {
             return Ok(());
         }
@@ -339,7 +340,7 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
     Ok(())
 }
 
-/// Pictures that frames.csv names and the folder does not have.
+/// Returns a message about pictures that frames.csv names and the folder lacks.
 fn missing_note(frames: &Frames, request: &Request, folder: &Path) -> Option<String> {
     if !request.inputs.iter().all(|p| p.is_dir()) {
         return None;
@@ -411,7 +412,7 @@ mod tests {
                 _ => Vec::new(),
             })
             .collect();
-        // 2020-11-20, and a picture without a camera.
+        // The time is on 2020-11-20. The second picture is not from a camera.
         assert!(matches!(times.as_slice(), [Some(t), None] if (t / 86400.0).floor() == 18_586.0), "{times:?}");
     }
 }

@@ -1,4 +1,5 @@
-//! The picture as it is shown: colour, brightness or level, in the camera's plane or a pinhole's.
+//! Paints the picture for the screen: in colour, as brightness or as lit and dark pixels, in the plane of the camera or
+//! of a pinhole.
 
 use egui::{Color32, ColorImage};
 use hzn_core::camera::Camera;
@@ -8,31 +9,31 @@ use hzn_run::source::{Picture, picture::Samples};
 
 use crate::model::{Look, Plane};
 
-/// Lit pixels of the level view.
+/// Colour of lit pixels in the threshold view.
 const LIT: Color32 = Color32::from_rgb(214, 214, 206);
-/// Dark pixels of the level view.
+/// Colour of dark pixels in the threshold view.
 const DARK: Color32 = Color32::from_rgb(24, 30, 46);
 
-/// What the shown picture depends on.
+/// All properties that the shown picture depends on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recipe {
-    /// How it is shown.
+    /// Display of the picture.
     pub look: Look,
-    /// The level, for [`Look::Level`].
+    /// Threshold, for [`Look::Level`].
     pub level: u16,
-    /// Which channel is brightness.
+    /// Channel that is taken as brightness.
     pub channel: Channel,
-    /// How the picture was turned.
+    /// Orientation in which the picture is read.
     pub orient: Orient,
-    /// The plane it is shown in.
+    /// The plane that the picture is shown in.
     pub plane: Plane,
 }
 
-/// Where each pixel of a plane comes from; made once for a camera and plane.
+/// Source of each pixel of a plane. It is computed once for a camera and a plane.
 #[derive(Debug, Default)]
 pub struct Warp {
     of: Option<(Plane, hzn_core::camera::Config)>,
-    /// Index of the camera's pixel, `u32::MAX` outside of what the lens sees.
+    /// Index of the camera's pixel; `u32::MAX` outside the field of view of the lens.
     from: Vec<u32>,
 }
 
@@ -52,7 +53,7 @@ impl Warp {
     }
 }
 
-/// Paints a picture. Without a camera of its size it stays in its own plane.
+/// Paints a picture. Without a camera of the same size, the picture is shown in the plane of the camera.
 pub fn paint(
     picture: &Picture,
     recipe: &Recipe,
@@ -99,8 +100,8 @@ fn colours(picture: &Picture) -> Vec<Color32> {
     }
 }
 
-/// Each pixel by its value and full scale. A level is turned while one looks: so every value has its colour only once,
-/// and the room is there from the start.
+/// Returns the colour of each pixel, from its value and the full scale. The threshold may change with every frame of
+/// the window, so the colour of each value is computed only once and the memory is reserved at the start.
 fn each(view: &ImageView<'_>, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
     fn all<P: Pixels>(p: &P, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
         let full = p.full_scale();
@@ -119,7 +120,7 @@ fn each(view: &ImageView<'_>, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color
     }
 }
 
-/// Brightness of a pixel, and its samples, for the read-out.
+/// Returns the brightness of a pixel and its samples, for the read-out; `None` outside the picture.
 pub fn read(picture: &Picture, channel: Channel, x: u16, y: u16) -> Option<(u16, Vec<u16>)> {
     let layout = picture.layout;
     if u32::from(x) >= layout.width || u32::from(y) >= layout.height {
@@ -162,7 +163,7 @@ mod tests {
         assert_eq!(grey[(3, 1)], Color32::from_gray(55));
         assert_eq!(paint(&picture(1), &recipe(Look::Colour), None, &mut Warp::default()), grey);
         let level = paint(&picture(1), &recipe(Look::Level), None, &mut Warp::default());
-        // 100 is reached by the pixel number 20: row 2, column 4.
+        // Pixel number 20 (row 2, column 4) has the value 100.
         assert_eq!((level[(3, 2)], level[(4, 2)]), (DARK, LIT));
         let colour = paint(&picture(3), &recipe(Look::Colour), None, &mut Warp::default());
         assert_eq!(colour[(1, 0)], Color32::from_rgb(15, 20, 25));

@@ -1,4 +1,4 @@
-//! The one way to a frame's picture, as it stands in its file, recording or video.
+//! Reads the picture of any place: a file, a recording or a video.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,10 @@ use hzn_run::source::{self, Payload, Source};
 
 use crate::model::Place;
 
-/// Reads what is not decoded yet.
+/// Reader of pictures that are not decoded yet.
 #[derive(Default)]
 pub(super) struct Reader {
-    /// What was opened: a video is begun again from there.
+    /// Files and folders that were opened; a video is reopened from these.
     pub(super) inputs: Vec<PathBuf>,
     pub(super) recording: Option<Pictures>,
     video: Option<(Box<dyn Source>, u64)>,
@@ -21,10 +21,10 @@ impl Reader {
         Self { inputs, recording, video: None }
     }
 
-    /// What there is for one frame; [`Payload::Broken`] where only this one cannot be had.
+    /// Returns the payload of one picture, or [`Payload::Broken`] if only this picture cannot be read.
     ///
     /// # Errors
-    /// The recording or the video cannot be read any more.
+    /// The recording or the video can no longer be read.
     pub(super) fn payload(&mut self, place: &Place) -> anyhow::Result<Payload> {
         Ok(match place {
             Place::File(path) => Payload::File(path.clone()),
@@ -38,7 +38,7 @@ impl Reader {
         })
     }
 
-    /// A video goes forward only; for a picture before, it is begun again.
+    /// Returns a picture of the video. A video is read forward only, so for an earlier picture it is reopened.
     fn of_video(&mut self, index: u64) -> anyhow::Result<Payload> {
         let (source, next) = match &mut self.video {
             Some(video) if video.1 <= index => video,

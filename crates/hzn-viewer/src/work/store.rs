@@ -1,4 +1,4 @@
-//! Pictures on demand, decoded, as many as memory is set aside for.
+//! Cache of decoded pictures, within a fixed amount of memory.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -10,39 +10,39 @@ use hzn_run::source::{Picture, picture::Samples};
 use super::reader::Reader;
 use crate::model::Place;
 
-/// Decoded pictures that are kept, in bytes. A larger picture is kept alone.
+/// Limit for the decoded pictures in memory, in bytes. A larger picture is kept alone.
 const KEEP_BYTES: usize = 192 << 20;
 
-/// A decoded picture, or why there is none.
+/// A decoded picture, or the reason why there is none.
 pub type Decoded = Result<Arc<Picture>, String>;
 
-/// Reads pictures and keeps those that were used last.
+/// Cache that reads pictures and keeps those that were used last.
 #[derive(Default)]
 pub struct Store {
     reader: Reader,
-    /// The one used last stands last.
+    /// Index, picture and size in bytes; the most recently used picture is last.
     kept: VecDeque<(usize, Decoded, usize)>,
 }
 
 impl Store {
-    /// Another sequence.
+    /// Starts another sequence and drops all pictures.
     pub fn open(&mut self, inputs: Vec<PathBuf>) {
         *self = Self { reader: Reader::new(inputs, None), ..Self::default() };
     }
-    /// How pictures of the recording are read.
+    /// Sets the reader for the pictures of the recording.
     pub fn recording(&mut self, pictures: Pictures) {
         self.reader.recording = Some(pictures);
     }
-    /// Is the picture of this frame at hand?
+    /// Returns true if the picture with this index is in the cache.
     pub fn has(&self, index: usize) -> bool {
         self.kept.iter().any(|(i, ..)| *i == index)
     }
-    /// Memory of the pictures that are kept, in bytes.
+    /// Returns the memory of the kept pictures, in bytes.
     pub fn bytes(&self) -> usize {
         self.kept.iter().map(|(_, _, bytes)| bytes).sum()
     }
 
-    /// The picture of a frame.
+    /// Returns a picture; decodes it if it is not in the cache.
     pub fn get(&mut self, index: usize, place: &Place) -> Decoded {
         if let Some(at) = self.kept.iter().position(|(i, ..)| *i == index)
             && let Some(kept) = self.kept.remove(at)

@@ -1,5 +1,5 @@
-//! The whole sequence with the parameters as they are, on all cores, with progress and a way to stop: for the plots, or
-//! into a new file.
+//! Processing of the whole sequence with the current parameters, on all cores, with progress and a way to stop. The
+//! results go to the plots or into a new file.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,59 +16,59 @@ use super::Wake;
 use super::walk::Walk;
 use crate::model::Sequence;
 
-/// What is to be done.
+/// A sweep to be done.
 pub struct Task {
-    /// All frames.
+    /// All pictures.
     pub sequence: Sequence,
     /// The configuration.
     pub config: Arc<Config>,
-    /// Its version.
+    /// Version number of the configuration.
     pub changes: u64,
     /// The text of the sensor.toml.
     pub sensor_toml: String,
-    /// As on the flight computer.
+    /// Single precision and 2048 points, as on the flight computer.
     pub flight: bool,
-    /// Where results go; without it, to the plots only. A file of that name is replaced.
+    /// File for the results; an existing file is replaced. Without it, the results go to the plots only.
     pub output: Option<PathBuf>,
 }
 
-/// What a sweep tells.
+/// An event of a sweep.
 #[derive(Debug)]
 pub enum Event {
-    /// A frame is through.
+    /// A picture was processed.
     Frame {
-        /// Its place in the sequence.
+        /// Index of the picture in the sequence.
         index: usize,
-        /// Which version of the configuration.
+        /// Version number of the configuration.
         changes: u64,
-        /// Its results.
+        /// Results of the picture.
         rows: Vec<Row>,
     },
-    /// It ended, or was stopped.
+    /// The sweep ended or was stopped.
     End {
         /// The file that was written.
         file: Option<PathBuf>,
-        /// It was stopped: there is no file.
+        /// True if the sweep was stopped. Then there is no file.
         stopped: bool,
     },
-    /// It broke off.
+    /// The sweep failed, for this reason.
     Failed(String),
 }
 
-/// A sweep under way. Dropped, it stops.
+/// A sweep in progress. It stops when the handle is dropped.
 pub struct Sweep {
     stop: Arc<AtomicBool>,
     events: Receiver<Event>,
-    /// Frames that are through.
+    /// Number of pictures that are processed.
     pub done: usize,
-    /// Frames in all.
+    /// Number of all pictures.
     pub total: usize,
-    /// Writes a file.
+    /// The sweep writes a file.
     pub writes: bool,
 }
 
 impl Sweep {
-    /// Begins.
+    /// Starts a sweep.
     pub fn start(task: Task, wake: Wake) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let (send, events) = unbounded();
@@ -81,11 +81,11 @@ impl Sweep {
         });
         Self { stop, events, done: 0, total, writes }
     }
-    /// Stops after the frames that were begun.
+    /// Stops the sweep after the pictures that were begun.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
     }
-    /// Stops it and waits until what it had begun is removed, but not for ever.
+    /// Stops the sweep and waits until its unfinished file is removed, but at most 3 s.
     pub fn abandon(&self) {
         self.stop();
         let until = Instant::now() + Duration::from_secs(3);
@@ -95,11 +95,11 @@ impl Sweep {
             }
         }
     }
-    /// Is it asked to stop?
+    /// Returns true if the sweep was asked to stop.
     pub fn is_stopping(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
-    /// What has happened since the last call.
+    /// Returns the events since the last call.
     pub fn events(&mut self) -> Vec<Event> {
         let events: Vec<Event> = self.events.try_iter().collect();
         self.done += events.iter().filter(|e| matches!(e, Event::Frame { .. })).count();
@@ -154,7 +154,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
     Ok(Event::End { file: output, stopped })
 }
 
-/// For results that nobody writes.
+/// Sink for results that are not written.
 struct Nothing;
 impl Sink for Nothing {
     fn write(&mut self, _: &mut Finished) -> anyhow::Result<()> {

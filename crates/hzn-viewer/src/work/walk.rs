@@ -1,4 +1,4 @@
-//! The frames as the window has them, as an input of `hzn-cli`.
+//! The pictures of the window's sequence, as a [`Source`] for the engine of `hzn-run`.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use hzn_run::source::{Item, Source, TimeSource};
 use super::reader::Reader;
 use crate::model::{Entry, Sequence};
 
-/// Goes through a sequence from its first frame on.
+/// Iterator over the pictures of a sequence, from the first one.
 pub(super) struct Walk {
     entries: std::vec::IntoIter<Entry>,
     reader: Reader,
@@ -23,10 +23,10 @@ impl Walk {
     }
 }
 
-/// A reader of one's own for the pictures of a recording.
+/// Opens a separate reader for the pictures of a recording.
 fn pictures(path: &Path) -> Result<Pictures, String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
-    // Its channels are declared before the first picture.
+    // The channels of the recording are declared before the first picture.
     while index.channels() == 0 && index.next_part().map_err(|e| e.to_string())?.is_some() {}
     index.pictures().map_err(|e| e.to_string())
 }
@@ -34,7 +34,7 @@ fn pictures(path: &Path) -> Result<Pictures, String> {
 impl Source for Walk {
     fn next(&mut self) -> Option<anyhow::Result<Item>> {
         let Entry { name, time_s, data, place } = self.entries.next()?;
-        // All that is known of it: nothing is looked for elsewhere.
+        // The window's data of the picture are complete, so nothing is looked up elsewhere.
         let data = FrameData { file: name.clone(), time_s, ..data.unwrap_or_default() };
         Some(self.reader.payload(&place).map(|payload| Item {
             name,

@@ -1,4 +1,4 @@
-//! Everything that is written: pictures, videos, tables, recordings, sensor.toml.
+//! Tests of all files that the window writes: pictures, videos, tables, recordings, sensor.toml.
 
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
@@ -6,7 +6,7 @@ use hzn_core::status::Status;
 
 use crate::window::*;
 
-/// As [`folder`], with thousands of frames.
+/// Like [`folder`], with thousands of pictures.
 fn long() -> (tempfile::TempDir, std::path::PathBuf) {
     let (dir, pictures) = folder();
     lengthen(&pictures, 3000);
@@ -27,7 +27,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     said(&mut window, "Written");
     let saved = image::open(&png).unwrap().to_rgb8();
     assert_eq!(saved.dimensions(), (WIDTH.into(), HEIGHT.into()));
-    // The fitted limb is drawn where it is.
+    // The saved picture shows the fitted limb in its place.
     let limb = sight(&window).answers[0].bodies[0].limb.concat();
     let inside = |p: &&[f64; 2]| p[0] > 2.0 && p[1] > 2.0 && p[0] < 317.0 && p[1] < 237.0;
     let coloured = |p: &[f64; 2]| {
@@ -37,7 +37,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     let points: Vec<_> = limb.iter().filter(inside).collect();
     assert!(points.len() > 10 && points.iter().filter(|p| coloured(p)).count() * 10 > points.len() * 9);
 
-    // With the overlays hidden it is the picture itself, but for the line of text.
+    // With the overlays hidden, the saved file is the picture itself, except for the line of text.
     window.key_press(Key::H);
     window.run_steps(2);
     window.key_press_modifiers(Modifiers::COMMAND, Key::E);
@@ -47,7 +47,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     let plain = image::open(&plain).unwrap().to_rgb8();
     assert!(colours(&saved) > 200 && colours(&plain) == 0, "{} {}", colours(&saved), colours(&plain));
 
-    // Another ending is no PNG.
+    // A name with another ending is refused.
     window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     path(&mut window, &dir.path().join("shown.jpg"), "Write");
     said(&mut window, "ending must be .png");
@@ -89,7 +89,7 @@ fn the_video_shows_every_frame_or_nothing_is_left() {
     assert_eq!(watched.state().sequence().len(), 4);
     assert_eq!(files(dir.path()), ["flight.mp4", "pictures"]);
 
-    // Stopped, and what had the name before is as it was.
+    // A stopped job leaves an earlier file of the same name as it was.
     let (dir, pictures) = long();
     let film = dir.path().join("long.mp4");
     std::fs::write(&film, b"before").unwrap();
@@ -105,7 +105,7 @@ fn the_video_shows_every_frame_or_nothing_is_left() {
     said(&mut window, "Saving the video was stopped");
     assert_eq!(files(dir.path()), ["long.mp4", "pictures"]);
     assert_eq!(std::fs::read(&film).unwrap(), b"before");
-    // No kind of video.
+    // The ending is not that of a video.
     menu(&mut window, "Export", "Save video with overlays…");
     path(&mut window, &dir.path().join("long.nothing"), "Write");
     said(&mut window, "ffmpeg");
@@ -122,7 +122,7 @@ fn a_run_that_is_cancelled_leaves_no_recording() {
         path(window, &recording, "Write");
         window.get_by_label("Cancel").click();
         said(window, "Processing was stopped");
-        // What was said of one run is not taken for the next.
+        // The message is closed, so that it is not taken for the message of the next run.
         window.get_by_label("Close").click();
         window.run_steps(2);
     };
@@ -179,7 +179,7 @@ fn the_sensor_is_saved_elsewhere_with_its_comments() {
 #[test]
 fn a_full_disk_is_said_and_the_rest_goes_on() {
     let (dir, pictures) = folder();
-    // /dev/full takes the place of unfinished files: every write to it says that the disk is full.
+    // /dev/full takes the place of unfinished files, so every write to them reports a full disk.
     let full = |name: &str| std::os::unix::fs::symlink("/dev/full", dir.path().join(name)).unwrap();
     let mut window = window_on(&pictures);
     let write = |window: &mut Window, name: &str, words: &str| {
@@ -204,7 +204,7 @@ fn a_full_disk_is_said_and_the_rest_goes_on() {
         write(&mut window, "d.mp4", "d.mp4: the disk is full");
     }
     assert_eq!(files(dir.path()), ["pictures"], "nothing is left of what could not be written");
-    // A recording keeps its finished frames, and says where.
+    // A recording keeps its finished pictures, and the message says where.
     full("e.mcap.part");
     window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
     write(&mut window, "e.mcap", "no space left on the disk");
@@ -231,7 +231,7 @@ fn what_cannot_be_recovered_for_want_of_space_stays_open() {
     said(&mut window, "no space left on the disk");
     assert_eq!(window.state().sequence().title, "cut.mcap");
     assert_eq!(files(dir.path()), ["cut.mcap", "pictures", "run.mcap"]);
-    // A second try takes another name where one is taken.
+    // If the name is taken, recovery takes another name.
     open(&mut window, &cut);
     said(&mut window, "was not closed");
     settled(&mut window);

@@ -1,4 +1,4 @@
-//! The viewer through its accessibility tree and by mouse, as a user or a screen reader would drive it.
+//! Tests of the viewer through its accessibility tree and by mouse, as a user or a screen reader would drive it.
 
 mod exports;
 mod mouse;

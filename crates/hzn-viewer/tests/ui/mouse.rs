@@ -1,4 +1,4 @@
-//! By mouse: the mask, files dropped, clicks in plots and in the time line.
+//! Tests with the mouse: the mask, dropped files, clicks in plots and in the time line.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,7 +16,7 @@ fn area(window: &Window) -> Area {
     Area { min: [rect.min.x.into(), rect.min.y.into()], size: [rect.width().into(), rect.height().into()] }
 }
 
-/// Where a point of the picture is on the screen.
+/// Returns the screen point of a picture point.
 fn at(window: &Window, p: Point) -> Pos2 {
     let [x, y] = window.state().view().to_screen(area(window), SIZE, p);
     pos2(x as f32, y as f32)
@@ -31,7 +31,7 @@ fn button(window: &mut Window, pos: Pos2, button: PointerButton, pressed: bool) 
 fn click_with(window: &mut Window, pos: Pos2, which: PointerButton) {
     button(window, pos, which, true);
     button(window, pos, which, false);
-    // Two clicks in a row are no double click.
+    // The pause keeps two clicks from being a double click.
     window.run_steps(30);
 }
 
@@ -63,7 +63,7 @@ fn the_mask_is_drawn_moved_and_removed() {
     let before = answer(&window);
     let edge_points = |w: &Window| sight(w).answers[0].bodies[0].row.edge_points.unwrap();
     let points = edge_points(&window);
-    // Over the right part of the limb.
+    // The mask covers the right part of the limb.
     let limb = sight(&window).answers[0].bodies[0].limb.concat();
     let middle = limb.iter().filter(|p| p[0] > 220.0 && p[0] < 230.0).map(|p| p[1]).next().unwrap();
     let corners = [[200.0, middle - 40.0], [300.0, middle - 40.0], [300.0, middle + 40.0], [200.0, middle + 40.0]];
@@ -83,7 +83,7 @@ fn the_mask_is_drawn_moved_and_removed() {
     assert!(edge_points(&window) < points, "masked points are left out");
     assert!(window.state().session().unwrap().sheet().text().contains("[mask]\npolygons_px = "));
 
-    // A corner is moved: one step to undo.
+    // Moving a corner is one step to undo.
     let (from, to) = (at(&window, corners[1]), at(&window, [280.0, middle - 50.0]));
     drag(&mut window, from, to);
     settled(&mut window);
@@ -92,7 +92,7 @@ fn the_mask_is_drawn_moved_and_removed() {
     settled(&mut window);
     assert_eq!(polygons(&window), drawn);
 
-    // A right click on a corner removes it, one within the rest all of it.
+    // A right click on a corner removes it; a right click inside removes the whole polygon.
     let corner = at(&window, corners[2]);
     click_with(&mut window, corner, PointerButton::Secondary);
     assert_eq!(polygons(&window)[0].len(), 3);
@@ -101,7 +101,7 @@ fn the_mask_is_drawn_moved_and_removed() {
     settled(&mut window);
     assert!(polygons(&window).is_empty());
     assert_eq!(answer(&window), before);
-    // With the tool put away, a click draws nothing.
+    // After the tool is closed, a click draws nothing.
     window.key_press(Key::Escape);
     window.run_steps(2);
     for corner in corners {
@@ -142,18 +142,18 @@ fn what_is_dropped_is_opened() {
     assert_eq!(window.state().sequence().len(), 4);
     let before = answer(&window);
 
-    // A sensor.toml is for the pictures that are open.
+    // A sensor.toml applies to the pictures that are open.
     let other = another_sensor(dir.path());
     drop_files(&mut window, &[&other]);
     settled(&mut window);
     assert_eq!(window.state().session().unwrap().path(), Some(&*other));
     assert!(answer(&window).1 > before.1);
 
-    // Some pictures are a sequence of their own.
+    // Several dropped pictures are a new sequence.
     drop_files(&mut window, &[&pictures.join("1.png"), &pictures.join("2.png")]);
     until(&mut window, "two pictures", |v| v.sequence().len() == 2 && v.is_settled());
     assert_eq!(sight(&window).name, "1.png");
-    // Nothing of the kind: what is open stays.
+    // The file does not exist, so the open sequence stays.
     drop_files(&mut window, &[&dir.path().join("none.mcap")]);
     said(&mut window, "no such file");
     assert_eq!(window.state().sequence().len(), 2);
@@ -174,7 +174,7 @@ fn a_click_in_a_plot_or_the_time_line_goes_to_the_frame() {
     settled(&mut window);
     assert_eq!(sight(&window).index, 3);
     let rect = plot(&window, "3 sigma");
-    // Beyond the numbers at its left.
+    // This point is to the right of the axis labels.
     click(&mut window, pos2(rect.left() + 60.0, rect.center().y - 10.0));
     settled(&mut window);
     assert_eq!(sight(&window).index, 0);

@@ -1,4 +1,4 @@
-//! Looking, stepping, tuning, saving, comparing.
+//! Tests of viewing, stepping, tuning, saving and comparing.
 
 use egui::{Key, Role};
 use egui_kittest::kittest::Queryable;
@@ -17,7 +17,7 @@ fn open_step_tune_save_and_open_again() {
     let first = answer(&window);
     assert_eq!((sight(&window).index, first.0), (1, Status::Ok));
 
-    // The level is turned, and the answer follows.
+    // The threshold changes, and the answer follows.
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(1.5);
     settled(&mut window);
     let tuned = answer(&window);
@@ -25,7 +25,7 @@ fn open_step_tune_save_and_open_again() {
     assert_ne!(tuned.2, first.2);
     assert!(window.state().session().unwrap().is_changed());
 
-    // Back and forth.
+    // Undo and redo.
     window.get_by_label("Undo").click();
     settled(&mut window);
     assert_eq!(answer(&window), first);
@@ -33,13 +33,13 @@ fn open_step_tune_save_and_open_again() {
     settled(&mut window);
     assert_eq!(answer(&window), tuned);
 
-    // Saved: one value is another, everything else is as it was.
+    // After saving, one value differs and everything else is unchanged.
     window.get_by_label("Save").click();
     window.run_steps(3);
     let text = std::fs::read_to_string(dir.path().join("sensor.toml")).unwrap();
     assert_eq!(text, SENSOR.replace("scale = 1.0 ", "scale = 1.5 "));
 
-    // Opened again by another window, the frame is the same to the last bit.
+    // In another window, the answer of the saved file is the same to the last bit.
     let mut again = window_on(dir.path());
     again.get_by_label("Next frame").click();
     settled(&mut again);
@@ -117,14 +117,14 @@ fn two_sensor_files_stand_side_by_side_with_the_difference() {
     assert!(window.query_by_label(&format!("{apart:.4}° apart")).is_some());
     let level = f64::from(b.level.unwrap()) - f64::from(a.level.unwrap());
     assert!(level > 0.0 && window.query_by_label(&format!("{level:+.0}")).is_some());
-    // The session goes on being tuned; the other stays.
+    // The session can be tuned further; the other sensor stays.
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(1.6);
     until(&mut window, "not equal", |v| {
         v.sight().is_some_and(|s| {
             s.answers.len() == 2 && s.answers[0].bodies[0].row.axis() == s.answers[1].bodies[0].row.axis()
         })
     });
-    // A file that is none is said, and the comparison stays.
+    // An invalid file is reported, and the comparison stays.
     std::fs::write(&other, "preset = 3").unwrap();
     menu(&mut window, "Compare", "with another sensor.toml…");
     path(&mut window, &other, "Open this");
@@ -140,7 +140,7 @@ fn a_refused_value_is_said_in_place() {
     let before = answer(&window);
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(-3.0);
     settled(&mut window);
-    // Whatever the slider makes of it, the sensor never has a value beyond its limits.
+    // Wherever the slider is set, the value of the sensor stays within its limits.
     let config = window.state().session().unwrap().config().unwrap().clone();
     assert!((0.1..=10.0).contains(&config.binarize.scale));
     assert_eq!(before.0, Status::Ok);

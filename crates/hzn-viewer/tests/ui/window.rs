@@ -1,4 +1,4 @@
-//! A window with a small flight, and what is done in most tests.
+//! A window with a small flight, and the actions that most tests use.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use tempfile::TempDir;
 
 pub(crate) const WIDTH: u16 = 320;
 pub(crate) const HEIGHT: u16 = 240;
-/// Half-angle of the Earth from 240 km, with the limb 10 km above the ground.
+/// Sine of the half-angle of the Earth from 240 km, with the limb 10 km above the ground.
 const HALF_ANGLE: f64 = 6381.0088 / 6611.0088;
 
 pub(crate) const SENSOR: &str = "# tuned by hand
@@ -40,7 +40,7 @@ altitude_km = 240.0
 scale = 1.0     # times Otsu's level
 ";
 
-/// Pictures of a limb with a soft edge that turns from frame to frame; the last one is dark.
+/// Writes pictures of a limb with a soft edge, which turns from picture to picture. The last picture is dark.
 pub(crate) fn flight(folder: &Path) {
     let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, WIDTH, HEIGHT, 260.0)).unwrap();
     for frame in 0..4 {
@@ -58,7 +58,7 @@ pub(crate) fn flight(folder: &Path) {
     std::fs::write(folder.join("sensor.toml"), SENSOR).unwrap();
 }
 
-/// Pictures in a folder of their own, so that what is written lies beside it.
+/// Creates a folder that contains a folder of pictures, so that written files go next to the pictures.
 pub(crate) fn folder() -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let pictures = dir.path().join("pictures");
@@ -67,14 +67,14 @@ pub(crate) fn folder() -> (TempDir, PathBuf) {
     (dir, pictures)
 }
 
-/// Makes a flight longer, by links to its pictures.
+/// Makes a flight longer by links to its pictures.
 pub(crate) fn lengthen(pictures: &Path, frames: usize) {
     for i in 4..frames {
         std::fs::hard_link(pictures.join(format!("{}.png", i % 3)), pictures.join(format!("{i:05}.png"))).unwrap();
     }
 }
 
-/// A sensor.toml whose level is higher.
+/// Writes a sensor.toml with a higher threshold.
 pub(crate) fn another_sensor(folder: &Path) -> PathBuf {
     let path = folder.join("other.toml");
     std::fs::write(&path, SENSOR.replace("scale = 1.0", "scale = 1.6")).unwrap();
@@ -93,7 +93,7 @@ pub(crate) fn window() -> Window {
     window
 }
 
-/// Steps until `ready`, for as long as threads beside the window may take.
+/// Steps the window until `ready`, and allows for the time of the other threads.
 pub(crate) fn until(window: &mut Window, what: &str, ready: impl Fn(&Viewer) -> bool) {
     let begin = Instant::now();
     while !ready(window.state()) {
@@ -109,12 +109,12 @@ pub(crate) fn until(window: &mut Window, what: &str, ready: impl Fn(&Viewer) -> 
 }
 
 pub(crate) fn settled(window: &mut Window) {
-    // A step for what was clicked, one for what follows from it.
+    // One step handles the click, the other one its effects.
     window.run_steps(2);
     until(window, "the frame is not there", Viewer::is_settled);
 }
 
-/// Types a path where one is asked for.
+/// Types a path into the dialog.
 pub(crate) fn path(window: &mut Window, path: &Path, accept: &str) {
     window.run_steps(3);
     window.get_by_role_and_label(Role::TextInput, "Path").focus();
@@ -126,13 +126,13 @@ pub(crate) fn path(window: &mut Window, path: &Path, accept: &str) {
     window.run_steps(2);
 }
 
-/// Opens by typing the path.
+/// Opens a path by typing it.
 pub(crate) fn open(window: &mut Window, what: &Path) {
     window.key_press_modifiers(Modifiers::COMMAND, Key::O);
     path(window, what, "Open this");
 }
 
-/// A window on a folder of pictures.
+/// Returns a window with a folder of pictures.
 pub(crate) fn window_on(folder: &Path) -> Window {
     let mut window = window();
     open(&mut window, folder);
@@ -140,7 +140,7 @@ pub(crate) fn window_on(folder: &Path) -> Window {
     window
 }
 
-/// The same on a flight, which is there as long as its folder is held.
+/// Returns a window with a flight, whose folder exists until the first value is dropped.
 pub(crate) fn window_on_flight() -> (TempDir, Window) {
     let dir = tempfile::tempdir().unwrap();
     flight(dir.path());
@@ -148,14 +148,14 @@ pub(crate) fn window_on_flight() -> (TempDir, Window) {
     (dir, window)
 }
 
-/// Runs the sequence into a new recording.
+/// Processes the sequence into a new recording.
 pub(crate) fn run_into(window: &mut Window, recording: &Path) {
     window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
     path(window, recording, "Write");
     said(window, "Written");
 }
 
-/// Beside a recording, one that ends where the end of its data should be.
+/// Writes a copy next to a recording, cut off where the end of the data should be.
 pub(crate) fn cut_off(recording: &Path) -> PathBuf {
     let bytes = std::fs::read(recording).unwrap();
     let end = bytes.windows(9).rposition(|w| w == [0x0f, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
@@ -164,7 +164,7 @@ pub(crate) fn cut_off(recording: &Path) -> PathBuf {
     cut
 }
 
-/// Chooses from a menu.
+/// Chooses an entry of a menu.
 pub(crate) fn menu(window: &mut Window, menu: &str, entry: &str) {
     window.get_by_label(menu).click();
     window.run_steps(3);
@@ -172,12 +172,12 @@ pub(crate) fn menu(window: &mut Window, menu: &str, entry: &str) {
     window.run_steps(2);
 }
 
-/// Waits until something is said that contains these words.
+/// Waits for a message that contains these words.
 pub(crate) fn said(window: &mut Window, words: &str) {
     until(window, words, |v| v.messages().any(|m| m.contains(words)));
 }
 
-/// Names of the files in a folder.
+/// Returns the names of the files in a folder, sorted.
 pub(crate) fn files(folder: &Path) -> Vec<String> {
     let name = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().to_string_lossy().into_owned();
     let mut names: Vec<String> = std::fs::read_dir(folder).unwrap().map(name).collect();
@@ -189,7 +189,7 @@ pub(crate) fn sight(window: &Window) -> &FrameView {
     window.state().sight().unwrap()
 }
 
-/// Status, level and axis of the frame that is shown.
+/// Returns status, threshold and axis of the shown picture.
 pub(crate) fn answer(window: &Window) -> (Status, Option<u16>, Option<[f64; 3]>) {
     let row = &sight(window).answers[0].bodies[0].row;
     (row.status, row.level, row.axis())

@@ -1,4 +1,4 @@
-//! Wrong input: it is said in place, and the rest keeps working.
+//! Tests with wrong input: the window reports it in place, and everything else keeps working.
 
 use egui::Key;
 use egui_kittest::kittest::Queryable;
@@ -10,14 +10,14 @@ use crate::window::*;
 fn wrong_files_are_said_and_the_rest_goes_on() {
     let (dir, mut window) = window_on_flight();
 
-    // Not a recording: what was open stays.
+    // The file is no recording, so the open sequence stays.
     let bad = dir.path().join("bad.mcap");
     std::fs::write(&bad, b"no recording").unwrap();
     open(&mut window, &bad);
     until(&mut window, "nothing is said", |v| v.messages().any(|m| m.contains("is not an MCAP file")));
     assert_eq!(window.state().sequence().len(), 4);
 
-    // A picture that cannot be decoded, and one of another size.
+    // One picture cannot be decoded, and one has another size.
     std::fs::write(dir.path().join("1.png"), b"no picture").unwrap();
     image::GrayImage::new(40, 30).save(dir.path().join("2.png")).unwrap();
     open(&mut window, dir.path());
@@ -51,18 +51,18 @@ fn a_recording_that_was_cut_off_is_recovered() {
     let (dir, pictures) = folder();
     let mut window = window_on(&pictures);
 
-    // Run into a recording, by the window itself.
+    // The window writes the recording.
     let whole = dir.path().join("run.mcap");
     run_into(&mut window, &whole);
     let folder = answer(&window);
 
-    // The recording says the same as the folder.
+    // The recording gives the same answer as the folder.
     open(&mut window, &whole);
     settled(&mut window);
     assert_eq!(answer(&window), folder);
     assert_eq!(window.state().recorded(0).and_then(|r| r.axis()), folder.2);
 
-    // Cut before the end of its data: every frame is there, and it can be closed.
+    // The file is cut off before the end of its data. All pictures are there, and it can be recovered.
     let cut = cut_off(&whole);
     open(&mut window, &cut);
     until(&mut window, "not said", |v| v.messages().any(|m| m.contains("was not closed")));

@@ -1,4 +1,4 @@
-//! The mask's tool: corners by mouse.
+//! The tool that draws and edits the mask with the mouse.
 
 use egui::{Align2, Painter, PointerButton, Pos2, Response, Shape, Stroke, Ui, vec2};
 
@@ -9,7 +9,7 @@ use crate::model::mask::MaskEdit;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
 
-/// The mask's tool; true while it holds a corner.
+/// Runs the tool. Returns true while a corner is grabbed.
 pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, stage: &Stage<'_>) -> bool {
     let (Some(mut tool), Some(session)) = (viewer.mask.take(), viewer.session.as_mut()) else { return false };
     let polygons = session.polygons();

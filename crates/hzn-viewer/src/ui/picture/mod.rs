@@ -1,4 +1,4 @@
-//! The picture, and everything that is drawn over it.
+//! The panel with the picture and its overlays.
 
 mod mask;
 mod overlays;
@@ -20,7 +20,7 @@ use read_out::{label, notice};
 use stage::{Stage, area};
 pub(super) use textures::Textures;
 
-/// How near the pointer must be to a corner, screen points.
+/// Largest distance of the pointer from a corner that is grabbed, in screen points.
 const REACH: f64 = 9.0;
 
 fn size_of(sight: &FrameView) -> Option<Point> {
@@ -126,7 +126,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, sight: &FrameView, rect: Rect, pane: us
     }
 }
 
-/// Zoom and pan, or the mask's tool. True when the view has changed.
+/// Handles zoom and pan, or the tool of the mask. Returns true if the view has changed.
 fn pointer(viewer: &mut Viewer, ui: &Ui, response: &Response, stage: &mut Stage<'_>) -> bool {
     let before = stage.view;
     if let Some(at) = response.hover_pos() {
@@ -171,7 +171,7 @@ pub(super) fn look_at(viewer: &mut Viewer, p: Point) {
     }
 }
 
-/// Zoom by key or menu, about the middle of the window.
+/// Zooms by key or menu, about the middle of the window.
 pub(super) fn zoom(viewer: &mut Viewer, command: Command, ctx: &egui::Context) {
     let Some(size) = viewer.sight.as_ref().and_then(size_of) else { return };
     let rect = ctx.content_rect();

@@ -1,4 +1,4 @@
-//! What is drawn over the picture.
+//! The overlays of the picture.
 
 use egui::{Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
@@ -11,7 +11,7 @@ use crate::ui::viewer::Viewer;
 use crate::work::FrameView;
 use crate::work::frame_view::{BodyResult, Outcome};
 
-/// Everything that is switched on.
+/// Draws all layers that are switched on.
 pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &FrameView, outcome: &Outcome, stage: &Stage<'_>) {
     let on = |layer| viewer.settings.shows(layer);
     if on(Layer::Mask) {
@@ -56,7 +56,9 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &FrameView, outcom
     }
 }
 
-/// Where Sun and Moon should be: from the time, the position and the attitude, or from frames.csv or the truth.
+/// Returns the expected places of the Sun and the Moon on the screen. The Sun direction comes from frames.csv, else
+/// from the truth, else from time, position and attitude. The Moon direction comes from the truth, else from time,
+/// position and attitude.
 fn sky(viewer: &Viewer, sight: &FrameView, stage: &Stage<'_>) -> Vec<(&'static str, Pos2)> {
     let Some(camera) = stage.camera else { return Vec::new() };
     let mut out = Vec::new();
@@ -95,7 +97,7 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, stage: &Stage<'
         }
     }
     if on(Layer::Limb) {
-        // A dark line below keeps it visible on clouds.
+        // A dark line below keeps the limb visible on clouds.
         lines(painter, stage, &answer.limb, Stroke::new(6.0, Color32::from_black_alpha(120)));
         lines(painter, stage, &answer.limb, Stroke::new(3.4, theme::LIMB));
     }
@@ -106,7 +108,7 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, stage: &Stage<'
         dots(painter, points(false), dot + 0.6, theme::REJECTED);
     }
     if on(Layer::Inliers) {
-        // Narrower than the limb's line, so that both are seen.
+        // The dots are narrower than the line of the limb, so that both are seen.
         dots(painter, points(true), dot, theme::INLIER);
     }
     let inside = |p: &Point| (0..2).all(|i| (-0.5..stage.size[i] - 0.5).contains(&p[i]));
@@ -125,7 +127,7 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, stage: &Stage<'
     }
 }
 
-/// An axis that is not in the picture: an arrow at its border, towards it.
+/// Draws an arrow at the border towards an axis that is outside the picture.
 fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &BodyResult) {
     let (Some(s), Some(camera)) = (answer.solution(), stage.camera) else { return };
     let [x, y, _] = s.axis.xyz();
@@ -140,7 +142,7 @@ fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &BodyResult) {
         stage.place([-0.5, -0.5]),
         stage.place([stage.size[0] - 0.5, stage.size[1] - 0.5]),
     ));
-    // As far as the frame lets it go.
+    // The arrow goes to the border.
     let far = |at: f32, way: f32, low: f32, high: f32| if way > 0.0 { (high - at) / way } else { (low - at) / way };
     let reach = [far(from.x, way.x, frame.left(), frame.right()), far(from.y, way.y, frame.top(), frame.bottom())];
     let reach = reach.into_iter().filter(|r| r.is_finite()).fold(f32::INFINITY, f32::min);
@@ -161,11 +163,11 @@ fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &BodyResult) {
     painter.galley(rect.min + vec2(5.0, 2.0), galley, theme::AXIS);
 }
 
-/// Where a label of this size stands beside an arrow: as far back as it can without leaving the frame, and never over
-/// the arrow.
+/// Returns the place of a label next to an arrow. The label is as far back as the frame allows and never covers the
+/// arrow.
 fn beside(arrow: Rect, way: Vec2, size: Vec2, frame: Rect) -> Rect {
     let c = arrow.center();
-    // Along the border it may move, to stay within.
+    // The label may move along the border to stay within the frame.
     let x = (c.x - size.x / 2.0).min(frame.right() - size.x).max(frame.left());
     let y = (c.y - size.y / 2.0).min(frame.bottom() - size.y).max(frame.top());
     let mut places = [
@@ -187,14 +189,14 @@ fn cross(painter: &Painter, at: Pos2, arm: f32, stroke: Stroke) {
 
 fn lines(painter: &Painter, stage: &Stage<'_>, lines: &[Vec<Point>], stroke: Stroke) {
     for line in lines {
-        // A point that the plane does not show ends the line.
+        // A point that the plane cannot show ends the line.
         for part in line.split(|p| stage.screen(*p).is_none()) {
             painter.add(Shape::line(part.iter().filter_map(|p| stage.screen(*p)).collect(), stroke));
         }
     }
 }
 
-/// Thousands of points as one mesh of squares.
+/// Draws thousands of points as one mesh of squares.
 fn dots(painter: &Painter, points: impl Iterator<Item = Pos2>, radius: f32, colour: Color32) {
     let clip = painter.clip_rect().expand(radius);
     let mut mesh = Mesh::default();
@@ -204,7 +206,7 @@ fn dots(painter: &Painter, points: impl Iterator<Item = Pos2>, radius: f32, colo
     painter.add(mesh);
 }
 
-/// A masked area: its outline, and lines across it.
+/// Hatches a masked area with diagonal lines.
 fn hatch(painter: &Painter, outline: &[Pos2]) {
     if outline.len() < 3 {
         return;
@@ -214,7 +216,7 @@ fn hatch(painter: &Painter, outline: &[Pos2]) {
     let polygon: Vec<Point> = outline.iter().map(|p| [p.x.into(), p.y.into()]).collect();
     let mut y = (bounds.top() - bounds.width()).floor() - (bounds.top() - bounds.width()).floor() % 9.0;
     while y < bounds.bottom() {
-        // Along a falling diagonal, the parts that are inside.
+        // This draws the inner parts of one falling diagonal.
         let steps = (bounds.width() / 2.0).max(1.0) as usize;
         let mut from: Option<Pos2> = None;
         for i in 0..=steps {

@@ -1,4 +1,4 @@
-//! Numbers and words over the picture: what is under the pointer, values of single pixels, what is wrong.
+//! Text over the picture: the data under the pointer, the values of single pixels, and errors.
 
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, vec2};
 use hzn_core::pixel::ImagePoint;
@@ -8,13 +8,13 @@ use crate::model::{Plane, rows};
 use crate::work::frame_view::{BodyResult, FrameView, Outcome, Residual};
 use crate::work::paint;
 
-/// Screen points a picture pixel from which single pixels show their values.
+/// Scale from which single pixels show their values, in screen points per picture pixel.
 const VALUES_FROM: f64 = 34.0;
 
-/// How near the pointer must be to a rejected point, screen points.
+/// Largest distance of the pointer from a rejected point that is described, in screen points.
 const REJECTED_REACH: f64 = 6.0;
 
-/// Values of single pixels, when they are large enough.
+/// Writes the values on single pixels, if they are large enough.
 pub(super) fn values(painter: &Painter, sight: &FrameView, stage: &Stage<'_>, rect: Rect) {
     let (Ok(picture), Plane::Camera) = (&sight.picture, &stage.plane) else { return };
     if stage.scale() < VALUES_FROM {
@@ -33,7 +33,7 @@ pub(super) fn values(painter: &Painter, sight: &FrameView, stage: &Stage<'_>, re
     }
 }
 
-/// What is under the pointer.
+/// Returns a description of the pixel under the pointer: its value, its ray in the camera frame and its angles.
 pub(super) fn under_pointer(
     sight: &FrameView,
     outcome: Option<&Outcome>,
@@ -74,7 +74,7 @@ pub(super) fn under_pointer(
     Some(text)
 }
 
-/// A line of text that can be read on any picture.
+/// Draws text on a background that makes it readable on every picture.
 pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
     let width = painter.clip_rect().width() - 30.0;
     let galley = painter.layout(text.to_owned(), FontId::proportional(12.5), Color32::from_rgb(236, 238, 242), width);
@@ -83,7 +83,7 @@ pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
     painter.galley(rect.min + vec2(7.0, 4.0), galley, Color32::WHITE);
 }
 
-/// Something that is wrong with what is shown, across its middle.
+/// Draws an error message across the middle of the picture.
 pub(super) fn notice(painter: &Painter, rect: Rect, text: &str, colour: Color32) {
     let galley = painter.layout(text.to_owned(), FontId::proportional(14.0), colour, (rect.width() - 60.0).min(640.0));
     let place = Align2::CENTER_CENTER.anchor_size(rect.center(), galley.size() + vec2(24.0, 16.0));

@@ -1,4 +1,4 @@
-//! Where a picture lies on the screen, and in which plane.
+//! Placement of a picture on the screen, and the plane it is shown in.
 
 use egui::{Pos2, Rect, pos2};
 use hzn_core::camera::Camera;
@@ -6,7 +6,7 @@ use hzn_core::camera::Camera;
 use crate::model::view::{Area, Point};
 use crate::model::{Plane, View};
 
-/// Where a picture of this size lies, and in which plane.
+/// Placement of a picture of this size, and the plane it is shown in.
 pub(super) struct Stage<'a> {
     pub(super) view: View,
     pub(super) area: Area,
@@ -27,7 +27,7 @@ impl Stage<'_> {
         let [x, y] = self.view.to_screen(self.area, self.size, p);
         pos2(x as f32, y as f32)
     }
-    /// The point of the camera's picture under a point of the screen.
+    /// Returns the point of the camera's picture under a point of the screen.
     pub(super) fn picture(&self, at: Pos2) -> Option<Point> {
         let p = self.view.to_picture(self.area, self.size, [at.x.into(), at.y.into()]);
         match (&self.plane, self.camera) {
@@ -40,7 +40,7 @@ impl Stage<'_> {
     }
 }
 
-/// A part of the screen.
+/// Converts a rectangle of the screen.
 pub(super) fn area(rect: Rect) -> Area {
     Area {
         min: [rect.min.x.into(), rect.min.y.into()],

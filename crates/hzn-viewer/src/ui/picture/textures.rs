@@ -1,4 +1,4 @@
-//! Pictures on the graphics card.
+//! Textures of the pictures on the graphics card.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use egui::{ColorImage, TextureFilter, TextureHandle, TextureOptions};
 use crate::work::FrameView;
 use crate::work::frame_view::Shown;
 
-/// Pictures on the graphics card.
+/// Textures of the pictures on the graphics card.
 #[derive(Default)]
 pub(in crate::ui) struct Textures {
     pub(super) shown: Option<(Arc<Shown>, TextureHandle)>,
@@ -15,9 +15,9 @@ pub(in crate::ui) struct Textures {
 }
 
 impl Textures {
-    /// Takes what is new in the sight.
+    /// Uploads the pictures that have changed.
     pub(in crate::ui) fn take(&mut self, sight: Option<&FrameView>, ctx: &egui::Context) {
-        // Single pixels stay squares, a large picture is smoothed.
+        // Enlarged pixels stay sharp squares; a picture that is made smaller is smoothed.
         let smooth = TextureOptions {
             magnification: TextureFilter::Nearest,
             minification: TextureFilter::Linear,

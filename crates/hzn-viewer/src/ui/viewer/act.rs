@@ -1,4 +1,4 @@
-//! What keys, menus and buttons do.
+//! The actions of keys, menus and buttons.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::ui::dialogs::{Asking, Purpose};
 use crate::ui::{Command, picture};
 
 impl Viewer {
-    /// Does what a key or a menu asks for.
+    /// Executes a command.
     pub fn run(&mut self, command: Command, ctx: &egui::Context) {
         let count = self.sequence.len();
         match command {
@@ -69,14 +69,14 @@ impl Viewer {
     fn save(&mut self) {
         let Some(session) = &self.session else { return };
         let Some(path) = session.path().map(Path::to_owned) else {
-            // Out of a recording: nothing is written where nobody said.
+            // The text comes from a recording, so the user has to confirm the path.
             self.asking = Some(Asking::new(Purpose::SaveSensor, session.home()));
             return;
         };
         self.save_to(&path);
     }
 
-    /// Saves the sensor.toml into a file, which is its own from then on.
+    /// Saves the sensor.toml to `path`, which becomes the file of the session.
     pub(in crate::ui) fn save_to(&mut self, path: &Path) {
         match self.session.as_mut().map(|s| s.save(path)) {
             Some(Ok(())) => self.say(format!("Saved: {}", path.display())),
@@ -92,7 +92,7 @@ impl Viewer {
         }
     }
 
-    /// By error where the truth is known, else by sigma.
+    /// Goes to the worst picture: by error if the truth is known, otherwise by sigma.
     fn go_worst(&mut self) {
         let known = !self.truth.is_empty();
         let badness = |row: &hzn_mcap::Row| {
@@ -106,7 +106,7 @@ impl Viewer {
         if worst.is_empty() {
             return;
         }
-        // Once more goes to the next worst, as long as the one shown is that of before.
+        // If the shown picture is the worst one of the last call, the next worst follows.
         let at = worst.iter().position(|&i| i == self.playback.frame());
         self.worst = if at == Some(self.worst) { (self.worst + 1) % worst.len() } else { 0 };
         if let Some(&frame) = worst.get(self.worst) {

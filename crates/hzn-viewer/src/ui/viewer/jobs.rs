@@ -1,4 +1,4 @@
-//! Work on files and on the whole sequence, beside the window.
+//! Starts and ends the work on files and on the whole sequence, which runs on other threads.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::work::job::{Done, Halt, Job, Progress};
 use crate::work::sweep::{self, Sweep};
 
 impl Viewer {
-    /// All frames, for the plots or into a file.
+    /// Processes all pictures, for the plots or into a file.
     pub(in crate::ui) fn process_all(&mut self, output: Option<PathBuf>) {
         let Some(session) = &self.session else {
             self.say("Open a sensor.toml first.");
@@ -35,20 +35,20 @@ impl Viewer {
         self.sweep = Some(Sweep::start(task, Arc::clone(&self.wake)));
     }
 
-    /// The picture with what is drawn over it.
+    /// Saves the picture with its overlays.
     pub(in crate::ui) fn export_picture(&mut self, path: PathBuf) {
         let Some(sight) = self.sight.clone() else { return };
         let layers = self.layers_drawn();
         self.begin("Saving the picture", move |_| export::picture(&sight, &layers, &path));
     }
 
-    /// The newest results of all frames.
+    /// Saves the newest results of all pictures.
     pub(in crate::ui) fn export_table(&mut self, path: PathBuf) {
         let rows: Vec<_> = self.rows.all().cloned().collect();
         self.begin("Saving results", move |progress| export::table(&rows, &path, progress));
     }
 
-    /// Every frame with everything drawn over it, as a video.
+    /// Saves all pictures with their overlays as a video.
     pub(in crate::ui) fn export_video(&mut self, path: PathBuf) {
         let Some(config) = self.session.as_ref().and_then(|s| s.config().map(Arc::clone)) else { return };
         let fps = self.sequence.duration_s(0).filter(|d| *d > 0.0).map_or(25.0, |d| (1.0 / d).clamp(1.0, 60.0));
@@ -57,7 +57,7 @@ impl Viewer {
         self.begin("Saving the video", move |progress| film.write(&path, progress));
     }
 
-    /// Recovers a recording that was cut off, and then opens what came of it.
+    /// Recovers a recording that was cut off; the recovered recording is then opened.
     pub(in crate::ui) fn recover(&mut self, path: PathBuf) {
         self.begin("Recovering the recording", move |progress| export::recover(&path, progress));
     }
@@ -70,7 +70,7 @@ impl Viewer {
         self.jobs.push(Job::start(name, &self.wake, work));
     }
 
-    /// What has come of the work on files.
+    /// Takes the results of finished jobs.
     pub(super) fn ended(&mut self) {
         let mut ends = Vec::new();
         self.jobs.retain(|job| job.end().map(|end| ends.push((job.name, end))).is_none());

@@ -21,16 +21,16 @@ use crate::work::sweep::Sweep;
 use crate::work::{Engine, FrameView, Job, Wake};
 use threads::Asked;
 
-/// Frames that are decoded beforehand.
+/// Number of pictures that are decoded in advance.
 const AHEAD: usize = 4;
-/// The window waits so long at most for an answer, from the wish on, so that it comes with the frame of the change:
-/// what is left of a displayed frame's 16 ms is enough to lay the window out and to hand it over.
+/// Longest wait of the window for an answer, from the request on, so that the answer appears in the same frame as the
+/// change. The rest of the 16 ms of a displayed frame is enough to lay out the window and to hand it over.
 const AT_ONCE: Duration = Duration::from_millis(10);
 
-/// A window that stood still for longer goes on from where it was.
+/// Longest time that playing advances in one frame of the window, for example after the window stood still.
 const LONGEST_PASS: Duration = Duration::from_millis(250);
 
-/// Something to be said, in place, until it is closed.
+/// A message in the window, which stays until it is closed.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Message {
     pub(super) text: String,
@@ -42,19 +42,19 @@ pub(super) struct Message {
 /// The window's state.
 pub struct Viewer {
     pub(super) settings: Settings,
-    /// Where they are kept; `None` leaves them.
+    /// File of the settings; with `None` they are not stored.
     store: Option<PathBuf>,
     pub(super) sequence: Sequence,
     pub(super) rows: ResultHistory,
     pub(super) truth: HashMap<String, Vec<Truth>>,
     pub(super) session: Option<Session>,
-    /// What the session is compared with, and its name.
+    /// Name and session that the session is compared with.
     pub(super) other: Option<(String, Session)>,
     pub(super) flight: bool,
     pub(super) playback: Playback,
     pub(super) view: View,
     pub(super) body: usize,
-    /// The candidate that is pointed at.
+    /// Candidate that the pointer is on in the column of stages.
     pub(super) pointed: Option<u32>,
     pub(super) sight: Option<FrameView>,
     pub(super) messages: Vec<Message>,
@@ -63,11 +63,11 @@ pub struct Viewer {
     pub(super) showing_help: bool,
     pub(super) showing_diff: bool,
     pub(super) layers_hidden: bool,
-    /// Place in the list of worst frames.
+    /// Position in the list of the worst pictures.
     worst: usize,
     request: Request,
     opening: Option<Receiver<open::Event>>,
-    /// Messages that were there when it began.
+    /// Number of messages when the opening began.
     said_before: usize,
     pub(super) sweep: Option<Sweep>,
     /// Work on files.
@@ -76,14 +76,14 @@ pub struct Viewer {
     engine: Engine,
     wake: Wake,
     asked: Option<Asked>,
-    /// When that was.
+    /// Time of the last request.
     asked_at: Instant,
     last: Instant,
     styled: bool,
 }
 
 impl Viewer {
-    /// An empty window. `wake` is called by threads that have something to show.
+    /// Creates an empty window. Threads that have something to show call `wake`.
     pub fn new(settings: Settings, store: Option<PathBuf>, wake: Wake) -> Self {
         Self {
             settings,
@@ -121,7 +121,7 @@ impl Viewer {
         }
     }
 
-    /// Opens something else.
+    /// Opens another sequence.
     pub fn open(&mut self, request: Request) {
         self.said_before = self.messages.len();
         self.opening = Some(open::start(request.clone(), Arc::clone(&self.wake)));
@@ -131,9 +131,9 @@ impl Viewer {
         self.request = request;
     }
 
-    /// Opens files or a folder, with what is known about them by the command line.
+    /// Opens files or a folder. The pictures per second of the command line still apply; all else is the default.
     pub(super) fn open_paths(&mut self, inputs: Vec<PathBuf>) {
-        // A sensor.toml is for the pictures that are open.
+        // A sensor.toml applies to the pictures that are open.
         if let [one] = inputs.as_slice()
             && one.extension().is_some_and(|e| e == "toml")
         {
@@ -146,54 +146,54 @@ impl Viewer {
         self.open(Request { inputs, fps: self.request.fps, ..Request::default() });
     }
 
-    /// As on the flight computer.
+    /// Switches to single precision and 2048 points, as on the flight computer.
     pub fn set_flight(&mut self, flight: bool) {
         self.flight = flight;
     }
 
-    /// The frame that is shown, once it is.
+    /// Returns the picture that is shown, if there is one yet.
     pub fn sight(&self) -> Option<&FrameView> {
         self.sight.as_ref()
     }
-    /// The frames.
+    /// Returns the sequence.
     pub fn sequence(&self) -> &Sequence {
         &self.sequence
     }
-    /// The sensor.
+    /// Returns the sensor that is tuned.
     pub fn session(&self) -> Option<&Session> {
         self.session.as_ref()
     }
-    /// The sensor, to be changed.
+    /// Returns the sensor that is tuned, for changes.
     pub fn session_mut(&mut self) -> Option<&mut Session> {
         self.session.as_mut()
     }
-    /// Goes to a frame.
+    /// Goes to a picture.
     pub fn go(&mut self, frame: usize) {
         self.playback.go(frame, self.sequence.len());
     }
-    /// Changes the settings.
+    /// Returns the settings, for changes.
     pub fn settings_mut(&mut self) -> &mut Settings {
         &mut self.settings
     }
-    /// Is the frame on the screen the one that was asked for, as the parameters are now?
+    /// Returns true if the screen shows the requested picture, processed with the current parameters.
     pub fn is_settled(&self) -> bool {
         let changes = self.session.as_ref().map_or(0, Session::changes);
         self.opening.is_none()
             && self.sight.as_ref().is_some_and(|s| s.index == self.playback.frame() && s.changes == changes)
     }
-    /// Number of frames that the parameters as they are now were applied to.
+    /// Returns the number of pictures that are processed with the current parameters.
     pub fn processed(&self) -> usize {
         self.rows.fresh()
     }
-    /// What the file says about a frame and the body that is looked at.
+    /// Returns the file's result for a picture and the selected body.
     pub fn recorded(&self, frame: usize) -> Option<&hzn_mcap::Row> {
         self.rows.recorded(frame, self.body)
     }
-    /// Where the picture lies on the screen.
+    /// Returns the zoom and the position of the picture.
     pub fn view(&self) -> View {
         self.view
     }
-    /// What is said to the user.
+    /// Returns the messages to the user.
     pub fn messages(&self) -> impl Iterator<Item = &str> {
         self.messages.iter().map(|m| m.text.as_str())
     }
@@ -217,13 +217,13 @@ impl Viewer {
         self.body = 0;
     }
 
-    /// What was made of the body that is looked at.
+    /// Returns the result for the selected body.
     pub(super) fn answer(&self) -> Option<&BodyResult> {
         let outcome = self.sight.as_ref()?.answers.first()?;
         outcome.bodies.get(self.body).or(outcome.bodies.first())
     }
 
-    /// The truth about a picture and the body that is looked at.
+    /// Returns the truth for a picture and a body.
     pub(super) fn truth_of(&self, name: &str, body: &str) -> Option<&Truth> {
         self.truth.get(name)?.iter().find(|t| t.body == body)
     }
@@ -244,7 +244,7 @@ impl Viewer {
         if !dropped.is_empty() {
             self.open_paths(dropped);
         }
-        // The answer is made while the panels are laid out.
+        // The answer is computed while the panels are laid out.
         self.ask();
         top::show(self, ui);
         timeline::show(self, ui);
@@ -255,7 +255,7 @@ impl Viewer {
         if self.settings.stages {
             stages::show(self, ui);
         }
-        // What was turned just now is in the picture of this very frame, when the answer is quick.
+        // A quick answer to a change in the panels is shown in this frame of the window.
         self.ask();
         self.wait(&ctx);
         compare::show(self, ui);
@@ -266,8 +266,8 @@ impl Viewer {
         self.ask();
     }
 
-    /// Time goes on. No frame is passed over because it is slow: each has been drawn before the next one is asked for,
-    /// which is then made while this one is painted.
+    /// Advances the time of playing. No picture is skipped because it is slow: each is drawn before the next one is
+    /// requested. The next one is computed while this one is painted.
     fn advance(&mut self, ctx: &egui::Context) {
         let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
         let lasts_s = |frame| self.sequence.duration_s(frame);
@@ -279,12 +279,12 @@ impl Viewer {
         }
     }
 
-    /// Stops what is being written, and keeps the settings.
+    /// Stops unfinished writing and stores the settings.
     pub fn close(&self) {
         self.jobs.iter().for_each(Job::abandon);
         self.sweep.iter().for_each(Sweep::abandon);
         if let Some(place) = &self.store {
-            // Nobody is there any more to hear of it.
+            // The window is gone, so an error cannot be shown.
             let _ = self.settings.store(place);
         }
     }

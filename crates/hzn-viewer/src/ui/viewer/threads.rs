@@ -1,4 +1,4 @@
-//! What the threads tell the window, and what it asks them for.
+//! Messages between the window and its threads.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -11,7 +11,7 @@ use crate::work::open;
 use crate::work::sweep::{self, Sweep};
 use crate::work::{Ask, FrameView, Setup};
 
-/// What was asked for last: nothing is asked for twice.
+/// The last request. An equal request is not sent again.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Asked {
     index: usize,
@@ -24,7 +24,7 @@ pub(super) struct Asked {
 }
 
 impl Viewer {
-    /// Takes what the threads have.
+    /// Takes all messages of the threads.
     pub(super) fn poll(&mut self, ctx: &egui::Context) {
         let opening: Vec<open::Event> = self.opening.iter().flat_map(|r| r.try_iter()).collect();
         for event in opening {
@@ -43,7 +43,7 @@ impl Viewer {
         dialogs::poll(self);
     }
 
-    /// Waits a moment for the answer to what was asked last; a slow one comes with a later frame.
+    /// Waits a short time for the answer to the last request. A slow answer comes with a later frame of the window.
     pub(super) fn wait(&mut self, ctx: &egui::Context) {
         let until = self.asked_at + AT_ONCE;
         let mut new = false;
@@ -54,12 +54,12 @@ impl Viewer {
         }
         if new {
             self.textures.take(self.sight.as_ref(), ctx);
-            // The columns were drawn before the answer came.
+            // The columns were drawn before the answer came, so they are drawn again.
             ctx.request_repaint();
         }
     }
 
-    /// A frame was looked at.
+    /// Takes over a processed picture.
     fn see(&mut self, sight: FrameView) {
         if let Some(outcome) = sight.answers.first()
             && self.session.as_ref().is_some_and(|s| s.changes() == sight.changes)
@@ -84,11 +84,11 @@ impl Viewer {
                 (self.sight, self.asked, self.sweep, self.mask) = (None, None, None, None);
                 (self.worst, self.body) = (0, 0);
                 self.view = View::FIT;
-                // What was said of what was open before; not what was said since.
+                // Messages about the previous sequence are removed; newer messages stay.
                 self.messages.drain(..self.said_before.min(self.messages.len()));
                 self.playback.go(self.request.frame, usize::MAX);
                 self.engine.open(self.request.inputs.clone());
-                // A sensor that was opened by hand stays when only the pictures are others.
+                // A sensor that the user opened stays if the new pictures come without one.
                 match opened.sensor {
                     Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
                     None if self.session.is_none() => self.say(
@@ -170,7 +170,7 @@ impl Viewer {
         }
     }
 
-    /// Wishes for what is to be seen, when it is not what was wished for last.
+    /// Requests the picture to show, unless the last request was the same.
     pub(super) fn ask(&mut self) {
         let index = self.playback.frame();
         let Some(entry) = self.sequence.entries.get(index) else { return };
