@@ -134,7 +134,7 @@ pub struct Choice {
     /// The feature of this crate that the choice needs.
     pub feature: Option<&'static str>,
     /// Whether the choice is in this build.
-    pub built: bool,
+    pub is_built: bool,
     /// The number of the choice in flight; `None` for a choice on the ground only.
     pub flight: Option<u16>,
 }
@@ -168,7 +168,7 @@ pub trait Value: Clone + PartialEq {
         false
     }
     /// Returns a value for [`Self::set_number`] to fill; `None` for a type that is not in flight.
-    fn blank() -> Option<Self> {
+    fn empty() -> Option<Self> {
         None
     }
 }
@@ -217,7 +217,7 @@ impl Value for f64 {
         *self = Some(number).filter(|x| x.is_finite())?;
         Some(())
     }
-    fn blank() -> Option<Self> {
+    fn empty() -> Option<Self> {
         Some(0.0)
     }
 }
@@ -237,7 +237,7 @@ macro_rules! whole {
                 *self = (f64::from(whole) == number).then_some(whole)?;
                 Some(())
             }
-            fn blank() -> Option<Self> {
+            fn empty() -> Option<Self> {
                 Some(0)
             }
         }
@@ -264,7 +264,7 @@ impl<T: Value> Value for Option<T> {
             *self = None;
             return Some(());
         }
-        let mut value = T::blank()?;
+        let mut value = T::empty()?;
         value.set_number(place, number)?;
         *self = Some(value);
         Some(())
@@ -381,7 +381,7 @@ macro_rules! choices {
                     name: $word,
                     doc: concat!($($doc, "\n"),+),
                     feature: $crate::base::keys::feature_name!($($feature)?),
-                    built: true $(&& cfg!(feature = $feature))?,
+                    is_built: true $(&& cfg!(feature = $feature))?,
                     flight: $crate::base::keys::flight!($id),
                 }),+
             ];

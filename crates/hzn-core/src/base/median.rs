@@ -3,7 +3,7 @@
 use crate::base::real::Real;
 
 /// Returns the median of values from 0 to `most`, with an error of at most `most`/4096.
-pub(crate) fn of_reals<T: Real>(values: &[T], most: T) -> T {
+pub(crate) fn median_of_reals<T: Real>(values: &[T], most: T) -> T {
     let (mut low, mut high) = (T::ZERO, most);
     for _ in 0..12 {
         let middle = (low + high) * T::from_f64(0.5);
@@ -14,7 +14,7 @@ pub(crate) fn of_reals<T: Real>(values: &[T], most: T) -> T {
 }
 
 /// Returns the smallest value that at least half of the values do not exceed, by bisection; 0 for no values.
-pub(crate) fn of_counts(values: &[u16]) -> u16 {
+pub(crate) fn median_of_counts(values: &[u16]) -> u16 {
     let (mut low, mut high) = (0u32, values.iter().fold(0, |most, &v| most.max(v)).into());
     while low < high {
         let middle = (low + high) / 2;
@@ -26,21 +26,21 @@ pub(crate) fn of_counts(values: &[u16]) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use super::{of_counts, of_reals};
+    use super::{median_of_counts, median_of_reals};
 
     #[test]
     fn medians_of_few_and_many_counts() {
-        assert_eq!(of_counts(&[]), 0);
-        assert_eq!(of_counts(&[7]), 7);
-        assert_eq!(of_counts(&[9, 1, 5]), 5);
-        assert_eq!(of_counts(&[65535, 65535, 3, 65535]), 65535);
-        assert_eq!(of_counts(&[4, 2, 8, 6]), 4);
+        assert_eq!(median_of_counts(&[]), 0);
+        assert_eq!(median_of_counts(&[7]), 7);
+        assert_eq!(median_of_counts(&[9, 1, 5]), 5);
+        assert_eq!(median_of_counts(&[65535, 65535, 3, 65535]), 65535);
+        assert_eq!(median_of_counts(&[4, 2, 8, 6]), 4);
     }
 
     #[test]
     fn medians_of_reals() {
-        assert_eq!(of_reals(&[0.0, 0.0, 4096.0], 4096.0), 1.0);
-        assert_eq!(of_reals(&[3.0, 1.0, 2.0, 4.0], 4.0), 2.0);
-        assert!((of_reals(&[0.1, 0.7, 0.3_f32], 0.7) - 0.3).abs() < 2e-4);
+        assert_eq!(median_of_reals(&[0.0, 0.0, 4096.0], 4096.0), 1.0);
+        assert_eq!(median_of_reals(&[3.0, 1.0, 2.0, 4.0], 4.0), 2.0);
+        assert!((median_of_reals(&[0.1, 0.7, 0.3_f32], 0.7) - 0.3).abs() < 2e-4);
     }
 }

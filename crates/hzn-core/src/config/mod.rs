@@ -150,7 +150,7 @@ impl Config {
     /// Returns the threshold parameters of body number `which`, from 0: those of the body, or else those of the sensor.
     /// A Sun among several bodies without its own parameters has those of the preset `sun`, because every other body in
     /// the picture is brighter than the dark as well.
-    pub fn levels_of(&self, which: u8) -> &threshold::Config {
+    pub fn threshold_of(&self, which: u8) -> &threshold::Config {
         let body = self.each_body().get(usize::from(which));
         match body.and_then(|b| b.binarize.as_ref()) {
             Some(own) => own,
@@ -159,7 +159,7 @@ impl Config {
         }
     }
     /// Returns the noise model of body number `which`: that of the body, or else that of the sensor.
-    pub(crate) fn noise_of(&self, which: u8) -> &covariance::Config {
+    pub(crate) fn noise_model_of(&self, which: u8) -> &covariance::Config {
         let own = self.each_body().get(usize::from(which)).and_then(|b| b.covariance.as_ref());
         own.unwrap_or(&self.covariance)
     }
@@ -169,7 +169,7 @@ impl Config {
         if self.select.max_rate_deg_s.is_some() {
             return true;
         }
-        (0..self.each_body().len()).any(|which| self.levels_of(which as u8).method == threshold::Method::Track)
+        (0..self.each_body().len()).any(|which| self.threshold_of(which as u8).method == threshold::Method::Track)
     }
     /// Returns the same bodies as [`Self::each_body`], for changes.
     pub fn each_body_mut(&mut self) -> &mut [body::Config] {

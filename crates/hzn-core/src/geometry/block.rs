@@ -12,7 +12,7 @@ use crate::geometry::pixel::ImagePoint;
 /// Number of lanes of a block.
 pub(crate) const LANES: usize = 8;
 /// Number of lanes for loops with many sums: eight lanes of each sum would not stay in registers.
-pub(crate) const HALF: usize = LANES / 2;
+pub(crate) const HALF_LANES: usize = LANES / 2;
 
 /// The side of an edge point that is lit: the direction of the brightness gradient along the axis (u or v) on which the
 /// edge was located.
@@ -32,7 +32,7 @@ pub(crate) enum Lit {
 #[cfg(any(test, feature = "_edges"))]
 impl Lit {
     /// Returns the side to which a direction (u, v) in the picture points.
-    pub(crate) fn towards<T: Real>(g: [T; 2]) -> Self {
+    pub(crate) fn from_gradient<T: Real>(g: [T; 2]) -> Self {
         match (g[0].abs() >= g[1].abs(), g[0] > T::ZERO, g[1] > T::ZERO) {
             (true, true, _) => Self::Right,
             (true, false, _) => Self::Left,
@@ -151,12 +151,12 @@ impl<T: Real> Block<T> {
 
     /// Returns whether the lit side lies towards `e`, as it does on the limb of a body.
     #[inline]
-    pub(crate) fn faces(&self, l: usize, e: &V3<T>) -> bool {
-        self.faces_along(l, self.gradient_at(l, e))
+    pub(crate) fn is_lit_towards(&self, l: usize, e: &V3<T>) -> bool {
+        self.is_lit_along(l, self.gradient_at(l, e))
     }
-    /// Does the same as [`Self::faces`], from the gradient.
+    /// Does the same as [`Self::is_lit_towards`], from the gradient.
     #[inline(always)]
-    pub(crate) fn faces_along(&self, l: usize, [gu, gv]: [T; 2]) -> bool {
+    pub(crate) fn is_lit_along(&self, l: usize, [gu, gv]: [T; 2]) -> bool {
         match (self.lit >> (2 * (l & 7))) & 3 {
             0 => gu > T::ZERO,
             1 => gu < T::ZERO,

@@ -20,7 +20,7 @@ pub(crate) struct Circle<T> {
 
 impl<T: Real> Circle<T> {
     /// Fits a circle to the points. `None` with fewer than three points, or when they lie on a line.
-    pub(crate) fn through(points: impl Iterator<Item = [T; 2]> + Clone) -> Option<Self> {
+    pub(crate) fn fit(points: impl Iterator<Item = [T; 2]> + Clone) -> Option<Self> {
         let (mut n, mut x, mut y) = (T::ZERO, T::ZERO, T::ZERO);
         for p in points.clone() {
             n += T::one();
@@ -87,12 +87,12 @@ mod tests {
         fn exact_arcs_are_found(x in -3000.0..3000.0f64, y in -3000.0..3000.0f64, r in 5.0..5000.0f64,
                                 from in 0.0..6.0f64, span in 0.3..6.2f64) {
             let points = arc([x, y], r, from, from + span, 60);
-            let found = Circle::through(points.iter().copied()).unwrap();
+            let found = Circle::fit(points.iter().copied()).unwrap();
             prop_assert!((found.radius - r).abs() < 1e-7 * r.max(x.abs()));
             let off = (found.centre[0] - x).abs() + (found.centre[1] - y).abs();
             prop_assert!(off < 1e-6 * r.max(x.abs()).max(y.abs()));
             // The fit also works in single precision, because the centre is subtracted first.
-            let found = Circle::through(points.iter().map(|p| [p[0] as f32, p[1] as f32])).unwrap();
+            let found = Circle::fit(points.iter().map(|p| [p[0] as f32, p[1] as f32])).unwrap();
             let limit = 0.02 * r + 0.05 * x.abs().max(y.abs()) / span;
             prop_assert!((f64::from(found.radius) - r).abs() < limit, "{}", found.radius);
         }
@@ -110,14 +110,14 @@ mod tests {
         let denominator = |p: f64| l * l * n - 2.0 * l * m * o + k * o * o + m * m * p - k * n * p;
         // Cramer's rule for y_c, which is the paper's B up to the sign, with the middle column replaced.
         let numerator = -(k * (r * n - s * o) - q * (l * n - o * m) + m * (l * s - r * m)) / 2.0;
-        let ours = Circle::through(points.iter().copied()).unwrap();
+        let ours = Circle::fit(points.iter().copied()).unwrap();
         assert!((ours.centre[1] + 30.0).abs() < 1e-9 && (numerator / denominator(p) + 30.0).abs() < 1e-6);
         assert!((numerator / denominator(q) + 30.0).abs() > 1.0);
     }
 
     #[test]
     fn what_is_no_circle_is_none() {
-        let through = |points: &[[f64; 2]]| Circle::through(points.iter().copied());
+        let through = |points: &[[f64; 2]]| Circle::fit(points.iter().copied());
         assert!(through(&[]).is_none());
         assert!(through(&[[1.0, 2.0], [3.0, 4.0]]).is_none());
         assert!(through(&[[5.0, 5.0]; 20]).is_none());

@@ -78,7 +78,7 @@ impl<F, T: Real> UnitVec3<F, T> {
 impl<T: Real> UnitVec3<Cam, T> {
     /// Returns the unit vector (right, down) in the picture from the principal point towards the body's centre. This is
     /// HORACE's two-dimensional direction (Barf 2014, (2.37)). `None` straight ahead and straight behind.
-    pub fn in_picture(&self) -> Option<[T; 2]> {
+    pub fn to_picture_direction(&self) -> Option<[T; 2]> {
         let flat = (self.v.x * self.v.x + self.v.y * self.v.y).sqrt();
         (flat > T::from_f64(1e-12)).then(|| [self.v.x / flat, self.v.y / flat])
     }
@@ -126,7 +126,7 @@ impl<F, T: Real> Cov3<F, T> {
         [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
     }
     /// Returns the variance along the direction `d`, rad².
-    pub fn along(&self, d: &UnitVec3<F, T>) -> T {
+    pub fn variance_along(&self, d: &UnitVec3<F, T>) -> T {
         let rows = self.rows();
         let d = d.xyz();
         let mut sum = T::zero();
@@ -229,11 +229,11 @@ mod tests {
             let ((sy, cy), (sx, cx)) = (libm::sincos(y), libm::sincos(x));
             let z = UnitVec3::<Cam, f64>::try_new([sy * cx, -sx, cy * cx]).unwrap();
             assert!(z.angle_rad(&d) < 1e-15, "{v:?}");
-            if let Some([a, b]) = d.in_picture() {
+            if let Some([a, b]) = d.to_picture_direction() {
                 assert!((a * d.xyz()[1] - b * d.xyz()[0]).abs() < 1e-15 && (a * a + b * b - 1.0).abs() < 1e-15);
             }
         }
-        assert!(UnitVec3::<Cam, f64>::try_new([0.0, 0.0, 1.0]).unwrap().in_picture().is_none());
+        assert!(UnitVec3::<Cam, f64>::try_new([0.0, 0.0, 1.0]).unwrap().to_picture_direction().is_none());
     }
 
     #[test]
@@ -241,6 +241,6 @@ mod tests {
         let c = Cov3::<Cam, f64>::from_tangent(&V3::x(), &V3::y(), [4.0, 0.0, 9.0]);
         assert!((c.sigma_max_rad() - 3.0).abs() < 1e-15);
         let e = UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
-        assert_eq!(c.along(&e), 0.0);
+        assert_eq!(c.variance_along(&e), 0.0);
     }
 }

@@ -66,7 +66,7 @@ impl<T: Real> Section<T> {
     /// Converts a point (x, y) of the plane to the principal frame. The paper's (27) prints the shift as a stack of
     /// three terms; it is the fraction e_z √(e_x² + e_y²)/Δ along x. The result is not finite for a parabola, whose
     /// frame lies at infinity.
-    pub fn principal(&self, [x, y]: [T; 2]) -> [T; 2] {
+    pub fn to_principal(&self, [x, y]: [T; 2]) -> [T; 2] {
         let [a, b] = self.along;
         [a * x + b * y + self.offset / self.delta, a * y - b * x]
     }
@@ -151,7 +151,7 @@ mod tests {
             for p in limb(&axis, alpha, 0.0) {
                 prop_assert!(section.distance(p).abs() < 1e-6 * (1.0 + p[0] * p[0] + p[1] * p[1]), "{p:?}: \
                     {}", section.distance(p));
-                let [px, py] = section.principal(p);
+                let [px, py] = section.to_principal(p);
                 let [a, b] = section.semi_axes();
                 if a < 1e3 {
                     let sign = if section.kind() == Kind::Ellipse { 1.0 } else { -1.0 };
@@ -176,7 +176,7 @@ mod tests {
         let x = a * libm::sqrt(1.0 + y * y / (b * b));
         // The point lies along the projected axis (down) by −x − shift: its principal x is −x.
         let wrong = [-y, -x - shift];
-        let printed = section.principal(wrong)[0].abs() - x;
+        let printed = section.to_principal(wrong)[0].abs() - x;
         assert!(printed.abs() < 1e-9, "{printed}");
         assert!((section.distance(wrong) + 2.0 * x).abs() < 1e-9);
     }
@@ -190,7 +190,7 @@ mod tests {
         let [a, b] = section.semi_axes();
         let flat = libm::sqrt(ex * ex + ey * ey);
         for p in limb(&axis, alpha, 0.0) {
-            let right = section.principal(p);
+            let right = section.to_principal(p);
             let delta = flat * flat - libm::cos(alpha).powi(2);
             let printed = right[0] - flat * ez / delta + flat * ez;
             let value = |x: f64| (x / a).powi(2) - (right[1] / b).powi(2) - 1.0;

@@ -14,7 +14,7 @@ choices! {
         /// larger.
         ///
         /// This is for values that were measured with the same camera and in the same kind of scene.
-        @0 Told = "told";
+        @0 Given = "told";
         /// Restricted maximum likelihood of the residuals gives sigma, correlation length and white part, averaged over
         /// their posterior; the sigma of `[covariance]` is the floor.
         @- Reml = "reml" needs "reml";
@@ -62,8 +62,8 @@ section! {
 
 impl Config {
     /// Makes a known noise model from these values, without a common shift or tilt.
-    pub fn told(sigma_px: f64, correlation_px: f64) -> Self {
-        Self { noise: Noise::Told, sigma_px, correlation_px, bias_px: 0.0, tilt_px: 0.0, ..Self::default() }
+    pub fn given(sigma_px: f64, correlation_px: f64) -> Self {
+        Self { noise: Noise::Given, sigma_px, correlation_px, bias_px: 0.0, tilt_px: 0.0, ..Self::default() }
     }
 }
 

@@ -46,13 +46,13 @@ impl Term {
 }
 
 /// Number of terms that are known before the expected half-angle is fused. The other terms come from the fusion.
-const OF_THE_FIT: usize = 5;
+const FIT_TERMS: usize = 5;
 
 /// The covariance of an answer's axis, term by term. The sum of the terms is the whole covariance.
 #[derive(Debug, Clone, Copy)]
 pub struct ErrorBudget<T> {
     /// Covariances of (δ₁₂, δc) by term, before the expected half-angle is fused.
-    fit: [M3<T>; OF_THE_FIT],
+    fit: [M3<T>; FIT_TERMS],
     /// Covariances of the axis in the camera frame by term, rad².
     axis: [Cov3<Cam, T>; Term::ALL.len()],
     /// Gain of the fusion with the expected half-angle: the shift of the axis in the camera frame, rad, for a change of
@@ -64,7 +64,7 @@ impl<T: Real> ErrorBudget<T> {
     /// Makes an empty error budget.
     pub(crate) fn new() -> Self {
         Self {
-            fit: [M3::zeros(); OF_THE_FIT],
+            fit: [M3::zeros(); FIT_TERMS],
             axis: [Cov3::from_upper([T::ZERO; 6]); Term::ALL.len()],
             axis_by_cos: [T::ZERO; 3],
         }
@@ -88,8 +88,8 @@ impl<T: Real> ErrorBudget<T> {
             let p22 = p.m22 - k2 * p.m23 - k2 * p23;
             *axis = Cov3::from_tangent(b1, b2, [p11, p12, p22]);
         }
-        let total = expected.sigma_parts.iter().fold(T::ZERO, |sum, s| sum + *s * *s).max(T::from_f64(1e-30));
-        for (axis, sigma) in self.axis.iter_mut().skip(OF_THE_FIT).zip(expected.sigma_parts) {
+        let total = expected.limb_sigma_parts_m.iter().fold(T::ZERO, |sum, s| sum + *s * *s).max(T::from_f64(1e-30));
+        for (axis, sigma) in self.axis.iter_mut().skip(FIT_TERMS).zip(expected.limb_sigma_parts_m) {
             let part = sigma * sigma / total;
             *axis = Cov3::from_tangent(
                 b1,
@@ -102,7 +102,7 @@ impl<T: Real> ErrorBudget<T> {
 
     /// Returns the contribution of a term to the covariance of (δ₁₂, δc) before the expected half-angle is fused.
     #[cfg(test)]
-    pub(crate) fn of_fit(&self, term: Term) -> &M3<T> {
+    pub(crate) fn fit_term(&self, term: Term) -> &M3<T> {
         &self.fit[term as usize]
     }
 

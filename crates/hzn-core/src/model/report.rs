@@ -36,7 +36,7 @@ pub struct Report<T> {
 
 impl<T> Report<T> {
     /// Makes the report on a picture that is not processed yet.
-    pub(crate) fn of_nothing() -> Self {
+    pub(crate) fn empty() -> Self {
         Self {
             status: Status::Rejected,
             stage: Stage::Binarize,

@@ -20,21 +20,21 @@ section! {
 }
 
 /// Default budget for each border pixel that the lists hold.
-const A_PIXEL: u32 = 120;
+const DEFAULT_PER_PIXEL: u32 = 120;
 
 /// Cost to begin to follow an edge.
 pub(crate) const EDGE: u32 = 20;
 /// Returns the cost of a step of the border follower that tests all neighbours, including the mask.
-pub(crate) fn look(mask: u32) -> u32 {
+pub(crate) fn follow_step_cost(mask: u32) -> u32 {
     5 + mask * 5 / 2
 }
 /// Returns the cost of a search line from one column to another. A pixel takes few instructions, but the search for a
 /// small body has lines on every row.
-pub(crate) fn line(from: u16, to: u16) -> u32 {
+pub(crate) fn line_cost(from: u16, to: u16) -> u32 {
     u32::from(to.saturating_sub(from)) / 15
 }
 /// Returns the cost to scan the picture's border pixel by pixel, beyond the few pixels that are free.
-pub(crate) fn ring(width: u16, height: u16) -> u32 {
+pub(crate) fn ring_cost(width: u16, height: u16) -> u32 {
     (u32::from(width) + u32::from(height)) / 2
 }
 /// Cost of a further look at a picture, before anything is found.
@@ -45,7 +45,7 @@ pub(crate) const CROSSING: u32 = 4;
 pub(crate) const POINT: u32 = 16;
 /// Returns the additional cost of a point whose reads are checked one by one: next to a mask or the border, or on a
 /// wide edge.
-pub(crate) fn slow_point(mask: u32) -> u32 {
+pub(crate) fn slow_point_cost(mask: u32) -> u32 {
     18 + 12 * mask
 }
 /// Cost of a draw of the consensus stage, verified on one further point.
@@ -57,12 +57,12 @@ pub(crate) const SCORE: u32 = 4;
 pub(crate) const LIKELIHOOD: u32 = 80;
 /// Returns the cost of a pixel's gradient: its eight neighbours are read and tested against the mask.
 #[cfg(feature = "zju")]
-pub(crate) fn gradient(mask: u32) -> u32 {
+pub(crate) fn gradient_cost(mask: u32) -> u32 {
     4 + 9 * mask
 }
 /// Returns the cost to count the lit pixels of a square.
 #[cfg(feature = "horace")]
-pub(crate) fn square(side: u16, mask: u32) -> u32 {
+pub(crate) fn square_cost(side: u16, mask: u32) -> u32 {
     u32::from(side) * u32::from(side) * (1 + 2 * mask)
 }
 /// Cost to sort one pixel among those of its edge.
@@ -79,72 +79,72 @@ pub(crate) const GATES: u32 = 1000;
 /// The remaining work budget.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WorkBudget {
-    all: u32,
-    left: u32,
-    cut: bool,
+    total: u32,
+    remaining: u32,
+    truncated: bool,
 }
 
 impl WorkBudget {
     /// Makes the budget for lists that hold `pixels` border pixels, where a sub-pixel point costs `point`.
     pub(crate) fn new(config: &Config, pixels: usize, point: u32) -> Self {
-        let a_pixel = A_PIXEL - POINT + point;
-        let all = config.max_work.unwrap_or(a_pixel.saturating_mul(pixels as u32));
-        Self { all, left: all, cut: false }
+        let a_pixel = DEFAULT_PER_PIXEL - POINT + point;
+        let total = config.max_work.unwrap_or(a_pixel.saturating_mul(pixels as u32));
+        Self { total, remaining: total, truncated: false }
     }
 
     /// Makes an unlimited budget, for stages that run on their own.
     #[cfg(any(test, feature = "_edges"))]
     pub(crate) fn unlimited() -> Self {
-        Self { all: u32::MAX, left: u32::MAX, cut: false }
+        Self { total: u32::MAX, remaining: u32::MAX, truncated: false }
     }
 
     /// Spends `cost` if the budget allows it and returns true. Otherwise nothing is left from then on.
     #[inline]
     pub(crate) fn try_spend(&mut self, cost: u32) -> bool {
-        let rest = self.left.checked_sub(cost);
-        self.cut |= rest.is_none();
-        self.left = rest.unwrap_or(0);
+        let rest = self.remaining.checked_sub(cost);
+        self.truncated |= rest.is_none();
+        self.remaining = rest.unwrap_or(0);
         rest.is_some()
     }
 
     /// Gives `follow` a limit to count down for one edge: three quarters of the remaining budget, so that the rest can
     /// pay for the edge's own fit.
-    pub(crate) fn on_edge<R>(&mut self, follow: impl FnOnce(&mut u32) -> R) -> R {
-        let mut steps = self.left - self.left / 4;
+    pub(crate) fn limit_edge<R>(&mut self, follow: impl FnOnce(&mut u32) -> R) -> R {
+        let mut steps = self.remaining - self.remaining / 4;
         let before = steps;
         let result = follow(&mut steps);
-        self.left -= before - steps;
-        self.cut |= steps == 0;
+        self.remaining -= before - steps;
+        self.truncated |= steps == 0;
         result
     }
 
     /// Spends `cost` for work that is done already, down to 0.
     pub(crate) fn charge(&mut self, cost: u32) {
-        self.left = self.left.saturating_sub(cost);
+        self.remaining = self.remaining.saturating_sub(cost);
     }
     /// Returns whether nothing is left.
     pub(crate) fn is_exhausted(&self) -> bool {
-        self.left == 0
+        self.remaining == 0
     }
     /// Ends all work on the picture.
     pub(crate) fn exhaust(&mut self) {
-        (self.left, self.cut) = (0, true);
+        (self.remaining, self.truncated) = (0, true);
     }
     /// Records that some work was omitted for lack of budget. The remaining budget can still serve other work.
     #[cfg(feature = "horace")]
     pub(crate) fn mark_truncated(&mut self) {
-        self.cut = true;
+        self.truncated = true;
     }
     /// Returns whether some work was omitted for lack of budget.
     pub(crate) fn was_truncated(&self) -> bool {
-        self.cut
+        self.truncated
     }
     /// Returns the remaining budget.
     pub(crate) fn remaining(&self) -> u32 {
-        self.left
+        self.remaining
     }
     /// Returns the budget that is spent.
     pub(crate) fn spent(&self) -> u32 {
-        self.all - self.left
+        self.total - self.remaining
     }
 }

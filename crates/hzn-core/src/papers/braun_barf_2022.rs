@@ -1,7 +1,7 @@
 //! Preset and gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28),
 //! 7.3).
 
-use super::{told, trust_every_fit};
+use super::{disable_gates, set_given_noise};
 use crate::base::linalg::{V3, basis};
 use crate::base::real::Real;
 use crate::config::Config;
@@ -19,7 +19,7 @@ use crate::stages::{consensus, covariance, edge_points, fit, threshold};
 /// Sets the chain of Braun & Barf 2022 as flown on ATEK: fixed threshold, whole pixels, RANSAC on three points, the
 /// direct nadir, the overbound of its covariance, and none of the gates of `hzn`.
 pub(super) fn preset(config: &mut Config) {
-    told(config);
+    set_given_noise(config);
     config.binarize.method = threshold::Method::Fixed;
     config.candidates.sub_pixel = edge_points::SubPixel::None;
     config.candidates.keep_points = 0;
@@ -28,7 +28,7 @@ pub(super) fn preset(config: &mut Config) {
     config.estimate.half_angle = fit::HalfAngle::Free;
     config.covariance.method = covariance::Method::BraunBarf;
     config.covariance.overbound = true;
-    trust_every_fit(config);
+    disable_gates(config);
     config.select.limb_in_view = true;
     // The value of section 7.3, for the Earth. This limit applies to the mean and not to the sum, in focal lengths
     // squared.
@@ -57,15 +57,15 @@ pub(super) fn verdict<T: Real>(
 }
 
 /// Number of points around the limb that are tested.
-const PLACES: i32 = 128;
+const LIMB_SAMPLES: i32 = 128;
 
 /// Returns whether any part of the limb of the cone (e, c) lies in the region. A nadir that was fitted to the edge of
 /// something else puts the limb elsewhere (Braun & Barf 2022, 3.5).
 fn in_view<T: Real>(e: &V3<T>, c: T, camera: &Camera<T>, region: &Region<T>) -> bool {
     let (b1, b2) = basis(e);
     let sin = (T::one() - c * c).max(T::ZERO).sqrt();
-    (0..PLACES).any(|i| {
-        let (s, cos) = T::from_f64(f64::from(i) * core::f64::consts::TAU / f64::from(PLACES)).sin_cos();
+    (0..LIMB_SAMPLES).any(|i| {
+        let (s, cos) = T::from_f64(f64::from(i) * core::f64::consts::TAU / f64::from(LIMB_SAMPLES)).sin_cos();
         let Some(p) = camera.project(&UnitVec3::assume_unit(e * c + (b1 * cos + b2 * s) * sin)) else { return false };
         let half = T::from_f64(0.5);
         let inside = p.u > -half && p.v > -half;

@@ -1,6 +1,6 @@
 //! HORACE: preset, and gate on the radius of the circle (Barf 2014, (2.31) to (2.36)).
 
-use super::{told, trust_every_fit};
+use super::{disable_gates, set_given_noise};
 use crate::base::real::Real;
 use crate::config::Config;
 use crate::config::retry;
@@ -19,7 +19,7 @@ use crate::stages::{consensus, contour, edge_points, fit, threshold};
 /// applies only to `contour.method = "erode"`. There the pixel itself counts too and the limit is exclusive, so the key
 /// is 7. The copy's height, the brightness gate and the shortest edge are numbers of `hzn`.
 pub(super) fn preset(config: &mut Config) {
-    told(config);
+    set_given_noise(config);
     config.gate.min_mean = 0.02;
     config.gate.max_mean = 0.9;
     config.binarize.method = threshold::Method::Dynamic;
@@ -36,7 +36,7 @@ pub(super) fn preset(config: &mut Config) {
     config.estimate.method = fit::Method::Circle;
     config.estimate.half_angle = fit::HalfAngle::Free;
     config.recover.method = retry::Method::Division;
-    trust_every_fit(config);
+    disable_gates(config);
     config.select.altitude_limits_km = Some([20.0, 100.0]);
     config.select.radius_margin = 0.0;
     config.select.radius_margin_px = 5000.0 * f64::from(rows) / 768.0;

@@ -60,9 +60,9 @@ impl Config {
         match preset {
             Preset::Hzn => {}
             // The Sun saturates every camera that was not made for it; the sky next to it does not.
-            Preset::Sun => disc(&mut config, Kind::Sun, threshold::SUN.level),
+            Preset::Sun => set_disc(&mut config, Kind::Sun, threshold::SUN.level),
             Preset::Moon => {
-                disc(&mut config, Kind::Moon, 0.25);
+                set_disc(&mut config, Kind::Moon, 0.25);
                 // At most half of the Moon's limb is lit, and less than that is bright.
                 config.select.min_support = 0.25;
             }
@@ -76,7 +76,7 @@ impl Config {
 
 /// Sets a disc with a fixed threshold (fraction of full scale), because its histogram is nearly all sky. The edge of a
 /// blooming disc lies within 3 px, by the same amount in all directions (Braun & Barf 2022, section 5).
-fn disc(config: &mut Config, kind: Kind, level: f64) {
+fn set_disc(config: &mut Config, kind: Kind, level: f64) {
     config.body.kind = kind;
     config.binarize = threshold::Config { method: threshold::Method::Fixed, level, ..config.binarize };
     config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, bias_px: 0.0, ..config.covariance };
@@ -84,17 +84,17 @@ fn disc(config: &mut Config, kind: Kind, level: f64) {
 
 /// Sets the noise model and limb height that the published systems' presets have always had: given values, for
 /// comparison.
-fn told(config: &mut Config) {
+fn set_given_noise(config: &mut Config) {
     config.body.limb_height_km = 10.0;
     config.body.limb_height_sigma_km = 2.0;
     [config.body.clipped_height_km, config.body.clipped_sigma_km] = [0.0; 2];
-    config.covariance = covariance::Config::told(1.0, 300.0);
+    config.covariance = covariance::Config::given(1.0, 300.0);
     config.reject.noise_sigma = 0.0;
 }
 
 /// Leaves only the gates that every fit must pass, and raises the work budget: some of these methods examine every
 /// pixel and every point.
-fn trust_every_fit(config: &mut Config) {
+fn disable_gates(config: &mut Config) {
     config.limits.max_work = Some(200_000_000);
     // The published systems look only once.
     config.recover.levels.clear();
@@ -150,7 +150,7 @@ mod tests {
         for preset in [Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015] {
             let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
             let covariance::Config { noise, sigma_px, correlation_px, bias_px, tilt_px, .. } = config.covariance;
-            assert_eq!(noise, covariance::Noise::Told);
+            assert_eq!(noise, covariance::Noise::Given);
             assert_eq!([sigma_px, correlation_px, bias_px, tilt_px], [1.0, 300.0, 0.0, 0.0]);
             assert_eq!([config.body.limb_height_km, config.body.limb_height_sigma_km], [10.0, 2.0]);
             let braun_barf = config.covariance.method == covariance::Method::BraunBarf;

@@ -1,6 +1,6 @@
 //! The infrared Earth sensor of Wang et al. 2022.
 
-use super::{told, trust_every_fit};
+use super::{disable_gates, set_given_noise};
 use crate::config::Config;
 use crate::stages::{consensus, contour, edge_points, fit};
 
@@ -10,7 +10,7 @@ use crate::stages::{consensus, contour, edge_points, fit};
 /// Their threshold is 1°, which is 1.6 px with their lens (384×288, 92 px/rad). For another lens, set
 /// `reject.threshold_px` accordingly.
 pub(super) fn preset(config: &mut Config) {
-    told(config);
+    set_given_noise(config);
     config.contour.method = contour::Method::Sobel;
     config.candidates.sub_pixel = edge_points::SubPixel::Zernike;
     config.candidates.keep_points = 0;
@@ -20,5 +20,5 @@ pub(super) fn preset(config: &mut Config) {
     config.estimate.method = fit::Method::Wtls;
     config.estimate.weigh_above_deg = 60.0;
     config.estimate.half_angle = fit::HalfAngle::Free;
-    trust_every_fit(config);
+    disable_gates(config);
 }

@@ -44,7 +44,7 @@ pub struct Edges<T> {
 
 /// The consensus: the cone that a method of rejection finds.
 #[derive(Debug, Clone, Copy)]
-pub struct Agreed<T> {
+pub struct ConsensusCone<T> {
     /// Axis of the cone, towards the body, in the camera frame.
     pub axis: UnitVec3<Cam, T>,
     /// cos of the half-angle.
@@ -96,7 +96,7 @@ impl<T: Real> Sensor<T> {
     /// Returns `too-dark`, `too-bright`, or `no-limb` when dark and lit pixels cannot be separated.
     pub fn level<P: Pixels>(&self, picture: &P, expected: &Expected<T>) -> Result<Level<T>, Status> {
         let config = self.config();
-        let levels = config.levels_of(expected.which);
+        let levels = config.threshold_of(expected.which);
         let seed = config.reject.seed;
         threshold::split(picture, self.region(), &config.gate, levels, expected.level, seed, &Unobserved)
     }
@@ -107,8 +107,8 @@ impl<T: Real> Sensor<T> {
         let (mut border, mut marks) = (vec![Pixel { x: 0, y: 0 }; HOST_POINTS], vec![0; HOST_WORDS]);
         let lists = Lists { border: &mut border, blocks: &mut [], marks: &mut marks };
         let borders = Borders::default();
-        let binary = BinaryPicture::new(picture, &self.region, level, &borders).blooming(expected.blooms());
-        self.search(lists, &binary, WorkBudget::unlimited(), expected, &[], &mut Report::of_nothing());
+        let binary = BinaryPicture::new(picture, &self.region, level, &borders).with_blooming(expected.blooms());
+        self.search(lists, &binary, WorkBudget::unlimited(), expected, &[], &mut Report::empty());
         borders.0.into_inner()
     }
 }
@@ -135,7 +135,7 @@ impl<T: Real> Edges<T> {
                 let j = ray.jacobian();
                 let e = lit.xyz();
                 let g: [T; 2] = core::array::from_fn(|k| (0..3).map(|r| j[r][k] * e[r]).fold(T::ZERO, |a, b| a + b));
-                Lit::towards(g)
+                Lit::from_gradient(g)
             })
         };
         Self::from_points(camera, points.iter().map(|p| (*p, side(p))).collect())
@@ -143,15 +143,16 @@ impl<T: Real> Edges<T> {
 
     /// Same as [`Self::new`], with the direction towards the light in the picture, (u, v), for each point.
     pub fn towards(camera: &Camera<T>, points: &[(ImagePoint<T>, [T; 2])]) -> Self {
-        Self::from_points(camera, points.iter().map(|(p, lit)| (*p, Lit::towards(*lit))).collect())
+        Self::from_points(camera, points.iter().map(|(p, lit)| (*p, Lit::from_gradient(*lit))).collect())
     }
 
     /// Locates the edge points of a border, as the stage `candidates` does.
     pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
-        let binary =
-            BinaryPicture::new(picture, sensor.region(), level, &Unobserved).blooming(sensor.config().body.blooms());
+        let binary = BinaryPicture::new(picture, sensor.region(), level, &Unobserved)
+            .with_blooming(sensor.config().body.blooms());
         let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
-        let made = edge_points::pick(&binary, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
+        let made =
+            edge_points::locate_edge_points(&binary, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
         let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
         let clipped = T::from_i32(made.clipped as i32) / T::from_i32(made.count.max(1) as i32);
         Self { clipped, ..Self::from_points(sensor.camera(), (0..made.count as usize).map(point).collect()) }
@@ -207,35 +208,35 @@ impl<T: Real> Edges<T> {
     }
 
     /// Rejects outliers and returns the consensus; `None` if there is none.
-    pub fn reject(&mut self, expected: &Expected<T>, config: &consensus::Config) -> Option<Agreed<T>> {
+    pub fn reject(&mut self, expected: &Expected<T>, config: &consensus::Config) -> Option<ConsensusCone<T>> {
         let (count, mut work) = (self.points.len() as u32, WorkBudget::unlimited());
         let expected = &expected.clipped(self.clipped);
         let threshold = self.threshold(expected, config);
-        let found = consensus::keep(&mut self.blocks, count, expected, self.focal_px, threshold, config, &mut work)?;
+        let found = consensus::find(&mut self.blocks, count, expected, self.focal_px, threshold, config, &mut work)?;
         let axis = UnitVec3::assume_unit(found.e);
-        Some(Agreed { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
+        Some(ConsensusCone { axis, cos_half_angle: found.c, draws: found.draws, all: found.all })
     }
 
     /// Fits the cone, beginning at the consensus. Stores in each point its weight in the fit.
-    pub fn fit(&mut self, sensor: &Sensor<T>, start: &Agreed<T>, expected: &Expected<T>) -> Option<Fitted<T>> {
+    pub fn fit(&mut self, sensor: &Sensor<T>, start: &ConsensusCone<T>, expected: &Expected<T>) -> Option<Fitted<T>> {
         let config = sensor.config();
         let expected = &expected.clipped(self.clipped);
         let start =
             consensus::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
         let threshold = self.threshold(expected, &config.reject).px;
-        let noise = sensor.config.noise_of(expected.which);
+        let noise = sensor.config.noise_model_of(expected.which);
         fit::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise).map(Fitted)
     }
 
     /// Makes a fit of a cone that was fitted elsewhere: computes the normal equations of the weighted points at this
     /// cone.
-    pub fn given(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T) -> Option<Fitted<T>> {
-        fit::given(&mut self.blocks, *axis.v(), cos_half_angle).map(Fitted)
+    pub fn fit_at(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T) -> Option<Fitted<T>> {
+        fit::fit_at(&mut self.blocks, *axis.v(), cos_half_angle).map(Fitted)
     }
 
     /// Computes the covariance of a fit and fuses the fit with the expected half-angle.
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
-        let noise = sensor.config.noise_of(expected.which);
+        let noise = sensor.config.noise_model_of(expected.which);
         let expected = &expected.clipped(self.clipped);
         let fused =
             covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate, sensor.camera(), None)?;

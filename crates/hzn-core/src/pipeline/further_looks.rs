@@ -5,7 +5,7 @@
 //! time at another threshold. All looks draw on the one work budget of the picture. Each look is also another chance
 //! for a false answer: all looks have the same gates, and there are few of them.
 
-use super::account;
+use super::budget;
 use super::found_limb::FoundLimb;
 use super::sensor::Sensor;
 use super::workspace::Lists;
@@ -42,9 +42,9 @@ impl<T: Real> Sensor<T> {
     ) {
         let config = &self.config;
         // A `fixed` threshold is kept: there are no other thresholds.
-        let fixed = config.levels_of(expected.which).method == threshold::Method::Fixed;
+        let fixed = config.threshold_of(expected.which).method == threshold::Method::Fixed;
         let mut others = if fixed { [].iter() } else { config.recover.levels.iter() };
-        let mut work = account::open(config, lists.border.len());
+        let mut work = budget::new(config, lists.border.len());
         let mut within = None;
         let mut status = None;
         let mut lowest = None;
@@ -52,8 +52,8 @@ impl<T: Real> Sensor<T> {
         loop {
             let look = |region| {
                 BinaryPicture::new(picture, region, report.level, observer)
-                    .blooming(expected.blooms())
-                    .contrasting(first.contrast)
+                    .with_blooming(expected.blooms())
+                    .with_contrast(first.contrast)
             };
             if within.is_none() {
                 let frame = look(&self.region).dark_frame_px(config.recover.frame_px, &mut work);
@@ -63,7 +63,7 @@ impl<T: Real> Sensor<T> {
                 }
             }
             let binary = look(within.as_ref().unwrap_or(&self.region));
-            work = self.search(lists.again(), &binary, work, expected, taken, report);
+            work = self.search(lists.reborrow(), &binary, work, expected, taken, report);
             if !goes_on(report.status) {
                 break;
             }
@@ -77,7 +77,7 @@ impl<T: Real> Sensor<T> {
                 let noise = threshold::dark_noise(picture, &self.region, first.level, config.reject.seed, observer);
                 first.dark + noise * T::from_f64(config.recover.min_sigma)
             });
-            let mut levels = others.by_ref().map(|&part| first.part(part));
+            let mut levels = others.by_ref().map(|&part| first.at_fraction(part));
             let Some(level) = levels.find(|&level| T::from_i32(level.into()) >= lowest) else { break };
             report.level = level;
             observer.look(report.counters.looks, report.level);

@@ -221,17 +221,17 @@ fn solve<T: Real>(
     let mut blocks = blocks(camera, points, lit_towards);
     let config = consensus::Config::default();
     let (fx, _) = camera.focal_px();
-    let start = consensus::keep(
+    let start = consensus::find(
         &mut blocks,
         points.len() as u32,
         expected,
         fx,
-        consensus::Threshold::told(&config),
+        consensus::Threshold::from_config(&config),
         &config,
         &mut WorkBudget::unlimited(),
     )?;
     let estimate = fit::Config { half_angle, ..Default::default() };
-    let noise = covariance::Config::told(sigma_px, correlation_px);
+    let noise = covariance::Config::given(sigma_px, correlation_px);
     let fit = fit::fit(&mut blocks, &start, expected, camera, T::from_f64(config.threshold_px), &estimate, &noise)?;
     let fused = covariance::fuse(&blocks, &fit, expected, &noise, &estimate, camera, None)?;
     let (b1, b2) = basis(&fused.e);
@@ -515,7 +515,7 @@ fn in_view(camera: &Camera<f64>, step_px: f64, ray: impl Fn(f64) -> UnitVec3<Cam
 struct Statistics {
     rms_deg: f64,
     /// RMS error in degrees that the covariances predict.
-    told_deg: f64,
+    predicted_deg: f64,
     nees: f64,
 }
 
@@ -524,7 +524,7 @@ struct Statistics {
 struct Errors {
     runs: u32,
     squares: f64,
-    told: f64,
+    predicted: f64,
     nees: f64,
 }
 
@@ -538,14 +538,14 @@ impl Errors {
         let [a, b, d] = invert_spd2(p).expect("a covariance");
         self.runs += 1;
         self.squares += x * x + y * y;
-        self.told += p[0] + p[2];
+        self.predicted += p[0] + p[2];
         self.nees += a * x * x + 2.0 * b * x * y + d * y * y;
         assert!(answer.covariance.sigma_max_rad() > T::ZERO);
     }
     fn statistics(&self) -> Statistics {
         let n = f64::from(self.runs);
         let rms_deg = |sum: f64| libm::sqrt(sum / n).to_degrees();
-        Statistics { rms_deg: rms_deg(self.squares), told_deg: rms_deg(self.told), nees: self.nees / n }
+        Statistics { rms_deg: rms_deg(self.squares), predicted_deg: rms_deg(self.predicted), nees: self.nees / n }
     }
 }
 
@@ -598,7 +598,7 @@ fn bound_deg(camera: &Camera<f64>, e: &UnitVec3<Cam, f64>, altitude_m: f64, sigm
     let mut blocks = blocks(camera, &limb(camera, e, c, 3.0), e);
     let (b1, b2) = basis(e.v());
     let sums = fit::pass(&mut blocks, e.v(), &b1, &b2, 1.0 - c, [0.0; 2], &fit::Weights::Kept, None);
-    let [a, _, d] = invert_spd2(sums.known([0.0; 2])).unwrap();
+    let [a, _, d] = invert_spd2(sums.normal_fixed([0.0; 2])).unwrap();
     (libm::sqrt(a + d) * sigma_px).to_degrees()
 }
 
@@ -615,7 +615,7 @@ fn white_errors_reach_the_bound() {
 }
 
 #[test]
-fn correlated_errors_are_told_honestly() {
+fn correlated_errors_have_an_honest_covariance() {
     let (camera, e) = rocket_camera();
     for (altitude, limb_sigma) in [(80e3, 0.5), (120e3, 0.05), (120e3, 0.5), (120e3, 2.0), (240e3, 0.5), (240e3, 8.0)] {
         let runs = if altitude < 100e3 { 800 } else { 200 };
@@ -628,7 +628,7 @@ fn correlated_errors_are_told_honestly() {
             let statistical = 1.0 + 1.0 / libm::sqrt(2.0 * f64::from(runs));
             let limit = if altitude < 100e3 { 0.065 * statistical } else { 0.065 };
             assert!(got.rms_deg < limit, "{altitude} {limb_sigma}: {}", got.rms_deg);
-            assert!(got.told_deg < 0.065, "{altitude} {limb_sigma}: told {}", got.told_deg);
+            assert!(got.predicted_deg < 0.065, "{altitude} {limb_sigma}: predicted {}", got.predicted_deg);
         }
     }
 }

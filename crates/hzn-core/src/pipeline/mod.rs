@@ -6,7 +6,7 @@
 //! doubt. Otherwise the best of all edges that begin at the border is chosen; closed edges are examined only if there
 //! is none. A picture without an answer is examined again, at other thresholds (`[recover]`).
 
-mod account;
+mod budget;
 #[cfg(any(test, feature = "_edges"))]
 pub mod edges;
 mod found_limb;

@@ -1,6 +1,6 @@
 //! Takes the edges of one picture from border to verdict, one after the other, and decides which of them is the limb.
 
-use super::account;
+use super::budget;
 use super::found_limb::FoundLimb;
 use super::sensor::Sensor;
 use crate::base::linalg::basis;
@@ -61,7 +61,7 @@ pub(super) struct Search<'a, T, O> {
     taken: &'a [FoundLimb<T>],
     noise: &'a covariance::Config,
     /// Whether the answer needs a threshold for the next picture (method `track`).
-    tracks: bool,
+    needs_next_threshold: bool,
     /// Length of the shortest candidate, border pixels.
     min_points: u16,
     observer: &'a O,
@@ -117,13 +117,13 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         Self {
             expected,
             taken,
-            noise: config.noise_of(expected.which),
-            tracks: config.levels_of(expected.which).method == threshold::Method::Track,
+            noise: config.noise_model_of(expected.which),
+            needs_next_threshold: config.threshold_of(expected.which).method == threshold::Method::Track,
             min_points: config
                 .candidates
                 .min_points
-                .min(gates::small(expected.sin, &sensor.camera, 2))
-                .min(gates::few_rows(&sensor.camera, 2)),
+                .min(gates::small_disc_points(expected.sin, &sensor.camera, 2))
+                .min(gates::small_picture_points(&sensor.camera, 2)),
             observer,
             work,
             blocks,
@@ -138,7 +138,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     }
 
     /// Returns whether the search is over: the limb is found, or the work budget is used up.
-    fn done(&self) -> bool {
+    fn is_over(&self) -> bool {
         self.work.is_exhausted() || self.best.as_ref().is_some_and(|b| b.certain)
     }
 
@@ -162,18 +162,18 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let ranked = binary.ranked_starts(stride);
         self.work.charge(binary.cost());
         for start in &ranked {
-            if self.done() {
+            if self.is_over() {
                 break;
             }
-            self.edge(binary, start.pixel, start.dark, border, &mut marks);
+            self.follow_and_judge(binary, start.pixel, start.dark, border, &mut marks);
         }
-        if !self.done() {
+        if !self.is_over() {
             binary.each_start(stride, &mut |start| {
                 if !ranked.iter().any(|r| r.pixel == start.pixel && r.dark == start.dark) {
-                    self.edge(binary, start.pixel, start.dark, border, &mut marks);
+                    self.follow_and_judge(binary, start.pixel, start.dark, border, &mut marks);
                 }
                 self.work.charge(binary.cost());
-                !self.done()
+                !self.is_over()
             });
         }
         if self.best.is_some() {
@@ -182,23 +182,23 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let mut missed = Missed::Unknown;
         for y in marks.rows(height) {
             let Some((x0, x1)) = binary.region.span(y) else { continue };
-            if self.done() || !self.work.try_spend(work::line(x0, x1)) {
+            if self.is_over() || !self.work.try_spend(work::line_cost(x0, x1)) {
                 break;
             }
             let crossings = binary.each_crossing(y, (x0, x1), &mut marks, |pixel, dark, marks| {
-                self.edge_on_line(binary, pixel, dark, border, marks, &mut missed);
-                !self.done()
+                self.follow_from_line(binary, pixel, dark, border, marks, &mut missed);
+                !self.is_over()
             });
             self.work.charge(crossings * work::CROSSING + binary.cost());
             if missed == Missed::Some {
                 missed = Missed::Found;
-                if !self.work.try_spend(work::ring(width, height)) {
+                if !self.work.try_spend(work::ring_cost(width, height)) {
                     break;
                 }
                 binary.each_narrow_start(stride, &mut |start| {
-                    self.edge(binary, start.pixel, start.dark, border, &mut marks);
+                    self.follow_and_judge(binary, start.pixel, start.dark, border, &mut marks);
                     self.work.charge(binary.cost());
-                    !self.done()
+                    !self.is_over()
                 });
             }
         }
@@ -208,7 +208,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     /// that were read, and only a part of it is followed from the search line. It is therefore not judged; instead,
     /// `missed` requests a search of the whole border, which finds the edge from its beginning. After that search,
     /// every edge is judged.
-    fn edge_on_line<P: Pixels>(
+    fn follow_from_line<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
         pixel: Pixel,
@@ -220,7 +220,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let mut edge = Thinned::new(border);
         match self.follow(binary, pixel, dark, &mut edge, marks) {
             Some(End::Open) if *missed != Missed::Found => *missed = Missed::Some,
-            Some(_) => self.piece(binary, &edge),
+            Some(_) => self.judge_edge(binary, &edge),
             None => {}
         }
     }
@@ -233,14 +233,14 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         border: &mut [Pixel],
         bits: &mut [u32],
     ) {
-        let most = self.work.remaining();
-        let mut steps = most;
+        let budget = self.work.remaining();
+        let mut steps = budget;
         let ended = contour::raster::each_border(binary, bits, border, &mut steps, |edge| {
-            self.piece(binary, edge);
+            self.judge_edge(binary, edge);
             !self.work.is_exhausted()
         });
-        self.report.counters.followed += most - steps;
-        self.work.charge(most - steps);
+        self.report.counters.followed += budget - steps;
+        self.work.charge(budget - steps);
         if ended == contour::raster::Scanned::Truncated {
             self.work.mark_truncated();
         }
@@ -248,17 +248,17 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
 
     /// Examines all edge pixels of the picture as one edge, for methods that do not separate edges.
     #[cfg(any(feature = "horace", feature = "zju"))]
-    pub(super) fn whole<'b, P: Pixels>(
+    pub(super) fn judge_all_as_one<'b, P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
         edges: impl FnOnce(&mut WorkBudget) -> Thinned<'b>,
     ) {
         let edge = edges(&mut self.work);
-        self.piece(binary, &edge);
+        self.judge_edge(binary, &edge);
     }
 
     /// Follows one edge and takes it through every stage.
-    fn edge<P: Pixels>(
+    fn follow_and_judge<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
         pixel: Pixel,
@@ -268,7 +268,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     ) {
         let mut edge = Thinned::new(border);
         if self.follow(binary, pixel, dark, &mut edge, marks).is_some() {
-            self.piece(binary, &edge);
+            self.judge_edge(binary, &edge);
         }
     }
 
@@ -285,7 +285,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         if !self.work.try_spend(work::EDGE) {
             return None;
         }
-        let end = self.work.on_edge(|steps| binary.follow(pixel, dark, edge, marks, steps));
+        let end = self.work.limit_edge(|steps| binary.follow(pixel, dark, edge, marks, steps));
         self.report.counters.followed += edge.total();
         // A hole is sky or ground that is seen through something.
         let hole = matches!(end, End::Closed { twice_area } if twice_area > 0);
@@ -293,7 +293,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     }
 
     /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
-    pub(super) fn piece<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
+    pub(super) fn judge_edge<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
         let counters = &mut self.report.counters;
         let length = edge.total();
         if length < u32::from(self.min_points) {
@@ -302,7 +302,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         }
         let keep = u32::from(self.sensor.config.candidates.keep_points);
         let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
-        let point = account::point(self.sensor.config.candidates.sub_pixel, binary.mask_cost());
+        let point = budget::point_cost(self.sensor.config.candidates.sub_pixel, binary.mask_cost());
         if !self.work.try_spend(points.saturating_mul(point)) {
             return;
         }
@@ -316,7 +316,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let (outcome, solution) = self.candidate(binary, number, length, edge.pixels());
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
         if let Some(new) = solution {
-            self.weigh(new);
+            self.keep_better(new);
         }
         self.fitted |=
             !matches!(outcome.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken);
@@ -341,7 +341,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             rms_px: T::from_f64(f64::NAN),
             verdict: Verdict::NoConsensus,
         };
-        let best = self.edge_points(binary, border, &mut outcome).and_then(|points| {
+        let best = self.locate_points(binary, border, &mut outcome).and_then(|points| {
             let clipped = T::from_i32(points.clipped as i32) / T::from_i32(points.count.max(1) as i32);
             let expected = self.expected.clipped(clipped);
             let (fit, threshold) = self.fit(&points, &expected, &mut outcome)?;
@@ -352,17 +352,17 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
 
     /// Locates the edge points. The caller has paid for them; the extra work of slow points is charged here.
     #[inline(always)]
-    fn edge_points<P: Pixels>(
+    fn locate_points<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
         border: &[Pixel],
         outcome: &mut Candidate<T>,
     ) -> Option<Points> {
         self.enter(Stage::Candidates);
-        let slow = work::slow_point(binary.mask_cost());
+        let slow = work::slow_point_cost(binary.mask_cost());
         let most_slow = self.work.remaining() / slow;
         let config = &self.sensor.config.candidates;
-        let points = edge_points::pick(binary, config, border, outcome.number, self.blocks, most_slow);
+        let points = edge_points::locate_edge_points(binary, config, border, outcome.number, self.blocks, most_slow);
         if points.slow == most_slow {
             self.work.exhaust();
             return None;
@@ -390,8 +390,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         rays::to_rays(camera, blocks);
 
         enter(self.report, self.observer, Stage::Reject);
-        let told_px = T::from_f64(config.reject.threshold_px);
-        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, told_px)).sum();
+        let configured_px = T::from_f64(config.reject.threshold_px);
+        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, configured_px)).sum();
         if on_another * 2 > points.count {
             outcome.verdict = Verdict::Taken;
             return None;
@@ -400,7 +400,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let focal = (fx + fy) * T::from_f64(0.5);
         let threshold = Threshold::new(blocks, points.count, expected, focal, &config.reject);
         let work = &mut self.work;
-        let consensus = consensus::keep(blocks, points.count, expected, focal, threshold, &config.reject, work)?;
+        let consensus = consensus::find(blocks, points.count, expected, focal, threshold, &config.reject, work)?;
         self.report.counters.draws += consensus.draws;
 
         enter(self.report, self.observer, Stage::Estimate);
@@ -443,8 +443,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
-        let (made, raised) = (points.count, threshold.raised);
-        let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, raised, binary, camera, &config.select);
+        let (made, factor) = (points.count, threshold.factor);
+        let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, factor, binary, camera, &config.select);
         outcome.verdict = match judged.verdict {
             Verdict::Passed => papers::verdict(fit, expected, blocks, camera, binary.region, &config.select),
             failed => failed,
@@ -458,32 +458,33 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             return None;
         }
         if config.estimate.half_angle == fit::HalfAngle::Fused
-            && !self.tells_side(fit, &fused, expected)
+            && !self.is_side_known(fit, &fused, expected)
             && !expected.free
         {
             outcome.verdict = Verdict::Straight;
             return None;
         }
-        let solution = self.solution(fit, &fused, covariance, expected, outcome.number);
+        let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number);
         let share = T::from_i32(fit.inliers as i32)
             > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
         let certain = judged.support > T::from_f64(config.select.certain_support)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
-        let tracks = (self.tracks && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
-        Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: tracks.flatten() })
+        let next =
+            (self.needs_next_threshold && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
+        Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: next.flatten() })
     }
 
     /// Returns whether the curvature of the edge shows on which side of the edge the body is.
     ///
     /// A body on the other side of the same edge would have the half-angle π − α. The half-angle that the edge itself
     /// gives must be much nearer to α: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ must exceed `min_side_sigma`² variances.
-    fn tells_side(&self, fit: &Fit<T>, fused: &Fused<T>, expected: &Expected<T>) -> bool {
+    fn is_side_known(&self, fit: &Fit<T>, fused: &Fused<T>, expected: &Expected<T>) -> bool {
         let sides = T::from_f64(self.sensor.config.select.min_side_sigma);
         fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0))
     }
 
     #[inline(always)]
-    fn solution(
+    fn make_solution(
         &self,
         fit: &Fit<T>,
         fused: &Fused<T>,
@@ -517,7 +518,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
 
     /// Keeps the better of two answers. If they point in different directions, the score of the other is kept as the
     /// rival's.
-    fn weigh(&mut self, new: Best<T>) {
+    fn keep_better(&mut self, new: Best<T>) {
         let Some(old) = self.best.take() else {
             self.best = Some(new);
             return;

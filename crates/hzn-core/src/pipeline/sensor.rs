@@ -85,7 +85,7 @@ impl<T: Real> Sensor<T> {
         expected: &Expected<T>,
         observer: &O,
     ) -> Report<T> {
-        self.process_beside(workspace.lists(), picture, expected, &[], observer)
+        self.process_excluding(workspace.lists(), picture, expected, &[], observer)
     }
     /// Finds several bodies in one picture, at most [`MAX_BODIES`], one after the other in the order of `expected`. An
     /// edge on the limb of a body that was found is not used for another body.
@@ -100,7 +100,7 @@ impl<T: Real> Sensor<T> {
         let mut taken = heapless::Vec::<FoundLimb<T>, MAX_BODIES>::new();
         for one in expected {
             observer.body(one.which);
-            let report = self.process_beside(workspace.lists(), picture, one, &taken, observer);
+            let report = self.process_excluding(workspace.lists(), picture, one, &taken, observer);
             let found = report.solution.as_ref();
             let found = found.map(|s| FoundLimb { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
             // Both lists have room for the largest number of bodies.
@@ -111,7 +111,7 @@ impl<T: Real> Sensor<T> {
         reports
     }
 
-    fn process_beside<P: Pixels, O: Observer<T>>(
+    fn process_excluding<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
         picture: &P,
@@ -119,7 +119,7 @@ impl<T: Real> Sensor<T> {
         taken: &[FoundLimb<T>],
         observer: &O,
     ) -> Report<T> {
-        let mut report = Report::of_nothing();
+        let mut report = Report::empty();
         if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
             #[cfg(feature = "horace")]
             self.look_at_parts(lists, picture, expected, taken, observer, &mut report);
@@ -148,7 +148,7 @@ impl<T: Real> Sensor<T> {
     ) {
         observer.enter(Stage::Binarize);
         let config = &self.config;
-        let levels = config.levels_of(expected.which);
+        let levels = config.threshold_of(expected.which);
         let level = match threshold::split(
             picture,
             &self.region,
@@ -189,10 +189,14 @@ impl<T: Real> Sensor<T> {
             contour::Method::Raster => search.raster(binary, lists.border, lists.marks),
             #[cfg(feature = "horace")]
             contour::Method::Erode => {
-                search.whole(binary, |work| contour::erode::edges(binary, &config.contour, lists.border, work));
+                search.judge_all_as_one(binary, |work| {
+                    contour::erode::edges(binary, &config.contour, lists.border, work)
+                });
             }
             #[cfg(feature = "zju")]
-            contour::Method::Sobel => search.whole(binary, |work| contour::sobel::edges(binary, lists.border, work)),
+            contour::Method::Sobel => {
+                search.judge_all_as_one(binary, |work| contour::sobel::edges(binary, lists.border, work))
+            }
             // `Config::check` refuses a method that is not built in.
             _ => search.border_following(binary, lists.border, lists.marks),
         }

@@ -6,7 +6,7 @@
 //! when a part is too small *and* too bright and too dark at once; here it ends when a part is too small, or too
 //! bright, or too dark.
 
-use super::account;
+use super::budget;
 use super::found_limb::FoundLimb;
 use super::sensor::Sensor;
 use super::workspace::Lists;
@@ -46,9 +46,9 @@ impl<T: Real> Sensor<T> {
     ) {
         let whole = Crop::whole([picture.width(), picture.height()], self.config.input.scale_to_height);
         if whole.is_all() {
-            self.look(lists.again(), picture, expected, taken, observer, report);
+            self.look(lists.reborrow(), picture, expected, taken, observer, report);
         } else {
-            self.look_through(lists.again(), whole, picture, expected, taken, observer, None, report);
+            self.look_at_crop(lists.reborrow(), whole, picture, expected, taken, observer, None, report);
         }
         let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright);
         if self.config.recover.method == Method::Division && divisible {
@@ -68,7 +68,7 @@ impl<T: Real> Sensor<T> {
     ) {
         let (status, level) = (report.status, report.level);
         // The work budget that the whole picture has left.
-        let mut work = account::open(&self.config, lists.border.len());
+        let mut work = budget::new(&self.config, lists.border.len());
         work.charge(report.counters.work);
         let mut cut = false;
         let least = f64::from(whole.area()) * self.config.recover.least_part;
@@ -82,7 +82,16 @@ impl<T: Real> Sensor<T> {
                 break;
             }
             report.counters.work = 0;
-            self.look_through(lists.again(), part, picture, expected, taken, observer, Some(work.remaining()), report);
+            self.look_at_crop(
+                lists.reborrow(),
+                part,
+                picture,
+                expected,
+                taken,
+                observer,
+                Some(work.remaining()),
+                report,
+            );
             work.charge(report.counters.work);
             cut |= report.status == Status::Truncated;
             if let Some(answer) = report.solution.take() {
@@ -103,7 +112,7 @@ impl<T: Real> Sensor<T> {
         if cut || work.was_truncated() {
             report.status = Status::Truncated;
         }
-        if let Some(mut answer) = together(&mut answers, self.config.recover.combine) {
+        if let Some(mut answer) = combine_answers(&mut answers, self.config.recover.combine) {
             answer.axis_body = self.cam_to_body.as_ref().map(|r| r.apply(&answer.axis));
             report.status = Status::Ok;
             report.stage = Stage::Select;
@@ -115,7 +124,7 @@ impl<T: Real> Sensor<T> {
     }
 
     /// Examines a part with the part's own camera and region. `left` is the largest work that it may cost.
-    fn look_through<P: Pixels, O: Observer<T>>(
+    fn look_at_crop<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
         crop: Crop,
@@ -130,8 +139,8 @@ impl<T: Real> Sensor<T> {
         config.limits.max_work = left.or(config.limits.max_work);
         let part = Sensor {
             config,
-            camera: self.camera.through(&crop),
-            region: self.region.through(&crop),
+            camera: self.camera.for_crop(&crop),
+            region: self.region.for_crop(&crop),
             cam_to_body: self.cam_to_body,
         };
         part.look(lists, &Cropped::new(picture, crop), expected, taken, &Through { observer, crop }, report);
@@ -140,7 +149,7 @@ impl<T: Real> Sensor<T> {
 
 /// Combines the answers of the parts. The axis is their median or mean, the covariance includes their scatter, and the
 /// rest comes from the answer that is nearest to this axis.
-fn together<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Option<Solution<T>> {
+fn combine_answers<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Option<Solution<T>> {
     let count = T::from_f64(answers.len() as f64);
     let axis = match combine {
         Combine::Mean => answers.iter().fold(V3::new(T::ZERO, T::ZERO, T::ZERO), |sum, a| sum + a.axis.v()),
@@ -220,7 +229,7 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
         self.observer.wants(candidate)
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
-        self.observer.point(candidate, self.crop.in_picture(point));
+        self.observer.point(candidate, self.crop.to_picture(point));
     }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.observer.weight(candidate, point, weight);

@@ -47,7 +47,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Work
 
 impl<T> Lists<'_, T> {
     /// Borrows the same lists for one of several looks.
-    pub(super) fn again(&mut self) -> Lists<'_, T> {
+    pub(super) fn reborrow(&mut self) -> Lists<'_, T> {
         Lists { border: self.border, blocks: self.blocks, marks: self.marks }
     }
 }

@@ -39,7 +39,7 @@ impl<T: Real> Level<T> {
     /// Returns the threshold at the fraction `part` of the way from the dark pixels to this threshold, in counts. A
     /// `part` of 1 gives this threshold. Half of a threshold then means half of the light, even if the sky is not
     /// black, as in 16-bit pictures of a thermal camera.
-    pub(crate) fn part(&self, part: f64) -> u16 {
+    pub(crate) fn at_fraction(&self, part: f64) -> u16 {
         let level = T::from_i32(i32::from(self.level));
         counts(self.dark + (level - self.dark) * T::from_f64(part))
     }
@@ -55,7 +55,7 @@ const LEAST_SPREADS: f64 = 4.0;
 /// Smallest contrast between the classes in counts, where `LEAST_SPREADS` decides. A smaller contrast can be rounding.
 const LEAST_COUNTS: f64 = 4.0;
 /// Ratio of sigma to the mean distance between two values of a normal distribution: √π/2.
-const BY_DISTANCE: f64 = 0.886_226_925_452_758;
+const SIGMA_PER_MEAN_DISTANCE: f64 = 0.886_226_925_452_758;
 /// Number of cells along each side of the first and of the second sample, as powers of two.
 const SIDES_LOG2: [u32; 2] = [4, 6];
 
@@ -121,7 +121,7 @@ pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
             (here < level && there < level).then(|| here.abs_diff(there))
         });
     }
-    sample.histogram.mean().unwrap_or(T::ZERO) * T::from_f64(BY_DISTANCE)
+    sample.histogram.mean().unwrap_or(T::ZERO) * T::from_f64(SIGMA_PER_MEAN_DISTANCE)
 }
 
 /// Both samples of a picture that arrives row by row.
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn fixed_and_dynamic_do_as_told() {
+    fn fixed_and_dynamic_follow_the_configuration() {
         let data = halves(10, 210);
         let fixed = Config { method: Method::Fixed, level: 77.0, ..Config::default() };
         assert_eq!(level(&data, 8, Gate::default(), fixed).unwrap().level, 77);
@@ -418,7 +418,7 @@ mod tests {
             assert!(found.level.abs_diff(sky + 620) < 40, "{sky}: {found:?}");
             assert!((found.contrast - 1200.0).abs() < 40.0 && (found.dark - f64::from(sky) - 20.0).abs() < 40.0);
             // Half of the light is found at every brightness of the sky.
-            assert!(found.part(0.5).abs_diff(sky + 320) < 40, "{sky}: {}", found.part(0.5));
+            assert!(found.at_fraction(0.5).abs_diff(sky + 320) < 40, "{sky}: {}", found.at_fraction(0.5));
             // Noise alone does not form two classes.
             let flat: Vec<u16> = (0..64 * 64).map(|i| sky + noise(i)).collect();
             assert_eq!(level(&flat, 16, Gate::default(), Config::default()).unwrap_err(), Status::NoLimb);
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_of_the_dark_is_told_whatever_lies_in_it() {
+    fn dark_noise_is_measured_on_any_background() {
         // The noise is the sum of twelve numbers: nearly normal, with a sigma of 4 counts. It lies on a sky and on dim
         // ground.
         let mut rng = Rng::new(5);

@@ -29,11 +29,11 @@ pub(crate) fn symmetric_eigen<T: Real, const N: usize>(mut m: [[T; N]; N]) -> ([
                 // This rotation makes m[p][q] zero.
                 let Some((c, s)) = rotation(m[p][p], m[q][q], m[p][q]) else { continue };
                 for row in &mut m {
-                    (row[p], row[q]) = turned(row[p], row[q], c, s);
+                    (row[p], row[q]) = rotate_pair(row[p], row[q], c, s);
                 }
                 for j in 0..N {
-                    (m[p][j], m[q][j]) = turned(m[p][j], m[q][j], c, s);
-                    (vectors[p][j], vectors[q][j]) = turned(vectors[p][j], vectors[q][j], c, s);
+                    (m[p][j], m[q][j]) = rotate_pair(m[p][j], m[q][j], c, s);
+                    (vectors[p][j], vectors[q][j]) = rotate_pair(vectors[p][j], vectors[q][j], c, s);
                 }
             }
         }
@@ -83,7 +83,7 @@ impl<T: Real, const N: usize> Triangle<T, N> {
     /// Returns the singular values of the rows so far, smallest first, and the right singular vectors as rows in the
     /// same order. Rotations make the columns of R orthogonal to each other (one-sided Jacobi, Hestenes 1958), which
     /// keeps small values exact.
-    pub(crate) fn singular(&self) -> ([T; N], [[T; N]; N]) {
+    pub(crate) fn singular_values(&self) -> ([T; N], [[T; N]; N]) {
         // The columns of R are the rows of `u`.
         let mut u = [[T::ZERO; N]; N];
         for i in 0..N {
@@ -103,8 +103,8 @@ impl<T: Real, const N: usize> Triangle<T, N> {
                     let Some((c, s)) = rotation(a, b, d) else { continue };
                     moved = true;
                     for j in 0..N {
-                        (u[p][j], u[q][j]) = turned(u[p][j], u[q][j], c, s);
-                        (v[p][j], v[q][j]) = turned(v[p][j], v[q][j], c, s);
+                        (u[p][j], u[q][j]) = rotate_pair(u[p][j], u[q][j], c, s);
+                        (v[p][j], v[q][j]) = rotate_pair(v[p][j], v[q][j], c, s);
                     }
                 }
             }
@@ -119,7 +119,7 @@ impl<T: Real, const N: usize> Triangle<T, N> {
 
     /// Returns the x with last component 1 that minimises the sum of (row · x)² over the rows. `None` when the rows do
     /// not determine x in this precision.
-    pub(crate) fn kernel(&self) -> Option<[T; N]> {
+    pub(crate) fn solve_with_unit_last(&self) -> Option<[T; N]> {
         let floor = self.floor(N.saturating_sub(1))?;
         let mut x = [T::ZERO; N];
         if let Some(last) = x.last_mut() {
@@ -180,7 +180,7 @@ fn rotation<T: Real>(a: T, b: T, d: T) -> Option<(T, T)> {
 }
 
 #[inline(always)]
-fn turned<T: Real>(x: T, y: T, c: T, s: T) -> (T, T) {
+fn rotate_pair<T: Real>(x: T, y: T, c: T, s: T) -> (T, T) {
     (c * x - s * y, s * x + c * y)
 }
 
@@ -261,7 +261,7 @@ mod tests {
                     }
                 }
             }
-            let (values, vectors) = triangle.singular();
+            let (values, vectors) = triangle.singular_values();
             let (squares, _) = symmetric_eigen(square);
             for k in 0..6 {
                 prop_assert!((values[k] * values[k] - squares[k]).abs() < 1e-11 * squares[5]);
@@ -285,7 +285,7 @@ mod tests {
             for row in m {
                 triangle.push(row);
             }
-            let _ = triangle.singular();
+            let _ = triangle.singular_values();
             if let Some(x) = triangle.solve([1.0; 3]) {
                 let odd = |x: f32| !x.is_finite() || x.abs() > 1e15 || x.abs() < 1e-15;
                 prop_assert!(!x[0].is_nan() || m.iter().flatten().any(|x| odd(*x)));
@@ -301,7 +301,7 @@ mod tests {
             let x = (i as f32 * 0.37).sin();
             triangle.push([x, x + 1e-5 * (i as f32 * 1.7).cos()]);
         }
-        let ([small, _], [v, _]) = triangle.singular();
+        let ([small, _], [v, _]) = triangle.singular_values();
         // The expected value is |noise| / √2, where |noise| is the root of the sum of a hundred points of 1/2.
         assert!((small / (1e-5 * 7.07 / 1.414) - 1.0).abs() < 0.1, "{small}");
         assert!((v[0] + v[1]).abs() < 1e-4);

@@ -51,13 +51,13 @@ impl Curve<f64> {
 impl<T: Real> Curve<T> {
     /// Returns r(θ) and r'(θ).
     #[inline(always)]
-    pub(super) fn forward(&self, theta: T) -> (T, T) {
+    pub(super) fn radius_and_slope(&self, theta: T) -> (T, T) {
         match self {
             Self::KannalaBrandt(k) => kannala_brandt(k, theta),
             #[cfg(feature = "kalibr")]
-            Self::DoubleSphere(k) => double_sphere::forward(k, theta),
+            Self::DoubleSphere(k) => double_sphere::radius_and_slope(k, theta),
             #[cfg(feature = "kalibr")]
-            Self::Eucm(k) => eucm::forward(k, theta),
+            Self::Eucm(k) => eucm::radius_and_slope(k, theta),
         }
     }
 

@@ -6,7 +6,7 @@
 use crate::base::real::Real;
 
 /// Returns r(θ) and r'(θ).
-pub(super) fn forward<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
+pub(super) fn radius_and_slope<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
     let [alpha, beta] = *k;
     let one = T::one();
     let (sin, cos) = theta.sin_cos();

@@ -154,8 +154,8 @@ impl<T: Real> Camera<T> {
 
     /// Returns the camera for a rectangle of this camera's pictures, or for smaller copies.
     #[cfg(feature = "horace")]
-    pub(crate) fn through(&self, crop: &Crop) -> Self {
-        let ([sx, sy], centre) = (crop.scale::<T>(), crop.of_picture(self.principal_point()));
+    pub(crate) fn for_crop(&self, crop: &Crop) -> Self {
+        let ([sx, sy], centre) = (crop.scale::<T>(), crop.from_picture(self.principal_point()));
         Self {
             width: crop.width,
             height: crop.height,
@@ -166,7 +166,7 @@ impl<T: Real> Camera<T> {
             cx: centre.u,
             cy: centre.v,
             row_s: self.row_s * sy,
-            middle_row: crop.of_picture(ImagePoint { u: T::ZERO, v: self.middle_row }).v,
+            middle_row: crop.from_picture(ImagePoint { u: T::ZERO, v: self.middle_row }).v,
             ..self.clone()
         }
     }
@@ -200,7 +200,7 @@ impl<T: Real> Camera<T> {
     /// Returns the ray of an image point with its derivative; `None` beyond the image circle.
     #[inline]
     pub fn ray(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
-        let ray = self.ray_at_its_row(p)?;
+        let ray = self.ray_in_row_frame(p)?;
         Some(match &self.turning {
             None => ray,
             Some(turning) => turning.to_frame_time(&ray, p.v),
@@ -209,7 +209,7 @@ impl<T: Real> Camera<T> {
 
     /// Does the same as [`Self::ray`], in the camera frame at the time when the point's row is exposed.
     #[inline(always)]
-    fn ray_at_its_row(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
+    fn ray_in_row_frame(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
         let x = (p.u - self.cx) * self.inv_fx;
         let y = (p.v - self.cy) * self.inv_fy;
         let rho2 = x * x + y * y;
@@ -272,7 +272,7 @@ impl<T: Real> Camera<T> {
 
     /// Converts an image point to its offset from the principal point, in focal lengths.
     #[cfg(feature = "horace")]
-    pub(crate) fn in_focal_lengths(&self, p: ImagePoint<T>) -> [T; 2] {
+    pub(crate) fn to_focal_lengths(&self, p: ImagePoint<T>) -> [T; 2] {
         [(p.u - self.cx) * self.inv_fx, (p.v - self.cy) * self.inv_fy]
     }
 
@@ -280,14 +280,14 @@ impl<T: Real> Camera<T> {
     /// beyond the picture and the image circle. Beyond its largest radius, a radial lens is continued along the tangent
     /// of its curve, up to 180° off axis. All other lenses count as a pinhole. `None` when the direction is not finite.
     #[cfg(feature = "horace")]
-    pub(crate) fn continued(&self, [x, y]: [T; 2]) -> Option<UnitVec3<Cam, T>> {
+    pub(crate) fn unproject_extrapolated(&self, [x, y]: [T; 2]) -> Option<UnitVec3<Cam, T>> {
         let rho2 = x * x + y * y;
         let Lens::Radial(lens) = &self.lens else { return UnitVec3::try_new([x, y, T::one()]) };
         if rho2 <= self.rho_max * self.rho_max {
             return Some(UnitVec3::assume_unit(lens.ray(x, y, rho2).0));
         }
         let rho = rho2.sqrt();
-        let (s, c) = lens.beyond(rho).sin_cos();
+        let (s, c) = lens.extrapolate_theta(rho).sin_cos();
         UnitVec3::try_new([x / rho * s, y / rho * s, c])
     }
 
@@ -299,14 +299,14 @@ impl<T: Real> Camera<T> {
     /// Returns the image point of a direction; `None` beyond the image circle. The point may lie outside the picture.
     pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
         match &self.turning {
-            None => self.project_at_its_row(d.v()),
+            None => self.project_in_row_frame(d.v()),
             Some(turning) => turning.project(self, d.v()),
         }
     }
 
     /// Does the same as [`Self::project`], for a direction in the camera frame at the time when the point's row is
     /// exposed.
-    fn project_at_its_row(&self, s: &V3<T>) -> Option<ImagePoint<T>> {
+    fn project_in_row_frame(&self, s: &V3<T>) -> Option<ImagePoint<T>> {
         let h = (s.x * s.x + s.y * s.y).sqrt();
         let theta = h.atan2(s.z);
         if !(theta <= self.theta_max) {

@@ -45,7 +45,7 @@ pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
     const STEPS: i32 = 1800;
     let at = |i: i32| core::f64::consts::PI * f64::from(i) / f64::from(STEPS);
     let grows = |theta: f64| {
-        let (r, slope) = curve.forward(theta);
+        let (r, slope) = curve.radius_and_slope(theta);
         slope > 0.0 && r >= 0.0
     };
     let (mut low, mut high) = (1..=STEPS).find(|&i| !grows(at(i))).map(|i| (at(i - 1), at(i)))?;
@@ -61,7 +61,7 @@ pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
 fn invert<T: Real>(curve: &Curve<T>, rho: T, theta_max: T, r_max: T) -> T {
     let mut theta = rho * theta_max / r_max;
     for _ in 0..8 {
-        let (r, d) = curve.forward(theta);
+        let (r, d) = curve.radius_and_slope(theta);
         let step = (r - rho) / d;
         theta = (theta - step).max(T::zero()).min(theta_max);
         if step.abs() <= T::EPSILON * theta {
@@ -79,8 +79,8 @@ impl<T: Real> Radial<T> {
         let margin = 2f64.to_radians();
         let usable = limit - margin;
         // `corner` is the angle of the corner, if the lens reaches it before the end of monotony.
-        let corner = (curve.forward(usable).0 >= rho_corner)
-            .then(|| invert(&curve, rho_corner, usable, curve.forward(usable).0));
+        let corner = (curve.radius_and_slope(usable).0 >= rho_corner)
+            .then(|| invert(&curve, rho_corner, usable, curve.radius_and_slope(usable).0));
         let theta_max = match (config.theta_max_deg.map(f64::to_radians), corner) {
             (Some(circle), Some(corner)) => circle.min(corner),
             (None, Some(corner)) => corner,
@@ -98,7 +98,7 @@ impl<T: Real> Radial<T> {
                 });
             }
         };
-        let r_max = curve.forward(theta_max).0;
+        let r_max = curve.radius_and_slope(theta_max).0;
         let (tt, rt) = (T::from_f64(theta_max), T::from_f64(r_max));
         let inverse = Self::series(&curve, theta_max, r_max);
         Ok((Self { curve: curve.cast(), theta_max: tt, r_max: rt, inverse }, r_max, theta_max))
@@ -108,12 +108,12 @@ impl<T: Real> Radial<T> {
     fn series(curve: &Curve<f64>, theta_max: f64, r_max: f64) -> Inverse<T> {
         let values = |rho: f64| -> [f64; 3] {
             if rho == 0.0 {
-                let slope = 1.0 / curve.forward(0.0).1;
+                let slope = 1.0 / curve.radius_and_slope(0.0).1;
                 return [slope, 1.0, slope];
             }
             let theta = invert(curve, rho, theta_max, r_max);
             let (sin, cos) = libm::sincos(theta);
-            [sin / rho, cos, 1.0 / curve.forward(theta).1]
+            [sin / rho, cos, 1.0 / curve.radius_and_slope(theta).1]
         };
         let rho_of = |t: f64| libm::sqrt(0.5 * (t + 1.0)) * r_max;
         let mut terms = [[0.0f64; 3]; TERMS];
@@ -206,7 +206,7 @@ impl<T: Real> Radial<T> {
         let rho = rho2.sqrt();
         let theta = invert(&self.curve, rho, self.theta_max, self.r_max);
         let (sin, cos) = theta.sin_cos();
-        let dtheta = T::one() / self.curve.forward(theta).1;
+        let dtheta = T::one() / self.curve.radius_and_slope(theta).1;
         // At the centre, sin θ/ρ equals dθ/dρ.
         let s = if rho > T::from_f64(1e-12) { sin / rho } else { dtheta };
         radial_ray(x, y, s, cos, dtheta)
@@ -214,8 +214,8 @@ impl<T: Real> Radial<T> {
 
     /// Returns θ beyond the largest radius, along the tangent of the curve there, up to π.
     #[cfg(feature = "horace")]
-    pub(super) fn beyond(&self, rho: T) -> T {
-        let (r, d) = self.curve.forward(self.theta_max);
+    pub(super) fn extrapolate_theta(&self, rho: T) -> T {
+        let (r, d) = self.curve.radius_and_slope(self.theta_max);
         (self.theta_max + (rho - r) / d).min(T::from_f64(core::f64::consts::PI))
     }
 
@@ -226,7 +226,7 @@ impl<T: Real> Radial<T> {
 
     /// Returns r(θ) in units of the focal length.
     pub(super) fn radius(&self, theta: T) -> T {
-        self.curve.forward(theta).0
+        self.curve.radius_and_slope(theta).0
     }
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Turning<T> {
 
 /// Number of iterations that find the row of a direction. Each reduces the error, about 50 px at first, to a twentieth
 /// or less.
-const LOOKS: usize = 4;
+const ROW_ITERATIONS: usize = 4;
 
 impl<T: Real> Camera<T> {
     /// Returns this camera with a rate of rotation. With a rolling shutter, rays and projected directions then refer to
@@ -45,11 +45,11 @@ impl<T: Real> Turning<T> {
     #[inline(never)]
     pub(super) fn to_frame_time(self, ray: &Ray<T>, v: T) -> Ray<T> {
         let angle = self.per_row * (v - self.middle);
-        let s = turned(&ray.s, &angle);
+        let s = rotate(&ray.s, &angle);
         // The derivative is converted from the tangent basis at the one ray to that at the other. The turn itself adds
         // a derivative by the row.
         let [[a, b], [c, d]] = [tangent(&ray.s), tangent(&s)];
-        let (a, b) = (turned(&a, &angle), turned(&b, &angle));
+        let (a, b) = (rotate(&a, &angle), rotate(&b, &angle));
         let by_row = self.per_row.cross(&s);
         let [au, av, bu, bv] = ray.m;
         let (du, dv) = (a * au + b * bu, a * av + b * bv + by_row);
@@ -59,16 +59,16 @@ impl<T: Real> Turning<T> {
     /// Returns the image point of a direction in the camera frame at the picture's time, at the row that sees the
     /// direction.
     pub(super) fn project(&self, camera: &Camera<T>, s: &V3<T>) -> Option<ImagePoint<T>> {
-        let mut p = camera.project_at_its_row(s)?;
-        for _ in 0..LOOKS {
-            p = camera.project_at_its_row(&turned(s, &(self.per_row * (self.middle - p.v))))?;
+        let mut p = camera.project_in_row_frame(s)?;
+        for _ in 0..ROW_ITERATIONS {
+            p = camera.project_in_row_frame(&rotate(s, &(self.per_row * (self.middle - p.v))))?;
         }
         Some(p)
     }
 }
 
 /// Turns `s` by the rotation vector `angle`, with tan(φ/2) to third order: the error is below 1e-6 rad up to 15°.
-fn turned<T: Real>(s: &V3<T>, angle: &V3<T>) -> V3<T> {
+fn rotate<T: Real>(s: &V3<T>, angle: &V3<T>) -> V3<T> {
     let square = angle.dot(angle);
     let half = angle * (T::from_f64(0.5) + square * T::from_f64(1.0 / 24.0));
     let first = half.cross(s);

@@ -107,13 +107,13 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
 
 impl<T: Real> Camera<T> {
     /// Returns the 1-sigma modes of the intrinsic parameters; `None` for a lens that is known exactly.
-    pub(crate) fn uncertain(&self) -> Option<&[[T; INTRINSICS]]> {
+    pub(crate) fn intrinsic_modes(&self) -> Option<&[[T; INTRINSICS]]> {
         (!self.modes.is_empty()).then_some(&self.modes)
     }
 
     /// Returns the motion of the image point of the ray `s` (camera frame), in pixels (u, v), when each parameter grows
     /// by 1 in the relative units.
-    pub(crate) fn moves(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
+    pub(crate) fn shift_by_intrinsics(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
         let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
         let h2 = s.x * s.x + s.y * s.y;
         // These are the image point in focal lengths and its derivatives by the coefficients.

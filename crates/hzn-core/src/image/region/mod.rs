@@ -138,10 +138,10 @@ impl<T: Real> Region<T> {
 
     /// Returns the region in the coordinates of a rectangle of the picture or of a smaller copy.
     #[cfg(feature = "horace")]
-    pub(crate) fn through(&self, crop: &Crop) -> Self {
+    pub(crate) fn for_crop(&self, crop: &Crop) -> Self {
         let [sx, sy] = crop.scale::<T>();
         let place = |[u, v]: [T; 2]| {
-            let p = crop.of_picture(ImagePoint { u, v });
+            let p = crop.from_picture(ImagePoint { u, v });
             [p.u, p.v]
         };
         let mut polygons = heapless::Vec::new();

@@ -31,7 +31,7 @@ pub struct Expected<T> {
     /// free.
     pub(crate) sigma_cos: T,
     /// Contributions to `sigma_cos` as 1-sigmas of the limb height: limb, altitude, unknown radius, clipping; metres.
-    pub(crate) sigma_parts: [T; 4],
+    pub(crate) limb_sigma_parts_m: [T; 4],
     /// Height that clipping adds to a limb that is clipped everywhere, and its 1-sigma; metres.
     pub(crate) clipped_m: [T; 2],
     /// The limb cone of the ellipsoid (ECEF), when the position is known.
@@ -43,7 +43,7 @@ pub struct Expected<T> {
     pub(crate) harmonics_cos: [T; 2],
     /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct, because the azimuth of north
     /// or the position is unknown.
-    pub(crate) uneven_cos: [T; 2],
+    pub(crate) unknown_harmonics_cos: [T; 2],
     /// Threshold that the previous picture proposes, counts.
     pub(crate) level: Option<u16>,
     /// Direction to the Sun in the camera frame, if only the sunlit limb of the body counts as limb.
@@ -70,29 +70,29 @@ pub struct Expected<T> {
 }
 
 /// Refuses impossible numbers of a prior, and returns the 1-sigma of its attitude in radians.
-fn check<T: Real>(frame: &Prior<T>) -> Result<T, PriorError> {
-    if frame.altitude_m.is_some_and(|h| !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite())) {
+fn check<T: Real>(prior: &Prior<T>) -> Result<T, PriorError> {
+    if prior.altitude_m.is_some_and(|h| !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite())) {
         return Err(PriorError::Altitude);
     }
-    if frame.position_m.is_some_and(|p| !p.iter().all(|x| x.is_finite())) {
+    if prior.position_m.is_some_and(|p| !p.iter().all(|x| x.is_finite())) {
         return Err(PriorError::Position);
     }
-    let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(T::from_f64(ATTITUDE_SIGMA_RAD));
+    let attitude_sigma = prior.attitude_sigma_rad.unwrap_or(T::from_f64(ATTITUDE_SIGMA_RAD));
     if !(attitude_sigma >= T::zero() && attitude_sigma.is_finite()) {
         return Err(PriorError::AttitudeSigma);
     }
-    if frame.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::from_f64(MAX_RATE_RAD_S))) {
+    if prior.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::from_f64(MAX_RATE_RAD_S))) {
         return Err(PriorError::Rate);
     }
     Ok(attitude_sigma)
 }
 
-fn below<T: Real>(altitude: T, limb: T) -> PriorError {
+fn below_limb_error<T: Real>(altitude: T, limb: T) -> PriorError {
     PriorError::BelowLimb { altitude_m: rounded_m(altitude), limb_m: rounded_m(limb) }
 }
 
 /// The body as it appears from the position of the camera; lengths in metres.
-struct Seen<T> {
+struct ApparentBody<T> {
     /// Radius of the sphere with this half-angle at this altitude.
     radius: T,
     altitude: T,
@@ -107,11 +107,11 @@ struct Seen<T> {
     unknown_second_m: T,
 }
 
-impl<T: Real> Seen<T> {
-    fn new(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
-        match (body.kind, frame.position_m) {
+impl<T: Real> ApparentBody<T> {
+    fn new(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
+        match (body.kind, prior.position_m) {
             (Kind::Earth, Some(p)) => Self::ellipsoid(body, p),
-            _ => Self::sphere(body, frame),
+            _ => Self::sphere(body, prior),
         }
     }
 
@@ -137,7 +137,7 @@ impl<T: Real> Seen<T> {
             cone = raised(limb);
         }
         if !(h > limb) {
-            return Err(below(h, limb));
+            return Err(below_limb_error(h, limb));
         }
         let cone = cone?;
         let (sin, _) = cone.mean_half_angle_rad().sin_cos();
@@ -154,12 +154,12 @@ impl<T: Real> Seen<T> {
     }
 
     /// Describes a sphere, as seen from a position or an altitude.
-    fn sphere(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
+    fn sphere(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let limb = T::from_f64(body.limb_height_km) * km;
-        let given = frame.altitude_m.or(body.altitude_km.map(|h| T::from_f64(h) * km));
+        let given = prior.altitude_m.or(body.altitude_km.map(|h| T::from_f64(h) * km));
         let r = T::from_f64(body.mean_radius_km()) * km;
-        let altitude = match (frame.position_m, given, body.kind) {
+        let altitude = match (prior.position_m, given, body.kind) {
             (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
                 let h = (x * x + y * y + z * z).sqrt() - r;
                 if !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite()) {
@@ -188,8 +188,8 @@ impl<T: Real> Seen<T> {
     }
 
     /// Returns the limb axis in ECEF that follows from the position; `None` without a position.
-    fn axis_ecef(&self, body: &Config, frame: &Prior<T>) -> Option<UnitVec3<Ecef, T>> {
-        match (&self.ellipsoid, frame.position_m, body.kind) {
+    fn axis_ecef(&self, body: &Config, prior: &Prior<T>) -> Option<UnitVec3<Ecef, T>> {
+        match (&self.ellipsoid, prior.position_m, body.kind) {
             (Some(cone), ..) => Some(cone.axis),
             (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
             _ => None,
@@ -211,15 +211,15 @@ impl<T: Real> Expected<T> {
     }
 
     /// Computes the expected cone: sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
-    pub(crate) fn new(body: &Config, frame: &Prior<T>) -> Result<Self, PriorError> {
-        let attitude_sigma = check(frame)?;
+    pub(crate) fn new(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
+        let attitude_sigma = check(prior)?;
         let km = T::from_f64(1000.0);
         let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
-        let seen = Seen::new(body, frame)?;
-        let Seen { sin, limb, .. } = seen;
+        let seen = ApparentBody::new(body, prior)?;
+        let ApparentBody { sin, limb, .. } = seen;
         let cos2 = T::one() - sin * sin;
         if !(sin > T::zero() && cos2 > T::EPSILON) {
-            return Err(below(seen.altitude, limb));
+            return Err(below_limb_error(seen.altitude, limb));
         }
         let cos = cos2.sqrt();
         let free = body.half_angle_is_free();
@@ -227,7 +227,7 @@ impl<T: Real> Expected<T> {
         // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
         let tan = sin / cos;
         let scale = tan / (seen.radius + seen.altitude);
-        let known = frame.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
+        let known = prior.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
         // A higher limb makes the cone wider. The shape of the ellipsoid adds half the difference between the cosines
         // of its two half-angles.
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);
@@ -240,27 +240,27 @@ impl<T: Real> Expected<T> {
             Some(_) => amplitude.abs() * (attitude_sigma * T::from_f64(k)).min(T::one()),
             None => amplitude.abs(),
         };
-        let uneven_cos =
+        let unknown_harmonics_cos =
             [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m];
-        let sigma_parts = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
-        let variance = sigma_parts.iter().fold(T::zero(), |sum, s| sum + *s * *s);
-        let axis_ecef = seen.axis_ecef(body, frame);
+        let limb_sigma_parts_m = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
+        let variance = limb_sigma_parts_m.iter().fold(T::zero(), |sum, s| sum + *s * *s);
+        let axis_ecef = seen.axis_ecef(body, prior);
         Ok(Self {
             cos,
             sin,
             sigma_cos: scale * variance.sqrt(),
-            sigma_parts,
+            limb_sigma_parts_m,
             clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::from_f64(h) * km),
             ellipsoid: seen.ellipsoid,
             cam_to_ecef: known,
             harmonics_cos,
-            uneven_cos,
-            level: frame.level,
-            sun: frame.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
-            sun_seen: frame.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
-            predicted: frame.cam_to_ecef.zip(axis_ecef).map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
-            last: frame.last,
-            rate_rad_s: frame.rate_rad_s,
+            unknown_harmonics_cos,
+            level: prior.level,
+            sun: prior.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
+            sun_seen: prior.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
+            predicted: prior.cam_to_ecef.zip(axis_ecef).map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
+            last: prior.last,
+            rate_rad_s: prior.rate_rad_s,
             radius_m: seen.radius,
             limb_m: limb,
             limb_sigma_m: (limb_sigma * limb_sigma + seen.unknown_m * seen.unknown_m).sqrt(),
@@ -273,7 +273,7 @@ impl<T: Real> Expected<T> {
     /// Returns the 1-sigma of the half-angle from the limb height alone, radians: its sigma over the distance to the
     /// limb, (R + d)/tan α.
     pub(crate) fn limb_sigma_rad(&self) -> T {
-        self.sigma_parts[0] * self.sin / (self.cos.max(T::from_f64(1e-6)) * (self.radius_m + self.limb_m))
+        self.limb_sigma_parts_m[0] * self.sin / (self.cos.max(T::from_f64(1e-6)) * (self.radius_m + self.limb_m))
     }
 
     /// Returns the expected cone for a limb of which the fraction `part`, 0 to 1, is clipped at full scale.
@@ -293,18 +293,18 @@ impl<T: Real> Expected<T> {
         let cos = (T::one() - sin * sin).sqrt();
         // ∂cos/∂d = −tan/(R + H), as in `new`.
         let scale = sin / (cos * distance);
-        let [limb, altitude, radius, _] = self.sigma_parts;
-        let sigma_parts = [limb, altitude, radius, sigma];
+        let [limb, altitude, radius, _] = self.limb_sigma_parts_m;
+        let limb_sigma_parts_m = [limb, altitude, radius, sigma];
         let one = T::one();
         let apart = self.clipped_m[0] * (part * (one - part)).max(T::zero()).sqrt();
         let root = |parts: &[T]| parts.iter().fold(T::zero(), |sum, s| sum + *s * *s).sqrt();
-        let [first, second] = self.uneven_cos;
+        let [first, second] = self.unknown_harmonics_cos;
         Self {
             cos,
             sin,
-            sigma_cos: scale * root(&sigma_parts),
-            sigma_parts,
-            uneven_cos: [
+            sigma_cos: scale * root(&limb_sigma_parts_m),
+            limb_sigma_parts_m,
+            unknown_harmonics_cos: [
                 root(&[first, scale * apart, scale * sigma * T::from_f64(core::f64::consts::FRAC_1_SQRT_2)]),
                 second,
             ],
@@ -392,7 +392,7 @@ mod tests {
             let same = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-5;
             assert!(same(clipped.cos, higher.cos) && same(clipped.sin, higher.sin), "{part}");
             assert!(same(clipped.sigma_cos, higher.sigma_cos) && same(clipped.limb_m, higher.limb_m), "{part}");
-            assert_eq!(clipped.uneven_cos[0] > 0.0, part > 0.0);
+            assert_eq!(clipped.unknown_harmonics_cos[0] > 0.0, part > 0.0);
         }
         // No apparent size of the Moon is expected, so clipping changes nothing.
         let moon = at(0.0, 0.0, Kind::Moon);
@@ -409,15 +409,15 @@ mod tests {
         };
         let sigma = |deg: f64| {
             let frame = Prior { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
-            Expected::<f64>::new(&body, &frame).unwrap().uneven_cos[1]
+            Expected::<f64>::new(&body, &frame).unwrap().unknown_harmonics_cos[1]
         };
-        let [_, none] = Expected::new(&body, &Prior { cam_to_ecef: None, ..frame }).unwrap().uneven_cos;
+        let [_, none] = Expected::new(&body, &Prior { cam_to_ecef: None, ..frame }).unwrap().unknown_harmonics_cos;
         assert!(none > 1e-5);
         assert_eq!(sigma(0.0), 0.0);
         assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);
         // From 30 degrees on, the attitude is no better than none and does not correct the shape.
         assert_eq!(sigma(40.0), none);
-        assert_eq!(Expected::new(&body, &frame).unwrap().uneven_cos[1], sigma(5.0));
+        assert_eq!(Expected::new(&body, &frame).unwrap().unknown_harmonics_cos[1], sigma(5.0));
         for deg in [f64::NAN, -1.0, f64::INFINITY] {
             let frame = Prior { attitude_sigma_rad: Some(deg), ..frame };
             assert_eq!(Expected::new(&body, &frame).unwrap_err(), PriorError::AttitudeSigma);

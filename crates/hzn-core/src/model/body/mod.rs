@@ -28,7 +28,7 @@ pub const LOWEST_ALTITUDE_M: f64 = -1000.0;
 /// Maximum number of rows of a limb height by latitude.
 pub const MAX_LATITUDES: usize = 16;
 /// Number of points on one half of the limb at which a height by latitude is evaluated.
-const PLACES: usize = 8;
+const LIMB_SAMPLES: usize = 8;
 
 choices! {
     /// The kind of body.
@@ -178,8 +178,8 @@ impl Config {
         let (one, cos) = (T::one(), (T::one() - sin * sin).max(T::zero()).sqrt());
         let (here, across) = latitude_rad.sin_cos();
         let mut sums = [T::zero(); 3];
-        for k in 0..PLACES {
-            let azimuth = T::from_f64((k as f64 + 0.5) * core::f64::consts::PI / PLACES as f64);
+        for k in 0..LIMB_SAMPLES {
+            let azimuth = T::from_f64((k as f64 + 0.5) * core::f64::consts::PI / LIMB_SAMPLES as f64);
             let (_, c) = azimuth.sin_cos();
             let s = here * sin + across * cos * c;
             let latitude = s.atan2((one - s * s).max(T::zero()).sqrt());
@@ -190,7 +190,7 @@ impl Config {
                 sums[2] + height * (c * c * T::from_f64(4.0) - T::from_f64(2.0)),
             ];
         }
-        sums.map(|s| s / T::from_f64(PLACES as f64))
+        sums.map(|s| s / T::from_f64(LIMB_SAMPLES as f64))
     }
 
     /// Returns whether the half-angle is always free. This holds for Sun and Moon: they bloom or show phases, so their

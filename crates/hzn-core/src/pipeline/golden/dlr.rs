@@ -94,7 +94,8 @@ fn covariances<T: Real>(tolerance: f64) {
                 };
                 blocks[(i + 1) / LANES].step_px[(i + 1) % LANES] = T::from_f64(step);
             }
-            let got = braun_barf::of(&blocks, e.v(), T::from_f64(length)).unwrap() * T::from_f64(num(&case["R_px2"]));
+            let got =
+                braun_barf::covariance(&blocks, e.v(), T::from_f64(length)).unwrap() * T::from_f64(num(&case["R_px2"]));
             let want = rows(&case[form]["P_c"]);
             let scale = want.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
             for i in 0..3 {
@@ -103,13 +104,13 @@ fn covariances<T: Real>(tolerance: f64) {
                     assert!(off < tolerance, "{} {form} [{i}][{j}]: {off:e}", case["id"]);
                 }
             }
-            let [bound, zero, same] = braun_barf::across(&got, e.v(), true);
+            let [bound, zero, same] = braun_barf::project(&got, e.v(), true);
             if form == "eq33" {
                 assert!((bound.to_f64() / num(&case[form]["lambda_max"]) - 1.0).abs() < tolerance);
             }
             assert!(zero == T::ZERO && same == bound);
             // No variance across the axis is larger than the overbound.
-            let [a, b, d] = braun_barf::across(&got, e.v(), false);
+            let [a, b, d] = braun_barf::project(&got, e.v(), false);
             assert!(a > T::ZERO && a * d > b * b && a + d < (bound + bound) * T::from_f64(1.0001));
         }
     }
@@ -183,7 +184,7 @@ fn covariance_goes_through_the_lens() {
         let off = got * (c / got_c) - V3::from(e.xyz());
         measured += off * off.transpose() / f64::from(runs);
     }
-    let mut claimed = braun_barf::of(&blocks(&camera, &exact, &e), e.v(), 0.0).unwrap() * (sigma * sigma);
+    let mut claimed = braun_barf::covariance(&blocks(&camera, &exact, &e), e.v(), 0.0).unwrap() * (sigma * sigma);
     let ratio = measured.trace() / claimed.trace();
     assert!((0.8..1.25).contains(&ratio), "{ratio}");
     // The printed form corresponds to the same rays through a pinhole with this focal length.
@@ -195,7 +196,7 @@ fn covariance_goes_through_the_lens() {
             flat.project(&ray).map(|p| (p.u, p.v)).unwrap()
         })
         .collect();
-    claimed = braun_barf::of(&blocks(&flat, &printed, &e), e.v(), 0.0).unwrap() * (sigma * sigma);
+    claimed = braun_barf::covariance(&blocks(&flat, &printed, &e), e.v(), 0.0).unwrap() * (sigma * sigma);
     let ratio = measured.trace() / claimed.trace();
     assert!(!(0.8..1.25).contains(&ratio), "the printed form must not hold: {ratio}");
 }
@@ -221,14 +222,14 @@ fn covariance_is_honest_and_the_overbound_is_not() {
         }
         let blocks = blocks(&camera, &points, &e);
         let (got, _) = direct::fit(&blocks).unwrap();
-        let p = braun_barf::of(&blocks, &got, 300.0).unwrap();
+        let p = braun_barf::covariance(&blocks, &got, 300.0).unwrap();
         let (b1, b2) = basis(&got);
         let off = V3::from(e.xyz()) - got;
         let (x, y) = (off.dot(&b1), off.dot(&b2));
         squares += x * x + y * y;
-        let [a, b, d] = invert_spd2(braun_barf::across(&p, &got, false)).unwrap();
+        let [a, b, d] = invert_spd2(braun_barf::project(&p, &got, false)).unwrap();
         nees += a * x * x + 2.0 * b * x * y + d * y * y;
-        bounded += (x * x + y * y) / braun_barf::across(&p, &got, true)[0];
+        bounded += (x * x + y * y) / braun_barf::project(&p, &got, true)[0];
     }
     let n = f64::from(runs);
     let (rms_deg, nees, bounded) = (libm::sqrt(squares / n).to_degrees(), nees / n, bounded / n);
@@ -356,7 +357,7 @@ fn degenerate_points_give_no_cone() {
         if points.len() < 5 {
             assert!(conic::fit(&blocks).is_none());
         }
-        assert!(braun_barf::of(&blocks, e.v(), 300.0).is_none_or(|p| p.iter().all(|v| v.is_finite())));
+        assert!(braun_barf::covariance(&blocks, e.v(), 300.0).is_none_or(|p| p.iter().all(|v| v.is_finite())));
     }
 }
 
@@ -377,12 +378,12 @@ fn ransac_leaves_outliers_out() {
     let body = crate::model::body::Config { altitude_km: Some(120.0), ..Default::default() };
     let expected = crate::model::body::Expected::new(&body, &crate::model::body::Prior::default()).unwrap();
     let config = consensus::Config { method: consensus::Method::Ransac, threshold_px: 1.0, ..Default::default() };
-    let found = consensus::keep(
+    let found = consensus::find(
         &mut blocks,
         points.len() as u32,
         &expected,
         888.97,
-        consensus::Threshold::told(&config),
+        consensus::Threshold::from_config(&config),
         &config,
         &mut WorkBudget::unlimited(),
     )
@@ -396,12 +397,12 @@ fn ransac_leaves_outliers_out() {
     }
     let (got, got_c) = direct::fit(&blocks).unwrap();
     assert!(UnitVec3::<Cam, f64>::assume_unit(got).angle_rad(&e).to_degrees() < 0.2 && (got_c - c).abs() < 0.01);
-    let few = consensus::keep(
+    let few = consensus::find(
         &mut blocks[..1],
         2,
         &expected,
         888.97,
-        consensus::Threshold::told(&config),
+        consensus::Threshold::from_config(&config),
         &config,
         &mut WorkBudget::unlimited(),
     );
@@ -414,5 +415,5 @@ fn overbound_is_the_largest_eigenvalue() {
     let p = M3::new(2.0, 0.3, 0.1, 0.3, 1.0, -0.2, 0.1, -0.2, 0.5);
     let e = unit(&V3::new(0.0, 0.6, 0.8)).unwrap();
     let ([_, _, largest], _) = symmetric_eigen::<f64, 3>(core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)])));
-    assert_eq!(braun_barf::across(&p, &e, true), [largest, 0.0, largest]);
+    assert_eq!(braun_barf::project(&p, &e, true), [largest, 0.0, largest]);
 }

@@ -47,18 +47,18 @@ fn fitted(
     let mut blocks = blocks(&camera, &points, &e);
     let config = consensus::Config { threshold_px: 30.0, ..consensus::Config::default() };
     let (fx, _) = camera.focal_px();
-    let start = consensus::keep(
+    let start = consensus::find(
         &mut blocks,
         points.len() as u32,
         &expected,
         fx,
-        consensus::Threshold::told(&config),
+        consensus::Threshold::from_config(&config),
         &config,
         &mut WorkBudget::unlimited(),
     )
     .unwrap();
     let estimate = fit::Config { half_angle: HalfAngle::Free, ..Default::default() };
-    let noise = covariance::Config::told(0.1, 60.0);
+    let noise = covariance::Config::given(0.1, 60.0);
     let fit = fit::fit(&mut blocks, &start, &expected, &camera, 30.0, &estimate, &noise).unwrap();
     let mut budget = ErrorBudget::new();
     covariance::fuse(&blocks, &fit, &expected, &noise, &estimate, &camera, Some(&mut budget)).unwrap();
@@ -75,7 +75,7 @@ fn difference(right: &CameraConfig, used: &CameraConfig, half_angle_deg: f64, to
     let (b1, b2) = basis(&e1);
     let off = e1 - e0;
     let shift = V3::new(off.dot(&b1), off.dot(&b2), c1 - c0);
-    let p = budget.of_fit(Term::Lens);
+    let p = budget.fit_term(Term::Lens);
     (shift * shift.transpose() - p).norm() / p.norm()
 }
 
@@ -139,7 +139,7 @@ fn a_full_covariance_beats_the_scalars_and_says_the_same_where_it_is_the_same() 
         ..right.clone()
     };
     let [a, b] =
-        [scalar, full.clone()].map(|used| *fitted(&right, &used, half_angle_deg, towards).2.of_fit(Term::Lens));
+        [scalar, full.clone()].map(|used| *fitted(&right, &used, half_angle_deg, towards).2.fit_term(Term::Lens));
     assert!((a - b).norm() < 1e-9 * a.norm(), "{a} {b}");
 
     let refused = |change: &dyn Fn(&mut Covariance)| {
@@ -179,15 +179,15 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
         let (fx, _) = camera.focal_px();
         let estimate = fit::Config::default();
         let mut told = None;
-        for noise in [Noise::Told, Noise::Rms] {
+        for noise in [Noise::Given, Noise::Rms] {
             let mut blocks = blocks(&camera, &points, &e);
             let mut work = WorkBudget::unlimited();
-            let start = consensus::keep(
+            let start = consensus::find(
                 &mut blocks,
                 points.len() as u32,
                 &expected,
                 fx,
-                consensus::Threshold::told(&config),
+                consensus::Threshold::from_config(&config),
                 &config,
                 &mut work,
             )

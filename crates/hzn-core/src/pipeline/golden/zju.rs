@@ -72,7 +72,7 @@ fn singular_vectors_solve_the_generic_cases() {
             let a = list(a);
             triangle.push([a[0], a[1], a[2], a[3], y]);
         }
-        let (values, [v, ..]) = triangle.singular();
+        let (values, [v, ..]) = triangle.singular_values();
         for (got, expected) in [v[0], v[1], v[2], v[3]].map(|v_k| -v_k / v[4]).into_iter().zip([x1, x2, x3, x4]) {
             assert!((got - expected).abs() < 1e-9 * expected.abs().max(1.0), "{}: {got} {expected}", case["id"]);
         }
@@ -98,8 +98,8 @@ fn printed_equation_18_is_no_cone() {
         let (xz, yz) = (sin * z * z * x, sin * z * z * y);
         printed.push([x * x, x * y, y * y, xz, yz, 1.0]);
     }
-    let (right, _) = right.singular();
-    let (printed, _) = printed.singular();
+    let (right, _) = right.singular_values();
+    let (printed, _) = printed.singular_values();
     assert!(right[0] < 1e-9, "{right:?}");
     assert!(printed[0] > 0.1, "{printed:?}");
 }
@@ -165,7 +165,7 @@ fn elliptic_cones_are_told_honestly() {
                     .collect();
                 let mut blocks = blocks(&camera, &points, &e);
                 let got = fit(&mut blocks, method, 0.0).unwrap();
-                let noise = covariance::Config::told(sigma_px, length_px);
+                let noise = covariance::Config::given(sigma_px, length_px);
                 let expected = expected();
                 let config = fit::Config { half_angle: HalfAngle::Free, ..fit::Config::default() };
                 let fused = covariance::fuse(&blocks, &got, &expected, &noise, &config, &camera, None).unwrap();
@@ -271,12 +271,12 @@ fn solved(config: &consensus::Config, outliers: f64, runs: u32) -> u32 {
     let solved = |seed: &u32| {
         let mut blocks = blocks(&camera, &scattered(&camera, &exact, outliers, 2 * *seed), &e);
         let config = consensus::Config { seed: *seed, ..*config };
-        let found = consensus::keep(
+        let found = consensus::find(
             &mut blocks,
             400,
             &expected(),
             92.0,
-            consensus::Threshold::told(&config),
+            consensus::Threshold::from_config(&config),
             &config,
             &mut WorkBudget::unlimited(),
         );
@@ -334,9 +334,9 @@ proptest::proptest! {
         for method in [consensus::Method::RansacPreverify, consensus::Method::Mlesac] {
             let mut blocks = blocks(&camera, &points, &direction([0.0, 0.0, 1.0]));
             let config = consensus::Config { method, max_draws: 300, ..consensus::Config::default() };
-            let (count, threshold) = (points.len() as u32, consensus::Threshold::told(&config));
+            let (count, threshold) = (points.len() as u32, consensus::Threshold::from_config(&config));
             let mut work = WorkBudget::unlimited();
-            let found = consensus::keep(&mut blocks, count, &expected(), 92.0, threshold, &config, &mut work);
+            let found = consensus::find(&mut blocks, count, &expected(), 92.0, threshold, &config, &mut work);
             if let Some(found) = found {
                 proptest::prop_assert!((found.e.dot(&found.e) - 1.0).abs() < 1e-4 && found.c.is_finite());
             }

@@ -22,7 +22,7 @@ mod runs;
 
 use core::fmt;
 
-use super::account;
+use super::budget;
 use super::search::Search;
 use super::sensor::Sensor;
 use super::workspace::Workspace;
@@ -179,7 +179,7 @@ impl<T: Real> Sensor<T> {
             return Err(RowStreamError::Bits);
         }
         let full_scale = ((1u32 << bits) - 1) as u16;
-        let levels = config.levels_of(expected.which);
+        let levels = config.threshold_of(expected.which);
         Ok(RowStream {
             sensor: self,
             expected,
@@ -228,7 +228,7 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
         observer: &O,
     ) -> Report<T> {
-        let mut report = Report::of_nothing();
+        let mut report = Report::empty();
         if self.rows == self.sensor.camera.height() {
             self.look(workspace, observer, &mut report);
         }
@@ -244,7 +244,7 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
     ) {
         observer.enter(Stage::Binarize);
         let config = &self.sensor.config;
-        let levels = config.levels_of(self.expected.which);
+        let levels = config.threshold_of(self.expected.which);
         let next = match self.samples.split::<T, O>(&config.gate, levels, None, observer) {
             Ok(found) => found.level,
             Err(status) => {
@@ -267,8 +267,8 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         let picture = Memory { runs: &self.runs, points: &self.points, width: region.width(), height: region.height() };
         let lists = workspace.lists();
         if picture.height > 1 {
-            let binary = BinaryPicture::new(&picture, &region, 1, observer).blooming(self.expected.blooms());
-            let work = account::open(&self.sensor.config, lists.border.len());
+            let binary = BinaryPicture::new(&picture, &region, 1, observer).with_blooming(self.expected.blooms());
+            let work = budget::new(&self.sensor.config, lists.border.len());
             let turning = self.sensor.turning(self.expected);
             let camera = turning.as_ref().unwrap_or(&self.sensor.camera);
             let mut judge = Search::new(self.sensor, camera, self.expected, &[], observer, lists.blocks, work, report);
@@ -288,11 +288,11 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
     /// Measures the edge points of a row. The rows around it must have arrived.
     fn measure(&mut self, y: u16, level: u16, region: &Region<T>) {
         let config = &self.sensor.config.candidates;
-        let binary = BinaryPicture::new(&self.window, region, level, &Unobserved).blooming(self.expected.blooms());
+        let binary = BinaryPicture::new(&self.window, region, level, &Unobserved).with_blooming(self.expected.blooms());
         self.runs.each_border(y, |x| {
             if region.contains(x, y)
                 && self.points.wants(x, y)
-                && let Some(found) = edge_points::pass(&binary, config, Pixel { x, y })
+                && let Some(found) = edge_points::locate_streamed_point(&binary, config, Pixel { x, y })
             {
                 self.points.push(x, StreamedPoint { cut: self.window.went_beyond(), ..found });
             }

@@ -5,7 +5,7 @@
 //! expectation-maximisation find the share γ of inliers. The hypothesis with the smallest −Σ ln(γ N(d; σ) + (1 − γ)/ν)
 //! wins. Every draw evaluates every point several times, with one exponential each.
 
-use super::sampled::{FEWEST, conclude, distances2, drawn, needed};
+use super::sampled::{FEWEST, conclude, distances2, draw_cone, required_draws};
 use super::{Config, Consensus, Threshold};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -20,7 +20,7 @@ const SIGMAS: f64 = 1.96;
 
 /// Finds the most likely cone; points beyond the threshold get weight 0. The result is `None` with fewer than three
 /// points, or if hardly any points are on a cone.
-pub(super) fn keep<T: Real>(
+pub(super) fn find<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
     focal_px: T,
@@ -39,11 +39,11 @@ pub(super) fn keep<T: Real>(
     let a_draw = DRAW + blocks.len() as u32 * LIKELIHOOD;
     while draws < enough.max(FEWEST).min(config.max_draws) && work.try_spend(a_draw) {
         draws += 1;
-        let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
+        let Some((e, c)) = draw_cone(blocks, count, &mut rng) else { continue };
         let (cost, share) = mixture.cost(blocks, &e, c);
         if best.is_none_or(|(_, _, least)| cost < least) && share * T::from_f64(f64::from(count)) > T::from_f64(3.5) {
             best = Some((e, c, cost));
-            enough = needed(share);
+            enough = required_draws(share);
         }
     }
     let cone = best.map(|(e, c, _)| (e, c));

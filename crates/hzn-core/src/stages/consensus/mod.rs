@@ -68,14 +68,14 @@ pub(crate) struct Threshold<T> {
     /// The largest distance, in pixels.
     pub(crate) px: T,
     /// Ratio of the largest distance to `threshold_px`, 1 or more. The largest RMS of the fit grows with it.
-    pub(crate) raised: T,
+    pub(crate) factor: T,
 }
 
 impl<T: Real> Threshold<T> {
     /// Uses `threshold_px` of the configuration as it is.
     #[cfg(test)]
-    pub(crate) fn told(config: &Config) -> Self {
-        Self { px: T::from_f64(config.threshold_px), raised: T::one() }
+    pub(crate) fn from_config(config: &Config) -> Self {
+        Self { px: T::from_f64(config.threshold_px), factor: T::one() }
     }
     /// Makes the threshold for the first `count` points of the blocks, which are rays in the order of the edge.
     ///
@@ -90,7 +90,7 @@ impl<T: Real> Threshold<T> {
         } else {
             told
         };
-        Self { px, raised: px / told }
+        Self { px, factor: px / told }
     }
 }
 
@@ -115,7 +115,7 @@ const FEWEST: u32 = 6;
 
 /// Finds the consensus. A point whose lit side is away from the consensus gets weight 0, because it belongs to another
 /// edge. The result is `None` if no cone goes through about a tenth of the points.
-pub(crate) fn keep<T: Real>(
+pub(crate) fn find<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
     expected: &Expected<T>,
@@ -132,11 +132,11 @@ pub(crate) fn keep<T: Real>(
             return Some(Consensus { e, c, draws: 1, all: true });
         }
         #[cfg(feature = "dlr")]
-        Method::Ransac => return ransac::keep(blocks, count, threshold, config, work),
+        Method::Ransac => return ransac::find(blocks, count, threshold, config, work),
         #[cfg(feature = "zju")]
-        Method::RansacPreverify => return preverified::keep(blocks, count, threshold, config, work),
+        Method::RansacPreverify => return preverified::find(blocks, count, threshold, config, work),
         #[cfg(feature = "zju")]
-        Method::Mlesac => return mlesac::keep(blocks, count, focal_px, threshold, config, work),
+        Method::Mlesac => return mlesac::find(blocks, count, focal_px, threshold, config, work),
         // `Config::check` refuses a method that is not built in.
         _ => search(blocks, count, expected, focal_px, threshold, config, work)?,
     };
@@ -144,7 +144,7 @@ pub(crate) fn keep<T: Real>(
         let g = block.gradient(&best.e);
         for lane in 0..LANES {
             let lit = || is_lit(&block.ray(lane), &best.e, best.c, expected);
-            if !(block.faces_along(lane, [g[0][lane], g[1][lane]]) && lit()) {
+            if !(block.is_lit_along(lane, [g[0][lane], g[1][lane]]) && lit()) {
                 block.weight[lane] = T::ZERO;
             }
         }
@@ -219,7 +219,7 @@ fn search<T: Real>(
                 let lane = i as usize % LANES;
                 blocks
                     .get(i as usize / LANES)
-                    .is_some_and(|b| b.faces(lane, &e) && is_lit(&b.ray(lane), &e, c, expected))
+                    .is_some_and(|b| b.is_lit_towards(lane, &e) && is_lit(&b.ray(lane), &e, c, expected))
             };
             if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {
                 continue;

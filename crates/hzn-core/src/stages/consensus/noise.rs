@@ -27,7 +27,7 @@ pub(super) fn point_to_point<T: Real>(blocks: &[Block<T>], count: u32) -> T {
             break;
         }
     }
-    median::of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
+    median::median_of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
 }
 
 /// Number of points to each side from which the direction of the edge is computed.
@@ -35,8 +35,8 @@ const ALONG: usize = 8;
 
 /// Returns the distance of point `b` from the middle between its neighbours, across the edge, in pixels.
 fn second_difference<T: Real>(blocks: &[Block<T>], b: usize) -> Option<T> {
-    let (before, at, after) = (seen(blocks, b - 1)?, seen(blocks, b)?, seen(blocks, b + 1)?);
-    let normal = at.cross(&(seen(blocks, b + ALONG)? - seen(blocks, b - ALONG)?));
+    let (before, at, after) = (ray_in_range(blocks, b - 1)?, ray_in_range(blocks, b)?, ray_in_range(blocks, b + 1)?);
+    let normal = at.cross(&(ray_in_range(blocks, b + ALONG)? - ray_in_range(blocks, b - ALONG)?));
     let [gu, gv] = blocks.get(b / LANES)?.gradient_at(b % LANES, &normal);
     let off = (at - before) - (after - at);
     let size = (gu * gu + gv * gv).sqrt();
@@ -44,7 +44,7 @@ fn second_difference<T: Real>(blocks: &[Block<T>], b: usize) -> Option<T> {
 }
 
 /// Returns the ray of a point if it is inside the range of the lens.
-fn seen<T: Real>(blocks: &[Block<T>], i: usize) -> Option<V3<T>> {
+fn ray_in_range<T: Real>(blocks: &[Block<T>], i: usize) -> Option<V3<T>> {
     let (block, lane) = (blocks.get(i / LANES)?, i % LANES);
     block.m.iter().any(|m| m[lane] != T::ZERO).then(|| block.ray(lane))
 }

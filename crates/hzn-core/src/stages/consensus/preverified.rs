@@ -1,6 +1,6 @@
 //! RANSAC with pre-verification (Wang et al. 2022, 2.3).
 //!
-//! Five points are drawn, and three of them define a cone. Only if the other two are also on this cone, the cone is
+//! Five points are draw_cone, and three of them define a cone. Only if the other two are also on this cone, the cone is
 //! compared with every point. Most wrong hypotheses therefore cost only two comparisons. The search ends when more than
 //! half of the points agree, or after k_max hypotheses.
 //!
@@ -9,7 +9,7 @@
 //! all five points are on the limb, which needs 7195 draws for the same p. With 286 draws in all, only 8.7 % of these
 //! pictures are solved. Here `max_draws` limits the number of draws.
 
-use super::sampled::{agreeing, conclude, distances2, point};
+use super::sampled::{conclude, count_inliers, distances2, point};
 use super::{Config, Consensus, Threshold};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -25,7 +25,7 @@ const SAMPLE: usize = 5;
 
 /// Finds the accepted cone with the most points near it; the other points get weight 0. The result is `None` with fewer
 /// than five points, or if no draw is accepted.
-pub(super) fn keep<T: Real>(
+pub(super) fn find<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
     threshold: Threshold<T>,
@@ -47,7 +47,7 @@ pub(super) fn keep<T: Real>(
         if !work.try_spend(blocks.len() as u32 * SCORE) {
             break;
         }
-        let near = agreeing(blocks, &e, c, limit2);
+        let near = count_inliers(blocks, &e, c, limit2);
         if near > most {
             (best, most) = (Some((e, c)), near);
             if near * T::from_f64(2.0) > T::from_f64(f64::from(count)) {
@@ -61,7 +61,7 @@ pub(super) fn keep<T: Real>(
 /// Returns the cone through the first three points if the other two are on it, too.
 fn verified<T: Real>(blocks: &[Block<T>], sample: [u32; SAMPLE], limit2: T) -> Option<(V3<T>, T)> {
     let [i, j, k, m, n] = sample;
-    // A point that is drawn twice verifies nothing.
+    // A point that is draw_cone twice verifies nothing.
     if m == n || [i, j, k].contains(&m) || [i, j, k].contains(&n) {
         return None;
     }

@@ -5,7 +5,7 @@
 //! knowledge: neither the half-angle nor the side of the edge on which the light is. Every draw is compared with every
 //! point. The default method, `two-point`, is better in these respects.
 
-use super::sampled::{FEWEST, agreeing, conclude, drawn, needed};
+use super::sampled::{FEWEST, conclude, count_inliers, draw_cone, required_draws};
 use super::{Config, Consensus, Threshold};
 use crate::base::real::Real;
 use crate::base::rng::Rng;
@@ -14,7 +14,7 @@ use crate::model::work::{DRAW, SCORE, WorkBudget};
 
 /// Finds the cone with the most points near it; the other points get weight 0. The result is `None` with fewer than
 /// three points, or if no cone has more points than the three through which it goes.
-pub(super) fn keep<T: Real>(
+pub(super) fn find<T: Real>(
     blocks: &mut [Block<T>],
     count: u32,
     threshold: Threshold<T>,
@@ -31,11 +31,11 @@ pub(super) fn keep<T: Real>(
     let a_draw = DRAW + blocks.len() as u32 * SCORE;
     while draws < enough.max(FEWEST).min(config.max_draws) && work.try_spend(a_draw) {
         draws += 1;
-        let Some((e, c)) = drawn(blocks, count, &mut rng) else { continue };
-        let near = agreeing(blocks, &e, c, limit2);
+        let Some((e, c)) = draw_cone(blocks, count, &mut rng) else { continue };
+        let near = count_inliers(blocks, &e, c, limit2);
         if near > most {
             (best, most) = (Some((e, c)), near);
-            enough = needed(near / T::from_f64(f64::from(count)));
+            enough = required_draws(near / T::from_f64(f64::from(count)));
         }
     }
     conclude(blocks, best, limit2, draws)

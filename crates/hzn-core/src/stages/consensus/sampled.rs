@@ -21,14 +21,14 @@ pub(super) fn point<T: Real>(blocks: &[Block<T>], i: u32) -> Option<V3<T>> {
 
 /// Draws three points at random and returns the axis and the cos of the half-angle of the cone through them, if there
 /// is one.
-pub(super) fn drawn<T: Real>(blocks: &[Block<T>], count: u32, rng: &mut Rng) -> Option<(V3<T>, T)> {
+pub(super) fn draw_cone<T: Real>(blocks: &[Block<T>], count: u32, rng: &mut Rng) -> Option<(V3<T>, T)> {
     let [i, j, k] = [(); 3].map(|()| rng.below(count));
     through_three(&point(blocks, i)?, &point(blocks, j)?, &point(blocks, k)?)
 }
 
 /// Returns the number of draws that give 99 % probability of a draw with three inliers, if the share `w` of the points
 /// are inliers.
-pub(super) fn needed<T: Real>(w: T) -> u32 {
+pub(super) fn required_draws<T: Real>(w: T) -> u32 {
     let p = w * w * w;
     if p > T::from_f64(0.99) {
         FEWEST
@@ -49,7 +49,7 @@ pub(super) fn distances2<T: Real>(b: &Block<T>, e: &V3<T>, c: T) -> [T; LANES] {
 }
 
 /// Returns the number of points with a weight that are within the threshold of a cone.
-pub(super) fn agreeing<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit2: T) -> T {
+pub(super) fn count_inliers<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T, limit2: T) -> T {
     let mut n = [T::ZERO; LANES];
     for b in blocks {
         let d2 = distances2(b, e, c);

@@ -5,7 +5,7 @@
 //! the picture are in one list. To give them an order along the limb, they are sorted by their angle about the centre
 //! of the circle through all of them. The order begins after the widest gap.
 
-use super::order::about_their_circle;
+use super::order::sort_about_common_circle;
 use super::thinned::Thinned;
 use super::{BinaryPicture, Config};
 use crate::base::real::Real;
@@ -25,7 +25,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     let mut edge = Thinned::new(buffer);
     let reach = config.erode_size_px / 2;
     let least = config.erode_threshold;
-    let around = work::square(config.erode_size_px, binary.mask_cost());
+    let around = work::square_cost(config.erode_size_px, binary.mask_cost());
     for y in 0..binary.region.height() {
         let Some((x0, x1)) = binary.region.span(y) else { continue };
         // This includes the mask reads of the previous row.
@@ -40,7 +40,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
         }
     }
     if work.try_spend(edge.pixels().len() as u32 * work::ORDER) {
-        about_their_circle::<T>(edge.pixels_mut());
+        sort_about_common_circle::<T>(edge.pixels_mut());
     }
     edge
 }

@@ -119,7 +119,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
             blooms: false,
             least_contrast,
             mask,
-            look: work::look(mask),
+            look: work::follow_step_cost(mask),
             masked,
             moves,
         }
@@ -128,13 +128,13 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     /// Reduces the smallest contrast of edge points to 1/16 of `contrast`, which is the contrast between the dark and
     /// the lit pixels of the picture in counts. It may be a small part of full scale, as in 16-bit pictures of a
     /// thermal camera. Pictures with 8 bits keep their limit of three counts, which is small in any case.
-    pub(crate) fn contrasting(self, contrast: T) -> Self {
+    pub(crate) fn with_contrast(self, contrast: T) -> Self {
         let own = (contrast / T::from_i32(CONTRAST_PART)).to_i32();
         let least = if own > 0 && self.picture.full_scale() > 255 { own.max(LEAST_CONTRAST) } else { i32::MAX };
         Self { least_contrast: self.least_contrast.min(least), ..self }
     }
 
-    pub(crate) fn blooming(self, blooms: bool) -> Self {
+    pub(crate) fn with_blooming(self, blooms: bool) -> Self {
         Self { blooms, ..self }
     }
 

@@ -30,7 +30,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
             return 0;
         }
         for px in 0..=most {
-            if !work.try_spend(work::ring(w, h)) {
+            if !work.try_spend(work::ring_cost(w, h)) {
                 return 0;
             }
             let lit = self.count_ring(px, 1);

@@ -19,7 +19,7 @@ pub(crate) struct Marks<'a> {
 }
 
 /// Number of places in the table that are tried for a crossing.
-const TRIES: usize = 16;
+const MAX_PROBES: usize = 16;
 
 /// Rounds `spacing` down to a power of two.
 fn rounded(spacing: u16) -> u16 {
@@ -63,7 +63,7 @@ impl<'a> Marks<'a> {
     fn key(&self, x: u16, y: u16) -> (u32, impl Iterator<Item = usize> + use<>) {
         let key = (u32::from(y) << 16 | u32::from(x)) + 1;
         let (n, first) = (self.words.len().max(1), key.wrapping_mul(0x9e37_79b1) >> 7);
-        (key, (0..TRIES).map(move |k| (first as usize + k) % n))
+        (key, (0..MAX_PROBES).map(move |k| (first as usize + k) % n))
     }
 
     #[inline]

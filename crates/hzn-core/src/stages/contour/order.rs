@@ -7,9 +7,9 @@ use crate::geometry::pixel::Pixel;
 
 /// Sorts the pixels by their angle about the circle through all of them. The widest gap is between the last and the
 /// first pixel. Pixels on a straight line keep their order.
-pub(super) fn about_their_circle<T: Real>(pixels: &mut [Pixel]) {
+pub(super) fn sort_about_common_circle<T: Real>(pixels: &mut [Pixel]) {
     let place = |p: &Pixel| [T::from_i32(i32::from(p.x)), T::from_i32(i32::from(p.y))];
-    let Some(circle) = Circle::through(pixels.iter().map(place)) else { return };
+    let Some(circle) = Circle::fit(pixels.iter().map(place)) else { return };
     // This value grows with the angle from −x over −y, from 0 to 4.
     let angle = |p: &Pixel| -> T {
         let [x, y] = place(p);

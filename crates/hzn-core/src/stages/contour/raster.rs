@@ -69,7 +69,7 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
     for y in 0..height {
         let (mut outside, mut before) = (true, false);
         for x in 0..width {
-            let lit = seen(binary, i32::from(x), i32::from(y));
+            let lit = is_lit_inside(binary, i32::from(x), i32::from(y));
             if lit && !before && outside && !bits.get(x, y) {
                 let start = At { pixel: Pixel { x, y }, back: WEST };
                 let Some(border) = follow(binary, start, u32::MAX, &mut bits, steps, |_, _| true) else {
@@ -108,7 +108,7 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// Whether a pixel is in the region, lit, and not masked.
-fn seen<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> bool {
+fn is_lit_inside<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> bool {
     let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
     binary.region.contains(x, y) && binary.lit(x, y)
 }
@@ -148,12 +148,12 @@ fn follow<T: Real, P: Pixels, O: Observer<T>>(
             let d = (at.back + turn) & 7;
             let (dx, dy) = STEPS[usize::from(d & 7)];
             let (x, y) = (i32::from(here.x) + dx, i32::from(here.y) + dy);
-            if seen(binary, x, y) {
+            if is_lit_inside(binary, x, y) {
                 next = Some(At { pixel: Pixel { x: x as u16, y: y as u16 }, back: (d + 4) & 7 });
                 break;
             }
             // Only neighbours that share a side with the pixel matter here; a corner beyond the region counts as dark.
-            cut |= d.is_multiple_of(2) && hidden(binary, x, y);
+            cut |= d.is_multiple_of(2) && is_beyond_or_masked(binary, x, y);
             if d == WEST {
                 bits.set(here.x, here.y);
             } else if d == EAST && x < i32::from(binary.region.width()) {
@@ -185,7 +185,11 @@ fn follow<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// Whether the pixel is beyond the region, or bright enough to be lit but masked.
-fn hidden<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> bool {
+fn is_beyond_or_masked<T: Real, P: Pixels, O: Observer<T>>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    x: i32,
+    y: i32,
+) -> bool {
     let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return true };
     !binary.region.contains(x, y) || (binary.region.masked(x, y) && binary.picture.at(x, y) >= binary.level)
 }
@@ -263,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_that_are_too_short_are_told() {
+    fn short_lists_truncate_the_scan() {
         let data: Vec<u8> = (0..64 * 64).map(|i| if (i / 7) % 3 == 0 { 200 } else { 0 }).collect();
         let picture = Grey::try_new(&data, Layout::packed(64, 64, 1, 8)).unwrap();
         let region = Region::<f32>::whole(64, 64);

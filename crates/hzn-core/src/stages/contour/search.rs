@@ -69,15 +69,17 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
                         stretch += counted;
                         passed = (if lit { 0 } else { next + 1 - k }, counted, before);
                         before = Some((Pixel { x, y }, lit));
-                        let leaps = if self.region.has_mask() { 0 } else { self.leaps(&run, next, stride, lit) };
-                        if leaps > 0 {
-                            let at = |leaps: u16| Some((run.at(next + leaps * stride), lit));
+                        let count_equal_strides =
+                            if self.region.has_mask() { 0 } else { self.count_equal_strides(&run, next, stride, lit) };
+                        if count_equal_strides > 0 {
+                            let at =
+                                |count_equal_strides: u16| Some((run.at(next + count_equal_strides * stride), lit));
                             if !lit {
-                                stretch += u32::from(leaps) * u32::from(stride);
-                                passed = (stride, stride.into(), at(leaps - 1));
+                                stretch += u32::from(count_equal_strides) * u32::from(stride);
+                                passed = (stride, stride.into(), at(count_equal_strides - 1));
                             }
-                            before = at(leaps);
-                            k = next + leaps * stride + 1;
+                            before = at(count_equal_strides);
+                            k = next + count_equal_strides * stride + 1;
                             continue;
                         }
                     }
@@ -114,19 +116,19 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     /// Returns how many times `stride` pixels can be skipped from pixel number `k` of a run, as long as each pixel read
     /// is lit (or dark) as `lit` says.
     #[inline(always)]
-    fn leaps(&self, run: &Run, k: u16, stride: u16, lit: bool) -> u16 {
+    fn count_equal_strides(&self, run: &Run, k: u16, stride: u16, lit: bool) -> u16 {
         let Pixel { x, y } = run.at(k);
         let (dx, dy) = run.step();
         let leap = (dx as isize * self.picture.across() as isize + dy as isize * self.picture.down() as isize)
             * stride as isize;
         let mut index = self.picture.index(x, y);
         let most = (run.len - 1 - k).checked_div(stride).unwrap_or(0);
-        for leaps in 0..most {
+        for count_equal_strides in 0..most {
             index = index.wrapping_add_signed(leap);
-            let there = run.at(k + (leaps + 1) * stride);
+            let there = run.at(k + (count_equal_strides + 1) * stride);
             self.observer.pixel(there.x, there.y);
             if (self.picture.read(index) >= self.level) != lit {
-                return leaps;
+                return count_equal_strides;
             }
         }
         most
@@ -209,7 +211,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         let (mut x, mut lit, mut crossings) = (x0, self.lit(x0, y), 0);
         while x < x1 {
             if !self.region.has_mask() {
-                x += self.alike_beyond(x, y, x1 - x);
+                x += self.count_equal_pixels(x, y, x1 - x);
             }
             x += 1;
             let now = x <= x1 && self.lit(x, y);
@@ -227,7 +229,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     /// Returns how many of the `count` pixels east of column `x` of row `y` are lit (or dark) like that pixel, before
     /// the first one that differs.
     #[inline(never)]
-    fn alike_beyond(&self, x: u16, y: u16, count: u16) -> u16 {
+    fn count_equal_pixels(&self, x: u16, y: u16, count: u16) -> u16 {
         let index = self.picture.index(x, y);
         let lit = self.picture.read(index) >= self.level;
         let alike = self.picture.alike(index + self.picture.across(), count.into(), self.level, lit) as u16;

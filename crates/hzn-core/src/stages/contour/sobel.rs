@@ -10,7 +10,7 @@
 //! all of them. The order begins after the widest gap.
 
 use super::BinaryPicture;
-use super::order::about_their_circle;
+use super::order::sort_about_common_circle;
 use super::thinned::Thinned;
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
@@ -30,7 +30,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
 ) -> Thinned<'a> {
     let mut edge = Thinned::new(buffer);
     let (mut sum, mut count) = (0u64, 0u64);
-    let look = work::gradient(binary.mask_cost());
+    let look = work::gradient_cost(binary.mask_cost());
     each_pixel(binary, look, work, |x, y, _| {
         if let Some((gx, gy)) = gradient(binary, x, y) {
             sum = sum.saturating_add(square(gx, gy));
@@ -49,7 +49,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
         }
     });
     if work.try_spend(edge.pixels().len() as u32 * work::ORDER) {
-        about_their_circle::<T>(edge.pixels_mut());
+        sort_about_common_circle::<T>(edge.pixels_mut());
     }
     edge
 }

@@ -24,13 +24,14 @@ use crate::stages::fit::direct::{LEAST_Z, Normal};
 
 /// Returns the answer of a fit with this covariance.
 pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config) -> Option<Fused<T>> {
-    let p = of(blocks, &fit.e, T::from_f64(config.correlation_px))? * T::from_f64(config.sigma_px * config.sigma_px);
+    let p = covariance(blocks, &fit.e, T::from_f64(config.correlation_px))?
+        * T::from_f64(config.sigma_px * config.sigma_px);
     // The length of the unnormalised vector is the assumed cos α divided by the measured one.
     let var_c = fit.c * fit.c * fit.e.dot(&(p * fit.e));
     Some(Fused {
         e: fit.e,
         c: fit.c,
-        p: across(&p, &fit.e, config.overbound),
+        p: project(&p, &fit.e, config.overbound),
         var_free_cos: Some(var_c),
         chi2: T::ZERO,
         edge: EdgeNoise {
@@ -43,7 +44,7 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
 
 /// Returns P of the unnormalised nadir in the camera frame at the unit axis `e`, for an edge variance of 1 px². The
 /// result is `None` if the points do not determine it.
-pub(crate) fn of<T: Real>(blocks: &[Block<T>], e: &V3<T>, length_px: T) -> Option<M3<T>> {
+pub(crate) fn covariance<T: Real>(blocks: &[Block<T>], e: &V3<T>, length_px: T) -> Option<M3<T>> {
     let (b1, b2) = basis(e);
     let normal = Normal::new(blocks, &b1, &b2, e)?;
     let zero = V3::new(T::ZERO, T::ZERO, T::ZERO);
@@ -79,7 +80,7 @@ pub(crate) fn of<T: Real>(blocks: &[Block<T>], e: &V3<T>, length_px: T) -> Optio
 
 /// Projects `p` on the plane perpendicular to the unit axis `e`: (11, 12, 22) on its tangent basis, rad². With
 /// `overbound`, the largest eigenvalue holds in every direction, as in (37).
-pub(crate) fn across<T: Real>(p: &M3<T>, e: &V3<T>, overbound: bool) -> [T; 3] {
+pub(crate) fn project<T: Real>(p: &M3<T>, e: &V3<T>, overbound: bool) -> [T; 3] {
     if overbound {
         let rows = core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)]));
         let ([_, _, largest], _) = symmetric_eigen::<T, 3>(rows);

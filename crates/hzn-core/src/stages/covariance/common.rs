@@ -19,7 +19,7 @@
 //! The signals vary slowly along the limb, so that a part of the points is used instead of all. This part has its own
 //! normal equations; a signal that the cone can follow is then fitted completely.
 
-use super::noise::Levels;
+use super::noise::EdgeNoiseModel;
 use super::{Term, response};
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;
@@ -35,28 +35,28 @@ const PART: usize = 64;
 const SPREAD: f64 = 0.577_350_269_189_625_8;
 
 /// Calls `add` with each term and its covariance of (δ₁₂, δc).
-pub(super) fn each<T: Real>(
+pub(super) fn add_terms<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
     expected: &Expected<T>,
-    noise: &Levels<T>,
+    noise: &EdgeNoiseModel<T>,
     camera: &Camera<T>,
     mut add: impl FnMut(Term, &M3<T>),
 ) -> Option<()> {
     let sums = Sums::new(blocks, fit, camera);
-    let response = response(&fit.sums.of_part(sums.normal), fit.mean, fit.free)?;
+    let response = response(&fit.sums.with_normal(sums.normal), fit.mean, fit.free)?;
     let error = |sum: &V3<T>| response * sum;
     let outer = |v: &V3<T>, variance: T| v * v.transpose() * variance;
     add(Term::CommonShift, &outer(&error(&sums.shift), noise.shift_px * noise.shift_px));
     add(Term::CommonTilt, &outer(&error(&sums.tilt()), noise.tilt_px * noise.tilt_px));
     let mut uneven = M3::zeros();
-    for (amplitude, pair) in expected.uneven_cos.iter().zip(&sums.harmonics) {
+    for (amplitude, pair) in expected.unknown_harmonics_cos.iter().zip(&sums.harmonics) {
         for sum in pair {
             uneven += outer(&error(sum), *amplitude * *amplitude * T::from_f64(0.5));
         }
     }
     add(Term::UnknownAzimuth, &uneven);
-    if let Some(modes) = camera.uncertain() {
+    if let Some(modes) = camera.intrinsic_modes() {
         let mut lens = M3::zeros();
         for mode in modes {
             let sum = mode.iter().zip(&sums.lens).fold(V3::zeros(), |sum, (m, by)| sum + by * *m);
@@ -95,7 +95,7 @@ impl<T: Real> Sums<T> {
             harmonics: [[zero; 2]; 2],
             lens: [zero; INTRINSICS],
         };
-        let is_uncertain = camera.uncertain().is_some();
+        let is_uncertain = camera.intrinsic_modes().is_some();
         let points = blocks.iter().flat_map(|block| (0..LANES).map(move |l| (block, l))).enumerate();
         let carrying = points.filter(|(_, (block, l))| block.weight[l & 7] > T::ZERO);
         // The points are in the middle of each stretch.
@@ -124,7 +124,7 @@ impl<T: Real> Sums<T> {
             sums.harmonics[1][0] += h * (c * c - s_ * s_);
             sums.harmonics[1][1] += h * ((c + c) * s_);
             if is_uncertain {
-                for (sum, [du, dv]) in sums.lens.iter_mut().zip(camera.moves(&s)) {
+                for (sum, [du, dv]) in sums.lens.iter_mut().zip(camera.shift_by_intrinsics(&s)) {
                     *sum += h * (gu * du + gv * dv);
                 }
             }

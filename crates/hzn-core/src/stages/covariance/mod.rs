@@ -20,7 +20,7 @@ pub mod reml;
 
 use crate::base::linalg::{M3, V3, basis, invert_spd2, unit};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, HALF, LANES, exp_neg};
+use crate::geometry::block::{Block, HALF_LANES, LANES, exp_neg};
 use crate::geometry::camera::Camera;
 use crate::model::body::Expected;
 use crate::stages::fit::{self, Fit};
@@ -71,7 +71,7 @@ pub(crate) fn fuse<T: Real>(
     if config.method == Method::BraunBarf {
         return braun_barf::fused(blocks, fit, config);
     }
-    let noise = noise::Levels::new(fit, config);
+    let noise = noise::EdgeNoiseModel::new(fit, config);
     #[cfg(feature = "zju")]
     if let Some(quadric) = &fit.quadric {
         let p = elliptic::covariance(blocks, quadric, noise.length_px) * noise.variance;
@@ -86,7 +86,7 @@ pub(crate) fn fuse<T: Real>(
     };
     add(Term::EdgeNoise, &p);
     let edge = noise.edge(p.m33);
-    common::each(blocks, fit, expected, &noise, camera, |term, more| {
+    common::add_terms(blocks, fit, expected, &noise, camera, |term, more| {
         p += more;
         add(term, more);
     })?;
@@ -101,7 +101,7 @@ pub(crate) fn response<T: Real>(sums: &fit::Sums<T>, [m1, m2]: [T; 2], free: boo
     if free {
         return Some(M3::new(one, zero, zero, zero, one, zero, m1, m2, one) * fit::inverse(sums)?);
     }
-    let [a, b, d] = invert_spd2(sums.known([m1, m2]))?;
+    let [a, b, d] = invert_spd2(sums.normal_fixed([m1, m2]))?;
     // The rows are Bᵀs = h₁₂ − m h₃.
     Some(M3::new(a, b, -(a * m1 + b * m2), b, d, -(b * m1 + d * m2), zero, zero, zero))
 }
@@ -126,7 +126,7 @@ fn fused<T: Real>(
     let var_free = fit.free.then_some(p.m33);
     if !fit.free || estimate.half_angle == fit::HalfAngle::Free || expected.free {
         // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
-        let k = held_gain(fit);
+        let k = fixed_half_angle_gain(fit);
         let var_c = if estimate.half_angle == fit::HalfAngle::Known { T::ZERO } else { var_c };
         let (k, var_c) = k.filter(|_| !fit.free).map_or(([T::ZERO; 2], T::ZERO), |k| (k, var_c));
         if let Some(budget) = budget {
@@ -161,9 +161,9 @@ fn fused<T: Real>(
 }
 
 /// Returns the change of the axis for δc = 1 with a fixed half-angle: Σ w Bᵀs · 1 through the normal equations.
-fn held_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
+fn fixed_half_angle_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
     let (sums, mean) = (&fit.sums, fit.mean);
-    let n = invert_spd2(sums.known(mean))?;
+    let n = invert_spd2(sums.normal_fixed(mean))?;
     let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);
     Some([n[0] * k1 + n[1] * k2, n[1] * k1 + n[2] * k2])
 }
@@ -177,7 +177,7 @@ pub(crate) fn correlated<T: Real>(
     mean: [T; 2],
     length_px: T,
 ) -> [T; 6] {
-    let mut sums = [[T::ZERO; HALF]; 6];
+    let mut sums = [[T::ZERO; HALF_LANES]; 6];
     // c for the errors in u and for those in v.
     let mut c = [[T::ZERO; 3]; 2];
     let per_length = if length_px > T::ZERO { T::one() / length_px } else { T::ZERO };
@@ -206,7 +206,7 @@ pub(crate) fn correlated<T: Real>(
             }
         }
         let [[u1, u2, u3], [v1, v2, v3]] = &before;
-        for l in 0..HALF {
+        for l in 0..HALF_LANES {
             let terms = |l: usize| {
                 let (g1, g2, g3) = (gap[l] * u1[l], gap[l] * u2[l], gap[l] * u3[l]);
                 let (h1, h2, h3) = (gap[l] * v1[l], gap[l] * v2[l], gap[l] * v3[l]);
@@ -219,7 +219,7 @@ pub(crate) fn correlated<T: Real>(
                     g3 * u3[l] + h3 * v3[l],
                 ]
             };
-            let (one, other) = (terms(l), terms(l + HALF));
+            let (one, other) = (terms(l), terms(l + HALF_LANES));
             for (sum, (a, b)) in sums.iter_mut().zip(one.iter().zip(&other)) {
                 sum[l] += *a + *b;
             }

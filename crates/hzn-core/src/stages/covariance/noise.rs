@@ -20,10 +20,10 @@ pub(crate) fn measured_length_px<T: Real>(fit: &Fit<T>) -> T {
 }
 
 /// Value of a tilt at the ends of the edge if its RMS along the edge is 1: √3.
-const ENDS: f64 = 1.732_050_807_568_877_2;
+const END_PER_RMS: f64 = 1.732_050_807_568_877_2;
 
 /// The noise model of one edge.
-pub(super) struct Levels<T> {
+pub(super) struct EdgeNoiseModel<T> {
     /// Variance of an edge point, px².
     pub(super) variance: T,
     /// Correlation length, px.
@@ -37,20 +37,20 @@ pub(super) struct Levels<T> {
     reml: Option<f64>,
 }
 
-impl<T: Real> Levels<T> {
+impl<T: Real> EdgeNoiseModel<T> {
     /// Makes the noise model of an edge, from its residuals if the configuration says so.
     pub(super) fn new(fit: &Fit<T>, config: &Config) -> Self {
         let told = T::from_f64(config.sigma_px);
         let (length_px, common) = match config.noise {
             Noise::Rms => (measured_length_px(fit), fit.rms_px),
             // The likelihood includes the errors that the fit absorbs, at every length.
-            Noise::Told | Noise::Reml => (T::ZERO, T::ZERO),
+            Noise::Given | Noise::Reml => (T::ZERO, T::ZERO),
         };
         Self {
             variance: (told * told).max(fit.rms_px * fit.rms_px),
             length_px: T::from_f64(config.correlation_px).max(length_px),
             shift_px: T::from_f64(config.bias_px).max(common),
-            tilt_px: T::from_f64(config.tilt_px).max(common * T::from_f64(ENDS)),
+            tilt_px: T::from_f64(config.tilt_px).max(common * T::from_f64(END_PER_RMS)),
             #[cfg(feature = "reml")]
             reml: (config.noise == Noise::Reml).then_some(config.sigma_px),
         }

@@ -98,7 +98,7 @@ fn by(
     move |binary, pixel| {
         let mut blocks = [Block::default(); 1];
         let config = Config { sub_pixel: method, keep_points: 0, ..Config::default() };
-        (pick(binary, &config, &[pixel], 0, &mut blocks, u32::MAX).count == 1).then(|| blocks[0].point(0))
+        (locate_edge_points(binary, &config, &[pixel], 0, &mut blocks, u32::MAX).count == 1).then(|| blocks[0].point(0))
     }
 }
 

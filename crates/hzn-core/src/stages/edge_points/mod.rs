@@ -107,7 +107,7 @@ pub(crate) struct Points {
 
 /// Fills `blocks` with the edge points of a border, thinned evenly to `keep_points`. Empty lanes have weight 0. The
 /// function stops after `most_slow` points that cost more.
-pub(crate) fn pick<T: Real, P: Pixels, O: Observer<T>>(
+pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     border: &[Pixel],
@@ -193,7 +193,7 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
 /// Locates the edge point at a border pixel of a picture that is not kept. It is for the methods that locate a point
 /// along an axis.
 #[inline(never)]
-pub(crate) fn pass<T: Real, P: Pixels, O: Observer<T>>(
+pub(crate) fn locate_streamed_point<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     p: Pixel,
@@ -256,7 +256,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
 
     /// Reads the 3×3 neighbourhood.
     #[inline(always)]
-    fn near(&self) -> Option<Near> {
+    fn read_3x3(&self) -> Option<Near> {
         let [nw, n, ne] = self.row(-1)?;
         let [w, c, e] = self.row(0)?;
         let [sw, s, se] = self.row(1)?;
@@ -296,7 +296,7 @@ impl<'a, 'b, 'c, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'a, 
     }
     /// Returns four times the brightness `k` steps towards the dark, smoothed with 1-2-1 along the edge.
     #[inline(always)]
-    fn three(&self, k: i32) -> Option<i32> {
+    fn smoothed(&self, k: i32) -> Option<i32> {
         Some(self.at(k, -1)? + 2 * self.at(k, 0)? + self.at(k, 1)?)
     }
 }
@@ -393,7 +393,7 @@ fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(
     p: Pixel,
 ) -> Option<EdgePoint<T>> {
     let around = Around::<T, P, O, false>::new(binary, p);
-    let (lit, dx, dy) = orientation(around.near()?.gradient())?;
+    let (lit, dx, dy) = orientation(around.read_3x3()?.gradient())?;
     Some(EdgePoint::plain(point_off(p, (dx, dy), T::from_f64(0.5)), lit))
 }
 
@@ -412,7 +412,7 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     slow: &mut u32,
 ) -> Option<EdgePoint<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
-    let near = around.near()?;
+    let near = around.read_3x3()?;
     let gradient = near.gradient();
     let (lit, dx, dy) = orientation(gradient)?;
     let level = i32::from(binary.level);
@@ -436,12 +436,12 @@ fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
     let found = if FREE && is_clear(binary, p, (MARGIN * step) as u16) {
-        in_steps::<T, P, O, true>(binary, p, (dx, dy), step)?
+        locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step)?
     } else {
-        in_steps::<T, P, O, false>(binary, p, (dx, dy), step)?
+        locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step)?
     };
-    let Wide { off, fallback, clipped, .. } =
-        if found.rising { climb(binary, p, (dx, dy), step, found, slow) } else { found };
+    let WideCrossing { off, fallback, clipped, .. } =
+        if found.rising { recentre_profile(binary, p, (dx, dy), step, found, slow) } else { found };
     Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
 }
 
@@ -452,14 +452,14 @@ const CLIMBS: u32 = 4;
 /// the lit side still rises at the end of the reach. There is no plateau then, and the mid-level depends on the
 /// threshold that determined the border pixel.
 #[inline(never)]
-fn climb<T: Real, P: Pixels, O: Observer<T>>(
+fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     (dx, dy): (i32, i32),
     step: i32,
-    mut found: Wide<T>,
+    mut found: WideCrossing<T>,
     slow: &mut u32,
-) -> Wide<T> {
+) -> WideCrossing<T> {
     let mut whole = 0;
     for _ in 0..CLIMBS {
         let moved = (found.off + T::from_i32(FARTHEST)).to_i32() - FARTHEST - whole;
@@ -471,11 +471,12 @@ fn climb<T: Real, P: Pixels, O: Observer<T>>(
             break;
         }
         *slow += 1;
-        let Some(next) = in_steps::<T, P, O, false>(binary, Pixel { x: x as u16, y: y as u16 }, (dx, dy), step) else {
+        let Some(next) = locate_in_steps::<T, P, O, false>(binary, Pixel { x: x as u16, y: y as u16 }, (dx, dy), step)
+        else {
             break;
         };
         whole += moved;
-        found = Wide { off: next.off + T::from_i32(whole), ..next };
+        found = WideCrossing { off: next.off + T::from_i32(whole), ..next };
     }
     found
 }
@@ -488,7 +489,7 @@ fn is_clear<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P,
 }
 
 /// Crossing of the mid-level on a wide edge; `off` is its distance from the border pixel towards the dark, in pixels.
-struct Wide<T> {
+struct WideCrossing<T> {
     off: T,
     fallback: bool,
     clipped: bool,
@@ -498,36 +499,36 @@ struct Wide<T> {
 
 /// Locates the crossing like [`linear`], with steps of `step` pixels.
 #[inline(never)]
-fn in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     (dx, dy): (i32, i32),
     step: i32,
-) -> Option<Wide<T>> {
+) -> Option<WideCrossing<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     let line = Line::new(&around, (dx, dy), step);
     let Crossing { part, mid2, fallback, clipped, rising } =
-        line.crossing([line.three(-1)?, line.three(0)?, line.three(1)?])?;
+        line.crossing([line.smoothed(-1)?, line.smoothed(0)?, line.smoothed(1)?])?;
     let coarse = part * T::from_i32(step);
     // The profile is curved within a step. The crossing is therefore interpolated again over half a step around it.
     let half = step / 2;
     if half == 0 {
-        return Some(Wide { off: coarse, fallback, clipped, rising });
+        return Some(WideCrossing { off: coarse, fallback, clipped, rising });
     }
     let pixels = Line::new(&around, (dx, dy), 1);
     let whole = (coarse + T::from_i32(REACH * WIDEST)).to_i32() - REACH * WIDEST;
     let k = whole - half / 2;
-    let (a, b) = (pixels.three(k)?, pixels.three(k + half)?);
+    let (a, b) = (pixels.smoothed(k)?, pixels.smoothed(k + half)?);
     let fine = T::from_i32(k) + T::from_i32(half * (2 * a - mid2)) / T::from_i32((2 * (a - b)).max(1));
     let off = if (fine - coarse).abs() <= T::from_i32(half) { fine } else { coarse };
-    Some(Wide { off, fallback, clipped, rising })
+    Some(WideCrossing { off, fallback, clipped, rising })
 }
 
 /// Crossing of an edge with the mid-level.
 struct Crossing<T> {
     /// Distance from the border pixel towards the dark, in steps.
     part: T,
-    /// Twice the mid-level, in units of [`Line::three`].
+    /// Twice the mid-level, in units of [`Line::smoothed`].
     mid2: i32,
     /// The threshold of the picture replaces the local mid-level.
     fallback: bool,
@@ -552,7 +553,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         }
     }
 
-    /// Returns the brightness of a plateau, in units of [`Line::three`], and the offset in steps where it begins. The
+    /// Returns the brightness of a plateau, in units of [`Line::smoothed`], and the offset in steps where it begins. The
     /// search begins at the border pixel (or its dark neighbour) with brightness `v` and goes outwards until the
     /// profile levels off. It has levelled off if each of two more steps changes it by less than a twelfth of the
     /// contrast to `other`.
@@ -617,14 +618,14 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
             if k >= outer.max(1) {
                 return None;
             }
-            b = self.three(k + 1)?;
+            b = self.smoothed(k + 1)?;
         }
         while 2 * a < mid2 {
             if k <= inner.min(-1) {
                 return None;
             }
             (k, b) = (k - 1, a);
-            a = self.three(k)?;
+            a = self.smoothed(k)?;
         }
         if a <= b {
             return None;
@@ -671,7 +672,7 @@ mod tests {
             })
             .collect();
         let mut blocks = [Block::default(); 64];
-        let made = pick(&binary, config, &border, 0, &mut blocks, u32::MAX);
+        let made = locate_edge_points(&binary, config, &border, 0, &mut blocks, u32::MAX);
         assert!(made.count > 30, "{made:?}");
         blocks
             .iter()
@@ -717,7 +718,7 @@ mod tests {
                 let region = Region::<f64>::whole(100, 100);
                 let binary = BinaryPicture::new(&grey, &region, 70, &Unobserved);
                 let mut blocks = [Block::default(); 8];
-                let made = pick(&binary, &Config::default(), &border, 0, &mut blocks, u32::MAX);
+                let made = locate_edge_points(&binary, &Config::default(), &border, 0, &mut blocks, u32::MAX);
                 assert_eq!((made.count, made.clipped), (60, if all { 60 } else { 0 }), "{width} {bright}");
             }
         }
@@ -733,7 +734,7 @@ mod tests {
         let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
         let mut blocks = [Block::default(); 2];
         assert_eq!(
-            pick(&binary, &config, &border, 0, &mut blocks, u32::MAX),
+            locate_edge_points(&binary, &config, &border, 0, &mut blocks, u32::MAX),
             Points { count: 15, ..Points::default() }
         );
         let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);

@@ -25,9 +25,9 @@ pub(crate) fn fit<T: Real>(blocks: &[Block<T>], camera: &Camera<T>) -> Option<(V
         (0..LANES)
             .filter(move |&l| b.weight[l & 7] > T::ZERO)
             .filter_map(move |l| camera.project(&UnitVec3::assume_unit(b.ray(l))))
-            .map(|p| camera.in_focal_lengths(p))
+            .map(|p| camera.to_focal_lengths(p))
     });
-    let Circle { centre, radius } = Circle::through(points)?;
-    let axis = camera.continued(centre)?;
-    Some((*axis.v(), camera.continued([radius, T::ZERO])?.v().z))
+    let Circle { centre, radius } = Circle::fit(points)?;
+    let axis = camera.unproject_extrapolated(centre)?;
+    Some((*axis.v(), camera.unproject_extrapolated([radius, T::ZERO])?.v().z))
 }

@@ -102,7 +102,7 @@ impl<T: Real> Plane<T> {
         for [_, _, _, a, b, c] in rest {
             quadratic.push([a, b, c]);
         }
-        let (values, vectors) = quadratic.singular();
+        let (values, vectors) = quadratic.singular_values();
         // If the points are exactly on a conic, the smallest singular value is zero except for rounding. If the next
         // one is zero, too, more than one conic goes through the points: they are on a line, or at fewer than five
         // places.

@@ -23,7 +23,7 @@ mod quadric;
 use crate::base::keys::{choices, section};
 use crate::base::linalg::{M3, V3, basis, invert_spd2, invert_spd3, unit};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, HALF, LANES, sum};
+use crate::geometry::block::{Block, HALF_LANES, LANES, sum};
 use crate::geometry::camera::Camera;
 use crate::geometry::cone::Azimuth;
 use crate::model::body::Expected;
@@ -143,23 +143,23 @@ pub(crate) fn fit<T: Real>(
     let _ = camera;
     let cone = match config.method {
         #[cfg(feature = "dlr")]
-        Method::Direct => held(blocks, start, threshold_px, direct::fit)?,
+        Method::Direct => fit_by(blocks, start, threshold_px, direct::fit)?,
         #[cfg(feature = "dlr")]
-        Method::Conic => held(blocks, start, threshold_px, conic::fit)?,
+        Method::Conic => fit_by(blocks, start, threshold_px, conic::fit)?,
         #[cfg(feature = "zju")]
         Method::Tls => elliptic(blocks, start, threshold_px, HALF_TURN_RAD)?,
         #[cfg(feature = "zju")]
         Method::Wtls => elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?,
         #[cfg(feature = "horace")]
-        Method::Circle => held(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
+        Method::Circle => fit_by(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
         // `Config::check` refuses a method that is not built in.
         _ => sphere(blocks, start, expected, threshold_px, config, noise)?,
     };
-    Some(counted(blocks, cone))
+    Some(count_points(blocks, cone))
 }
 
 /// Makes the fit of a cone, and counts its points.
-fn counted<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T> {
+fn count_points<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T> {
     let (mut inliers, mut arc) = ([T::ZERO; LANES], [T::ZERO; LANES]);
     let mut before = T::ZERO;
     for block in blocks.iter() {
@@ -236,7 +236,7 @@ fn sphere<T: Real>(
 /// cos of the half-angle.
 #[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
 #[allow(dead_code, reason = "for the estimators behind features")]
-fn held<T: Real>(
+fn fit_by<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,
     threshold_px: T,
@@ -255,20 +255,20 @@ fn held<T: Real>(
         }
     }
     let (e, c) = find(blocks)?;
-    at(blocks, e, c)
+    cone_at(blocks, e, c)
 }
 
 /// Returns the fit at a given cone, with the weights that the points have.
 #[cfg(any(test, feature = "_edges"))]
 #[allow(dead_code, reason = "behind a feature")]
-pub(crate) fn given<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Fit<T>> {
-    let cone = at(blocks, e, c)?;
-    Some(counted(blocks, cone))
+pub(crate) fn fit_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Fit<T>> {
+    let cone = cone_at(blocks, e, c)?;
+    Some(count_points(blocks, cone))
 }
 
 /// Returns a cone with the normal equations at it.
 #[cfg(any(test, feature = "dlr", feature = "zju", feature = "horace", feature = "_edges"))]
-fn at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
+fn cone_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
     let e = unit(&e)?;
     if !(c.abs() < T::one()) {
         return None;
@@ -301,7 +301,7 @@ fn elliptic<T: Real>(
     weigh_above_rad: f64,
 ) -> Option<Cone<T>> {
     let mut quadric = None;
-    let cone = held(blocks, start, threshold_px, |blocks| {
+    let cone = fit_by(blocks, start, threshold_px, |blocks| {
         let found = Quadric::fit(blocks, T::from_f64(weigh_above_rad))?;
         quadric = Some(found);
         Some((found.e, found.c))
@@ -505,14 +505,14 @@ impl<T: Real> Sums<T> {
 
     /// Returns the step with a fixed half-angle: δc = 0, and therefore δc' = −m·δ₁₂.
     fn step_known(&self, mean: [T; 2]) -> Option<([T; 2], T)> {
-        let [a, b, d] = invert_spd2(self.known(mean))?;
+        let [a, b, d] = invert_spd2(self.normal_fixed(mean))?;
         let [g1, g2, g3] = self.g;
         let (g1, g2) = (g1 - mean[0] * g3, g2 - mean[1] * g3);
         Some(([a * g1 + b * g2, b * g1 + d * g2], T::ZERO))
     }
 
     /// Returns the upper triangle of Σ w (Bᵀs)(Bᵀs)ᵀ.
-    pub(crate) fn known(&self, [m1, m2]: [T; 2]) -> [T; 3] {
+    pub(crate) fn normal_fixed(&self, [m1, m2]: [T; 2]) -> [T; 3] {
         let [n11, n12, n13, n22, n23, n33] = self.n;
         // h₁₂ + m times (h₃ = −1): Bᵀs = h₁₂ − m h₃.
         [
@@ -528,7 +528,7 @@ impl<T: Real> Sums<T> {
     }
 
     /// Replaces the normal equations by those of a part of the points.
-    pub(crate) fn of_part(&self, n: [T; 6]) -> Self {
+    pub(crate) fn with_normal(&self, n: [T; 6]) -> Self {
         Self { n, ..*self }
     }
 
@@ -580,7 +580,7 @@ pub(crate) fn pass<T: Real>(
         Weights::Tukey { cutoff2, every } => (T::one() / cutoff2, every, false),
         Weights::Last { cutoff2 } => (T::one() / cutoff2, 1, true),
     };
-    let mut totals = [[T::ZERO; HALF]; 11];
+    let mut totals = [[T::ZERO; HALF_LANES]; 11];
     let mut nearby = [T::ZERO; LANES];
     let half = T::from_f64(0.5);
     let east_along = azimuth.map_or(T::ZERO, |a| a.east.dot(e));
@@ -595,7 +595,7 @@ pub(crate) fn pass<T: Real>(
             }
         }
         let [mut robust, mut parts] = [[T::ZERO; LANES]; 2];
-        for l in 0..HALF {
+        for l in 0..HALF_LANES {
             let mut terms = |l: usize| {
                 let (x, y, z) = (b.s[0][l] - e.x, b.s[1][l] - e.y, b.s[2][l] - e.z);
                 let r = target[l] + (x * x + y * y + z * z) * half;
@@ -611,7 +611,7 @@ pub(crate) fn pass<T: Real>(
                 let (w1, w2) = (w * h1, w * h2);
                 [w1 * h1, w1 * h2, w1, w2 * h2, w2, w, w1 * r, w2 * r, w * r, robust[l], robust[l] * d2]
             };
-            let (one, other) = (terms(l), terms(l + HALF));
+            let (one, other) = (terms(l), terms(l + HALF_LANES));
             for (total, (a, b)) in totals.iter_mut().zip(one.iter().zip(&other)) {
                 total[l] += *a + *b;
             }

@@ -160,7 +160,7 @@ impl<T: Real> Point<T> {
 fn tls<T: Real>(blocks: &[Block<T>]) -> Option<[T; N]> {
     let mut triangle = Triangle::<T, N>::new();
     each(blocks, |block, lane| triangle.push(monomials(&block.ray(lane))));
-    let (values, [v, ..]) = triangle.singular();
+    let (values, [v, ..]) = triangle.singular_values();
     let floor = values[N - 1] * T::EPSILON * T::from_f64(16.0);
     (values[1] > floor && values[1].is_finite()).then_some(v)
 }
@@ -179,7 +179,7 @@ fn wtls<T: Real>(blocks: &[Block<T>], mut v: [T; N]) -> Option<[T; N]> {
             let (row, q) = point.row(&v, true);
             push(&mut triangle, row, point.residual, T::one() / q.sqrt());
         });
-        let step = triangle.kernel()?;
+        let step = triangle.solve_with_unit_last()?;
         let mut size = T::ZERO;
         for (x, d) in v.iter_mut().zip(step) {
             *x += d;

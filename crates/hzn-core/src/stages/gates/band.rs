@@ -21,7 +21,7 @@ const ACROSS: f64 = 0.8;
 const ASIDE_PX: i32 = 6;
 /// Smallest part of the places behind a band that must be sky, as numerator and denominator. Inside a body, almost no
 /// place is sky.
-const FOR_GOOD: [usize; 2] = [2, 3];
+const MIN_SKY_SHARE: [usize; 2] = [2, 3];
 /// Largest brightness of a sky place behind a band, above the median of the sky, as a part of the step at the limb. It
 /// allows for blur and stray light.
 const SKY_PART: f64 = 0.1;
@@ -39,7 +39,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
     step: T,
 ) -> T {
     let (mut looks, mut bands) = (0, 0);
-    for (block, lane) in super::inliers(blocks, super::LOOKS) {
+    for (block, lane) in super::inliers(blocks, super::MAX_PLACES) {
         let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
         let [gu, gv] = block.gradient_at(lane, e);
         let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
@@ -69,7 +69,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
         for (k, cell) in (1..=PLACES).zip(is_sky.iter_mut()) {
             *cell = seen(place(k)).map(|b| b < dark);
         }
-        let Some(back) = back_for_good(&is_sky) else { continue };
+        let Some(back) = first_lasting_sky(&is_sky) else { continue };
         // The far edge is where half of the brightness of the band is left: after the last place that is brighter.
         let above = |px: i32| seen(px).map_or(T::ZERO, |b| b - sky.median);
         let passed = |k: i32| above(if k == 0 { ASIDE_PX } else { place(k) });
@@ -106,16 +106,16 @@ fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
     within
 }
 
-/// Returns the first place that is sky and from which on at least `FOR_GOOD` of the visible places are sky. At least
+/// Returns the first place that is sky and from which on at least `MIN_SKY_SHARE` of the visible places are sky. At least
 /// three visible places are necessary.
-fn back_for_good(is_sky: &[Option<bool>]) -> Option<usize> {
+fn first_lasting_sky(is_sky: &[Option<bool>]) -> Option<usize> {
     let (mut first, mut sky, mut all) = (None, 0, 0);
     // The loop begins at the far end, so that each place is added to those behind it.
     for (k, seen) in is_sky.iter().enumerate().rev() {
         let Some(is_sky) = *seen else { continue };
         all += 1;
         sky += usize::from(is_sky);
-        if is_sky && all >= 3 && sky * FOR_GOOD[1] >= all * FOR_GOOD[0] {
+        if is_sky && all >= 3 && sky * MIN_SKY_SHARE[1] >= all * MIN_SKY_SHARE[0] {
             first = Some(k);
         }
     }

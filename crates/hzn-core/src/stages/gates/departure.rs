@@ -191,7 +191,7 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
         return false;
     }
     let mut on_cone = Mean::default();
-    for (block, lane) in super::inliers(blocks, super::LOOKS) {
+    for (block, lane) in super::inliers(blocks, super::MAX_PLACES) {
         let [gu, gv] = block.gradient_at(lane, curve.axis());
         if let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) {
             on_cone.add(edge.contrast([at.u, at.v], [-gv, gu]));

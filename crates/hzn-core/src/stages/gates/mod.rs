@@ -236,7 +236,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let support = (covered_px / limb_px.max(T::one())).min(T::one());
     let sigma_limit = T::from_f64(config.max_sigma_deg.to_radians());
     let chi = T::from_f64(config.max_half_angle_sigma);
-    let least = config.min_inliers.min(small(expected.sin, camera, 3)).min(few_rows(camera, 3));
+    let least = config.min_inliers.min(small_disc_points(expected.sin, camera, 3)).min(small_picture_points(camera, 3));
     let counts = |n: u32| T::from_i32(n as i32);
     let verdict = if counts(fit.inliers) < counts(points) * T::from_f64(config.min_inlier_share) {
         Verdict::NoConsensus
@@ -246,7 +246,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::ShortArc
     } else if !(fit.rms_px <= T::from_f64(config.max_rms_px) * raised) {
         Verdict::Residuals
-    } else if !(fused.chi2 <= chi * chi) || !blooms_to(&fit.c, expected, camera, config) {
+    } else if !(fused.chi2 <= chi * chi) || !is_possible_size(&fit.c, expected, camera, config) {
         Verdict::HalfAngle
     } else if !(sigma_max_rad <= sigma_limit) {
         Verdict::Uncertain
@@ -257,14 +257,14 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     {
         Verdict::Indistinct
     } else {
-        surroundings(fused, expected, blocks, binary, camera, config)
+        check_surroundings(fused, expected, blocks, binary, camera, config)
     };
     let verdict = match verdict {
         Verdict::Passed => attitude::verdict(&fused.e, sigma_max_rad, expected, config),
         failed => failed,
     };
     let verdict = match verdict {
-        Verdict::Passed => rivals(fit, fused, expected, blocks, points, support, binary, camera, config),
+        Verdict::Passed => check_rivals(fit, fused, expected, blocks, points, support, binary, camera, config),
         failed => failed,
     };
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support }
@@ -277,7 +277,7 @@ fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Conf
 }
 
 /// Tests whether the sky is beyond the fitted limb, and the body is inside.
-fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
+fn check_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     fused: &Fused<T>,
     expected: &Expected<T>,
     blocks: &[Block<T>],
@@ -285,7 +285,7 @@ fn surroundings<T: Real, P: Pixels, O: Observer<T>>(
     camera: &Camera<T>,
     config: &Config,
 ) -> Verdict {
-    let sky = sky::beyond(&fused.e, blocks, binary, camera);
+    let sky = sky::measure_sky(&fused.e, blocks, binary, camera);
     if sky.lit > T::from_f64(config.max_lit_sky) {
         return Verdict::NoSky;
     }
@@ -312,7 +312,7 @@ fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T {
 
 /// Tests whether the points belong to another curve. They pass if they fit the cone as well as other shapes, if they
 /// agree with its half-angle within their own noise, and if the edge does not continue next to the cone.
-fn rivals<T: Real, P: Pixels, O: Observer<T>>(
+fn check_rivals<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
     expected: &Expected<T>,
@@ -375,7 +375,7 @@ fn least_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
 
 /// Whether a body with a free half-angle can appear with the half-angle of cosine `c`. Other bodies always pass,
 /// because another gate compares them with the expected half-angle.
-fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config: &Config) -> bool {
+fn is_possible_size<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config: &Config) -> bool {
     let sin = (T::one() - *c * *c).max(T::ZERO).sqrt();
     let (fx, fy) = camera.focal_px();
     let px = T::one() / fx.min(fy);
@@ -393,7 +393,7 @@ fn blooms_to<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config:
 
 /// Returns one `part`-th of the circumference of the body's disc in pixels, at least 8. A small body needs no more
 /// points.
-pub(crate) fn small<T: Real>(sin: T, camera: &Camera<T>, part: i32) -> u16 {
+pub(crate) fn small_disc_points<T: Real>(sin: T, camera: &Camera<T>, part: i32) -> u16 {
     let (fx, fy) = camera.focal_px();
     let around = T::from_f64(core::f64::consts::PI) * (fx + fy) * sin;
     (around / T::from_i32(part)).to_i32().clamp(8, i32::from(u16::MAX)) as u16
@@ -405,7 +405,7 @@ const SMALL_PICTURE: u16 = 80;
 
 /// Returns one `part`-th of the shorter side of a small picture in pixels, at least 8. In a thermal array of 24 rows, a
 /// limb has no more points. Other pictures have no limit.
-pub(crate) fn few_rows<T: Real>(camera: &Camera<T>, part: u16) -> u16 {
+pub(crate) fn small_picture_points<T: Real>(camera: &Camera<T>, part: u16) -> u16 {
     let side = camera.width().min(camera.height());
     if side < SMALL_PICTURE { (side / part.max(1)).max(8) } else { u16::MAX }
 }
@@ -429,7 +429,7 @@ fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (
 }
 
 /// Number of inliers from which the gates look outwards and inwards.
-const LOOKS: usize = 12;
+const MAX_PLACES: usize = 12;
 
 /// Distance from the limb at which the brightness on both sides is read for the threshold of the next picture, in
 /// pixels.
@@ -444,7 +444,7 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
     camera: &Camera<T>,
 ) -> Option<u16> {
     let (mut dark, mut lit, mut looks) = (0u32, 0u32, 0u32);
-    for (block, lane) in inliers(blocks, LOOKS) {
+    for (block, lane) in inliers(blocks, MAX_PLACES) {
         let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
         let [gu, gv] = block.gradient_at(lane, e);
         let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));

@@ -104,7 +104,7 @@ pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
             let _ = all.push(second);
         }
     }
-    median::of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
+    median::median_of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
 }
 
 /// Returns the arc over which the residuals are correlated, in points of the shape: 1 + 2 Σ ρ_k up to the first below

@@ -26,15 +26,15 @@ pub(super) struct Sky<T> {
 }
 
 /// Reads the brightness from the limb outwards to the border of the region.
-pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
+pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
 ) -> Sky<T> {
     let (mut looks, mut lit) = (0, 0);
-    let mut seen = heapless::Vec::<u16, { super::LOOKS * OUTWARDS }>::new();
-    for (block, lane) in super::inliers(blocks, super::LOOKS) {
+    let mut seen = heapless::Vec::<u16, { super::MAX_PLACES * OUTWARDS }>::new();
+    for (block, lane) in super::inliers(blocks, super::MAX_PLACES) {
         let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
         let [gu, gv] = block.gradient_at(lane, e);
         let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
@@ -58,11 +58,11 @@ pub(super) fn beyond<T: Real, P: Pixels, O: Observer<T>>(
             distance = (distance + distance).max(T::from_f64(NEAREST_PX));
         }
     }
-    let middle = median::of_counts(&seen);
+    let middle = median::median_of_counts(&seen);
     for b in &mut seen {
         *b = b.abs_diff(middle);
     }
-    let spread = median::of_counts(&seen);
+    let spread = median::median_of_counts(&seen);
     Sky {
         lit: T::from_i32(lit) / T::from_i32(looks.max(1)),
         median: T::from_i32(middle.into()),

@@ -5,13 +5,13 @@ use crate::model::work::{POINT, WorkBudget};
 use crate::stages::edge_points::SubPixel;
 
 /// Returns the whole work budget of a picture, for lists that hold `pixels` border pixels.
-pub(super) fn open(config: &Config, pixels: usize) -> WorkBudget {
-    WorkBudget::new(&config.limits, pixels, point(config.candidates.sub_pixel, 0))
+pub(super) fn new(config: &Config, pixels: usize) -> WorkBudget {
+    WorkBudget::new(&config.limits, pixels, point_cost(config.candidates.sub_pixel, 0))
 }
 
 /// Returns the cost of a sub-pixel point with its ray, in steps of the border follower. `mask` is the cost of one look
 /// at the mask.
-pub(super) fn point(method: SubPixel, mask: u32) -> u32 {
+pub(super) fn point_cost(method: SubPixel, mask: u32) -> u32 {
     // The cost above that of the default method, and the number of looks at the mask.
     let (more, looks) = match method {
         SubPixel::Linear | SubPixel::None => (0, 0),
