@@ -1,7 +1,7 @@
 //! Preset and gates of Braun & Barf 2022: plausibility (3.5) and the residual in the principal frame ((25) to (28),
 //! 7.3).
 
-use super::{disable_gates, set_given_noise};
+use super::common::{disable_gates, set_given_noise};
 use crate::base::linalg::{V3, basis};
 use crate::base::real::Real;
 use crate::config::Config;

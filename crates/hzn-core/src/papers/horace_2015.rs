@@ -1,6 +1,6 @@
 //! HORACE: preset, and gate on the radius of the circle (Barf 2014, (2.31) to (2.36)).
 
-use super::{disable_gates, set_given_noise};
+use super::common::{disable_gates, set_given_noise};
 use crate::base::real::Real;
 use crate::config::Config;
 use crate::config::retry;

@@ -1,6 +1,6 @@
 //! The infrared Earth sensor of Wang et al. 2022.
 
-use super::{disable_gates, set_given_noise};
+use super::common::{disable_gates, set_given_noise};
 use crate::config::Config;
 use crate::stages::{consensus, contour, edge_points, fit};
 

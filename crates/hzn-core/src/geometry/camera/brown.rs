@@ -1,6 +1,7 @@
 //! Brown-Conrady: a pinhole with radial and tangential distortion, with the coefficients in OpenCV's order.
 
 use super::config::Config;
+use super::ray::radial_ray;
 use crate::base::error::{ConfigError, Limit};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -110,7 +111,7 @@ impl<T: Real> Brown<T> {
             return None;
         }
         let z = T::one() / (T::one() + x * x + y * y).sqrt();
-        let (s, [pa, pb, pc, pd]) = super::radial_ray(x, y, z, z, z * z);
+        let (s, [pa, pb, pc, pd]) = radial_ray(x, y, z, z, z * z);
         let [ia, ib, ic, id] = inverse;
         Some((s, [pa * ia + pb * ic, pa * ib + pb * id, pc * ia + pd * ic, pc * ib + pd * id]))
     }

@@ -1,8 +1,11 @@
 //! `[camera]` of sensor.toml.
 
-use super::uncertain::INTRINSICS;
 use crate::base::error::{ConfigError, Limit, between, require};
 use crate::base::keys::{Form, Section, Value, choices, section};
+
+/// Maximum number of intrinsic parameters: two focal lengths, two coordinates of the principal point, five
+/// coefficients.
+pub(crate) const INTRINSICS: usize = 9;
 
 choices! {
     /// The projection of the lens.

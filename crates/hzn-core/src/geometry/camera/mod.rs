@@ -10,12 +10,17 @@ mod curve;
 mod double_sphere;
 #[cfg(feature = "kalibr")]
 mod eucm;
+mod lens;
 mod radial;
+mod ray;
 mod shutter;
 mod uncertain;
 
+pub(crate) use config::INTRINSICS;
 pub use config::{Config, Covariance, Intrinsic, Model};
-pub(crate) use uncertain::INTRINSICS;
+use lens::Lens;
+pub use ray::Ray;
+use ray::radial_ray;
 
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
@@ -50,47 +55,6 @@ pub struct Camera<T> {
     middle_row: T,
     /// How the camera turns while this picture is read out.
     turning: Option<shutter::Turning<T>>,
-}
-
-#[derive(Debug, Clone)]
-enum Lens<T> {
-    Radial(radial::Radial<T>),
-    Pinhole,
-    Brown(brown::Brown<T>),
-}
-
-/// The ray of a pixel and its derivative by the pixel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ray<T> {
-    /// Unit vector in the camera frame.
-    pub(crate) s: V3<T>,
-    /// `[∂a/∂u, ∂a/∂v, ∂b/∂u, ∂b/∂v]`, where a and b are the coordinates of the ray's change in the tangent basis that
-    /// [`tangent`] spans at `s`; radians per pixel.
-    pub(crate) m: [T; 4],
-}
-
-/// Returns the tangent basis at `s`: the images of x and y under the shortest rotation that takes z to `s`. It is
-/// smooth everywhere except at `s` = −z, which no lens sees.
-#[inline(always)]
-pub(crate) fn tangent<T: Real>(s: &V3<T>) -> [V3<T>; 2] {
-    let one = T::one();
-    let q = one / (one + s.z);
-    let xy = -s.x * s.y * q;
-    [V3::new(one - s.x * s.x * q, xy, -s.x), V3::new(xy, one - s.y * s.y * q, -s.y)]
-}
-
-impl<T: Real> Ray<T> {
-    /// Returns the direction.
-    pub fn direction(&self) -> UnitVec3<Cam, T> {
-        UnitVec3::assume_unit(self.s)
-    }
-    /// Returns the derivative of the ray by (u, v): rows x, y, z; radians per pixel.
-    pub fn jacobian(&self) -> [[T; 2]; 3] {
-        let [a, b] = tangent(&self.s);
-        let [au, av, bu, bv] = self.m;
-        let row = |a: T, b: T| [a * au + b * bu, a * av + b * bv];
-        [row(a.x, b.x), row(a.y, b.y), row(a.z, b.z)]
-    }
 }
 
 impl<T: Real> Camera<T> {
@@ -300,7 +264,7 @@ impl<T: Real> Camera<T> {
     pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
         match &self.turning {
             None => self.project_in_row_frame(d.v()),
-            Some(turning) => turning.project(self, d.v()),
+            Some(turning) => turning.project(d.v(), |s| self.project_in_row_frame(s)),
         }
     }
 
@@ -322,20 +286,34 @@ impl<T: Real> Camera<T> {
         };
         Some(ImagePoint { u: x * self.fx + self.cx, v: y * self.fy + self.cy })
     }
-}
 
-/// Returns the ray and its derivative for a radially symmetric lens: `scale` = sin θ / ρ, `cos` = cos θ,
-/// `dtheta` = dθ/dρ.
-///
-/// In the tangent basis of [`tangent`] the derivative by (x, y) is `scale`·I + (`dtheta` − `scale`)·u uᵀ with u the
-/// unit vector of (x, y) (math: J = t_r dθ/dρ uᵀ + t_φ (sin θ/ρ) u⊥ᵀ, and the basis turns t_r to u, t_φ to u⊥).
-#[inline(always)]
-fn radial_ray<T: Real>(x: T, y: T, scale: T, cos: T, dtheta: T) -> (V3<T>, [T; 4]) {
-    let s = V3::new(x * scale, y * scale, cos);
-    let rho2 = x * x + y * y;
-    let k = if rho2 > T::from_f64(1e-24) { (dtheta - scale) / rho2 } else { T::zero() };
-    let xy = k * x * y;
-    (s, [scale + k * x * x, xy, xy, scale + k * y * y])
+    /// Returns this camera with a rate of rotation. With a rolling shutter, rays and projected directions then refer to
+    /// the camera frame at the time of the middle row. `rate_rad_s` is the camera's rate of rotation against the stars
+    /// or the ground, in its own axes, rad/s. Without a rolling shutter the rate has no effect.
+    pub fn turning(&self, rate_rad_s: Option<[T; 3]>) -> Self {
+        let turning = rate_rad_s
+            .filter(|_| self.has_rolling_shutter())
+            .map(|rate| shutter::Turning::new(rate, self.row_s, self.middle_row));
+        Self { turning, ..self.clone() }
+    }
+
+    /// Returns whether rows are exposed one after the other, so that a rate of rotation has an effect.
+    pub fn has_rolling_shutter(&self) -> bool {
+        self.row_s != T::ZERO
+    }
+
+    /// Returns the 1-sigma modes of the intrinsic parameters; `None` for a lens that is known exactly.
+    pub(crate) fn intrinsic_modes(&self) -> Option<&[[T; INTRINSICS]]> {
+        (!self.modes.is_empty()).then_some(&self.modes)
+    }
+
+    /// Returns the motion of the image point of the ray `s` (camera frame), in pixels (u, v), when each parameter grows
+    /// by 1 in the relative units.
+    pub(crate) fn shift_by_intrinsics(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
+        let (one, zero) = (T::one(), T::ZERO);
+        let (x, y, [k1, k2, k3, k4, k5]) = self.lens.by_coefficients(s);
+        [[x, zero], [zero, y], [one, zero], [zero, one], k1, k2, k3, k4, k5].map(|[u, v]| [u * self.fx, v * self.fy])
+    }
 }
 
 /// `hypot` for the checks at load time, from the same library on every target.

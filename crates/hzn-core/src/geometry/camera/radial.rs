@@ -7,7 +7,7 @@
 
 use super::config::Config;
 use super::curve::Curve;
-use super::radial_ray;
+use super::ray::radial_ray;
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
 use crate::base::real::Real;

@@ -4,7 +4,7 @@
 //! ray s_t in its current frame. With the camera's rate ω in its own axes, the same direction is exp([ω t]×) s_t in the
 //! camera frame at the picture's time, where t = readout · (row/(h − 1) − ½). All rays are returned in that frame.
 
-use super::{Camera, Ray, tangent};
+use super::ray::{Ray, tangent};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::pixel::ImagePoint;
@@ -22,24 +22,13 @@ pub(super) struct Turning<T> {
 /// or less.
 const ROW_ITERATIONS: usize = 4;
 
-impl<T: Real> Camera<T> {
-    /// Returns this camera with a rate of rotation. With a rolling shutter, rays and projected directions then refer to
-    /// the camera frame at the time of the middle row. `rate_rad_s` is the camera's rate of rotation against the stars
-    /// or the ground, in its own axes, rad/s. Without a rolling shutter the rate has no effect.
-    pub fn turning(&self, rate_rad_s: Option<[T; 3]>) -> Self {
-        let turning = rate_rad_s
-            .filter(|_| self.has_rolling_shutter())
-            .map(|rate| Turning { per_row: V3::from(rate) * self.row_s, middle: self.middle_row });
-        Self { turning, ..self.clone() }
-    }
-
-    /// Returns whether rows are exposed one after the other, so that a rate of rotation has an effect.
-    pub fn has_rolling_shutter(&self) -> bool {
-        self.row_s != T::ZERO
-    }
-}
-
 impl<T: Real> Turning<T> {
+    /// Makes the rotation for a rate in rad/s, in the camera's axes. `row_s` is the time from one row to the next, and
+    /// `middle` is the row that is exposed at the picture's time.
+    pub(super) fn new(rate_rad_s: [T; 3], row_s: T, middle: T) -> Self {
+        Self { per_row: V3::from(rate_rad_s) * row_s, middle }
+    }
+
     /// Converts a ray of row `v` to the camera frame at the picture's time.
     // One copy in flash.
     #[inline(never)]
@@ -57,11 +46,15 @@ impl<T: Real> Turning<T> {
     }
 
     /// Returns the image point of a direction in the camera frame at the picture's time, at the row that sees the
-    /// direction.
-    pub(super) fn project(&self, camera: &Camera<T>, s: &V3<T>) -> Option<ImagePoint<T>> {
-        let mut p = camera.project_in_row_frame(s)?;
+    /// direction. `in_row_frame` projects a direction in the camera frame at the time of its row.
+    pub(super) fn project(
+        &self,
+        s: &V3<T>,
+        in_row_frame: impl Fn(&V3<T>) -> Option<ImagePoint<T>>,
+    ) -> Option<ImagePoint<T>> {
+        let mut p = in_row_frame(s)?;
         for _ in 0..ROW_ITERATIONS {
-            p = camera.project_in_row_frame(&rotate(s, &(self.per_row * (self.middle - p.v))))?;
+            p = in_row_frame(&rotate(s, &(self.per_row * (self.middle - p.v))))?;
         }
         Some(p)
     }
@@ -78,6 +71,7 @@ fn rotate<T: Real>(s: &V3<T>, angle: &V3<T>) -> V3<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::Camera;
     use crate::geometry::camera::{Config, Model};
     use crate::geometry::frames::UnitVec3;
 

@@ -4,15 +4,9 @@
 //! Parameters are relative: focal lengths as fractions of themselves, the principal point in focal lengths. In these
 //! units a rectangle of the picture and a scaled picture have the same numbers.
 
-use super::config::{Config, Intrinsic, Model};
-use super::{Camera, Lens};
+use super::config::{Config, INTRINSICS, Intrinsic, Model};
 use crate::base::error::{ConfigError, Limit, require};
-use crate::base::linalg::V3;
 use crate::base::real::Real;
-
-/// Maximum number of intrinsic parameters: two focal lengths, two coordinates of the principal point, five
-/// coefficients.
-pub(crate) const INTRINSICS: usize = 9;
 
 /// 1-sigma changes of all parameters at once. The modes are independent of each other; their outer products add up to
 /// the covariance.
@@ -25,7 +19,7 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
     if let Some(given) = &config.covariance {
         let order = &given.order;
         let field = "camera.covariance.order";
-        let places = order.iter().map(|i| i.place(config.model));
+        let places = order.iter().map(|i| i.index_in(config.model));
         for (n, place) in places.clone().enumerate() {
             let rule = "a parameter that this lens model does not have";
             require(place.is_some(), field, n as f64, Limit::Rule(rule))?;
@@ -105,50 +99,9 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
     Ok(columns)
 }
 
-impl<T: Real> Camera<T> {
-    /// Returns the 1-sigma modes of the intrinsic parameters; `None` for a lens that is known exactly.
-    pub(crate) fn intrinsic_modes(&self) -> Option<&[[T; INTRINSICS]]> {
-        (!self.modes.is_empty()).then_some(&self.modes)
-    }
-
-    /// Returns the motion of the image point of the ray `s` (camera frame), in pixels (u, v), when each parameter grows
-    /// by 1 in the relative units.
-    pub(crate) fn shift_by_intrinsics(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
-        let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
-        let h2 = s.x * s.x + s.y * s.y;
-        // These are the image point in focal lengths and its derivatives by the coefficients.
-        let (x, y, by_k): (T, T, [[T; 2]; 5]) = match &self.lens {
-            Lens::Radial(lens) => {
-                let h = h2.sqrt();
-                let theta = h.atan2(s.z);
-                let per = if h > zero { one / h } else { zero };
-                let radius = if h > zero { lens.radius(theta) * per } else { one };
-                let by_k = lens.by_coefficients(theta, per).map(|by| [s.x * by, s.y * by]);
-                (s.x * radius, s.y * radius, by_k)
-            }
-            Lens::Pinhole => (s.x / s.z, s.y / s.z, [[zero; 2]; 5]),
-            Lens::Brown(lens) => {
-                let (x, y) = (s.x / s.z, s.y / s.z);
-                let q = x * x + y * y;
-                let (dx, dy) = lens.distort(x, y);
-                let by_k = [
-                    [x * q, y * q],
-                    [x * q * q, y * q * q],
-                    [two * x * y, q + two * y * y],
-                    [q + two * x * x, two * x * y],
-                    [x * q * q * q, y * q * q * q],
-                ];
-                (dx, dy, by_k)
-            }
-        };
-        let [k1, k2, k3, k4, k5] = by_k;
-        [[x, zero], [zero, y], [one, zero], [zero, one], k1, k2, k3, k4, k5].map(|[u, v]| [u * self.fx, v * self.fy])
-    }
-}
-
 impl Intrinsic {
     /// Returns the parameter's place among those of a model; `None` if the model does not have the parameter.
-    fn place(self, model: Model) -> Option<usize> {
+    fn index_in(self, model: Model) -> Option<usize> {
         match self {
             Self::FxPx => Some(0),
             Self::FyPx => Some(1),

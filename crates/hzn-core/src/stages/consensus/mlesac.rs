@@ -5,8 +5,9 @@
 //! expectation-maximisation find the share γ of inliers. The hypothesis with the smallest −Σ ln(γ N(d; σ) + (1 − γ)/ν)
 //! wins. Every draw evaluates every point several times, with one exponential each.
 
+use super::config::Config;
+use super::inliers::{Consensus, Threshold};
 use super::sampled::{FEWEST, conclude, distances2, draw_cone, required_draws};
-use super::{Config, Consensus, Threshold};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;

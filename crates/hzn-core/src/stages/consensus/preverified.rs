@@ -9,8 +9,9 @@
 //! all five points are on the limb, which needs 7195 draws for the same p. With 286 draws in all, only 8.7 % of these
 //! pictures are solved. Here `max_draws` limits the number of draws.
 
+use super::config::Config;
+use super::inliers::{Consensus, Threshold};
 use super::sampled::{conclude, count_inliers, distances2, point};
-use super::{Config, Consensus, Threshold};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;

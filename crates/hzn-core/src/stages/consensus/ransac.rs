@@ -5,8 +5,9 @@
 //! knowledge: neither the half-angle nor the side of the edge on which the light is. Every draw is compared with every
 //! point. The default method, `two-point`, is better in these respects.
 
+use super::config::Config;
+use super::inliers::{Consensus, Threshold};
 use super::sampled::{FEWEST, conclude, count_inliers, draw_cone, required_draws};
-use super::{Config, Consensus, Threshold};
 use crate::base::real::Real;
 use crate::base::rng::Rng;
 use crate::geometry::block::Block;

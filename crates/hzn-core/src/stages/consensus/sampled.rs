@@ -1,6 +1,6 @@
 //! Common parts of the published samplers: cones through three points that are compared with every point.
 
-use super::Consensus;
+use super::inliers::Consensus;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;

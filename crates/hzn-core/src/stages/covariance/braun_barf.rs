@@ -15,10 +15,11 @@
 //!   normalised. A filter does not need full rank: P can be projected on the plane perpendicular to e. The overbound is
 //!   an option; it is about twenty times too large.
 
-use super::{Config, EdgeNoise, Fused};
+use super::answer::{EdgeNoise, Fused};
 use crate::base::linalg::{M3, V3, basis, symmetric_eigen};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
+use crate::model::edge_noise::Config;
 use crate::stages::fit::Fit;
 use crate::stages::fit::direct::{LEAST_Z, Normal};
 

@@ -20,12 +20,13 @@
 //! normal equations; a signal that the cone can follow is then fitted completely.
 
 use super::noise::EdgeNoiseModel;
-use super::{Term, response};
+use super::sandwich::response;
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::camera::{Camera, INTRINSICS};
 use crate::model::body::Expected;
+use crate::model::error_budget::Term;
 use crate::stages::fit::Fit;
 
 /// Largest number of points over which the signals are summed, evenly along the edge.

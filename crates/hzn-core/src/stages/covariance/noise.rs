@@ -1,10 +1,12 @@
 //! Size and correlation length of the errors of the edge points, from the configuration or from the residuals.
 
-use super::{Config, EdgeNoise, Noise, correlated};
+use super::answer::EdgeNoise;
+use super::gauss_markov::correlated;
 use crate::base::linalg::basis;
 use crate::base::real::Real;
 use crate::geometry::block::Block;
 use crate::model::body::Expected;
+use crate::model::edge_noise::{Config, Noise};
 use crate::stages::fit::Fit;
 
 /// Ratio of the edge length to the correlation length, with `rms`. The fit absorbs the longest wavelengths of the

@@ -12,7 +12,7 @@
 //! ln L ~ N(ln(arc/4), 0.7²). A flat prior would make the sigma of a disc three times too large, and without a white
 //! part the process would have an L of a few pixels.
 
-use super::correlated;
+use super::gauss_markov::correlated;
 use crate::base::linalg::{basis, invert_spd3};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};

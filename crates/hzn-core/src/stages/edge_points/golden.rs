@@ -1,6 +1,7 @@
 //! Tests the accuracy of each method on blurred steps that are integrated over the pixels, with noise.
 
 use super::*;
+use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
 use crate::image::{Grey, Layout};
 use crate::model::observer::Unobserved;

@@ -1,6 +1,6 @@
 //! Attitude gates: compare the axis with a prior attitude and with the last answer.
 
-use super::Config;
+use super::config::Config;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, UnitVec3};

@@ -1,6 +1,7 @@
 //! Band gate: a band has sky on both sides, for example a ring, a streak or the frame of a window. Inside a limb is the
 //! body.
 
+use super::places::{MAX_PLACES, inliers};
 use super::sky;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -39,7 +40,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
     step: T,
 ) -> T {
     let (mut looks, mut bands) = (0, 0);
-    for (block, lane) in super::inliers(blocks, super::MAX_PLACES) {
+    for (block, lane) in inliers(blocks, MAX_PLACES) {
         let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
         let [gu, gv] = block.gradient_at(lane, e);
         let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));

@@ -1,7 +1,8 @@
 //! Departure gate: an edge that continues smoothly next to the fitted cone is evidence against a limb, because a limb
 //! stays on its cone.
 
-use super::Config;
+use super::config::Config;
+use super::places::{MAX_PLACES, inliers};
 use super::shape::Curve;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
@@ -191,7 +192,7 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
         return false;
     }
     let mut on_cone = Mean::default();
-    for (block, lane) in super::inliers(blocks, super::MAX_PLACES) {
+    for (block, lane) in inliers(blocks, MAX_PLACES) {
         let [gu, gv] = block.gradient_at(lane, curve.axis());
         if let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) {
             on_cone.add(edge.contrast([at.u, at.v], [-gv, gu]));

@@ -1,6 +1,6 @@
 //! Compares the fitted half-angle with the expected one, using the noise of the residuals instead of the given noise.
 
-use super::Config;
+use super::config::Config;
 use crate::base::linalg::basis;
 use crate::base::real::Real;
 use crate::geometry::block::Block;

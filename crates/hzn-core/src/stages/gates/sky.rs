@@ -1,5 +1,6 @@
 //! Sky gate: the sky is beyond the fitted limb, except where an object is in front of it.
 
+use super::places::{MAX_PLACES, inliers};
 use crate::base::linalg::V3;
 use crate::base::median;
 use crate::base::real::Real;
@@ -33,8 +34,8 @@ pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
     camera: &Camera<T>,
 ) -> Sky<T> {
     let (mut looks, mut lit) = (0, 0);
-    let mut seen = heapless::Vec::<u16, { super::MAX_PLACES * OUTWARDS }>::new();
-    for (block, lane) in super::inliers(blocks, super::MAX_PLACES) {
+    let mut seen = heapless::Vec::<u16, { MAX_PLACES * OUTWARDS }>::new();
+    for (block, lane) in inliers(blocks, MAX_PLACES) {
         let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
         let [gu, gv] = block.gradient_at(lane, e);
         let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));

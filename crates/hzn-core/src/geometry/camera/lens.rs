@@ -1,0 +1,45 @@
+//! The lens models behind one interface.
+
+use super::{brown, radial};
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+
+#[derive(Debug, Clone)]
+pub(super) enum Lens<T> {
+    Radial(radial::Radial<T>),
+    Pinhole,
+    Brown(brown::Brown<T>),
+}
+
+impl<T: Real> Lens<T> {
+    /// Returns the image point of the ray `s` (camera frame) in focal lengths from the principal point, and its
+    /// derivatives by the coefficients of the lens.
+    #[inline(always)]
+    pub(super) fn by_coefficients(&self, s: &V3<T>) -> (T, T, [[T; 2]; 5]) {
+        let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
+        match self {
+            Self::Radial(lens) => {
+                let h = (s.x * s.x + s.y * s.y).sqrt();
+                let theta = h.atan2(s.z);
+                let per = if h > zero { one / h } else { zero };
+                let radius = if h > zero { lens.radius(theta) * per } else { one };
+                let by_k = lens.by_coefficients(theta, per).map(|by| [s.x * by, s.y * by]);
+                (s.x * radius, s.y * radius, by_k)
+            }
+            Self::Pinhole => (s.x / s.z, s.y / s.z, [[zero; 2]; 5]),
+            Self::Brown(lens) => {
+                let (x, y) = (s.x / s.z, s.y / s.z);
+                let q = x * x + y * y;
+                let (dx, dy) = lens.distort(x, y);
+                let by_k = [
+                    [x * q, y * q],
+                    [x * q * q, y * q * q],
+                    [two * x * y, q + two * y * y],
+                    [q + two * x * x, two * x * y],
+                    [x * q * q * q, y * q * q * q],
+                ];
+                (dx, dy, by_k)
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Shape of a picture in memory, and why a picture can be refused.
+
+use core::fmt;
+
+/// Why a picture was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageError {
+    /// Width or height is zero, or above 65535.
+    Size,
+    /// The stride is shorter than a row of samples.
+    Stride,
+    /// The slice ends before the end of the last row.
+    TooShort,
+    /// There is no channel with that number, or the number of channels is zero.
+    Channel,
+    /// Bits per sample are not 8 for bytes, or not 8 to 16 for words.
+    Bits,
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Size => "width and height must be 1 to 65535 pixels",
+            Self::Stride => "the row stride is shorter than a row of samples",
+            Self::TooShort => "the picture's data end before its last row",
+            Self::Channel => "there is no channel of that number",
+            Self::Bits => "bits per sample must be 8 for bytes and 8 to 16 for words",
+        })
+    }
+}
+
+impl core::error::Error for ImageError {}
+
+/// Shape of a picture in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples from the start of a row to the start of the next; at least `width * channels`.
+    pub stride: usize,
+    /// Interleaved samples per pixel: 1 grey, 3 RGB, 4 RGBA.
+    pub channels: u8,
+    /// Significant bits of a sample: 8 for bytes, 8 to 16 for words.
+    pub bits: u8,
+}
+
+impl Layout {
+    /// Makes the layout of a picture without padding.
+    pub const fn packed(width: u32, height: u32, channels: u8, bits: u8) -> Self {
+        Self { width, height, stride: width as usize * channels as usize, channels, bits }
+    }
+}

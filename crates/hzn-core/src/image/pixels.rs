@@ -1,0 +1,100 @@
+//! The interface between a picture and the pipeline.
+
+use crate::geometry::block::Lit;
+
+/// The input of the pipeline: one brightness per pixel.
+pub trait Pixels {
+    /// Whether the picture arrived row by row and is no longer in memory. Only [`Self::streamed_point`] then has its
+    /// edges.
+    const STREAMED: bool = false;
+    /// Returns the number of columns, 1 to 65535.
+    fn width(&self) -> u16;
+    /// Returns the number of rows, 1 to 65535.
+    fn height(&self) -> u16;
+    /// Returns the largest value that a sample can have, for example 255 or 4095.
+    fn full_scale(&self) -> u16;
+    /// Returns the index of column `x`, row `y` in memory, for [`Self::read`].
+    fn index(&self, x: u16, y: u16) -> usize;
+    /// Returns the index distance from a column to the next.
+    fn across(&self) -> usize;
+    /// Returns the index distance from a row to the next.
+    fn down(&self) -> usize;
+    /// Returns the brightness at an index; 0 beyond the end.
+    fn read(&self, index: usize) -> u16;
+    /// Returns the brightness at an index and at the two columns to the right of it.
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        [0, 1, 2].map(|k| self.read(index + k * self.across()))
+    }
+    /// Counts pixels from an index to the right, up to `count`, before the first that is not as `lit` says. A pixel is
+    /// lit at `level` or above.
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()
+    }
+    /// Returns the edge point of a border pixel, for a picture that arrived row by row. The point was measured while
+    /// the rows around it were in memory.
+    fn streamed_point(&self, _x: u16, _y: u16) -> Option<StreamedPoint> {
+        None
+    }
+    /// Returns the brightness at column `x`, row `y`. The caller must stay within the picture; beyond it, the result is
+    /// some other pixel or 0.
+    #[inline(always)]
+    fn at(&self, x: u16, y: u16) -> u16 {
+        self.read(self.index(x, y))
+    }
+}
+
+/// An edge point that is stored with its border pixel, see [`Pixels::streamed_point`].
+#[derive(Debug, Clone, Copy)]
+pub struct StreamedPoint {
+    /// Distance from the pixel's centre, away from the light, px.
+    pub(crate) towards_dark_px: f32,
+    pub(crate) lit: Lit,
+    /// Whether the point is located at the picture's threshold, because no local mid-level was found.
+    pub(crate) fallback: bool,
+    /// Whether its lit side is clipped at full scale.
+    pub(crate) clipped: bool,
+    /// Whether its plateaus were not within the rows that were held.
+    pub(crate) cut: bool,
+}
+
+impl<P: Pixels> Pixels for &P {
+    const STREAMED: bool = P::STREAMED;
+    fn streamed_point(&self, x: u16, y: u16) -> Option<StreamedPoint> {
+        (**self).streamed_point(x, y)
+    }
+    fn width(&self) -> u16 {
+        (**self).width()
+    }
+    fn height(&self) -> u16 {
+        (**self).height()
+    }
+    fn full_scale(&self) -> u16 {
+        (**self).full_scale()
+    }
+    #[inline(always)]
+    fn index(&self, x: u16, y: u16) -> usize {
+        (**self).index(x, y)
+    }
+    #[inline(always)]
+    fn across(&self) -> usize {
+        (**self).across()
+    }
+    #[inline(always)]
+    fn down(&self) -> usize {
+        (**self).down()
+    }
+    #[inline(always)]
+    fn read(&self, index: usize) -> u16 {
+        (**self).read(index)
+    }
+    #[inline(always)]
+    fn three(&self, index: usize) -> [u16; 3] {
+        (**self).three(index)
+    }
+    #[inline(always)]
+    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        (**self).alike(index, count, level, lit)
+    }
+}

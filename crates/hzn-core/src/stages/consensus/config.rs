@@ -1,0 +1,41 @@
+//! `[reject]` of sensor.toml: the cone that most edge points agree on, and their outliers.
+
+use crate::base::keys::{choices, section};
+
+choices! {
+    /// How the inliers are found.
+    pub enum Method {
+        /// RANSAC on two points with the expected half-angle (three points where that is too uncertain); a further
+        /// point verifies a draw before it is scored.
+        @0 TwoPoint = "two-point";
+        /// Every point is an inlier.
+        @1 None = "none";
+        /// RANSAC on three points; every draw is scored with every point (Braun & Barf 2022, 3.6).
+        @- Ransac = "ransac" needs "dlr";
+        /// RANSAC on five points, of which two verify the cone through the other three before it is scored (Wang et al.
+        /// 2022, 2.3); it needs about 20000 draws.
+        @- RansacPreverify = "ransac-preverify" needs "zju";
+        /// RANSAC on three points by the likelihood of a mixture (Torr & Zisserman 2000).
+        @- Mlesac = "mlesac" needs "zju";
+    }
+}
+
+section! {
+    /// `[reject]` of sensor.toml: the cone that most edge points agree on, and their outliers.
+    "reject" pub struct Config: Copy {
+        /// How the inliers are found.
+        @80 method: Method = Method::TwoPoint, [choice];
+        /// Largest distance of an inlier from the limb, px.
+        @81 threshold_px: f64 = 3.0, [above 0.0 to 1000.0];
+        /// The largest distance is at least this many times the noise from point to point; 0 leaves it at
+        /// `threshold_px`.
+        ///
+        /// It is at most the sigma of the limb height. A threshold that cuts into the noise keeps the points that
+        /// happen to lie near some limb. Two sigmas hold 95 % of a limb's points.
+        @84 noise_sigma: f64 = 2.0, [0.0 to 100.0];
+        /// Seed of the random draws; the same seed gives the same answer.
+        @82 seed: u32 = 1, [0.0 to 4294967295.0];
+        /// Largest number of draws; 800 find the limb among 80 % of outliers.
+        @83 max_draws: u32 = 800, [1.0 to 100000.0];
+    }
+}

@@ -1,0 +1,137 @@
+//! The default method: RANSAC with the expected half-angle, verified on one further point.
+
+use super::config::Config;
+use super::inliers::{Consensus, Threshold};
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::base::rng::Rng;
+use crate::geometry::block::{Block, LANES, sum};
+use crate::geometry::cone::{through_three, through_two};
+use crate::model::body::Expected;
+use crate::model::work::{DRAW, SCORE, WorkBudget};
+
+/// Largest number of blocks that are scored.
+pub(super) const SCORED: usize = 20;
+
+/// Smallest number of draws, even if the first one fits well.
+pub(super) const FEWEST: u32 = 6;
+
+/// Sigma of the expected half-angle in radians.
+pub(super) fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
+    expected.sigma_cos / expected.sin
+}
+
+/// Whether the Sun lights the body where the ray touches it. The answer is yes if the direction of the Sun is unknown.
+/// The surface normal at this place is (s cos α − e)/sin α.
+pub(super) fn is_lit<T: Real>(s: &V3<T>, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
+    expected.sun.as_ref().is_none_or(|sun| s.dot(sun) * c - e.dot(sun) > T::ZERO)
+}
+
+pub(super) fn ray<T: Real>(blocks: &[Block<T>], i: u32) -> Option<V3<T>> {
+    blocks.get(i as usize / LANES).map(|b| b.ray(i as usize % LANES))
+}
+
+pub(super) fn search<T: Real>(
+    blocks: &[Block<T>],
+    count: u32,
+    expected: &Expected<T>,
+    focal_px: T,
+    threshold: Threshold<T>,
+    config: &Config,
+    work: &mut WorkBudget,
+) -> Option<Consensus<T>> {
+    if count < 3 {
+        return None;
+    }
+    let sigma_alpha = sigma_alpha(expected);
+    let free = expected.free || sigma_alpha > T::from_f64(0.0175);
+    // An error of the half-angle bends the edge by a small part of this error. The limit grows accordingly, at most by
+    // three thresholds.
+    let threshold = threshold.px;
+    let bend =
+        if free { T::ZERO } else { (sigma_alpha * focal_px * T::from_f64(0.05)).min(threshold * T::from_f64(3.0)) };
+    let limit2 = (threshold + bend) * (threshold + bend);
+    let scored = blocks.len().div_ceil(SCORED).max(1);
+    let looked_at = blocks.len().div_ceil(scored);
+    let points = looked_at as f64 * LANES as f64;
+    let nothing = limit2 * T::from_f64(points);
+    let mut best_cost = nothing * T::from_f64(0.95);
+    let mut best = None;
+    let mut rng = Rng::new(config.seed);
+    let mut needed = config.max_draws;
+    let mut draws = 0;
+    let score_cost = looked_at as u32 * SCORE;
+    'draws: while draws < needed.max(FEWEST).min(config.max_draws) && work.try_spend(DRAW) {
+        draws += 1;
+        let i = rng.below(count);
+        // Points far apart give a precise cone. Points close together find a limb that is a small part of the edge,
+        // because most neighbours of a limb point are limb points, too. The reach varies from draw to draw.
+        let reach = (count >> (draws % 6)).max(8);
+        let mut near = || (i + 1 + rng.below(reach)) % count;
+        let (j, k, check) = (near(), near(), near());
+        let (Some(a), Some(b)) = (ray(blocks, i), ray(blocks, j)) else { continue };
+        let hypotheses = if free {
+            let Some(third) = ray(blocks, k) else { continue };
+            let Some((e, c)) = through_three(&a, &b, &third) else { continue };
+            [Some((e, c)), None]
+        } else {
+            let Some([e, f]) = through_two(&a, &b, expected.cos) else { continue };
+            [Some((e, expected.cos)), Some((f, expected.cos))]
+        };
+        for (e, c) in hypotheses.into_iter().flatten() {
+            let faces = |i: u32| {
+                let lane = i as usize % LANES;
+                blocks
+                    .get(i as usize / LANES)
+                    .is_some_and(|b| b.is_lit_towards(lane, &e) && is_lit(&b.ray(lane), &e, c, expected))
+            };
+            if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {
+                continue;
+            }
+            if !work.try_spend(score_cost) {
+                break 'draws;
+            }
+            let cost = score(blocks, scored, &e, c, limit2);
+            if cost < best_cost {
+                best_cost = cost;
+                best = Some((e, c));
+                // With the inlier share w, a draw succeeds with probability w³ (w⁴ with three points). After `needed`
+                // draws the probability of a success is 99 %.
+                let share = T::one() - cost / nothing;
+                let p = share * share * share * if free { share } else { T::one() };
+                needed = if p > T::from_f64(0.99) {
+                    FEWEST
+                } else {
+                    (T::from_f64(-4.6) / (T::one() - p).ln()).to_i32().clamp(1, 100_000) as u32
+                };
+            }
+        }
+    }
+    let (e, c) = best?;
+    let share = T::one() - best_cost / nothing;
+    (share > T::from_f64(0.06)).then_some(Consensus { e, c, draws, all: false })
+}
+
+/// Returns the squared distance of a point from the limb, in px².
+pub(super) fn distance2<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T) -> T {
+    let Some(block) = blocks.get(i as usize / LANES) else { return T::from_f64(1e30) };
+    let lane = i as usize % LANES;
+    let r = c - block.ray(lane).dot(e);
+    let [gu, gv] = block.gradient_at(lane, e);
+    r * r / (gu * gu + gv * gv).max(T::from_f64(1e-20))
+}
+
+/// Returns the sum of the squared distances, each at most `limit2`, over every `scored`-th block, in px². Empty lanes
+/// count as outliers.
+pub(super) fn score<T: Real>(blocks: &[Block<T>], scored: usize, e: &V3<T>, c: T, limit2: T) -> T {
+    let mut total = [T::ZERO; LANES];
+    for b in blocks.iter().step_by(scored) {
+        let g = b.gradient(e);
+        for l in 0..LANES {
+            let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
+            let d2 = r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20));
+            total[l] += d2.min(limit2);
+        }
+    }
+    sum(&total)
+}

@@ -1,0 +1,66 @@
+//! Fuses the fitted half-angle with the expected one.
+
+use super::answer::{EdgeNoise, Fused};
+use crate::base::linalg::{M3, V3, basis, invert_spd2, unit};
+use crate::base::real::Real;
+use crate::model::body::Expected;
+use crate::model::error_budget::ErrorBudget;
+use crate::stages::fit;
+use crate::stages::fit::Fit;
+
+/// Fuses a fit and the covariance of its (δ₁₂, δc) with the expected half-angle, unless this half-angle is not to be
+/// used.
+pub(super) fn fused<T: Real>(
+    fit: &Fit<T>,
+    p: &M3<T>,
+    edge: EdgeNoise<T>,
+    expected: &Expected<T>,
+    estimate: &fit::Config,
+    budget: Option<&mut ErrorBudget<T>>,
+) -> Option<Fused<T>> {
+    let (b1, b2) = basis(&fit.e);
+    let var_c = expected.sigma_cos * expected.sigma_cos;
+    let var_free = fit.free.then_some(p.m33);
+    if !fit.free || estimate.half_angle == fit::HalfAngle::Free || expected.free {
+        // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
+        let k = fixed_half_angle_gain(fit);
+        let var_c = if estimate.half_angle == fit::HalfAngle::Known { T::ZERO } else { var_c };
+        let (k, var_c) = k.filter(|_| !fit.free).map_or(([T::ZERO; 2], T::ZERO), |k| (k, var_c));
+        if let Some(budget) = budget {
+            budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
+        }
+        let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
+        return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: var_free, chi2: T::ZERO, edge });
+    }
+    let total = p.m33 + var_c;
+    let difference = expected.cos - fit.c;
+    let k = V3::new(p.m13, p.m23, p.m33) * (T::one() / total);
+    let e = unit(&(fit.e + b1 * (k.x * difference) + b2 * (k.y * difference)))?;
+    if let Some(budget) = budget {
+        budget.project(&b1, &b2, [k.x, k.y], [k.x * expected.sigma_cos, k.y * expected.sigma_cos], expected);
+    }
+    // The tangent basis at the fused axis differs only by a small rotation. The covariance is therefore transformed
+    // through the camera frame without other changes.
+    let fused = [p.m11 - k.x * p.m13, p.m12 - k.x * p.m23, p.m22 - k.y * p.m23];
+    let (n1, n2) = basis(&e);
+    let turn = |n: &V3<T>| [n.dot(&b1), n.dot(&b2)];
+    let (r1, r2) = (turn(&n1), turn(&n2));
+    let form =
+        |a: [T; 2], b: [T; 2]| a[0] * (fused[0] * b[0] + fused[1] * b[1]) + a[1] * (fused[1] * b[0] + fused[2] * b[1]);
+    Some(Fused {
+        e,
+        c: fit.c + k.z * difference,
+        p: [form(r1, r1), form(r1, r2), form(r2, r2)],
+        var_free_cos: var_free,
+        chi2: difference * difference / total,
+        edge,
+    })
+}
+
+/// Returns the change of the axis for δc = 1 with a fixed half-angle: Σ w Bᵀs · 1 through the normal equations.
+pub(super) fn fixed_half_angle_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
+    let (sums, mean) = (&fit.sums, fit.mean);
+    let n = invert_spd2(sums.normal_fixed(mean))?;
+    let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);
+    Some([n[0] * k1 + n[1] * k2, n[1] * k1 + n[2] * k2])
+}

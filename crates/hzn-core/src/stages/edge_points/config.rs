@@ -1,0 +1,49 @@
+//! `[candidates]` of sensor.toml: edges that are candidates for the limb, and their edge points.
+
+use crate::base::error::{ConfigError, Limit, require};
+use crate::base::keys::{Section, choices, section};
+
+choices! {
+    /// How a border pixel becomes an edge point.
+    pub enum SubPixel {
+        /// The point is where the brightness crosses the middle between the plateaus on both sides, in three rows
+        /// smoothed along the edge.
+        ///
+        /// The Sun blooms into a glare that is no plateau: its edge point is where the brightness crosses the
+        /// threshold.
+        @0 Linear = "linear";
+        /// The point is the border pixel's centre, moved half a pixel to the dark side.
+        @1 None = "none";
+        /// A blurred step is fitted to 7×7 pixels between the means of the plateaus: the best accuracy, at about a
+        /// hundred times the cost.
+        @- Erf = "erf" needs "erf";
+        /// Zernike moments of 7×7 pixels locate a step across a disc (Wang et al. 2022).
+        @- Zernike = "zernike" needs "zju";
+    }
+}
+
+section! {
+    /// `[candidates]` of sensor.toml: edges that are candidates for the limb, and their edge points.
+    "candidates" pub struct Config: Copy {
+        /// Shortest edge, border pixels; a small body or picture needs fewer.
+        ///
+        /// For a small disc, half of its circumference in pixels is enough; in a picture of fewer than 80 rows or
+        /// columns, half of its shorter side.
+        @70 min_points: u16 = 40, [8.0 or more];
+        /// Points kept per edge, evenly along it; 0 keeps all that fit into memory.
+        ///
+        /// 200 points take half the time and lose little accuracy.
+        @71 keep_points: u16 = 600, ["0 (all) or 16 to 65535"];
+        /// How a border pixel becomes an edge point.
+        @72 sub_pixel: SubPixel = SubPixel::Linear, [choice];
+    }
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        self.check_keys()?;
+        let keep = f64::from(self.keep_points);
+        let enough = self.keep_points == 0 || self.keep_points >= 16;
+        require(enough, "candidates.keep_points", keep, Limit::Rule("must be 16 or more, or 0 to keep all"))
+    }
+}

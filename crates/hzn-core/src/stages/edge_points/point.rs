@@ -1,0 +1,56 @@
+//! An edge point, and the side on which its light is.
+
+use crate::base::real::Real;
+use crate::geometry::block::Lit;
+use crate::geometry::pixel::{ImagePoint, Pixel};
+
+/// An edge point.
+pub(super) struct EdgePoint<T> {
+    pub(super) point: ImagePoint<T>,
+    /// Side on which the light is.
+    pub(super) lit: Lit,
+    /// The point is at the threshold of the picture, because no local mid-level was found.
+    pub(super) fallback: bool,
+    /// The lit side is clipped at full scale, so that half of its brightness is not half of the light.
+    pub(super) clipped: bool,
+}
+
+impl<T> EdgePoint<T> {
+    /// Makes a point of a method that has no mid-level.
+    pub(super) fn plain(point: ImagePoint<T>, lit: Lit) -> Self {
+        Self { point, lit, fallback: false, clipped: false }
+    }
+}
+
+/// Returns the side of the light along the axis of the larger component, and the step (dx, dy) towards the dark. The
+/// result is `None` if the gradient is zero.
+pub(super) fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
+    if gx == 0 && gy == 0 {
+        return None;
+    }
+    let lit = if gx.abs() >= gy.abs() {
+        if gx > 0 { Lit::Right } else { Lit::Left }
+    } else if gy > 0 {
+        Lit::Below
+    } else {
+        Lit::Above
+    };
+    let (dx, dy) = lit.towards_dark();
+    Some((lit, dx, dy))
+}
+
+/// Makes an edge point for the methods that know the direction of the gradient.
+#[cfg(any(feature = "erf", feature = "zju"))]
+pub(super) fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<EdgePoint<T>> {
+    // `orientation` compares integers, and the direction is a unit vector.
+    let scale = T::from_f64(1024.0);
+    let (lit, _, _) = orientation(((x * scale).to_i32(), (y * scale).to_i32()))?;
+    Some(EdgePoint::plain(point, lit))
+}
+
+pub(super) fn point_off<T: Real>(p: Pixel, (dx, dy): (i32, i32), towards_dark: T) -> ImagePoint<T> {
+    ImagePoint {
+        u: T::from_i32(i32::from(p.x)) + T::from_i32(dx) * towards_dark,
+        v: T::from_i32(i32::from(p.y)) + T::from_i32(dy) * towards_dark,
+    }
+}

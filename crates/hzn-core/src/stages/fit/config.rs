@@ -1,0 +1,48 @@
+//! `[estimate]` of sensor.toml: the fit of the cone.
+
+use crate::base::keys::{choices, section};
+
+choices! {
+    /// Which half-angle the fitted cone has.
+    pub enum HalfAngle {
+        /// The half-angle is fitted freely, then fused with the expected one by their covariances; the result is never
+        /// worse than the better of the two.
+        @0 Fused = "fused";
+        /// The half-angle is the expected one, exactly.
+        @1 Known = "known";
+        /// The half-angle is fitted; the expected one is only a start.
+        @2 Free = "free";
+    }
+}
+
+choices! {
+    /// How the cone is fitted.
+    pub enum Method {
+        /// Gauss-Newton on the sphere, with Tukey's weights and the expected half-angle.
+        @- Sphere = "sphere";
+        /// Linear least squares on the plane z = 1, half-angle free (Braun & Barf 2022, (24)).
+        @- Direct = "direct" needs "dlr";
+        /// The axis of the ellipse or hyperbola through the points (Braun & Barf 2022, (17), (18) corrected).
+        @- Conic = "conic" needs "dlr";
+        /// An elliptic cone by total least squares (Wang et al. 2022, (10) to (17)).
+        @- Tls = "tls" needs "zju";
+        /// An elliptic cone by total least squares; every point is weighed by the angle of a pixel at its place (Wang
+        /// et al. 2022, (18) to (21)).
+        @- Wtls = "wtls" needs "zju";
+        /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
+        @- Circle = "circle" needs "horace";
+    }
+}
+
+section! {
+    /// `[estimate]` of sensor.toml: the fit of the cone.
+    "estimate" pub struct Config: Copy {
+        /// How the cone is fitted.
+        @- method: Method = Method::Sphere, [choice];
+        /// Which half-angle the fitted cone has.
+        @90 half_angle: HalfAngle = HalfAngle::Fused, [choice];
+        /// For `wtls`: points are weighed where the axis is farther off the optical axis than this, degrees; 0 always
+        /// weighs them.
+        @- weigh_above_deg: f64 = 0.0, [0.0 to 180.0] { needs: "zju" };
+    }
+}

@@ -1,0 +1,182 @@
+//! `[select]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
+
+use crate::base::error::{ConfigError, between};
+use crate::base::keys::{Section, section};
+
+section! {
+    /// `[select]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
+    "select" pub struct Config: Copy {
+        /// Fewest inliers; a small body or picture needs fewer.
+        ///
+        /// For a small disc, one third of its circumference in pixels is enough; in a picture of fewer than 80 rows or
+        /// columns, one third of its shorter side.
+        @110 min_inliers: u16 = 24, [8.0 or more];
+        /// Shortest length of edge that inliers must cover, px.
+        ///
+        /// Shorter edges fit many curves.
+        @111 min_arc_px: Option<f64> = None, [0.0 to 1e6] {
+            unset: "a tenth of the diagonal, or a third of the body's circumference if less",
+            example: "60.0",
+        };
+        /// Largest weighted RMS distance of the inliers from the limb, px; it grows as `reject.noise_sigma` raises the
+        /// largest distance of an inlier.
+        @112 max_rms_px: f64 = 2.0, [above 0.0];
+        /// Largest difference between the fitted and the expected half-angle, in standard deviations.
+        @113 max_half_angle_sigma: f64 = 3.0, [above 0.0];
+        /// Largest standard deviation of an answer, degrees.
+        @114 max_sigma_deg: f64 = 10.0, [above 0.0 to 180.0];
+        /// Smallest part of the fitted limb in view that edge points must cover.
+        ///
+        /// A limb goes on where the edge of a mast or of a cloud ends.
+        @115 min_support: f64 = 0.4, [0.0 to 1.0];
+        /// Largest part of the sky beyond the fitted limb that may be lit.
+        ///
+        /// Beyond the edge of a cloud are other clouds. Ghosts in the sky next to a limb light up to a quarter of it.
+        @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
+        /// Smallest part of an edge's points that must be inliers.
+        ///
+        /// With one inlier in 20 points and a threshold of three pixels, a cone that is free to turn passes through
+        /// clutter by chance.
+        @- min_inlier_share: f64 = 0.05, [0.0 to 1.0];
+        /// Largest number of points close to the fitted limb that are no inliers, as a part of the inliers.
+        ///
+        /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has other points
+        /// close to it.
+        @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
+        /// An edge lies on the limb as a whole where at least this part of its points are inliers; 0 checks no edge for
+        /// `max_way`.
+        @- whole_edge: f64 = 0.8, [0.0 to 1.0];
+        /// Longest way along the inliers of an edge that is not whole, as a multiple of the limb that they cover.
+        ///
+        /// A cloud's edge winds, and a part of it may lie on a limb by chance.
+        @- max_way: f64 = 3.0, [1.0 to 1e6];
+        /// For the Sun: smallest part of the fitted limb in view that edge points must cover, where `min_support` is
+        /// above 0.
+        ///
+        /// The Sun is a whole disc; a gibbous Moon shows less.
+        @- min_support_whole: f64 = 0.7, [0.0 to 1.0];
+        /// Largest ratio of the cone's residual to that of a circle of the image or of four straight pieces; 1e6 turns
+        /// the gate off.
+        ///
+        /// Lens flares are circles of the image; an iris and a vehicle have straight edges. Where residuals are noise
+        /// the ratio is about 1. A ratio of 2 is a likelihood ratio of 4 to the power of half the number of independent
+        /// points.
+        @- max_rival_ratio: f64 = 2.0, [1.0 to 1e6];
+        /// Smallest evidence for the limb over a straight line, and largest evidence for a rival shape over the limb:
+        /// twice the logarithm of the likelihood ratio; −1e6 turns the gate off.
+        ///
+        /// A value of 9 is three standard deviations. Points with correlated residuals count once.
+        @- min_evidence: f64 = 9.0, [-1e6 to 1e6];
+        /// Residuals below this count as equal, px.
+        ///
+        /// Sampling and interpolation leave about this residual of a perfect edge.
+        @- rival_floor_px: f64 = 0.03, [above 0.0 to 1e4];
+        /// Smallest noise of an edge in the gate of the half-angle, where its residuals are smaller than the given
+        /// noise, px; 1e4 leaves the gate to the given noise.
+        @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
+        /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
+        /// turns the gate off.
+        ///
+        /// A continuation counts where it keeps its contrast, see `departure_contrast`.
+        @- max_departure: f64 = 0.2, [0.0 to 1e6];
+        /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb with
+        /// its contrast kept; 0 turns the gate off.
+        ///
+        /// The corner of an iris and the crossing of two flares end an edge in this way. The default is 0, because 0.7
+        /// also refuses half-lit discs and crescents.
+        @- min_support_abrupt: f64 = 0.0, [0.0 to 1.0];
+        /// Largest turn between two lengths of 16 px of edge that counts as smooth, degrees.
+        ///
+        /// 8 degrees are a curve of 115 px radius; corners of clouds are sharper. Room for the noise is added.
+        @- departure_turn_deg: f64 = 8.0, [0.0 to 90.0];
+        /// Smallest contrast of a continuation that counts, as a part of the limb's contrast.
+        ///
+        /// A terminator fades; the rim of a flare does not.
+        @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
+        /// Largest part of the looks inwards from the limb that may end in the sky behind a second edge; 1 turns the
+        /// gate off.
+        ///
+        /// The gate is for a body that cannot lie whole in the picture: a crescent is a band, too.
+        @- max_band: f64 = 0.5, [0.0 to 1.0];
+        /// Smallest step of a second edge, as a part of the limb's step.
+        @- band_step: f64 = 0.4, [above 0.0 to 1.0];
+        /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
+        /// deviations.
+        @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
+        /// Fastest turn of the vehicle, degrees per second: an axis farther from the previous answer is refused.
+        ///
+        /// Pictures are then processed in order.
+        @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
+        /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
+        /// `body.sunlit = false`.
+        @- max_unlit: f64 = 0.5, [0.0 to 1.0];
+        /// Lowest elevation of the Sun that lights a limb, degrees; −18 is the end of twilight.
+        @- min_sun_elevation_deg: f64 = -18.0, [-90.0 to 90.0];
+        /// Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard
+        /// deviations.
+        ///
+        /// The curvature of the edge shows on which side the body is.
+        @- min_side_sigma: f64 = 4.0, [0.0 to 1e6];
+        /// Answers farther apart than this contradict each other, degrees.
+        @- ambiguous_deg: f64 = 5.0, [0.0 to 180.0];
+        /// Of answers that contradict each other, the better one counts where its score is better by this factor.
+        @- ambiguous_score: f64 = 2.0, [1.0 to 1e6];
+        /// An answer ends the search where its edge covers more than this part of the limb in view; `certain_share`
+        /// must hold, too.
+        @- certain_support: f64 = 0.5, [0.0 to 1.0];
+        /// An answer ends the search where more than this part of its edge's points are inliers; `certain_support` must
+        /// hold, too.
+        ///
+        /// An RMS below a quarter of the largest distance of an inlier replaces this condition.
+        @- certain_share: f64 = 0.8, [0.0 to 1.0];
+        /// [smallest, largest] half-angle of a Sun, as multiples of its true one.
+        ///
+        /// The Sun never looks smaller than it is, and it blooms.
+        @- sun_size: [f64; 2] = [0.9, 12.0], [above 0.0 to 1e6];
+        /// [smallest, largest] half-angle of a Moon, as multiples of its mean one.
+        ///
+        /// The saturated part of the Moon is smaller than the Moon, and the Moon is sometimes nearer than on average.
+        @- moon_size: [f64; 2] = [0.5, 1.1], [above 0.0 to 1e6];
+        /// Largest blooming by which a Moon may exceed `moon_size`, px.
+        @- moon_bloom_px: f64 = 10.0, [0.0 to 1e6];
+        /// Some of the limb of the expected half-angle about the fitted axis must lie in the picture.
+        @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };
+        /// Largest mean square distance of the points from the expected conic section, focal lengths squared.
+        ///
+        /// The distance is taken along the section's principal axis.
+        @- max_section_residual: Option<f64> = None, [above 0.0] { needs: "dlr", unset: "any", example: "0.025" };
+        /// [lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them.
+        ///
+        /// At altitude 0 the limb is infinitely wide.
+        @- altitude_limits_km: Option<[f64; 2]> = None, [0.0 to 1e9]
+            { needs: "horace", unset: "any", example: "[0.0, 1000.0]" };
+        /// With `altitude_limits_km`: the radius may lie beyond its limits by this part of them.
+        @- radius_margin: f64 = 0.1, [0.0 to 1000.0] { needs: "horace" };
+        /// With `altitude_limits_km`: the radius may lie beyond its limits by this length, px.
+        ///
+        /// HORACE's margin is 5000 px (Barf 2014, (2.35)).
+        @- radius_margin_px: f64 = 0.0, [0.0 to 1e6] { needs: "horace" };
+    }
+}
+
+impl Config {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        self.check_keys()?;
+        if let Some([low, high]) = self.altitude_limits_km {
+            between("select.altitude_limits_km", high, low, 1e9)?;
+        }
+        for (name, [smallest, largest]) in [("select.sun_size", self.sun_size), ("select.moon_size", self.moon_size)] {
+            between(name, largest, smallest, 1e6)?;
+        }
+        Ok(())
+    }
+
+    /// Turns off every gate that compares an edge with shapes other than a limb. This is for the presets that rebuild
+    /// published systems.
+    pub(crate) fn trust_every_shape(&mut self) {
+        (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
+        (self.min_support_abrupt, self.whole_edge) = (0.0, 0.0);
+        (self.max_departure, self.max_band, self.max_unlit) = (1e6, 1.0, 1.0);
+        self.max_attitude_sigma = 1e6;
+    }
+}

@@ -1,0 +1,66 @@
+//! Limits that depend on the size of the body and of the picture.
+
+use super::config::Config;
+use crate::base::real::Real;
+use crate::geometry::camera::Camera;
+use crate::model::body::Expected;
+
+/// Returns the diameter of the body's disc, 2 α f, in pixels.
+pub(super) fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T {
+    let (fx, fy) = camera.focal_px();
+    expected.half_angle_rad() * (fx + fy)
+}
+
+/// Returns the smallest part of the limb in view that edge points must cover; 0 means no minimum for any body.
+pub(super) fn min_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
+    let whole = config.min_support > 0.0 && !expected.phases;
+    if whole { config.min_support.max(config.min_support_whole) } else { config.min_support }
+}
+
+/// Whether a body with a free half-angle can appear with the half-angle of cosine `c`. Other bodies always pass,
+/// because another gate compares them with the expected half-angle.
+pub(super) fn is_possible_size<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config: &Config) -> bool {
+    let sin = (T::one() - *c * *c).max(T::ZERO).sqrt();
+    let (fx, fy) = camera.focal_px();
+    let px = T::one() / fx.min(fy);
+    let times = |n: f64| expected.sin * T::from_f64(n);
+    let (least, most) = if expected.blooms() {
+        // The lower limit is reduced by one pixel, the error of the measurement, but never below half of its value.
+        let [least, most] = config.sun_size;
+        ((times(least) - px).max(times(least * 0.5)), times(most))
+    } else {
+        let [least, most] = config.moon_size;
+        (times(least), times(most) + px * T::from_f64(config.moon_bloom_px))
+    };
+    !expected.free || (sin >= least && sin <= most.min(T::one()) && *c > T::ZERO)
+}
+
+/// Returns one `part`-th of the circumference of the body's disc in pixels, at least 8. A small body needs no more
+/// points.
+pub(crate) fn small_disc_points<T: Real>(sin: T, camera: &Camera<T>, part: i32) -> u16 {
+    let (fx, fy) = camera.focal_px();
+    let around = T::from_f64(core::f64::consts::PI) * (fx + fy) * sin;
+    (around / T::from_i32(part)).to_i32().clamp(8, i32::from(u16::MAX)) as u16
+}
+
+/// Pictures with shorter sides than this are small, in pixels: an edge has fewer points there than the defaults
+/// require.
+pub(super) const SMALL_PICTURE: u16 = 80;
+
+/// Returns one `part`-th of the shorter side of a small picture in pixels, at least 8. In a thermal array of 24 rows, a
+/// limb has no more points. Other pictures have no limit.
+pub(crate) fn small_picture_points<T: Real>(camera: &Camera<T>, part: u16) -> u16 {
+    let side = camera.width().min(camera.height());
+    if side < SMALL_PICTURE { (side / part.max(1)).max(8) } else { u16::MAX }
+}
+
+pub(super) fn min_arc<T: Real>(c: &T, camera: &Camera<T>, config: &Config) -> T {
+    if let Some(arc) = config.min_arc_px {
+        return T::from_f64(arc);
+    }
+    let (w, h) = (T::from_i32(i32::from(camera.width())), T::from_i32(i32::from(camera.height())));
+    let (fx, fy) = camera.focal_px();
+    let sin = (T::one() - *c * *c).max(T::ZERO).sqrt();
+    let circumference = T::from_f64(core::f64::consts::PI) * (fx + fy) * sin;
+    ((w * w + h * h).sqrt() * T::from_f64(0.1)).min(circumference * T::from_f64(0.33))
+}
