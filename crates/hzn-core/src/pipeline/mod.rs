@@ -12,6 +12,7 @@ pub mod edges;
 mod found_limb;
 mod further_looks;
 mod horizon;
+mod process;
 mod row_stream;
 mod search;
 mod sensor;

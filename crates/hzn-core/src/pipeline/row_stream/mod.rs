@@ -39,11 +39,10 @@ use crate::stages::edge_points::{self, SubPixel};
 use crate::stages::threshold;
 use crate::stages::threshold::RowSampler;
 use points::{Point, Points};
+pub use recent_rows::ROWS_HELD;
 use recent_rows::RecentRows;
 use runs::Runs;
 
-/// Rows of the picture that are kept in memory.
-pub const ROWS_HELD: u16 = 32;
 /// Rows that must follow a border pixel's row before the pixel is measured. At least as many rows before it are in
 /// memory then.
 const AHEAD: u16 = 15;

@@ -2,8 +2,10 @@
 
 use core::cell::Cell;
 
-use super::ROWS_HELD;
 use crate::image::{Pixels, Sample};
+
+/// Rows of the picture that are kept in memory.
+pub const ROWS_HELD: u16 = 32;
 
 /// The last [`ROWS_HELD`] rows. A read of an older or a later row returns the first or the last of these rows instead,
 /// and is counted.

@@ -1,0 +1,98 @@
+//! `choices!`: an enumeration whose variants are words in sensor.toml.
+
+/// Declares an enumeration whose variants are words in sensor.toml; the first variant is the default. Each line has `@`
+/// and the number in flight or `-`, the variant, the word, and the feature that the variant needs. Every variant exists
+/// in every build; a build without the feature refuses the variant and names the feature.
+macro_rules! choices {
+    (
+        $(#[doc = $about:literal])+
+        pub enum $name:ident {
+            $($(#[doc = $doc:literal])+ @ $id:tt $variant:ident = $word:literal $(needs $feature:literal)?;)+
+        }
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[non_exhaustive]
+        pub enum $name {
+            $(
+                $(#[doc = $doc])+
+                $(#[doc = ""] #[doc = concat!("It needs the feature `", $feature, "`.")])?
+                #[cfg_attr(feature = "serde", serde(rename = $word))]
+                $variant,
+            )+
+        }
+
+        impl $name {
+            /// All variants, in the order of their declaration.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// Returns the word in sensor.toml.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+
+            /// Returns the feature that the variant needs and this build does not have.
+            #[allow(unused, reason = "some enumerations need no feature")]
+            const fn lacking(self) -> Option<&'static str> {
+                match self {
+                    $($(Self::$variant if !cfg!(feature = $feature) => Some($feature),)?)+
+                    _ => None,
+                }
+            }
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                const FIRST: $name = $name::ALL[0];
+                FIRST
+            }
+        }
+
+        impl $crate::base::keys::Value for $name {
+            const FORM: $crate::base::keys::Form = $crate::base::keys::Form::Word;
+            const CHOICES: &'static [$crate::base::keys::Choice] = &[
+                $($crate::base::keys::Choice {
+                    name: $word,
+                    doc: concat!($($doc, "\n"),+),
+                    feature: $crate::base::keys::feature_name!($($feature)?),
+                    is_built: true $(&& cfg!(feature = $feature))?,
+                    flight: $crate::base::keys::flight!($id),
+                }),+
+            ];
+            fn check(
+                &self,
+                path: &'static str,
+                _low: f64,
+                _above: bool,
+                _high: f64,
+            ) -> Result<(), $crate::base::error::ConfigError> {
+                match self.lacking() {
+                    Some(feature) => Err($crate::base::error::ConfigError::lacks(path, Some(self.name()), feature)),
+                    None => Ok(()),
+                }
+            }
+            fn number(&self, _place: u16) -> f64 {
+                let number = match self {
+                    $(Self::$variant => $crate::base::keys::flight!($id),)+
+                };
+                number.map_or(f64::NAN, f64::from)
+            }
+            fn set_number(&mut self, _place: u16, number: f64) -> Option<()> {
+                $(
+                    if let Some(own) = $crate::base::keys::flight!($id)
+                        && f64::from(own) == number
+                    {
+                        *self = Self::$variant;
+                        return Some(());
+                    }
+                )+
+                None
+            }
+        }
+    };
+}
+
+pub(crate) use choices;

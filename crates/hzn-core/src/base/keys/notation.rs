@@ -1,0 +1,98 @@
+//! The notation of an entry: numbers in flight, limits and options.
+
+/// Gives a number in flight, or `None` for `-`.
+macro_rules! flight {
+    (-) => {
+        None::<u16>
+    };
+    ($id:literal) => {
+        Some::<u16>($id)
+    };
+}
+
+/// Gives the place of the number `id` among the numbers of a key.
+macro_rules! place {
+    (-, $ty:ty, $id:ident) => {{
+        let _ = $id;
+        None::<u16>
+    }};
+    ($first:literal, $ty:ty, $id:ident) => {
+        $id.checked_sub($first).filter(|place| *place < <$ty as $crate::base::keys::Value>::NUMBERS)
+    };
+}
+
+/// Gives the feature of a choice.
+macro_rules! feature_name {
+    () => {
+        None
+    };
+    ($feature:literal) => {
+        Some($feature)
+    };
+}
+
+/// Gives the text of one option among several.
+macro_rules! option {
+    ($wanted:ident) => { None };
+    (needs needs $text:literal $($rest:tt)*) => { Some($text) };
+    (unset unset $text:literal $($rest:tt)*) => { Some($text) };
+    (example example $text:literal $($rest:tt)*) => { Some($text) };
+    ($wanted:ident $other:ident $text:literal $($rest:tt)*) => { $crate::base::keys::option!($wanted $($rest)*) };
+}
+
+/// Gives [`Limits`] from their notation.
+macro_rules! limits {
+    ([choice]) => {
+        $crate::base::keys::Limits::Choice
+    };
+    ([$rule:literal]) => {
+        $crate::base::keys::Limits::Rule($rule)
+    };
+    ([above $low:literal]) => {
+        $crate::base::keys::Limits::Number { low: $low, above: true, high: f64::INFINITY }
+    };
+    ([above $low:literal to $high:literal]) => {
+        $crate::base::keys::Limits::Number { low: $low, above: true, high: $high }
+    };
+    ([$low:literal or more]) => {
+        $crate::base::keys::Limits::Number { low: $low, above: false, high: f64::INFINITY }
+    };
+    ([$low:literal to $high:literal]) => {
+        $crate::base::keys::Limits::Number { low: $low, above: false, high: $high }
+    };
+}
+
+/// Checks one value; the section's own code checks a rule in words.
+macro_rules! check {
+    ($value:expr, $path:expr, [$rule:literal]) => {};
+    ($value:expr, $path:expr, [choice]) => {
+        $crate::base::keys::Value::check(&$value, $path, 0.0, false, 0.0)?
+    };
+    ($value:expr, $path:expr, [above $low:literal]) => {
+        $crate::base::keys::Value::check(&$value, $path, $low, true, f64::INFINITY)?
+    };
+    ($value:expr, $path:expr, [above $low:literal to $high:literal]) => {
+        $crate::base::keys::Value::check(&$value, $path, $low, true, $high)?
+    };
+    ($value:expr, $path:expr, [$low:literal or more]) => {
+        $crate::base::keys::Value::check(&$value, $path, $low, false, f64::INFINITY)?
+    };
+    ($value:expr, $path:expr, [$low:literal to $high:literal]) => {
+        $crate::base::keys::Value::check(&$value, $path, $low, false, $high)?
+    };
+}
+
+/// Checks that a key keeps its default when its feature is not in this build.
+macro_rules! needs {
+    ($value:expr, $default:tt, $path:expr, needs $feature:literal $($rest:tt)*) => {
+        if !cfg!(feature = $feature) && $value != $default {
+            return Err($crate::base::error::ConfigError::lacks($path, None, $feature));
+        }
+    };
+    ($value:expr, $default:tt, $path:expr, $option:ident $text:literal $($rest:tt)*) => {
+        $crate::base::keys::needs!($value, $default, $path, $($rest)*)
+    };
+    ($value:expr, $default:tt, $path:expr,) => {};
+}
+
+pub(crate) use {check, feature_name, flight, limits, needs, option, place};

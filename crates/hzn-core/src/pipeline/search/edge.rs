@@ -1,0 +1,263 @@
+//! The way of one edge from its border to a verdict.
+
+use super::{Best, Search};
+use crate::base::linalg::basis;
+use crate::base::real::Real;
+use crate::geometry::block::LANES;
+use crate::geometry::frames::{Cam, Cov3, UnitVec3};
+use crate::geometry::pixel::Pixel;
+use crate::image::Pixels;
+use crate::model::body::Expected;
+use crate::model::error_budget::ErrorBudget;
+use crate::model::observer::Observer;
+use crate::model::report::{Candidate, Free, Report, Solution};
+use crate::model::status::Stage;
+use crate::model::verdict::Verdict;
+use crate::model::work;
+use crate::papers;
+use crate::pipeline::budget;
+use crate::stages::consensus::{self, Threshold};
+use crate::stages::contour::{BinaryPicture, Thinned};
+use crate::stages::covariance::{self, Fused};
+use crate::stages::edge_points::{self, Points};
+use crate::stages::fit::{self, Fit};
+use crate::stages::{gates, rays};
+
+impl<T: Real, O: Observer<T>> Search<'_, T, O> {
+    /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
+    pub(super) fn judge_edge<P: Pixels>(
+        &mut self,
+        binary: &BinaryPicture<'_, T, P, O>,
+        edge: &Thinned<'_>,
+    ) {
+        let counters = &mut self.report.counters;
+        let length = edge.total();
+        if length < u32::from(self.min_points) {
+            self.short += 1;
+            return;
+        }
+        let keep = u32::from(self.sensor.config.candidates.keep_points);
+        let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
+        let point = budget::point_cost(self.sensor.config.candidates.sub_pixel, binary.mask_cost());
+        if !self.work.try_spend(points.saturating_mul(point)) {
+            return;
+        }
+        let number = counters.candidates;
+        counters.candidates += 1;
+        counters.dropped += length - length.div_ceil(edge.stride().max(1));
+        self.observer.edge(number, edge.pixels().iter().copied(), edge.stride());
+        if !self.observer.wants(number) {
+            return;
+        }
+        let (outcome, solution) = self.candidate(binary, number, length, edge.pixels());
+        self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
+        if let Some(new) = solution {
+            self.keep_better(new);
+        }
+        self.fitted |=
+            !matches!(outcome.verdict, Verdict::NoConsensus | Verdict::NoFit | Verdict::FewInliers | Verdict::Taken);
+        // When the list is full, the candidate is only counted. `Report::choose` lists it later if it is chosen.
+        let _ = self.report.candidates.push(outcome);
+        self.observer.enter(Stage::Contour);
+    }
+
+    /// Takes an edge from its border to a verdict. Returns the answer if the edge passes every gate.
+    fn candidate<P: Pixels>(
+        &mut self,
+        binary: &BinaryPicture<'_, T, P, O>,
+        number: u32,
+        length: u32,
+        border: &[Pixel],
+    ) -> (Candidate<T>, Option<Best<T>>) {
+        let mut outcome = Candidate {
+            number,
+            length_px: length,
+            points: 0,
+            inliers: 0,
+            rms_px: T::from_f64(f64::NAN),
+            verdict: Verdict::NoConsensus,
+        };
+        let best = self.locate_points(binary, border, &mut outcome).and_then(|points| {
+            let clipped = T::from_i32(points.clipped as i32) / T::from_i32(points.count.max(1) as i32);
+            let expected = self.expected.clipped(clipped);
+            let (fit, threshold) = self.fit(&points, &expected, &mut outcome)?;
+            self.judge(binary, &points, &expected, &fit, threshold, &mut outcome)
+        });
+        (outcome, best)
+    }
+
+    /// Locates the edge points. The caller has paid for them; the extra work of slow points is charged here.
+    #[inline(always)]
+    fn locate_points<P: Pixels>(
+        &mut self,
+        binary: &BinaryPicture<'_, T, P, O>,
+        border: &[Pixel],
+        outcome: &mut Candidate<T>,
+    ) -> Option<Points> {
+        self.enter(Stage::Candidates);
+        let slow = work::slow_point_cost(binary.mask_cost());
+        let most_slow = self.work.remaining() / slow;
+        let config = &self.sensor.config.candidates;
+        let points = edge_points::locate_edge_points(binary, config, border, outcome.number, self.blocks, most_slow);
+        if points.slow == most_slow {
+            self.work.exhaust();
+            return None;
+        }
+        self.work.charge(points.slow * slow);
+        outcome.points = points.count;
+        self.report.counters.edge_points += points.count;
+        self.report.counters.fallback_points += points.fallback;
+        self.report.counters.cut_points += points.cut;
+        Some(points)
+    }
+
+    /// Computes the rays, finds the consensus and fits the cone. Returns the fit with the threshold of the consensus.
+    #[inline(always)]
+    fn fit(
+        &mut self,
+        points: &Points,
+        expected: &Expected<T>,
+        outcome: &mut Candidate<T>,
+    ) -> Option<(Fit<T>, Threshold<T>)> {
+        let (config, camera) = (&self.sensor.config, self.camera);
+        let used = (points.count as usize).div_ceil(LANES);
+        let blocks = self.blocks.get_mut(..used)?;
+        enter(self.report, self.observer, Stage::Undistort);
+        rays::to_rays(camera, blocks);
+
+        enter(self.report, self.observer, Stage::Reject);
+        let configured_px = T::from_f64(config.reject.threshold_px);
+        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, configured_px)).sum();
+        if on_another * 2 > points.count {
+            outcome.verdict = Verdict::Taken;
+            return None;
+        }
+        let (fx, fy) = camera.focal_px();
+        let focal = (fx + fy) * T::from_f64(0.5);
+        let threshold = Threshold::new(blocks, points.count, expected, focal, &config.reject);
+        let work = &mut self.work;
+        let consensus = consensus::find(blocks, points.count, expected, focal, threshold, &config.reject, work)?;
+        self.report.counters.draws += consensus.draws;
+
+        enter(self.report, self.observer, Stage::Estimate);
+        outcome.verdict = Verdict::NoFit;
+        if !self.work.try_spend(used as u32 * work::FIT + work::GATES) {
+            return None;
+        }
+        let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.estimate, self.noise)?;
+        outcome.inliers = fit.inliers;
+        outcome.rms_px = fit.rms_px;
+        for place in 0..points.count {
+            if let Some(block) = blocks.get(place as usize / LANES) {
+                self.observer.weight(outcome.number, place, block.weight[place as usize % LANES]);
+            }
+        }
+        Some((fit, threshold))
+    }
+
+    /// Computes the covariance and applies the gates. Returns the answer if every gate is passed.
+    #[inline(always)]
+    fn judge<P: Pixels>(
+        &mut self,
+        binary: &BinaryPicture<'_, T, P, O>,
+        points: &Points,
+        expected: &Expected<T>,
+        fit: &Fit<T>,
+        threshold: Threshold<T>,
+        outcome: &mut Candidate<T>,
+    ) -> Option<Best<T>> {
+        let (config, camera) = (&self.sensor.config, self.camera);
+        let blocks = self.blocks.get(..(points.count as usize).div_ceil(LANES))?;
+        enter(self.report, self.observer, Stage::Covariance);
+        let mut budget = self.observer.wants_budget().then(ErrorBudget::new);
+        let fused = covariance::fuse(blocks, fit, expected, self.noise, &config.estimate, camera, budget.as_mut())?;
+        if let Some(budget) = &budget {
+            self.observer.budget(outcome.number, budget);
+        }
+
+        enter(self.report, self.observer, Stage::Select);
+        let (b1, b2) = basis(&fused.e);
+        let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
+        let sigma = covariance.sigma_max_rad();
+        let (made, factor) = (points.count, threshold.factor);
+        let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, factor, binary, camera, &config.select);
+        outcome.verdict = match judged.verdict {
+            Verdict::Passed => papers::verdict(fit, expected, blocks, camera, binary.region, &config.select),
+            failed => failed,
+        };
+        let fewest = T::from_i32(points.count as i32) * T::from_f64(config.recover.min_part);
+        if self.report.counters.looks > 0 && T::from_i32(fit.inliers as i32) < fewest {
+            outcome.verdict = Verdict::NoConsensus;
+            return None;
+        }
+        if outcome.verdict != Verdict::Passed || !sigma.is_finite() {
+            return None;
+        }
+        if config.estimate.half_angle == fit::HalfAngle::Fused
+            && !self.is_side_known(fit, &fused, expected)
+            && !expected.free
+        {
+            outcome.verdict = Verdict::Straight;
+            return None;
+        }
+        let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number);
+        let share = T::from_i32(fit.inliers as i32)
+            > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
+        let certain = judged.support > T::from_f64(config.select.certain_support)
+            && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
+        let next =
+            (self.needs_next_threshold && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
+        Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: next.flatten() })
+    }
+
+    /// Returns whether the curvature of the edge shows on which side of the edge the body is.
+    ///
+    /// A body on the other side of the same edge would have the half-angle π − α. The half-angle that the edge itself
+    /// gives must be much nearer to α: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ must exceed `min_side_sigma`² variances.
+    fn is_side_known(&self, fit: &Fit<T>, fused: &Fused<T>, expected: &Expected<T>) -> bool {
+        let sides = T::from_f64(self.sensor.config.select.min_side_sigma);
+        fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0))
+    }
+
+    #[inline(always)]
+    fn make_solution(
+        &self,
+        fit: &Fit<T>,
+        fused: &Fused<T>,
+        covariance: Cov3<Cam, T>,
+        expected: &Expected<T>,
+        number: u32,
+    ) -> Solution<T> {
+        let axis = UnitVec3::assume_unit(fused.e);
+        let one = T::one();
+        let half_angle = |k: T| (k * (one + one - k)).max(T::ZERO).sqrt().atan2(one - k);
+        Solution {
+            axis,
+            covariance,
+            axis_ecef: expected.axis_ecef(),
+            axis_body: self.sensor.cam_to_body.as_ref().map(|r| r.apply(&axis)),
+            half_angle_rad: half_angle(fit.k),
+            fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
+            altitude_m: fused.var_free_cos.and_then(|v| expected.altitude(fit.c, v)),
+            free: fused.var_free_cos.map(|var_cos| Free {
+                axis: UnitVec3::assume_unit(fit.e),
+                cos: fit.c,
+                var_cos,
+                cos_per_px: fit.sums.cos_per_px(),
+            }),
+            rms_px: fit.rms_px,
+            inliers: fit.inliers,
+            arc_px: fit.arc_px,
+            candidate: number,
+        }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        enter(self.report, self.observer, stage);
+    }
+}
+
+fn enter<T, O: Observer<T>>(report: &mut Report<T>, observer: &O, stage: Stage) {
+    report.stage = report.stage.max(stage);
+    observer.enter(stage);
+}

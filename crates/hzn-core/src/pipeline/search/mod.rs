@@ -1,0 +1,141 @@
+//! Takes the edges of one picture from border to verdict, one after the other, and decides which of them is the limb.
+
+mod edge;
+mod order;
+
+use super::found_limb::FoundLimb;
+use super::sensor::Sensor;
+use crate::base::real::Real;
+use crate::geometry::block::Block;
+use crate::geometry::camera::Camera;
+use crate::model::body::Expected;
+use crate::model::observer::Observer;
+use crate::model::report::{Candidate, Report, Solution};
+use crate::model::status::Status;
+use crate::model::work::WorkBudget;
+use crate::stages::{covariance, gates, threshold};
+
+/// The search over the edges of one picture, which are judged one by one.
+pub(super) struct Search<'a, T, O> {
+    sensor: &'a Sensor<T>,
+    /// Camera of the sensor, or [`Sensor::turning`] if the camera turns while the picture is read out.
+    camera: &'a Camera<T>,
+    expected: &'a Expected<T>,
+    taken: &'a [FoundLimb<T>],
+    noise: &'a covariance::Config,
+    /// Whether the answer needs a threshold for the next picture (method `track`).
+    needs_next_threshold: bool,
+    /// Length of the shortest candidate, border pixels.
+    min_points: u16,
+    observer: &'a O,
+    blocks: &'a mut [Block<T>],
+    /// The rest of the work budget.
+    work: WorkBudget,
+    best: Option<Best<T>>,
+    /// The best score of an answer that points in another direction.
+    rival: Option<T>,
+    /// Number of edges with too few points.
+    short: u32,
+    /// Whether any edge was fitted, whatever its verdict.
+    fitted: bool,
+    report: &'a mut Report<T>,
+}
+
+struct Best<T> {
+    solution: Solution<T>,
+    outcome: Candidate<T>,
+    /// Threshold for the next picture.
+    level: Option<u16>,
+    score: T,
+    /// The answer explains most of the limb in view, and either most points of its edge are inliers or the residuals
+    /// are small. The search can end.
+    certain: bool,
+}
+
+impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
+    /// Begins a search. `camera` is the camera of the sensor or [`Sensor::turning`], `taken` are the limbs found
+    /// before, `blocks` has room for the points of one edge, and `work` is the work budget of the look.
+    pub(super) fn new(
+        sensor: &'a Sensor<T>,
+        camera: &'a Camera<T>,
+        expected: &'a Expected<T>,
+        taken: &'a [FoundLimb<T>],
+        observer: &'a O,
+        blocks: &'a mut [Block<T>],
+        work: WorkBudget,
+        report: &'a mut Report<T>,
+    ) -> Self {
+        let config = &sensor.config;
+        Self {
+            expected,
+            taken,
+            noise: config.noise_model_of(expected.which),
+            needs_next_threshold: config.threshold_of(expected.which).method == threshold::Method::Track,
+            min_points: config
+                .candidates
+                .min_points
+                .min(gates::small_disc_points(expected.sin, &sensor.camera, 2))
+                .min(gates::small_picture_points(&sensor.camera, 2)),
+            observer,
+            work,
+            blocks,
+            best: None,
+            rival: None,
+            short: 0,
+            fitted: false,
+            report,
+            camera,
+            sensor,
+        }
+    }
+
+    /// Returns whether the search is over: the limb is found, or the work budget is used up.
+    fn is_over(&self) -> bool {
+        self.work.is_exhausted() || self.best.as_ref().is_some_and(|b| b.certain)
+    }
+
+    /// Keeps the better of two answers. If they point in different directions, the score of the other is kept as the
+    /// rival's.
+    fn keep_better(&mut self, new: Best<T>) {
+        let Some(old) = self.best.take() else {
+            self.best = Some(new);
+            return;
+        };
+        let apart = new.solution.axis.angle_rad(&old.solution.axis)
+            > T::from_f64(self.sensor.config.select.ambiguous_deg.to_radians());
+        let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
+        if apart {
+            self.rival = Some(self.rival.map_or(other.score, |r| r.min(other.score)));
+        }
+        self.best = Some(better);
+    }
+
+    /// Writes the answer into the report. Returns the rest of the work budget.
+    pub(super) fn conclude(self) -> WorkBudget {
+        let (report, work) = (self.report, self.work);
+        report.counters.work = work.spent();
+        report.counters.looks += 1;
+        if let Some(best) = self.best {
+            let factor = T::from_f64(self.sensor.config.select.ambiguous_score);
+            if !best.certain && self.rival.is_some_and(|r| r < best.score * factor) {
+                report.status = Status::Ambiguous;
+                return work;
+            }
+            report.choose(best.outcome);
+            report.status = Status::Ok;
+            report.next_level = best.level;
+            report.solution = Some(best.solution);
+            return work;
+        }
+        report.status = if work.was_truncated() {
+            Status::Truncated
+        } else if self.fitted {
+            Status::Rejected
+        } else if report.counters.candidates == 0 && self.short > 0 {
+            Status::TooFewPoints
+        } else {
+            Status::NoLimb
+        };
+        work
+    }
+}
