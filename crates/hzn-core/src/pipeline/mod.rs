@@ -21,6 +21,7 @@ mod subdivide;
 mod workspace;
 
 #[cfg(test)]
+#[path = "../../tests/unit/golden/mod.rs"]
 mod golden;
 
 pub use horizon::{FlightHorizon, Horizon, HostHorizon};

@@ -25,11 +25,7 @@ use crate::stages::{gates, rays};
 
 impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
-    pub(super) fn judge_edge<P: Pixels>(
-        &mut self,
-        binary: &BinaryPicture<'_, T, P, O>,
-        edge: &Thinned<'_>,
-    ) {
+    pub(super) fn judge_edge<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
         let counters = &mut self.report.counters;
         let length = edge.total();
         if length < u32::from(self.min_points) {

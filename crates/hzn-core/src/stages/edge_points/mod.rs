@@ -14,6 +14,7 @@ mod config;
 #[cfg(feature = "erf")]
 mod erf;
 #[cfg(test)]
+#[path = "../../../tests/unit/edge_points.rs"]
 mod golden;
 mod linear;
 #[cfg(any(feature = "erf", feature = "zju"))]

@@ -10,7 +10,7 @@ use crate::stages::fit::{conic, direct};
 /// Compares with `nadir_cases.json`: (24) by scipy, with inliers only and pinholes only.
 fn directions<T: Real>(tolerance_deg: f64) {
     let mut compared = 0;
-    for case in load(include_str!("../../../tests/golden/nadir_cases.json")) {
+    for case in load(include_str!("../../golden/nadir_cases.json")) {
         if case["reference"]["eq24_direction_c"].is_null() {
             continue;
         }
@@ -74,7 +74,7 @@ fn five_coefficients_are_a_focal_length_and_four() {
 /// distance.
 fn covariances<T: Real>(tolerance: f64) {
     let mut compared = 0;
-    for case in load(include_str!("../../../tests/golden/covariance.json")) {
+    for case in load(include_str!("../../golden/covariance.json")) {
         let camera = Camera::<T>::try_new(&camera_config(&case["camera"])).unwrap();
         let points: Vec<(f64, f64)> =
             case["pixels"].as_array().unwrap().iter().map(|p| (num(&p[0]), num(&p[1]))).collect();
@@ -127,7 +127,7 @@ fn braun_barf_covariance_equals_the_dense_product() {
 /// small by a factor above 3.
 #[test]
 fn correlation_by_sample_is_not_that_by_distance() {
-    let case = &load(include_str!("../../../tests/golden/covariance.json"))[0];
+    let case = &load(include_str!("../../golden/covariance.json"))[0];
     let (printed, right) = (rows(&case["eq33"]["P_c"]), rows(&case["eq33_arc"]["P_c"]));
     assert!(right[1][1] / printed[1][1] > 3.0);
 }

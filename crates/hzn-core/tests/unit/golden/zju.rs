@@ -7,7 +7,7 @@ use crate::stages::consensus::Consensus;
 use crate::stages::fit::{Fit, Method, Quadric};
 
 fn file() -> Value {
-    serde_json::from_str(include_str!("../../../tests/golden/tls_cases.json")).unwrap()
+    serde_json::from_str(include_str!("../../golden/tls_cases.json")).unwrap()
 }
 fn list(v: &Value) -> Vec<f64> {
     v.as_array().unwrap().iter().map(num).collect()
