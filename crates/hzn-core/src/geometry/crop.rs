@@ -62,7 +62,7 @@ impl Crop {
     }
 
     /// Converts a point of the crop to a point of the picture.
-    pub(crate) fn to_picture<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
+    pub(crate) fn picture_point<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
         let ([sx, sy], half) = (self.scale(), T::from_f64(0.5));
         ImagePoint {
             u: (p.u + half + T::from_f64(f64::from(self.x0))) * sx - half,
@@ -71,7 +71,7 @@ impl Crop {
     }
 
     /// Converts a point of the picture to a point of the crop.
-    pub(crate) fn from_picture<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
+    pub(crate) fn crop_point<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
         let ([sx, sy], half) = (self.scale(), T::from_f64(0.5));
         ImagePoint {
             u: (p.u + half) / sx - half - T::from_f64(f64::from(self.x0)),

@@ -83,7 +83,7 @@ mod tests {
             assert_eq!((part.height(), part.width()), (height, (120.0 * f64::from(height) / 90.0_f64).round() as u16));
             for y in 0..part.height() {
                 for x in 0..part.width() {
-                    let p = crop.to_picture(ImagePoint { u: f64::from(x), v: f64::from(y) });
+                    let p = crop.picture_point(ImagePoint { u: f64::from(x), v: f64::from(y) });
                     let want = 100.0 * p.u.clamp(0.0, 119.0) + 3.0 * p.v.clamp(0.0, 89.0);
                     assert!((f64::from(part.at(x, y)) - want).abs() <= 1.0, "{height}: {x} {y}");
                     let near = crop.pixel(x, y);
@@ -118,7 +118,7 @@ mod tests {
                         let at = crop.pixel(x, y);
                         prop_assert_eq!(part.at(x, y), picture.at(at.x, at.y));
                         seen[usize::from(at.y) * usize::from(w) + usize::from(at.x)] += 1;
-                        let back = crop.from_picture(ImagePoint { u: f64::from(at.x), v: f64::from(at.y) });
+                        let back = crop.crop_point(ImagePoint { u: f64::from(at.x), v: f64::from(at.y) });
                         prop_assert!((back.u - f64::from(x)).abs() < 1e-9 && (back.v - f64::from(y)).abs() < 1e-9);
                     }
                 }

@@ -56,6 +56,7 @@ impl<T: Real> Sensor<T> {
         }
     }
 
+    /// Looks at smaller and smaller parts of the picture, and combines the answers of the parts.
     fn divide<P: Pixels, O: Observer<T>>(
         &self,
         mut lists: Lists<'_, T>,
@@ -82,16 +83,8 @@ impl<T: Real> Sensor<T> {
                 break;
             }
             report.counters.work = 0;
-            self.look_at_crop(
-                lists.reborrow(),
-                part,
-                picture,
-                expected,
-                taken,
-                observer,
-                Some(work.remaining()),
-                report,
-            );
+            let left = Some(work.remaining());
+            self.look_at_crop(lists.reborrow(), part, picture, expected, taken, observer, left, report);
             work.charge(report.counters.work);
             cut |= report.status == Status::Truncated;
             if let Some(answer) = report.solution.take() {
@@ -112,7 +105,12 @@ impl<T: Real> Sensor<T> {
         if cut || work.was_truncated() {
             report.status = Status::Truncated;
         }
-        if let Some(mut answer) = combine_answers(&mut answers, self.config.recover.combine) {
+        self.conclude_parts(&mut answers, &chosen, report);
+    }
+
+    /// Writes the answer of the parts into the report, if there is one.
+    fn conclude_parts(&self, answers: &mut Answers<T>, chosen: &[Candidate<T>], report: &mut Report<T>) {
+        if let Some(mut answer) = combine_answers(answers, self.config.recover.combine) {
             answer.axis_body = self.cam_to_body.as_ref().map(|r| r.apply(&answer.axis));
             report.status = Status::Ok;
             report.stage = Stage::Select;
@@ -229,7 +227,7 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
         self.observer.wants(candidate)
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
-        self.observer.point(candidate, self.crop.to_picture(point));
+        self.observer.point(candidate, self.crop.picture_point(point));
     }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.observer.weight(candidate, point, weight);

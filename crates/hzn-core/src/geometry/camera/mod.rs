@@ -119,7 +119,7 @@ impl<T: Real> Camera<T> {
     /// Returns the camera for a rectangle of this camera's pictures, or for smaller copies.
     #[cfg(feature = "horace")]
     pub(crate) fn for_crop(&self, crop: &Crop) -> Self {
-        let ([sx, sy], centre) = (crop.scale::<T>(), crop.from_picture(self.principal_point()));
+        let ([sx, sy], centre) = (crop.scale::<T>(), crop.crop_point(self.principal_point()));
         Self {
             width: crop.width,
             height: crop.height,
@@ -130,7 +130,7 @@ impl<T: Real> Camera<T> {
             cx: centre.u,
             cy: centre.v,
             row_s: self.row_s * sy,
-            middle_row: crop.from_picture(ImagePoint { u: T::ZERO, v: self.middle_row }).v,
+            middle_row: crop.crop_point(ImagePoint { u: T::ZERO, v: self.middle_row }).v,
             ..self.clone()
         }
     }

@@ -141,7 +141,7 @@ impl<T: Real> Region<T> {
     pub(crate) fn for_crop(&self, crop: &Crop) -> Self {
         let [sx, sy] = crop.scale::<T>();
         let place = |[u, v]: [T; 2]| {
-            let p = crop.from_picture(ImagePoint { u, v });
+            let p = crop.crop_point(ImagePoint { u, v });
             [p.u, p.v]
         };
         let mut polygons = heapless::Vec::new();

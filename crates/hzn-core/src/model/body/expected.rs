@@ -2,13 +2,11 @@
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
-use crate::geometry::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
+use crate::geometry::ellipsoid::LimbCone;
 use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 
-use super::{
-    AU_KM, AltitudeReference, Config, Kind, LOWEST_ALTITUDE_M, Last, MOON_DISTANCE_KM, MOON_RADIUS_KM, Prior,
-    PriorError, SUN_RADIUS_KM, shape,
-};
+use super::apparent::{ApparentBody, below_limb_error};
+use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Prior, PriorError};
 
 /// From this 1-sigma on, a prior attitude is no better than none and does not correct the shape of the limb: 30 degrees
 /// (book/theory/math.md, ellipsoid).
@@ -85,116 +83,6 @@ fn check<T: Real>(prior: &Prior<T>) -> Result<T, PriorError> {
         return Err(PriorError::Rate);
     }
     Ok(attitude_sigma)
-}
-
-fn below_limb_error<T: Real>(altitude: T, limb: T) -> PriorError {
-    PriorError::BelowLimb { altitude_m: rounded_m(altitude), limb_m: rounded_m(limb) }
-}
-
-/// The body as it appears from the position of the camera; lengths in metres.
-struct ApparentBody<T> {
-    /// Radius of the sphere with this half-angle at this altitude.
-    radius: T,
-    altitude: T,
-    /// Sine of the half-angle.
-    sin: T,
-    /// Mean height of the limb, and its first and second harmonic by azimuth from north.
-    limb: T,
-    harmonics: [T; 2],
-    ellipsoid: Option<LimbCone<T>>,
-    /// 1-sigma of the local radius, and of the second harmonic, if the latitude is unknown.
-    unknown_m: T,
-    unknown_second_m: T,
-}
-
-impl<T: Real> ApparentBody<T> {
-    fn new(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
-        match (body.kind, prior.position_m) {
-            (Kind::Earth, Some(p)) => Self::ellipsoid(body, p),
-            _ => Self::sphere(body, prior),
-        }
-    }
-
-    /// Describes the Earth as seen from an ECEF position in metres.
-    fn ellipsoid(body: &Config, p: [T; 3]) -> Result<Self, PriorError> {
-        let km = T::from_f64(1000.0);
-        let (mut limb, mut harmonics) = (T::from_f64(body.limb_height_km) * km, [T::zero(); 2]);
-        let raised = |limb: T| {
-            let (a, b) = (T::from_f64(WGS84_A_M) + limb, T::from_f64(WGS84_B_M) + limb);
-            LimbCone::try_new(p, a, b).ok_or(PriorError::Position)
-        };
-        let (h, latitude) = geodetic(p, T::from_f64(WGS84_A_M), T::from_f64(WGS84_B_M));
-        if !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite()) {
-            return Err(PriorError::Position);
-        }
-        let mut cone = raised(limb);
-        if !body.limb_height_by_latitude_km.is_empty() {
-            // Below the limb height there is no cone. The limb then counts as being at the camera's own latitude
-            // everywhere.
-            let sin = cone.as_ref().map_or(T::one(), |cone| cone.mean_half_angle_rad().sin_cos().0);
-            let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
-            (limb, harmonics) = (mean * km, [first * km, second * km]);
-            cone = raised(limb);
-        }
-        if !(h > limb) {
-            return Err(below_limb_error(h, limb));
-        }
-        let cone = cone?;
-        let (sin, _) = cone.mean_half_angle_rad().sin_cos();
-        Ok(Self {
-            radius: (sin * h - limb) / (T::one() - sin),
-            altitude: h,
-            sin,
-            limb,
-            harmonics,
-            ellipsoid: Some(cone),
-            unknown_m: T::zero(),
-            unknown_second_m: T::zero(),
-        })
-    }
-
-    /// Describes a sphere, as seen from a position or an altitude.
-    fn sphere(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
-        let km = T::from_f64(1000.0);
-        let limb = T::from_f64(body.limb_height_km) * km;
-        let given = prior.altitude_m.or(body.altitude_km.map(|h| T::from_f64(h) * km));
-        let r = T::from_f64(body.mean_radius_km()) * km;
-        let altitude = match (prior.position_m, given, body.kind) {
-            (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
-                let h = (x * x + y * y + z * z).sqrt() - r;
-                if !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite()) {
-                    return Err(PriorError::Position);
-                }
-                h
-            }
-            (_, _, Kind::Sun) => T::from_f64((AU_KM - SUN_RADIUS_KM) * 1e3),
-            (_, _, Kind::Moon) => T::from_f64((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
-            (_, Some(h), _) => h,
-            (_, None, _) => return Err(PriorError::NoAltitude),
-        };
-        let sin = (r + limb) / (r + altitude);
-        let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
-        if body.kind == Kind::Earth {
-            // A height above the ellipsoid rises with the local radius, so most of the error of the radius cancels.
-            let counts = match body.altitude_reference {
-                AltitudeReference::Ellipsoid => (altitude - limb) / (r + altitude),
-                AltitudeReference::Sphere => T::one(),
-            };
-            unknown_m = shape::radius_sigma_m(sin) * counts;
-            unknown_second_m = shape::second_harmonic_m(sin);
-        }
-        let harmonics = [T::zero(); 2];
-        Ok(Self { radius: r, altitude, sin, limb, harmonics, ellipsoid: None, unknown_m, unknown_second_m })
-    }
-
-    /// Returns the limb axis in ECEF that follows from the position; `None` without a position.
-    fn axis_ecef(&self, body: &Config, prior: &Prior<T>) -> Option<UnitVec3<Ecef, T>> {
-        match (&self.ellipsoid, prior.position_m, body.kind) {
-            (Some(cone), ..) => Some(cone.axis),
-            (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
-            _ => None,
-        }
-    }
 }
 
 impl<T> Expected<T> {
@@ -349,11 +237,6 @@ impl<T: Real> Expected<T> {
     }
 }
 
-/// Rounds a length to the nearest metre, for messages.
-fn rounded_m<T: Real>(m: T) -> i32 {
-    (m + T::from_f64(0.5)).floor().to_i32()
-}
-
 #[cfg(test)]
 mod tests {
     use std::string::ToString;
@@ -433,7 +316,8 @@ mod tests {
         let told = PriorError::BelowLimb { altitude_m: 3200, limb_m: 17_000 };
         assert_eq!(at(&body, altitude(3200.0)), told);
         assert_eq!(told.to_string(), "altitude 3.2 km is below the limb height 17 km");
-        let pad = crate::geometry::ellipsoid::from_geodetic(1.18, 0.37, 3200.0, WGS84_A_M, WGS84_B_M);
+        use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic};
+        let pad = from_geodetic(1.18, 0.37, 3200.0, WGS84_A_M, WGS84_B_M);
         assert_eq!(at(&body, Prior { position_m: Some(pad), ..Prior::default() }), told);
         let rows = [[-90.0, 16.0], [0.0, 18.0], [90.0, 16.0]].into_iter().collect();
         let by_latitude = Config { limb_height_by_latitude_km: rows, ..body.clone() };

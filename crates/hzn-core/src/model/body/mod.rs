@@ -1,5 +1,6 @@
 //! The body whose limb the sensor searches for, and its cone for a given position and altitude.
 
+mod apparent;
 mod expected;
 mod shape;
 

@@ -7,7 +7,7 @@
 
 use super::config::Config;
 use super::inliers::{Consensus, Threshold};
-use super::sampled::{FEWEST, conclude, distances2, draw_cone, required_draws};
+use super::sampled::{MIN_DRAWS, conclude, distances2, draw_cone, required_draws};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;
@@ -38,7 +38,7 @@ pub(super) fn find<T: Real>(
     let mut best: Option<(V3<T>, T, T)> = None;
     let (mut draws, mut enough) = (0, config.max_draws);
     let a_draw = DRAW + blocks.len() as u32 * LIKELIHOOD;
-    while draws < enough.max(FEWEST).min(config.max_draws) && work.try_spend(a_draw) {
+    while draws < enough.max(MIN_DRAWS).min(config.max_draws) && work.try_spend(a_draw) {
         draws += 1;
         let Some((e, c)) = draw_cone(blocks, count, &mut rng) else { continue };
         let (cost, share) = mixture.cost(blocks, &e, c);

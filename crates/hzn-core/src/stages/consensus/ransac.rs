@@ -7,7 +7,7 @@
 
 use super::config::Config;
 use super::inliers::{Consensus, Threshold};
-use super::sampled::{FEWEST, conclude, count_inliers, draw_cone, required_draws};
+use super::sampled::{MIN_DRAWS, conclude, count_inliers, draw_cone, required_draws};
 use crate::base::real::Real;
 use crate::base::rng::Rng;
 use crate::geometry::block::Block;
@@ -30,7 +30,7 @@ pub(super) fn find<T: Real>(
     let (mut best, mut most) = (None, T::from_f64(3.5));
     let (mut draws, mut enough) = (0, config.max_draws);
     let a_draw = DRAW + blocks.len() as u32 * SCORE;
-    while draws < enough.max(FEWEST).min(config.max_draws) && work.try_spend(a_draw) {
+    while draws < enough.max(MIN_DRAWS).min(config.max_draws) && work.try_spend(a_draw) {
         draws += 1;
         let Some((e, c)) = draw_cone(blocks, count, &mut rng) else { continue };
         let near = count_inliers(blocks, &e, c, limit2);

@@ -8,7 +8,7 @@ use crate::geometry::block::{Block, LANES, sum};
 use crate::geometry::cone::through_three;
 
 /// Smallest number of draws, even if the first one fits well.
-pub(super) const FEWEST: u32 = 6;
+pub(super) const MIN_DRAWS: u32 = 6;
 
 /// Largest value of `max_draws`.
 const MOST: u32 = 100_000;
@@ -31,7 +31,7 @@ pub(super) fn draw_cone<T: Real>(blocks: &[Block<T>], count: u32, rng: &mut Rng)
 pub(super) fn required_draws<T: Real>(w: T) -> u32 {
     let p = w * w * w;
     if p > T::from_f64(0.99) {
-        FEWEST
+        MIN_DRAWS
     } else if p > T::from_f64(1e-4) {
         (T::from_f64(-4.6) / (T::one() - p).ln()).to_i32().clamp(1, MOST as i32) as u32
     } else {

@@ -14,7 +14,7 @@ use crate::model::work::{DRAW, SCORE, WorkBudget};
 pub(super) const SCORED: usize = 20;
 
 /// Smallest number of draws, even if the first one fits well.
-pub(super) const FEWEST: u32 = 6;
+pub(super) const MIN_DRAWS: u32 = 6;
 
 /// Sigma of the expected half-angle in radians.
 pub(super) fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
@@ -43,14 +43,9 @@ pub(super) fn search<T: Real>(
     if count < 3 {
         return None;
     }
-    let sigma_alpha = sigma_alpha(expected);
-    let free = expected.free || sigma_alpha > T::from_f64(0.0175);
-    // An error of the half-angle bends the edge by a small part of this error. The limit grows accordingly, at most by
-    // three thresholds.
-    let threshold = threshold.px;
-    let bend =
-        if free { T::ZERO } else { (sigma_alpha * focal_px * T::from_f64(0.05)).min(threshold * T::from_f64(3.0)) };
-    let limit2 = (threshold + bend) * (threshold + bend);
+    let free = expected.free || sigma_alpha(expected) > T::from_f64(0.0175);
+    let limit = limit_px(threshold.px, free, expected, focal_px);
+    let limit2 = limit * limit;
     let scored = blocks.len().div_ceil(SCORED).max(1);
     let looked_at = blocks.len().div_ceil(scored);
     let points = looked_at as f64 * LANES as f64;
@@ -61,7 +56,7 @@ pub(super) fn search<T: Real>(
     let mut needed = config.max_draws;
     let mut draws = 0;
     let score_cost = looked_at as u32 * SCORE;
-    'draws: while draws < needed.max(FEWEST).min(config.max_draws) && work.try_spend(DRAW) {
+    'draws: while draws < needed.max(MIN_DRAWS).min(config.max_draws) && work.try_spend(DRAW) {
         draws += 1;
         let i = rng.below(count);
         // Points far apart give a precise cone. Points close together find a limb that is a small part of the edge,
@@ -70,21 +65,10 @@ pub(super) fn search<T: Real>(
         let mut near = || (i + 1 + rng.below(reach)) % count;
         let (j, k, check) = (near(), near(), near());
         let (Some(a), Some(b)) = (ray(blocks, i), ray(blocks, j)) else { continue };
-        let hypotheses = if free {
-            let Some(third) = ray(blocks, k) else { continue };
-            let Some((e, c)) = through_three(&a, &b, &third) else { continue };
-            [Some((e, c)), None]
-        } else {
-            let Some([e, f]) = through_two(&a, &b, expected.cos) else { continue };
-            [Some((e, expected.cos)), Some((f, expected.cos))]
-        };
+        let third = if free { ray(blocks, k) } else { None };
+        let hypotheses = hypotheses(&a, &b, third, free, expected.cos);
         for (e, c) in hypotheses.into_iter().flatten() {
-            let faces = |i: u32| {
-                let lane = i as usize % LANES;
-                blocks
-                    .get(i as usize / LANES)
-                    .is_some_and(|b| b.is_lit_towards(lane, &e) && is_lit(&b.ray(lane), &e, c, expected))
-            };
+            let faces = |i: u32| faces_light(blocks, i, &e, c, expected);
             if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {
                 continue;
             }
@@ -98,18 +82,50 @@ pub(super) fn search<T: Real>(
                 // With the inlier share w, a draw succeeds with probability w³ (w⁴ with three points). After `needed`
                 // draws the probability of a success is 99 %.
                 let share = T::one() - cost / nothing;
-                let p = share * share * share * if free { share } else { T::one() };
-                needed = if p > T::from_f64(0.99) {
-                    FEWEST
-                } else {
-                    (T::from_f64(-4.6) / (T::one() - p).ln()).to_i32().clamp(1, 100_000) as u32
-                };
+                needed = required_draws(share * share * share * if free { share } else { T::one() });
             }
         }
     }
     let (e, c) = best?;
     let share = T::one() - best_cost / nothing;
     (share > T::from_f64(0.06)).then_some(Consensus { e, c, draws, all: false })
+}
+
+/// Returns the largest distance of an inlier from a drawn cone, in pixels. An error of the half-angle bends the edge by a
+/// small part of this error. The limit grows accordingly, at most by three thresholds.
+#[inline(always)]
+fn limit_px<T: Real>(threshold_px: T, free: bool, expected: &Expected<T>, focal_px: T) -> T {
+    let bend = (sigma_alpha(expected) * focal_px * T::from_f64(0.05)).min(threshold_px * T::from_f64(3.0));
+    threshold_px + if free { T::ZERO } else { bend }
+}
+
+/// Returns the cones through two points with the half-angle of cosine `cos`, or with a `free` half-angle the one through
+/// three points.
+#[inline(always)]
+fn hypotheses<T: Real>(a: &V3<T>, b: &V3<T>, third: Option<V3<T>>, free: bool, cos: T) -> [Option<(V3<T>, T)>; 2] {
+    if free {
+        [third.and_then(|third| through_three(a, b, &third)), None]
+    } else {
+        through_two(a, b, cos).map_or([None; 2], |axes| axes.map(|e| Some((e, cos))))
+    }
+}
+
+/// Whether the lit side of a point lies towards the axis, and the Sun lights the body there.
+#[inline(always)]
+fn faces_light<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
+    let lane = i as usize % LANES;
+    let block = blocks.get(i as usize / LANES);
+    block.is_some_and(|b| b.is_lit_towards(lane, e) && is_lit(&b.ray(lane), e, c, expected))
+}
+
+/// Returns the number of draws that give 99 % probability of a success, if one draw succeeds with the probability `p`.
+#[inline(always)]
+fn required_draws<T: Real>(p: T) -> u32 {
+    if p > T::from_f64(0.99) {
+        MIN_DRAWS
+    } else {
+        (T::from_f64(-4.6) / (T::one() - p).ln()).to_i32().clamp(1, 100_000) as u32
+    }
 }
 
 /// Returns the squared distance of a point from the limb, in px².

@@ -69,17 +69,16 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
                         stretch += counted;
                         passed = (if lit { 0 } else { next + 1 - k }, counted, before);
                         before = Some((Pixel { x, y }, lit));
-                        let count_equal_strides =
+                        let equal =
                             if self.region.has_mask() { 0 } else { self.count_equal_strides(&run, next, stride, lit) };
-                        if count_equal_strides > 0 {
-                            let at =
-                                |count_equal_strides: u16| Some((run.at(next + count_equal_strides * stride), lit));
+                        if equal > 0 {
+                            let after = |strides: u16| Some((run.at(next + strides * stride), lit));
                             if !lit {
-                                stretch += u32::from(count_equal_strides) * u32::from(stride);
-                                passed = (stride, stride.into(), at(count_equal_strides - 1));
+                                stretch += u32::from(equal) * u32::from(stride);
+                                passed = (stride, stride.into(), after(equal - 1));
                             }
-                            before = at(count_equal_strides);
-                            k = next + count_equal_strides * stride + 1;
+                            before = after(equal);
+                            k = next + equal * stride + 1;
                             continue;
                         }
                     }

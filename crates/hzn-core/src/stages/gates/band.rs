@@ -41,60 +41,75 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
 ) -> T {
     let (mut looks, mut bands) = (0, 0);
     for (block, lane) in inliers(blocks, MAX_PLACES) {
-        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
-        let [gu, gv] = block.gradient_at(lane, e);
-        let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
-        let (du, dv) = (gu / norm, gv / norm);
-        let at = |px: i32| {
-            let (x, y) = ((from.u + du * T::from_i32(px)).to_i32(), (from.v + dv * T::from_i32(px)).to_i32());
-            let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            binary.region.contains(x, y).then_some((x, y))
-        };
-        let seen = |px: i32| {
-            at(px)
-                .filter(|&(x, y)| !binary.region.masked(x, y))
-                .map(|(x, y)| T::from_i32(binary.brightness(x, y).into()))
-        };
-        let most = i32::from(binary.region.width()) + i32::from(binary.region.height());
-        let end = inside(&at, most.min((disc_px * T::from_f64(ACROSS)).to_i32()));
-        if end < SHORTEST_PX {
-            continue;
-        }
-        // The brightest pixel is used, because a band may be narrower than `ASIDE_PX`.
-        let lit = (1..=ASIDE_PX).filter_map(seen).fold(T::ZERO, |a, b| a.max(b));
-        let limb = (lit - sky.median).max(T::one());
-        let dark = (sky.spread * T::from_f64(3.0)).max(limb * T::from_f64(SKY_PART)) + sky.median;
+        let Some(is_band) = comes_back(e, block, lane, binary, camera, sky, disc_px, step) else { continue };
         looks += 1;
-        let place = |k: i32| ASIDE_PX + (end - ASIDE_PX) * k / PLACES;
-        let mut is_sky = [None; PLACES as usize];
-        for (k, cell) in (1..=PLACES).zip(is_sky.iter_mut()) {
-            *cell = seen(place(k)).map(|b| b < dark);
-        }
-        let Some(back) = first_lasting_sky(&is_sky) else { continue };
-        // The far edge is where half of the brightness of the band is left: after the last place that is brighter.
-        let above = |px: i32| seen(px).map_or(T::ZERO, |b| b - sky.median);
-        let passed = |k: i32| above(if k == 0 { ASIDE_PX } else { place(k) });
-        let level = (0..=back as i32).fold(limb, |most, k| most.max(passed(k))) * T::from_f64(0.5);
-        let last = (0..=back as i32).rev().find(|&k| passed(k) >= level).unwrap_or(0);
-        let (mut near, mut far) = (place(last), place(last + 1));
-        while far - near > 1 {
-            let middle = (near + far) / 2;
-            if seen(middle).is_some_and(|b| b - sky.median < level) { far = middle } else { near = middle }
-        }
-        // The mean of three pixels reduces the noise.
-        let edge = |px: i32| {
-            let (mut sum, mut count) = (T::ZERO, 0);
-            for b in [px - 1, px, px + 1].into_iter().filter_map(seen) {
-                sum += b;
-                count += 1;
-            }
-            if count > 0 { sum / T::from_i32(count) } else { sky.median }
-        };
-        // In a narrow band, the brightest pixel is less than `ASIDE_PX` from the far edge.
-        let bright = ((near - ASIDE_PX).max(1)..=near).map(edge).fold(T::ZERO, |a, b| a.max(b));
-        bands += i32::from(bright - edge(far + ASIDE_PX) >= limb * step);
+        bands += i32::from(is_band);
     }
     T::from_i32(bands) / T::from_i32(looks.max(1))
+}
+
+/// Returns whether the look inwards from one inlier comes back to the sky across a second edge; `None` if the picture
+/// does not show enough of the body there.
+#[inline(always)]
+fn comes_back<T: Real, P: Pixels, O: Observer<T>>(
+    e: &V3<T>,
+    block: &Block<T>,
+    lane: usize,
+    binary: &BinaryPicture<'_, T, P, O>,
+    camera: &Camera<T>,
+    sky: &sky::Sky<T>,
+    disc_px: T,
+    step: T,
+) -> Option<bool> {
+    let from = camera.project(&UnitVec3::assume_unit(block.ray(lane)))?;
+    let [gu, gv] = block.gradient_at(lane, e);
+    let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+    let (du, dv) = (gu / norm, gv / norm);
+    let at = |px: i32| {
+        let (x, y) = ((from.u + du * T::from_i32(px)).to_i32(), (from.v + dv * T::from_i32(px)).to_i32());
+        let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
+        binary.region.contains(x, y).then_some((x, y))
+    };
+    let seen = |px: i32| {
+        at(px).filter(|&(x, y)| !binary.region.masked(x, y)).map(|(x, y)| T::from_i32(binary.brightness(x, y).into()))
+    };
+    let most = i32::from(binary.region.width()) + i32::from(binary.region.height());
+    let end = inside(&at, most.min((disc_px * T::from_f64(ACROSS)).to_i32()));
+    if end < SHORTEST_PX {
+        return None;
+    }
+    // The brightest pixel is used, because a band may be narrower than `ASIDE_PX`.
+    let lit = (1..=ASIDE_PX).filter_map(seen).fold(T::ZERO, |a, b| a.max(b));
+    let limb = (lit - sky.median).max(T::one());
+    let dark = (sky.spread * T::from_f64(3.0)).max(limb * T::from_f64(SKY_PART)) + sky.median;
+    let place = |k: i32| ASIDE_PX + (end - ASIDE_PX) * k / PLACES;
+    let mut is_sky = [None; PLACES as usize];
+    for (k, cell) in (1..=PLACES).zip(is_sky.iter_mut()) {
+        *cell = seen(place(k)).map(|b| b < dark);
+    }
+    let Some(back) = first_lasting_sky(&is_sky) else { return Some(false) };
+    // The far edge is where half of the brightness of the band is left: after the last place that is brighter.
+    let above = |px: i32| seen(px).map_or(T::ZERO, |b| b - sky.median);
+    let passed = |k: i32| above(if k == 0 { ASIDE_PX } else { place(k) });
+    let level = (0..=back as i32).fold(limb, |most, k| most.max(passed(k))) * T::from_f64(0.5);
+    let last = (0..=back as i32).rev().find(|&k| passed(k) >= level).unwrap_or(0);
+    let (mut near, mut far) = (place(last), place(last + 1));
+    while far - near > 1 {
+        let middle = (near + far) / 2;
+        if seen(middle).is_some_and(|b| b - sky.median < level) { far = middle } else { near = middle }
+    }
+    // The mean of three pixels reduces the noise.
+    let edge = |px: i32| {
+        let (mut sum, mut count) = (T::ZERO, 0);
+        for b in [px - 1, px, px + 1].into_iter().filter_map(seen) {
+            sum += b;
+            count += 1;
+        }
+        if count > 0 { sum / T::from_i32(count) } else { sky.median }
+    };
+    // In a narrow band, the brightest pixel is less than `ASIDE_PX` from the far edge.
+    let bright = ((near - ASIDE_PX).max(1)..=near).map(edge).fold(T::ZERO, |a, b| a.max(b));
+    Some(bright - edge(far + ASIDE_PX) >= limb * step)
 }
 
 /// Returns how far the region extends from the limb inwards, in pixels, at most `most`. The search halves the interval.

@@ -110,6 +110,48 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
         Some(Stretch { at: sum.at.map(|x| x / n), off: sum.off / n, ..sum })
     }
 
+    /// Follows the edge beyond the end of a run of inliers, and adds its boxes that are not on the cone to `found`.
+    #[inline(always)]
+    fn follow_beyond(&self, end: usize, ahead: bool, noise_px: T, config: &Config, found: &mut Continuation<T>) {
+        let off_cone = noise_px.max(T::from_f64(config.rival_floor_px)) * T::from_f64(3.0);
+        let turn = T::from_f64(config.departure_turn_deg.to_radians());
+        // Two boxes within the run give the direction at its end.
+        let mut place = Some(end);
+        let (Some(mut before), Some(further)) = (self.stretch(&mut place, !ahead), self.stretch(&mut place, !ahead))
+        else {
+            return;
+        };
+        let mut heading = [before.at[0] - further.at[0], before.at[1] - further.at[1]];
+        let mut place = if ahead { Some(end + 1) } else { end.checked_sub(1) };
+        let mut is_smooth = true;
+        for number in 0..BOXES {
+            let Some(now) = self.stretch(&mut place, ahead) else { break };
+            let step = [now.at[0] - before.at[0], now.at[1] - before.at[1]];
+            let cross = heading[0] * step[1] - heading[1] * step[0];
+            let dot = heading[0] * step[0] + heading[1] * step[1];
+            // Each place is a mean of n points, and a turn compares three places: four sigmas are 4 √6 σ/√n over the
+            // box.
+            let n = T::from_i32(now.points.max(1)).sqrt();
+            let length = (step[0] * step[0] + step[1] * step[1]).sqrt().max(T::one());
+            let blur = noise_px * T::from_f64(4.0 * 2.449_489_743) / (n * length);
+            is_smooth = is_smooth && cross.abs().atan2(dot) <= turn + blur;
+            if now.off.abs() > off_cone {
+                let contrast = self.contrast(now.at, step);
+                if number < NEAR {
+                    found.near.add(contrast);
+                }
+                if is_smooth {
+                    found.away += now.length;
+                    found.smooth.add(contrast);
+                }
+            }
+            if !is_smooth && number >= NEAR {
+                break;
+            }
+            (before, heading) = (now, step);
+        }
+    }
+
     /// Returns the difference in brightness across the edge at `at`, in counts. The edge has the direction (dx, dy).
     fn contrast(&self, at: [T; 2], [dx, dy]: [T; 2]) -> Option<i32> {
         let norm = (dx * dx + dy * dy).sqrt().max(T::from_f64(1e-6));
@@ -144,47 +186,11 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
 ) -> bool {
     let edge = Edge { blocks, points: points as usize, curve, camera, binary };
     let Some(run) = longest(blocks) else { return false };
-    let off_cone = noise_px.max(T::from_f64(config.rival_floor_px)) * T::from_f64(3.0);
-    let (mut away, mut smooth, mut near) = (T::ZERO, Mean::default(), Mean::default());
-    let turn = T::from_f64(config.departure_turn_deg.to_radians());
+    let mut found = Continuation { away: T::ZERO, smooth: Mean::default(), near: Mean::default() };
     for ahead in [false, true] {
-        let end = if ahead { run.last } else { run.first };
-        // Two boxes within the run give the direction at its end.
-        let mut place = Some(end);
-        let (Some(mut before), Some(further)) = (edge.stretch(&mut place, !ahead), edge.stretch(&mut place, !ahead))
-        else {
-            continue;
-        };
-        let mut heading = [before.at[0] - further.at[0], before.at[1] - further.at[1]];
-        let mut place = if ahead { Some(end + 1) } else { end.checked_sub(1) };
-        let mut is_smooth = true;
-        for number in 0..BOXES {
-            let Some(now) = edge.stretch(&mut place, ahead) else { break };
-            let step = [now.at[0] - before.at[0], now.at[1] - before.at[1]];
-            let cross = heading[0] * step[1] - heading[1] * step[0];
-            let dot = heading[0] * step[0] + heading[1] * step[1];
-            // Each place is a mean of n points, and a turn compares three places: four sigmas are 4 √6 σ/√n over the
-            // box.
-            let n = T::from_i32(now.points.max(1)).sqrt();
-            let length = (step[0] * step[0] + step[1] * step[1]).sqrt().max(T::one());
-            let blur = noise_px * T::from_f64(4.0 * 2.449_489_743) / (n * length);
-            is_smooth = is_smooth && cross.abs().atan2(dot) <= turn + blur;
-            if now.off.abs() > off_cone {
-                let contrast = edge.contrast(now.at, step);
-                if number < NEAR {
-                    near.add(contrast);
-                }
-                if is_smooth {
-                    away += now.length;
-                    smooth.add(contrast);
-                }
-            }
-            if !is_smooth && number >= NEAR {
-                break;
-            }
-            (before, heading) = (now, step);
-        }
+        edge.follow_beyond(if ahead { run.last } else { run.first }, ahead, noise_px, config, &mut found);
     }
+    let Continuation { away, smooth, near } = found;
     let is_long =
         away >= T::from_f64(2.0 * BOX_PX) && away > run.length.max(T::one()) * T::from_f64(config.max_departure);
     let is_abrupt = near.count > 0 && support < T::from_f64(config.min_support_abrupt);
@@ -203,6 +209,16 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
         beside.count > 0 && beside.mean::<T>() >= on_cone.mean::<T>() * T::from_f64(config.departure_contrast)
     };
     (is_long && kept(&smooth)) || (is_abrupt && kept(&near))
+}
+
+/// The parts of an edge next to the cone that continue a run of inliers.
+struct Continuation<T> {
+    /// Length of the smooth part, in pixels.
+    away: T,
+    /// Contrast of the smooth part.
+    smooth: Mean,
+    /// Contrast of the first boxes, smooth or not.
+    near: Mean,
 }
 
 /// Sum and number of contrasts, in counts.
