@@ -49,8 +49,8 @@
 //!
 //! | workspace | scalar | border pixels | points fitted | bytes |
 //! |---|---|---|---|---|
-//! | [`FlightHorizon`] | f32 | 2048 | 2048 | below 96 KiB |
-//! | [`HostHorizon`] | f64 | 16384 | 16384 | 1.5 MiB |
+//! | [`FlightHorizon`] | f32 | 2048 | 2048 | below 92 KiB |
+//! | [`HostHorizon`] | f64 | 16384 | 16384 | below 1.5 MiB |
 //!
 //! # Features
 //!

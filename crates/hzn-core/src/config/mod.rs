@@ -180,6 +180,15 @@ impl Config {
     ///
     /// # Errors
     /// Returns the first field that is out of its limits.
+    ///
+    /// ```
+    /// use hzn_core::Config;
+    /// use hzn_core::camera::{self, Model};
+    ///
+    /// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 500.0));
+    /// config.body.limb_height_km = 1700.0;
+    /// assert_eq!(config.check().unwrap_err().field, "body.limb_height_km");
+    /// ```
     pub fn check(&self) -> Result<(), ConfigError> {
         if let Some(mount) = &self.mount {
             let q = mount.q_body_from_camera_wxyz;

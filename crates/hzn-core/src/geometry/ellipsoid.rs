@@ -16,6 +16,15 @@ pub const WGS84_B_M: f64 = 6_356_752.314_245_179;
 pub const EARTH_MEAN_RADIUS_M: f64 = 6_371_008.8;
 
 /// The cone of rays that touch an ellipsoid, seen from one position.
+///
+/// ```
+/// use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M};
+///
+/// // Above the equator, the limb to the east and west is wider than the limb towards the poles.
+/// let cone = LimbCone::<f64>::try_new([7_000e3, 0.0, 0.0], WGS84_A_M, WGS84_B_M).expect("above the surface");
+/// let (east, meridian) = cone.half_angles_rad();
+/// assert!(east > meridian && cone.axis.xyz()[0] == -1.0);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct LimbCone<T> {
     /// Axis of the cone, towards the body.
@@ -100,6 +109,14 @@ pub fn geodetic<T: Real>([x, y, z]: [T; 3], a_m: T, b_m: T) -> (T, T) {
 }
 
 /// Converts a geodetic latitude and longitude (radians) and height (metres) to an ECEF position in metres.
+///
+/// ```
+/// use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic, geodetic};
+///
+/// let position_m = from_geodetic(0.8, 0.2, 400e3, WGS84_A_M, WGS84_B_M);
+/// let (height_m, latitude_rad) = geodetic(position_m, WGS84_A_M, WGS84_B_M);
+/// assert!((height_m - 400e3).abs() < 1e-3 && (latitude_rad - 0.8).abs() < 1e-9);
+/// ```
 pub fn from_geodetic<T: Real>(lat_rad: T, lon_rad: T, height_m: T, a_m: T, b_m: T) -> [T; 3] {
     let (sl, cl) = lat_rad.sin_cos();
     let (so, co) = lon_rad.sin_cos();

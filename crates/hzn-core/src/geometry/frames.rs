@@ -27,6 +27,15 @@ pub enum Ecef {}
 pub enum Body {}
 
 /// A direction: three numbers of unit length in frame `F`.
+///
+/// ```
+/// use hzn_core::frames::{Cam, UnitVec3};
+///
+/// let forward = UnitVec3::<Cam, f64>::try_new([0.0, 0.0, 2.0]).expect("not of length zero");
+/// let down = UnitVec3::<Cam, f64>::try_new([0.0, 1.0, 0.0]).expect("not of length zero");
+/// assert_eq!(forward.xyz(), [0.0, 0.0, 1.0]);
+/// assert_eq!(forward.angle_rad(&down).to_degrees(), 90.0);
+/// ```
 #[derive(Debug)]
 pub struct UnitVec3<F, T> {
     v: V3<T>,
@@ -92,6 +101,16 @@ impl<T: Real> UnitVec3<Cam, T> {
 }
 
 /// Covariance of a direction in frame `F`, rad²: symmetric 3×3 of rank 2; its null space is the direction.
+///
+/// ```
+/// use hzn_core::frames::{Cam, Cov3, UnitVec3};
+///
+/// // 2 mrad about the y axis and 1 mrad about the x axis, of a direction along z.
+/// let covariance = Cov3::<Cam, f64>::from_upper([4e-6, 0.0, 0.0, 1e-6, 0.0, 0.0]);
+/// let x = UnitVec3::try_new([1.0, 0.0, 0.0]).expect("not of length zero");
+/// assert_eq!(covariance.variance_along(&x), 4e-6);
+/// assert!((covariance.sigma_max_rad() - 2e-3).abs() < 1e-12);
+/// ```
 #[derive(Debug)]
 pub struct Cov3<F, T> {
     /// The upper triangle: xx, xy, xz, yy, yz, zz, in rad².
@@ -149,6 +168,18 @@ impl<F, T: Real> Cov3<F, T> {
 }
 
 /// A rotation that converts coordinates from frame `A` to frame `B`.
+///
+/// ```
+/// use hzn_core::frames::{Body, Cam, Rotation, UnitVec3};
+///
+/// // The camera looks along the vehicle's x axis: camera z is x, camera x is y, camera y is z.
+/// let cam_to_body = Rotation::<Cam, Body, f64>::assume_from_quaternion([0.5, 0.5, 0.5, 0.5]).expect("a rotation");
+/// let boresight = UnitVec3::<Cam, f64>::try_new([0.0, 0.0, 1.0]).expect("not of length zero");
+/// let [x, y, z] = cam_to_body.apply(&boresight).xyz();
+/// assert!((x - 1.0).abs() < 1e-15 && y.abs() < 1e-15 && z.abs() < 1e-15);
+/// let back = cam_to_body.inverse().apply(&cam_to_body.apply(&boresight));
+/// assert!(back.angle_rad(&boresight) < 1e-12);
+/// ```
 #[derive(Debug)]
 pub struct Rotation<A, B, T> {
     rows: [V3<T>; 3],

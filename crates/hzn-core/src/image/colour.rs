@@ -21,6 +21,16 @@ choices! {
 }
 
 /// A picture with interleaved colours, read as one brightness per pixel.
+///
+/// ```
+/// use hzn_core::image::{Channel, Colour, Layout, Pixels};
+///
+/// let rgb = [10u8, 20, 33, 0, 0, 0];
+/// let mean = Colour::try_new(&rgb, Layout::packed(2, 1, 3, 8), Channel::Mean)?;
+/// let green = Colour::try_new(&rgb, Layout::packed(2, 1, 3, 8), Channel::Green)?;
+/// assert_eq!((mean.at(0, 0), green.at(0, 0)), (21, 20));
+/// # Ok::<(), hzn_core::image::ImageError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Colour<'a, S> {
     grey: Grey<'a, S>,

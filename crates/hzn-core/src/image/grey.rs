@@ -5,6 +5,15 @@ use super::pixels::Pixels;
 use super::sample::Sample;
 
 /// A picture with one sample per pixel.
+///
+/// ```
+/// use hzn_core::image::{Grey, ImageError, Layout};
+///
+/// let data = [0u8; 640 * 480];
+/// assert!(Grey::try_new(&data, Layout::packed(640, 480, 1, 8)).is_ok());
+/// // One row more than there is data for.
+/// assert_eq!(Grey::try_new(&data, Layout::packed(640, 481, 1, 8)).unwrap_err(), ImageError::TooShort);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Grey<'a, S> {
     pub(super) data: &'a [S],

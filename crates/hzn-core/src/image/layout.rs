@@ -32,6 +32,15 @@ impl fmt::Display for ImageError {
 impl core::error::Error for ImageError {}
 
 /// Shape of a picture in memory.
+///
+/// ```
+/// use hzn_core::image::{Grey, Layout};
+///
+/// // A 12-bit camera whose rows of 640 samples begin every 672 samples.
+/// let data = vec![0u16; 672 * 480];
+/// let layout = Layout { stride: 672, ..Layout::packed(640, 480, 1, 12) };
+/// assert!(Grey::try_new(&data, layout).is_ok());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Columns.

@@ -3,6 +3,32 @@
 use crate::geometry::block::Lit;
 
 /// The input of the pipeline: one brightness per pixel.
+///
+/// # Example
+///
+/// A frame buffer with a layout of its own, here two pixels in each byte, needs the methods without a default:
+///
+/// ```
+/// use hzn_core::image::Pixels;
+///
+/// struct Nibbles<'a>(&'a [u8]);
+///
+/// impl Pixels for Nibbles<'_> {
+///     fn width(&self) -> u16 { 64 }
+///     fn height(&self) -> u16 { 48 }
+///     fn full_scale(&self) -> u16 { 15 }
+///     fn index(&self, x: u16, y: u16) -> usize { usize::from(y) * 64 + usize::from(x) }
+///     fn across(&self) -> usize { 1 }
+///     fn down(&self) -> usize { 64 }
+///     fn read(&self, index: usize) -> u16 {
+///         let byte = self.0.get(index / 2).copied().unwrap_or(0);
+///         u16::from(if index % 2 == 0 { byte >> 4 } else { byte & 15 })
+///     }
+/// }
+///
+/// let frame = [0x5a; 32 * 48];
+/// assert_eq!((Nibbles(&frame).at(0, 0), Nibbles(&frame).at(1, 0)), (5, 10));
+/// ```
 pub trait Pixels {
     /// Whether the picture arrived row by row and is no longer in memory. Only [`Self::streamed_point`] then has its
     /// edges.

@@ -6,6 +6,14 @@ use super::layout::{ImageError, Layout};
 use super::pixels::Pixels;
 
 /// A picture whose kind is known only at run time, as on a workstation.
+///
+/// ```
+/// use hzn_core::image::{Channel, ImageView, Layout, Pixels};
+///
+/// let view = ImageView::from_words(&[4095, 0], Layout::packed(2, 1, 1, 12), Channel::Mean)?;
+/// assert_eq!((view.width(), view.full_scale(), view.at(0, 0)), (2, 4095, 4095));
+/// # Ok::<(), hzn_core::image::ImageError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub enum ImageView<'a> {
     /// One byte per pixel.

@@ -7,6 +7,39 @@ use crate::model::status::Stage;
 
 /// Receives calls at stage boundaries and on pixel reads. Every method does nothing by default; implement the ones that
 /// you need. Methods take `&self`: an observer that collects data uses `Cell` or `RefCell`.
+///
+/// # Example
+///
+/// ```
+/// use std::cell::Cell;
+///
+/// use hzn_core::observer::Observer;
+/// use hzn_core::status::Stage;
+/// # use hzn_core::camera::{self, Model};
+/// # use hzn_core::image::{Grey, Layout};
+/// # use hzn_core::{Config, FlightHorizon, Prior};
+/// # let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+/// # config.body.altitude_km = Some(230.0);
+/// # let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
+/// # let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
+/// # let mut horizon = FlightHorizon::new(&config)?;
+/// # let expected = horizon.expect(&Prior::default())?;
+///
+/// /// Counts the pixels that are read.
+/// #[derive(Default)]
+/// struct Reads(Cell<u32>);
+///
+/// impl<T> Observer<T> for Reads {
+///     fn pixel(&self, _x: u16, _y: u16) {
+///         self.0.set(self.0.get() + 1);
+///     }
+/// }
+///
+/// let reads = Reads::default();
+/// horizon.process_observed(&picture, &expected, &reads);
+/// assert!(reads.0.get() > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Observer<T> {
     /// The search for body number `which`, from 0, begins. This is not called when there is only one body.
     fn body(&self, _which: u8) {}

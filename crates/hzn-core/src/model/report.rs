@@ -14,6 +14,37 @@ pub const MAX_LISTED: usize = 16;
 pub type Reports<T> = heapless::Vec<Report<T>, MAX_BODIES>;
 
 /// The report on one picture. Every picture gets a report.
+///
+/// # What to look at
+///
+/// Check [`Self::status`] first. With [`Status::Ok`] there is a [`Self::solution`]; with any other status there is none,
+/// and [`Self::stage`], [`Self::counters`] and the verdicts of [`Self::candidates`] say how far the picture came and why it
+/// was refused.
+///
+/// # Example
+///
+/// ```
+/// # use hzn_core::camera::{self, Model};
+/// # use hzn_core::image::{Grey, Layout};
+/// # use hzn_core::{Config, FlightHorizon, Prior};
+/// # let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+/// # config.body.altitude_km = Some(230.0);
+/// # let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
+/// # let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
+/// # let mut horizon = FlightHorizon::new(&config)?;
+/// # let expected = horizon.expect(&Prior::default())?;
+/// let report = horizon.process(&picture, &expected);
+/// match &report.solution {
+///     Some(solution) => println!("axis {:?} in the camera", solution.axis.xyz()),
+///     None => {
+///         println!("{} at stage {}", report.status, report.stage.name());
+///         for edge in &report.candidates {
+///             println!("edge of {} px: {}", edge.length_px, edge.verdict.name());
+///         }
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Report<T> {
     /// Outcome of the picture.
@@ -115,6 +146,25 @@ pub struct Free<T> {
 }
 
 /// A direction with its covariance.
+///
+/// # Frames and units
+///
+/// The axis is a unit vector in the camera frame (x right, y down, z forward). Its covariance is in rad², 3×3 and of rank 2:
+/// a direction has no error along itself. A filter uses it with any two axes perpendicular to the direction.
+///
+/// # Example
+///
+/// A filter tests an answer against its own prediction before it uses the answer:
+///
+/// ```
+/// use hzn_core::Solution;
+/// use hzn_core::frames::{Cam, UnitVec3};
+///
+/// /// Whether the answer lies within three standard deviations of the predicted direction.
+/// fn is_plausible(solution: &Solution<f64>, predicted: &UnitVec3<Cam, f64>) -> bool {
+///     solution.axis.angle_rad(predicted) < 3.0 * solution.covariance.sigma_max_rad()
+/// }
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Solution<T> {
     /// Unit vector to the body in the camera frame: the limb axis for `earth`, the centre for spheres.

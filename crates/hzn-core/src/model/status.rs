@@ -3,6 +3,12 @@
 use core::fmt;
 
 /// Outcome of one picture. The numbers are frozen, because files and telemetry contain them.
+///
+/// ```
+/// use hzn_core::status::Status;
+///
+/// assert_eq!((Status::NoLimb.name(), Status::NoLimb as u8), ("no-limb", 1));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Status {

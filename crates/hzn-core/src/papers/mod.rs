@@ -56,6 +56,15 @@ impl Preset {
 
 impl Config {
     /// Makes a sensor with this camera and every other value from the preset.
+    ///
+    /// ```
+    /// use hzn_core::camera::{self, Model};
+    /// use hzn_core::{Config, Preset};
+    ///
+    /// let preset = Preset::named("sun").expect("a preset of this name");
+    /// let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 640, 480, 500.0));
+    /// assert!(config.body.blooms());
+    /// ```
     pub fn preset(preset: Preset, camera: camera::Config) -> Self {
         let mut config = Self::new(camera);
         match preset {

@@ -21,6 +21,29 @@ pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 /// A horizon sensor: a [`Sensor`] with its [`Workspace`].
 ///
 /// It is large: keep it in a `Box`. A flight computer keeps the two parts apart, the workspace in a `static`.
+///
+/// # Example
+///
+/// A program makes one for each camera and gives it one picture after another:
+///
+/// ```
+/// use hzn_core::camera::{self, Model};
+/// use hzn_core::image::{Grey, Layout};
+/// use hzn_core::{Config, FlightHorizon, Prior};
+///
+/// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+/// config.body.altitude_km = Some(230.0);
+/// let mut horizon = FlightHorizon::new(&config)?;
+///
+/// // The altitude of this picture, in metres, replaces that of the configuration.
+/// let expected = horizon.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
+/// let data = [0u8; 64 * 48];
+/// let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
+/// let report = horizon.process(&picture, &expected);
+/// // A black picture has no limb, and the report says so.
+/// assert!(report.solution.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Horizon<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
     sensor: Sensor<T>,
@@ -60,6 +83,18 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     ///
     /// # Errors
     /// Returns the first field that is out of its limits.
+    ///
+    /// ```
+    /// # use hzn_core::camera::{self, Model};
+    /// # use hzn_core::{Config, FlightHorizon};
+    /// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+    /// let mut horizon = FlightHorizon::new(&config)?;
+    /// config.reject.threshold_px = -1.0;
+    /// let error = horizon.reconfigure(&config).unwrap_err();
+    /// assert_eq!(error.field, "reject.threshold_px");
+    /// assert_eq!(horizon.config().reject.threshold_px, 3.0);
+    /// # Ok::<(), hzn_core::error::ConfigError>(())
+    /// ```
     pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
         self.sensor = Sensor::new(config)?;
         self.levels = [None; MAX_BODIES];

@@ -10,6 +10,34 @@ use crate::model::body::{Expected, Prior, PriorError};
 
 /// A checked configuration with everything that follows from it: lens, region, mounting. It takes some kilobytes. The
 /// lists that a picture needs are in a [`Workspace`]; [`Horizon`](super::Horizon) holds both.
+///
+/// # Frames and units
+///
+/// Answers are in the camera frame [`Cam`](crate::frames::Cam): x right, y down, z along the optical axis. The [`Config`] has kilometres and
+/// degrees; everything that a sensor takes or returns has metres and radians.
+///
+/// # Example
+///
+/// A flight computer keeps the sensor and its lists apart, because the lists can stand in a `static`:
+///
+/// ```
+/// use hzn_core::camera::{self, Model};
+/// use hzn_core::image::{Grey, Layout};
+/// use hzn_core::observer::Unobserved;
+/// use hzn_core::{Config, FlightWorkspace, Prior, Sensor};
+///
+/// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+/// config.body.altitude_km = Some(230.0);
+/// let sensor = Sensor::<f32>::new(&config)?;
+/// let mut workspace = Box::new(FlightWorkspace::new());
+///
+/// let data = [0u8; 64 * 48];
+/// let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
+/// let expected = sensor.expect(&Prior::default())?;
+/// let report = sensor.process(&mut workspace, &picture, &expected, &Unobserved);
+/// assert!(report.solution.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Sensor<T> {
     pub(super) config: Config,

@@ -81,6 +81,14 @@ impl Key {
 }
 
 /// A section with its keys.
+///
+/// ```
+/// use hzn_core::config::SECTIONS;
+///
+/// let keys = SECTIONS.iter().flat_map(|section| section.keys);
+/// let in_flight = keys.filter(|key| key.flight.is_some()).count();
+/// assert!(in_flight > 50);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
     /// The name of the section, for example `reject`.

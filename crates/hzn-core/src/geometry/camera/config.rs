@@ -140,6 +140,14 @@ fn is_zero(x: &f64) -> bool {
 
 impl Config {
     /// Makes an ideal lens with its principal point in the middle and equal focal lengths.
+    ///
+    /// ```
+    /// use hzn_core::camera::{Config, Model};
+    ///
+    /// // 1920×1080 pixels with a horizontal field of view of 94.4°.
+    /// let config = Config::ideal(Model::Pinhole, 1920, 1080, 888.97);
+    /// assert_eq!((config.cx_px, config.cy_px), (959.5, 539.5));
+    /// ```
     pub fn ideal(model: Model, width: u16, height: u16, focal_px: f64) -> Self {
         Self {
             width,

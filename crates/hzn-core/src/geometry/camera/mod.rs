@@ -32,6 +32,28 @@ use crate::geometry::frames::{Cam, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
 
 /// A lens that is checked and ready. All of its functions are total.
+///
+/// # Frames and units
+///
+/// Pixels have their centres at integers ([`crate::pixel`]). Rays are unit vectors in the camera frame: x right, y down, z
+/// along the optical axis.
+///
+/// # Example
+///
+/// ```
+/// use hzn_core::camera::{Camera, Config, Model};
+/// use hzn_core::pixel::ImagePoint;
+///
+/// let camera = Camera::<f64>::try_new(&Config::ideal(Model::Equidistant, 640, 480, 200.0))?;
+/// let corner = ImagePoint { u: 0.0, v: 0.0 };
+/// let ray = camera.unproject(corner).expect("the corner is within the image circle");
+/// // With r = f θ, 399 px from the middle are 399/200 rad off axis.
+/// let [x, y, z] = ray.xyz();
+/// assert!((x.hypot(y).atan2(z) - 319.5f64.hypot(239.5) / 200.0).abs() < 1e-12);
+/// let back = camera.project(&ray).expect("the ray is within the image circle");
+/// assert!((back.u - corner.u).abs() < 1e-9 && (back.v - corner.v).abs() < 1e-9);
+/// # Ok::<(), hzn_core::error::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Camera<T> {
     width: u16,

@@ -5,6 +5,21 @@ use crate::base::real::Real;
 use crate::geometry::frames::{Cam, UnitVec3};
 
 /// The ray of a pixel and its derivative by the pixel.
+///
+/// # Example
+///
+/// Near the middle of the picture, a pixel is 1/f radians wide:
+///
+/// ```
+/// use hzn_core::camera::{Camera, Config, Model};
+/// use hzn_core::pixel::ImagePoint;
+///
+/// let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, 641, 481, 500.0))?;
+/// let ray = camera.ray(ImagePoint { u: 320.0, v: 240.0 }).expect("the middle has a ray");
+/// let [[x_by_u, _], [_, y_by_v], _] = ray.jacobian();
+/// assert_eq!([x_by_u, y_by_v], [1.0 / 500.0; 2]);
+/// # Ok::<(), hzn_core::error::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray<T> {
     /// Unit vector in the camera frame.

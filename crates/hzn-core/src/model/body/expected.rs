@@ -19,6 +19,22 @@ const MAX_RATE_RAD_S: f64 = 1000.0;
 
 /// The cone that is expected: the cosine of its half-angle with its sigma, and the lengths that convert a half-angle to
 /// an altitude.
+///
+/// [`Sensor::expect`](crate::Sensor::expect) makes it from a [`Prior`].
+///
+/// # Example
+///
+/// ```
+/// use hzn_core::camera::{self, Model};
+/// use hzn_core::{Config, Prior, Sensor};
+///
+/// let config = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 500.0));
+/// let sensor = Sensor::<f64>::new(&config)?;
+/// let expected = sensor.expect(&Prior { altitude_m: Some(400e3), ..Prior::default() })?;
+/// // The limb at a height of 17 km, seen from 400 km: sin α = (6371 + 17)/(6371 + 400).
+/// assert!((expected.half_angle_rad().sin() - 6388.0 / 6771.0).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Expected<T> {
     /// cos α₀ of the best single cone.

@@ -218,6 +218,24 @@ impl Config {
 }
 
 /// What is known about one picture before it is processed. Every field may be missing.
+///
+/// # Example
+///
+/// A position in ECEF determines the cone of the ellipsoid. An attitude, good to a few degrees, corrects its shape:
+///
+/// ```
+/// use hzn_core::Prior;
+/// use hzn_core::frames::Rotation;
+///
+/// let prior = Prior::<f64> {
+///     position_m: Some([6_771e3, 0.0, 0.0]),
+///     // The quaternion is scalar first, and takes coordinates from the camera to ECEF.
+///     cam_to_ecef: Rotation::assume_from_quaternion([0.5, 0.5, 0.5, 0.5]),
+///     attitude_sigma_rad: Some(3f64.to_radians()),
+///     ..Prior::default()
+/// };
+/// assert!(prior.altitude_m.is_none() && prior.cam_to_ecef.is_some());
+/// ```
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Prior<T> {
     /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. It must be above the limb height.

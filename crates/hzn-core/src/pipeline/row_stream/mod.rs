@@ -122,6 +122,27 @@ impl fmt::Display for RowStreamError {
 impl core::error::Error for RowStreamError {}
 
 /// A picture whose rows are being added.
+///
+/// ```
+/// use hzn_core::camera::{self, Model};
+/// use hzn_core::observer::Unobserved;
+/// use hzn_core::pipeline::{ROWS_HELD, RowBuffers};
+/// use hzn_core::{Config, FlightWorkspace, Prior, Sensor};
+///
+/// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
+/// config.body.altitude_km = Some(230.0);
+/// let sensor = Sensor::<f32>::new(&config)?;
+/// let expected = sensor.expect(&Prior::default())?;
+/// let mut buffers = Box::new(RowBuffers::<u8, { ROWS_HELD as usize * 64 }, 48, 1024, 1024>::new());
+/// let mut rows = sensor.rows(&mut buffers, 8, &expected)?;
+/// for y in 0..48 {
+///     rows.push_row(&[if y < 20 { 5 } else { 200 }; 64])?;
+/// }
+/// let report = rows.finish(&mut Box::new(FlightWorkspace::new()), &Unobserved);
+/// // The first picture only gives the threshold of the next one.
+/// assert!(report.solution.is_none() && report.next_level.is_some());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct RowStream<'a, T, S> {
     sensor: &'a Sensor<T>,
