@@ -61,7 +61,7 @@ impl fmt::Display for Limit {
             Self::Between(a, b) => write!(f, "must be between {a} and {b}"),
             Self::Monotone(deg) => write!(
                 f,
-                "the lens is monotone only up to {deg:.2} degrees off axis, so that pixels beyond have no single ray; \
+                "the lens is monotone only up to {deg:.2} degrees off axis, and pixels beyond that angle have no unique ray; \
                  set camera.theta_max_deg to {:.2} or less, or correct camera.k",
                 deg - 2.0
             ),
@@ -70,7 +70,7 @@ impl fmt::Display for Limit {
                 write!(f, "{word:?} is not in this build: it needs hzn-core with the feature {feature:?}")
             }
             Self::Feature { word: None, feature } => {
-                write!(f, "this build reads no such key: it needs hzn-core with the feature {feature:?}")
+                write!(f, "this build does not read this key: the key needs hzn-core with the feature {feature:?}")
             }
         }
     }

@@ -94,7 +94,7 @@ section! {
         /// It is 12 for a 12-bit camera whose values are in the lower bits of 16-bit words. Programs that read files
         /// copy it to the picture's [`Layout`](crate::image::Layout).
         @- bits: Option<u8> = None, [8.0 to 16.0]
-            { unset: "as the file says; for words of 16 bits found from the pictures", example: "12" };
+            { unset: "from the file; for 16-bit words, determined from the pictures", example: "12" };
         /// Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
         /// picture.
         @- orient: Orient = Orient::AsStored, [choice];

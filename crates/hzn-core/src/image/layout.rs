@@ -23,7 +23,7 @@ impl fmt::Display for ImageError {
             Self::Size => "width and height must be 1 to 65535 pixels",
             Self::Stride => "the row stride is shorter than a row of samples",
             Self::TooShort => "the picture's data end before its last row",
-            Self::Channel => "there is no channel of that number",
+            Self::Channel => "the picture has no channel with this number",
             Self::Bits => "bits per sample must be 8 for bytes and 8 to 16 for words",
         })
     }

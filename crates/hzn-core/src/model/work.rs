@@ -15,7 +15,7 @@ section! {
         /// An ordinary picture costs about 30 thousand. If there is no answer by then, the status is `truncated`. The
         /// default is 120 for each border pixel that the lists hold, and 2120 with `erf`.
         @120 max_work: Option<u32> = None, [10000.0 to 1e9]
-            { unset: "245 760 in flight lists, 1 966 080 in the host's", example: "1000000" };
+            { unset: "245 760 on a flight computer, 1 966 080 on the host", example: "1000000" };
     }
 }
 

@@ -100,7 +100,7 @@ section! {
         ///
         /// Coefficients that are left out are 0. The other models have none. The list does not contain the factor 1 of
         /// the first power of the angle.
-        @8 k: heapless::Vec<f64, 5>, serde(default), ["as many as the model has; the lens is monotone"]
+        @8 k: heapless::Vec<f64, 5>, serde(default), ["at most as many as the model has; the lens must be monotone"]
             { unset: "none", example: "[-0.055, 0.011, -0.0035, 0.0002]" };
         /// Radius of the image circle, degrees off the optical axis; pixels beyond it count as masked.
         ///

@@ -100,7 +100,7 @@ impl<T: Real> Camera<T> {
                             deg < 89.0,
                             "camera.theta_max_deg",
                             deg,
-                            Limit::Rule("a pinhole ends before 89 degrees"),
+                            Limit::Rule("must be below 89 degrees for a pinhole"),
                         )?;
                         deg.to_radians().min(libm::atan(rho_corner))
                     }

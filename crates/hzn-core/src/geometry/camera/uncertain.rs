@@ -21,14 +21,19 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
         let field = "camera.covariance.order";
         let places = order.iter().map(|i| i.index_in(config.model));
         for (n, place) in places.clone().enumerate() {
-            let rule = "a parameter that this lens model does not have";
+            let rule = "this lens model does not have the parameter";
             require(place.is_some(), field, n as f64, Limit::Rule(rule))?;
-            require(!places.clone().take(n).any(|p| p == place), field, n as f64, Limit::Rule("stands twice"))?;
+            require(
+                !places.clone().take(n).any(|p| p == place),
+                field,
+                n as f64,
+                Limit::Rule("the parameter is listed twice"),
+            )?;
         }
         let n = order.len();
         let square = given.rows.len() == n && given.rows.iter().all(|row| row.len() == n);
         let field = "camera.covariance.rows";
-        let rule = "must have as many rows, and as many values in each, as order has names";
+        let rule = "must be a square matrix with one row and one column for each name in order";
         require(square && n > 0, field, given.rows.len() as f64, Limit::Rule(rule))?;
         for column in triangle(&given.rows)?.iter().take(n) {
             let mut mode = [T::ZERO; INTRINSICS];

@@ -108,7 +108,7 @@ section! {
         @- sunlit: Option<bool> = None, ["true or false"] { unset: "true for `moon` and `sphere`", example: "true" };
         /// Threshold for this body, as a table with the keys of `[binarize]`.
         @- binarize: Option<threshold::Config> = None, ["the keys of `[binarize]`"]
-            { unset: "`[binarize]`; for a `sun` among several bodies `fixed` at 0.9" };
+            { unset: "`[binarize]`; `fixed` at 0.9 for a `sun` among several bodies" };
         /// Noise model of edge points for this body, as a table with the keys of `[covariance]`.
         @- covariance: Option<edge_noise::Config> = None, ["the keys of `[covariance]`"] { unset: "`[covariance]`" };
     }
@@ -122,7 +122,7 @@ impl Config {
                 require(false, "body.radius_km", f64::NAN, Limit::Rule("a sphere needs its radius in km"))?
             }
             (_, Some(r)) => {
-                require(false, "body.radius_km", r, Limit::Rule("only body.kind = \"sphere\" takes a radius"))?
+                require(false, "body.radius_km", r, Limit::Rule("only body.kind = \"sphere\" may have a radius"))?
             }
             (_, None) => {}
         }
@@ -139,7 +139,7 @@ impl Config {
             rows.is_empty() || self.kind == Kind::Earth,
             field,
             rows.len() as f64,
-            Limit::Rule("only body.kind = \"earth\" has latitudes"),
+            Limit::Rule("only body.kind = \"earth\" may have limb heights by latitude"),
         )?;
         self.binarize.map_or(Ok(()), |b| b.check_keys())?;
         self.covariance.map_or(Ok(()), |c| c.check_keys())
@@ -312,7 +312,7 @@ impl core::fmt::Display for PriorError {
             Self::NoAltitude => {
                 "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
             }
-            Self::NoBody => "the sensor has fewer bodies",
+            Self::NoBody => "the sensor has no body with this number",
         })
     }
 }
