@@ -82,7 +82,7 @@ impl Camera {
             return Err(errors::config("camera matrix: shape (3, 3) is expected"));
         }
         let (width, height) =
-            size.ok_or_else(|| errors::config("size: a camera matrix does not say it; give size=(width, height)"))?;
+            size.ok_or_else(|| errors::config("size: is required with a camera matrix; pass size=(width, height)"))?;
         let k: Vec<f64> = match distortion {
             Some(d) => d.py().import("numpy")?.call_method1("ravel", (d,))?.call_method0("tolist")?.extract()?,
             None => Vec::new(),

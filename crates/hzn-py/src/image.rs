@@ -64,10 +64,10 @@ impl<'py> Array<'py> {
         let channels = self.shape().get(2).map_or(1, |&c| c as u8);
         let bits = match (self, bits) {
             (Self::Bytes(_), None | Some(8)) => 8,
-            (Self::Bytes(_), Some(_)) => return Err(errors::image("bits: an array of uint8 has 8")),
+            (Self::Bytes(_), Some(_)) => return Err(errors::image("bits: must be 8 for an array of uint8")),
             (Self::Words(_), None) => 16,
             (Self::Words(_), Some(n @ 8..=16)) => n,
-            (Self::Words(_), Some(n)) => return Err(errors::image(format!("bits: {n} is not within 8 to 16"))),
+            (Self::Words(_), Some(n)) => return Err(errors::image(format!("bits: {n} is refused: must be 8 to 16"))),
         };
         Ok(Layout::packed(side(width)?, side(height)?, channels, bits))
     }

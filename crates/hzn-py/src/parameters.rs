@@ -34,7 +34,7 @@ pub(crate) fn from_python(data: &Bound<'_, PyAny>) -> PyResult<Value> {
     options.set_item("default", py.import("operator")?.call_method1("methodcaller", ("tolist",))?)?;
     let text: PyResult<String> = json(py)?.call_method("dumps", (data,), Some(&options)).and_then(|t| t.extract());
     let value = serde_json::from_str(&text.map_err(|e| errors::config(format!("parameters: {e}")))?);
-    value.map(without_null).map_err(|_| errors::config("parameters: hold a number that is not finite; leave it out"))
+    value.map(without_null).map_err(|_| errors::config("parameters: contain a number that is not finite; remove it"))
 }
 
 fn json(py: Python<'_>) -> PyResult<Bound<'_, PyModule>> {

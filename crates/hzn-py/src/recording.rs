@@ -115,7 +115,7 @@ impl Recording {
     }
     #[doc = doc!("Recording.sensor")]
     fn sensor(&self) -> PyResult<Sensor> {
-        let text = self.sensor_toml.as_deref().ok_or_else(|| errors::other("the recording holds no sensor.toml"))?;
+        let text = self.sensor_toml.as_deref().ok_or_else(|| errors::other("the recording contains no sensor.toml"))?;
         let parsed = hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(errors::config)?;
         Sensor::from_config(parsed.config, false)
     }

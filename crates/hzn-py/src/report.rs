@@ -115,7 +115,7 @@ impl Report {
     /// Makes the report of the first body and attaches the reports of the others.
     pub(crate) fn of_bodies(py: Python<'_>, reports: impl IntoIterator<Item = Self>) -> PyResult<Self> {
         let mut reports = reports.into_iter();
-        let first = reports.next().ok_or_else(|| errors::config("bodies: there is none"))?;
+        let first = reports.next().ok_or_else(|| errors::config("bodies: is empty"))?;
         Ok(Self { others: reports.map(|r| Py::new(py, r)).collect::<PyResult<_>>()?, ..first })
     }
 
@@ -169,7 +169,7 @@ impl Report {
     }
 
     fn detail_of(&self, what: &str) -> PyResult<&Detail> {
-        let missing = || errors::other(format!("{what} are kept by process(image, detail=True) only"));
+        let missing = || errors::other(format!("{what} are kept only by process(image, detail=True)"));
         self.detail.as_ref().ok_or_else(missing)
     }
 }
@@ -346,7 +346,7 @@ impl Report {
     #[getter]
     fn rays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inliers = &self.detail_of("rays")?.drawing.inliers;
-        let missing = || errors::other("rays: the recording does not say its camera");
+        let missing = || errors::other("rays: the recording does not contain its camera");
         let lens = &self.camera.as_ref().ok_or_else(missing)?.lens;
         let ray = |p: &[f64; 2]| lens.unproject(ImagePoint { u: p[0], v: p[1] }).map_or([f64::NAN; 3], |ray| ray.xyz());
         Ok(table(py, &inliers.iter().map(ray).collect::<Vec<_>>()))

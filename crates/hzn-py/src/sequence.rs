@@ -97,7 +97,7 @@ impl Sequence {
     /// Decodes and processes a picture. Each picture can be processed only once.
     fn process(&self, py: Python<'_>, item: &Item) -> PyResult<Report> {
         let taken = item.item.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let taken = taken.ok_or_else(|| errors::other("this picture was processed already"))?;
+        let taken = taken.ok_or_else(|| errors::other("this picture is already processed"))?;
         processed(py, &self.state, &self.plan, item.index, taken)
     }
 }

@@ -29,7 +29,7 @@ impl Expected {
     pub(crate) fn new(state: &State, data: FrameData, body: usize) -> PyResult<Self> {
         let bodies = state.config.each_body().len();
         if body >= bodies {
-            return Err(errors::config(format!("body: {body} is refused: the sensor's are 0 to {}", bodies - 1)));
+            return Err(errors::config(format!("body: {body} is refused: must be 0 to {}", bodies - 1)));
         }
         let core = state.core.expect_body(body, &data.to_frame(None)).map_err(errors::config)?;
         Ok(Self { data, core })
@@ -53,7 +53,7 @@ pub(crate) struct Cone(Agreed<f64>);
 impl Cone {
     #[new]
     fn new(axis: [f64; 3], cos_half_angle: f64) -> PyResult<Self> {
-        let axis = UnitVec3::<Cam, f64>::try_new(axis).ok_or_else(|| errors::config("axis: is no direction"))?;
+        let axis = UnitVec3::<Cam, f64>::try_new(axis).ok_or_else(|| errors::config("axis: must be finite and not zero"))?;
         if !(cos_half_angle.abs() < 1.0) {
             return Err(errors::config(format!(
                 "cos_half_angle: {cos_half_angle} is refused: must be between -1 and 1"
@@ -174,7 +174,7 @@ pub(crate) fn level(sensor: &Sensor, image: &Bound<'_, PyAny>, expected: &Expect
     let state = sensor.state();
     let core = state.core()?;
     let found = with_picture!(image, state, bits, |picture| core.level(&picture, &expected.core));
-    found.map(|l| l.level).map_err(|status| errors::other(format!("no level: {}", status.name())))
+    found.map(|l| l.level).map_err(|status| errors::other(format!("no threshold: {}", status.name())))
 }
 
 /// Returns every edge of a picture at a threshold, with at least `candidates.min_points` border pixels, in the order in
@@ -217,7 +217,7 @@ pub(crate) fn pick(
         inside.then_some(Pixel { x: r[0] as u16, y: r[1] as u16 })
     };
     let border: Option<Vec<Pixel>> = border.as_array().outer_iter().map(pixel).collect();
-    let border = border.ok_or_else(|| errors::image("border: a pixel lies outside of the picture"))?;
+    let border = border.ok_or_else(|| errors::image("border: a pixel lies outside the picture"))?;
     Ok(Rays::new(with_picture!(image, state, bits, |picture| Edges::pick(core, &picture, level, &border))))
 }
 
@@ -227,7 +227,7 @@ pub(crate) fn rays(sensor: &Sensor, points: &Bound<'_, PyAny>, lit: &Bound<'_, P
     let state = sensor.state();
     let (points, lit) = (rows(points, 2, "points")?, rows(lit, 2, "lit")?);
     if points.as_array().nrows() != lit.as_array().nrows() {
-        return Err(errors::image("lit: as many rows as points are expected"));
+        return Err(errors::image("lit: must have one row for each point"));
     }
     let both: Vec<_> = points
         .as_array()
@@ -298,7 +298,7 @@ impl State {
     /// Returns the sensor in double precision.
     fn core(&self) -> PyResult<&CoreSensor<f64>> {
         if self.flight {
-            return Err(errors::config("flight: the single stages are those of the workstation, in double precision"));
+            return Err(errors::config("flight: the single stages exist only in double precision; use a sensor without flight=True"));
         }
         Ok(&self.core)
     }

@@ -123,7 +123,7 @@ impl Measure {
         if self.times.len() == CHANGES {
             println!("parameter to new picture, {}:", self.look.name());
             for (what, part) in [
-                ("from the wish to the answer", (|t| t.answer) as fn(&Times) -> Duration),
+                ("from the request to the answer", (|t| t.answer) as fn(&Times) -> Duration),
                 ("from the change to the frame that shows it, laid out", |t| t.handed),
                 ("from the change to the screen, with tessellation and OpenGL", |t| t.screen),
             ] {
@@ -140,7 +140,7 @@ impl Measure {
                 self.times.iter().map(part).sum::<Duration>().as_secs_f64() * 1e3 / CHANGES as f64
             };
             println!(
-                "  processor time of the window's thread: laid out {:.1} ms, to the screen {:.1} ms in the mean",
+                "  processor time of the window's thread: laid out {:.1} ms, to the screen {:.1} ms (mean)",
                 mean(|t| t.layout_work),
                 mean(|t| t.screen_work)
             );

@@ -24,7 +24,7 @@ const PASSES: u32 = 6;
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let began = Instant::now();
     if !(args.fps > 0.0 && args.fps.is_finite()) {
-        bail!("--fps: must be above 0");
+        bail!("--fps: must be a finite number above 0");
     }
     let shot = args.screenshot.clone();
     // A screenshot for documents must not depend on the settings of an earlier run.
@@ -61,7 +61,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }),
     );
     made.map_err(|e| anyhow!("{e}")).context("the window cannot be opened (it needs a display and OpenGL)")?;
-    let outcome = outcome.lock().map_err(|_| anyhow!("the window broke off"))?.take();
+    let outcome = outcome.lock().map_err(|_| anyhow!("the window ended with an error"))?.take();
     outcome.unwrap_or(Ok(()))
 }
 
@@ -102,7 +102,7 @@ impl eframe::App for Window {
         ctx.request_repaint_after(Duration::from_millis(20));
         if self.begin.elapsed() > SHOT_LIMIT {
             let said: Vec<&str> = self.viewer.messages().collect();
-            return self.end(&ctx, Err(anyhow!("nothing came to be shown: {}", said.join("; "))));
+            return self.end(&ctx, Err(anyhow!("no picture was shown within {} s: {}", SHOT_LIMIT.as_secs(), said.join("; "))));
         }
         if !self.viewer.is_settled() {
             let failed = self.viewer.sequence().is_empty() && self.viewer.messages().next().is_some();

@@ -94,13 +94,13 @@ def process_archive(
     """
     pictures = [(url, {}) if isinstance(url, str) else (url[0], dict(url[1])) for url in urls]
     if not pictures:
-        raise ConfigError("urls: there are none")
+        raise ConfigError("urls: is empty")
     if shard_frames < 1:
         raise ConfigError(f"shard_frames: {shard_frames} is refused: must be 1 or more")
     if format not in ("parquet", "mcap"):
         raise ConfigError(f"format: {format!r} is refused: parquet or mcap")
     if sensor.parameters["binarize"]["method"] == "track":
-        raise ConfigError("binarize.method: track takes its level from the picture before, which another worker may have")
+        raise ConfigError("binarize.method: track takes its threshold from the previous picture, which another worker may have")
     client = client or get_client()
     filesystem, folder = fsspec.core.url_to_fs(out)
     filesystem.makedirs(folder, exist_ok=True)

@@ -45,7 +45,7 @@ impl Sheet {
     /// The text is not TOML, or the section is not a table.
     pub fn with(&self, key: Key<'_>, value: Option<Value>) -> Result<Self, String> {
         let mut document: DocumentMut = self.0.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
-        let no_section = || format!("[{}] is no section", key.section);
+        let no_section = || format!("[{}] is not a section", key.section);
         match value {
             None => {
                 if let Some(table) = table(&mut document, key, false) {

@@ -38,9 +38,9 @@ impl Purpose {
             Self::SaveSensor => "Comments are kept",
             Self::Compare => "Another sensor.toml for the same camera",
             Self::Picture => "PNG in the picture's own size",
-            Self::Video => "By the ending: .mp4, .mkv, .webm; needs ffmpeg on PATH",
+            Self::Video => "The ending sets the format: .mp4, .mkv, .webm; needs ffmpeg on PATH",
             Self::Table => ".csv or .jsonl, with the results that are shown",
-            Self::Rerun => ".mcap with the parameters as they are now",
+            Self::Rerun => ".mcap with the current parameters",
         }
     }
     fn writes(self) -> bool {
@@ -119,13 +119,13 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         accepted |= field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
         let exists = Path::new(asking.text.trim()).exists();
         if asking.purpose.writes() && exists && !Path::new(asking.text.trim()).is_dir() {
-            ui.colored_label(ui.visuals().warn_fg_color, "There is a file of this name; it would be replaced.");
+            ui.colored_label(ui.visuals().warn_fg_color, "A file of this name exists; it would be replaced.");
         } else {
             ui.label("");
         }
         ui.horizontal(|ui| {
             accepted |= ui.button(if asking.purpose.writes() { "Write" } else { "Open this" }).clicked();
-            closed |= ui.button("Never mind").clicked();
+            closed |= ui.button("Cancel").clicked();
             ui.separator();
             let idle = asking.browsing.is_none();
             if ui.add_enabled(idle, egui::Button::new("Browse…")).clicked() {

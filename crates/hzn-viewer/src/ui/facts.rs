@@ -60,13 +60,13 @@ pub(super) fn lines(card: &Card, sight: &FrameView, outcome: &Outcome, answer: &
             }
             out
         }
-        "Recover" if c.looks > 1 => vec![format!("{} looks, each at another level", c.looks)],
+        "Recover" if c.looks > 1 => vec![format!("{} looks, each with another threshold", c.looks)],
         "Limits" => vec![format!("{} steps of work", c.work)],
         "Candidates" if reached(Stage::Contour) => {
             let edges = if c.candidates == 1 { "edge" } else { "edges" };
             let mut out = vec![format!("{} {edges} of {} px or more", c.candidates, config.candidates.min_points)];
             if c.fallback_points > 0 {
-                out.push(format!("{} points stand at the global level", c.fallback_points));
+                out.push(format!("{} points were located at the global threshold", c.fallback_points));
             }
             out
         }
@@ -95,7 +95,7 @@ pub(super) fn lines(card: &Card, sight: &FrameView, outcome: &Outcome, answer: &
         "Covariance" => answer.solution().map_or_else(Vec::new, |s| {
             let ([major, minor], angle) = hzn_run::explain::principal(s);
             vec![format!(
-                "σ {:.4}° along {:.0}° from image x, {:.4}° across",
+                "σ {:.4}° at {:.0}° from image x, {:.4}° perpendicular to it",
                 major.to_degrees(),
                 angle.to_degrees(),
                 minor.to_degrees()
@@ -146,8 +146,8 @@ fn level(answer: &BodyResult, config: &Config) -> Vec<String> {
             "mean brightness is outside of {} to {} of full scale",
             config.gate.min_mean, config.gate.max_mean
         )],
-        (_, Some((mean, n))) => vec![format!("level {}, mean {mean:.1} of {n} pixels", report.level)],
-        _ => vec![format!("level {}", report.level)],
+        (_, Some((mean, n))) => vec![format!("threshold {}, mean {mean:.1} of {n} pixels", report.level)],
+        _ => vec![format!("threshold {}", report.level)],
     }
 }
 

@@ -46,7 +46,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
                 });
             }
             if chosen.is_empty() {
-                ui.weak("Choose what is plotted above.");
+                ui.weak("Choose the plots above.");
             }
         });
         if let Some(frame) = go {
@@ -255,7 +255,7 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
         all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
     };
     if all.is_empty() {
-        ui.weak("The residuals along the limb stand here once the frame has an answer.");
+        ui.weak("This plot shows the residuals along the limb if the frame has an answer.");
         return None;
     }
     head(ui, "Residual [px] by azimuth about the axis", &[("inliers", theme::INLIER), ("rejected", theme::REJECTED)]);

@@ -85,7 +85,7 @@ fn change(recorded: &hzn_mcap::Row, answer: &BodyResult) -> Option<String> {
             (angle > 1e-9).then(|| format!("{angle:.4}°"))
         }
         (None, Some(_)) => Some("answered now".into()),
-        (Some(_), None) => Some("refused now".into()),
+        (Some(_), None) => Some("no answer now".into()),
         (None, None) => None,
     }
 }
@@ -134,7 +134,7 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
                 let own_plane = matches!(layer, Layer::Touched | Layer::Circle);
                 let drawn = !(own_plane && viewer.settings.undistorted);
                 let switch = ui.add_enabled(drawn, egui::Checkbox::new(&mut on, layer.name()));
-                if switch.on_disabled_hover_text("Only in the camera's own picture, not undistorted").changed() {
+                if switch.on_disabled_hover_text("This overlay is drawn only if the picture is not undistorted").changed() {
                     viewer.settings.show(layer, on);
                 }
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {

@@ -43,13 +43,13 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
 
 /// Says how to get a sensor.toml if there is none.
 fn without(viewer: &mut Viewer, ui: &mut Ui) {
-    ui.label("What the sensor does with a picture, stage by stage, stands here once there is a sensor.toml.");
+    ui.label("With a sensor.toml, this column shows the result of every stage.");
     ui.add_space(4.0);
     if ui.button("Open a sensor.toml…").clicked() {
         viewer.run(Command::Open, &ui.ctx().clone());
     }
     ui.add_space(4.0);
-    ui.weak("hzn init writes one to start from; it can be dropped on the window, too.");
+    ui.weak("`hzn init` writes a first one. You can also drop a sensor.toml on the window.");
 }
 
 /// Draws preset, undo, redo, reset and save, and the error in the text.
@@ -97,7 +97,7 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
             (None, Some(line)) => format!("line {line}: {}", problem.what),
             _ => problem.what.clone(),
         };
-        ui.colored_label(ui.visuals().error_fg_color, text).on_hover_text("The last values that were accepted count.");
+        ui.colored_label(ui.visuals().error_fg_color, text).on_hover_text("The last accepted values are in use.");
     }
     if viewer.sight.as_ref().and_then(|s| s.answers.first()).is_some_and(|o| o.bodies.len() > 1) {
         bodies(viewer, ui);
@@ -154,7 +154,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>)
                 clicked |= arrow.clicked();
                 if let Some(time) = time {
                     ui.weak(format!("{:.0} µs", time.as_nanos() as f64 / 1e3))
-                        .on_hover_text("Time of this stage while it is watched, which takes time too");
+                        .on_hover_text("Time of this stage, including the time of the observer");
                 }
             });
             clicked
@@ -231,7 +231,7 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
     });
     let more = (report.counters.candidates as usize).saturating_sub(report.candidates.len());
     if more > 0 {
-        ui.weak(format!("and {more} more, not listed"));
+        ui.weak(format!("{more} more are not listed"));
     }
 }
 
@@ -363,7 +363,7 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
 /// Draws the button that restores the saved file's value of a key.
 fn restore(session: &mut Session, ui: &mut Ui, key: &Key, body: usize) {
     let differs = session.differs(key.section(), key.name(), body);
-    if differs && ui.small_button("file").on_hover_text("Back to the file's value").clicked() {
+    if differs && ui.small_button("file").on_hover_text("Restore the value of the file").clicked() {
         session.restore(key.section(), key.name(), body);
         session.settle();
     }

@@ -27,7 +27,7 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
         let play = if viewer.playback.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
         for (c, icon, name) in [
             (Command::First, Icon::First, "First frame"),
-            (Command::Back, Icon::Back, "Frame before"),
+            (Command::Back, Icon::Back, "Previous frame"),
             (Command::Play, play.0, play.1),
             (Command::Next, Icon::Next, "Next frame"),
             (Command::Last, Icon::Last, "Last frame"),
@@ -141,7 +141,7 @@ fn work(viewer: &mut Viewer, ui: &mut Ui) {
         );
     } else if viewer.sequence.len() > 1 && viewer.session.is_some() {
         let hint = format!(
-            "Every frame with the parameters as they are, for the plots ({})",
+            "Process every frame with the current parameters, for the plots ({})",
             Command::ProcessAll.key(ui.ctx())
         );
         if ui.button("Process all").on_hover_text(hint).clicked() {

@@ -142,7 +142,7 @@ fn messages(viewer: &mut Viewer, ui: &mut Ui) {
                 closed = Some(i);
             }
             if let Some(path) = path
-                && ui.button("Recover it").on_hover_text("Writes a whole recording beside it, and opens that").clicked()
+                && ui.button("Recover it").on_hover_text("Writes a complete recording next to it and opens that").clicked()
             {
                 recover = Some(path.clone());
                 closed = Some(i);

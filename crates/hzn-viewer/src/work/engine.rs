@@ -229,7 +229,7 @@ impl Looker {
         }
         match self.sensors.get_mut(which) {
             Some((.., sensor)) => Ok((Arc::new(sensor.camera().clone()), sensor)),
-            None => Err("the sensor before it could not be made".into()),
+            None => Err("the sensor of the session could not be made".into()),
         }
     }
 

@@ -64,7 +64,7 @@ fn draw(picture: &Picture, outcome: Option<&Outcome>, layers: &[Layer]) -> image
 /// There is no picture, the name does not end in `.png`, or the file cannot be written.
 pub fn picture(sight: &FrameView, layers: &[Layer], path: &Path) -> Result<Done, Halt> {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-        return Err(Halt::Failed(format!("{}: the picture's ending must be .png", path.display())));
+        return Err(Halt::Failed(format!("{}: the file name of a picture must end in .png", path.display())));
     }
     let picture = sight.picture.as_ref().map_err(Clone::clone)?;
     let image = draw(picture, sight.answers.first().map(|o| &**o), layers);
@@ -101,7 +101,7 @@ pub fn recover(path: &Path, progress: &Progress) -> Result<Done, Halt> {
     let stem = name.trim_end_matches(".part").trim_end_matches(".mcap");
     let free = |name: String| Some(path.with_file_name(name)).filter(|p| !p.exists());
     let numbered = || (2..).find_map(|n: u64| free(format!("{stem}-recovered-{n}.mcap")));
-    let out = free(format!("{stem}-recovered.mcap")).or_else(numbered).ok_or_else(|| "no free name".to_owned())?;
+    let out = free(format!("{stem}-recovered.mcap")).or_else(numbered).ok_or_else(|| format!("{}: no file name is free for the recovered recording", path.display()).to_owned())?;
     match hzn_mcap::recover_while(path, &out, |done, total| progress.at(done, total).is_ok()) {
         Ok(found) => Ok(Done::Recovered { path: out, frames: found.frames }),
         Err(hzn_mcap::Error::Stopped { .. }) => Err(Halt::Stopped),
@@ -174,7 +174,7 @@ impl Film {
                 }
                 Err(_) => image::RgbImage::new(size.0, size.1),
             };
-            let input = pipe.stdin.as_mut().ok_or_else(|| "ffmpeg takes no input".to_owned())?;
+            let input = pipe.stdin.as_mut().ok_or_else(|| "ffmpeg does not take input".to_owned())?;
             if input.write_all(image.as_raw()).is_err() {
                 // ffmpeg itself says why, on its error output.
                 break;
@@ -197,7 +197,7 @@ fn start_ffmpeg(path: &Path, (width, height): (u32, u32), fps: f64) -> Result<Ch
         .spawn()
         .map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => {
-                "a video needs `ffmpeg` on PATH, and it is not there: install it".to_owned()
+                "a video needs `ffmpeg` on PATH: install it".to_owned()
             }
             _ => format!("ffmpeg cannot be started: {e}"),
         })

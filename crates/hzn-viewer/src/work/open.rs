@@ -112,7 +112,7 @@ impl Teller {
 fn run(request: &Request, teller: &Teller) -> Result<(), String> {
     match request.inputs.as_slice() {
         [one] if one.is_file() && is_recording(one) => recording(one, request, teller),
-        [one] if is_table(one) => Err(format!("{}: is no picture or recording", one.display())),
+        [one] if is_table(one) => Err(format!("{}: is neither a picture nor a recording", one.display())),
         _ => pictures(request, teller),
     }
 }
@@ -348,7 +348,7 @@ fn missing_note(frames: &Frames, request: &Request, folder: &Path) -> Option<Str
     let missing: Vec<&str> =
         frames.rows.iter().map(|r| r.file.as_str()).filter(|file| !folder.join(file).exists()).collect();
     let first = missing.first()?;
-    Some(format!("{} pictures that frames.csv names are not there, the first is {first}", missing.len()))
+    Some(format!("{} pictures in frames.csv do not exist; the first one is {first}", missing.len()))
 }
 
 #[cfg(test)]
@@ -376,7 +376,7 @@ mod tests {
             other => panic!("{other:?}"),
         };
         assert!(why(&at("a.mcap", b"no recording")).contains("is not an MCAP file"));
-        assert!(why(&at("b.csv", b"file\n")).contains("is no picture or recording"));
+        assert!(why(&at("b.csv", b"file\n")).contains("is neither a picture nor a recording"));
         assert!(why(&dir.path().join("none.png")).contains("no such file"));
     }
 

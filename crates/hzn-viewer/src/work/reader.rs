@@ -34,7 +34,7 @@ impl Reader {
                 None => Payload::Broken("the recording is not open".into()),
             },
             Place::Video(index) => self.of_video(*index)?,
-            Place::Nowhere => Payload::Broken("the recording holds no picture of this frame".into()),
+            Place::Nowhere => Payload::Broken("the recording contains no picture of this frame".into()),
         })
     }
 

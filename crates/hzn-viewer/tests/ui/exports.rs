@@ -50,7 +50,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     // A name with another ending is refused.
     window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     path(&mut window, &dir.path().join("shown.jpg"), "Write");
-    said(&mut window, "ending must be .png");
+    said(&mut window, "must end in .png");
     assert_eq!(files(dir.path()), ["pictures", "plain.png", "shown.png"]);
 }
 

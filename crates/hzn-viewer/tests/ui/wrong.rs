@@ -42,7 +42,7 @@ fn missing_pictures_are_named() {
     flight(dir.path());
     std::fs::write(dir.path().join("frames.csv"), "file,time_s\n0.png,0\n1.png,1\nlost.png,2\ngone.png,3\n").unwrap();
     let mut window = window_on(dir.path());
-    said(&mut window, "2 pictures that frames.csv names are not there, the first is lost.png");
+    said(&mut window, "2 pictures in frames.csv do not exist; the first one is lost.png");
     assert_eq!((window.state().sequence().len(), answer(&window).0), (4, Status::Ok));
 }
 

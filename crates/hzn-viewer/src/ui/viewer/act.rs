@@ -88,7 +88,7 @@ impl Viewer {
     fn go_refused(&mut self, back: bool) {
         match self.rows.next_refused(self.playback.frame(), back, self.body) {
             Some(frame) => self.playback.go(frame, self.sequence.len()),
-            None => self.say("No frame is without an answer, among those that were processed."),
+            None => self.say("All processed frames have an answer."),
         }
     }
 

@@ -21,7 +21,7 @@ impl Viewer {
         if let (Some(output), Some(open)) = (&output, &self.sequence.recording)
             && same(output, open)
         {
-            self.say_bad(format!("{}: is the recording that is open; write into another file", output.display()));
+            self.say_bad(format!("{}: is the recording that is open; write to another file", output.display()));
             return;
         }
         let task = sweep::Task {

@@ -92,8 +92,8 @@ impl Viewer {
                 match opened.sensor {
                     Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
                     None if self.session.is_none() => self.say(
-                        "There is no sensor.toml here, so pictures are only shown. Open one (or drop it on the \
-                         window); `hzn init` writes one to start from.",
+                        "There is no sensor.toml, so the pictures are shown but not processed. Open one, or drop it \
+                         on the window; `hzn init` writes a first one.",
                     ),
                     None => {}
                 }
@@ -121,20 +121,19 @@ impl Viewer {
                 if cut_off {
                     let path = self.request.inputs.first().cloned();
                     self.message(Message {
-                        text:
-                            "This recording was not closed: its run broke off, or the file was cut. What is whole is \
-                               shown."
-                                .into(),
+                        text: "This recording was not closed: its run was interrupted, or the file was cut off. All \
+                               complete frames are shown."
+                            .into(),
                         bad: true,
                         recover: path,
                     });
                 }
                 if self.sequence.is_empty() {
-                    self.say_bad("There is no frame in it.");
+                    self.say_bad(format!("{}: contains no picture", self.sequence.title));
                 } else if self.sequence.entries.iter().all(|e| e.place == Place::Nowhere) {
                     self.say(
-                        "This recording was made without pictures (--no-images): results are shown, but nothing \
-                              can be processed again.",
+                        "This recording was made without pictures (--no-images): the window shows its results, but \
+                         cannot process the pictures again.",
                     );
                 }
                 if let Some(note) = note {
