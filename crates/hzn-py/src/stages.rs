@@ -53,7 +53,8 @@ pub(crate) struct Cone(Agreed<f64>);
 impl Cone {
     #[new]
     fn new(axis: [f64; 3], cos_half_angle: f64) -> PyResult<Self> {
-        let axis = UnitVec3::<Cam, f64>::try_new(axis).ok_or_else(|| errors::config("axis: must be finite and not zero"))?;
+        let axis =
+            UnitVec3::<Cam, f64>::try_new(axis).ok_or_else(|| errors::config("axis: must be finite and not zero"))?;
         if !(cos_half_angle.abs() < 1.0) {
             return Err(errors::config(format!(
                 "cos_half_angle: {cos_half_angle} is refused: must be between -1 and 1"
@@ -298,7 +299,9 @@ impl State {
     /// Returns the sensor in double precision.
     fn core(&self) -> PyResult<&CoreSensor<f64>> {
         if self.flight {
-            return Err(errors::config("flight: the single stages exist only in double precision; use a sensor without flight=True"));
+            return Err(errors::config(
+                "flight: the single stages exist only in double precision; use a sensor without flight=True",
+            ));
         }
         Ok(&self.core)
     }

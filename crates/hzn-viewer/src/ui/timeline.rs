@@ -147,9 +147,9 @@ fn work(viewer: &mut Viewer, ui: &mut Ui) {
         if ui.button("Process all").on_hover_text(hint).clicked() {
             viewer.process_all(None);
         }
-        let fresh = viewer.rows.fresh();
-        if fresh > 1 {
-            ui.weak(format!("{fresh} new"));
+        let current = viewer.rows.current_len();
+        if current > 1 {
+            ui.weak(format!("{current} new"));
         }
     }
 }

@@ -25,11 +25,11 @@ fn wrong_files_are_said_and_the_rest_goes_on() {
     assert_eq!(answer(&window).0, Status::Ok);
     window.key_press(Key::ArrowRight);
     settled(&mut window);
-    assert!(sight(&window).picture.as_ref().is_err_and(|why| why.contains("no picture")));
+    assert!(frame_view(&window).picture.as_ref().is_err_and(|why| why.contains("no picture")));
     assert!(window.query_by_label("unreadable").is_some());
     window.key_press(Key::ArrowRight);
     settled(&mut window);
-    let refused = sight(&window).answers[0].refused.clone().unwrap();
+    let refused = frame_view(&window).answers[0].refused.clone().unwrap();
     assert!(refused.contains("40 x 30") && refused.contains("320 x 240"), "{refused}");
     window.key_press(Key::ArrowRight);
     settled(&mut window);
