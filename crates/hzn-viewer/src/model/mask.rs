@@ -117,8 +117,9 @@ mod tests {
     #[test]
     fn the_last_corner_that_can_be_closes_it() {
         let mut edit = MaskEdit::default();
-        let came: Vec<_> = (0..MAX_CORNERS).filter_map(|i| edit.click(&vec![], [i as f64 * 10.0, 0.0], 2.0)).collect();
-        assert_eq!((came.len(), came[0][0].len()), (1, MAX_CORNERS));
+        let closed: Vec<_> =
+            (0..MAX_CORNERS).filter_map(|i| edit.click(&vec![], [i as f64 * 10.0, 0.0], 2.0)).collect();
+        assert_eq!((closed.len(), closed[0][0].len()), (1, MAX_CORNERS));
     }
 
     #[test]

@@ -65,8 +65,8 @@ impl ResultHistory {
     /// Returns the next picture after `from` (before it with `back`) whose status is not `ok`. The search wraps around.
     pub fn next_refused(&self, from: usize, back: bool, body: usize) -> Option<usize> {
         let n = self.len();
-        let at = |k: usize| if back { (from + n - k % n) % n } else { (from + k) % n };
-        (1..=n).map(at).find(|&i| self.newest(i, body).is_some_and(|r| r.status != Status::Ok))
+        let nth = |k: usize| if back { (from + n - k % n) % n } else { (from + k) % n };
+        (1..=n).map(nth).find(|&i| self.newest(i, body).is_some_and(|r| r.status != Status::Ok))
     }
 
     /// Returns the pictures, the worst first: refused pictures, then the others in falling order of `badness`. Pictures

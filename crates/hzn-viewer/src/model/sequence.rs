@@ -78,8 +78,8 @@ impl Sequence {
     }
     /// Returns the index of the picture that is nearest in time.
     pub fn nearest(&self, time_s: f64) -> Option<usize> {
-        let apart = |(i, e): (usize, &Entry)| Some((i, (e.time_s? - time_s).abs()));
-        let best = self.entries.iter().enumerate().filter_map(apart).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        let distance = |(i, e): (usize, &Entry)| Some((i, (e.time_s? - time_s).abs()));
+        let best = self.entries.iter().enumerate().filter_map(distance).min_by(|(_, a), (_, b)| a.total_cmp(b));
         best.map(|(i, _)| i)
     }
 }

@@ -14,8 +14,8 @@ pub struct SliderRange {
 }
 
 impl SliderRange {
-    /// Returns the slider of a value with these limits and the usual `magnitude`, or `None` if the value is no
-    /// number. A slider does not reach a limit that is far from the usual value; values beyond the slider can be typed.
+    /// Returns the slider of a value with these limits and this usual magnitude, or `None` if the value is no number. A
+    /// slider does not reach a limit that is far from the usual value; values beyond the slider can be typed.
     pub fn from_limits(limits: &Limits, magnitude: f64) -> Option<Self> {
         let Limits::Number { low, above, high } = *limits else { return None };
         let magnitude = if magnitude.abs() > 0.0 { magnitude.abs() } else { 1.0 };

@@ -71,12 +71,12 @@ fn difference(x: f64, digits: usize) -> String {
 }
 
 fn columns(a: &BodyResult, b: &BodyResult) -> Vec<Column> {
-    let apart = match (a.row.axis(), b.row.axis()) {
+    let angle = match (a.row.axis(), b.row.axis()) {
         (Some(x), Some(y)) => format!("{:.4}° apart", rows::angle_deg(x, y)),
         _ => String::new(),
     };
     let [session, other] = [a, b].map(|answer| answer.row.status.name().to_owned());
-    let mut out = vec![Column { name: "status", session, other, difference: apart }];
+    let mut out = vec![Column { name: "status", session, other, difference: angle }];
     let mut add = |name, digits: usize, unit: &str, value_of: fn(&hzn_mcap::Row) -> Option<f64>| {
         let text = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.digits$}{unit}"));
         let (x, y) = (value_of(&a.row), value_of(&b.row));

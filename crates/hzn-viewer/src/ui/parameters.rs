@@ -92,7 +92,7 @@ fn choice(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, current: &
 fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &Limits, name: Id, hint: &str) {
     let Some(mut x) = session.number(key.section(), key.name(), body) else { return };
     let before = x;
-    let whole = matches!(session.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)));
+    let is_whole = matches!(session.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)));
     let unit = if key.unit().is_empty() { String::new() } else { format!(" {}", key.unit()) };
     let magnitude = session.usual_magnitude(key.section(), key.name(), body);
     let response = match SliderRange::from_limits(limits, magnitude).filter(|_| key.section() != "camera") {
@@ -102,7 +102,7 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
                 .logarithmic(range.logarithmic)
                 .clamping(SliderClamping::Never)
                 .suffix(unit);
-            if whole {
+            if is_whole {
                 slider = slider.integer();
             }
             if range.logarithmic {
@@ -111,8 +111,8 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
             ui.add(slider)
         }
         None => {
-            let speed = if whole { 1.0 } else { (x.abs() * 0.002).max(1e-5) };
-            ui.add(egui::DragValue::new(&mut x).speed(speed).suffix(unit).max_decimals(if whole { 0 } else { 6 }))
+            let speed = if is_whole { 1.0 } else { (x.abs() * 0.002).max(1e-5) };
+            ui.add(egui::DragValue::new(&mut x).speed(speed).suffix(unit).max_decimals(if is_whole { 0 } else { 6 }))
         }
     };
     let response = response.labelled_by(name).on_hover_text(hint);

@@ -289,13 +289,13 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
         ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
     });
     set_label(&shown.response, RESIDUALS);
-    let at = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
+    let pointer = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
     // The point that is nearest on the screen is returned.
-    let apart = |r: &Residual| {
+    let distance = |r: &Residual| {
         let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px].into());
-        p.distance_sq(at)
+        p.distance_sq(pointer)
     };
-    all.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|r| r.at)
+    all.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|r| r.point)
 }
 
 #[cfg(test)]
@@ -304,13 +304,13 @@ mod tests {
 
     #[test]
     fn ticks_are_round_numbers() {
-        let at = |low: f64, high: f64| -> Vec<f64> {
+        let tick_values = |low: f64, high: f64| -> Vec<f64> {
             ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0).iter().map(|m| m.value).collect()
         };
-        assert_eq!(at(0.0, 10.0), [0.0, 5.0, 10.0]);
-        assert_eq!(at(-0.9, 7.2), [0.0, 5.0]);
-        assert_eq!(at(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
-        assert!(at(1.0, 1.0).is_empty() && at(f64::NAN, 1.0).is_empty());
+        assert_eq!(tick_values(0.0, 10.0), [0.0, 5.0, 10.0]);
+        assert_eq!(tick_values(-0.9, 7.2), [0.0, 5.0]);
+        assert_eq!(tick_values(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
+        assert!(tick_values(1.0, 1.0).is_empty() && tick_values(f64::NAN, 1.0).is_empty());
     }
 
     #[test]
@@ -322,8 +322,8 @@ mod tests {
             assert!(labels.len() > 1 && distinct.len() == labels.len(), "{labels:?}");
         }
         assert_eq!((tick_label(0.1, 0.02).as_str(), tick_label(-1e-17, 5.0).as_str()), ("0.10", "0"));
-        let at = |value: f64| axis_labels(" s")(GridMark { value, step_size: 10.0 }, &(0.0..=101.0));
-        assert_eq!((at(90.0).as_str(), at(100.0).as_str()), ("90 s", ""));
+        let label = |value: f64| axis_labels(" s")(GridMark { value, step_size: 10.0 }, &(0.0..=101.0));
+        assert_eq!((label(90.0).as_str(), label(100.0).as_str()), ("90 s", ""));
     }
 
     #[test]

@@ -84,11 +84,11 @@ fn icon_button(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     let visuals = ui.style().interact(&response);
     ui.painter().rect_filled(rect, visuals.corner_radius, visuals.weak_bg_fill);
     let (c, ink) = (rect.center(), visuals.fg_stroke.color);
-    let triangle = |x: f32, way: f32| {
+    let triangle = |x: f32, direction: f32| {
         let tip = [
-            pos2(c.x + x + 4.5 * way, c.y),
-            pos2(c.x + x - 3.5 * way, c.y - 5.0),
-            pos2(c.x + x - 3.5 * way, c.y + 5.0),
+            pos2(c.x + x + 4.5 * direction, c.y),
+            pos2(c.x + x - 3.5 * direction, c.y - 5.0),
+            pos2(c.x + x - 3.5 * direction, c.y + 5.0),
         ];
         ui.painter().add(Shape::convex_polygon(tip.to_vec(), ink, Stroke::NONE));
     };

@@ -183,13 +183,13 @@ impl Worker {
             picture: &picture,
         };
         self.sensors.truncate(request.setups.len());
-        for (which, setup) in request.setups.iter().enumerate() {
-            let outcome = match self.sensor(which, setup, request.flight) {
+        for (index, setup) in request.setups.iter().enumerate() {
+            let outcome = match self.sensor(index, setup, request.flight) {
                 Ok((camera, sensor)) => {
-                    if which == 0 {
+                    if index == 0 {
                         frame_view.camera = Some(camera);
                     }
-                    process_frame(input, &setup.config, sensor, request.touched && which == 0)
+                    process_frame(input, &setup.config, sensor, request.touched && index == 0)
                 }
                 Err(why) => Outcome { refused: Some(why), ..Outcome::new(&setup.config) },
             };
@@ -200,14 +200,14 @@ impl Worker {
         frame_view
     }
 
-    /// Returns the camera and the sensor number `which` with this configuration.
+    /// Returns the camera and the sensor number `index` with this configuration.
     fn sensor(
         &mut self,
-        which: usize,
+        index: usize,
         setup: &Setup,
         flight: bool,
     ) -> Result<(Arc<Camera<f64>>, &mut AnySensor), String> {
-        match self.sensors.get_mut(which).filter(|(_, own, _)| *own == flight) {
+        match self.sensors.get_mut(index).filter(|(_, is_flight, _)| *is_flight == flight) {
             // A sensor that tracks the threshold remembers the picture before, which may be any picture here. So it
             // starts anew.
             Some((config, _, sensor)) if *config != setup.config || config.tracks() => {
@@ -217,11 +217,11 @@ impl Worker {
             Some(_) => {}
             None => {
                 let sensor = AnySensor::new(&setup.config, flight).map_err(|e| e.to_string())?;
-                self.sensors.truncate(which);
+                self.sensors.truncate(index);
                 self.sensors.push((Arc::clone(&setup.config), flight, sensor));
             }
         }
-        match self.sensors.get_mut(which) {
+        match self.sensors.get_mut(index) {
             Some((.., sensor)) => Ok((Arc::new(sensor.camera().clone()), sensor)),
             None => Err("the sensor of the session could not be made".into()),
         }

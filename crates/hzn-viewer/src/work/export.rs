@@ -30,8 +30,8 @@ pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
         }
         for r in &answer.residuals {
             match r.weight > 0.0 {
-                true if on(Layer::Inliers) => out.inliers.push(r.at),
-                false if on(Layer::Rejected) => out.rejected.push(r.at),
+                true if on(Layer::Inliers) => out.inliers.push(r.point),
+                false if on(Layer::Rejected) => out.rejected.push(r.point),
                 _ => {}
             }
         }

@@ -129,15 +129,15 @@ pub struct Residual {
     /// Weight in the fit, 0 to 1.
     pub weight: f64,
     /// The edge point, in pixels.
-    pub at: Point,
+    pub point: Point,
 }
 
 impl Residual {
     /// Returns the rejected point that is nearest to a point of the picture, within `reach_px`.
     pub fn rejected_at(all: &[Self], p: Point, reach_px: f64) -> Option<&Self> {
-        let apart = |r: &&Self| (r.at[0] - p[0]).hypot(r.at[1] - p[1]);
-        let rejected = all.iter().filter(|r| r.weight <= 0.0 && apart(r) <= reach_px);
-        rejected.min_by(|a, b| apart(a).total_cmp(&apart(b)))
+        let distance = |r: &&Self| (r.point[0] - p[0]).hypot(r.point[1] - p[1]);
+        let rejected = all.iter().filter(|r| r.weight <= 0.0 && distance(r) <= reach_px);
+        rejected.min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 }
 
@@ -193,8 +193,8 @@ impl Watch for PixelTraces {
 }
 
 impl<T: Real + Into<f64>> Observer<T> for PixelTraces {
-    fn body(&self, which: u8) {
-        Observer::<T>::body(&self.traces, which);
+    fn body(&self, index: u8) {
+        Observer::<T>::body(&self.traces, index);
     }
     fn enter(&self, stage: Stage) {
         Observer::<T>::enter(&self.traces, stage);
@@ -364,7 +364,7 @@ fn residuals(s: &Solution<f64>, edge: &Edge, camera: &Camera<f64>) -> Vec<Residu
             azimuth_deg: azimuth.to_degrees(),
             distance_px: distance.copysign(outside),
             weight: *weight,
-            at: *at,
+            point: *at,
         })
     };
     edge.points.iter().zip(&edge.weights).filter_map(residual).collect()
@@ -376,7 +376,7 @@ mod tests {
 
     #[test]
     fn the_nearest_rejected_point_is_found() {
-        let at = |x: f64, weight: f64| Residual { azimuth_deg: 0.0, distance_px: x, weight, at: [x, 0.0] };
+        let at = |x: f64, weight: f64| Residual { azimuth_deg: 0.0, distance_px: x, weight, point: [x, 0.0] };
         let all = [at(1.0, 0.0), at(2.0, 1.0), at(3.0, 0.0)];
         let found = |x: f64| Residual::rejected_at(&all, [x, 0.0], 1.5).map(|r| r.distance_px);
         assert_eq!((found(2.2), found(0.0), found(9.0)), (Some(3.0), Some(1.0), None));

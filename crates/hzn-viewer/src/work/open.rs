@@ -128,15 +128,15 @@ fn is_table(path: &Path) -> bool {
 
 /// Returns the name of a file or folder for the title.
 fn title(path: &Path) -> String {
-    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    whole.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    absolute.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Reads the files next to the pictures.
-fn read_companions(request: &Request, folder: &Path, own: Option<SensorText>) -> (Opened, Option<Frames>) {
+fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<SensorText>) -> (Opened, Option<Frames>) {
     let mut opened = Opened { folder: folder.to_owned(), ..Opened::default() };
     let file =
-        |given: &Option<PathBuf>, name: &str| given.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
+        |named: &Option<PathBuf>, name: &str| named.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
     let mut sensor_file = |path: &Path| match std::fs::read_to_string(path) {
         Ok(text) => Some(SensorText { text, home: path.to_owned(), is_file: true }),
         Err(e) => {
@@ -144,9 +144,9 @@ fn read_companions(request: &Request, folder: &Path, own: Option<SensorText>) ->
             None
         }
     };
-    opened.sensor = match (&request.sensor, own) {
+    opened.sensor = match (&request.sensor, recorded_sensor) {
         (Some(path), _) => sensor_file(path),
-        (None, Some(own)) => Some(own),
+        (None, Some(recorded)) => Some(recorded),
         (None, None) => file(&None, "sensor.toml").and_then(|path| sensor_file(&path)),
     };
     let frames = file(&request.frames, "frames.csv").and_then(|path| match hzn_calib::frames::load(&path) {
@@ -191,7 +191,7 @@ fn complete_sensor(opened: &mut Opened, source: &dyn Source) {
 fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Result<(), String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
     let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    let own = index.sensor_toml().map(|text| SensorText {
+    let recorded_sensor = index.sensor_toml().map(|text| SensorText {
         text: text.to_owned(),
         home: folder.join("sensor.toml"),
         is_file: false,
@@ -202,7 +202,7 @@ fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Resul
     if request.truth.is_none() && !folder.join("truth.csv").exists() && truth_of_folder.exists() {
         request.truth = Some(truth_of_folder);
     }
-    let (mut opened, frames) = read_companions(&request, &folder, own);
+    let (mut opened, frames) = read_companions(&request, &folder, recorded_sensor);
     opened.title = title(path);
     if let Ok(source) = source::open(std::slice::from_ref(&path.to_owned()), None, None) {
         complete_sensor(&mut opened, source.as_ref());
@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn unusable_inputs_are_reported() {
         let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str, bytes: &[u8]| {
+        let file = |name: &str, bytes: &[u8]| {
             std::fs::write(dir.path().join(name), bytes).unwrap();
             dir.path().join(name)
         };
@@ -375,8 +375,8 @@ mod tests {
             Some(Event::Failed(why)) => why,
             other => panic!("{other:?}"),
         };
-        assert!(why(&at("a.mcap", b"no recording")).contains("is not an MCAP file"));
-        assert!(why(&at("b.csv", b"file\n")).contains("is neither a picture nor a recording"));
+        assert!(why(&file("a.mcap", b"no recording")).contains("is not an MCAP file"));
+        assert!(why(&file("b.csv", b"file\n")).contains("is neither a picture nor a recording"));
         assert!(why(&dir.path().join("none.png")).contains("no such file"));
     }
 

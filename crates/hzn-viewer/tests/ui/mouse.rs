@@ -202,7 +202,7 @@ fn a_click_among_the_residuals_shows_the_point() {
     let middle = [middle.min[0] + middle.size[0] / 2.0, middle.min[1] + middle.size[1] / 2.0];
     let shown = view.to_picture(area(&window), SIZE, middle);
     let residuals = &frame_view(&window).answers[0].bodies[0].residuals;
-    assert!(residuals.iter().any(|r| near(r.at, shown)), "{shown:?}");
+    assert!(residuals.iter().any(|r| near(r.point, shown)), "{shown:?}");
 }
 
 #[test]

@@ -128,15 +128,16 @@ impl Session {
     }
 
     fn find<'a>(values: &'a toml::Table, section: &str, name: &str, body: usize) -> Option<&'a toml::Value> {
-        let of_body = match values.get("bodies").and_then(toml::Value::as_array) {
+        let body_values = match values.get("bodies").and_then(toml::Value::as_array) {
             Some(bodies) => bodies.get(body),
             None => values.get("body"),
         };
         if section == "body" {
-            return of_body?.get(name);
+            return body_values?.get(name);
         }
-        let own = of_body.and_then(|b| b.get(section)).filter(|_| matches!(section, "binarize" | "covariance"));
-        own.or_else(|| values.get(section))?.get(name)
+        let own_section =
+            body_values.and_then(|b| b.get(section)).filter(|_| matches!(section, "binarize" | "covariance"));
+        own_section.or_else(|| values.get(section))?.get(name)
     }
 
     /// Returns the value in effect if it is a number.
@@ -167,9 +168,9 @@ impl Session {
 
     /// Sets a number. It is rounded to a whole number if the value in effect is whole.
     pub fn set_number(&mut self, key: &Key, body: usize, x: f64) {
-        let whole = matches!(self.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)))
+        let is_whole = matches!(self.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)))
             || (self.value(key.section(), key.name(), body).is_none() && key.form == Form::Whole);
-        let value = if whole { Value::from(x.round() as i64) } else { Value::from(tidy(x)) };
+        let value = if is_whole { Value::from(x.round() as i64) } else { Value::from(tidy(x)) };
         self.set(key.section(), key.name(), body, Some(value));
     }
 
@@ -274,9 +275,9 @@ impl Session {
         self.differing.clear();
         if self.is_changed() {
             let bodies = table.as_ref().and_then(|t| t.get("bodies")?.as_array()).map_or(1, |b| b.len().max(1));
-            let of_bodies = |k: &'static Key| (0..bodies).map(move |body| (k, body));
+            let with_bodies = |k: &'static Key| (0..bodies).map(move |body| (k, body));
             let key = |(k, body): (&'static Key, usize)| sheet::Key { section: k.section(), name: k.name(), body };
-            let keys = keys::all().flat_map(of_bodies).map(key);
+            let keys = keys::all().flat_map(with_bodies).map(key);
             self.differing.extend(self.sheet.differing(&self.saved, keys).iter().map(|k| (k.section, k.name, k.body)));
         }
         match hzn_calib::sensor::parse(self.sheet.text(), &self.home) {

@@ -69,17 +69,17 @@ fn sky(viewer: &Viewer, frame_view: &FrameView, placement: &Placement<'_>) -> Ve
     let Some(camera) = placement.camera else { return Vec::new() };
     let mut out = Vec::new();
     let mut add = |name, direction: Option<[f64; 3]>| {
-        let found = direction.and_then(hzn_core::frames::UnitVec3::try_new).and_then(|d| camera.project(&d));
-        if let Some(at) = found.and_then(|p| placement.to_screen([p.u, p.v])) {
+        let projected = direction.and_then(hzn_core::frames::UnitVec3::try_new).and_then(|d| camera.project(&d));
+        if let Some(at) = projected.and_then(|p| placement.to_screen([p.u, p.v])) {
             out.push((name, at));
         }
     };
     let truth = viewer.truth.get(&frame_view.name).and_then(|t| t.first());
-    let given = frame_view.data.as_ref();
-    let sun = given.and_then(|d| d.sun_camera).or_else(|| Some([truth?.sun_x?, truth?.sun_y?, truth?.sun_z?]));
-    add("Sun", sun.or_else(|| from_ephemeris(given?, hzn_nav::ephemeris::sun)));
+    let data = frame_view.data.as_ref();
+    let sun = data.and_then(|d| d.sun_camera).or_else(|| Some([truth?.sun_x?, truth?.sun_y?, truth?.sun_z?]));
+    add("Sun", sun.or_else(|| from_ephemeris(data?, hzn_nav::ephemeris::sun)));
     let moon = truth.and_then(|t| Some([t.moon_x?, t.moon_y?, t.moon_z?]));
-    add("Moon", moon.or_else(|| from_ephemeris(given?, hzn_nav::ephemeris::moon)));
+    add("Moon", moon.or_else(|| from_ephemeris(data?, hzn_nav::ephemeris::moon)));
     out
 }
 
@@ -108,7 +108,7 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
         lines(painter, placement, &answer.limb, Stroke::new(3.4, theme::LIMB));
     }
     let points = |kept: bool| {
-        answer.residuals.iter().filter(move |r| (r.weight > 0.0) == kept).filter_map(|r| placement.to_screen(r.at))
+        answer.residuals.iter().filter(move |r| (r.weight > 0.0) == kept).filter_map(|r| placement.to_screen(r.point))
     };
     if on(Layer::Rejected) {
         dots(painter, points(false), dot + 0.6, theme::REJECTED);
@@ -141,7 +141,7 @@ fn arrow(painter: &Painter, placement: &Placement<'_>, answer: &BodyResult) {
     if length < 1e-9 {
         return;
     }
-    let way = vec2((x / length) as f32, (y / length) as f32);
+    let direction = vec2((x / length) as f32, (y / length) as f32);
     let centre = camera.principal_point();
     let from = placement.shown_to_screen([centre.u, centre.v]);
     let frame = painter.clip_rect().shrink(16.0).intersect(Rect::from_min_max(
@@ -149,29 +149,33 @@ fn arrow(painter: &Painter, placement: &Placement<'_>, answer: &BodyResult) {
         placement.shown_to_screen([placement.size[0] - 0.5, placement.size[1] - 0.5]),
     ));
     // The arrow goes to the border.
-    let far = |at: f32, way: f32, low: f32, high: f32| if way > 0.0 { (high - at) / way } else { (low - at) / way };
-    let reach = [far(from.x, way.x, frame.left(), frame.right()), far(from.y, way.y, frame.top(), frame.bottom())];
+    let far = |at: f32, direction: f32, low: f32, high: f32| {
+        if direction > 0.0 { (high - at) / direction } else { (low - at) / direction }
+    };
+    let reach =
+        [far(from.x, direction.x, frame.left(), frame.right()), far(from.y, direction.y, frame.top(), frame.bottom())];
     let reach = reach.into_iter().filter(|r| r.is_finite()).fold(f32::INFINITY, f32::min);
     if !(reach > 0.0 && reach.is_finite()) {
         return;
     }
-    let tip = from + way * (reach - 6.0);
-    let (back, side) = (tip - way * 32.0, vec2(-way.y, way.x) * 7.5);
-    let head = vec![tip, tip - way * 14.0 + side, tip - way * 14.0 - side];
-    painter.line_segment([back, tip - way * 12.0], Stroke::new(6.5, Color32::from_black_alpha(170)));
-    painter.line_segment([back, tip - way * 12.0], Stroke::new(3.5, theme::AXIS));
+    let tip = from + direction * (reach - 6.0);
+    let (back, side) = (tip - direction * 32.0, vec2(-direction.y, direction.x) * 7.5);
+    let head = vec![tip, tip - direction * 14.0 + side, tip - direction * 14.0 - side];
+    painter.line_segment([back, tip - direction * 12.0], Stroke::new(6.5, Color32::from_black_alpha(170)));
+    painter.line_segment([back, tip - direction * 12.0], Stroke::new(3.5, theme::AXIS));
     painter.add(Shape::convex_polygon(head, theme::AXIS, Stroke::new(1.0, Color32::from_black_alpha(150))));
     let degrees = s.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
     let text = format!("axis, {degrees:.1}° off the optical axis");
     let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), theme::AXIS);
-    let rect = place_label(Rect::from_two_pos(back, tip).expand(7.0), way, galley.size() + vec2(10.0, 4.0), frame);
+    let rect =
+        place_label(Rect::from_two_pos(back, tip).expand(7.0), direction, galley.size() + vec2(10.0, 4.0), frame);
     painter.rect_filled(rect, 4, Color32::from_black_alpha(200));
     painter.galley(rect.min + vec2(5.0, 2.0), galley, theme::AXIS);
 }
 
 /// Returns the place of a label next to an arrow. The label is as far back as the frame allows and never covers the
 /// arrow.
-fn place_label(arrow: Rect, way: Vec2, size: Vec2, frame: Rect) -> Rect {
+fn place_label(arrow: Rect, direction: Vec2, size: Vec2, frame: Rect) -> Rect {
     let c = arrow.center();
     // The label may move along the border to stay within the frame.
     let x = (c.x - size.x / 2.0).min(frame.right() - size.x).max(frame.left());
@@ -183,7 +187,7 @@ fn place_label(arrow: Rect, way: Vec2, size: Vec2, frame: Rect) -> Rect {
         pos2(x, arrow.bottom()),
     ]
     .map(|min| Rect::from_min_size(min, size));
-    let ahead = |r: &Rect| (r.center() - c).dot(way);
+    let ahead = |r: &Rect| (r.center() - c).dot(direction);
     places.sort_by(|a, b| ahead(a).total_cmp(&ahead(b)));
     places.into_iter().find(|r| frame.expand(0.5).contains_rect(*r)).unwrap_or(places[0])
 }
@@ -254,13 +258,13 @@ mod tests {
         let frame = Rect::from_min_size(pos2(20.0, 30.0), vec2(500.0, 300.0));
         let size = vec2(180.0, 18.0);
         for i in 0..72 {
-            let way = Vec2::angled(i as f32 * std::f32::consts::TAU / 72.0);
+            let direction = Vec2::angled(i as f32 * std::f32::consts::TAU / 72.0);
             for tip in [pos2(24.0, 34.0), pos2(516.0, 34.0), pos2(516.0, 326.0), pos2(270.0, 326.0), pos2(24.0, 180.0)]
             {
-                let arrow = Rect::from_two_pos(tip, tip - way * 22.0).expand(7.0);
-                let label = place_label(arrow, way, size, frame);
-                assert!(frame.expand(0.5).contains_rect(label), "{way:?} {tip:?} {label:?}");
-                assert!(!label.shrink(0.1).intersects(arrow), "{way:?} {tip:?} {label:?}");
+                let arrow = Rect::from_two_pos(tip, tip - direction * 22.0).expand(7.0);
+                let label = place_label(arrow, direction, size, frame);
+                assert!(frame.expand(0.5).contains_rect(label), "{direction:?} {tip:?} {label:?}");
+                assert!(!label.shrink(0.1).intersects(arrow), "{direction:?} {tip:?} {label:?}");
             }
         }
     }

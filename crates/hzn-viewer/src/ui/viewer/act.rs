@@ -107,8 +107,8 @@ impl Viewer {
             return;
         }
         // If the shown picture is the worst one of the last call, the next worst follows.
-        let at = worst.iter().position(|&i| i == self.playback.frame());
-        self.worst = if at == Some(self.worst) { (self.worst + 1) % worst.len() } else { 0 };
+        let position = worst.iter().position(|&i| i == self.playback.frame());
+        self.worst = if position == Some(self.worst) { (self.worst + 1) % worst.len() } else { 0 };
         if let Some(&frame) = worst.get(self.worst) {
             self.playback.go(frame, self.sequence.len());
         }

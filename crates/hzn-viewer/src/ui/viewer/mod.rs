@@ -229,11 +229,11 @@ impl Viewer {
     /// requested. The next one is computed while this one is painted.
     pub(super) fn advance(&mut self, ctx: &egui::Context) {
         let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
-        let lasts_s = |frame| self.sequence.duration_s(frame);
+        let duration_s = |frame| self.sequence.duration_s(frame);
         if self.frame_view.as_ref().is_none_or(|s| s.index == self.playback.frame()) {
-            self.playback.advance(elapsed.min(LONGEST_PASS), self.sequence.len(), lasts_s);
+            self.playback.advance(elapsed.min(LONGEST_PASS), self.sequence.len(), duration_s);
         }
-        if let Some(due) = self.playback.due(lasts_s) {
+        if let Some(due) = self.playback.due(duration_s) {
             ctx.request_repaint_after(due.clamp(Duration::from_millis(4), LONGEST_PASS / 2));
         }
     }
