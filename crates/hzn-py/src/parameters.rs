@@ -8,16 +8,11 @@ use pyo3::types::{PyDict, PyModule};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::camera::Camera;
 use crate::errors;
 
-/// Reads sections and checks them like a sensor.toml. A `hzn.Camera` may replace its section.
+/// Reads sections and checks them like a sensor.toml.
 pub(crate) fn config(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
-    let sections = sections.copy()?;
-    if let Some(camera) = sections.get_item("camera")?.as_ref().and_then(|c| c.cast::<Camera>().ok()) {
-        sections.set_item("camera", to_python(sections.py(), &camera.get().config)?)?;
-    }
-    let text = toml::to_string(&from_python(&sections)?).map_err(errors::config)?;
+    let text = toml::to_string(&from_python(sections)?).map_err(errors::config)?;
     Ok(hzn_calib::sensor::parse(&text, Path::new("parameters")).map_err(errors::config)?.config)
 }
 
