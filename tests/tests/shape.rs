@@ -28,9 +28,7 @@ const STILL_LONG: &[&str] = &[
     "crates/hzn-core/src/stages/threshold.rs",
     "crates/hzn-flight/src/flight.rs",
     "crates/hzn-flight/tests/flight.rs",
-    "crates/hzn-py/src/report.rs",
     "crates/hzn-run/src/engine/mod.rs",
-    "crates/hzn-viewer/src/model/session.rs",
 ];
 
 fn sources(dir: &Path, out: &mut Vec<PathBuf>) {

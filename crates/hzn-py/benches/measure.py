@@ -117,10 +117,10 @@ def archive(frames, workers):
         with distributed.LocalCluster(
             n_workers=workers, threads_per_worker=1, dashboard_address=None
         ) as cluster, distributed.Client(cluster) as client:
-            told = [(str(picture), {"time_s": float(i)}) for i in range(frames)]
-            process_archive(told[: 2 * workers], sensor, client=client, out=f"{folder}/warm", shard_frames=1)
+            urls = [(str(picture), {"time_s": float(i)}) for i in range(frames)]
+            process_archive(urls[: 2 * workers], sensor, client=client, out=f"{folder}/warm", shard_frames=1)
             start = time.perf_counter()
-            result = process_archive(told, sensor, client=client, out=f"{folder}/out", shard_frames=500)
+            result = process_archive(urls, sensor, client=client, out=f"{folder}/out", shard_frames=500)
             assert not result.failed
             return frames / (time.perf_counter() - start)
 
@@ -128,20 +128,21 @@ def archive(frames, workers):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path)
-    parser.add_argument("--frames", type=int, default=100_000, help="frames of the run that watches the memory")
+    parser.add_argument("--frames", type=int, default=100_000, help="pictures of the run that measures the memory")
     arguments = parser.parse_args()
     load = os.getloadavg()[0]
     lines = [
-        "# Measured",
+        "# Measurements of the Python package",
         "",
         "Written by `cargo xtask bench python`: the wheel of a release build, "
         f"Python {platform.python_version()}, NumPy {np.__version__}, {os.cpu_count()} cores; "
         f"load of the machine at the start {load:.1f}.",
         "",
-        "## What a call costs",
+        "## Time of a call",
         "",
-        "Medians of 400 calls of `Sensor.process` on one picture, warm, in double precision. The difference is everything that"
-        " Python adds to the Rust call: taking the array, lending a sensor, releasing the interpreter, making the report.",
+        "Medians of 400 calls of `Sensor.process` on one picture, warm, in double precision. The difference is the time"
+        " that Python adds to the Rust call: it reads the array, takes an idle sensor, releases the interpreter and makes the"
+        " report.",
         "",
         "| picture | call, µs | Rust within it, µs | difference, µs |",
         "|---|---|---|---|",
@@ -154,8 +155,9 @@ def main():
         "",
         "## `process_many`",
         "",
-        "Frames a second; in brackets, times the loop over `process` in the same run (from files, times one thread). Arrays are"
-        " eight pictures in turn, PNG files four, decoding included.",
+        "Pictures per second. The number in brackets is the ratio to a loop over `process` in the same run (for files, to one"
+        " thread). The arrays are eight pictures in turn. The PNG files are four pictures in turn; their time includes the"
+        " decoding.",
         "",
         f"| picture | loop over `process` |{head}",
         "|---|---|" + "---|" * len(threads()),
@@ -166,16 +168,16 @@ def main():
         lines.append(f"| {width}×{height} array | {alone:.0f} |{cells}")
     many = scaling_of_files(1920, 1080, 400)
     lines.append("| 1920×1080 PNG file | |" + "".join(f" {r:.0f} ({r / many[0]:.2f}) |" for r in many))
-    tenth, all_of_it = memory(arguments.frames)
+    tenth, full = memory(arguments.frames)
     lines += [
         "",
-        f"Memory of the process after {arguments.frames // 10} frames {tenth:.0f} MB, after {arguments.frames} frames"
-        f" {all_of_it:.0f} MB (160×120, a new array each).",
+        f"The process uses {tenth:.0f} MB after {arguments.frames // 10} pictures and {full:.0f} MB after {arguments.frames}"
+        " pictures (160×120, each a new array).",
         "",
         "## `hzn.dask`",
         "",
-        f"A `LocalCluster` of 2 processes on this machine, pictures of 640×480 from PGM files, Parquet shards of 500:"
-        f" {archive(10_000, 2):.0f} frames a second.",
+        f"A `LocalCluster` of 2 processes on this machine processes {archive(10_000, 2):.0f} pictures per second: 640×480 from"
+        " PGM files, into Parquet shards of 500.",
         "",
     ]
     arguments.output.write_text("\n".join(lines))

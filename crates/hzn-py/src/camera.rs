@@ -82,7 +82,7 @@ impl Camera {
             return Err(errors::config("camera matrix: shape (3, 3) is expected"));
         }
         let (width, height) =
-            size.ok_or_else(|| errors::config("size: a camera matrix does not say it; give size=(width, height)"))?;
+            size.ok_or_else(|| errors::config("size: is required with a camera matrix; pass size=(width, height)"))?;
         let k: Vec<f64> = match distortion {
             Some(d) => d.py().import("numpy")?.call_method1("ravel", (d,))?.call_method0("tolist")?.extract()?,
             None => Vec::new(),
@@ -92,8 +92,8 @@ impl Camera {
             (false, 0) => Model::Pinhole,
             (false, 4 | 5) => Model::BrownConrady,
             (_, n) => {
-                let most = if fisheye { "up to 4 (fisheye)" } else { "4 or 5 (k1, k2, p1, p2, k3)" };
-                return Err(errors::config(format!("distortion: {n} coefficients; {most} are expected")));
+                let allowed = if fisheye { "up to 4 (fisheye)" } else { "4 or 5 (k1, k2, p1, p2, k3)" };
+                return Err(errors::config(format!("distortion: {n} coefficients; {allowed} are expected")));
             }
         };
         let ideal = Config::ideal(model, width, height, m[(0, 0)]);
@@ -168,7 +168,7 @@ impl Camera {
             let [[a, b], [c, d], [e, f]] = ray.jacobian();
             Some([a, b, c, d, e, f])
         })?;
-        Ok(in_cubes(&flat).to_pyarray(py))
+        Ok(to_jacobians(&flat).to_pyarray(py))
     }
 
     fn __repr__(&self) -> String {
@@ -222,6 +222,6 @@ pub(crate) fn map_rows<const N: usize>(
 }
 
 /// Reshapes (n, 6) to (n, 3, 2).
-pub(crate) fn in_cubes(flat: &Array2<f64>) -> Array3<f64> {
+pub(crate) fn to_jacobians(flat: &Array2<f64>) -> Array3<f64> {
     Array3::from_shape_fn((flat.len_of(Axis(0)), 3, 2), |(i, j, k)| flat[(i, 2 * j + k)])
 }

@@ -7,12 +7,12 @@ use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::{PyErr, create_exception};
 
-create_exception!(hzn, HznError, PyValueError, "Base of hzn's exceptions.");
+create_exception!(hzn, HznError, PyValueError, "Base class of hzn's exceptions.");
 create_exception!(
     hzn,
     ConfigError,
     HznError,
-    "A sensor, a calibration or a frame's own data that cannot be; names the field."
+    "An impossible sensor, calibration or prior of a picture; the message names the field."
 );
 create_exception!(hzn, ImageError, HznError, "An array that is no picture, or not one of this camera.");
 
@@ -42,7 +42,7 @@ pub(crate) fn warn(py: Python<'_>, what: impl std::fmt::Display) -> PyResult<()>
 pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| {
         let what = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-        PyRuntimeError::new_err(format!("a fault of hzn itself, please report it: {}", what.unwrap_or("no message")))
+        PyRuntimeError::new_err(format!("internal error of hzn, please report it: {}", what.unwrap_or("no message")))
     })
 }
 

@@ -64,10 +64,10 @@ impl<'py> Array<'py> {
         let channels = self.shape().get(2).map_or(1, |&c| c as u8);
         let bits = match (self, bits) {
             (Self::Bytes(_), None | Some(8)) => 8,
-            (Self::Bytes(_), Some(_)) => return Err(errors::image("bits: an array of uint8 has 8")),
+            (Self::Bytes(_), Some(_)) => return Err(errors::image("bits: must be 8 for an array of uint8")),
             (Self::Words(_), None) => 16,
             (Self::Words(_), Some(n @ 8..=16)) => n,
-            (Self::Words(_), Some(n)) => return Err(errors::image(format!("bits: {n} is not within 8 to 16"))),
+            (Self::Words(_), Some(n)) => return Err(errors::image(format!("bits: {n} is refused: must be 8 to 16"))),
         };
         Ok(Layout::packed(side(width)?, side(height)?, channels, bits))
     }
@@ -143,8 +143,8 @@ impl<'a> Strided<'a> {
             return Err(errors::image("width and height must be 1 to 65535 pixels"));
         }
         let samples = match array {
-            Array::Bytes(a) => Samples::Bytes(in_three(a.as_array())?),
-            Array::Words(a) => Samples::Words(in_three(a.as_array())?),
+            Array::Bytes(a) => Samples::Bytes(to_three_axes(a.as_array())?),
+            Array::Words(a) => Samples::Words(to_three_axes(a.as_array())?),
         };
         let channels = match channel {
             Channel::Mean if layout.channels >= 3 => 0..3,
@@ -156,7 +156,7 @@ impl<'a> Strided<'a> {
     }
 }
 
-fn in_three<T>(array: ArrayViewD<'_, T>) -> PyResult<ArrayView3<'_, T>> {
+fn to_three_axes<T>(array: ArrayViewD<'_, T>) -> PyResult<ArrayView3<'_, T>> {
     match array.ndim() {
         2 => array.into_dimensionality::<Ix2>().map(|a| a.insert_axis(Axis(2))),
         _ => array.into_dimensionality::<Ix3>(),

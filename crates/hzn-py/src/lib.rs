@@ -12,8 +12,11 @@ macro_rules! doc {
 }
 
 mod camera;
+mod drawing;
 mod errors;
+mod expected;
 mod image;
+mod notebook;
 mod overlay;
 mod parameters;
 mod recording;
@@ -22,6 +25,7 @@ mod sensor;
 mod sequence;
 mod simulation;
 mod stages;
+mod state;
 
 /// The module `hzn._hzn`.
 #[pyo3::pymodule(gil_used = false)]
@@ -30,6 +34,8 @@ mod _hzn {
     use crate::camera::Camera;
     #[pymodule_export]
     use crate::errors::{ConfigError, HznError, ImageError, panic_within};
+    #[pymodule_export]
+    use crate::expected::Expected;
     #[pymodule_export]
     use crate::overlay::overlay;
     #[pymodule_export]
@@ -43,7 +49,10 @@ mod _hzn {
     #[pymodule_export]
     use crate::simulation::{SimulatedFrame, Simulation, design, evaluate};
     #[pymodule_export]
-    use crate::stages::{Cone, Expected, Fit, Rays, borders, fit, fuse, keep, level, pick, rays, withdraw};
+    use crate::stages::{
+        Cone, Fit, Rays, exclude_body, find_borders, find_consensus, find_threshold, fit_cone, fuse_half_angle,
+        locate_points, to_rays,
+    };
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's own spelling")]

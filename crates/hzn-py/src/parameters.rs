@@ -8,16 +8,11 @@ use pyo3::types::{PyDict, PyModule};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::camera::Camera;
 use crate::errors;
 
-/// Reads sections and checks them like a sensor.toml. A `hzn.Camera` may replace its section.
+/// Reads sections and checks them like a sensor.toml.
 pub(crate) fn config(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
-    let sections = sections.copy()?;
-    if let Some(camera) = sections.get_item("camera")?.as_ref().and_then(|c| c.cast::<Camera>().ok()) {
-        sections.set_item("camera", to_python(sections.py(), &camera.get().config)?)?;
-    }
-    let text = toml::to_string(&from_python(&sections)?).map_err(errors::config)?;
+    let text = toml::to_string(&from_python(sections)?).map_err(errors::config)?;
     Ok(hzn_calib::sensor::parse(&text, Path::new("parameters")).map_err(errors::config)?.config)
 }
 
@@ -34,7 +29,7 @@ pub(crate) fn from_python(data: &Bound<'_, PyAny>) -> PyResult<Value> {
     options.set_item("default", py.import("operator")?.call_method1("methodcaller", ("tolist",))?)?;
     let text: PyResult<String> = json(py)?.call_method("dumps", (data,), Some(&options)).and_then(|t| t.extract());
     let value = serde_json::from_str(&text.map_err(|e| errors::config(format!("parameters: {e}")))?);
-    value.map(without_null).map_err(|_| errors::config("parameters: hold a number that is not finite; leave it out"))
+    value.map(without_null).map_err(|_| errors::config("parameters: contain a number that is not finite; remove it"))
 }
 
 fn json(py: Python<'_>) -> PyResult<Bound<'_, PyModule>> {

@@ -55,7 +55,7 @@ pub(crate) fn open_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
         metadata: reader.metadata().clone(),
         camera: config.and_then(|c| Camera::from_config(c.config.camera).ok()).map(Arc::new),
         path,
-        open: Mutex::new(Some(Open { reader, ahead: None, told: false })),
+        open: Mutex::new(Some(Open { reader, ahead: None, warned: false })),
     })
 }
 
@@ -74,13 +74,13 @@ struct Open {
     /// First record of the next picture.
     ahead: Option<FrameRecord>,
     /// True if the user was warned about missing data.
-    told: bool,
+    warned: bool,
 }
 
 impl Open {
     /// Returns which part is missing of a recording that was read to its end, but only once.
     fn lost(&mut self, path: &Path) -> Option<String> {
-        if std::mem::replace(&mut self.told, true) {
+        if std::mem::replace(&mut self.warned, true) {
             None
         } else {
             hzn_run::source::lost_of_recording(&self.reader, path, "read")
@@ -115,7 +115,7 @@ impl Recording {
     }
     #[doc = doc!("Recording.sensor")]
     fn sensor(&self) -> PyResult<Sensor> {
-        let text = self.sensor_toml.as_deref().ok_or_else(|| errors::other("the recording holds no sensor.toml"))?;
+        let text = self.sensor_toml.as_deref().ok_or_else(|| errors::other("the recording contains no sensor.toml"))?;
         let parsed = hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(errors::config)?;
         Sensor::from_config(parsed.config, false)
     }
@@ -140,8 +140,8 @@ impl Recording {
             lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
             return Ok(None);
         };
-        let reports = records.into_iter().map(|r| Report::recorded(r, self.camera.clone()));
-        Ok(Some(Frame { image, report: Py::new(py, Report::of_bodies(py, reports)?)? }))
+        let reports = records.into_iter().map(|r| Report::from_record(r, self.camera.clone()));
+        Ok(Some(Frame { image, report: Py::new(py, Report::from_bodies(py, reports)?)? }))
     }
     fn __enter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
         slf

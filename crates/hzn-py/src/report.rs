@@ -3,8 +3,6 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use hzn_core::camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
@@ -18,13 +16,10 @@ use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
-use crate::{errors, parameters};
+use crate::{drawing, errors, notebook, parameters};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
 type Reduced = (Py<PyAny>, (Py<PyBytes>, Vec<Py<Report>>));
-
-/// Longest side of a picture in a notebook, in pixels.
-const SHOWN_PX: u32 = 960;
 
 #[doc = doc!("Report")]
 #[pyclass(frozen, module = "hzn", weakref)]
@@ -76,12 +71,12 @@ impl Report {
             half_angle_rad: report.solution.as_ref().map(|s| s.fused_half_angle_rad),
             detail,
             stage: report.stage.name().into(),
-            ..Self::of_row(row)
+            ..Self::from_row(row)
         }
     }
 
     /// Makes a report from a row alone, for example of a picture that could not be read.
-    pub(crate) fn of_row(row: Row) -> Self {
+    pub(crate) fn from_row(row: Row) -> Self {
         Self {
             row,
             candidates: Vec::new(),
@@ -97,13 +92,13 @@ impl Report {
     }
 
     /// Makes the report of a record in a recording.
-    pub(crate) fn recorded(record: FrameRecord, camera: Option<Arc<Camera>>) -> Self {
+    pub(crate) fn from_record(record: FrameRecord, camera: Option<Arc<Camera>>) -> Self {
         let drawing = record.annotations;
         Self {
             candidates: record.candidates,
             camera,
             detail: (!drawing.is_empty()).then(|| Detail { drawing, ..Detail::default() }),
-            ..Self::of_row(record.row)
+            ..Self::from_row(record.row)
         }
     }
 
@@ -113,9 +108,9 @@ impl Report {
     }
 
     /// Makes the report of the first body and attaches the reports of the others.
-    pub(crate) fn of_bodies(py: Python<'_>, reports: impl IntoIterator<Item = Self>) -> PyResult<Self> {
+    pub(crate) fn from_bodies(py: Python<'_>, reports: impl IntoIterator<Item = Self>) -> PyResult<Self> {
         let mut reports = reports.into_iter();
-        let first = reports.next().ok_or_else(|| errors::config("bodies: there is none"))?;
+        let first = reports.next().ok_or_else(|| errors::config("bodies: is empty"))?;
         Ok(Self { others: reports.map(|r| Py::new(py, r)).collect::<PyResult<_>>()?, ..first })
     }
 
@@ -168,8 +163,8 @@ impl Report {
         }
     }
 
-    fn detail_of(&self, what: &str) -> PyResult<&Detail> {
-        let missing = || errors::other(format!("{what} are kept by process(image, detail=True) only"));
+    fn require_detail(&self, what: &str) -> PyResult<&Detail> {
+        let missing = || errors::other(format!("{what} are kept only by process(image, detail=True)"));
         self.detail.as_ref().ok_or_else(missing)
     }
 }
@@ -330,23 +325,23 @@ impl Report {
     #[doc = doc!("Report.edges")]
     #[getter]
     fn edges<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-        Ok(self.detail_of("edges")?.drawing.edges.iter().map(|e| table(py, e)).collect())
+        Ok(self.require_detail("edges")?.drawing.edges.iter().map(|e| table(py, e)).collect())
     }
     #[doc = doc!("Report.inliers")]
     #[getter]
     fn inliers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        Ok(table(py, &self.detail_of("inliers")?.drawing.inliers))
+        Ok(table(py, &self.require_detail("inliers")?.drawing.inliers))
     }
     #[doc = doc!("Report.rejected")]
     #[getter]
     fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        Ok(table(py, &self.detail_of("rejected points")?.drawing.rejected))
+        Ok(table(py, &self.require_detail("rejected points")?.drawing.rejected))
     }
     #[doc = doc!("Report.rays")]
     #[getter]
     fn rays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let inliers = &self.detail_of("rays")?.drawing.inliers;
-        let missing = || errors::other("rays: the recording does not say its camera");
+        let inliers = &self.require_detail("rays")?.drawing.inliers;
+        let missing = || errors::other("rays: the recording does not contain its camera");
         let lens = &self.camera.as_ref().ok_or_else(missing)?.lens;
         let ray = |p: &[f64; 2]| lens.unproject(ImagePoint { u: p[0], v: p[1] }).map_or([f64::NAN; 3], |ray| ray.xyz());
         Ok(table(py, &inliers.iter().map(ray).collect::<Vec<_>>()))
@@ -355,7 +350,7 @@ impl Report {
     #[getter]
     fn stages_us<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (name, us) in &self.detail_of("times of the stages")?.stages_us {
+        for (name, us) in &self.require_detail("times of the stages")?.stages_us {
             dict.set_item(name, us)?;
         }
         Ok(dict)
@@ -392,7 +387,7 @@ impl Report {
             stage: pickled.stage,
             others,
             bits: pickled.bits,
-            ..Self::of_row(pickled.row)
+            ..Self::from_row(pickled.row)
         })
     }
     /// Returns the report itself, because it never changes.
@@ -418,66 +413,11 @@ impl Report {
 
     /// Shows the numbers in a notebook, next to the picture with all annotations.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
-        let mut html = String::from("<div style=\"display:flex;gap:1em;align-items:start\">");
-        if let Some(image) = self.image.as_ref().and_then(|w| w.bind(py).upgrade()) {
-            let rgb = crate::overlay::draw(py, &image, self, self.bits)?;
-            let png = errors::detached(py, || png(&rgb))??;
-            html += &format!("<img style=\"max-width:60%\" src=\"data:image/png;base64,{}\">", STANDARD.encode(png));
-        }
-        html += "<table>";
-        for report in self.each() {
-            for (name, value) in report.shown() {
-                html += &format!("<tr><th style=\"text-align:left\">{name}</th><td>{}</td></tr>", escaped(&value));
-            }
-        }
-        Ok(html + "</table></div>")
+        let image = self.image.as_ref().and_then(|w| w.bind(py).upgrade());
+        let png = image.map(|image| {
+            let rgb = drawing::draw(py, &image, &self.drawing_of_all(), &self.title(), self.bits)?;
+            errors::detached(py, || notebook::to_png(&rgb))?
+        });
+        Ok(notebook::to_html(png.transpose()?, self.each().map(|report| &report.row)))
     }
-}
-
-impl Report {
-    /// Returns names and values of the numbers for a notebook.
-    fn shown(&self) -> Vec<(&'static str, String)> {
-        let r = &self.row;
-        let mut rows = vec![(
-            if r.body.is_empty() { "status" } else { "body, status" },
-            format!("{} {}", r.body, r.status.name()),
-        )];
-        if !r.detail.is_empty() {
-            rows.push(("detail", r.detail.clone()));
-        }
-        if let Some([x, y, z]) = r.axis() {
-            rows.push(("axis (camera)", format!("{x:.6}, {y:.6}, {z:.6}")));
-        }
-        let numbers = [
-            ("sigma", r.sigma_max_deg, 4, "°"),
-            ("half-angle, free", r.half_angle_deg, 4, "°"),
-            ("altitude, free", r.altitude_est_km, 1, "km"),
-            ("... its sigma", r.altitude_est_sigma_km, 1, "km"),
-            ("rms", r.rms_px, 2, "px"),
-            ("inliers", r.inliers.map(f64::from), 0, ""),
-            ("edge points", r.edge_points.map(f64::from), 0, ""),
-            ("time", r.elapsed_us, 0, "µs"),
-        ];
-        rows.extend(
-            numbers.into_iter().filter_map(|(n, v, digits, unit)| Some((n, format!("{:.digits$} {unit}", v?)))),
-        );
-        rows
-    }
-}
-
-fn png(picture: &image::RgbImage) -> PyResult<Vec<u8>> {
-    let (w, h) = picture.dimensions();
-    let small = (w.max(h) > SHOWN_PX).then(|| {
-        let scale = f64::from(SHOWN_PX) / f64::from(w.max(h));
-        let side = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
-        image::imageops::resize(picture, side(w), side(h), image::imageops::FilterType::Triangle)
-    });
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    let shown = small.as_ref().unwrap_or(picture);
-    shown.write_to(&mut bytes, image::ImageFormat::Png).map_err(errors::other)?;
-    Ok(bytes.into_inner())
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -1,21 +1,22 @@
 //! `hzn.Sensor`.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, PoisonError, RwLock};
 
 use hzn_calib::{FrameData, plausible, sensor};
+use hzn_core::Config;
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
-use hzn_core::{Config, Sensor as CoreSensor};
 use hzn_mcap::{Row, RowMeta};
-use hzn_run::engine::{AnySensor, Traces};
+use hzn_run::engine::Traces;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::camera::Camera;
+use crate::expected::Expected;
 use crate::image::{Array, View};
 use crate::report::Report;
-use crate::stages::Expected;
+use crate::state::State;
 use crate::{errors, parameters};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
@@ -25,37 +26,6 @@ type Pickled = (Py<PyAny>, (Py<PyAny>, bool));
 #[pyclass(frozen, module = "hzn")]
 pub(crate) struct Sensor {
     state: RwLock<Arc<State>>,
-}
-
-/// A configuration that was accepted, and the objects made from it.
-pub(crate) struct State {
-    pub(crate) config: Config,
-    pub(crate) flight: bool,
-    pub(crate) camera: Arc<Camera>,
-    /// Sensor in double precision, for the single stages.
-    pub(crate) core: CoreSensor<f64>,
-    /// Idle sensors. Each call takes one or makes one, so threads never wait for each other.
-    idle: Mutex<Vec<AnySensor>>,
-}
-
-impl State {
-    fn new(config: Config, flight: bool) -> PyResult<Arc<Self>> {
-        let core = CoreSensor::new(&config).map_err(errors::config)?;
-        let camera = Arc::new(Camera::from_config(config.camera.clone())?);
-        Ok(Arc::new(Self { config, flight, camera, core, idle: Mutex::default() }))
-    }
-
-    /// Lends a sensor to `work`. A sensor in which `work` panicked is dropped.
-    pub(crate) fn lend<T>(&self, work: impl FnOnce(&mut AnySensor) -> T) -> PyResult<T> {
-        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut sensor = match idle {
-            Some(sensor) => sensor,
-            None => AnySensor::new(&self.config, self.flight).map_err(errors::config)?,
-        };
-        let done = work(&mut sensor);
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(sensor);
-        Ok(done)
-    }
 }
 
 impl Sensor {
@@ -75,7 +45,7 @@ impl Sensor {
     #[pyo3(signature = (*, flight = false, **sections))]
     fn new(py: Python<'_>, flight: bool, sections: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let none = PyDict::new(py);
-        let config = parameters::config(sections.unwrap_or(&none))?;
+        let config = read_sections(sections.unwrap_or(&none))?;
         let doubts = plausible::doubts(&config);
         doubts.iter().try_for_each(|doubt| errors::warn(py, format_args!("{}: {}", doubt.key, doubt.what)))?;
         Self::from_config(config, flight)
@@ -97,7 +67,7 @@ impl Sensor {
     }
     #[setter]
     fn set_parameters(&self, sections: &Bound<'_, PyDict>) -> PyResult<()> {
-        let state = State::new(parameters::config(sections)?, self.flight())?;
+        let state = State::new(read_sections(sections)?, self.flight())?;
         *self.state.write().unwrap_or_else(PoisonError::into_inner) = state;
         Ok(())
     }
@@ -125,7 +95,7 @@ impl Sensor {
         rate_rad_s: Option<[f64; 3]>,
         time_s: Option<f64>,
     ) -> PyResult<Expected> {
-        let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
+        let data = collect_prior(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
         Expected::new(&self.state(), data, body)
     }
 
@@ -145,7 +115,7 @@ impl Sensor {
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<Report> {
-        let data = known(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
+        let data = collect_prior(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
         let state = self.state();
         let array = Array::from_object(image)?;
         state.check_size(&array)?;
@@ -173,7 +143,7 @@ impl Sensor {
                 // Every rocket starts below the limb height, and its flight goes on, so this is a report and not an
                 // error.
                 Err(why @ PriorError::BelowLimb { .. }) => {
-                    return Ok(Report::of_row(Row::unprocessed(&meta, Status::NoAltitude, why.to_string())));
+                    return Ok(Report::from_row(Row::unprocessed(&meta, Status::NoAltitude, why.to_string())));
                 }
                 Err(why) => return Err(errors::config(why)),
             };
@@ -188,7 +158,7 @@ impl Sensor {
         {
             errors::warn(py, format_args!("nothing found: {tip}"))?;
         }
-        Ok(Report::of_bodies(py, reports)?.with_image(image, bits))
+        Ok(Report::from_bodies(py, reports)?.with_image(image, bits))
     }
 
     #[doc = doc!("Sensor.process_many")]
@@ -222,12 +192,21 @@ impl Sensor {
     }
     #[staticmethod]
     fn _of(sections: &Bound<'_, PyDict>, flight: bool) -> PyResult<Self> {
-        Self::from_config(parameters::config(sections)?, flight)
+        Self::from_config(read_sections(sections)?, flight)
     }
 }
 
+/// Reads sections and checks them like a sensor.toml. A `hzn.Camera` may replace its section.
+fn read_sections(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
+    let sections = sections.copy()?;
+    if let Some(camera) = sections.get_item("camera")?.as_ref().and_then(|c| c.cast::<Camera>().ok()) {
+        sections.set_item("camera", parameters::to_python(sections.py(), &camera.get().config)?)?;
+    }
+    parameters::config(&sections)
+}
+
 /// Collects the prior of a picture, with the checks that the core cannot make.
-fn known(
+fn collect_prior(
     altitude_km: Option<f64>,
     position_km: Option<[f64; 3]>,
     attitude: Option<[f64; 4]>,

@@ -11,9 +11,10 @@ use hzn_run::{Error, Kind};
 use pyo3::prelude::*;
 
 use crate::errors;
+use crate::expected::Expected;
 use crate::report::Report;
-use crate::sensor::{Sensor, State};
-use crate::stages::Expected;
+use crate::sensor::Sensor;
+use crate::state::State;
 
 /// Pictures of a folder, a pattern, a video, a recording, or picture files, in order and not yet decoded.
 #[pyclass(frozen, name = "_Sequence", module = "hzn._hzn")]
@@ -32,7 +33,7 @@ pub(crate) struct Item {
 }
 
 /// Converts the reason why a run cannot begin or ends early to an exception.
-pub(crate) fn stopped(error: Error) -> PyErr {
+pub(crate) fn to_exception(error: Error) -> PyErr {
     match error.kind() {
         Kind::Unusable => errors::config(error),
         Kind::Failed => errors::other(error),
@@ -45,14 +46,14 @@ impl Sequence {
     fn new(py: Python<'_>, sensor: &Sensor, inputs: Vec<PathBuf>) -> PyResult<Self> {
         let state = sensor.state();
         let (source, frames, bits) = errors::detached(py, || -> PyResult<_> {
-            let mut source = source::open(&inputs, None, None).map_err(stopped)?;
-            source.want_channel(state.config.input.channel).map_err(stopped)?;
+            let mut source = source::open(&inputs, None, None).map_err(to_exception)?;
+            source.want_channel(state.config.input.channel).map_err(to_exception)?;
             let given = state.config.input.bits.or(source.bits());
             let found = if given.is_none() { source::find_bits(source.as_ref()) } else { None };
             let bits = (given.or(found.map(|f| f.bits)), found.filter(|f| f.bits < 16));
-            let beside = source.folder().join("frames.csv");
-            let own = source.sensor_toml().is_some();
-            let frames = (!own && beside.exists()).then(|| hzn_calib::frames::load(&beside)).transpose();
+            let table = source.folder().join("frames.csv");
+            let has_sensor = source.sensor_toml().is_some();
+            let frames = (!has_sensor && table.exists()).then(|| hzn_calib::frames::load(&table)).transpose();
             let frames = frames.map_err(errors::config)?;
             engine::prepare(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
             Ok((source, frames, bits))
@@ -64,7 +65,7 @@ impl Sequence {
         if let Some(found) = found {
             errors::warn(py, found)?;
         }
-        let mut plan = plan(&state, frames);
+        let mut plan = default_plan(&state, frames);
         plan.config.input.bits = bits;
         Ok(Self { state, plan, source: Mutex::new(source), next: AtomicU64::new(0) })
     }
@@ -96,9 +97,9 @@ impl Sequence {
 
     /// Decodes and processes a picture. Each picture can be processed only once.
     fn process(&self, py: Python<'_>, item: &Item) -> PyResult<Report> {
-        let taken = item.item.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let taken = taken.ok_or_else(|| errors::other("this picture was processed already"))?;
-        processed(py, &self.state, &self.plan, item.index, taken)
+        let contents = item.item.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let contents = contents.ok_or_else(|| errors::other("this picture is already processed"))?;
+        process_item(py, &self.state, &self.plan, item.index, contents)
     }
 }
 
@@ -118,9 +119,9 @@ pub(crate) fn process_encoded(
     let state = sensor.state();
     let time_s = expected.data.time_s.or(Some(index as f64));
     let row = FrameData { file: name.clone(), time_s, ..expected.data.clone() };
-    let plan = plan(&state, None);
+    let plan = default_plan(&state, None);
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
-    processed(
+    process_item(
         py,
         &state,
         &plan,
@@ -129,7 +130,7 @@ pub(crate) fn process_encoded(
     )
 }
 
-fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
+fn default_plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
     Plan {
         config: state.config.clone(),
         flight: state.flight,
@@ -144,13 +145,13 @@ fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
     }
 }
 
-fn processed(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: source::Item) -> PyResult<Report> {
+fn process_item(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: source::Item) -> PyResult<Report> {
     let finished = errors::detached(py, || state.lend(|sensor| engine::one(plan, sensor, index, item)))??;
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
     let rows = hzn_run::sink::rows(&finished, &plan.config);
     let report = |(row, found): (hzn_mcap::Row, &engine::BodyOutcome)| match &found.report {
         Ok(found) => Report::new(row, found, None, &state.camera),
-        Err(_) => Report::of_row(row),
+        Err(_) => Report::from_row(row),
     };
-    Report::of_bodies(py, rows.into_iter().zip(&finished.found).map(report))
+    Report::from_bodies(py, rows.into_iter().zip(&finished.found).map(report))
 }

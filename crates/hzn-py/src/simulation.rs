@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use crate::camera::Camera;
 use crate::report::Report;
 use crate::sensor::Sensor;
-use crate::sequence::stopped;
+use crate::sequence::to_exception;
 use crate::{errors, parameters};
 
 #[doc = doc!("Simulation")]
@@ -41,7 +41,7 @@ impl Simulation {
             // JSON has no dates, but the start time in a scene.toml is a date and not text.
             scene::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
         };
-        let scenario = scenario.map_err(stopped)?;
+        let scenario = scenario.map_err(to_exception)?;
         let flight = errors::detached(py, || scenario.flight())?.map_err(errors::config)?;
         Ok(Self { scenario, flight, sensor: PyOnceLock::new() })
     }
@@ -56,13 +56,13 @@ impl Simulation {
     #[doc = doc!("Simulation.sensor")]
     #[getter]
     fn sensor(&self, py: Python<'_>) -> PyResult<Py<Sensor>> {
-        let made = self.sensor.get_or_try_init(py, || {
+        let sensor = self.sensor.get_or_try_init(py, || {
             let fit = errors::detached(py, || Fit::measure(&self.scenario, MEASURED, &|_, _| ()))?;
             let mut config = self.flight.sensor.clone();
             fit.map_err(errors::config)?.iter().for_each(|fit| fit.apply(&mut config));
             Py::new(py, Sensor::from_config(config, false)?)
         });
-        made.map(|sensor| sensor.clone_ref(py))
+        sensor.map(|sensor| sensor.clone_ref(py))
     }
 
     fn __len__(&self) -> usize {
@@ -74,7 +74,7 @@ impl Simulation {
         let frame = frame.ok_or_else(|| PyIndexError::new_err(format!("frame {index} of {}", self.__len__())))?;
         let truths = self.scenario.bodies.iter().map(|&body| frame.scene.truth_of(body, &frame.file, frame.time_s));
         Ok(SimulatedFrame {
-            known: known(&self.scenario, frame),
+            known: known_arguments(&self.scenario, frame),
             truths: truths.collect::<Result<_, _>>().map_err(errors::config)?,
             frame: frame.clone(),
             image: PyOnceLock::new(),
@@ -91,7 +91,7 @@ impl Simulation {
 }
 
 /// Returns the keyword arguments of `Sensor.process` for a picture.
-fn known(scenario: &Scenario, frame: &FlightFrame) -> Value {
+fn known_arguments(scenario: &Scenario, frame: &FlightFrame) -> Value {
     let row = scenario.known_of(frame);
     let mut known = json!({
         "altitude_km": row.altitude_km,
@@ -184,7 +184,7 @@ pub(crate) fn evaluate<'py>(
     let mut camera = camera.map(|c| c.config.clone());
     let mut rows = match results.extract::<PathBuf>() {
         Ok(path) => {
-            let (rows, sensor) = hzn_run::results::read(&path).map_err(stopped)?;
+            let (rows, sensor) = hzn_run::results::read(&path).map_err(to_exception)?;
             let recorded = sensor.and_then(|t| hzn_calib::sensor::parse(&t, Path::new("sensor.toml")).ok());
             camera = camera.or(recorded.map(|s| s.config.camera));
             rows
@@ -195,11 +195,11 @@ pub(crate) fn evaluate<'py>(
             let mut rows = Vec::new();
             for (i, report) in results.try_iter()?.enumerate() {
                 let report: Py<Report> = report?.extract()?;
-                let of_truth = files.get(i).copied().unwrap_or_default();
+                let file_of_truth = files.get(i).copied().unwrap_or_default();
                 rows.extend(report.get().each().map(|r| {
                     let mut row = r.row.clone();
                     if row.file.is_empty() {
-                        of_truth.clone_into(&mut row.file);
+                        file_of_truth.clone_into(&mut row.file);
                     }
                     row
                 }));

@@ -2,48 +2,21 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use hzn_calib::FrameData;
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pipeline::edges::{Agreed, Edges, Fitted};
 use hzn_core::pixel::{ImagePoint, Pixel};
-use hzn_core::{Expected as CoreExpected, Sensor as CoreSensor};
 use numpy::ndarray::{Array1, Array2, arr1, arr2};
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::camera::rows;
 use crate::errors;
+use crate::expected::Expected;
 use crate::image::{Array, View};
-use crate::sensor::{Sensor, State};
+use crate::sensor::Sensor;
 
-type Two<'py> = Bound<'py, PyArray2<f64>>;
-
-#[doc = doc!("Expected")]
-#[pyclass(frozen, module = "hzn")]
-pub(crate) struct Expected {
-    pub(crate) data: FrameData,
-    core: CoreExpected<f64>,
-}
-
-impl Expected {
-    pub(crate) fn new(state: &State, data: FrameData, body: usize) -> PyResult<Self> {
-        let bodies = state.config.each_body().len();
-        if body >= bodies {
-            return Err(errors::config(format!("body: {body} is refused: the sensor's are 0 to {}", bodies - 1)));
-        }
-        let core = state.core.expect_body(body, &data.to_frame(None)).map_err(errors::config)?;
-        Ok(Self { data, core })
-    }
-}
-
-#[pymethods]
-impl Expected {
-    #[doc = doc!("Expected.half_angle_deg")]
-    #[getter]
-    fn half_angle_deg(&self) -> f64 {
-        self.core.half_angle_rad().to_degrees()
-    }
-}
+/// A NumPy array with two axes.
+type Array2d<'py> = Bound<'py, PyArray2<f64>>;
 
 #[doc = doc!("Cone")]
 #[pyclass(frozen, subclass, module = "hzn.consensus")]
@@ -53,7 +26,8 @@ pub(crate) struct Cone(Agreed<f64>);
 impl Cone {
     #[new]
     fn new(axis: [f64; 3], cos_half_angle: f64) -> PyResult<Self> {
-        let axis = UnitVec3::<Cam, f64>::try_new(axis).ok_or_else(|| errors::config("axis: is no direction"))?;
+        let axis =
+            UnitVec3::<Cam, f64>::try_new(axis).ok_or_else(|| errors::config("axis: must be finite and not zero"))?;
         if !(cos_half_angle.abs() < 1.0) {
             return Err(errors::config(format!(
                 "cos_half_angle: {cos_half_angle} is refused: must be between -1 and 1"
@@ -117,19 +91,19 @@ impl Rays {
 impl Rays {
     #[doc = doc!("Rays.points")]
     #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> Two<'py> {
+    fn points<'py>(&self, py: Python<'py>) -> Array2d<'py> {
         let points: Vec<[f64; 2]> = self.edges().points().map(|(p, _)| [p.u, p.v]).collect();
         arr2(&points).to_pyarray(py)
     }
     #[doc = doc!("Rays.lit")]
     #[getter]
-    fn lit<'py>(&self, py: Python<'py>) -> Two<'py> {
+    fn lit<'py>(&self, py: Python<'py>) -> Array2d<'py> {
         let lit: Vec<[f64; 2]> = self.edges().points().map(|(_, lit)| lit.map(f64::from)).collect();
         arr2(&lit).to_pyarray(py)
     }
     #[doc = doc!("Rays.directions")]
     #[getter]
-    fn directions<'py>(&self, py: Python<'py>) -> Two<'py> {
+    fn directions<'py>(&self, py: Python<'py>) -> Array2d<'py> {
         let rays: Vec<[f64; 3]> = self.edges().rays().collect();
         arr2(&rays).to_pyarray(py)
     }
@@ -170,25 +144,30 @@ macro_rules! with_picture {
 
 #[pyfunction]
 #[pyo3(name = "_level", signature = (sensor, image, expected, bits = None))]
-pub(crate) fn level(sensor: &Sensor, image: &Bound<'_, PyAny>, expected: &Expected, bits: Option<u8>) -> PyResult<u16> {
+pub(crate) fn find_threshold(
+    sensor: &Sensor,
+    image: &Bound<'_, PyAny>,
+    expected: &Expected,
+    bits: Option<u8>,
+) -> PyResult<u16> {
     let state = sensor.state();
     let core = state.core()?;
     let found = with_picture!(image, state, bits, |picture| core.level(&picture, &expected.core));
-    found.map(|l| l.level).map_err(|status| errors::other(format!("no level: {}", status.name())))
+    found.map(|l| l.level).map_err(|status| errors::other(format!("no threshold: {}", status.name())))
 }
 
 /// Returns every edge of a picture at a threshold, with at least `candidates.min_points` border pixels, in the order in
 /// which the sensor examines them.
 #[pyfunction]
 #[pyo3(name = "_borders", signature = (sensor, image, level, expected, bits = None))]
-pub(crate) fn borders<'py>(
+pub(crate) fn find_borders<'py>(
     py: Python<'py>,
     sensor: &Sensor,
     image: &Bound<'py, PyAny>,
     level: u16,
     expected: &Expected,
     bits: Option<u8>,
-) -> PyResult<Vec<Two<'py>>> {
+) -> PyResult<Vec<Array2d<'py>>> {
     let state = sensor.state();
     let core = state.core()?;
     let borders = with_picture!(image, state, bits, |picture| core.borders(&picture, level, &expected.core));
@@ -201,7 +180,7 @@ pub(crate) fn borders<'py>(
 
 #[pyfunction]
 #[pyo3(name = "_pick", signature = (sensor, image, level, border, bits = None))]
-pub(crate) fn pick(
+pub(crate) fn locate_points(
     sensor: &Sensor,
     image: &Bound<'_, PyAny>,
     level: u16,
@@ -217,17 +196,17 @@ pub(crate) fn pick(
         inside.then_some(Pixel { x: r[0] as u16, y: r[1] as u16 })
     };
     let border: Option<Vec<Pixel>> = border.as_array().outer_iter().map(pixel).collect();
-    let border = border.ok_or_else(|| errors::image("border: a pixel lies outside of the picture"))?;
+    let border = border.ok_or_else(|| errors::image("border: a pixel lies outside the picture"))?;
     Ok(Rays::new(with_picture!(image, state, bits, |picture| Edges::pick(core, &picture, level, &border))))
 }
 
 #[pyfunction]
 #[pyo3(name = "_rays")]
-pub(crate) fn rays(sensor: &Sensor, points: &Bound<'_, PyAny>, lit: &Bound<'_, PyAny>) -> PyResult<Rays> {
+pub(crate) fn to_rays(sensor: &Sensor, points: &Bound<'_, PyAny>, lit: &Bound<'_, PyAny>) -> PyResult<Rays> {
     let state = sensor.state();
     let (points, lit) = (rows(points, 2, "points")?, rows(lit, 2, "lit")?);
     if points.as_array().nrows() != lit.as_array().nrows() {
-        return Err(errors::image("lit: as many rows as points are expected"));
+        return Err(errors::image("lit: must have one row for each point"));
     }
     let both: Vec<_> = points
         .as_array()
@@ -240,7 +219,12 @@ pub(crate) fn rays(sensor: &Sensor, points: &Bound<'_, PyAny>, lit: &Bound<'_, P
 
 #[pyfunction]
 #[pyo3(name = "_keep")]
-pub(crate) fn keep(py: Python<'_>, sensor: &Sensor, rays: &Rays, expected: &Expected) -> PyResult<Option<Cone>> {
+pub(crate) fn find_consensus(
+    py: Python<'_>,
+    sensor: &Sensor,
+    rays: &Rays,
+    expected: &Expected,
+) -> PyResult<Option<Cone>> {
     let state = sensor.state();
     state.core()?;
     Ok(errors::detached(py, || rays.edges().reject(&expected.core, &state.config.reject))?.map(Cone))
@@ -248,7 +232,7 @@ pub(crate) fn keep(py: Python<'_>, sensor: &Sensor, rays: &Rays, expected: &Expe
 
 #[pyfunction]
 #[pyo3(name = "_withdraw")]
-pub(crate) fn withdraw(sensor: &Sensor, rays: &Rays, found: &Cone) -> PyResult<u32> {
+pub(crate) fn exclude_body(sensor: &Sensor, rays: &Rays, found: &Cone) -> PyResult<u32> {
     let state = sensor.state();
     state.core()?;
     Ok(rays.edges().withdraw(&found.0.axis, found.0.cos_half_angle, &state.config.reject))
@@ -256,7 +240,7 @@ pub(crate) fn withdraw(sensor: &Sensor, rays: &Rays, found: &Cone) -> PyResult<u
 
 #[pyfunction]
 #[pyo3(name = "_fit")]
-pub(crate) fn fit(
+pub(crate) fn fit_cone(
     py: Python<'_>,
     sensor: &Sensor,
     rays: &Rays,
@@ -272,11 +256,11 @@ pub(crate) fn fit(
 }
 
 /// Axis, covariance and cosine of the half-angle; None if the points do not determine them.
-type Fused<'py> = Option<(Bound<'py, PyArray1<f64>>, Two<'py>, f64)>;
+type Fused<'py> = Option<(Bound<'py, PyArray1<f64>>, Array2d<'py>, f64)>;
 
 #[pyfunction]
 #[pyo3(name = "_fuse")]
-pub(crate) fn fuse<'py>(
+pub(crate) fn fuse_half_angle<'py>(
     py: Python<'py>,
     sensor: &Sensor,
     rays: &Rays,
@@ -292,27 +276,4 @@ pub(crate) fn fuse<'py>(
     };
     let fused = fitted.and_then(|fit| edges.fuse(core, &fit, &expected.core));
     Ok(fused.map(|f| (arr1(&f.axis.xyz()).to_pyarray(py), arr2(&f.covariance.rows()).to_pyarray(py), f.cos_half_angle)))
-}
-
-impl State {
-    /// Returns the sensor in double precision.
-    fn core(&self) -> PyResult<&CoreSensor<f64>> {
-        if self.flight {
-            return Err(errors::config("flight: the single stages are those of the workstation, in double precision"));
-        }
-        Ok(&self.core)
-    }
-
-    /// Returns an error if the array does not have the size of the camera's picture.
-    pub(crate) fn check_size(&self, array: &Array<'_>) -> PyResult<()> {
-        let camera = &self.config.camera;
-        let (width, height) = array.size();
-        if (width, height) == (usize::from(camera.width), usize::from(camera.height)) {
-            return Ok(());
-        }
-        Err(errors::image(format!(
-            "the picture is {width} x {height} px (shape ({height}, {width})), but the camera is {} x {}",
-            camera.width, camera.height
-        )))
-    }
 }

@@ -91,8 +91,8 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
 
 
 def test_mcap_shards_and_what_is_known(client, archive, small, tmp_path):
-    told = [(path, {"altitude_km": 399.0}) for path in archive[:30]]
-    result = process_archive(told, small, client=client, out=f"file://{tmp_path}/m", format="mcap", shard_frames=20)
+    urls = [(path, {"altitude_km": 399.0}) for path in archive[:30]]
+    result = process_archive(urls, small, client=client, out=f"file://{tmp_path}/m", format="mcap", shard_frames=20)
     (first, second) = [shard.removeprefix("file://") for shard in result.shards]
     table = hzn.read_mcap(first)
     assert len(table["index"]) == 20 and len(hzn.read_mcap(second)["index"]) == 10 and result.failed == []

@@ -54,9 +54,9 @@ def test_kinds_of_arrays_give_one_answer(sensor):
     words = sensor.process(image.astype(np.uint16) * 256)
     assert np.allclose(words.axis, expected, atol=1e-6)
     assert np.allclose(sensor.process(image.astype(np.uint16), bits=8).axis, expected, atol=1e-6)
-    told = sensor.parameters
-    told["input"]["bits"] = 8
-    assert np.allclose(hzn.Sensor(**told).process(image.astype(np.uint16)).axis, expected, atol=1e-6)
+    parameters = sensor.parameters
+    parameters["input"]["bits"] = 8
+    assert np.allclose(hzn.Sensor(**parameters).process(image.astype(np.uint16)).axis, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(

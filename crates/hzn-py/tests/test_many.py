@@ -39,8 +39,8 @@ def test_what_is_known_of_each_picture(sensor):
     assert [r.altitude_km for r in many] == [390.0, 400.0, 410.0]
 
 
-@pytest.mark.parametrize(("side", "most"), [(16, _TASK_ITEMS), (3000, 1)])
-def test_no_more_is_taken_than_is_worked_on(side, most):
+@pytest.mark.parametrize(("side", "task_items"), [(16, _TASK_ITEMS), (3000, 1)])
+def test_no_more_is_taken_than_is_worked_on(side, task_items):
     camera = dict(width=side, height=side, model="pinhole", fx_px=1e4, fy_px=1e4, cx_px=side / 2, cy_px=side / 2)
     sensor = hzn.Sensor(**{**PARAMETERS, "camera": camera})
     image = np.full((side, side), 9, np.uint8)
@@ -53,10 +53,10 @@ def test_no_more_is_taken_than_is_worked_on(side, most):
             yield image
 
     reports = sensor.process_many(endless(), jobs=2)
-    for given in range(1, 500 if most > 1 else 20):
+    for returned in range(1, 500 if task_items > 1 else 20):
         assert next(reports).status == "no-limb"
         # There are two tasks for each thread, and one more in transfer.
-        assert given <= taken <= given + most * (2 * 2 + 1)
+        assert returned <= taken <= returned + task_items * (2 * 2 + 1)
     reports.close()
     assert not threads_left()
 
@@ -103,17 +103,17 @@ def test_an_interrupt_waits_for_no_more_than_a_picture(interruptible):
 
 def test_pictures_that_come_slowly_are_not_waited_for():
     """The reports of a camera come while it takes more pictures, not only when a task is full."""
-    given = []
+    processed = []
 
     def camera():
         for i in range(12):
             time.sleep(0.02)
             yield i
 
-    for i in _in_order(lambda item: given.append(item) or item, camera(), 2):
+    for i in _in_order(lambda item: processed.append(item) or item, camera(), 2):
         # The item before was processed when this one came.
-        assert len(given) <= i + 3
-    assert given == list(range(12))
+        assert len(processed) <= i + 3
+    assert processed == list(range(12))
 
 
 def test_what_comes_after_an_error_of_the_iterable(sensor):

@@ -57,7 +57,7 @@ fn size(text: &str) -> Result<[f32; 2], String> {
     let parts = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     parts
         .filter(|s: &[f32; 2]| s.iter().all(|x| (200.0..=16384.0).contains(x)))
-        .ok_or_else(|| "such as 1440x900".into())
+        .ok_or_else(|| "must be WIDTHxHEIGHT with sides of 200 to 16384, for example 1440x900".into())
 }
 
 impl Args {

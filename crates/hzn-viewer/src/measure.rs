@@ -67,7 +67,7 @@ impl Measure {
 
     /// Runs before the window is drawn, when the last drawing is on the screen. Returns true when the measurement is
     /// finished.
-    pub fn before(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
+    pub fn before_pass(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
         match self.kind {
             Kind::Start => self.start(viewer),
             Kind::Tune => self.tune(viewer),
@@ -76,18 +76,18 @@ impl Measure {
     }
 
     /// Runs after the window is drawn.
-    pub fn after(&mut self, viewer: &Viewer, ctx: &egui::Context) {
+    pub fn after_pass(&mut self, viewer: &Viewer, ctx: &egui::Context) {
         self.seen = match self.kind {
             // A recording is on the screen before all of its pictures are known.
-            Kind::Start => viewer.sight().is_some(),
+            Kind::Start => viewer.frame_view().is_some(),
             _ => viewer.is_settled(),
         };
         if !self.seen {
             self.late += 1;
-        } else if let (Some(changed), Some(sight)) = (self.changed, viewer.sight()) {
+        } else if let (Some(changed), Some(frame_view)) = (self.changed, viewer.frame_view()) {
             self.handed = Times {
                 late: std::mem::take(&mut self.late),
-                answer: sight.latency,
+                answer: frame_view.latency,
                 handed: changed.elapsed(),
                 layout_work: processor_time().saturating_sub(self.worked),
                 ..Times::default()
@@ -105,11 +105,11 @@ impl Measure {
             println!("start to the first frame on the screen: {ms:.0} ms");
             self.changed = Some(self.began);
         }
-        let through = self.changed.is_some() && viewer.sequence().complete;
-        if through {
+        let is_finished = self.changed.is_some() && viewer.sequence().complete;
+        if is_finished {
             println!("until all {} frames are known: {ms:.0} ms", viewer.sequence().len());
         }
-        through
+        is_finished
     }
 
     fn tune(&mut self, viewer: &mut Viewer) -> bool {
@@ -123,14 +123,14 @@ impl Measure {
         if self.times.len() == CHANGES {
             println!("parameter to new picture, {}:", self.look.name());
             for (what, part) in [
-                ("from the wish to the answer", (|t| t.answer) as fn(&Times) -> Duration),
+                ("from the request to the answer", (|t| t.answer) as fn(&Times) -> Duration),
                 ("from the change to the frame that shows it, laid out", |t| t.handed),
                 ("from the change to the screen, with tessellation and OpenGL", |t| t.screen),
             ] {
                 let mut each: Vec<Duration> = self.times.iter().map(part).collect();
                 each.sort();
-                let at = |part: f64| each[(part * (CHANGES - 1) as f64) as usize].as_secs_f64() * 1e3;
-                println!("  {what}: median {:.1} ms, 95 % {:.1} ms", at(0.5), at(0.95));
+                let quantile = |part: f64| each[(part * (CHANGES - 1) as f64) as usize].as_secs_f64() * 1e3;
+                println!("  {what}: median {:.1} ms, 95 % {:.1} ms", quantile(0.5), quantile(0.95));
             }
             let in_time = self.times.iter().filter(|t| t.late == 0).count();
             let latest = self.times.iter().map(|t| t.late).max().unwrap_or(0);
@@ -140,7 +140,7 @@ impl Measure {
                 self.times.iter().map(part).sum::<Duration>().as_secs_f64() * 1e3 / CHANGES as f64
             };
             println!(
-                "  processor time of the window's thread: laid out {:.1} ms, to the screen {:.1} ms in the mean",
+                "  processor time of the window's thread: laid out {:.1} ms, to the screen {:.1} ms (mean)",
                 mean(|t| t.layout_work),
                 mean(|t| t.screen_work)
             );
@@ -159,7 +159,7 @@ impl Measure {
         let scale = 1.0 + 0.002 * (self.times.len() % 100) as f64 + 0.001;
         if let Some(session) = viewer.session_mut() {
             session.set("binarize", "scale", 0, Some(scale.into()));
-            session.settle();
+            session.end_step();
         }
         self.seen = false;
         false
@@ -175,7 +175,7 @@ impl Measure {
             viewer.run(Command::Play, ctx);
             self.changed = Some(Instant::now());
         }
-        let index = viewer.sight().map(|s| s.index);
+        let index = viewer.frame_view().map(|s| s.index);
         if index != self.shown {
             (self.shown, self.frames) = (index, self.frames + 1);
             if self.frames.is_power_of_two() || index == Some(count - 1) {
@@ -187,18 +187,18 @@ impl Measure {
                 );
             }
         }
-        let through = index == Some(count - 1);
-        if let (true, Some(began)) = (through, self.changed) {
+        let is_finished = index == Some(count - 1);
+        if let (true, Some(began)) = (is_finished, self.changed) {
             println!("{:.1} frames a second", self.frames as f64 / began.elapsed().as_secs_f64());
         }
-        through
+        is_finished
     }
 }
 
 /// Returns the processor time of this thread so far, or zero if the system does not report it.
 fn processor_time() -> Duration {
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    told.split(' ').next().and_then(|ns| ns.parse().ok()).map_or(Duration::ZERO, Duration::from_nanos)
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split(' ').next().and_then(|ns| ns.parse().ok()).map_or(Duration::ZERO, Duration::from_nanos)
 }
 
 /// Returns a memory size of this process in megabytes, or 0 if the system does not report it.

@@ -15,20 +15,20 @@ use crate::ui::Viewer;
 /// Longest time to wait for the screenshot.
 const SHOT_LIMIT: Duration = Duration::from_secs(60);
 /// Passes of the window before the screenshot is taken; plots find their bounds and panels their sizes in these passes.
-const PASSES: u32 = 6;
+const SHOT_PASSES: u32 = 6;
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
 /// There is no display or no OpenGL. With `--screenshot`, it is also an error if there is nothing to show.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let began = Instant::now();
+    let program_start = Instant::now();
     if !(args.fps > 0.0 && args.fps.is_finite()) {
-        bail!("--fps: must be above 0");
+        bail!("--fps: must be a finite number above 0");
     }
     let shot = args.screenshot.clone();
     // A screenshot for documents must not depend on the settings of an earlier run.
-    let store = if shot.is_some() || args.measure.is_some() { None } else { Settings::place() };
+    let store = if shot.is_some() || args.measure.is_some() { None } else { Settings::default_path() };
     let mut settings = store.as_deref().map(Settings::load).unwrap_or_default();
     if args.light {
         settings.dark = false;
@@ -44,9 +44,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         .with_min_inner_size([720.0, 480.0])
         .with_drag_and_drop(true);
     let options = eframe::NativeOptions { viewport, ..Default::default() };
-    let measure = args.measure.map(|kind| Measure::new(kind, began));
-    let (args, taken) = (args.clone(), Arc::clone(&outcome));
-    let made = eframe::run_native(
+    let measure = args.measure.map(|kind| Measure::new(kind, program_start));
+    let (args, result) = (args.clone(), Arc::clone(&outcome));
+    let window = eframe::run_native(
         "hzn-viewer",
         options,
         Box::new(move |cc| {
@@ -57,11 +57,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             if !args.input.is_empty() {
                 viewer.open(args.request());
             }
-            Ok(Box::new(Window { viewer, shot, measure, begin: Instant::now(), passes: 0, told: false, taken }))
+            Ok(Box::new(Window { viewer, shot, measure, begun: Instant::now(), passes: 0, is_printed: false, result }))
         }),
     );
-    made.map_err(|e| anyhow!("{e}")).context("the window cannot be opened (it needs a display and OpenGL)")?;
-    let outcome = outcome.lock().map_err(|_| anyhow!("the window broke off"))?.take();
+    window.map_err(|e| anyhow!("{e}")).context("the window cannot be opened (it needs a display and OpenGL)")?;
+    let outcome = outcome.lock().map_err(|_| anyhow!("the window ended with an error"))?.take();
     outcome.unwrap_or(Ok(()))
 }
 
@@ -72,25 +72,25 @@ struct Window {
     /// File for the screenshot of the window; `None` without `--screenshot`.
     shot: Option<PathBuf>,
     measure: Option<Measure>,
-    begin: Instant,
+    begun: Instant,
     /// Passes of the window since the picture is shown.
     passes: u32,
-    told: bool,
-    taken: RunResult,
+    is_printed: bool,
+    result: RunResult,
 }
 
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         if let Some(measure) = &mut self.measure
-            && measure.before(&mut self.viewer, &ctx)
+            && measure.before_pass(&mut self.viewer, &ctx)
         {
             ctx.send_viewport_cmd(ViewportCommand::Close);
             self.measure = None;
         }
         self.viewer.show(ui);
         if let Some(measure) = &mut self.measure {
-            measure.after(&self.viewer, &ctx);
+            measure.after_pass(&self.viewer, &ctx);
         }
         if self.shot.is_none() {
             let size = ctx.input(|i| i.viewport().inner_rect.map(|r| r.size()));
@@ -100,34 +100,37 @@ impl eframe::App for Window {
             return;
         }
         ctx.request_repaint_after(Duration::from_millis(20));
-        if self.begin.elapsed() > SHOT_LIMIT {
-            let said: Vec<&str> = self.viewer.messages().collect();
-            return self.end(&ctx, Err(anyhow!("nothing came to be shown: {}", said.join("; "))));
+        if self.begun.elapsed() > SHOT_LIMIT {
+            let messages: Vec<&str> = self.viewer.messages().collect();
+            return self.finish(
+                &ctx,
+                Err(anyhow!("no picture was shown within {} s: {}", SHOT_LIMIT.as_secs(), messages.join("; "))),
+            );
         }
         if !self.viewer.is_settled() {
             let failed = self.viewer.sequence().is_empty() && self.viewer.messages().next().is_some();
-            if failed && self.begin.elapsed() > Duration::from_secs(2) {
-                let said: Vec<&str> = self.viewer.messages().collect();
-                return self.end(&ctx, Err(anyhow!("{}", said.join("; "))));
+            if failed && self.begun.elapsed() > Duration::from_secs(2) {
+                let messages: Vec<&str> = self.viewer.messages().collect();
+                return self.finish(&ctx, Err(anyhow!("{}", messages.join("; "))));
             }
             return;
         }
         self.passes += 1;
-        if self.passes == PASSES
+        if self.passes == SHOT_PASSES
             && let Some(shot) = self.shot.clone()
         {
-            let (taken, again) = (Arc::clone(&self.taken), ctx.clone());
+            let (result, again) = (Arc::clone(&self.result), ctx.clone());
             let callback = ScreenshotCallback::new(move |image| {
-                if let Ok(mut taken) = taken.lock() {
-                    *taken = Some(save(&image, &shot));
+                if let Ok(mut result) = result.lock() {
+                    *result = Some(save(&image, &shot));
                 }
                 again.request_repaint();
             });
             ctx.send_viewport_cmd(ViewportCommand::Screenshot(callback));
         }
-        let done = self.taken.lock().is_ok_and(|t| t.is_some());
-        if done && !std::mem::replace(&mut self.told, true) {
-            tell(&self.viewer);
+        let done = self.result.lock().is_ok_and(|t| t.is_some());
+        if done && !std::mem::replace(&mut self.is_printed, true) {
+            print_answers(&self.viewer);
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
     }
@@ -138,21 +141,21 @@ impl eframe::App for Window {
 }
 
 impl Window {
-    fn end(&self, ctx: &egui::Context, result: anyhow::Result<()>) {
-        if let Ok(mut taken) = self.taken.lock() {
-            taken.get_or_insert(result);
+    fn finish(&self, ctx: &egui::Context, result: anyhow::Result<()>) {
+        if let Ok(mut slot) = self.result.lock() {
+            slot.get_or_insert(result);
         }
         ctx.send_viewport_cmd(ViewportCommand::Close);
     }
 }
 
 /// Prints what the window shows, one line for each body.
-fn tell(viewer: &Viewer) {
-    let Some(sight) = viewer.sight() else { return };
-    let rows = sight.answers.first().into_iter().flat_map(|o| &o.bodies).map(|b| &b.row);
+fn print_answers(viewer: &Viewer) {
+    let Some(frame_view) = viewer.frame_view() else { return };
+    let rows = frame_view.answers.first().into_iter().flat_map(|o| &o.bodies).map(|b| &b.row);
     for row in rows {
         let axis = row.axis().map_or_else(|| "-".to_owned(), |[x, y, z]| format!("{x} {y} {z}"));
-        println!("frame {} {} {} {} {axis}", sight.index, sight.name, row.body, row.status);
+        println!("frame {} {} {} {} {axis}", frame_view.index, frame_view.name, row.body, row.status);
     }
 }
 

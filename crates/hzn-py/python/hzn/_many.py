@@ -63,16 +63,16 @@ class _Task:
         self.items: list[Any] = []
         self.error: BaseException | None = None
         """Raised after the reports of the task."""
-        self.through: SimpleQueue[list[Report]] = SimpleQueue()
+        self.done: SimpleQueue[list[Report]] = SimpleQueue()
 
     def reports(self) -> Iterator[Report]:
         """Wait for the reports."""
-        yield from self.through.get()
+        yield from self.done.get()
         if self.error is not None:
             raise self.error
 
 
-class _Pace:
+class _Shared:
     """State that the threads share."""
 
     stopped = False
@@ -83,42 +83,43 @@ class _Pace:
 def _in_order(work: Callable[[Any], Report], items: Iterable[Any], threads: int) -> Iterator[Report]:
     tasks: SimpleQueue[_Task | None] = SimpleQueue()
     pending: deque[_Task] = deque()
-    pace = _Pace()
+    shared = _Shared()
     # Daemon threads: if a second interrupt comes while they end, the program does not wait for them.
     workers = [
-        threading.Thread(target=_serve, args=(work, tasks, pace), name=f"hzn-{i}", daemon=True) for i in range(threads)
+        threading.Thread(target=_run_tasks, args=(work, tasks, shared), name=f"hzn-{i}", daemon=True)
+        for i in range(threads)
     ]
     try:
         for worker in workers:
             worker.start()
-        for task in _taken(items, pace):
+        for task in _tasks(items, shared):
             tasks.put(task)
             pending.append(task)
-            while pending and (len(pending) > 2 * threads or not pending[0].through.empty()):
+            while pending and (len(pending) > 2 * threads or not pending[0].done.empty()):
                 yield from pending.popleft().reports()
         while pending:
             yield from pending.popleft().reports()
     finally:
         # Also runs if the caller stops early or presses Ctrl-C: items in progress are finished, all others are dropped.
-        pace.stopped = True
+        shared.stopped = True
         for _ in workers:
             tasks.put(None)
         for worker in workers:
             worker.join()
 
 
-def _taken(items: Iterable[Any], pace: _Pace) -> Iterator[_Task]:
+def _tasks(items: Iterable[Any], shared: _Shared) -> Iterator[_Task]:
     """Yield tasks of some milliseconds, or of a single item if an item takes longer to arrive or to process."""
     iterator = iter(items)
     while True:
-        task, held, begun = _Task(), 0, perf_counter()
+        task, held_bytes, begun = _Task(), 0, perf_counter()
         try:
             while True:
                 item = next(iterator)
                 task.items.append(item)
-                held += getattr(item[0] if isinstance(item, tuple) else item, "nbytes", 0)
-                next_s = max(perf_counter() - begun, (len(task.items) + 1) * pace.item_s)
-                if held >= _TASK_BYTES or next_s > _TASK_S or len(task.items) == _TASK_ITEMS:
+                held_bytes += getattr(item[0] if isinstance(item, tuple) else item, "nbytes", 0)
+                next_s = max(perf_counter() - begun, (len(task.items) + 1) * shared.item_s)
+                if held_bytes >= _TASK_BYTES or next_s > _TASK_S or len(task.items) == _TASK_ITEMS:
                     break
         except StopIteration:
             if task.items:
@@ -131,21 +132,21 @@ def _taken(items: Iterable[Any], pace: _Pace) -> Iterator[_Task]:
             return
 
 
-def _serve(work: Callable[[Any], Report], tasks: SimpleQueue[_Task | None], pace: _Pace) -> None:
+def _run_tasks(work: Callable[[Any], Report], tasks: SimpleQueue[_Task | None], shared: _Shared) -> None:
     """Run the tasks; the function of each thread."""
     while (task := tasks.get()) is not None:
         reports: list[Report] = []
         begun = perf_counter()
         try:
             for item in task.items:
-                if pace.stopped:
+                if shared.stopped:
                     return
                 reports.append(work(item))
-                pace.item_s = (perf_counter() - begun) / len(reports)
+                shared.item_s = (perf_counter() - begun) / len(reports)
         except BaseException as error:
             task.error = error
         task.items.clear()
-        task.through.put(reports)
+        task.done.put(reports)
 
 
 def _with_bar(reports: Iterator[Report], total: int | None) -> Iterator[Report]:

@@ -160,8 +160,8 @@ def sensitivity(
         for name, value in place.items():
             columns[name].append(value)
         for name, (group, key) in _SIGMAS.items():
-            within = (sigmas[group] if group else sigmas) if sigmas else {key: math.nan}
-            columns[name].append(within[key])
+            group_values = (sigmas[group] if group else sigmas) if sigmas else {key: math.nan}
+            columns[name].append(group_values[key])
     return {name: np.array(column) for name, column in columns.items()}
 
 
@@ -174,11 +174,11 @@ _SIGMAS = {
 
 def _ideal(lens: str, size: tuple[int, int], fov_deg: float) -> Camera:
     """Return a camera with an ideal lens and this field of view across the width."""
-    most = {"pinhole": 175.0, "equidistant": 350.0}.get(lens)
-    if most is None:
-        raise ConfigError(f"lens: {lens!r} is refused: pinhole or equidistant")
-    if not 0.0 < fov_deg <= most:
-        raise ConfigError(f"fov_deg: {fov_deg} is refused: above 0 and up to {most:g} for this lens")
+    max_fov_deg = {"pinhole": 175.0, "equidistant": 350.0}.get(lens)
+    if max_fov_deg is None:
+        raise ConfigError(f"lens: {lens!r} is refused: must be pinhole or equidistant")
+    if not 0.0 < fov_deg <= max_fov_deg:
+        raise ConfigError(f"fov_deg: {fov_deg} is refused: must be above 0 and at most {max_fov_deg:g} for this lens")
     width, height = size
     half = math.radians(fov_deg / 2)
     f_px = width / 2 / (math.tan(half) if lens == "pinhole" else half)

@@ -4,4 +4,4 @@ import warnings
 
 from .threshold import *  # noqa: F403
 
-warnings.warn("hzn.binarize is now hzn.threshold; the old name will go", DeprecationWarning, stacklevel=2)
+warnings.warn("hzn.binarize is now hzn.threshold; the old name will be removed", DeprecationWarning, stacklevel=2)

@@ -4,4 +4,4 @@ import warnings
 
 from .contour import *  # noqa: F403
 
-warnings.warn("hzn.contours is now hzn.contour; the old name will go", DeprecationWarning, stacklevel=2)
+warnings.warn("hzn.contours is now hzn.contour; the old name will be removed", DeprecationWarning, stacklevel=2)

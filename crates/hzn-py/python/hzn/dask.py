@@ -94,24 +94,26 @@ def process_archive(
     """
     pictures = [(url, {}) if isinstance(url, str) else (url[0], dict(url[1])) for url in urls]
     if not pictures:
-        raise ConfigError("urls: there are none")
+        raise ConfigError("urls: is empty")
     if shard_frames < 1:
         raise ConfigError(f"shard_frames: {shard_frames} is refused: must be 1 or more")
     if format not in ("parquet", "mcap"):
-        raise ConfigError(f"format: {format!r} is refused: parquet or mcap")
+        raise ConfigError(f"format: {format!r} is refused: must be parquet or mcap")
     if sensor.parameters["binarize"]["method"] == "track":
-        raise ConfigError("binarize.method: track takes its level from the picture before, which another worker may have")
+        raise ConfigError(
+            "binarize.method: track takes its threshold from the previous picture, which another worker may have"
+        )
     client = client or get_client()
     filesystem, folder = fsspec.core.url_to_fs(out)
     filesystem.makedirs(folder, exist_ok=True)
-    there = set(filesystem.ls(folder, detail=False))
+    existing = set(filesystem.ls(folder, detail=False))
     names: list[str] = []
     tasks = []
     for first in range(0, len(pictures), shard_frames):
         shard = pictures[first : first + shard_frames]
         name = f"{folder}/part-{first // shard_frames:06}-{_digest(sensor, first, shard)}.{format}"
         names.append(name)
-        if not any(path.endswith(name.lstrip("/")) for path in there):
+        if not any(path.endswith(name.lstrip("/")) for path in existing):
             # The task is not pure: its result is the file on the disk, not its return value.
             tasks.append(client.submit(_shard, sensor, first, shard, out, name, retries=retries, pure=False))
     for _ in as_completed(tasks):
@@ -138,8 +140,8 @@ def _sweep(filesystem: Any, folder: str, names: Sequence[str]) -> None:
 
 def _digest(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
     """Return a digest of everything that a shard depends on, so that the same name means the same result."""
-    told = json.dumps([__version__, sensor.parameters, sensor.flight, first, shard], default=list, sort_keys=True)
-    return hashlib.sha256(told.encode()).hexdigest()[:12]
+    inputs = json.dumps([__version__, sensor.parameters, sensor.flight, first, shard], default=list, sort_keys=True)
+    return hashlib.sha256(inputs.encode()).hexdigest()[:12]
 
 
 def _shard(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]], out: str, name: str) -> None:

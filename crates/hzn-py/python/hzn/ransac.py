@@ -4,4 +4,4 @@ import warnings
 
 from .consensus import *  # noqa: F403
 
-warnings.warn("hzn.ransac is now hzn.consensus; the old name will go", DeprecationWarning, stacklevel=2)
+warnings.warn("hzn.ransac is now hzn.consensus; the old name will be removed", DeprecationWarning, stacklevel=2)

@@ -16,18 +16,18 @@ pub struct MaskEdit {
     grabbed: Option<(usize, usize)>,
 }
 
-fn apart(a: Point, b: Point) -> f64 {
+fn distance(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 fn corner_at(polygons: &Polygons, p: Point, reach: f64) -> Option<(usize, usize)> {
     let all = polygons.iter().enumerate().flat_map(|(i, c)| (0..c.len()).map(move |j| (i, j)));
-    let near = |&(i, j): &(usize, usize)| apart(polygons[i][j], p);
+    let near = |&(i, j): &(usize, usize)| distance(polygons[i][j], p);
     all.min_by(|a, b| near(a).total_cmp(&near(b))).filter(|at| near(at) <= reach)
 }
 
 /// Returns true if the point is inside the polygon, by the even-odd rule.
-pub fn inside(polygon: &[Point], [x, y]: Point) -> bool {
+pub fn is_inside(polygon: &[Point], [x, y]: Point) -> bool {
     let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
     edges.filter(|(a, b)| (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0]).count() % 2
         == 1
@@ -37,7 +37,7 @@ impl MaskEdit {
     /// Adds a corner at `p`. A click within `reach` of the first corner closes the polygon instead. The corner number
     /// [`MAX_CORNERS`] closes the polygon, too. Returns all polygons if a polygon was closed.
     pub fn click(&mut self, polygons: &Polygons, p: Point, reach: f64) -> Option<Polygons> {
-        if self.open.len() >= 3 && self.open.first().is_some_and(|first| apart(*first, p) <= reach) {
+        if self.open.len() >= 3 && self.open.first().is_some_and(|first| distance(*first, p) <= reach) {
             return self.close(polygons);
         }
         self.open.push(p);
@@ -50,7 +50,7 @@ impl MaskEdit {
         (new.len() >= 3).then(|| polygons.iter().cloned().chain([new]).collect())
     }
     /// Removes the last corner of the polygon that is being drawn.
-    pub fn back(&mut self) {
+    pub fn remove_last_corner(&mut self) {
         self.open.pop();
     }
     /// Grabs the corner within `reach` of `p`. Returns false if there is none.
@@ -70,7 +70,7 @@ impl MaskEdit {
         self.grabbed = None;
     }
     /// Returns true if a corner is grabbed.
-    pub fn holds(&self) -> bool {
+    pub fn is_grabbing(&self) -> bool {
         self.grabbed.is_some()
     }
     /// Returns the polygons without the corner at `p`, or else without the polygon around `p`. A polygon with fewer
@@ -84,7 +84,7 @@ impl MaskEdit {
             }
             return Some(left);
         }
-        let at = polygons.iter().position(|polygon| inside(polygon, p))?;
+        let at = polygons.iter().position(|polygon| is_inside(polygon, p))?;
         left.remove(at);
         Some(left)
     }
@@ -117,8 +117,9 @@ mod tests {
     #[test]
     fn the_last_corner_that_can_be_closes_it() {
         let mut edit = MaskEdit::default();
-        let came: Vec<_> = (0..MAX_CORNERS).filter_map(|i| edit.click(&vec![], [i as f64 * 10.0, 0.0], 2.0)).collect();
-        assert_eq!((came.len(), came[0][0].len()), (1, MAX_CORNERS));
+        let closed: Vec<_> =
+            (0..MAX_CORNERS).filter_map(|i| edit.click(&vec![], [i as f64 * 10.0, 0.0], 2.0)).collect();
+        assert_eq!((closed.len(), closed[0][0].len()), (1, MAX_CORNERS));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The state and the decisions of the viewer. Everything here is plain Rust and works without a window, also in tests.
 
-pub mod knob;
+pub mod atomic_file;
 pub mod mask;
 pub mod plane;
 pub mod playback;
@@ -9,10 +9,9 @@ pub mod sequence;
 pub mod session;
 pub mod settings;
 pub mod sheet;
+pub mod slider_range;
 pub mod view;
-pub mod whole;
 
-pub use knob::Knob;
 pub use mask::MaskEdit;
 pub use plane::Plane;
 pub use playback::Playback;
@@ -21,4 +20,5 @@ pub use sequence::{Entry, Place, Sequence};
 pub use session::Session;
 pub use settings::{Look, Settings};
 pub use sheet::Sheet;
+pub use slider_range::SliderRange;
 pub use view::View;

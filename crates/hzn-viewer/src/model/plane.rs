@@ -43,7 +43,7 @@ impl Pinhole {
 impl Plane {
     /// Returns where a point of the camera's picture is shown, in pixels of the shown picture; `None` if the plane has
     /// no place for the point.
-    pub fn show(&self, camera: &Camera<f64>, p: Point) -> Option<Point> {
+    pub fn to_shown(&self, camera: &Camera<f64>, p: Point) -> Option<Point> {
         match self {
             Self::Camera => Some(p),
             Self::Pinhole(pinhole) => {
@@ -56,7 +56,7 @@ impl Plane {
     }
 
     /// Returns the point of the camera's picture that is shown at `p`; `None` outside the field of view of the lens.
-    pub fn of(&self, camera: &Camera<f64>, p: Point) -> Option<Point> {
+    pub fn to_camera(&self, camera: &Camera<f64>, p: Point) -> Option<Point> {
         match self {
             Self::Camera => Some(p),
             Self::Pinhole(pinhole) => {
@@ -82,7 +82,7 @@ mod tests {
         let camera = camera(Model::Equidistant, 280.0);
         let plane = Plane::Pinhole(Pinhole::new(&camera));
         for p in [[319.5, 239.5], [100.0, 200.0], [600.0, 450.0]] {
-            let back = plane.of(&camera, plane.show(&camera, p).unwrap()).unwrap();
+            let back = plane.to_camera(&camera, plane.to_shown(&camera, p).unwrap()).unwrap();
             assert!((back[0] - p[0]).abs() < 1e-6 && (back[1] - p[1]).abs() < 1e-6, "{p:?} {back:?}");
         }
     }
@@ -97,7 +97,7 @@ mod tests {
             .iter()
             .map(|&x| {
                 let at = camera.project(&UnitVec3::try_new([x, 0.5, 1.0]).unwrap()).unwrap();
-                plane.show(&camera, [at.u, at.v]).unwrap()
+                plane.to_shown(&camera, [at.u, at.v]).unwrap()
             })
             .collect();
         assert!(shown.iter().all(|p| (p[1] - shown[0][1]).abs() < 1e-6), "{shown:?}");

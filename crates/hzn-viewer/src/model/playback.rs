@@ -44,9 +44,9 @@ impl Playback {
         self.spent_s = 0.0;
     }
     /// Steps by some pictures, backwards with a negative number, and stops playing.
-    pub fn step(&mut self, by: isize, count: usize) {
+    pub fn step(&mut self, frames: isize, count: usize) {
         self.playing = false;
-        self.go(self.frame.saturating_add_signed(by), count);
+        self.go(self.frame.saturating_add_signed(frames), count);
     }
     /// Starts or stops playing. At the end of the sequence it starts again at the first picture.
     pub fn toggle(&mut self, count: usize) {
@@ -67,14 +67,14 @@ impl Playback {
     }
 
     /// Returns how long the picture is shown, in seconds of the sequence.
-    fn lasts_s(&self, duration_s: impl Fn(usize) -> Option<f64>) -> f64 {
+    fn time_shown_s(&self, duration_s: impl Fn(usize) -> Option<f64>) -> f64 {
         let known = duration_s(self.frame).filter(|d| *d > 0.0 && d.is_finite());
         known.unwrap_or(1.0).clamp(0.0, self.speed / SLOWEST_FPS).max(self.speed / FASTEST_FPS)
     }
 
     /// Returns the time until the next picture is due; `None` if the sequence is not played.
     pub fn due(&self, duration_s: impl Fn(usize) -> Option<f64>) -> Option<Duration> {
-        let left_s = (self.lasts_s(duration_s) - self.spent_s).max(0.0);
+        let left_s = (self.time_shown_s(duration_s) - self.spent_s).max(0.0);
         self.playing.then(|| Duration::from_secs_f64(left_s / self.speed))
     }
 
@@ -85,13 +85,13 @@ impl Playback {
         if !self.playing {
             return false;
         }
-        let lasts = self.lasts_s(duration_s);
+        let shown_s = self.time_shown_s(duration_s);
         self.spent_s += elapsed.as_secs_f64() * self.speed;
-        if self.spent_s < lasts {
+        if self.spent_s < shown_s {
             return false;
         }
         // At most the duration of one picture is carried over to the next one.
-        let rest = (self.spent_s - lasts).min(lasts);
+        let rest = (self.spent_s - shown_s).min(shown_s);
         if self.frame + 1 >= count {
             self.playing = false;
             return false;

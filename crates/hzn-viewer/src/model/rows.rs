@@ -10,7 +10,7 @@ use hzn_sim::truth::Truth;
 #[derive(Debug, Clone, Default)]
 pub struct ResultHistory {
     recorded: Vec<Vec<Row>>,
-    fresh: HashMap<usize, Vec<Row>>,
+    current: HashMap<usize, Vec<Row>>,
 }
 
 impl ResultHistory {
@@ -24,20 +24,20 @@ impl ResultHistory {
         }
     }
     /// Stores the results of a picture with the current parameters.
-    pub fn refresh(&mut self, index: usize, rows: Vec<Row>) {
-        self.fresh.insert(index, rows);
+    pub fn set_current(&mut self, index: usize, rows: Vec<Row>) {
+        self.current.insert(index, rows);
     }
     /// Drops the results of the current parameters, because the parameters have changed.
-    pub fn forget(&mut self) {
-        self.fresh.clear();
+    pub fn clear_current(&mut self) {
+        self.current.clear();
     }
     /// Returns the number of pictures with results of the current parameters.
-    pub fn fresh(&self) -> usize {
-        self.fresh.len()
+    pub fn current_len(&self) -> usize {
+        self.current.len()
     }
     /// Returns the number of pictures, up to the last one with a result.
     pub fn len(&self) -> usize {
-        self.fresh.keys().map(|i| i + 1).max().unwrap_or(0).max(self.recorded.len())
+        self.current.keys().map(|i| i + 1).max().unwrap_or(0).max(self.recorded.len())
     }
     /// Returns true if there are no results.
     pub fn is_empty(&self) -> bool {
@@ -49,14 +49,14 @@ impl ResultHistory {
     }
     /// Returns the newest result: the one of the current parameters, or else the file's.
     pub fn newest(&self, index: usize, body: usize) -> Option<&Row> {
-        match self.fresh.get(&index) {
+        match self.current.get(&index) {
             Some(rows) => rows.get(body),
             None => self.recorded(index, body),
         }
     }
     /// Returns the newest results of all pictures and bodies, in order.
     pub fn all(&self) -> impl Iterator<Item = &Row> {
-        (0..self.len()).flat_map(|i| match self.fresh.get(&i) {
+        (0..self.len()).flat_map(|i| match self.current.get(&i) {
             Some(rows) => rows.iter(),
             None => self.recorded.get(i).map(|r| r.iter()).unwrap_or_default(),
         })
@@ -65,8 +65,8 @@ impl ResultHistory {
     /// Returns the next picture after `from` (before it with `back`) whose status is not `ok`. The search wraps around.
     pub fn next_refused(&self, from: usize, back: bool, body: usize) -> Option<usize> {
         let n = self.len();
-        let at = |k: usize| if back { (from + n - k % n) % n } else { (from + k) % n };
-        (1..=n).map(at).find(|&i| self.newest(i, body).is_some_and(|r| r.status != Status::Ok))
+        let nth = |k: usize| if back { (from + n - k % n) % n } else { (from + k) % n };
+        (1..=n).map(nth).find(|&i| self.newest(i, body).is_some_and(|r| r.status != Status::Ok))
     }
 
     /// Returns the pictures, the worst first: refused pictures, then the others in falling order of `badness`. Pictures
@@ -91,11 +91,11 @@ pub struct Quantity {
     /// Unit of the quantity.
     pub unit: &'static str,
     /// Lines of the plot: the name and the value of each.
-    pub lines: &'static [(&'static str, Of)],
+    pub lines: &'static [(&'static str, RowValue)],
 }
 
 /// Function that returns a value of a result, possibly compared with the truth.
-pub type Of = fn(&Row, Option<&Truth>) -> Option<f64>;
+pub type RowValue = fn(&Row, Option<&Truth>) -> Option<f64>;
 
 /// All quantities that can be plotted.
 pub const QUANTITIES: &[Quantity] = &[
@@ -176,15 +176,15 @@ mod tests {
     }
 
     #[test]
-    fn new_results_come_before_the_files_until_forgotten() {
+    fn new_results_come_before_the_files_until_cleared() {
         let mut rows = rows();
-        rows.refresh(1, vec![row(1, Some(0.5))]);
+        rows.set_current(1, vec![row(1, Some(0.5))]);
         assert_eq!(rows.newest(1, 0).unwrap().status, Status::Ok);
         assert_eq!(rows.recorded(1, 0).unwrap().status, Status::NoLimb);
         assert_eq!(rows.next_refused(0, false, 0), Some(4));
-        rows.refresh(7, vec![row(7, None)]);
+        rows.set_current(7, vec![row(7, None)]);
         assert_eq!((rows.len(), rows.all().count()), (8, 6));
-        rows.forget();
+        rows.clear_current();
         assert_eq!((rows.next_refused(0, false, 0), rows.len()), (Some(1), 5));
     }
 

@@ -61,7 +61,7 @@ impl Sequence {
     }
     /// Returns the default path of a file that is made from the sequence: next to the sequence. For a folder of
     /// pictures, the path is next to the folder, because a picture in the folder would become part of the sequence.
-    pub fn beside(&self, name: &str) -> PathBuf {
+    pub fn default_output_path(&self, name: &str) -> PathBuf {
         let folder = match self.inputs.as_slice() {
             [one] if one.is_dir() => std::path::absolute(one).ok().and_then(|p| Some(p.parent()?.to_owned())),
             _ => None,
@@ -78,8 +78,8 @@ impl Sequence {
     }
     /// Returns the index of the picture that is nearest in time.
     pub fn nearest(&self, time_s: f64) -> Option<usize> {
-        let apart = |(i, e): (usize, &Entry)| Some((i, (e.time_s? - time_s).abs()));
-        let best = self.entries.iter().enumerate().filter_map(apart).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        let distance = |(i, e): (usize, &Entry)| Some((i, (e.time_s? - time_s).abs()));
+        let best = self.entries.iter().enumerate().filter_map(distance).min_by(|(_, a), (_, b)| a.total_cmp(b));
         best.map(|(i, _)| i)
     }
 }
@@ -90,15 +90,15 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn what_is_made_of_it_lies_beside_it() {
+    fn output_files_lie_next_to_the_sequence() {
         // Any existing folder serves.
         let pictures = Path::new(env!("CARGO_MANIFEST_DIR"));
         let parent = pictures.parent().unwrap();
         let folder = Sequence { inputs: vec![pictures.into()], folder: pictures.into(), ..Sequence::default() };
-        assert_eq!(folder.beside("flight.mp4"), parent.join("flight.mp4"));
+        assert_eq!(folder.default_output_path("flight.mp4"), parent.join("flight.mp4"));
         let file = parent.join("flight.mcap");
         let recording = Sequence { inputs: vec![file], folder: parent.into(), ..Sequence::default() };
-        assert_eq!(recording.beside("flight.mp4"), parent.join("flight.mp4"));
+        assert_eq!(recording.default_output_path("flight.mp4"), parent.join("flight.mp4"));
         assert_eq!(Sequence { title: "a.mcap.part".into(), ..Sequence::default() }.stem(), "a");
     }
 

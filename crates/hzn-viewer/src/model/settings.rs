@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 /// Number of recent files that are offered.
-const RECENT: usize = 8;
+const MAX_RECENT: usize = 8;
 
 /// Display of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -161,34 +161,34 @@ impl Settings {
         }
     }
     /// Puts a file first in the list of recent files.
-    pub fn opened(&mut self, path: &Path) {
+    pub fn add_recent(&mut self, path: &Path) {
         // A relative path names another file in another folder.
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         self.recent.retain(|p| *p != path);
         self.recent.insert(0, path);
-        self.recent.truncate(RECENT);
+        self.recent.truncate(MAX_RECENT);
     }
 
     /// Returns the path of the settings file; `None` if the system names no place for it.
-    pub fn place() -> Option<PathBuf> {
+    pub fn default_path() -> Option<PathBuf> {
         let config = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
         let home = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".config"));
         Some(config.or_else(home)?.join("hzn").join("viewer.json"))
     }
     /// Reads the settings. A missing setting has its default. If the file cannot be read, all settings have their
     /// defaults.
-    pub fn load(place: &Path) -> Self {
-        std::fs::read_to_string(place).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default()
+    pub fn load(path: &Path) -> Self {
+        std::fs::read_to_string(path).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default()
     }
     /// Writes the settings.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn store(&self, place: &Path) -> std::io::Result<()> {
-        if let Some(folder) = place.parent() {
+    pub fn store(&self, path: &Path) -> std::io::Result<()> {
+        if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder)?;
         }
-        std::fs::write(place, serde_json::to_string_pretty(self)?)
+        std::fs::write(path, serde_json::to_string_pretty(self)?)
     }
 }
 
@@ -199,27 +199,27 @@ mod tests {
     #[test]
     fn what_is_stored_comes_back() {
         let dir = tempfile::tempdir().unwrap();
-        let place = dir.path().join("hzn").join("viewer.json");
+        let path = dir.path().join("hzn").join("viewer.json");
         let mut settings = Settings { dark: false, look: Look::Level, ..Settings::default() };
         settings.show(Layer::Touched, true);
         settings.show(Layer::Limb, false);
-        settings.opened(Path::new("/a/b.mcap"));
-        settings.store(&place).unwrap();
-        assert_eq!(Settings::load(&place), settings);
-        std::fs::write(&place, "{\"dark\": false, \"unknown\": 3}").unwrap();
-        assert_eq!(Settings::load(&place), Settings { dark: false, ..Settings::default() });
-        std::fs::write(&place, "no json").unwrap();
-        assert_eq!(Settings::load(&place), Settings::default());
+        settings.add_recent(Path::new("/a/b.mcap"));
+        settings.store(&path).unwrap();
+        assert_eq!(Settings::load(&path), settings);
+        std::fs::write(&path, "{\"dark\": false, \"unknown\": 3}").unwrap();
+        assert_eq!(Settings::load(&path), Settings { dark: false, ..Settings::default() });
+        std::fs::write(&path, "no json").unwrap();
+        assert_eq!(Settings::load(&path), Settings::default());
     }
 
     #[test]
     fn files_opened_last_come_first_and_once() {
         let mut settings = Settings::default();
         for n in 0..12 {
-            settings.opened(Path::new(&format!("/{n}")));
+            settings.add_recent(Path::new(&format!("/{n}")));
         }
-        settings.opened(Path::new("/9"));
-        assert_eq!(settings.recent.len(), RECENT);
+        settings.add_recent(Path::new("/9"));
+        assert_eq!(settings.recent.len(), MAX_RECENT);
         assert_eq!(settings.recent[..3], ["/9", "/11", "/10"].map(PathBuf::from));
     }
 }

@@ -29,13 +29,13 @@ impl Sheet {
 
     /// Returns the value of a key as it is written in the text; `None` if the text has no value for the key.
     pub fn get(&self, key: Key<'_>) -> Option<String> {
-        written(&mut self.0.parse().ok()?, key)
+        value_text(&mut self.0.parse().ok()?, key)
     }
 
     /// Returns the keys whose values differ between the two texts.
     pub fn differing<'k>(&self, other: &Self, keys: impl Iterator<Item = Key<'k>>) -> Vec<Key<'k>> {
         let [mut ours, mut theirs] = [self, other].map(|s| s.0.parse::<DocumentMut>().unwrap_or_default());
-        keys.filter(|key| written(&mut ours, *key) != written(&mut theirs, *key)).collect()
+        keys.filter(|key| value_text(&mut ours, *key) != value_text(&mut theirs, *key)).collect()
     }
 
     /// Returns the text with another value for the key. `None` removes the key, so that the value of the preset applies
@@ -43,9 +43,9 @@ impl Sheet {
     ///
     /// # Errors
     /// The text is not TOML, or the section is not a table.
-    pub fn with(&self, key: Key<'_>, value: Option<Value>) -> Result<Self, String> {
+    pub fn with_value(&self, key: Key<'_>, value: Option<Value>) -> Result<Self, String> {
         let mut document: DocumentMut = self.0.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
-        let no_section = || format!("[{}] is no section", key.section);
+        let no_section = || format!("[{}] is not a section", key.section);
         match value {
             None => {
                 if let Some(table) = table(&mut document, key, false) {
@@ -75,7 +75,7 @@ impl Sheet {
         let (old, new): (Vec<&str>, Vec<&str>) = (other.0.lines().collect(), self.0.lines().collect());
         let mut out = Vec::new();
         let (mut i, mut j) = (0, 0);
-        for (a, b) in common(&old, &new).into_iter().chain([(old.len(), new.len())]) {
+        for (a, b) in common_lines(&old, &new).into_iter().chain([(old.len(), new.len())]) {
             out.extend(old.get(i..a).unwrap_or_default().iter().map(|l| format!("-{l}")));
             out.extend(new.get(j..b).unwrap_or_default().iter().map(|l| format!("+{l}")));
             (i, j) = (a + 1, b + 1);
@@ -85,7 +85,7 @@ impl Sheet {
 }
 
 /// Returns the indices of a longest common subsequence of lines, in both texts.
-fn common(old: &[&str], new: &[&str]) -> Vec<(usize, usize)> {
+fn common_lines(old: &[&str], new: &[&str]) -> Vec<(usize, usize)> {
     let width = new.len() + 1;
     let mut longest = vec![0u32; (old.len() + 1) * width];
     for i in (0..old.len()).rev() {
@@ -111,7 +111,7 @@ fn common(old: &[&str], new: &[&str]) -> Vec<(usize, usize)> {
     out
 }
 
-fn written(document: &mut DocumentMut, key: Key<'_>) -> Option<String> {
+fn value_text(document: &mut DocumentMut, key: Key<'_>) -> Option<String> {
     let value = table(document, key, false)?.get(key.name)?.as_value()?;
     Some(value.clone().decorated("", "").to_string())
 }
@@ -122,17 +122,17 @@ fn table<'a>(document: &'a mut DocumentMut, key: Key<'_>, create: bool) -> Optio
     if key.section.is_empty() {
         return Some(root);
     }
-    let several = root.get("bodies").is_some_and(Item::is_array_of_tables);
-    let of_body = match key.section {
+    let is_list = root.get("bodies").is_some_and(Item::is_array_of_tables);
+    let is_of_body = match key.section {
         "body" => true,
         // The threshold and the edge errors of a body override those of the sensor.
-        "binarize" | "covariance" => own_section(root, key, several),
+        "binarize" | "covariance" => has_own_section(root, key, is_list),
         _ => false,
     };
-    if !of_body {
+    if !is_of_body {
         return section(root, key.section, create);
     }
-    let body: &mut dyn TableLike = if several {
+    let body: &mut dyn TableLike = if is_list {
         root.get_mut("bodies")?.as_array_of_tables_mut()?.get_mut(key.body)?
     } else {
         section(root, "body", create)?
@@ -141,8 +141,8 @@ fn table<'a>(document: &'a mut DocumentMut, key: Key<'_>, create: bool) -> Optio
 }
 
 /// Returns true if the body has a section of this name.
-fn own_section(root: &Table, key: Key<'_>, several: bool) -> bool {
-    let body: Option<&dyn TableLike> = if several {
+fn has_own_section(root: &Table, key: Key<'_>, is_list: bool) -> bool {
+    let body: Option<&dyn TableLike> = if is_list {
         root.get("bodies").and_then(Item::as_array_of_tables).and_then(|a| a.get(key.body)).map(|t| t as &dyn TableLike)
     } else {
         root.get("body").and_then(Item::as_table_like)
@@ -172,44 +172,44 @@ mod tests {
 
     #[test]
     fn everything_but_the_value_stays() {
-        let sheet = Sheet::new(TEXT).with(key("reject", "threshold_px"), Some(4.5.into())).unwrap();
+        let sheet = Sheet::new(TEXT).with_value(key("reject", "threshold_px"), Some(4.5.into())).unwrap();
         assert_eq!(sheet.text(), TEXT.replace("3.0", "4.5"));
         assert_eq!(sheet.diff(&Sheet::new(TEXT)), ["-threshold_px = 3.0     # wide", "+threshold_px = 4.5     # wide"]);
-        let back = sheet.with(key("reject", "threshold_px"), Some(3.0.into())).unwrap();
+        let back = sheet.with_value(key("reject", "threshold_px"), Some(3.0.into())).unwrap();
         assert_eq!(back.text(), TEXT);
         assert!(back.diff(&Sheet::new(TEXT)).is_empty());
-        let preset = back.with(key("", "preset"), Some("sun".into())).unwrap();
+        let preset = back.with_value(key("", "preset"), Some("sun".into())).unwrap();
         assert_eq!(preset.text(), TEXT.replace("\"hzn\"", "\"sun\""));
     }
 
     #[test]
     fn new_keys_and_sections_are_appended() {
-        let sheet = Sheet::new(TEXT).with(key("reject", "seed"), Some(7.into())).unwrap();
+        let sheet = Sheet::new(TEXT).with_value(key("reject", "seed"), Some(7.into())).unwrap();
         assert!(sheet.text().contains("# wide\nseed = 7\n"), "{}", sheet.text());
-        let sheet = sheet.with(key("gate", "max_mean"), Some(0.5.into())).unwrap();
+        let sheet = sheet.with_value(key("gate", "max_mean"), Some(0.5.into())).unwrap();
         assert!(sheet.text().ends_with("kind = \"earth\"\n\n[gate]\nmax_mean = 0.5\n"), "{}", sheet.text());
-        let sheet = sheet.with(key("gate", "max_mean"), None).unwrap();
+        let sheet = sheet.with_value(key("gate", "max_mean"), None).unwrap();
         assert!(!sheet.text().contains("max_mean"));
         // Removing a missing value changes nothing and inserts nothing.
-        assert_eq!(Sheet::new(TEXT).with(key("mask", "polygons_px"), None).unwrap().text(), TEXT);
+        assert_eq!(Sheet::new(TEXT).with_value(key("mask", "polygons_px"), None).unwrap().text(), TEXT);
     }
 
     #[test]
     fn a_body_of_several_has_its_own_values() {
         let text = "[binarize]\nscale = 1.0\n[[bodies]]\nkind = \"earth\"\n[[bodies]]\nkind = \
             \"sun\"\n[bodies.binarize]\nlevel = 0.9\n";
-        let at = |section, name, body, value: f64| {
-            Sheet::new(text).with(Key { section, name, body }, Some(value.into())).unwrap().text().to_owned()
+        let changed = |section, name, body, value: f64| {
+            Sheet::new(text).with_value(Key { section, name, body }, Some(value.into())).unwrap().text().to_owned()
         };
-        assert!(at("body", "altitude_km", 1, 5.0).contains("kind = \"sun\"\naltitude_km = 5.0\n"));
-        assert_eq!(at("binarize", "level", 1, 0.5), text.replace("0.9", "0.5"));
-        assert_eq!(at("binarize", "scale", 0, 2.0), text.replace("1.0", "2.0"));
-        assert!(Sheet::new("mask = 3").with(key("mask", "x"), Some(1.into())).is_err());
+        assert!(changed("body", "altitude_km", 1, 5.0).contains("kind = \"sun\"\naltitude_km = 5.0\n"));
+        assert_eq!(changed("binarize", "level", 1, 0.5), text.replace("0.9", "0.5"));
+        assert_eq!(changed("binarize", "scale", 0, 2.0), text.replace("1.0", "2.0"));
+        assert!(Sheet::new("mask = 3").with_value(key("mask", "x"), Some(1.into())).is_err());
     }
 
     #[test]
     fn inline_tables_are_tables() {
-        let sheet = Sheet::new("reject = { seed = 1 }\n").with(key("reject", "seed"), Some(2.into())).unwrap();
+        let sheet = Sheet::new("reject = { seed = 1 }\n").with_value(key("reject", "seed"), Some(2.into())).unwrap();
         assert_eq!(sheet.text(), "reject = { seed = 2 }\n");
     }
 }

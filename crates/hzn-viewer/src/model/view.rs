@@ -56,22 +56,22 @@ impl View {
 
     /// Returns the screen point of a picture point.
     pub fn to_screen(&self, area: Area, picture: Point, p: Point) -> Point {
-        let (centre, scale) = self.placed(area, picture);
+        let (centre, scale) = self.centre_and_scale(area, picture);
         let middle = area.middle();
         [middle[0] + (p[0] - centre[0]) * scale, middle[1] + (p[1] - centre[1]) * scale]
     }
 
     /// Returns the picture point of a screen point.
     pub fn to_picture(&self, area: Area, picture: Point, s: Point) -> Point {
-        let (centre, scale) = self.placed(area, picture);
+        let (centre, scale) = self.centre_and_scale(area, picture);
         let middle = area.middle();
         [centre[0] + (s[0] - middle[0]) / scale, centre[1] + (s[1] - middle[1]) / scale]
     }
 
-    /// Enlarges the picture by `factor` and keeps the picture point under `at` (a screen point) in place. The picture
-    /// does not get smaller than the whole picture; at this limit the view becomes [`View::FIT`].
-    pub fn zoom(&mut self, area: Area, picture: Point, at: Point, factor: f64) {
-        let before = self.to_picture(area, picture, at);
+    /// Enlarges the picture by `factor` and keeps the picture point under `pointer` (a screen point) in place. The
+    /// picture does not get smaller than the whole picture; at this limit the view becomes [`View::FIT`].
+    pub fn zoom(&mut self, area: Area, picture: Point, pointer: Point, factor: f64) {
+        let before = self.to_picture(area, picture, pointer);
         let smallest = fit(area, picture);
         let scale = (self.scale(area, picture) * factor).min(MAX_SCALE.max(smallest));
         if !(scale > smallest * 1.0001) {
@@ -79,22 +79,23 @@ impl View {
             return;
         }
         let middle = area.middle();
-        let centre = [before[0] - (at[0] - middle[0]) / scale, before[1] - (at[1] - middle[1]) / scale];
-        self.centre = Some((hold(centre, picture), scale));
+        let centre = [before[0] - (pointer[0] - middle[0]) / scale, before[1] - (pointer[1] - middle[1]) / scale];
+        self.centre = Some((clamp_to(centre, picture), scale));
     }
 
-    /// Moves the picture by `by` screen points. The middle of the area stays within the picture.
-    pub fn pan(&mut self, area: Area, picture: Point, by: Point) {
-        let (centre, scale) = self.placed(area, picture);
+    /// Moves the picture by `delta` screen points. The middle of the area stays within the picture.
+    pub fn pan(&mut self, area: Area, picture: Point, delta: Point) {
+        let (centre, scale) = self.centre_and_scale(area, picture);
         if self.centre.is_some() {
-            self.centre = Some((hold([centre[0] - by[0] / scale, centre[1] - by[1] / scale], picture), scale));
+            self.centre =
+                Some((clamp_to([centre[0] - delta[0] / scale, centre[1] - delta[1] / scale], picture), scale));
         }
     }
 
     /// Moves a point of the picture into the middle, with at least `scale` screen points per pixel.
     pub fn look_at(&mut self, picture: Point, p: Point, scale: f64) {
         let scale = self.centre.map_or(scale, |(_, now)| now.max(scale));
-        self.centre = Some((hold(p, picture), scale));
+        self.centre = Some((clamp_to(p, picture), scale));
     }
 
     /// Sets the scale to `scale` screen points per pixel and keeps the middle in place.
@@ -103,7 +104,7 @@ impl View {
         self.zoom(area, picture, area.middle(), factor);
     }
 
-    fn placed(&self, area: Area, picture: Point) -> (Point, f64) {
+    fn centre_and_scale(&self, area: Area, picture: Point) -> (Point, f64) {
         self.centre.unwrap_or_else(|| ([(picture[0] - 1.0) / 2.0, (picture[1] - 1.0) / 2.0], fit(area, picture)))
     }
 }
@@ -112,7 +113,7 @@ fn fit(area: Area, picture: Point) -> f64 {
     (area.size[0] / picture[0].max(1.0)).min(area.size[1] / picture[1].max(1.0)).max(1e-3)
 }
 
-fn hold(p: Point, picture: Point) -> Point {
+fn clamp_to(p: Point, picture: Point) -> Point {
     [p[0].clamp(-0.5, picture[0] - 0.5), p[1].clamp(-0.5, picture[1] - 0.5)]
 }
 

@@ -19,9 +19,10 @@ struct Column {
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let Some((name, other)) = &viewer.other else { return };
-    let answers =
-        |sight: &crate::work::FrameView| [0, 1].map(|i| sight.answers.get(i)?.bodies.get(viewer.body).cloned());
-    let columns = match viewer.sight.as_ref().map(answers) {
+    let answers = |frame_view: &crate::work::FrameView| {
+        [0, 1].map(|i| frame_view.answers.get(i)?.bodies.get(viewer.body).cloned())
+    };
+    let columns = match viewer.frame_view.as_ref().map(answers) {
         Some([Some(a), Some(b)]) => columns(&a, &b),
         _ => Vec::new(),
     };
@@ -54,10 +55,10 @@ fn table(ui: &mut Ui, name: &str, columns: &[Column]) {
         ui.end_row();
         let lines: [(&str, Line); 3] =
             [("session", |c| &c.session), (name, |c| &c.other), ("difference", |c| &c.difference)];
-        for (head, of) in lines {
-            ui.weak(RichText::new(head).size(12.0));
+        for (name, text_of) in lines {
+            ui.weak(RichText::new(name).size(12.0));
             for column in columns {
-                ui.label(RichText::new(of(column)).monospace().size(11.5));
+                ui.label(RichText::new(text_of(column)).monospace().size(11.5));
             }
             ui.end_row();
         }
@@ -70,15 +71,15 @@ fn difference(x: f64, digits: usize) -> String {
 }
 
 fn columns(a: &BodyResult, b: &BodyResult) -> Vec<Column> {
-    let apart = match (a.row.axis(), b.row.axis()) {
+    let angle = match (a.row.axis(), b.row.axis()) {
         (Some(x), Some(y)) => format!("{:.4}° apart", rows::angle_deg(x, y)),
         _ => String::new(),
     };
     let [session, other] = [a, b].map(|answer| answer.row.status.name().to_owned());
-    let mut out = vec![Column { name: "status", session, other, difference: apart }];
-    let mut add = |name, digits: usize, unit: &str, of: fn(&hzn_mcap::Row) -> Option<f64>| {
+    let mut out = vec![Column { name: "status", session, other, difference: angle }];
+    let mut add = |name, digits: usize, unit: &str, value_of: fn(&hzn_mcap::Row) -> Option<f64>| {
         let text = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.digits$}{unit}"));
-        let (x, y) = (of(&a.row), of(&b.row));
+        let (x, y) = (value_of(&a.row), value_of(&b.row));
         let difference = x.zip(y).map_or_else(String::new, |(x, y)| difference(y - x, digits) + unit);
         out.push(Column { name, session: text(x), other: text(y), difference });
     };

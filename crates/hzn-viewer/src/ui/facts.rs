@@ -1,7 +1,7 @@
 //! Short lines about the work of each stage.
 
 use hzn_core::status::{Stage, Status};
-use hzn_core::{Config, body};
+use hzn_core::{Config, Report, Solution, body};
 
 use crate::work::frame_view::{BodyResult, FrameView, Outcome};
 
@@ -36,12 +36,12 @@ pub(super) const CARDS: &[Card] = &[
 ];
 
 /// Returns lines about the input of a stage, its output, and the points that it dropped.
-pub(super) fn lines(card: &Card, sight: &FrameView, outcome: &Outcome, answer: &BodyResult) -> Vec<String> {
+pub(super) fn lines(card: &Card, frame_view: &FrameView, outcome: &Outcome, answer: &BodyResult) -> Vec<String> {
     let Ok(report) = &answer.report else { return Vec::new() };
     let (c, config) = (report.counters, &outcome.config);
     let reached = |stage| report.stage >= stage;
     match card.title {
-        "Picture" => picture(sight, config),
+        "Picture" => picture(frame_view, config),
         "Body" => expected(answer),
         "Level" => level(answer, config),
         "Mask" => vec![match config.mask.polygons_px.len() {
@@ -49,72 +49,21 @@ pub(super) fn lines(card: &Card, sight: &FrameView, outcome: &Outcome, answer: &
             1 => "1 area is masked".into(),
             n => format!("{n} areas are masked"),
         }],
-        "Contour" if reached(Stage::Contour) => {
-            let mut out = vec![format!("{} border pixels followed", c.followed)];
-            if let Some(n) = outcome.touched_pixels {
-                let all = f64::from(config.camera.width) * f64::from(config.camera.height);
-                out.push(format!("{n} pixels read, {:.2} % of the picture", 100.0 * n as f64 / all));
-            }
-            if c.dropped > 0 {
-                out.push(format!("{} dropped: a list was full", c.dropped));
-            }
-            out
-        }
-        "Recover" if c.looks > 1 => vec![format!("{} looks, each at another level", c.looks)],
+        "Contour" if reached(Stage::Contour) => contour(report, outcome),
+        "Recover" if c.looks > 1 => vec![format!("{} looks, each with another threshold", c.looks)],
         "Limits" => vec![format!("{} steps of work", c.work)],
-        "Candidates" if reached(Stage::Contour) => {
-            let edges = if c.candidates == 1 { "edge" } else { "edges" };
-            let mut out = vec![format!("{} {edges} of {} px or more", c.candidates, config.candidates.min_points)];
-            if c.fallback_points > 0 {
-                out.push(format!("{} points stand at the global level", c.fallback_points));
-            }
-            out
-        }
+        "Candidates" if reached(Stage::Contour) => edge_points(report, config),
         "Undistort" if reached(Stage::Undistort) => vec![format!("{} points became rays", c.edge_points)],
-        "Reject" if reached(Stage::Reject) => {
-            let mut out = vec![format!("{} draws", c.draws)];
-            if let Some(edge) = answer.chosen() {
-                let kept = edge.weights.iter().filter(|w| **w > 0.0).count();
-                out.push(format!("{kept} of {} points kept, {} rejected", edge.points.len(), edge.points.len() - kept));
-            }
-            out
-        }
-        "Estimate" => answer.solution().map_or_else(Vec::new, |s| {
-            let mut out = vec![
-                format!("half-angle {:.4}° fitted freely", s.half_angle_rad.to_degrees()),
-                format!(
-                    "{:.4}° fused, {:.4}° expected",
-                    s.fused_half_angle_rad.to_degrees(),
-                    answer.expected_rad.unwrap_or(f64::NAN).to_degrees()
-                ),
-                format!("RMS {:.3} px over {:.0} px of edge", s.rms_px, s.arc_px),
-            ];
-            out.extend(s.altitude_m.map(|(h, sigma)| format!("altitude {:.1} ± {:.1} km", h / 1e3, sigma / 1e3)));
-            out
-        }),
-        "Covariance" => answer.solution().map_or_else(Vec::new, |s| {
-            let ([major, minor], angle) = hzn_run::explain::principal(s);
-            vec![format!(
-                "σ {:.4}° along {:.0}° from image x, {:.4}° across",
-                major.to_degrees(),
-                angle.to_degrees(),
-                minor.to_degrees()
-            )]
-        }),
-        "Select" => match report.status {
-            Status::Ok => vec!["passed every gate".into()],
-            status => {
-                let mut out = vec![format!("{status} at {}", report.stage.name())];
-                out.extend(hzn_run::explain::tips(report).into_iter().map(|tip| format!("Try: {tip}")));
-                out
-            }
-        },
+        "Reject" if reached(Stage::Reject) => consensus(report, answer),
+        "Estimate" => answer.solution().map_or_else(Vec::new, |s| fit(s, answer)),
+        "Covariance" => answer.solution().map_or_else(Vec::new, covariance),
+        "Select" => gates(report),
         _ => Vec::new(),
     }
 }
 
-fn picture(sight: &FrameView, config: &Config) -> Vec<String> {
-    let Ok(picture) = &sight.picture else { return Vec::new() };
+fn picture(frame_view: &FrameView, config: &Config) -> Vec<String> {
+    let Ok(picture) = &frame_view.picture else { return Vec::new() };
     let l = picture.layout;
     let form = match l.channels {
         1 => "grey".to_owned(),
@@ -124,7 +73,7 @@ fn picture(sight: &FrameView, config: &Config) -> Vec<String> {
     if l.channels >= 3 {
         out.push(format!("brightness: {}", format!("{:?}", config.input.channel).to_lowercase()));
     }
-    if let Some(time) = sight.decoding {
+    if let Some(time) = frame_view.decoding {
         out.push(format!("decoded in {:.1} ms", time.as_secs_f64() * 1e3));
     }
     out
@@ -146,14 +95,81 @@ fn level(answer: &BodyResult, config: &Config) -> Vec<String> {
             "mean brightness is outside of {} to {} of full scale",
             config.gate.min_mean, config.gate.max_mean
         )],
-        (_, Some((mean, n))) => vec![format!("level {}, mean {mean:.1} of {n} pixels", report.level)],
-        _ => vec![format!("level {}", report.level)],
+        (_, Some((mean, n))) => vec![format!("threshold {}, mean {mean:.1} of {n} pixels", report.level)],
+        _ => vec![format!("threshold {}", report.level)],
+    }
+}
+
+fn contour(report: &Report<f64>, outcome: &Outcome) -> Vec<String> {
+    let (c, config) = (report.counters, &outcome.config);
+    let mut out = vec![format!("{} border pixels followed", c.followed)];
+    if let Some(n) = outcome.touched_pixels {
+        let all = f64::from(config.camera.width) * f64::from(config.camera.height);
+        out.push(format!("{n} pixels read, {:.2} % of the picture", 100.0 * n as f64 / all));
+    }
+    if c.dropped > 0 {
+        out.push(format!("{} dropped: a list was full", c.dropped));
+    }
+    out
+}
+
+fn edge_points(report: &Report<f64>, config: &Config) -> Vec<String> {
+    let c = report.counters;
+    let edges = if c.candidates == 1 { "edge" } else { "edges" };
+    let mut out = vec![format!("{} {edges} of {} px or more", c.candidates, config.candidates.min_points)];
+    if c.fallback_points > 0 {
+        out.push(format!("{} points were located at the global threshold", c.fallback_points));
+    }
+    out
+}
+
+fn consensus(report: &Report<f64>, answer: &BodyResult) -> Vec<String> {
+    let mut out = vec![format!("{} draws", report.counters.draws)];
+    if let Some(edge) = answer.chosen() {
+        let kept = edge.weights.iter().filter(|w| **w > 0.0).count();
+        out.push(format!("{kept} of {} points kept, {} rejected", edge.points.len(), edge.points.len() - kept));
+    }
+    out
+}
+
+fn fit(s: &Solution<f64>, answer: &BodyResult) -> Vec<String> {
+    let mut out = vec![
+        format!("half-angle {:.4}° fitted freely", s.half_angle_rad.to_degrees()),
+        format!(
+            "{:.4}° fused, {:.4}° expected",
+            s.fused_half_angle_rad.to_degrees(),
+            answer.expected_rad.unwrap_or(f64::NAN).to_degrees()
+        ),
+        format!("RMS {:.3} px over {:.0} px of edge", s.rms_px, s.arc_px),
+    ];
+    out.extend(s.altitude_m.map(|(h, sigma)| format!("altitude {:.1} ± {:.1} km", h / 1e3, sigma / 1e3)));
+    out
+}
+
+fn covariance(s: &Solution<f64>) -> Vec<String> {
+    let ([major, minor], angle) = hzn_run::explain::principal(s);
+    vec![format!(
+        "σ {:.4}° at {:.0}° from image x, {:.4}° perpendicular to it",
+        major.to_degrees(),
+        angle.to_degrees(),
+        minor.to_degrees()
+    )]
+}
+
+fn gates(report: &Report<f64>) -> Vec<String> {
+    match report.status {
+        Status::Ok => vec!["passed every gate".into()],
+        status => {
+            let mut out = vec![format!("{status} at {}", report.stage.name())];
+            out.extend(hzn_run::explain::tips(report).into_iter().map(|tip| format!("Try: {tip}")));
+            out
+        }
     }
 }
 
 /// Shortens the detail of a row without an answer, for example `ended at select: short-arc, short-arc`: a verdict of
 /// several edges appears once, with its count.
-pub(super) fn in_short(detail: &str) -> String {
+pub(super) fn shorten_detail(detail: &str) -> String {
     let Some((stage, verdicts)) = detail.split_once(": ") else { return detail.to_owned() };
     let mut counted: Vec<(&str, usize)> = Vec::new();
     for verdict in verdicts.split(", ") {
@@ -173,8 +189,8 @@ mod tests {
     #[test]
     fn a_verdict_of_many_edges_is_said_once() {
         let long = "ended at select: residuals, short-arc, no-fit, short-arc, short-arc";
-        assert_eq!(in_short(long), "ended at select: residuals, short-arc ×3, no-fit");
-        assert_eq!(in_short("ended at contour"), "ended at contour");
+        assert_eq!(shorten_detail(long), "ended at select: residuals, short-arc ×3, no-fit");
+        assert_eq!(shorten_detail("ended at contour"), "ended at contour");
     }
 
     #[test]

@@ -27,11 +27,11 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         });
         ui.separator();
         for line in [
-            "Wheel: zoom about the pointer, to single pixels and their values. Drag: move. Double click: in, and back.",
-            "Click in a plot or in the time line: go to that frame. Drag in a plot: move; double click: all of it.",
-            "Click among the residuals: the nearest point of the edge is shown in the picture.",
-            "Hover a candidate in the column of stages: it is pointed out in the picture.",
-            "Drop a recording, a folder, a picture, a video or a sensor.toml on the window: it is opened.",
+            "Wheel: zoom about the pointer, to single pixels with values. Drag: move. Double click: zoom in or out.",
+            "Click in a plot or in the time line: go to that frame. Drag in a plot: move it; double click: show all.",
+            "Click on the residuals: the picture shows the nearest edge point.",
+            "Hover over a candidate in the column of stages: the picture highlights it.",
+            "Drop a recording, a folder, a picture, a video or a sensor.toml on the window: the window opens it.",
         ] {
             ui.label(line);
         }

@@ -5,9 +5,9 @@ use std::ops::RangeInclusive;
 use egui::{Color32, Id, Rangef, Response, RichText, Ui, vec2};
 use egui_plot::{GridInput, GridMark, HLine, HoverPosition, Line, Plot, PlotPoints, Points, VLine};
 
+use super::theme;
 use super::viewer::Viewer;
-use super::{picture, theme};
-use crate::model::rows::{Of, QUANTITIES, Quantity};
+use crate::model::rows::{QUANTITIES, Quantity, RowValue};
 use crate::work::frame_view::Residual;
 
 /// Name of the plot of residuals.
@@ -25,7 +25,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         let chosen = if single {
             vec![RESIDUALS.to_owned()]
         } else {
-            choice(viewer, ui);
+            quantity_choice(viewer, ui);
             viewer.settings.plotted.clone()
         };
         let count = chosen.len().max(1);
@@ -46,20 +46,20 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
                 });
             }
             if chosen.is_empty() {
-                ui.weak("Choose what is plotted above.");
+                ui.weak("Choose the plots above.");
             }
         });
         if let Some(frame) = go {
             viewer.playback.go(frame, viewer.sequence.len());
         }
         if let Some(point) = look {
-            picture::look_at(viewer, point);
+            viewer.look_at(point);
         }
     });
     viewer.settings.plots_height = shown.response.rect.height();
 }
 
-fn choice(viewer: &mut Viewer, ui: &mut Ui) {
+fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         for name in QUANTITIES.iter().map(|q| q.name).chain([RESIDUALS]) {
             if name == "Error" && viewer.truth.is_empty() {
@@ -82,7 +82,7 @@ fn title(quantity: &Quantity) -> String {
 }
 
 /// Draws title and legend of a plot above it, because a legend inside would cover the lines.
-fn head(ui: &mut Ui, title: &str, lines: &[(&str, Color32)]) {
+fn heading(ui: &mut Ui, title: &str, lines: &[(&str, Color32)]) {
     ui.horizontal(|ui| {
         ui.label(RichText::new(title).size(12.5));
         for (name, colour) in lines {
@@ -94,7 +94,7 @@ fn head(ui: &mut Ui, title: &str, lines: &[(&str, Color32)]) {
 }
 
 /// Names the plot for screen readers.
-fn named(response: &Response, name: &str) {
+fn set_label(response: &Response, name: &str) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Plot {name}")));
 }
 
@@ -104,49 +104,28 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
     // Times may be large numbers, so the plot starts at the first picture with time zero.
     let start = entries.iter().find_map(|e| e.time_s).unwrap_or(0.0);
     let dark = ui.visuals().dark_mode;
-    let value = |i: usize, of: Of, fresh: bool| {
-        let row = if fresh { viewer.rows.newest(i, viewer.body) } else { viewer.rows.recorded(i, viewer.body) }?;
-        of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())
+    let value = |i: usize, value_of: RowValue, current: bool| {
+        let row = if current { viewer.rows.newest(i, viewer.body) } else { viewer.rows.recorded(i, viewer.body) }?;
+        value_of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())
     };
     let changed = viewer.session.as_ref().is_some_and(|s| s.is_changed());
-    let mut lines: Vec<_> =
-        quantity.lines.iter().zip(0..).map(|((name, _), n)| (*name, theme::line(n, dark))).collect();
-    if lines.len() == 1 {
-        lines.clear();
-    }
-    if changed {
-        lines.push(("as in the file", theme::line(0, dark).gamma_multiply(0.35)));
-    }
-    head(ui, &title(quantity), &lines);
-    let plot = framed(("plot", quantity.name), ui.available_height())
-        // The plot covers the whole sequence, also where there are no values.
-        .include_x(0.0)
-        .include_x(entries.iter().rev().find_map(|e| e.time_s).map_or(1.0, |t| (t - start).max(1e-3)))
-        .link_cursor(Id::unique("time"), [true, false])
-        .link_axis(Id::unique("time"), [true, false])
-        .allow_boxed_zoom(true)
-        .set_margin_fraction(vec2(0.01, 0.12))
-        .x_axis_formatter(along(" s"))
-        .label_formatter(move |at| {
-            let p = match at {
-                HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => position,
-            };
-            Some(format!("{:.3} s\n{:.5}", p.x, p.y))
-        });
+    heading(ui, &title(quantity), &legend(quantity, changed, dark));
+    let end_s = entries.iter().rev().find_map(|e| e.time_s).map_or(1.0, |t| (t - start).max(1e-3));
+    let plot = time_plot(quantity, ui.available_height(), end_s);
     let response = plot.show(ui, |ui| {
         let column = ui.transform().dvalue_dpos()[0].abs();
-        let line = |of: Of, fresh: bool| {
-            parts(entries.len(), column, |i| Some([entries.get(i)?.time_s? - start, value(i, of, fresh)?]))
+        let line = |value_of: RowValue, current: bool| {
+            polylines(entries.len(), column, |i| Some([entries.get(i)?.time_s? - start, value(i, value_of, current)?]))
         };
-        for (n, (name, of)) in quantity.lines.iter().enumerate() {
+        for (n, (name, value_of)) in quantity.lines.iter().enumerate() {
             let colour = theme::line(n, dark);
             // Where the parameters have changed, the file's results are drawn faintly.
             if changed {
-                for part in line(*of, false) {
+                for part in line(*value_of, false) {
                     ui.line(Line::new("file", part).color(colour.gamma_multiply(0.35)).width(1.0).allow_hover(false));
                 }
             }
-            for part in line(*of, true) {
+            for part in line(*value_of, true) {
                 if let [one] = part.as_slice() {
                     ui.points(Points::new(*name, vec![*one]).color(colour).radius(2.0));
                 } else {
@@ -161,12 +140,44 @@ fn over_time(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity) -> Option<usize>
         }
         ui.response().clicked().then(|| ui.pointer_coordinate()).flatten()
     });
-    named(&response.response, quantity.name);
+    set_label(&response.response, quantity.name);
     viewer.sequence.nearest(response.inner?.x + start)
 }
 
+/// Returns names and colours of the lines of a plot over time. A single line needs no name.
+fn legend(quantity: &Quantity, changed: bool, dark: bool) -> Vec<(&'static str, Color32)> {
+    let mut lines: Vec<_> =
+        quantity.lines.iter().zip(0..).map(|((name, _), n)| (*name, theme::line(n, dark))).collect();
+    if lines.len() == 1 {
+        lines.clear();
+    }
+    if changed {
+        lines.push(("as in the file", theme::line(0, dark).gamma_multiply(0.35)));
+    }
+    lines
+}
+
+/// Returns a plot over the time of the sequence, from 0 to `end_s`. All these plots share their time axis.
+fn time_plot(quantity: &Quantity, height: f32, end_s: f64) -> Plot<'static> {
+    shared_plot(("plot", quantity.name), height)
+        // The plot covers the whole sequence, also where there are no values.
+        .include_x(0.0)
+        .include_x(end_s)
+        .link_cursor(Id::unique("time"), [true, false])
+        .link_axis(Id::unique("time"), [true, false])
+        .allow_boxed_zoom(true)
+        .set_margin_fraction(vec2(0.01, 0.12))
+        .x_axis_formatter(axis_labels(" s"))
+        .label_formatter(move |at| {
+            let p = match at {
+                HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => position,
+            };
+            Some(format!("{:.3} s\n{:.5}", p.x, p.y))
+        })
+}
+
 /// Returns a plot with the properties that all plots share.
-fn framed<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
+fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
     Plot::new(id)
         .height(height)
         .allow_scroll(false)
@@ -179,7 +190,7 @@ fn framed<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
 }
 
 /// Returns the labels along an axis. The very end has none, because the border of the window would cut it.
-fn along(unit: &'static str) -> impl Fn(GridMark, &RangeInclusive<f64>) -> String {
+fn axis_labels(unit: &'static str) -> impl Fn(GridMark, &RangeInclusive<f64>) -> String {
     move |mark, range| {
         let room = 0.04 * (range.end() - range.start());
         let label = || tick_label(mark.value, mark.step_size) + unit;
@@ -214,7 +225,7 @@ fn tick_label(value: f64, step: f64) -> String {
 
 /// Returns rows of points; a missing point starts a new row. Within the same `column` (a width; 0 for none) only about
 /// the lowest and the highest points are kept. More cannot be seen, and a column may have thousands of pictures.
-fn parts(count: usize, column: f64, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
+fn polylines(count: usize, column: f64, point: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
     let mut out: Vec<Vec<[f64; 2]>> = Vec::new();
     let (mut open, mut last, mut in_last) = (false, f64::NAN, 0);
     for p in (0..count).map(point) {
@@ -249,19 +260,23 @@ fn parts(count: usize, column: f64, point: impl Fn(usize) -> Option<[f64; 2]>) -
 
 /// Plots the residuals of the edge points along the fitted limb; returns the picture point that was clicked.
 fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
-    let threshold = viewer.sight.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.reject.threshold_px);
+    let threshold = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.reject.threshold_px);
     let all = viewer.answer().map(|a| &*a.residuals).unwrap_or_default();
     let points = |kept: bool| -> PlotPoints<'_> {
         all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
     };
     if all.is_empty() {
-        ui.weak("The residuals along the limb stand here once the frame has an answer.");
+        ui.weak("This plot shows the residuals along the limb if the frame has an answer.");
         return None;
     }
-    head(ui, "Residual [px] by azimuth about the axis", &[("inliers", theme::INLIER), ("rejected", theme::REJECTED)]);
-    let plot = framed("residuals", ui.available_height())
+    heading(
+        ui,
+        "Residual [px] by azimuth about the axis",
+        &[("inliers", theme::INLIER), ("rejected", theme::REJECTED)],
+    );
+    let plot = shared_plot("residuals", ui.available_height())
         .set_margin_fraction(vec2(0.01, 0.1))
-        .x_axis_formatter(along("°"))
+        .x_axis_formatter(axis_labels("°"))
         .include_y(-1.0)
         .include_y(1.0);
     let shown = plot.show(ui, |ui| {
@@ -273,14 +288,14 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
         ui.points(Points::new("rejected", points(false)).color(theme::REJECTED).radius(1.8));
         ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
     });
-    named(&shown.response, RESIDUALS);
-    let at = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
+    set_label(&shown.response, RESIDUALS);
+    let pointer = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
     // The point that is nearest on the screen is returned.
-    let apart = |r: &Residual| {
+    let distance = |r: &Residual| {
         let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px].into());
-        p.distance_sq(at)
+        p.distance_sq(pointer)
     };
-    all.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|r| r.at)
+    all.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|r| r.point)
 }
 
 #[cfg(test)]
@@ -289,13 +304,13 @@ mod tests {
 
     #[test]
     fn ticks_are_round_numbers() {
-        let at = |low: f64, high: f64| -> Vec<f64> {
+        let tick_values = |low: f64, high: f64| -> Vec<f64> {
             ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0).iter().map(|m| m.value).collect()
         };
-        assert_eq!(at(0.0, 10.0), [0.0, 5.0, 10.0]);
-        assert_eq!(at(-0.9, 7.2), [0.0, 5.0]);
-        assert_eq!(at(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
-        assert!(at(1.0, 1.0).is_empty() && at(f64::NAN, 1.0).is_empty());
+        assert_eq!(tick_values(0.0, 10.0), [0.0, 5.0, 10.0]);
+        assert_eq!(tick_values(-0.9, 7.2), [0.0, 5.0]);
+        assert_eq!(tick_values(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
+        assert!(tick_values(1.0, 1.0).is_empty() && tick_values(f64::NAN, 1.0).is_empty());
     }
 
     #[test]
@@ -307,25 +322,25 @@ mod tests {
             assert!(labels.len() > 1 && distinct.len() == labels.len(), "{labels:?}");
         }
         assert_eq!((tick_label(0.1, 0.02).as_str(), tick_label(-1e-17, 5.0).as_str()), ("0.10", "0"));
-        let at = |value: f64| along(" s")(GridMark { value, step_size: 10.0 }, &(0.0..=101.0));
-        assert_eq!((at(90.0).as_str(), at(100.0).as_str()), ("90 s", ""));
+        let label = |value: f64| axis_labels(" s")(GridMark { value, step_size: 10.0 }, &(0.0..=101.0));
+        assert_eq!((label(90.0).as_str(), label(100.0).as_str()), ("90 s", ""));
     }
 
     #[test]
     fn lines_are_broken_where_values_are_missing() {
         let value = |i: usize| (!i.is_multiple_of(4)).then_some([i as f64, 1.0]);
         for column in [0.0, 0.5, f64::NAN] {
-            let lengths: Vec<usize> = parts(10, column, value).iter().map(Vec::len).collect();
+            let lengths: Vec<usize> = polylines(10, column, value).iter().map(Vec::len).collect();
             assert_eq!(lengths, [3, 3, 1]);
         }
-        assert!(parts(3, 0.0, |_| None).is_empty());
+        assert!(polylines(3, 0.0, |_| None).is_empty());
     }
 
     #[test]
     fn what_a_column_cannot_show_is_left_out_and_its_extremes_are_not() {
         let value = |i: usize| Some([i as f64, ((i * 7919) % 1000) as f64]);
         let all: Vec<[f64; 2]> = (0..10_000).filter_map(value).collect();
-        let thin = parts(all.len(), 100.0, value).concat();
+        let thin = polylines(all.len(), 100.0, value).concat();
         assert_eq!(thin.len(), 200);
         assert!(thin.is_sorted_by(|a, b| a[0] < b[0]));
         for (these, those) in all.chunks(100).zip(thin.chunks(2)) {

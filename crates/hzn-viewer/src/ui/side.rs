@@ -25,21 +25,21 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
 }
 
 fn answer(viewer: &Viewer, ui: &mut Ui) {
-    let Some(sight) = &viewer.sight else { return };
+    let Some(frame_view) = &viewer.frame_view else { return };
     let answer = viewer.answer();
-    let status = match (&sight.picture, answer) {
+    let status = match (&frame_view.picture, answer) {
         (Err(_), _) => Some(Status::Unreadable),
         (_, Some(answer)) => Some(answer.row.status),
         _ => None,
     };
     if let Some(status) = status {
         let colour = theme::status(status);
-        let text = RichText::new(status.name()).strong().size(16.0).color(theme::on(colour));
+        let text = RichText::new(status.name()).strong().size(16.0).color(theme::text_on(colour));
         egui::Frame::new().fill(colour).corner_radius(5).inner_margin(egui::Margin::symmetric(10, 4)).show(ui, |ui| {
             ui.label(text);
         });
         if status != Status::Ok {
-            for line in detail(sight, answer) {
+            for line in detail(frame_view, answer) {
                 ui.add(egui::Label::new(RichText::new(line).size(12.0)).wrap());
             }
         }
@@ -56,7 +56,7 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
                 row(name, format!("{x:+.6}"));
             }
             row("3σ", format!("{:.4}°", 3.0 * s.covariance.sigma_max_rad().to_degrees()));
-            if let Some(truth) = viewer.truth_of(&sight.name, &answer.row.body)
+            if let Some(truth) = viewer.truth_of(&frame_view.name, &answer.row.body)
                 && let Some(error) = rows::error_deg(&answer.row, Some(truth))
             {
                 row("error", format!("{error:.4}°"));
@@ -70,7 +70,7 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
             }
         }
         row("time", format!("{:.0} µs", answer.elapsed.as_nanos() as f64 / 1e3));
-        let recorded = viewer.rows.recorded(sight.index, viewer.body);
+        let recorded = viewer.rows.recorded(frame_view.index, viewer.body);
         if let Some(change) = recorded.and_then(|r| change(r, answer)) {
             row("moved", change);
         }
@@ -85,19 +85,19 @@ fn change(recorded: &hzn_mcap::Row, answer: &BodyResult) -> Option<String> {
             (angle > 1e-9).then(|| format!("{angle:.4}°"))
         }
         (None, Some(_)) => Some("answered now".into()),
-        (Some(_), None) => Some("refused now".into()),
+        (Some(_), None) => Some("no answer now".into()),
         (None, None) => None,
     }
 }
 
 /// Returns why there is no answer, and the first advice.
-fn detail(sight: &FrameView, answer: Option<&BodyResult>) -> Vec<String> {
-    match (&sight.picture, answer) {
+fn detail(frame_view: &FrameView, answer: Option<&BodyResult>) -> Vec<String> {
+    match (&frame_view.picture, answer) {
         (Err(why), _) => vec![why.clone()],
         (_, Some(answer)) => {
             let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
             let tip = tips.first().map(|tip| format!("Try: {tip}"));
-            [facts::in_short(&answer.row.detail)].into_iter().chain(tip).collect()
+            [facts::shorten_detail(&answer.row.detail)].into_iter().chain(tip).collect()
         }
         _ => Vec::new(),
     }
@@ -134,7 +134,10 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
                 let own_plane = matches!(layer, Layer::Touched | Layer::Circle);
                 let drawn = !(own_plane && viewer.settings.undistorted);
                 let switch = ui.add_enabled(drawn, egui::Checkbox::new(&mut on, layer.name()));
-                if switch.on_disabled_hover_text("Only in the camera's own picture, not undistorted").changed() {
+                if switch
+                    .on_disabled_hover_text("This overlay is drawn only if the picture is not undistorted")
+                    .changed()
+                {
                     viewer.settings.show(layer, on);
                 }
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {

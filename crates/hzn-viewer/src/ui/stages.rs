@@ -1,32 +1,28 @@
 //! The column of stages: the result of each stage for the picture, and its parameters.
 
-use egui::{Color32, ComboBox, RichText, Slider, SliderClamping, Ui, vec2};
-use hzn_calib::keys::{self, Key, Limits};
+use egui::collapsing_header::CollapsingState;
+use egui::{Color32, ComboBox, RichText, Ui, vec2};
+use hzn_calib::keys;
 use hzn_core::status::Status;
-use toml_edit::Value;
 
 use super::facts::{self, CARDS, Card};
 use super::viewer::Viewer;
-use super::{Command, theme};
-use crate::model::{Knob, Session};
+use super::{Command, parameters, theme};
 use crate::work::frame_view::{BodyResult, Outcome};
-
-/// Width of the names of parameters.
-const NAME_WIDTH: f32 = 136.0;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let width = viewer.settings.stages_width;
     let shown = egui::Panel::right("stages").default_size(width).size_range(300.0..=640.0).show(ui, |ui| {
-        head(viewer, ui);
+        header(viewer, ui);
         ui.separator();
         if viewer.session.is_none() {
-            return without(viewer, ui);
+            return show_missing_sensor(viewer, ui);
         }
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // The answer is shared, not copied, because it holds thousands of points.
-            let outcome = viewer.sight.as_ref().and_then(|s| s.answers.first().cloned());
+            let outcome = viewer.frame_view.as_ref().and_then(|s| s.answers.first().cloned());
             for card in CARDS {
-                one(viewer, ui, card, outcome.as_deref());
+                show_card(viewer, ui, card, outcome.as_deref());
             }
             ui.add_space(8.0);
         });
@@ -35,25 +31,25 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             && let Some(session) = &mut viewer.session
             && viewer.mask.is_none()
         {
-            session.settle();
+            session.end_step();
         }
     });
     viewer.settings.stages_width = shown.response.rect.width();
 }
 
 /// Says how to get a sensor.toml if there is none.
-fn without(viewer: &mut Viewer, ui: &mut Ui) {
-    ui.label("What the sensor does with a picture, stage by stage, stands here once there is a sensor.toml.");
+fn show_missing_sensor(viewer: &mut Viewer, ui: &mut Ui) {
+    ui.label("With a sensor.toml, this column shows the result of every stage.");
     ui.add_space(4.0);
     if ui.button("Open a sensor.toml…").clicked() {
         viewer.run(Command::Open, &ui.ctx().clone());
     }
     ui.add_space(4.0);
-    ui.weak("hzn init writes one to start from; it can be dropped on the window, too.");
+    ui.weak("`hzn init` writes a first one. You can also drop a sensor.toml on the window.");
 }
 
 /// Draws preset, undo, redo, reset and save, and the error in the text.
-fn head(viewer: &mut Viewer, ui: &mut Ui) {
+fn header(viewer: &mut Viewer, ui: &mut Ui) {
     ui.add_space(5.0);
     let Some(session) = &mut viewer.session else {
         ui.horizontal(|ui| {
@@ -73,7 +69,7 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
                 for choice in key.map_or(&[][..], |key| key.choices) {
                     if ui.selectable_label(choice.name == current, choice.name).clicked() {
                         session.set("", "preset", 0, Some(choice.name.into()));
-                        session.settle();
+                        session.end_step();
                     }
                 }
             })
@@ -97,9 +93,9 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
             (None, Some(line)) => format!("line {line}: {}", problem.what),
             _ => problem.what.clone(),
         };
-        ui.colored_label(ui.visuals().error_fg_color, text).on_hover_text("The last values that were accepted count.");
+        ui.colored_label(ui.visuals().error_fg_color, text).on_hover_text("The last accepted values are in use.");
     }
-    if viewer.sight.as_ref().and_then(|s| s.answers.first()).is_some_and(|o| o.bodies.len() > 1) {
+    if viewer.frame_view.as_ref().and_then(|s| s.answers.first()).is_some_and(|o| o.bodies.len() > 1) {
         bodies(viewer, ui);
     }
     if let Some(command) = command {
@@ -110,7 +106,7 @@ fn head(viewer: &mut Viewer, ui: &mut Ui) {
 /// Draws the choice between several bodies.
 fn bodies(viewer: &mut Viewer, ui: &mut Ui) {
     let names: Vec<(&str, Status)> = viewer
-        .sight
+        .frame_view
         .iter()
         .flat_map(|s| s.answers.first())
         .flat_map(|o| &o.bodies)
@@ -125,47 +121,21 @@ fn bodies(viewer: &mut Viewer, ui: &mut Ui) {
     });
 }
 
-fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>) {
+/// Draws a card: its header, the results of its stage, and the parameters, which unfold.
+fn show_card(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>) {
     let answer = outcome.and_then(|o| o.bodies.get(viewer.body).or(o.bodies.first()));
-    let time =
-        card.stage.and_then(|stage| answer?.times.iter().find(|(s, t)| *s == stage && !t.is_zero()).map(|(_, t)| *t));
     let id = ui.make_persistent_id(("card", card.title));
-    let mut state =
-        egui::containers::collapsing_header::CollapsingState::load_with_default_open(ui.ctx(), id, card.open);
+    let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, card.open);
     let fill = ui.visuals().faint_bg_color;
     egui::Frame::new().fill(fill).corner_radius(6).inner_margin(egui::Margin::symmetric(8, 5)).show(ui, |ui| {
         ui.set_width(ui.available_width());
-        let header = ui.horizontal(|ui| {
-            let (icon, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
-            let dot = reached(card, answer);
-            ui.painter().circle_filled(icon.center(), 4.5, dot);
-            let title = ui.add(
-                egui::Label::new(RichText::new(card.title).strong()).selectable(false).sense(egui::Sense::click()),
-            );
-            title.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, card.title));
-            let mut clicked = title.clicked();
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let (rect, arrow) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::click());
-                egui::collapsing_header::paint_default_icon(
-                    ui,
-                    state.openness(ui.ctx()),
-                    &arrow.clone().with_new_rect(rect),
-                );
-                clicked |= arrow.clicked();
-                if let Some(time) = time {
-                    ui.weak(format!("{:.0} µs", time.as_nanos() as f64 / 1e3))
-                        .on_hover_text("Time of this stage while it is watched, which takes time too");
-                }
-            });
-            clicked
-        });
-        if header.inner {
+        if card_header(ui, card, answer, state.openness(ui.ctx())) {
             state.toggle(ui);
         }
         state.store(ui.ctx());
         // The results are always visible; the parameters unfold.
-        if let (Some(sight), Some(outcome), Some(answer)) = (&viewer.sight, outcome, answer) {
-            for line in facts::lines(card, sight, outcome, answer) {
+        if let (Some(frame_view), Some(outcome), Some(answer)) = (&viewer.frame_view, outcome, answer) {
+            for line in facts::lines(card, frame_view, outcome, answer) {
                 ui.add(egui::Label::new(RichText::new(line).size(12.5)).wrap());
             }
         }
@@ -181,7 +151,7 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>)
             ui.add_space(2.0);
             for section in card.sections {
                 for key in keys::in_section(section) {
-                    parameter(viewer, ui, key);
+                    parameters::show(viewer, ui, key);
                 }
             }
         });
@@ -189,8 +159,34 @@ fn one(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>)
     ui.add_space(2.0);
 }
 
+/// Draws the dot, the title, the time and the arrow of a card. Returns true if the card is to unfold or to fold.
+fn card_header(ui: &mut Ui, card: &Card, answer: Option<&BodyResult>, openness: f32) -> bool {
+    let time =
+        card.stage.and_then(|stage| answer?.times.iter().find(|(s, t)| *s == stage && !t.is_zero()).map(|(_, t)| *t));
+    let header = ui.horizontal(|ui| {
+        let (icon, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
+        let dot = reached_colour(card, answer);
+        ui.painter().circle_filled(icon.center(), 4.5, dot);
+        let title =
+            ui.add(egui::Label::new(RichText::new(card.title).strong()).selectable(false).sense(egui::Sense::click()));
+        title.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, card.title));
+        let mut clicked = title.clicked();
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let (rect, arrow) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::click());
+            egui::collapsing_header::paint_default_icon(ui, openness, &arrow.clone().with_new_rect(rect));
+            clicked |= arrow.clicked();
+            if let Some(time) = time {
+                ui.weak(format!("{:.0} µs", time.as_nanos() as f64 / 1e3))
+                    .on_hover_text("Time of this stage, including the time of the observer");
+            }
+        });
+        clicked
+    });
+    header.inner
+}
+
 /// Returns the colour of a card's dot, which shows whether the picture reached the stage.
-fn reached(card: &Card, answer: Option<&BodyResult>) -> Color32 {
+fn reached_colour(card: &Card, answer: Option<&BodyResult>) -> Color32 {
     let grey = Color32::from_rgb(110, 115, 124);
     let Some(Ok(report)) = answer.map(|a| a.report.as_ref()) else { return grey };
     match card.stage {
@@ -208,7 +204,7 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
     if report.candidates.is_empty() {
         return;
     }
-    let select = viewer.sight.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.select);
+    let select = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.select);
     egui::Grid::new("candidates").num_columns(6).spacing(vec2(10.0, 2.0)).show(ui, |ui| {
         for head in ["", "length", "points", "inliers", "RMS px", "verdict"] {
             ui.weak(RichText::new(head).size(11.5));
@@ -231,7 +227,7 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
     });
     let more = (report.counters.candidates as usize).saturating_sub(report.candidates.len());
     if more > 0 {
-        ui.weak(format!("and {more} more, not listed"));
+        ui.weak(format!("{more} more are not listed"));
     }
 }
 
@@ -242,138 +238,14 @@ fn mask(viewer: &mut Viewer, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let drawing = viewer.mask.is_some();
         if ui.selectable_label(drawing, if drawing { "Done" } else { "Draw the mask" }).clicked() {
-            super::picture::toggle_mask(viewer);
+            viewer.toggle_mask();
         }
         if let Some(session) = &mut viewer.session
             && !session.polygons().is_empty()
             && ui.button("Clear").clicked()
         {
             session.set_polygons(&[]);
-            session.settle();
+            session.end_step();
         }
     });
-}
-
-/// Draws one key of sensor.toml: a slider, a choice or a switch.
-fn parameter(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
-    let body = viewer.body;
-    let Some(session) = &mut viewer.session else { return };
-    if matches!(key.path, "mask.polygons_px" | "camera.file" | "camera.camera") {
-        return;
-    }
-    let value = session.value(key.section(), key.name(), body).cloned();
-    let method = session.value(key.section(), "method", body).and_then(|m| m.as_str().map(str::to_owned));
-    // A key of another method has no effect, so it is hidden.
-    if key.method().is_some() && method.is_some() && key.method() != method.as_deref() {
-        return;
-    }
-    let hint = hint(key);
-    ui.horizontal(|ui| {
-        let place = egui::Layout::left_to_right(egui::Align::Center);
-        let name = ui
-            .allocate_ui_with_layout(vec2(NAME_WIDTH, 18.0), place, |ui| {
-                ui.set_min_width(NAME_WIDTH);
-                ui.add(egui::Label::new(RichText::new(key.name()).size(12.5)).truncate())
-            })
-            .inner
-            .on_hover_text(&hint);
-        match (&key.limits, &value) {
-            (Limits::Choice, Some(toml::Value::String(current))) => {
-                ComboBox::from_id_salt(key.path)
-                    .selected_text(current)
-                    .width(130.0)
-                    .show_ui(ui, |ui| {
-                        for choice in key.choices {
-                            if ui.selectable_label(choice.name == current, choice.name).clicked() {
-                                session.set(key.section(), key.name(), body, Some(choice.name.into()));
-                                session.settle();
-                            }
-                        }
-                    })
-                    .response
-                    .labelled_by(name.id)
-                    .on_hover_text(&hint);
-            }
-            (_, Some(toml::Value::Boolean(on))) => {
-                let mut on = *on;
-                if ui.checkbox(&mut on, "").labelled_by(name.id).on_hover_text(&hint).changed() {
-                    session.set(key.section(), key.name(), body, Some(Value::from(on)));
-                    session.settle();
-                }
-            }
-            (limits, Some(toml::Value::Float(_) | toml::Value::Integer(_))) => {
-                number(session, ui, key, body, limits, name.id, &hint);
-            }
-            (Limits::Number { .. }, None) => {
-                // The key is not in the text; a click sets a first value.
-                if ui.button("automatic").on_hover_text(format!("{hint}\nClick to set it.")).clicked()
-                    && let Some(knob) = Knob::from_limits(&key.limits, session.usual(key.section(), key.name(), body))
-                {
-                    session.set_number(key, body, knob.middle());
-                    session.settle();
-                }
-            }
-            (_, Some(other)) => {
-                let text = other.to_string();
-                ui.add(egui::Label::new(RichText::new(text).size(12.0)).truncate());
-            }
-            (_, None) => {
-                ui.weak("not set").on_hover_text(&hint);
-            }
-        }
-        restore(session, ui, key, body);
-    });
-}
-
-fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &Limits, name: egui::Id, hint: &str) {
-    let Some(mut x) = session.number(key.section(), key.name(), body) else { return };
-    let before = x;
-    let whole = matches!(session.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)));
-    let unit = if key.unit().is_empty() { String::new() } else { format!(" {}", key.unit()) };
-    let usual = session.usual(key.section(), key.name(), body);
-    let response = match Knob::from_limits(limits, usual).filter(|_| key.section() != "camera") {
-        Some(knob) => {
-            ui.spacing_mut().slider_width = (ui.available_width() - 96.0).max(60.0);
-            let mut slider = Slider::new(&mut x, knob.low..=knob.high)
-                .logarithmic(knob.logarithmic)
-                .clamping(SliderClamping::Never)
-                .suffix(unit);
-            if whole {
-                slider = slider.integer();
-            }
-            if knob.logarithmic {
-                slider = slider.smallest_positive((usual / 100.0).max(1e-4));
-            }
-            ui.add(slider)
-        }
-        None => {
-            let speed = if whole { 1.0 } else { (x.abs() * 0.002).max(1e-5) };
-            ui.add(egui::DragValue::new(&mut x).speed(speed).suffix(unit).max_decimals(if whole { 0 } else { 6 }))
-        }
-    };
-    let response = response.labelled_by(name).on_hover_text(hint);
-    if x != before {
-        session.set_number(key, body, x);
-    }
-    if response.lost_focus() {
-        session.settle();
-    }
-}
-
-/// Draws the button that restores the saved file's value of a key.
-fn restore(session: &mut Session, ui: &mut Ui, key: &Key, body: usize) {
-    let differs = session.differs(key.section(), key.name(), body);
-    if differs && ui.small_button("file").on_hover_text("Back to the file's value").clicked() {
-        session.restore(key.section(), key.name(), body);
-        session.settle();
-    }
-}
-
-fn hint(key: &Key) -> String {
-    let limits = match key.limits {
-        Limits::Choice => String::new(),
-        _ => format!("\n{}.", keys::limits_in_words(key).replace('`', "")),
-    };
-    let unit = if key.unit().is_empty() { String::new() } else { format!(" [{}]", key.unit()) };
-    format!("{}{unit}: {}{limits}", key.path, key.sentence().replace('`', ""))
 }

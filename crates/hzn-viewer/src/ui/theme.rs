@@ -64,7 +64,7 @@ pub(super) fn status(status: Status) -> Color32 {
 }
 
 /// Returns black or white, whichever can be read better on a colour.
-pub(super) fn on(colour: Color32) -> Color32 {
+pub(super) fn text_on(colour: Color32) -> Color32 {
     let [r, g, b, _] = colour.to_array().map(f32::from);
     if 0.299 * r + 0.587 * g + 0.114 * b > 140.0 { Color32::BLACK } else { Color32::WHITE }
 }

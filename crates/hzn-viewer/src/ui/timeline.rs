@@ -27,7 +27,7 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
         let play = if viewer.playback.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
         for (c, icon, name) in [
             (Command::First, Icon::First, "First frame"),
-            (Command::Back, Icon::Back, "Frame before"),
+            (Command::Back, Icon::Back, "Previous frame"),
             (Command::Play, play.0, play.1),
             (Command::Next, Icon::Next, "Next frame"),
             (Command::Last, Icon::Last, "Last frame"),
@@ -84,11 +84,11 @@ fn icon_button(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     let visuals = ui.style().interact(&response);
     ui.painter().rect_filled(rect, visuals.corner_radius, visuals.weak_bg_fill);
     let (c, ink) = (rect.center(), visuals.fg_stroke.color);
-    let triangle = |x: f32, way: f32| {
+    let triangle = |x: f32, direction: f32| {
         let tip = [
-            pos2(c.x + x + 4.5 * way, c.y),
-            pos2(c.x + x - 3.5 * way, c.y - 5.0),
-            pos2(c.x + x - 3.5 * way, c.y + 5.0),
+            pos2(c.x + x + 4.5 * direction, c.y),
+            pos2(c.x + x - 3.5 * direction, c.y - 5.0),
+            pos2(c.x + x - 3.5 * direction, c.y + 5.0),
         ];
         ui.painter().add(Shape::convex_polygon(tip.to_vec(), ink, Stroke::NONE));
     };
@@ -141,15 +141,15 @@ fn work(viewer: &mut Viewer, ui: &mut Ui) {
         );
     } else if viewer.sequence.len() > 1 && viewer.session.is_some() {
         let hint = format!(
-            "Every frame with the parameters as they are, for the plots ({})",
+            "Process every frame with the current parameters, for the plots ({})",
             Command::ProcessAll.key(ui.ctx())
         );
         if ui.button("Process all").on_hover_text(hint).clicked() {
             viewer.process_all(None);
         }
-        let fresh = viewer.rows.fresh();
-        if fresh > 1 {
-            ui.weak(format!("{fresh} new"));
+        let current = viewer.rows.current_len();
+        if current > 1 {
+            ui.weak(format!("{current} new"));
         }
     }
 }

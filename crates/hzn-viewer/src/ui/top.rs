@@ -6,11 +6,11 @@ use egui::{RichText, Ui};
 use hzn_core::Preset;
 
 use super::Command;
-use super::dialogs::{Asking, Purpose};
+use super::path_dialog::{PathDialog, Purpose};
 use super::viewer::{Message, Viewer};
 
 /// Age from which a job gets a bar. A bar for a shorter job would only make the window jump.
-const NOTICED: Duration = Duration::from_millis(200);
+const NOTICED_AFTER: Duration = Duration::from_millis(200);
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     egui::Panel::top("top").show(ui, |ui| {
@@ -51,7 +51,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     });
 }
 
-fn entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {
+fn menu_entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {
     let button = egui::Button::new(command.name()).shortcut_text(command.key(ui.ctx()));
     if ui.add_enabled(on, button).clicked() {
         viewer.run(command, &ui.ctx().clone());
@@ -60,77 +60,89 @@ fn entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {
 }
 
 fn menus(viewer: &mut Viewer, ui: &mut Ui) {
-    let (sensor, frames) = (viewer.session.is_some(), !viewer.sequence.is_empty());
-    ui.menu_button("File", |ui| {
-        entry(viewer, ui, Command::Open, true);
-        let recent = viewer.settings.recent.clone();
-        if !recent.is_empty() {
-            ui.menu_button("Opened last", |ui| {
-                for path in recent {
-                    if ui.button(path.display().to_string()).clicked() {
-                        viewer.open_paths(vec![path]);
-                        ui.close();
-                    }
-                }
-            });
-        }
-        ui.separator();
-        entry(viewer, ui, Command::Save, sensor);
-        entry(viewer, ui, Command::SaveAs, sensor);
-    });
-    ui.menu_button("Edit", |ui| {
-        let (undo, redo, changed) =
-            viewer.session.as_ref().map_or((false, false, false), |s| (s.can_undo(), s.can_redo(), s.is_changed()));
-        entry(viewer, ui, Command::Undo, undo);
-        entry(viewer, ui, Command::Redo, redo);
-        entry(viewer, ui, Command::Reset, changed);
-        entry(viewer, ui, Command::Diff, changed);
-        ui.separator();
-        entry(viewer, ui, Command::Mask, sensor);
-    });
-    ui.menu_button("Frames", |ui| {
-        for c in [Command::Play, Command::Next, Command::Back, Command::First, Command::Last] {
-            entry(viewer, ui, c, frames);
-        }
-        ui.separator();
-        for c in [Command::NextRefused, Command::BackRefused, Command::Worst] {
-            entry(viewer, ui, c, frames);
-        }
-        ui.separator();
-        entry(viewer, ui, Command::ProcessAll, sensor && frames && viewer.sweep.is_none());
-        entry(viewer, ui, Command::Rerun, sensor && frames && viewer.sweep.is_none());
-    });
-    ui.menu_button("Compare", |ui| {
-        ui.add_enabled_ui(sensor, |ui| {
-            for preset in Preset::ALL {
-                if ui.button(format!("with preset {}", preset.name())).clicked() {
-                    viewer.compare_with_preset(*preset);
+    ui.menu_button("File", |ui| file_menu(viewer, ui));
+    ui.menu_button("Edit", |ui| edit_menu(viewer, ui));
+    ui.menu_button("Frames", |ui| frames_menu(viewer, ui));
+    ui.menu_button("Compare", |ui| compare_menu(viewer, ui));
+    ui.menu_button("Export", |ui| export_menu(viewer, ui));
+}
+
+fn file_menu(viewer: &mut Viewer, ui: &mut Ui) {
+    let has_sensor = viewer.session.is_some();
+    menu_entry(viewer, ui, Command::Open, true);
+    let recent = viewer.settings.recent.clone();
+    if !recent.is_empty() {
+        ui.menu_button("Opened last", |ui| {
+            for path in recent {
+                if ui.button(path.display().to_string()).clicked() {
+                    viewer.open_paths(vec![path]);
                     ui.close();
                 }
             }
-            if ui.button("with another sensor.toml…").clicked() {
-                viewer.asking = Some(Asking::new(Purpose::Compare, &viewer.sequence.folder));
-                ui.close();
-            }
-            ui.separator();
-            if ui.add_enabled(viewer.other.is_some(), egui::Button::new("Stop comparing")).clicked() {
-                viewer.other = None;
-                ui.close();
-            }
         });
-    });
-    ui.menu_button("Export", |ui| {
-        entry(viewer, ui, Command::ExportPicture, frames);
-        let mut ask = |ui: &mut Ui, text: &str, on: bool, purpose: Purpose, name: &str| {
-            if ui.add_enabled(on, egui::Button::new(text)).clicked() {
-                viewer.asking = Some(Asking::new(purpose, &viewer.sequence.beside(name)));
+    }
+    ui.separator();
+    menu_entry(viewer, ui, Command::Save, has_sensor);
+    menu_entry(viewer, ui, Command::SaveAs, has_sensor);
+}
+
+fn edit_menu(viewer: &mut Viewer, ui: &mut Ui) {
+    let (undo, redo, changed) =
+        viewer.session.as_ref().map_or((false, false, false), |s| (s.can_undo(), s.can_redo(), s.is_changed()));
+    menu_entry(viewer, ui, Command::Undo, undo);
+    menu_entry(viewer, ui, Command::Redo, redo);
+    menu_entry(viewer, ui, Command::Reset, changed);
+    menu_entry(viewer, ui, Command::Diff, changed);
+    ui.separator();
+    menu_entry(viewer, ui, Command::Mask, viewer.session.is_some());
+}
+
+fn frames_menu(viewer: &mut Viewer, ui: &mut Ui) {
+    let (has_sensor, has_frames) = (viewer.session.is_some(), !viewer.sequence.is_empty());
+    for c in [Command::Play, Command::Next, Command::Back, Command::First, Command::Last] {
+        menu_entry(viewer, ui, c, has_frames);
+    }
+    ui.separator();
+    for c in [Command::NextRefused, Command::BackRefused, Command::Worst] {
+        menu_entry(viewer, ui, c, has_frames);
+    }
+    ui.separator();
+    menu_entry(viewer, ui, Command::ProcessAll, has_sensor && has_frames && viewer.sweep.is_none());
+    menu_entry(viewer, ui, Command::Rerun, has_sensor && has_frames && viewer.sweep.is_none());
+}
+
+fn compare_menu(viewer: &mut Viewer, ui: &mut Ui) {
+    ui.add_enabled_ui(viewer.session.is_some(), |ui| {
+        for preset in Preset::ALL {
+            if ui.button(format!("with preset {}", preset.name())).clicked() {
+                viewer.compare_with_preset(*preset);
                 ui.close();
             }
-        };
-        let stem = viewer.sequence.stem().to_owned();
-        ask(ui, "Save video with overlays…", sensor && frames, Purpose::Video, &format!("{stem}.mp4"));
-        ask(ui, "Save results as CSV…", frames, Purpose::Table, &format!("{stem}-viewed.csv"));
+        }
+        if ui.button("with another sensor.toml…").clicked() {
+            viewer.path_dialog = Some(PathDialog::new(Purpose::Compare, &viewer.sequence.folder));
+            ui.close();
+        }
+        ui.separator();
+        if ui.add_enabled(viewer.other.is_some(), egui::Button::new("Stop comparing")).clicked() {
+            viewer.other = None;
+            ui.close();
+        }
     });
+}
+
+fn export_menu(viewer: &mut Viewer, ui: &mut Ui) {
+    let (has_sensor, has_frames) = (viewer.session.is_some(), !viewer.sequence.is_empty());
+    menu_entry(viewer, ui, Command::ExportPicture, has_frames);
+    let mut ask = |ui: &mut Ui, text: &str, on: bool, purpose: Purpose, name: &str| {
+        if ui.add_enabled(on, egui::Button::new(text)).clicked() {
+            viewer.path_dialog = Some(PathDialog::new(purpose, &viewer.sequence.default_output_path(name)));
+            ui.close();
+        }
+    };
+    let stem = viewer.sequence.stem().to_owned();
+    ask(ui, "Save video with overlays…", has_sensor && has_frames, Purpose::Video, &format!("{stem}.mp4"));
+    ask(ui, "Save results as CSV…", has_frames, Purpose::Table, &format!("{stem}-viewed.csv"));
 }
 
 fn messages(viewer: &mut Viewer, ui: &mut Ui) {
@@ -142,7 +154,10 @@ fn messages(viewer: &mut Viewer, ui: &mut Ui) {
                 closed = Some(i);
             }
             if let Some(path) = path
-                && ui.button("Recover it").on_hover_text("Writes a whole recording beside it, and opens that").clicked()
+                && ui
+                    .button("Recover it")
+                    .on_hover_text("Writes a complete recording next to it and opens that")
+                    .clicked()
             {
                 recover = Some(path.clone());
                 closed = Some(i);
@@ -159,11 +174,11 @@ fn messages(viewer: &mut Viewer, ui: &mut Ui) {
     }
 }
 
-/// Shows the progress of jobs that take longer than [`NOTICED`].
+/// Shows the progress of jobs that take longer than [`NOTICED_AFTER`].
 fn jobs(viewer: &Viewer, ui: &mut Ui) {
     for job in &viewer.jobs {
-        ui.ctx().request_repaint_after(NOTICED);
-        if job.age() < NOTICED {
+        ui.ctx().request_repaint_after(NOTICED_AFTER);
+        if job.age() < NOTICED_AFTER {
             continue;
         }
         ui.horizontal(|ui| {

@@ -14,7 +14,7 @@ use hzn_run::source::Picture;
 use hzn_run::source::picture::Samples;
 
 use super::Wake;
-use super::frame_view::{self, FrameInput, FrameView, Outcome, Shown};
+use super::frame_view::{FrameInput, FrameView, Outcome, Shown, process_frame};
 use super::paint::{self, Recipe, Warp};
 use super::store::Store;
 use crate::model::{Entry, Look, Plane, plane::Pinhole};
@@ -25,12 +25,12 @@ pub struct Setup {
     /// The configuration.
     pub config: Arc<Config>,
     /// Version number of the configuration.
-    pub changes: u64,
+    pub version: u64,
 }
 
 /// Request to process and show a picture.
 #[derive(Debug, Clone)]
-pub struct Ask {
+pub struct FrameRequest {
     /// Index of the picture in the sequence.
     pub index: usize,
     /// The picture.
@@ -54,7 +54,7 @@ pub struct Ask {
 enum Message {
     Open(Vec<std::path::PathBuf>),
     Recording(hzn_mcap::Pictures),
-    Look(Box<Ask>),
+    Request(Box<FrameRequest>),
 }
 
 /// Handle of the thread. The thread ends when the handle is dropped.
@@ -67,8 +67,8 @@ impl Engine {
     /// Starts the thread.
     pub fn start(wake: Wake) -> Self {
         let (send, messages) = unbounded();
-        let (sights, receive) = unbounded();
-        std::thread::spawn(move || Looker::default().run(&messages, &sights, &wake));
+        let (frame_views, receive) = unbounded();
+        std::thread::spawn(move || Worker::default().run(&messages, &frame_views, &wake));
         Self { send, receive }
     }
     /// Starts another sequence.
@@ -76,12 +76,12 @@ impl Engine {
         let _ = self.send.send(Message::Open(inputs));
     }
     /// Sets the reader for the pictures of the recording.
-    pub fn recording(&self, pictures: hzn_mcap::Pictures) {
+    pub fn set_recording(&self, pictures: hzn_mcap::Pictures) {
         let _ = self.send.send(Message::Recording(pictures));
     }
     /// Requests a picture. Earlier requests that have not been answered are dropped.
-    pub fn ask(&self, ask: Ask) {
-        let _ = self.send.send(Message::Look(Box::new(ask)));
+    pub fn request(&self, request: FrameRequest) {
+        let _ = self.send.send(Message::Request(Box::new(request)));
     }
     /// Returns the answers that have come since the last call, the newest last.
     pub fn answers(&self) -> impl Iterator<Item = FrameView> {
@@ -94,7 +94,7 @@ impl Engine {
 }
 
 #[derive(Default)]
-struct Looker {
+struct Worker {
     store: Store,
     sensors: Vec<(Arc<Config>, bool, AnySensor)>,
     warp: Warp,
@@ -103,7 +103,7 @@ struct Looker {
 }
 
 /// Returns the picture with the number of bits and the orientation that `input` names.
-fn told(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
+fn with_input(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
     match (&picture.samples, input.bits) {
         (Samples::Words(_), Some(bits)) if bits != picture.layout.bits => {
             Picture::clone(&picture).told(input).map(Arc::new)
@@ -113,8 +113,8 @@ fn told(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
     }
 }
 
-impl Looker {
-    fn run(&mut self, messages: &Receiver<Message>, sights: &Sender<FrameView>, wake: &Wake) {
+impl Worker {
+    fn run(&mut self, messages: &Receiver<Message>, frame_views: &Sender<FrameView>, wake: &Wake) {
         loop {
             let mut newest = None;
             // The thread waits only if there is nothing to decode in advance.
@@ -129,15 +129,15 @@ impl Looker {
                         (self.shown, newest) = (None, None);
                         self.ahead.clear();
                     }
-                    Message::Recording(pictures) => self.store.recording(pictures),
-                    Message::Look(ask) => newest = Some(ask),
+                    Message::Recording(pictures) => self.store.set_recording(pictures),
+                    Message::Request(request) => newest = Some(request),
                 }
             }
             match newest {
-                Some(ask) => {
-                    let sight = self.look(&ask);
-                    self.ahead = ask.ahead.into();
-                    if sights.send(sight).is_err() {
+                Some(request) => {
+                    let frame_view = self.process(&request);
+                    self.ahead = request.ahead.into();
+                    if frame_views.send(frame_view).is_err() {
                         return;
                     }
                     wake();
@@ -153,67 +153,61 @@ impl Looker {
         }
     }
 
-    fn look(&mut self, ask: &Ask) -> FrameView {
+    fn process(&mut self, request: &FrameRequest) -> FrameView {
         let begin = Instant::now();
-        let at_hand = self.store.has(ask.index);
-        let picture = self.store.get(ask.index, &ask.entry.place).and_then(|p| match ask.setups.first() {
-            Some(setup) => told(p, &setup.config.input),
+        let is_cached = self.store.has(request.index);
+        let picture = self.store.get(request.index, &request.entry.place).and_then(|p| match request.setups.first() {
+            Some(setup) => with_input(p, &setup.config.input),
             None => Ok(p),
         });
-        let decoding = (!at_hand).then(|| begin.elapsed());
-        let mut sight = FrameView {
-            index: ask.index,
-            name: ask.entry.name.clone(),
-            time_s: ask.entry.time_s,
-            data: ask.entry.data.clone(),
+        let decoding = (!is_cached).then(|| begin.elapsed());
+        let mut frame_view = FrameView {
+            index: request.index,
+            name: request.entry.name.clone(),
+            time_s: request.entry.time_s,
+            data: request.entry.data.clone(),
             picture: picture.clone(),
             image: None,
             camera: None,
             answers: Vec::new(),
-            changes: ask.setups.first().map_or(0, |s| s.changes),
+            version: request.setups.first().map_or(0, |s| s.version),
             decoding,
-            latency: ask.since.elapsed(),
+            latency: request.since.elapsed(),
         };
-        let Ok(picture) = picture else { return sight };
-        let subject = FrameInput {
-            index: ask.index,
-            name: &ask.entry.name,
-            time_s: ask.entry.time_s,
-            data: ask.entry.data.as_ref(),
+        let Ok(picture) = picture else { return frame_view };
+        let input = FrameInput {
+            index: request.index,
+            name: &request.entry.name,
+            time_s: request.entry.time_s,
+            data: request.entry.data.as_ref(),
             picture: &picture,
         };
-        self.sensors.truncate(ask.setups.len());
-        for (which, setup) in ask.setups.iter().enumerate() {
-            let outcome = match self.sensor(which, setup, ask.flight) {
+        self.sensors.truncate(request.setups.len());
+        for (index, setup) in request.setups.iter().enumerate() {
+            let outcome = match self.sensor(index, setup, request.flight) {
                 Ok((camera, sensor)) => {
-                    if which == 0 {
-                        sight.camera = Some(camera);
+                    if index == 0 {
+                        frame_view.camera = Some(camera);
                     }
-                    frame_view::look(subject, &setup.config, sensor, ask.touched && which == 0)
+                    process_frame(input, &setup.config, sensor, request.touched && index == 0)
                 }
-                Err(why) => Outcome {
-                    config: Arc::clone(&setup.config),
-                    bodies: Vec::new(),
-                    refused: Some(why),
-                    touched: None,
-                    touched_pixels: None,
-                },
+                Err(why) => Outcome { refused: Some(why), ..Outcome::new(&setup.config) },
             };
-            sight.answers.push(Arc::new(outcome));
+            frame_view.answers.push(Arc::new(outcome));
         }
-        sight.image = Some(self.show(ask, &picture, &sight));
-        sight.latency = ask.since.elapsed();
-        sight
+        frame_view.image = Some(self.show(request, &picture, &frame_view));
+        frame_view.latency = request.since.elapsed();
+        frame_view
     }
 
-    /// Returns the camera and the sensor number `which` with this configuration.
+    /// Returns the camera and the sensor number `index` with this configuration.
     fn sensor(
         &mut self,
-        which: usize,
+        index: usize,
         setup: &Setup,
         flight: bool,
     ) -> Result<(Arc<Camera<f64>>, &mut AnySensor), String> {
-        match self.sensors.get_mut(which).filter(|(_, own, _)| *own == flight) {
+        match self.sensors.get_mut(index).filter(|(_, is_flight, _)| *is_flight == flight) {
             // A sensor that tracks the threshold remembers the picture before, which may be any picture here. So it
             // starts anew.
             Some((config, _, sensor)) if *config != setup.config || config.tracks() => {
@@ -223,40 +217,45 @@ impl Looker {
             Some(_) => {}
             None => {
                 let sensor = AnySensor::new(&setup.config, flight).map_err(|e| e.to_string())?;
-                self.sensors.truncate(which);
+                self.sensors.truncate(index);
                 self.sensors.push((Arc::clone(&setup.config), flight, sensor));
             }
         }
-        match self.sensors.get_mut(which) {
+        match self.sensors.get_mut(index) {
             Some((.., sensor)) => Ok((Arc::new(sensor.camera().clone()), sensor)),
-            None => Err("the sensor before it could not be made".into()),
+            None => Err("the sensor of the session could not be made".into()),
         }
     }
 
     /// Returns the picture for the screen. It is painted only if something that it depends on has changed.
-    fn show(&mut self, ask: &Ask, picture: &hzn_run::source::Picture, sight: &FrameView) -> Arc<Shown> {
-        let config = ask.setups.first().map(|s| &s.config);
-        let camera = sight.camera.as_deref();
+    fn show(
+        &mut self,
+        request: &FrameRequest,
+        picture: &hzn_run::source::Picture,
+        frame_view: &FrameView,
+    ) -> Arc<Shown> {
+        let config = request.setups.first().map(|s| &s.config);
+        let camera = frame_view.camera.as_deref();
         let plane = match camera {
-            Some(camera) if ask.undistorted => Plane::Pinhole(Pinhole::new(camera)),
+            Some(camera) if request.undistorted => Plane::Pinhole(Pinhole::new(camera)),
             _ => Plane::Camera,
         };
-        let reached = || sight.answers.first()?.bodies.first()?.row.level;
+        let reached = || frame_view.answers.first()?.bodies.first()?.row.level;
         // Only painted properties count: in colour, another threshold does not change the picture.
-        let level = if ask.look == Look::Level { reached().unwrap_or(0) } else { 0 };
+        let level = if request.look == Look::Level { reached().unwrap_or(0) } else { 0 };
         let channel = match config {
-            Some(config) if ask.look != Look::Colour => config.input.channel,
+            Some(config) if request.look != Look::Colour => config.input.channel,
             _ => hzn_core::image::Channel::Mean,
         };
         let orient = config.map_or(Orient::AsStored, |config| config.input.orient);
-        let recipe = Recipe { look: ask.look, level, channel, orient, plane };
-        let of = (ask.index, recipe);
-        if let Some(shown) = self.shown.as_ref().filter(|s| s.of == of) {
+        let recipe = Recipe { look: request.look, level, channel, orient, plane };
+        let key = (request.index, recipe);
+        if let Some(shown) = self.shown.as_ref().filter(|s| s.key == key) {
             return Arc::clone(shown);
         }
         let lens = config.zip(camera).map(|(config, camera)| (&config.camera, camera));
-        let image = paint::paint(picture, &of.1, lens, &mut self.warp);
-        let shown = Arc::new(Shown { of, image: Arc::new(image) });
+        let image = paint::paint(picture, &key.1, lens, &mut self.warp);
+        let shown = Arc::new(Shown { key, image: Arc::new(image) });
         self.shown = Some(Arc::clone(&shown));
         shown
     }

@@ -12,11 +12,11 @@ use hzn_run::overlay;
 use hzn_run::sink::{Existing, RowFile as Table};
 use hzn_run::source::{Picture, Source};
 
-use super::frame_view::{self, FrameInput, FrameView, Outcome};
-use super::job::{Done, Halt, Progress};
-use super::walk::Walk;
+use super::frame_view::{FrameInput, FrameView, Outcome, process_frame};
+use super::job::{Done, JobError, Progress};
+use super::sequence_source::SequenceSource;
 use crate::model::settings::Layer;
-use crate::model::{Sequence, whole};
+use crate::model::{Sequence, atomic_file};
 
 /// Returns the annotations of the layers that are switched on.
 pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
@@ -30,8 +30,8 @@ pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
         }
         for r in &answer.residuals {
             match r.weight > 0.0 {
-                true if on(Layer::Inliers) => out.inliers.push(r.at),
-                false if on(Layer::Rejected) => out.rejected.push(r.at),
+                true if on(Layer::Inliers) => out.inliers.push(r.point),
+                false if on(Layer::Rejected) => out.rejected.push(r.point),
                 _ => {}
             }
         }
@@ -62,14 +62,14 @@ fn draw(picture: &Picture, outcome: Option<&Outcome>, layers: &[Layer]) -> image
 ///
 /// # Errors
 /// There is no picture, the name does not end in `.png`, or the file cannot be written.
-pub fn picture(sight: &FrameView, layers: &[Layer], path: &Path) -> Result<Done, Halt> {
+pub fn save_picture(frame_view: &FrameView, layers: &[Layer], path: &Path) -> Result<Done, JobError> {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-        return Err(Halt::Failed(format!("{}: the picture's ending must be .png", path.display())));
+        return Err(JobError::Failed(format!("{}: the file name of a picture must end in .png", path.display())));
     }
-    let picture = sight.picture.as_ref().map_err(Clone::clone)?;
-    let image = draw(picture, sight.answers.first().map(|o| &**o), layers);
+    let picture = frame_view.picture.as_ref().map_err(Clone::clone)?;
+    let image = draw(picture, frame_view.answers.first().map(|o| &**o), layers);
     let bytes = overlay::png(&image).map_err(|e| format!("{}: {e:#}", path.display()))?;
-    whole::write(path, &bytes)?;
+    atomic_file::write(path, &bytes)?;
     Ok(Done::Written(path.to_owned()))
 }
 
@@ -77,18 +77,18 @@ pub fn picture(sight: &FrameView, layers: &[Layer], path: &Path) -> Result<Done,
 ///
 /// # Errors
 /// The ending is another one, or the file cannot be written.
-pub fn table(rows: &[Row], path: &Path, progress: &Progress) -> Result<Done, Halt> {
-    let told = |error: hzn_run::Error| error.to_string();
-    let mut table = Table::create(path, Existing::Replace).map_err(told)?;
+pub fn save_table(rows: &[Row], path: &Path, progress: &Progress) -> Result<Done, JobError> {
+    let to_text = |error: hzn_run::Error| error.to_string();
+    let mut table = Table::create(path, Existing::Replace).map_err(to_text)?;
     let total = rows.len() as u64;
     for (i, row) in (0..).zip(rows) {
-        let written = progress.at(i, total).and_then(|()| table.write(row).map_err(|e| format!("{e:#}").into()));
+        let written = progress.report(i, total).and_then(|()| table.write(row).map_err(|e| format!("{e:#}").into()));
         if written.is_err() {
             table.discard();
             return written.map(|()| Done::Written(path.to_owned()));
         }
     }
-    table.finish().map_err(told)?;
+    table.finish().map_err(to_text)?;
     Ok(Done::Written(path.to_owned()))
 }
 
@@ -96,21 +96,23 @@ pub fn table(rows: &[Row], path: &Path, progress: &Progress) -> Result<Done, Hal
 ///
 /// # Errors
 /// The recording cannot be read, or the new file cannot be written.
-pub fn recover(path: &Path, progress: &Progress) -> Result<Done, Halt> {
+pub fn recover(path: &Path, progress: &Progress) -> Result<Done, JobError> {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let stem = name.trim_end_matches(".part").trim_end_matches(".mcap");
     let free = |name: String| Some(path.with_file_name(name)).filter(|p| !p.exists());
     let numbered = || (2..).find_map(|n: u64| free(format!("{stem}-recovered-{n}.mcap")));
-    let out = free(format!("{stem}-recovered.mcap")).or_else(numbered).ok_or_else(|| "no free name".to_owned())?;
-    match hzn_mcap::recover_while(path, &out, |done, total| progress.at(done, total).is_ok()) {
+    let out = free(format!("{stem}-recovered.mcap"))
+        .or_else(numbered)
+        .ok_or_else(|| format!("{}: no file name is free for the recovered recording", path.display()).to_owned())?;
+    match hzn_mcap::recover_while(path, &out, |done, total| progress.report(done, total).is_ok()) {
         Ok(found) => Ok(Done::Recovered { path: out, frames: found.frames }),
-        Err(hzn_mcap::Error::Stopped { .. }) => Err(Halt::Stopped),
-        Err(e) => Err(Halt::Failed(e.to_string())),
+        Err(hzn_mcap::Error::Stopped { .. }) => Err(JobError::Stopped),
+        Err(e) => Err(JobError::Failed(e.to_string())),
     }
 }
 
 /// A video of all pictures with their annotations.
-pub struct Film {
+pub struct Video {
     /// The pictures.
     pub sequence: Sequence,
     /// Configuration that the pictures are processed with.
@@ -123,17 +125,17 @@ pub struct Film {
     pub fps: f64,
 }
 
-impl Film {
+impl Video {
     /// Writes the video with ffmpeg.
     ///
     /// # Errors
     /// There is no ffmpeg, ffmpeg fails, or the sequence cannot be read to its end.
-    pub fn write(self, path: &Path, progress: &Progress) -> Result<Done, Halt> {
-        whole::replace(path, |part| self.shoot(part, path, progress))?;
+    pub fn write(self, path: &Path, progress: &Progress) -> Result<Done, JobError> {
+        atomic_file::replace(path, |part| self.encode(part, path, progress))?;
         Ok(Done::Written(path.to_owned()))
     }
 
-    fn shoot(self, part: &Path, path: &Path, progress: &Progress) -> Result<(), Halt> {
+    fn encode(self, part: &Path, path: &Path, progress: &Progress) -> Result<(), JobError> {
         let mut sensor = AnySensor::new(&self.config, self.flight).map_err(|e| e.to_string())?;
         let size = (u32::from(self.config.camera.width), u32::from(self.config.camera.height));
         let mut pipe = start_ffmpeg(part, size, self.fps)?;
@@ -150,32 +152,40 @@ impl Film {
             _ if end.status.success() => Ok(()),
             Some(_) if why.contains("No space left") => {
                 let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
-                Err(Halt::Failed(hzn_run::sink::advice(path, &full)))
+                Err(JobError::Failed(hzn_run::sink::advice(path, &full)))
             }
-            last => Err(Halt::Failed(format!("{}: ffmpeg: {}", path.display(), last.unwrap_or("ended with an error")))),
+            last => {
+                Err(JobError::Failed(format!("{}: ffmpeg: {}", path.display(), last.unwrap_or("ended with an error"))))
+            }
         }
     }
 
-    fn feed(self, pipe: &mut Child, sensor: &mut AnySensor, size: (u32, u32), progress: &Progress) -> Result<(), Halt> {
+    fn feed(
+        self,
+        pipe: &mut Child,
+        sensor: &mut AnySensor,
+        size: (u32, u32),
+        progress: &Progress,
+    ) -> Result<(), JobError> {
         let known: Vec<_> = self.sequence.entries.iter().map(|e| e.data.clone()).collect();
         let total = known.len() as u64;
-        let mut walk = Walk::new(self.sequence)?;
+        let mut source = SequenceSource::new(self.sequence)?;
         for (index, data) in known.iter().enumerate() {
-            progress.at(index as u64, total)?;
-            let item = walk.next().ok_or_else(|| "the sequence ends before its last frame".to_owned())?;
+            progress.report(index as u64, total)?;
+            let item = source.next().ok_or_else(|| "the sequence ends before its last frame".to_owned())?;
             let item = item.map_err(|e| format!("{e:#}"))?;
             // A picture that cannot be read or has another size becomes a black picture, so that the times stay right.
             let image = match item.payload.decode(Some(&self.config)) {
                 Ok((picture, _)) => {
                     let (name, time_s) = (&*item.name, item.data.as_ref().and_then(|d| d.time_s));
-                    let subject = FrameInput { index, name, time_s, data: data.as_ref(), picture: &picture };
-                    let outcome = frame_view::look(subject, &self.config, sensor, false);
+                    let input = FrameInput { index, name, time_s, data: data.as_ref(), picture: &picture };
+                    let outcome = process_frame(input, &self.config, sensor, false);
                     draw(&picture, Some(&outcome), &self.layers)
                 }
                 Err(_) => image::RgbImage::new(size.0, size.1),
             };
-            let input = pipe.stdin.as_mut().ok_or_else(|| "ffmpeg takes no input".to_owned())?;
-            if input.write_all(image.as_raw()).is_err() {
+            let stdin = pipe.stdin.as_mut().ok_or_else(|| "ffmpeg does not take input".to_owned())?;
+            if stdin.write_all(image.as_raw()).is_err() {
                 // ffmpeg itself says why, on its error output.
                 break;
             }
@@ -196,9 +206,7 @@ fn start_ffmpeg(path: &Path, (width, height): (u32, u32), fps: f64) -> Result<Ch
         .stderr(Stdio::piped())
         .spawn()
         .map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => {
-                "a video needs `ffmpeg` on PATH, and it is not there: install it".to_owned()
-            }
+            std::io::ErrorKind::NotFound => "a video needs `ffmpeg` on PATH: install it".to_owned(),
             _ => format!("ffmpeg cannot be started: {e}"),
         })
 }

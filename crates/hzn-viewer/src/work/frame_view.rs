@@ -17,7 +17,7 @@ use hzn_core::status::Stage;
 use hzn_core::{Config, Observer, Report, Solution, body};
 use hzn_mcap::Row;
 use hzn_run::engine::trace::Edge;
-use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Traces, Watch};
+use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};
 use hzn_run::source::Picture;
 use hzn_run::{explain, sink};
 
@@ -44,18 +44,26 @@ pub struct FrameView {
     /// Results: of the session, then of the configuration that it is compared with.
     pub answers: Vec<Arc<Outcome>>,
     /// Version number of the session's configuration.
-    pub changes: u64,
+    pub version: u64,
     /// Time to read and decode the picture; `None` if it was already decoded.
     pub decoding: Option<Duration>,
     /// Time from the request to the answer.
     pub latency: Duration,
 }
 
+impl FrameView {
+    /// Returns width and height of the picture in pixels, if it could be read.
+    pub fn size(&self) -> Option<Point> {
+        let layout = self.picture.as_ref().ok()?.layout;
+        Some([layout.width.into(), layout.height.into()])
+    }
+}
+
 /// A picture for the screen.
 #[derive(Debug)]
 pub struct Shown {
-    /// Index of the picture, and how it is shown.
-    pub of: (usize, Recipe),
+    /// Index and recipe of the picture that the pixels were painted for.
+    pub key: (usize, Recipe),
     /// The pixels.
     pub image: Arc<ColorImage>,
 }
@@ -73,6 +81,13 @@ pub struct Outcome {
     pub touched: Option<Arc<ColorImage>>,
     /// Number of different pixels that were read.
     pub touched_pixels: Option<usize>,
+}
+
+impl Outcome {
+    /// Returns the outcome of a picture that is not processed yet.
+    pub(super) fn new(config: &Arc<Config>) -> Self {
+        Self { config: Arc::clone(config), bodies: Vec::new(), refused: None, touched: None, touched_pixels: None }
+    }
 }
 
 /// Result for one body.
@@ -114,19 +129,46 @@ pub struct Residual {
     /// Weight in the fit, 0 to 1.
     pub weight: f64,
     /// The edge point, in pixels.
-    pub at: Point,
+    pub point: Point,
 }
 
 impl Residual {
     /// Returns the rejected point that is nearest to a point of the picture, within `reach_px`.
     pub fn rejected_at(all: &[Self], p: Point, reach_px: f64) -> Option<&Self> {
-        let apart = |r: &&Self| (r.at[0] - p[0]).hypot(r.at[1] - p[1]);
-        let rejected = all.iter().filter(|r| r.weight <= 0.0 && apart(r) <= reach_px);
-        rejected.min_by(|a, b| apart(a).total_cmp(&apart(b)))
+        let distance = |r: &&Self| (r.point[0] - p[0]).hypot(r.point[1] - p[1]);
+        let rejected = all.iter().filter(|r| r.weight <= 0.0 && distance(r) <= reach_px);
+        rejected.min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 }
 
 impl BodyResult {
+    /// Collects the result for a body. `camera` is the camera that the limb is drawn with.
+    fn new(
+        kind: body::Kind,
+        outcome: BodyOutcome,
+        row: Row,
+        expected_rad: Option<f64>,
+        trace: &Trace,
+        camera: &Camera<f64>,
+    ) -> Self {
+        let solution = outcome.report.as_ref().ok().and_then(|r| r.solution.as_ref()).copied();
+        let edges = trace.edges().clone();
+        let chosen = solution.and_then(|s| edges.iter().find(|e| e.candidate == s.candidate));
+        Self {
+            kind,
+            row,
+            sample: trace.level().map(|(_, mean, n)| (mean, n)),
+            times: trace.times().to_vec(),
+            elapsed: outcome.elapsed,
+            expected_rad,
+            limb: solution.map(|s| sink::fitted(&s.axis, s.fused_half_angle_rad, camera).limb).unwrap_or_default(),
+            axis: solution.and_then(|s| camera.project(&s.axis)).map(|p| [p.u, p.v]),
+            ellipse: solution.map(|s| ellipse(&s, camera)).unwrap_or_default(),
+            residuals: solution.zip(chosen).map(|(s, edge)| residuals(&s, edge, camera)).unwrap_or_default(),
+            report: outcome.report.map_err(|e| e.why),
+            edges,
+        }
+    }
     /// Returns the solution, if there is one.
     pub fn solution(&self) -> Option<&Solution<f64>> {
         self.report.as_ref().ok()?.solution.as_ref()
@@ -151,8 +193,8 @@ impl Watch for PixelTraces {
 }
 
 impl<T: Real + Into<f64>> Observer<T> for PixelTraces {
-    fn body(&self, which: u8) {
-        Observer::<T>::body(&self.traces, which);
+    fn body(&self, index: u8) {
+        Observer::<T>::body(&self.traces, index);
     }
     fn enter(&self, stage: Stage) {
         Observer::<T>::enter(&self.traces, stage);
@@ -197,68 +239,48 @@ pub struct FrameInput<'a> {
     pub picture: &'a Picture,
 }
 
-/// Processes a picture and returns all facts to show. With `touched`, the result includes the pixels that were read.
-pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySensor, touched: bool) -> Outcome {
-    let FrameInput { index, name, time_s, data, picture } = subject;
-    let mut outcome =
-        Outcome { config: Arc::clone(config), bodies: Vec::new(), refused: None, touched: None, touched_pixels: None };
-    let (w, h) = (picture.layout.width, picture.layout.height);
-    let (own_w, own_h) = (u32::from(config.camera.width), u32::from(config.camera.height));
-    if (w, h) != (own_w, own_h) {
-        outcome.refused = Some(format!(
-            "the picture is {w} x {h} px, the sensor's camera {own_w} x {own_h}: open the sensor.toml of this camera, \
-             or set camera.width and height and scale focal lengths and centre with them"
-        ));
-        return outcome;
+impl FrameInput<'_> {
+    /// Returns the processed picture, from the outcomes of its bodies.
+    fn finish(&self, found: Vec<BodyOutcome>) -> Finished {
+        Finished {
+            index: self.index as u64,
+            name: self.name.to_owned(),
+            time_s: self.time_s,
+            data: self.data.cloned(),
+            found,
+            drawing: hzn_mcap::Annotations::default(),
+            picture: None,
+            traces: None,
+            tip: None,
+            pages: 1,
+        }
     }
-    let view = match picture.view(config.input.channel) {
+}
+
+/// Processes a picture and returns all facts to show. With `touched`, the result includes the pixels that were read.
+pub fn process_frame(input: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySensor, touched: bool) -> Outcome {
+    let mut outcome = Outcome::new(config);
+    let view = match checked_view(input.picture, config) {
         Ok(view) => view,
         Err(why) => {
-            outcome.refused = Some(format!("{why} (input.channel)"));
+            outcome.refused = Some(why);
             return outcome;
         }
     };
     let bodies = config.each_body();
     let watch = PixelTraces { traces: Traces::new(bodies.len()), pixels: touched.then(RefCell::default) };
-    let watched = sensor.process_watched(&view, data, &watch);
+    let watched = sensor.process_watched(&view, input.data, &watch);
     // A second run measures the time without the observer. It is left out if the sensor tracks the threshold, because
     // the threshold would then come from the first run.
-    let plain = if config.tracks() { watched } else { sensor.process(&view, data, None) };
-    let finished = Finished {
-        index: index as u64,
-        name: name.to_owned(),
-        time_s,
-        data: data.cloned(),
-        found: plain.into_iter().map(BodyOutcome::from).collect(),
-        drawing: hzn_mcap::Annotations::default(),
-        picture: None,
-        traces: None,
-        tip: None,
-        pages: 1,
-    };
+    let plain = if config.tracks() { watched } else { sensor.process(&view, input.data, None) };
+    let finished = input.finish(plain.into_iter().map(BodyOutcome::from).collect());
     let rows = sink::rows(&finished, config);
-    let half_angles = sensor.expected_half_angles_rad(data);
+    let half_angles = sensor.expected_half_angles_rad(input.data);
     // The drawing takes the rotation rate into account, so every row is drawn where the sensor saw it.
-    let camera = &sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
+    let camera = &sensor.camera().turning(input.data.and_then(|d| d.rate_rad_s));
     let each = bodies.iter().zip(finished.found).zip(rows).zip(half_angles).zip(&watch.traces.each);
     for ((((body, found), row), expected), trace) in each {
-        let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref()).copied();
-        let edges = trace.edges().clone();
-        let chosen = solution.and_then(|s| edges.iter().find(|e| e.candidate == s.candidate));
-        outcome.bodies.push(BodyResult {
-            kind: body.kind,
-            row,
-            sample: trace.level().map(|(_, mean, n)| (mean, n)),
-            times: trace.times().to_vec(),
-            elapsed: found.elapsed,
-            expected_rad: expected.ok(),
-            limb: solution.map(|s| sink::fitted(&s.axis, s.fused_half_angle_rad, camera).limb).unwrap_or_default(),
-            axis: solution.and_then(|s| camera.project(&s.axis)).map(|p| [p.u, p.v]),
-            ellipse: solution.map(|s| ellipse(&s, camera)).unwrap_or_default(),
-            residuals: solution.zip(chosen).map(|(s, edge)| residuals(&s, edge, camera)).unwrap_or_default(),
-            report: found.report.map_err(|e| e.why),
-            edges,
-        });
+        outcome.bodies.push(BodyResult::new(body.kind, found, row, expected.ok(), trace, camera));
     }
     if let Some(pixels) = watch.pixels {
         let pixels = pixels.into_inner();
@@ -266,6 +288,19 @@ pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySenso
         outcome.touched = Some(Arc::new(touched_image(&view, &pixels)));
     }
     outcome
+}
+
+/// Returns the picture for the sensor, or the reason why the sensor cannot process it.
+fn checked_view<'a>(picture: &'a Picture, config: &Config) -> Result<ImageView<'a>, String> {
+    let (w, h) = (picture.layout.width, picture.layout.height);
+    let (own_w, own_h) = (u32::from(config.camera.width), u32::from(config.camera.height));
+    if (w, h) != (own_w, own_h) {
+        return Err(format!(
+            "the picture is {w} x {h} px, the sensor's camera {own_w} x {own_h}: open the sensor.toml of this camera, \
+             or set camera.width and height and scale focal lengths and centre with them"
+        ));
+    }
+    picture.view(config.input.channel).map_err(|why| format!("{why} (input.channel)"))
 }
 
 fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorImage {
@@ -287,7 +322,7 @@ fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorIma
 
 /// Returns two unit vectors perpendicular to the axis (camera frame): image x and y, turned with the optical axis onto
 /// the limb axis by the shortest rotation.
-fn across([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
+fn tangent_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
     let q = 1.0 / (1.0 + z).max(1e-9);
     [[1.0 - x * x * q, -x * y * q, -x], [-x * y * q, 1.0 - y * y * q, -y]]
 }
@@ -297,8 +332,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Returns the direction at `angle_rad` from the axis (camera frame). The azimuth counts from image x towards image y.
-fn beside(axis: [f64; 3], angle_rad: f64, azimuth_rad: f64) -> Option<UnitVec3<hzn_core::frames::Cam, f64>> {
-    let [b1, b2] = across(axis);
+fn direction_at(axis: [f64; 3], angle_rad: f64, azimuth_rad: f64) -> Option<UnitVec3<hzn_core::frames::Cam, f64>> {
+    let [b1, b2] = tangent_basis(axis);
     let ((s, c), (sa, ca)) = (angle_rad.sin_cos(), azimuth_rad.sin_cos());
     UnitVec3::try_new(std::array::from_fn(|i| c * axis[i] + s * (ca * b1[i] + sa * b2[i])))
 }
@@ -309,7 +344,7 @@ fn ellipse(s: &Solution<f64>, camera: &Camera<f64>) -> Vec<Point> {
     let point = |i: usize| {
         let (sin, cos) = (i as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
         let (a, b) = (3.0 * major * cos, 3.0 * minor * sin);
-        let p = camera.project(&beside(s.axis.xyz(), a.hypot(b), b.atan2(a) + angle)?)?;
+        let p = camera.project(&direction_at(s.axis.xyz(), a.hypot(b), b.atan2(a) + angle)?)?;
         Some([p.u, p.v])
     };
     (0..=STEPS).map(point).collect::<Option<_>>().unwrap_or_default()
@@ -317,19 +352,19 @@ fn ellipse(s: &Solution<f64>, camera: &Camera<f64>) -> Vec<Point> {
 
 fn residuals(s: &Solution<f64>, edge: &Edge, camera: &Camera<f64>) -> Vec<Residual> {
     let axis = s.axis.xyz();
-    let [b1, b2] = across(axis);
+    let [b1, b2] = tangent_basis(axis);
     let residual = |(at, weight): (&Point, &f64)| {
         let ray = camera.unproject(ImagePoint { u: at[0], v: at[1] })?.xyz();
         let (x, y) = (dot(ray, b1), dot(ray, b2));
         let azimuth = y.atan2(x);
-        let limb = camera.project(&beside(axis, s.fused_half_angle_rad, azimuth)?)?;
+        let limb = camera.project(&direction_at(axis, s.fused_half_angle_rad, azimuth)?)?;
         let outside = x.hypot(y).atan2(dot(ray, axis)) - s.fused_half_angle_rad;
         let distance = (at[0] - limb.u).hypot(at[1] - limb.v);
         Some(Residual {
             azimuth_deg: azimuth.to_degrees(),
             distance_px: distance.copysign(outside),
             weight: *weight,
-            at: *at,
+            point: *at,
         })
     };
     edge.points.iter().zip(&edge.weights).filter_map(residual).collect()
@@ -341,7 +376,7 @@ mod tests {
 
     #[test]
     fn the_nearest_rejected_point_is_found() {
-        let at = |x: f64, weight: f64| Residual { azimuth_deg: 0.0, distance_px: x, weight, at: [x, 0.0] };
+        let at = |x: f64, weight: f64| Residual { azimuth_deg: 0.0, distance_px: x, weight, point: [x, 0.0] };
         let all = [at(1.0, 0.0), at(2.0, 1.0), at(3.0, 0.0)];
         let found = |x: f64| Residual::rejected_at(&all, [x, 0.0], 1.5).map(|r| r.distance_px);
         assert_eq!((found(2.2), found(0.0), found(9.0)), (Some(3.0), Some(1.0), None));

@@ -25,14 +25,14 @@ pub enum Done {
 
 /// Reason why a job has no result. In both cases no file is left.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Halt {
+pub enum JobError {
     /// The job was stopped.
     Stopped,
     /// The job failed, for this reason.
     Failed(String),
 }
 
-impl From<String> for Halt {
+impl From<String> for JobError {
     fn from(why: String) -> Self {
         Self::Failed(why)
     }
@@ -51,10 +51,10 @@ impl Progress {
     ///
     /// # Errors
     /// The job was stopped.
-    pub fn at(&self, done: u64, total: u64) -> Result<(), Halt> {
+    pub fn report(&self, done: u64, total: u64) -> Result<(), JobError> {
         self.done.store(done, Ordering::Relaxed);
         self.total.store(total, Ordering::Relaxed);
-        if self.stop.load(Ordering::Relaxed) { Err(Halt::Stopped) } else { Ok(()) }
+        if self.stop.load(Ordering::Relaxed) { Err(JobError::Stopped) } else { Ok(()) }
     }
 }
 
@@ -63,7 +63,7 @@ pub struct Job {
     /// Name of the job for the user.
     pub name: &'static str,
     progress: Arc<Progress>,
-    end: Receiver<Result<Done, Halt>>,
+    end: Receiver<Result<Done, JobError>>,
     began: Instant,
 }
 
@@ -72,7 +72,7 @@ impl Job {
     pub fn start(
         name: &'static str,
         wake: &Wake,
-        work: impl FnOnce(&Progress) -> Result<Done, Halt> + Send + 'static,
+        work: impl FnOnce(&Progress) -> Result<Done, JobError> + Send + 'static,
     ) -> Self {
         let progress = Arc::new(Progress::default());
         let (send, end) = bounded(1);
@@ -106,7 +106,7 @@ impl Job {
         let _ = self.end.recv_timeout(Duration::from_secs(3));
     }
     /// Returns the result once the job has ended, and only once.
-    pub fn end(&self) -> Option<Result<Done, Halt>> {
+    pub fn end(&self) -> Option<Result<Done, JobError>> {
         self.end.try_recv().ok()
     }
 }
@@ -121,17 +121,17 @@ impl Drop for Job {
 mod tests {
     use super::*;
 
-    fn count(upto: u64) -> impl FnOnce(&Progress) -> Result<Done, Halt> {
+    fn count(upto: u64) -> impl FnOnce(&Progress) -> Result<Done, JobError> {
         move |progress| {
             for i in 0..upto {
-                progress.at(i, upto)?;
+                progress.report(i, upto)?;
                 std::thread::sleep(Duration::from_millis(1));
             }
             Ok(Done::Written("x".into()))
         }
     }
 
-    fn wait(job: &Job) -> Result<Done, Halt> {
+    fn wait(job: &Job) -> Result<Done, JobError> {
         job.end.recv_timeout(Duration::from_secs(30)).unwrap()
     }
 
@@ -147,6 +147,6 @@ mod tests {
         let job = Job::start("count", &(Arc::new(|| {}) as Wake), count(1_000_000));
         assert_eq!(job.end(), None);
         job.stop();
-        assert_eq!((wait(&job), job.is_stopping()), (Err(Halt::Stopped), true));
+        assert_eq!((wait(&job), job.is_stopping()), (Err(JobError::Stopped), true));
     }
 }

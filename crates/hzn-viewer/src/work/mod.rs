@@ -7,11 +7,11 @@ pub mod job;
 pub mod open;
 pub mod paint;
 mod reader;
+mod sequence_source;
 pub mod store;
 pub mod sweep;
-mod walk;
 
-pub use engine::{Ask, Engine, Setup};
+pub use engine::{Engine, FrameRequest, Setup};
 pub use frame_view::{BodyResult, FrameView};
 pub use job::Job;
 

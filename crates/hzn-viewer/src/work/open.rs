@@ -87,33 +87,33 @@ pub enum Event {
 pub fn start(request: Request, wake: Wake) -> Receiver<Event> {
     let (send, receive) = unbounded();
     std::thread::spawn(move || {
-        let teller = Teller { send, wake };
-        if let Err(why) = run(&request, &teller) {
-            teller.tell(Event::Failed(why));
+        let events = EventSender { channel: send, wake };
+        if let Err(why) = run(&request, &events) {
+            events.send(Event::Failed(why));
         }
     });
     receive
 }
 
-struct Teller {
-    send: Sender<Event>,
+struct EventSender {
+    channel: Sender<Event>,
     wake: Wake,
 }
 
-impl Teller {
+impl EventSender {
     /// Sends an event. Returns false if the receiver is gone.
-    fn tell(&self, event: Event) -> bool {
-        let heard = self.send.send(event).is_ok();
+    fn send(&self, event: Event) -> bool {
+        let is_received = self.channel.send(event).is_ok();
         (self.wake)();
-        heard
+        is_received
     }
 }
 
-fn run(request: &Request, teller: &Teller) -> Result<(), String> {
+fn run(request: &Request, events: &EventSender) -> Result<(), String> {
     match request.inputs.as_slice() {
-        [one] if one.is_file() && is_recording(one) => recording(one, request, teller),
-        [one] if is_table(one) => Err(format!("{}: is no picture or recording", one.display())),
-        _ => pictures(request, teller),
+        [one] if one.is_file() && is_recording(one) => open_recording(one, request, events),
+        [one] if is_table(one) => Err(format!("{}: is neither a picture nor a recording", one.display())),
+        _ => open_pictures(request, events),
     }
 }
 
@@ -128,15 +128,15 @@ fn is_table(path: &Path) -> bool {
 
 /// Returns the name of a file or folder for the title.
 fn title(path: &Path) -> String {
-    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    whole.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    absolute.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Reads the files next to the pictures.
-fn companions(request: &Request, folder: &Path, own: Option<SensorText>) -> (Opened, Option<Frames>) {
+fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<SensorText>) -> (Opened, Option<Frames>) {
     let mut opened = Opened { folder: folder.to_owned(), ..Opened::default() };
     let file =
-        |given: &Option<PathBuf>, name: &str| given.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
+        |named: &Option<PathBuf>, name: &str| named.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
     let mut sensor_file = |path: &Path| match std::fs::read_to_string(path) {
         Ok(text) => Some(SensorText { text, home: path.to_owned(), is_file: true }),
         Err(e) => {
@@ -144,9 +144,9 @@ fn companions(request: &Request, folder: &Path, own: Option<SensorText>) -> (Ope
             None
         }
     };
-    opened.sensor = match (&request.sensor, own) {
+    opened.sensor = match (&request.sensor, recorded_sensor) {
         (Some(path), _) => sensor_file(path),
-        (None, Some(own)) => Some(own),
+        (None, Some(recorded)) => Some(recorded),
         (None, None) => file(&None, "sensor.toml").and_then(|path| sensor_file(&path)),
     };
     let frames = file(&request.frames, "frames.csv").and_then(|path| match hzn_calib::frames::load(&path) {
@@ -173,7 +173,7 @@ fn companions(request: &Request, folder: &Path, own: Option<SensorText>) -> (Ope
 }
 
 /// Adds the warnings about the sensor.toml, and adds `bits` if the pictures show the number of bits of their samples.
-fn settle(opened: &mut Opened, source: &dyn Source) {
+fn complete_sensor(opened: &mut Opened, source: &dyn Source) {
     let Some(sensor) = &mut opened.sensor else { return };
     // The session reports errors of the sensor.toml.
     let Ok(parsed) = hzn_calib::sensor::parse(&sensor.text, &sensor.home) else { return };
@@ -188,34 +188,34 @@ fn settle(opened: &mut Opened, source: &dyn Source) {
 }
 
 /// Opens a recording: one of ours with results and sensor, or one of another program with pictures only.
-fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), String> {
+fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Result<(), String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
     let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    let own = index.sensor_toml().map(|text| SensorText {
+    let recorded_sensor = index.sensor_toml().map(|text| SensorText {
         text: text.to_owned(),
         home: folder.join("sensor.toml"),
         is_file: false,
     });
     // The truth of simulated pictures stays with the pictures: `flight.mcap` next to `flight/truth.csv`.
     let mut request = request.clone();
-    let of_folder = path.with_extension("").join("truth.csv");
-    if request.truth.is_none() && !folder.join("truth.csv").exists() && of_folder.exists() {
-        request.truth = Some(of_folder);
+    let truth_of_folder = path.with_extension("").join("truth.csv");
+    if request.truth.is_none() && !folder.join("truth.csv").exists() && truth_of_folder.exists() {
+        request.truth = Some(truth_of_folder);
     }
-    let (mut opened, frames) = companions(&request, &folder, own);
+    let (mut opened, frames) = read_companions(&request, &folder, recorded_sensor);
     opened.title = title(path);
     if let Ok(source) = source::open(std::slice::from_ref(&path.to_owned()), None, None) {
-        settle(&mut opened, source.as_ref());
+        complete_sensor(&mut opened, source.as_ref());
     }
-    teller.tell(Event::Opened(Box::new(opened)));
-    let mut frames_of = Gather { name: title(path), frames, pending: HashMap::new(), pictures_only: 0, last: None };
+    events.send(Event::Opened(Box::new(opened)));
+    let mut joiner = FrameJoiner { name: title(path), frames, pending: HashMap::new(), pictures_only: 0, last: None };
     let mut known = 0;
     loop {
         let part = match index.next_part() {
             Ok(Some(part)) => part,
             Ok(None) => break,
             Err(e) => {
-                teller.tell(Event::End { cut_off: false, note: Some(e.to_string()) });
+                events.send(Event::End { cut_off: false, note: Some(e.to_string()) });
                 return Ok(());
             }
         };
@@ -224,24 +224,24 @@ fn recording(path: &Path, request: &Request, teller: &Teller) -> Result<(), Stri
         }
         if known != index.channels() {
             known = index.channels();
-            teller.tell(Event::Pictures(index.pictures().map_err(|e| e.to_string())?));
+            events.send(Event::Pictures(index.pictures().map_err(|e| e.to_string())?));
         }
-        let batch = frames_of.take(part, index.has_reports());
-        if !batch.is_empty() && !teller.tell(Event::Frames(batch)) {
+        let batch = joiner.join(part, index.has_reports());
+        if !batch.is_empty() && !events.send(Event::Frames(batch)) {
             return Ok(());
         }
     }
-    if let Some(last) = frames_of.last.take() {
-        teller.tell(Event::Frames(vec![last]));
+    if let Some(last) = joiner.last.take() {
+        events.send(Event::Frames(vec![last]));
     }
     let broken = index.broken_chunks();
     let note = (broken > 0).then(|| format!("{broken} parts of the recording are damaged; their frames are missing"));
-    teller.tell(Event::End { cut_off: !index.is_complete(), note });
+    events.send(Event::End { cut_off: !index.is_complete(), note });
     Ok(())
 }
 
 /// Joins pictures and their results.
-struct Gather {
+struct FrameJoiner {
     name: String,
     frames: Option<Frames>,
     /// Pictures whose results have not been read yet, by sequence number.
@@ -252,8 +252,8 @@ struct Gather {
     last: Option<(Entry, Vec<Row>)>,
 }
 
-impl Gather {
-    fn take(&mut self, part: Vec<IndexEntry>, has_reports: bool) -> Vec<(Entry, Vec<Row>)> {
+impl FrameJoiner {
+    fn join(&mut self, part: Vec<IndexEntry>, has_reports: bool) -> Vec<(Entry, Vec<Row>)> {
         let mut out = Vec::new();
         for found in part {
             match found {
@@ -291,25 +291,25 @@ impl Gather {
 }
 
 /// Opens pictures in separate files, or a video.
-fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
+fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> {
     let open = || source::open(&request.inputs, request.raw, None);
     let mut source = open().map_err(|e| e.to_string())?;
-    let (mut opened, frames) = companions(request, &source.folder(), None);
+    let (mut opened, frames) = read_companions(request, &source.folder(), None);
     opened.title = match request.inputs.as_slice() {
         [one] => title(one),
         several => format!("{} pictures", several.len()),
     };
     opened.notes.extend(source.notes());
-    settle(&mut opened, source.as_ref());
-    teller.tell(Event::Opened(Box::new(opened)));
+    complete_sensor(&mut opened, source.as_ref());
+    events.send(Event::Opened(Box::new(opened)));
     let mut batch = Vec::new();
     for index in 0u64.. {
         let mut item = match source.next() {
             None => break,
             Some(Ok(item)) => item,
             Some(Err(e)) => {
-                teller.tell(Event::Frames(std::mem::take(&mut batch)));
-                teller.tell(Event::End { cut_off: false, note: Some(format!("{e:#}")) });
+                events.send(Event::Frames(std::mem::take(&mut batch)));
+                events.send(Event::End { cut_off: false, note: Some(format!("{e:#}")) });
                 return Ok(());
             }
         };
@@ -330,13 +330,13 @@ fn pictures(request: &Request, teller: &Teller) -> Result<(), String> {
         batch.push((Entry { name, time_s, data, place }, Vec::new()));
         // To know the times, a video is decoded and a file is opened. This takes long, so the pictures found so far are
         // sent.
-        if takes_long && batch.len() >= 25 && !teller.tell(Event::Frames(std::mem::take(&mut batch))) {
+        if takes_long && batch.len() >= 25 && !events.send(Event::Frames(std::mem::take(&mut batch))) {
             return Ok(());
         }
     }
-    teller.tell(Event::Frames(batch));
+    events.send(Event::Frames(batch));
     let missing = frames.as_ref().and_then(|f| missing_note(f, request, &source.folder()));
-    teller.tell(Event::End { cut_off: false, note: source.lost().or(missing) });
+    events.send(Event::End { cut_off: false, note: source.lost().or(missing) });
     Ok(())
 }
 
@@ -348,7 +348,7 @@ fn missing_note(frames: &Frames, request: &Request, folder: &Path) -> Option<Str
     let missing: Vec<&str> =
         frames.rows.iter().map(|r| r.file.as_str()).filter(|file| !folder.join(file).exists()).collect();
     let first = missing.first()?;
-    Some(format!("{} pictures that frames.csv names are not there, the first is {first}", missing.len()))
+    Some(format!("{} pictures in frames.csv do not exist; the first one is {first}", missing.len()))
 }
 
 #[cfg(test)]
@@ -356,39 +356,39 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    fn all(request: Request) -> Vec<Event> {
+    fn all_events(request: Request) -> Vec<Event> {
         start(request, Arc::new(|| {})).iter().collect()
     }
 
-    fn of(path: &Path) -> Request {
+    fn request_for(path: &Path) -> Request {
         Request { inputs: vec![path.to_owned()], ..Request::default() }
     }
 
     #[test]
-    fn what_cannot_be_opened_is_said() {
+    fn unusable_inputs_are_reported() {
         let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str, bytes: &[u8]| {
+        let file = |name: &str, bytes: &[u8]| {
             std::fs::write(dir.path().join(name), bytes).unwrap();
             dir.path().join(name)
         };
-        let why = |path: &Path| match all(of(path)).pop() {
+        let why = |path: &Path| match all_events(request_for(path)).pop() {
             Some(Event::Failed(why)) => why,
             other => panic!("{other:?}"),
         };
-        assert!(why(&at("a.mcap", b"no recording")).contains("is not an MCAP file"));
-        assert!(why(&at("b.csv", b"file\n")).contains("is no picture or recording"));
+        assert!(why(&file("a.mcap", b"no recording")).contains("is not an MCAP file"));
+        assert!(why(&file("b.csv", b"file\n")).contains("is neither a picture nor a recording"));
         assert!(why(&dir.path().join("none.png")).contains("no such file"));
     }
 
     #[test]
-    fn a_folder_is_there_with_what_lies_beside_it() {
+    fn a_folder_is_opened_with_the_files_next_to_it() {
         let dir = tempfile::tempdir().unwrap();
         for name in ["b.png", "a.png"] {
             image::GrayImage::new(8, 6).save(dir.path().join(name)).unwrap();
         }
         std::fs::write(dir.path().join("frames.csv"), "file,time_s,altitude_km\na.png,5.5,230\nc.png,9,1\n").unwrap();
         std::fs::write(dir.path().join("truth.csv"), "no,truth\n1,2\n").unwrap();
-        let events = all(of(dir.path()));
+        let events = all_events(request_for(dir.path()));
         let [Event::Opened(opened), Event::Frames(frames), Event::End { note, .. }] = events.as_slice() else {
             panic!("{events:?}")
         };
@@ -405,7 +405,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         std::fs::copy(full.join("iss-limb-2020-11-20.jpg"), dir.path().join("a.jpg")).unwrap();
         image::GrayImage::new(8, 6).save(dir.path().join("b.png")).unwrap();
-        let times: Vec<_> = all(of(dir.path()))
+        let times: Vec<_> = all_events(request_for(dir.path()))
             .iter()
             .flat_map(|event| match event {
                 Event::Frames(frames) => frames.iter().map(|(e, _)| e.time_s).collect(),

@@ -32,7 +32,8 @@ pub struct Recipe {
 /// Source of each pixel of a plane. It is computed once for a camera and a plane.
 #[derive(Debug, Default)]
 pub struct Warp {
-    of: Option<(Plane, hzn_core::camera::Config)>,
+    /// Plane and camera that the sources were computed for.
+    key: Option<(Plane, hzn_core::camera::Config)>,
     /// Index of the camera's pixel; `u32::MAX` outside the field of view of the lens.
     from: Vec<u32>,
 }
@@ -40,16 +41,16 @@ pub struct Warp {
 impl Warp {
     fn prepare(&mut self, plane: &Plane, config: &hzn_core::camera::Config, camera: &Camera<f64>) {
         let key = (plane.clone(), config.clone());
-        if self.of.as_ref() == Some(&key) {
+        if self.key.as_ref() == Some(&key) {
             return;
         }
         let (w, h) = (u32::from(camera.width()), u32::from(camera.height()));
         let source = |x: u32, y: u32| -> Option<u32> {
-            let [u, v] = plane.of(camera, [f64::from(x), f64::from(y)])?.map(f64::round);
+            let [u, v] = plane.to_camera(camera, [f64::from(x), f64::from(y)])?.map(f64::round);
             ((0.0..f64::from(w)).contains(&u) && (0.0..f64::from(h)).contains(&v)).then(|| v as u32 * w + u as u32)
         };
         self.from = (0..h).flat_map(|y| (0..w).map(move |x| source(x, y).unwrap_or(u32::MAX))).collect();
-        self.of = Some(key);
+        self.key = Some(key);
     }
 }
 
@@ -62,12 +63,12 @@ pub fn paint(
 ) -> ColorImage {
     let (w, h) = (picture.layout.width as usize, picture.layout.height as usize);
     let pixels = match (recipe.look, picture.view(recipe.channel)) {
-        (Look::Colour, _) | (_, Err(_)) => colours(picture),
-        (Look::Grey, Ok(view)) => each(&view, |v, full| {
+        (Look::Colour, _) | (_, Err(_)) => paint_colours(picture),
+        (Look::Grey, Ok(view)) => paint_values(&view, |v, full| {
             let v = (u32::from(v) * 255 / u32::from(full.max(1))) as u8;
             Color32::from_gray(v)
         }),
-        (Look::Level, Ok(view)) => each(&view, |v, _| if v >= recipe.level { LIT } else { DARK }),
+        (Look::Level, Ok(view)) => paint_values(&view, |v, _| if v >= recipe.level { LIT } else { DARK }),
     };
     let pixels = match camera {
         Some((config, camera))
@@ -82,7 +83,7 @@ pub fn paint(
     ColorImage::new([w, h], pixels)
 }
 
-fn colours(picture: &Picture) -> Vec<Color32> {
+fn paint_colours(picture: &Picture) -> Vec<Color32> {
     let n = usize::from(picture.layout.channels);
     let shift = picture.layout.bits.saturating_sub(8);
     match &picture.samples {
@@ -102,7 +103,7 @@ fn colours(picture: &Picture) -> Vec<Color32> {
 
 /// Returns the colour of each pixel, from its value and the full scale. The threshold may change with every frame of
 /// the window, so the colour of each value is computed only once and the memory is reserved at the start.
-fn each(view: &ImageView<'_>, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
+fn paint_values(view: &ImageView<'_>, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
     fn all<P: Pixels>(p: &P, colour: impl Fn(u16, u16) -> Color32) -> Vec<Color32> {
         let full = p.full_scale();
         let table: Vec<Color32> = (0..=full).map(|v| colour(v, full)).collect();

@@ -33,13 +33,13 @@ impl Reader {
                 Some(pictures) => pictures.read(place)?.image.map_or_else(Payload::Broken, source::recorded),
                 None => Payload::Broken("the recording is not open".into()),
             },
-            Place::Video(index) => self.of_video(*index)?,
-            Place::Nowhere => Payload::Broken("the recording holds no picture of this frame".into()),
+            Place::Video(index) => self.read_video(*index)?,
+            Place::Nowhere => Payload::Broken("the recording contains no picture of this frame".into()),
         })
     }
 
     /// Returns a picture of the video. A video is read forward only, so for an earlier picture it is reopened.
-    fn of_video(&mut self, index: u64) -> anyhow::Result<Payload> {
+    fn read_video(&mut self, index: u64) -> anyhow::Result<Payload> {
         let (source, next) = match &mut self.video {
             Some(video) if video.1 <= index => video,
             video => video.insert((source::open(&self.inputs, None, None).map_err(hzn_run::Error::into_cause)?, 0)),

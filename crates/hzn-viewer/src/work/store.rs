@@ -30,7 +30,7 @@ impl Store {
         *self = Self { reader: Reader::new(inputs, None), ..Self::default() };
     }
     /// Sets the reader for the pictures of the recording.
-    pub fn recording(&mut self, pictures: Pictures) {
+    pub fn set_recording(&mut self, pictures: Pictures) {
         self.reader.recording = Some(pictures);
     }
     /// Returns true if the picture with this index is in the cache.

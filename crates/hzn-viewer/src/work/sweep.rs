@@ -13,7 +13,7 @@ use hzn_run::engine::{self, End, Finished, Plan, Sink};
 use hzn_run::sink::{self, Existing};
 
 use super::Wake;
-use super::walk::Walk;
+use super::sequence_source::SequenceSource;
 use crate::model::Sequence;
 
 /// A sweep to be done.
@@ -23,7 +23,7 @@ pub struct Task {
     /// The configuration.
     pub config: Arc<Config>,
     /// Version number of the configuration.
-    pub changes: u64,
+    pub version: u64,
     /// The text of the sensor.toml.
     pub sensor_toml: String,
     /// Single precision and 2048 points, as on the flight computer.
@@ -40,7 +40,7 @@ pub enum Event {
         /// Index of the picture in the sequence.
         index: usize,
         /// Version number of the configuration.
-        changes: u64,
+        version: u64,
         /// Results of the picture.
         rows: Vec<Row>,
     },
@@ -114,7 +114,7 @@ impl Drop for Sweep {
 }
 
 fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Result<Event, String> {
-    let Task { sequence, config, changes, sensor_toml, flight, output } = task;
+    let Task { sequence, config, version, sensor_toml, flight, output } = task;
     let threads = if config.tracks() { 1 } else { std::thread::available_parallelism().map_or(1, usize::from) };
     let plan = Plan {
         config: (*config).clone(),
@@ -128,7 +128,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
         overlay: None,
         last: Vec::new(),
     };
-    let mut source = Walk::new(sequence)?;
+    let mut source = SequenceSource::new(sequence)?;
     let mut file = match &output {
         Some(path) => {
             let opened = sink::open(Some(path), Existing::Replace, &config, &sensor_toml);
@@ -138,7 +138,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
     };
     let mut seen = |frame: &Finished| {
         let rows = sink::rows(frame, &config);
-        let _ = send.send(Event::Frame { index: frame.index as usize, changes, rows });
+        let _ = send.send(Event::Frame { index: frame.index as usize, version, rows });
         wake();
     };
     let end = match &mut file {

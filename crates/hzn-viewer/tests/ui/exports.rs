@@ -28,7 +28,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     let saved = image::open(&png).unwrap().to_rgb8();
     assert_eq!(saved.dimensions(), (WIDTH.into(), HEIGHT.into()));
     // The saved picture shows the fitted limb in its place.
-    let limb = sight(&window).answers[0].bodies[0].limb.concat();
+    let limb = frame_view(&window).answers[0].bodies[0].limb.concat();
     let inside = |p: &&[f64; 2]| p[0] > 2.0 && p[1] > 2.0 && p[0] < 317.0 && p[1] < 237.0;
     let coloured = |p: &[f64; 2]| {
         let p = saved.get_pixel(p[0].round() as u32, p[1].round() as u32);
@@ -50,7 +50,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     // A name with another ending is refused.
     window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     path(&mut window, &dir.path().join("shown.jpg"), "Write");
-    said(&mut window, "ending must be .png");
+    said(&mut window, "must end in .png");
     assert_eq!(files(dir.path()), ["pictures", "plain.png", "shown.png"]);
 }
 
@@ -85,7 +85,7 @@ fn the_video_shows_every_frame_or_nothing_is_left() {
     said(&mut window, "Written");
     let mut watched = self::window();
     open(&mut watched, &film);
-    until(&mut watched, "the video has frames", |v| v.sequence().complete && v.sight().is_some());
+    until(&mut watched, "the video has frames", |v| v.sequence().complete && v.frame_view().is_some());
     assert_eq!(watched.state().sequence().len(), 4);
     assert_eq!(files(dir.path()), ["flight.mp4", "pictures"]);
 
@@ -212,7 +212,7 @@ fn a_full_disk_is_said_and_the_rest_goes_on() {
 
     window.key_press(Key::ArrowRight);
     settled(&mut window);
-    assert_eq!((sight(&window).index, answer(&window).0), (1, Status::Ok));
+    assert_eq!((frame_view(&window).index, answer(&window).0), (1, Status::Ok));
 }
 
 #[cfg(unix)]

@@ -12,7 +12,7 @@ use crate::window::*;
 const SIZE: Point = [WIDTH as f64, HEIGHT as f64];
 
 fn area(window: &Window) -> Area {
-    let rect = window.get_by_label(&format!("Picture {}", sight(window).name)).rect();
+    let rect = window.get_by_label(&format!("Picture {}", frame_view(window).name)).rect();
     Area { min: [rect.min.x.into(), rect.min.y.into()], size: [rect.width().into(), rect.height().into()] }
 }
 
@@ -61,10 +61,10 @@ fn near(a: Point, b: Point) -> bool {
 fn the_mask_is_drawn_moved_and_removed() {
     let (_dir, mut window) = window_on_flight();
     let before = answer(&window);
-    let edge_points = |w: &Window| sight(w).answers[0].bodies[0].row.edge_points.unwrap();
+    let edge_points = |w: &Window| frame_view(w).answers[0].bodies[0].row.edge_points.unwrap();
     let points = edge_points(&window);
     // The mask covers the right part of the limb.
-    let limb = sight(&window).answers[0].bodies[0].limb.concat();
+    let limb = frame_view(&window).answers[0].bodies[0].limb.concat();
     let middle = limb.iter().filter(|p| p[0] > 220.0 && p[0] < 230.0).map(|p| p[1]).next().unwrap();
     let corners = [[200.0, middle - 40.0], [300.0, middle - 40.0], [300.0, middle + 40.0], [200.0, middle + 40.0]];
     window.key_press(Key::M);
@@ -152,7 +152,7 @@ fn what_is_dropped_is_opened() {
     // Several dropped pictures are a new sequence.
     drop_files(&mut window, &[&pictures.join("1.png"), &pictures.join("2.png")]);
     until(&mut window, "two pictures", |v| v.sequence().len() == 2 && v.is_settled());
-    assert_eq!(sight(&window).name, "1.png");
+    assert_eq!(frame_view(&window).name, "1.png");
     // The file does not exist, so the open sequence stays.
     drop_files(&mut window, &[&dir.path().join("none.mcap")]);
     said(&mut window, "no such file");
@@ -172,21 +172,21 @@ fn a_click_in_a_plot_or_the_time_line_goes_to_the_frame() {
     let rect = plot(&window, "RMS");
     click(&mut window, pos2(rect.right() - 4.0, rect.center().y - 10.0));
     settled(&mut window);
-    assert_eq!(sight(&window).index, 3);
+    assert_eq!(frame_view(&window).index, 3);
     let rect = plot(&window, "3 sigma");
     // This point is to the right of the axis labels.
     click(&mut window, pos2(rect.left() + 60.0, rect.center().y - 10.0));
     settled(&mut window);
-    assert_eq!(sight(&window).index, 0);
+    assert_eq!(frame_view(&window).index, 0);
 
     let strip = window.get_by_label("Time line").rect();
     let place = |part: f32| pos2(strip.left() + part * strip.width(), strip.bottom() - 6.0);
     click(&mut window, place(0.6));
     settled(&mut window);
-    assert_eq!(sight(&window).index, 2);
+    assert_eq!(frame_view(&window).index, 2);
     drag(&mut window, place(0.6), place(0.3));
     settled(&mut window);
-    assert_eq!(sight(&window).index, 1);
+    assert_eq!(frame_view(&window).index, 1);
 }
 
 #[test]
@@ -201,8 +201,8 @@ fn a_click_among_the_residuals_shows_the_point() {
     let middle = area(&window);
     let middle = [middle.min[0] + middle.size[0] / 2.0, middle.min[1] + middle.size[1] / 2.0];
     let shown = view.to_picture(area(&window), SIZE, middle);
-    let residuals = &sight(&window).answers[0].bodies[0].residuals;
-    assert!(residuals.iter().any(|r| near(r.at, shown)), "{shown:?}");
+    let residuals = &frame_view(&window).answers[0].bodies[0].residuals;
+    assert!(residuals.iter().any(|r| near(r.point, shown)), "{shown:?}");
 }
 
 #[test]

@@ -15,7 +15,7 @@ fn open_step_tune_save_and_open_again() {
     window.get_by_label("Next frame").click();
     settled(&mut window);
     let first = answer(&window);
-    assert_eq!((sight(&window).index, first.0), (1, Status::Ok));
+    assert_eq!((frame_view(&window).index, first.0), (1, Status::Ok));
 
     // The threshold changes, and the answer follows.
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(1.5);
@@ -51,18 +51,18 @@ fn keys_step_and_find_what_has_no_answer() {
     let (_dir, mut window) = window_on_flight();
     window.key_press(Key::ArrowRight);
     settled(&mut window);
-    assert_eq!(sight(&window).index, 1);
+    assert_eq!(frame_view(&window).index, 1);
     window.get_by_label("Process all").click();
     window.run_steps(2);
     until(&mut window, "not processed", |v| v.processed() == 4);
     window.key_press(Key::N);
     settled(&mut window);
-    assert_eq!(sight(&window).index, 3);
+    assert_eq!(frame_view(&window).index, 3);
     assert_eq!(answer(&window).0, Status::NoLimb);
     assert!(window.query_by_label("no-limb").is_some());
     window.key_press(Key::Home);
     settled(&mut window);
-    assert_eq!(sight(&window).index, 0);
+    assert_eq!(frame_view(&window).index, 0);
     window.key_press(Key::F1);
     window.run_steps(4);
     assert!(window.query_by_label("Keys and mouse").is_some());
@@ -77,12 +77,12 @@ fn playing_shows_every_frame_once() {
         window.key_press(Key::Period);
     }
     window.key_press(Key::Space);
-    let mut shown = vec![sight(&window).index];
+    let mut shown = vec![frame_view(&window).index];
     let begin = std::time::Instant::now();
     while shown.last() != Some(&59) {
         assert!(begin.elapsed().as_secs() < 60, "{shown:?}");
         window.step();
-        shown.extend(Some(sight(&window).index).filter(|i| shown.last() != Some(i)));
+        shown.extend(Some(frame_view(&window).index).filter(|i| shown.last() != Some(i)));
     }
     assert!(shown.iter().copied().eq(0..60), "{shown:?}");
 }
@@ -94,8 +94,8 @@ fn two_presets_stand_side_by_side() {
     window.run_steps(3);
     window.get_by_label("with preset dlr-2022").click();
     window.run_steps(2);
-    until(&mut window, "not compared", |v| v.sight().is_some_and(|s| s.answers.len() == 2));
-    let [a, b] = [0, 1].map(|i| sight(&window).answers[i].clone());
+    until(&mut window, "not compared", |v| v.frame_view().is_some_and(|s| s.answers.len() == 2));
+    let [a, b] = [0, 1].map(|i| frame_view(&window).answers[i].clone());
     assert_ne!(a.config, b.config);
     assert_eq!(a.config.camera, b.config.camera);
     assert!(window.query_by_label("Compared with dlr-2022").is_some());
@@ -107,10 +107,10 @@ fn two_sensor_files_stand_side_by_side_with_the_difference() {
     let other = another_sensor(dir.path());
     menu(&mut window, "Compare", "with another sensor.toml…");
     path(&mut window, &other, "Open this");
-    until(&mut window, "not compared", |v| v.sight().is_some_and(|s| s.answers.len() == 2));
+    until(&mut window, "not compared", |v| v.frame_view().is_some_and(|s| s.answers.len() == 2));
     window.run_steps(3);
     assert!(window.query_by_label("Compared with other.toml").is_some());
-    let [a, b] = [0, 1].map(|i| sight(&window).answers[i].bodies[0].row.clone());
+    let [a, b] = [0, 1].map(|i| frame_view(&window).answers[i].bodies[0].row.clone());
     assert_eq!([a.status, b.status], [Status::Ok; 2]);
     let apart = hzn_viewer::model::rows::angle_deg(a.axis().unwrap(), b.axis().unwrap());
     assert!(apart > 0.0);
@@ -120,7 +120,7 @@ fn two_sensor_files_stand_side_by_side_with_the_difference() {
     // The session can be tuned further; the other sensor stays.
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(1.6);
     until(&mut window, "not equal", |v| {
-        v.sight().is_some_and(|s| {
+        v.frame_view().is_some_and(|s| {
             s.answers.len() == 2 && s.answers[0].bodies[0].row.axis() == s.answers[1].bodies[0].row.axis()
         })
     });
@@ -129,9 +129,9 @@ fn two_sensor_files_stand_side_by_side_with_the_difference() {
     menu(&mut window, "Compare", "with another sensor.toml…");
     path(&mut window, &other, "Open this");
     said(&mut window, "other.toml");
-    assert_eq!(sight(&window).answers.len(), 2);
+    assert_eq!(frame_view(&window).answers.len(), 2);
     menu(&mut window, "Compare", "Stop comparing");
-    until(&mut window, "still compared", |v| v.sight().is_some_and(|s| s.answers.len() == 1));
+    until(&mut window, "still compared", |v| v.frame_view().is_some_and(|s| s.answers.len() == 1));
 }
 
 #[test]

@@ -185,12 +185,12 @@ pub(crate) fn files(folder: &Path) -> Vec<String> {
     names
 }
 
-pub(crate) fn sight(window: &Window) -> &FrameView {
-    window.state().sight().unwrap()
+pub(crate) fn frame_view(window: &Window) -> &FrameView {
+    window.state().frame_view().unwrap()
 }
 
 /// Returns status, threshold and axis of the shown picture.
 pub(crate) fn answer(window: &Window) -> (Status, Option<u16>, Option<[f64; 3]>) {
-    let row = &sight(window).answers[0].bodies[0].row;
+    let row = &frame_view(window).answers[0].bodies[0].row;
     (row.status, row.level, row.axis())
 }

@@ -25,11 +25,11 @@ fn wrong_files_are_said_and_the_rest_goes_on() {
     assert_eq!(answer(&window).0, Status::Ok);
     window.key_press(Key::ArrowRight);
     settled(&mut window);
-    assert!(sight(&window).picture.as_ref().is_err_and(|why| why.contains("no picture")));
+    assert!(frame_view(&window).picture.as_ref().is_err_and(|why| why.contains("no picture")));
     assert!(window.query_by_label("unreadable").is_some());
     window.key_press(Key::ArrowRight);
     settled(&mut window);
-    let refused = sight(&window).answers[0].refused.clone().unwrap();
+    let refused = frame_view(&window).answers[0].refused.clone().unwrap();
     assert!(refused.contains("40 x 30") && refused.contains("320 x 240"), "{refused}");
     window.key_press(Key::ArrowRight);
     settled(&mut window);
@@ -42,7 +42,7 @@ fn missing_pictures_are_named() {
     flight(dir.path());
     std::fs::write(dir.path().join("frames.csv"), "file,time_s\n0.png,0\n1.png,1\nlost.png,2\ngone.png,3\n").unwrap();
     let mut window = window_on(dir.path());
-    said(&mut window, "2 pictures that frames.csv names are not there, the first is lost.png");
+    said(&mut window, "2 pictures in frames.csv do not exist; the first one is lost.png");
     assert_eq!((window.state().sequence().len(), answer(&window).0), (4, Status::Ok));
 }
 

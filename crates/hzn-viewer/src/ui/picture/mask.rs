@@ -2,23 +2,25 @@
 
 use egui::{Align2, Painter, PointerButton, Pos2, Response, Shape, Stroke, Ui, vec2};
 
-use super::REACH;
 use super::read_out::label;
-use super::stage::Stage;
 use crate::model::mask::MaskEdit;
+use crate::ui::placement::Placement;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
 
+/// Largest distance of the pointer from a corner that is grabbed, in screen points.
+const REACH: f64 = 9.0;
+
 /// Runs the tool. Returns true while a corner is grabbed.
-pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, stage: &Stage<'_>) -> bool {
+pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, placement: &Placement<'_>) -> bool {
     let (Some(mut tool), Some(session)) = (viewer.mask.take(), viewer.session.as_mut()) else { return false };
     let polygons = session.polygons();
-    let reach = REACH / stage.scale();
-    let at = response.interact_pointer_pos().or(response.hover_pos()).and_then(|p| stage.picture(p));
+    let reach = REACH / placement.scale();
+    let at = response.interact_pointer_pos().or(response.hover_pos()).and_then(|p| placement.to_picture(p));
     let mut new = None;
     if let Some(p) = at {
         if response.drag_started_by(PointerButton::Primary) {
-            let from = ui.input(|i| i.pointer.press_origin()).and_then(|p| stage.picture(p)).unwrap_or(p);
+            let from = ui.input(|i| i.pointer.press_origin()).and_then(|p| placement.to_picture(p)).unwrap_or(p);
             tool.grab(&polygons, from, reach);
         }
         if response.dragged_by(PointerButton::Primary) {
@@ -31,10 +33,10 @@ pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, stage: &St
             new = tool.remove(&polygons, p, reach);
         }
     }
-    let held = tool.holds();
+    let grabbing = tool.is_grabbing();
     if response.drag_stopped() {
         tool.release();
-        session.settle();
+        session.end_step();
     }
     let (enter, back, escape) = ui.input(|i| {
         (i.key_pressed(egui::Key::Enter), i.key_pressed(egui::Key::Backspace), i.key_pressed(egui::Key::Escape))
@@ -44,27 +46,27 @@ pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, stage: &St
     }
     let leave = escape && tool.open.is_empty();
     if back {
-        tool.back();
+        tool.remove_last_corner();
     }
     if escape {
         tool.open.clear();
     }
     if let Some(new) = new {
         session.set_polygons(&new);
-        if !held {
-            session.settle();
+        if !grabbing {
+            session.end_step();
         }
     }
     viewer.mask = (!leave).then_some(tool);
-    held
+    grabbing
 }
 
-pub(super) fn draw(tool: &MaskEdit, viewer: &Viewer, painter: &Painter, stage: &Stage<'_>, ui: &Ui) {
+pub(super) fn draw(tool: &MaskEdit, viewer: &Viewer, painter: &Painter, placement: &Placement<'_>, ui: &Ui) {
     let stroke = Stroke::new(2.0, theme::TRUTH);
     for corner in viewer.session.iter().flat_map(|s| s.polygons()).flatten() {
-        painter.extend(stage.screen(corner).map(|p| Shape::circle_filled(p, 4.5, theme::TRUTH)));
+        painter.extend(placement.to_screen(corner).map(|p| Shape::circle_filled(p, 4.5, theme::TRUTH)));
     }
-    let mut line: Vec<Pos2> = tool.open.iter().filter_map(|p| stage.screen(*p)).collect();
+    let mut line: Vec<Pos2> = tool.open.iter().filter_map(|p| placement.to_screen(*p)).collect();
     painter.extend(line.iter().map(|p| Shape::circle_filled(*p, 4.5, theme::TRUTH)));
     if !line.is_empty() {
         line.extend(ui.ctx().pointer_hover_pos());
@@ -74,12 +76,4 @@ pub(super) fn draw(tool: &MaskEdit, viewer: &Viewer, painter: &Painter, stage: &
                 removes a corner or an area. Backspace: one corner back. Esc: done.";
     let rect = painter.clip_rect();
     label(painter, rect.center_top() + vec2(0.0, 10.0), Align2::CENTER_TOP, text);
-}
-
-pub(in crate::ui) fn toggle(viewer: &mut Viewer) {
-    viewer.mask = match viewer.mask.take() {
-        Some(_) => None,
-        None if viewer.session.is_some() => Some(MaskEdit::default()),
-        None => None,
-    };
 }

@@ -2,31 +2,37 @@
 
 use egui::{Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
-use super::stage::Stage;
 use crate::model::Plane;
 use crate::model::settings::Layer;
 use crate::model::view::Point;
+use crate::ui::placement::Placement;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
 use crate::work::FrameView;
 use crate::work::frame_view::{BodyResult, Outcome};
 
 /// Draws all layers that are switched on.
-pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &FrameView, outcome: &Outcome, stage: &Stage<'_>) {
+pub(super) fn draw(
+    viewer: &Viewer,
+    painter: &Painter,
+    frame_view: &FrameView,
+    outcome: &Outcome,
+    placement: &Placement<'_>,
+) {
     let on = |layer| viewer.settings.shows(layer);
     if on(Layer::Mask) {
         for polygon in &outcome.config.mask.polygons_px {
-            let outline: Vec<Pos2> = polygon.iter().filter_map(|p| stage.screen(*p)).collect();
+            let outline: Vec<Pos2> = polygon.iter().filter_map(|p| placement.to_screen(*p)).collect();
             hatch(painter, &outline);
         }
     }
     if on(Layer::Circle)
-        && let Some((centre, a, b)) = stage.camera.and_then(|c| c.image_circle_px())
-        && stage.plane == Plane::Camera
+        && let Some((centre, a, b)) = placement.camera.and_then(|c| c.image_circle_px())
+        && placement.plane == Plane::Camera
     {
         let at = |i: usize| {
             let (s, c) = (i as f64 * std::f64::consts::TAU / 256.0).sin_cos();
-            stage.screen([centre.u + a * c, centre.v + b * s])
+            placement.to_screen([centre.u + a * c, centre.v + b * s])
         };
         painter.add(Shape::dashed_line(
             &(0..=256).filter_map(at).collect::<Vec<_>>(),
@@ -36,20 +42,20 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &FrameView, outcom
         ));
     }
     for answer in &outcome.bodies {
-        body(viewer, painter, answer, stage);
+        body(viewer, painter, answer, placement);
     }
     if on(Layer::Truth) {
-        for truth in viewer.truth.get(&sight.name).into_iter().flatten() {
-            let (Some(camera), Some(axis)) = (stage.camera, truth.axis()) else { continue };
+        for truth in viewer.truth.get(&frame_view.name).into_iter().flatten() {
+            let (Some(camera), Some(axis)) = (placement.camera, truth.axis()) else { continue };
             let limb = hzn_run::overlay::limb::lines(axis.xyz(), truth.half_angle_deg.to_radians(), camera);
-            lines(painter, stage, &limb, Stroke::new(1.5, theme::TRUTH));
-            if let Some(p) = camera.project(&axis).and_then(|p| stage.screen([p.u, p.v])) {
+            lines(painter, placement, &limb, Stroke::new(1.5, theme::TRUTH));
+            if let Some(p) = camera.project(&axis).and_then(|p| placement.to_screen([p.u, p.v])) {
                 cross(painter, p, 8.0, Stroke::new(1.5, theme::TRUTH));
             }
         }
     }
     if on(Layer::Sky) {
-        for (name, at) in sky(viewer, sight, stage) {
+        for (name, at) in sky(viewer, frame_view, placement) {
             painter.circle_stroke(at, 11.0, Stroke::new(1.5, theme::SKY));
             painter.text(at + vec2(14.0, 0.0), Align2::LEFT_CENTER, name, FontId::proportional(12.0), theme::SKY);
         }
@@ -59,21 +65,21 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, sight: &FrameView, outcom
 /// Returns the expected places of the Sun and the Moon on the screen. The Sun direction comes from frames.csv, else
 /// from the truth, else from time, position and attitude. The Moon direction comes from the truth, else from time,
 /// position and attitude.
-fn sky(viewer: &Viewer, sight: &FrameView, stage: &Stage<'_>) -> Vec<(&'static str, Pos2)> {
-    let Some(camera) = stage.camera else { return Vec::new() };
+fn sky(viewer: &Viewer, frame_view: &FrameView, placement: &Placement<'_>) -> Vec<(&'static str, Pos2)> {
+    let Some(camera) = placement.camera else { return Vec::new() };
     let mut out = Vec::new();
     let mut add = |name, direction: Option<[f64; 3]>| {
-        let found = direction.and_then(hzn_core::frames::UnitVec3::try_new).and_then(|d| camera.project(&d));
-        if let Some(at) = found.and_then(|p| stage.screen([p.u, p.v])) {
+        let projected = direction.and_then(hzn_core::frames::UnitVec3::try_new).and_then(|d| camera.project(&d));
+        if let Some(at) = projected.and_then(|p| placement.to_screen([p.u, p.v])) {
             out.push((name, at));
         }
     };
-    let truth = viewer.truth.get(&sight.name).and_then(|t| t.first());
-    let given = sight.data.as_ref();
-    let sun = given.and_then(|d| d.sun_camera).or_else(|| Some([truth?.sun_x?, truth?.sun_y?, truth?.sun_z?]));
-    add("Sun", sun.or_else(|| from_ephemeris(given?, hzn_nav::ephemeris::sun)));
+    let truth = viewer.truth.get(&frame_view.name).and_then(|t| t.first());
+    let data = frame_view.data.as_ref();
+    let sun = data.and_then(|d| d.sun_camera).or_else(|| Some([truth?.sun_x?, truth?.sun_y?, truth?.sun_z?]));
+    add("Sun", sun.or_else(|| from_ephemeris(data?, hzn_nav::ephemeris::sun)));
     let moon = truth.and_then(|t| Some([t.moon_x?, t.moon_y?, t.moon_z?]));
-    add("Moon", moon.or_else(|| from_ephemeris(given?, hzn_nav::ephemeris::moon)));
+    add("Moon", moon.or_else(|| from_ephemeris(data?, hzn_nav::ephemeris::moon)));
     out
 }
 
@@ -84,25 +90,25 @@ fn from_ephemeris(data: &hzn_calib::FrameData, place: impl Fn(f64) -> hzn_nav::e
     Some(turn.apply(&UnitVec3::try_new(seen.direction)?).xyz())
 }
 
-fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, stage: &Stage<'_>) {
+fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) {
     let on = |layer| viewer.settings.shows(layer);
-    let dot = (stage.scale() as f32 * 0.5).clamp(0.9, 5.0);
+    let dot = (placement.scale() as f32 * 0.5).clamp(0.9, 5.0);
     if on(Layer::Edges) {
         for edge in &answer.edges {
             let pointed = viewer.pointed == Some(edge.candidate);
             let colour = theme::edge(edge.candidate);
             let radius = if pointed { dot + 1.6 } else { dot };
             let points = edge.border.iter().map(|p| [f64::from(p.x), f64::from(p.y)]);
-            dots(painter, points.filter_map(|p| stage.screen(p)), radius, colour);
+            dots(painter, points.filter_map(|p| placement.to_screen(p)), radius, colour);
         }
     }
     if on(Layer::Limb) {
         // A dark line below keeps the limb visible on clouds.
-        lines(painter, stage, &answer.limb, Stroke::new(6.0, Color32::from_black_alpha(120)));
-        lines(painter, stage, &answer.limb, Stroke::new(3.4, theme::LIMB));
+        lines(painter, placement, &answer.limb, Stroke::new(6.0, Color32::from_black_alpha(120)));
+        lines(painter, placement, &answer.limb, Stroke::new(3.4, theme::LIMB));
     }
     let points = |kept: bool| {
-        answer.residuals.iter().filter(move |r| (r.weight > 0.0) == kept).filter_map(|r| stage.screen(r.at))
+        answer.residuals.iter().filter(move |r| (r.weight > 0.0) == kept).filter_map(|r| placement.to_screen(r.point))
     };
     if on(Layer::Rejected) {
         dots(painter, points(false), dot + 0.6, theme::REJECTED);
@@ -111,16 +117,16 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, stage: &Stage<'
         // The dots are narrower than the line of the limb, so that both are seen.
         dots(painter, points(true), dot, theme::INLIER);
     }
-    let inside = |p: &Point| (0..2).all(|i| (-0.5..stage.size[i] - 0.5).contains(&p[i]));
+    let inside = |p: &Point| (0..2).all(|i| (-0.5..placement.size[i] - 0.5).contains(&p[i]));
     if on(Layer::Axis) && answer.axis.filter(inside).is_none() {
-        arrow(painter, stage, answer);
+        arrow(painter, placement, answer);
     }
     if on(Layer::Axis)
-        && let Some(at) = answer.axis.filter(inside).and_then(|p| stage.screen(p))
+        && let Some(at) = answer.axis.filter(inside).and_then(|p| placement.to_screen(p))
     {
         cross(painter, at, 13.0, Stroke::new(4.0, Color32::from_black_alpha(140)));
         cross(painter, at, 12.0, Stroke::new(2.0, theme::AXIS));
-        let outline: Vec<Pos2> = answer.ellipse.iter().filter_map(|p| stage.screen(*p)).collect();
+        let outline: Vec<Pos2> = answer.ellipse.iter().filter_map(|p| placement.to_screen(*p)).collect();
         if outline.len() > 2 {
             painter.add(Shape::closed_line(outline, Stroke::new(1.5, theme::AXIS)));
         }
@@ -128,44 +134,48 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, stage: &Stage<'
 }
 
 /// Draws an arrow at the border towards an axis that is outside the picture.
-fn arrow(painter: &Painter, stage: &Stage<'_>, answer: &BodyResult) {
-    let (Some(s), Some(camera)) = (answer.solution(), stage.camera) else { return };
+fn arrow(painter: &Painter, placement: &Placement<'_>, answer: &BodyResult) {
+    let (Some(s), Some(camera)) = (answer.solution(), placement.camera) else { return };
     let [x, y, _] = s.axis.xyz();
     let length = x.hypot(y);
     if length < 1e-9 {
         return;
     }
-    let way = vec2((x / length) as f32, (y / length) as f32);
+    let direction = vec2((x / length) as f32, (y / length) as f32);
     let centre = camera.principal_point();
-    let from = stage.place([centre.u, centre.v]);
+    let from = placement.shown_to_screen([centre.u, centre.v]);
     let frame = painter.clip_rect().shrink(16.0).intersect(Rect::from_min_max(
-        stage.place([-0.5, -0.5]),
-        stage.place([stage.size[0] - 0.5, stage.size[1] - 0.5]),
+        placement.shown_to_screen([-0.5, -0.5]),
+        placement.shown_to_screen([placement.size[0] - 0.5, placement.size[1] - 0.5]),
     ));
     // The arrow goes to the border.
-    let far = |at: f32, way: f32, low: f32, high: f32| if way > 0.0 { (high - at) / way } else { (low - at) / way };
-    let reach = [far(from.x, way.x, frame.left(), frame.right()), far(from.y, way.y, frame.top(), frame.bottom())];
+    let far = |at: f32, direction: f32, low: f32, high: f32| {
+        if direction > 0.0 { (high - at) / direction } else { (low - at) / direction }
+    };
+    let reach =
+        [far(from.x, direction.x, frame.left(), frame.right()), far(from.y, direction.y, frame.top(), frame.bottom())];
     let reach = reach.into_iter().filter(|r| r.is_finite()).fold(f32::INFINITY, f32::min);
     if !(reach > 0.0 && reach.is_finite()) {
         return;
     }
-    let tip = from + way * (reach - 6.0);
-    let (back, side) = (tip - way * 32.0, vec2(-way.y, way.x) * 7.5);
-    let head = vec![tip, tip - way * 14.0 + side, tip - way * 14.0 - side];
-    painter.line_segment([back, tip - way * 12.0], Stroke::new(6.5, Color32::from_black_alpha(170)));
-    painter.line_segment([back, tip - way * 12.0], Stroke::new(3.5, theme::AXIS));
+    let tip = from + direction * (reach - 6.0);
+    let (back, side) = (tip - direction * 32.0, vec2(-direction.y, direction.x) * 7.5);
+    let head = vec![tip, tip - direction * 14.0 + side, tip - direction * 14.0 - side];
+    painter.line_segment([back, tip - direction * 12.0], Stroke::new(6.5, Color32::from_black_alpha(170)));
+    painter.line_segment([back, tip - direction * 12.0], Stroke::new(3.5, theme::AXIS));
     painter.add(Shape::convex_polygon(head, theme::AXIS, Stroke::new(1.0, Color32::from_black_alpha(150))));
     let degrees = s.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
     let text = format!("axis, {degrees:.1}° off the optical axis");
     let galley = painter.layout_no_wrap(text, FontId::proportional(12.0), theme::AXIS);
-    let rect = beside(Rect::from_two_pos(back, tip).expand(7.0), way, galley.size() + vec2(10.0, 4.0), frame);
+    let rect =
+        place_label(Rect::from_two_pos(back, tip).expand(7.0), direction, galley.size() + vec2(10.0, 4.0), frame);
     painter.rect_filled(rect, 4, Color32::from_black_alpha(200));
     painter.galley(rect.min + vec2(5.0, 2.0), galley, theme::AXIS);
 }
 
 /// Returns the place of a label next to an arrow. The label is as far back as the frame allows and never covers the
 /// arrow.
-fn beside(arrow: Rect, way: Vec2, size: Vec2, frame: Rect) -> Rect {
+fn place_label(arrow: Rect, direction: Vec2, size: Vec2, frame: Rect) -> Rect {
     let c = arrow.center();
     // The label may move along the border to stay within the frame.
     let x = (c.x - size.x / 2.0).min(frame.right() - size.x).max(frame.left());
@@ -177,7 +187,7 @@ fn beside(arrow: Rect, way: Vec2, size: Vec2, frame: Rect) -> Rect {
         pos2(x, arrow.bottom()),
     ]
     .map(|min| Rect::from_min_size(min, size));
-    let ahead = |r: &Rect| (r.center() - c).dot(way);
+    let ahead = |r: &Rect| (r.center() - c).dot(direction);
     places.sort_by(|a, b| ahead(a).total_cmp(&ahead(b)));
     places.into_iter().find(|r| frame.expand(0.5).contains_rect(*r)).unwrap_or(places[0])
 }
@@ -187,11 +197,11 @@ fn cross(painter: &Painter, at: Pos2, arm: f32, stroke: Stroke) {
     painter.line_segment([at - vec2(0.0, arm), at + vec2(0.0, arm)], stroke);
 }
 
-fn lines(painter: &Painter, stage: &Stage<'_>, lines: &[Vec<Point>], stroke: Stroke) {
+fn lines(painter: &Painter, placement: &Placement<'_>, lines: &[Vec<Point>], stroke: Stroke) {
     for line in lines {
         // A point that the plane cannot show ends the line.
-        for part in line.split(|p| stage.screen(*p).is_none()) {
-            painter.add(Shape::line(part.iter().filter_map(|p| stage.screen(*p)).collect(), stroke));
+        for part in line.split(|p| placement.to_screen(*p).is_none()) {
+            painter.add(Shape::line(part.iter().filter_map(|p| placement.to_screen(*p)).collect(), stroke));
         }
     }
 }
@@ -221,7 +231,7 @@ fn hatch(painter: &Painter, outline: &[Pos2]) {
         let mut from: Option<Pos2> = None;
         for i in 0..=steps {
             let p = pos2(bounds.left() + 2.0 * i as f32, y + 2.0 * i as f32);
-            let inside = bounds.contains(p) && crate::model::mask::inside(&polygon, [p.x.into(), p.y.into()]);
+            let inside = bounds.contains(p) && crate::model::mask::is_inside(&polygon, [p.x.into(), p.y.into()]);
             match (inside, from) {
                 (true, None) => from = Some(p),
                 (false, Some(start)) => {
@@ -248,13 +258,13 @@ mod tests {
         let frame = Rect::from_min_size(pos2(20.0, 30.0), vec2(500.0, 300.0));
         let size = vec2(180.0, 18.0);
         for i in 0..72 {
-            let way = Vec2::angled(i as f32 * std::f32::consts::TAU / 72.0);
+            let direction = Vec2::angled(i as f32 * std::f32::consts::TAU / 72.0);
             for tip in [pos2(24.0, 34.0), pos2(516.0, 34.0), pos2(516.0, 326.0), pos2(270.0, 326.0), pos2(24.0, 180.0)]
             {
-                let arrow = Rect::from_two_pos(tip, tip - way * 22.0).expand(7.0);
-                let label = beside(arrow, way, size, frame);
-                assert!(frame.expand(0.5).contains_rect(label), "{way:?} {tip:?} {label:?}");
-                assert!(!label.shrink(0.1).intersects(arrow), "{way:?} {tip:?} {label:?}");
+                let arrow = Rect::from_two_pos(tip, tip - direction * 22.0).expand(7.0);
+                let label = place_label(arrow, direction, size, frame);
+                assert!(frame.expand(0.5).contains_rect(label), "{direction:?} {tip:?} {label:?}");
+                assert!(!label.shrink(0.1).intersects(arrow), "{direction:?} {tip:?} {label:?}");
             }
         }
     }

@@ -3,8 +3,8 @@
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, vec2};
 use hzn_core::pixel::ImagePoint;
 
-use super::stage::Stage;
 use crate::model::{Plane, rows};
+use crate::ui::placement::Placement;
 use crate::work::frame_view::{BodyResult, FrameView, Outcome, Residual};
 use crate::work::paint;
 
@@ -15,19 +15,19 @@ const VALUES_FROM: f64 = 34.0;
 const REJECTED_REACH: f64 = 6.0;
 
 /// Writes the values on single pixels, if they are large enough.
-pub(super) fn values(painter: &Painter, sight: &FrameView, stage: &Stage<'_>, rect: Rect) {
-    let (Ok(picture), Plane::Camera) = (&sight.picture, &stage.plane) else { return };
-    if stage.scale() < VALUES_FROM {
+pub(super) fn values(painter: &Painter, frame_view: &FrameView, placement: &Placement<'_>, rect: Rect) {
+    let (Ok(picture), Plane::Camera) = (&frame_view.picture, &placement.plane) else { return };
+    if placement.scale() < VALUES_FROM {
         return;
     }
-    let channel = sight.answers.first().map_or(Default::default(), |o| o.config.input.channel);
-    let (Some(a), Some(b)) = (stage.picture(rect.min), stage.picture(rect.max)) else { return };
-    for y in (a[1].round().max(0.0) as u16)..=(b[1].round().clamp(0.0, stage.size[1] - 1.0) as u16) {
-        for x in (a[0].round().max(0.0) as u16)..=(b[0].round().clamp(0.0, stage.size[0] - 1.0) as u16) {
+    let channel = frame_view.answers.first().map_or(Default::default(), |o| o.config.input.channel);
+    let (Some(a), Some(b)) = (placement.to_picture(rect.min), placement.to_picture(rect.max)) else { return };
+    for y in (a[1].round().max(0.0) as u16)..=(b[1].round().clamp(0.0, placement.size[1] - 1.0) as u16) {
+        for x in (a[0].round().max(0.0) as u16)..=(b[0].round().clamp(0.0, placement.size[0] - 1.0) as u16) {
             let Some((value, _)) = paint::read(picture, channel, x, y) else { continue };
             let bright = f64::from(value) > 0.5 * f64::from((1u32 << picture.layout.bits) - 1);
             let colour = if bright { Color32::from_black_alpha(200) } else { Color32::from_white_alpha(170) };
-            let at = stage.place([f64::from(x), f64::from(y)]);
+            let at = placement.shown_to_screen([f64::from(x), f64::from(y)]);
             painter.text(at, Align2::CENTER_CENTER, value.to_string(), FontId::monospace(11.0), colour);
         }
     }
@@ -35,18 +35,18 @@ pub(super) fn values(painter: &Painter, sight: &FrameView, stage: &Stage<'_>, re
 
 /// Returns a description of the pixel under the pointer: its value, its ray in the camera frame and its angles.
 pub(super) fn under_pointer(
-    sight: &FrameView,
+    frame_view: &FrameView,
     outcome: Option<&Outcome>,
     body: usize,
-    stage: &Stage<'_>,
+    placement: &Placement<'_>,
     at: Pos2,
 ) -> Option<String> {
-    let p = stage.picture(at)?;
+    let p = placement.to_picture(at)?;
     let (x, y) = (p[0].round(), p[1].round());
-    if !(0.0..stage.size[0]).contains(&x) || !(0.0..stage.size[1]).contains(&y) {
+    if !(0.0..placement.size[0]).contains(&x) || !(0.0..placement.size[1]).contains(&y) {
         return None;
     }
-    let picture = sight.picture.as_ref().ok()?;
+    let picture = frame_view.picture.as_ref().ok()?;
     let channel = outcome.map_or(Default::default(), |o| o.config.input.channel);
     let (value, samples) = paint::read(picture, channel, x as u16, y as u16)?;
     let mut text = format!("({x:.0}, {y:.0})   {value}");
@@ -54,9 +54,9 @@ pub(super) fn under_pointer(
         let each: Vec<String> = samples.iter().map(u16::to_string).collect();
         text += &format!(" of ({})", each.join(", "));
     }
-    let ray = stage.camera.and_then(|c| c.unproject(ImagePoint { u: p[0], v: p[1] }));
+    let ray = placement.camera.and_then(|c| c.unproject(ImagePoint { u: p[0], v: p[1] }));
     let Some([rx, ry, rz]) = ray.map(|r| r.xyz()) else {
-        return Some(text + if stage.camera.is_some() { "   outside of the image circle" } else { "" });
+        return Some(text + if placement.camera.is_some() { "   outside of the image circle" } else { "" });
     };
     text += &format!("   ray ({rx:.4}, {ry:.4}, {rz:.4})   {:.3}° off axis", rz.clamp(-1.0, 1.0).acos().to_degrees());
     if let Some(s) = outcome.and_then(|o| o.bodies.get(body)).and_then(BodyResult::solution) {
@@ -66,7 +66,7 @@ pub(super) fn under_pointer(
         text += &format!("   {angle:.3}° from the body's axis, {:.3}° {side} the limb", beyond.abs());
     }
     if let Some((outcome, answer)) = outcome.and_then(|o| Some((o, o.bodies.get(body)?)))
-        && let Some(r) = Residual::rejected_at(&answer.residuals, p, REJECTED_REACH / stage.scale())
+        && let Some(r) = Residual::rejected_at(&answer.residuals, p, REJECTED_REACH / placement.scale())
     {
         let limit = outcome.config.reject.threshold_px;
         text += &format!("   rejected point: {:+.2} px from the fitted limb (threshold_px {limit})", r.distance_px);

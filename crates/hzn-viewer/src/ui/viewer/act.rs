@@ -1,24 +1,24 @@
 //! The actions of keys, menus and buttons.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hzn_core::Preset;
 
 use super::Viewer;
-use crate::model::{Look, Session};
-use crate::ui::dialogs::{Asking, Purpose};
-use crate::ui::{Command, picture};
+use crate::model::{Look, MaskEdit, Session};
+use crate::ui::Command;
+use crate::ui::path_dialog::{PathDialog, Purpose};
 
 impl Viewer {
     /// Executes a command.
     pub fn run(&mut self, command: Command, ctx: &egui::Context) {
         let count = self.sequence.len();
         match command {
-            Command::Open => self.asking = Some(Asking::new(Purpose::Open, &self.sequence.folder)),
+            Command::Open => self.path_dialog = Some(PathDialog::new(Purpose::Open, &self.sequence.folder)),
             Command::Save => self.save(),
             Command::SaveAs => {
                 if let Some(session) = &self.session {
-                    self.asking = Some(Asking::new(Purpose::SaveSensor, session.home()));
+                    self.path_dialog = Some(PathDialog::new(Purpose::SaveSensor, session.home()));
                 }
             }
             Command::Undo => self.session.iter_mut().for_each(Session::undo),
@@ -36,12 +36,12 @@ impl Viewer {
             Command::Worst => self.go_worst(),
             Command::Faster => self.playback.change_speed(true),
             Command::Slower => self.playback.change_speed(false),
-            Command::Fit | Command::Actual | Command::ZoomIn | Command::ZoomOut => picture::zoom(self, command, ctx),
+            Command::Fit | Command::Actual | Command::ZoomIn | Command::ZoomOut => self.zoom(command, ctx),
             Command::Colour => self.settings.look = Look::Colour,
             Command::Grey => self.settings.look = Look::Grey,
             Command::Level => self.settings.look = Look::Level,
             Command::Undistorted => self.settings.undistorted = !self.settings.undistorted,
-            Command::Mask => picture::toggle_mask(self),
+            Command::Mask => self.toggle_mask(),
             Command::Layers => self.layers_hidden = !self.layers_hidden,
             Command::Compare => match self.other.take() {
                 Some(_) => {}
@@ -51,13 +51,13 @@ impl Viewer {
             Command::Rerun => {
                 if self.session.is_some() && count > 0 {
                     let name = format!("{}-again.mcap", self.sequence.stem());
-                    self.asking = Some(Asking::new(Purpose::Rerun, &self.sequence.beside(&name)));
+                    self.path_dialog = Some(PathDialog::new(Purpose::Rerun, &self.sequence.default_output_path(&name)));
                 }
             }
             Command::ExportPicture => {
-                let name = hzn_run::overlay::file_name(self.sight.as_ref().map_or("frame", |s| &s.name));
+                let name = hzn_run::overlay::file_name(self.frame_view.as_ref().map_or("frame", |s| &s.name));
                 let name = format!("overlay-{name}");
-                self.asking = Some(Asking::new(Purpose::Picture, &self.sequence.beside(&name)));
+                self.path_dialog = Some(PathDialog::new(Purpose::Picture, &self.sequence.default_output_path(&name)));
             }
             Command::Stages => self.settings.stages = !self.settings.stages,
             Command::Plots => self.settings.plots = !self.settings.plots,
@@ -70,7 +70,7 @@ impl Viewer {
         let Some(session) = &self.session else { return };
         let Some(path) = session.path().map(Path::to_owned) else {
             // The text comes from a recording, so the user has to confirm the path.
-            self.asking = Some(Asking::new(Purpose::SaveSensor, session.home()));
+            self.path_dialog = Some(PathDialog::new(Purpose::SaveSensor, session.home()));
             return;
         };
         self.save_to(&path);
@@ -79,8 +79,8 @@ impl Viewer {
     /// Saves the sensor.toml to `path`, which becomes the file of the session.
     pub(in crate::ui) fn save_to(&mut self, path: &Path) {
         match self.session.as_mut().map(|s| s.save(path)) {
-            Some(Ok(())) => self.say(format!("Saved: {}", path.display())),
-            Some(Err(why)) => self.say_bad(why),
+            Some(Ok(())) => self.add_note(format!("Saved: {}", path.display())),
+            Some(Err(why)) => self.add_problem(why),
             None => {}
         }
     }
@@ -88,7 +88,7 @@ impl Viewer {
     fn go_refused(&mut self, back: bool) {
         match self.rows.next_refused(self.playback.frame(), back, self.body) {
             Some(frame) => self.playback.go(frame, self.sequence.len()),
-            None => self.say("No frame is without an answer, among those that were processed."),
+            None => self.add_note("All processed frames have an answer."),
         }
     }
 
@@ -107,8 +107,8 @@ impl Viewer {
             return;
         }
         // If the shown picture is the worst one of the last call, the next worst follows.
-        let at = worst.iter().position(|&i| i == self.playback.frame());
-        self.worst = if at == Some(self.worst) { (self.worst + 1) % worst.len() } else { 0 };
+        let position = worst.iter().position(|&i| i == self.playback.frame());
+        self.worst = if position == Some(self.worst) { (self.worst + 1) % worst.len() } else { 0 };
         if let Some(&frame) = worst.get(self.worst) {
             self.playback.go(frame, self.sequence.len());
         }
@@ -124,13 +124,81 @@ impl Viewer {
         match Session::open(path) {
             Ok(session) => {
                 if let Some(problem) = session.problem() {
-                    self.say_bad(problem.to_string());
+                    self.add_problem(problem.to_string());
                     return;
                 }
                 let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
                 self.other = Some((name, session));
             }
-            Err(problem) => self.say_bad(problem.to_string()),
+            Err(problem) => self.add_problem(problem.to_string()),
         }
+    }
+
+    /// Takes the answer of the system's dialog for paths.
+    pub(super) fn poll_path_dialog(&mut self) {
+        if self.path_dialog.as_mut().is_some_and(PathDialog::take_answer) {
+            self.accept_path();
+        }
+    }
+
+    /// Does what the path of the dialog is for, and closes the dialog.
+    pub(in crate::ui) fn accept_path(&mut self) {
+        let Some(path_dialog) = self.path_dialog.take() else { return };
+        let path = PathBuf::from(path_dialog.text.trim());
+        if path.as_os_str().is_empty() {
+            return;
+        }
+        match path_dialog.purpose {
+            Purpose::Open => self.open_paths(vec![path]),
+            Purpose::SaveSensor => self.save_to(&path),
+            Purpose::Compare => self.compare_with_file(&path),
+            Purpose::Picture => self.export_picture(path),
+            Purpose::Video => self.export_video(path),
+            Purpose::Table => self.export_table(path),
+            Purpose::Rerun => self.process_all(Some(path)),
+        }
+    }
+
+    /// Starts or ends the drawing of the mask.
+    pub(in crate::ui) fn toggle_mask(&mut self) {
+        self.mask = match self.mask.take() {
+            Some(_) => None,
+            None if self.session.is_some() => Some(MaskEdit::default()),
+            None => None,
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use crossbeam_channel::bounded;
+
+    use super::*;
+    use crate::model::Settings;
+
+    /// Returns a viewer in which the system's dialog has given this answer.
+    fn browsed(purpose: Purpose, answer: Option<PathBuf>) -> Viewer {
+        let mut viewer = Viewer::new(Settings::default(), None, Arc::new(|| {}));
+        let (send, receive) = bounded(1);
+        viewer.path_dialog =
+            Some(PathDialog { browsing: Some(receive), ..PathDialog::new(purpose, Path::new("/typed")) });
+        viewer.poll_path_dialog();
+        assert!(viewer.path_dialog.as_ref().is_some_and(|a| a.browsing.is_some()), "the user takes time");
+        send.send(answer).unwrap();
+        viewer.poll_path_dialog();
+        viewer
+    }
+
+    #[test]
+    fn what_is_picked_is_opened_and_a_name_to_write_is_looked_at_first() {
+        let picked = PathBuf::from("/picked/flight.mcap");
+        let opened = browsed(Purpose::Open, Some(picked.clone()));
+        assert!(opened.path_dialog.is_none() && opened.settings.recent == [picked.clone()]);
+        let named = browsed(Purpose::Table, Some(picked.clone()));
+        assert!(named.path_dialog.is_some_and(|a| a.text == "/picked/flight.mcap" && a.browsing.is_none()));
+        let left = browsed(Purpose::Open, None);
+        assert!(left.path_dialog.is_some_and(|a| a.text == "/typed") && left.settings.recent.is_empty());
     }
 }

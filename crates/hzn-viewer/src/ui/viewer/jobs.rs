@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use super::Viewer;
 use crate::model::settings::Layer;
-use crate::work::export::{self, Film};
-use crate::work::job::{Done, Halt, Job, Progress};
+use crate::work::export::{self, Video};
+use crate::work::job::{Done, Job, JobError, Progress};
 use crate::work::sweep::{self, Sweep};
 
 impl Viewer {
     /// Processes all pictures, for the plots or into a file.
     pub(in crate::ui) fn process_all(&mut self, output: Option<PathBuf>) {
         let Some(session) = &self.session else {
-            self.say("Open a sensor.toml first.");
+            self.add_note("Open a sensor.toml first.");
             return;
         };
         let Some(config) = session.config().map(Arc::clone) else { return };
@@ -21,13 +21,13 @@ impl Viewer {
         if let (Some(output), Some(open)) = (&output, &self.sequence.recording)
             && same(output, open)
         {
-            self.say_bad(format!("{}: is the recording that is open; write into another file", output.display()));
+            self.add_problem(format!("{}: is the recording that is open; write to another file", output.display()));
             return;
         }
         let task = sweep::Task {
             sequence: self.sequence.clone(),
             config,
-            changes: session.changes(),
+            version: session.version(),
             sensor_toml: session.sheet().text().to_owned(),
             flight: self.flight,
             output,
@@ -37,15 +37,15 @@ impl Viewer {
 
     /// Saves the picture with its overlays.
     pub(in crate::ui) fn export_picture(&mut self, path: PathBuf) {
-        let Some(sight) = self.sight.clone() else { return };
+        let Some(frame_view) = self.frame_view.clone() else { return };
         let layers = self.layers_drawn();
-        self.begin("Saving the picture", move |_| export::picture(&sight, &layers, &path));
+        self.start_job("Saving the picture", move |_| export::save_picture(&frame_view, &layers, &path));
     }
 
     /// Saves the newest results of all pictures.
     pub(in crate::ui) fn export_table(&mut self, path: PathBuf) {
         let rows: Vec<_> = self.rows.all().cloned().collect();
-        self.begin("Saving results", move |progress| export::table(&rows, &path, progress));
+        self.start_job("Saving results", move |progress| export::save_table(&rows, &path, progress));
     }
 
     /// Saves all pictures with their overlays as a video.
@@ -53,36 +53,40 @@ impl Viewer {
         let Some(config) = self.session.as_ref().and_then(|s| s.config().map(Arc::clone)) else { return };
         let fps = self.sequence.duration_s(0).filter(|d| *d > 0.0).map_or(25.0, |d| (1.0 / d).clamp(1.0, 60.0));
         let (sequence, layers, flight) = (self.sequence.clone(), self.layers_drawn(), self.flight);
-        let film = Film { sequence, config, flight, layers, fps };
-        self.begin("Saving the video", move |progress| film.write(&path, progress));
+        let video = Video { sequence, config, flight, layers, fps };
+        self.start_job("Saving the video", move |progress| video.write(&path, progress));
     }
 
     /// Recovers a recording that was cut off; the recovered recording is then opened.
     pub(in crate::ui) fn recover(&mut self, path: PathBuf) {
-        self.begin("Recovering the recording", move |progress| export::recover(&path, progress));
+        self.start_job("Recovering the recording", move |progress| export::recover(&path, progress));
     }
 
     fn layers_drawn(&self) -> Vec<Layer> {
         if self.layers_hidden { Vec::new() } else { self.settings.layers.clone() }
     }
 
-    fn begin(&mut self, name: &'static str, work: impl FnOnce(&Progress) -> Result<Done, Halt> + Send + 'static) {
+    fn start_job(
+        &mut self,
+        name: &'static str,
+        work: impl FnOnce(&Progress) -> Result<Done, JobError> + Send + 'static,
+    ) {
         self.jobs.push(Job::start(name, &self.wake, work));
     }
 
     /// Takes the results of finished jobs.
-    pub(super) fn ended(&mut self) {
+    pub(super) fn take_finished_jobs(&mut self) {
         let mut ends = Vec::new();
         self.jobs.retain(|job| job.end().map(|end| ends.push((job.name, end))).is_none());
         for (name, end) in ends {
             match end {
-                Ok(Done::Written(path)) => self.say(format!("Written: {}", path.display())),
+                Ok(Done::Written(path)) => self.add_note(format!("Written: {}", path.display())),
                 Ok(Done::Recovered { path, frames }) => {
                     self.open_paths(vec![path.clone()]);
-                    self.say(format!("{frames} frames recovered into {}", path.display()));
+                    self.add_note(format!("{frames} frames recovered into {}", path.display()));
                 }
-                Err(Halt::Stopped) => self.say(format!("{name} was stopped; no file was written.")),
-                Err(Halt::Failed(why)) => self.say_bad(why),
+                Err(JobError::Stopped) => self.add_note(format!("{name} was stopped; no file was written.")),
+                Err(JobError::Failed(why)) => self.add_problem(why),
             }
         }
     }

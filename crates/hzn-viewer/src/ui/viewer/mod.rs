@@ -2,7 +2,9 @@
 
 mod act;
 mod jobs;
+mod request_key;
 mod threads;
+mod zoom;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -12,20 +14,14 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::Receiver;
 use hzn_sim::truth::Truth;
 
-use super::dialogs::Asking;
-use super::{command, compare, dialogs, help, picture, plots, side, stages, theme, timeline, top};
+use super::path_dialog::PathDialog;
+use super::textures::Textures;
 use crate::model::{MaskEdit, Playback, ResultHistory, Sequence, Session, Settings, View};
 use crate::work::frame_view::BodyResult;
 use crate::work::open::{self, Request};
 use crate::work::sweep::Sweep;
 use crate::work::{Engine, FrameView, Job, Wake};
-use threads::Asked;
-
-/// Number of pictures that are decoded in advance.
-const AHEAD: usize = 4;
-/// Longest wait of the window for an answer, from the request on, so that the answer appears in the same frame as the
-/// change. The rest of the 16 ms of a displayed frame is enough to lay out the window and to hand it over.
-const AT_ONCE: Duration = Duration::from_millis(10);
+use request_key::RequestKey;
 
 /// Longest time that playing advances in one frame of the window, for example after the window stood still.
 const LONGEST_PASS: Duration = Duration::from_millis(250);
@@ -56,9 +52,9 @@ pub struct Viewer {
     pub(super) body: usize,
     /// Candidate that the pointer is on in the column of stages.
     pub(super) pointed: Option<u32>,
-    pub(super) sight: Option<FrameView>,
+    pub(super) frame_view: Option<FrameView>,
     pub(super) messages: Vec<Message>,
-    pub(super) asking: Option<Asking>,
+    pub(super) path_dialog: Option<PathDialog>,
     pub(super) mask: Option<MaskEdit>,
     pub(super) showing_help: bool,
     pub(super) showing_diff: bool,
@@ -68,18 +64,19 @@ pub struct Viewer {
     request: Request,
     opening: Option<Receiver<open::Event>>,
     /// Number of messages when the opening began.
-    said_before: usize,
+    messages_before: usize,
     pub(super) sweep: Option<Sweep>,
     /// Work on files.
     pub(super) jobs: Vec<Job>,
-    pub(super) textures: picture::Textures,
+    pub(super) textures: Textures,
     engine: Engine,
     wake: Wake,
-    asked: Option<Asked>,
+    requested: Option<RequestKey>,
     /// Time of the last request.
-    asked_at: Instant,
+    requested_at: Instant,
     last: Instant,
-    styled: bool,
+    /// True once the colours and sizes of the window are set.
+    pub(super) styled: bool,
 }
 
 impl Viewer {
@@ -98,9 +95,9 @@ impl Viewer {
             view: View::FIT,
             body: 0,
             pointed: None,
-            sight: None,
+            frame_view: None,
             messages: Vec::new(),
-            asking: None,
+            path_dialog: None,
             mask: None,
             showing_help: false,
             showing_diff: false,
@@ -108,14 +105,14 @@ impl Viewer {
             worst: 0,
             request: Request::default(),
             opening: None,
-            said_before: 0,
+            messages_before: 0,
             sweep: None,
             jobs: Vec::new(),
-            textures: picture::Textures::default(),
+            textures: Textures::default(),
             engine: Engine::start(Arc::clone(&wake)),
             wake,
-            asked: None,
-            asked_at: Instant::now(),
+            requested: None,
+            requested_at: Instant::now(),
             last: Instant::now(),
             styled: false,
         }
@@ -123,10 +120,10 @@ impl Viewer {
 
     /// Opens another sequence.
     pub fn open(&mut self, request: Request) {
-        self.said_before = self.messages.len();
+        self.messages_before = self.messages.len();
         self.opening = Some(open::start(request.clone(), Arc::clone(&self.wake)));
         for path in &request.inputs {
-            self.settings.opened(path);
+            self.settings.add_recent(path);
         }
         self.request = request;
     }
@@ -139,7 +136,7 @@ impl Viewer {
         {
             match Session::open(one) {
                 Ok(session) => self.set_session(session),
-                Err(problem) => self.say_bad(problem.to_string()),
+                Err(problem) => self.add_problem(problem.to_string()),
             }
             return;
         }
@@ -152,8 +149,8 @@ impl Viewer {
     }
 
     /// Returns the picture that is shown, if there is one yet.
-    pub fn sight(&self) -> Option<&FrameView> {
-        self.sight.as_ref()
+    pub fn frame_view(&self) -> Option<&FrameView> {
+        self.frame_view.as_ref()
     }
     /// Returns the sequence.
     pub fn sequence(&self) -> &Sequence {
@@ -177,13 +174,13 @@ impl Viewer {
     }
     /// Returns true if the screen shows the requested picture, processed with the current parameters.
     pub fn is_settled(&self) -> bool {
-        let changes = self.session.as_ref().map_or(0, Session::changes);
+        let version = self.session.as_ref().map_or(0, Session::version);
         self.opening.is_none()
-            && self.sight.as_ref().is_some_and(|s| s.index == self.playback.frame() && s.changes == changes)
+            && self.frame_view.as_ref().is_some_and(|s| s.index == self.playback.frame() && s.version == version)
     }
     /// Returns the number of pictures that are processed with the current parameters.
     pub fn processed(&self) -> usize {
-        self.rows.fresh()
+        self.rows.current_len()
     }
     /// Returns the file's result for a picture and the selected body.
     pub fn recorded(&self, frame: usize) -> Option<&hzn_mcap::Row> {
@@ -198,13 +195,13 @@ impl Viewer {
         self.messages.iter().map(|m| m.text.as_str())
     }
 
-    pub(super) fn say(&mut self, text: impl Into<String>) {
-        self.message(Message { text: text.into(), bad: false, recover: None });
+    pub(super) fn add_note(&mut self, text: impl Into<String>) {
+        self.add_message(Message { text: text.into(), bad: false, recover: None });
     }
-    pub(super) fn say_bad(&mut self, text: impl Into<String>) {
-        self.message(Message { text: text.into(), bad: true, recover: None });
+    pub(super) fn add_problem(&mut self, text: impl Into<String>) {
+        self.add_message(Message { text: text.into(), bad: true, recover: None });
     }
-    fn message(&mut self, message: Message) {
+    fn add_message(&mut self, message: Message) {
         if !self.messages.contains(&message) {
             self.messages.push(message);
         }
@@ -212,14 +209,14 @@ impl Viewer {
 
     pub(super) fn set_session(&mut self, session: Session) {
         self.session = Some(session);
-        self.rows.forget();
-        self.asked = None;
+        self.rows.clear_current();
+        self.requested = None;
         self.body = 0;
     }
 
     /// Returns the result for the selected body.
     pub(super) fn answer(&self) -> Option<&BodyResult> {
-        let outcome = self.sight.as_ref()?.answers.first()?;
+        let outcome = self.frame_view.as_ref()?.answers.first()?;
         outcome.bodies.get(self.body).or(outcome.bodies.first())
     }
 
@@ -228,53 +225,15 @@ impl Viewer {
         self.truth.get(name)?.iter().find(|t| t.body == body)
     }
 
-    /// Draws the window.
-    pub fn show(&mut self, ui: &mut egui::Ui) {
-        let ctx = ui.ctx().clone();
-        if !self.styled {
-            theme::apply(&ctx);
-            self.styled = true;
-        }
-        ctx.set_theme(if self.settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
-        self.poll(&ctx);
-        for command in command::pressed(&ctx) {
-            self.run(command, &ctx);
-        }
-        let dropped: Vec<PathBuf> = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
-        if !dropped.is_empty() {
-            self.open_paths(dropped);
-        }
-        // The answer is computed while the panels are laid out.
-        self.ask();
-        top::show(self, ui);
-        timeline::show(self, ui);
-        if self.settings.plots {
-            plots::show(self, ui);
-        }
-        side::show(self, ui);
-        if self.settings.stages {
-            stages::show(self, ui);
-        }
-        // A quick answer to a change in the panels is shown in this frame of the window.
-        self.ask();
-        self.wait(&ctx);
-        compare::show(self, ui);
-        picture::show(self, ui);
-        dialogs::show(self, &ctx);
-        help::show(self, &ctx);
-        self.advance(&ctx);
-        self.ask();
-    }
-
     /// Advances the time of playing. No picture is skipped because it is slow: each is drawn before the next one is
     /// requested. The next one is computed while this one is painted.
-    fn advance(&mut self, ctx: &egui::Context) {
+    pub(super) fn advance(&mut self, ctx: &egui::Context) {
         let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
-        let lasts_s = |frame| self.sequence.duration_s(frame);
-        if self.sight.as_ref().is_none_or(|s| s.index == self.playback.frame()) {
-            self.playback.advance(elapsed.min(LONGEST_PASS), self.sequence.len(), lasts_s);
+        let duration_s = |frame| self.sequence.duration_s(frame);
+        if self.frame_view.as_ref().is_none_or(|s| s.index == self.playback.frame()) {
+            self.playback.advance(elapsed.min(LONGEST_PASS), self.sequence.len(), duration_s);
         }
-        if let Some(due) = self.playback.due(lasts_s) {
+        if let Some(due) = self.playback.due(duration_s) {
             ctx.request_repaint_after(due.clamp(Duration::from_millis(4), LONGEST_PASS / 2));
         }
     }

@@ -1,108 +1,74 @@
 //! Messages between the window and its threads.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use super::{AHEAD, AT_ONCE, Message, Viewer};
+use super::request_key::RequestKey;
+use super::{Message, Viewer};
 use crate::model::settings::Layer;
-use crate::model::{Look, Place, ResultHistory, Sequence, Session, View};
-use crate::ui::dialogs;
+use crate::model::{Place, ResultHistory, Sequence, Session, View};
 use crate::work::open;
 use crate::work::sweep::{self, Sweep};
-use crate::work::{Ask, FrameView, Setup};
+use crate::work::{FrameRequest, FrameView, Setup};
 
-/// The last request. An equal request is not sent again.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Asked {
-    index: usize,
-    changes: Vec<u64>,
-    look: Look,
-    undistorted: bool,
-    touched: bool,
-    flight: bool,
-    title: String,
-}
+/// Number of pictures that are decoded in advance.
+const AHEAD: usize = 4;
+/// Longest wait of the window for an answer, from the request on, so that the answer appears in the same frame as the
+/// change. The rest of the 16 ms of a displayed frame is enough to lay out the window and to hand it over.
+const AT_ONCE: Duration = Duration::from_millis(10);
 
 impl Viewer {
     /// Takes all messages of the threads.
-    pub(super) fn poll(&mut self, ctx: &egui::Context) {
-        let opening: Vec<open::Event> = self.opening.iter().flat_map(|r| r.try_iter()).collect();
-        for event in opening {
-            self.opened(event);
+    pub(in crate::ui) fn poll(&mut self, ctx: &egui::Context) {
+        let opening_events: Vec<open::Event> = self.opening.iter().flat_map(|r| r.try_iter()).collect();
+        for event in opening_events {
+            self.handle_opening(event);
         }
-        let sights: Vec<FrameView> = self.engine.answers().collect();
-        for sight in sights {
-            self.see(sight);
+        let frame_views: Vec<FrameView> = self.engine.answers().collect();
+        for frame_view in frame_views {
+            self.take_frame(frame_view);
         }
-        self.textures.take(self.sight.as_ref(), ctx);
-        let swept = self.sweep.as_mut().map(Sweep::events).unwrap_or_default();
-        for event in swept {
-            self.swept(event);
+        self.textures.take(self.frame_view.as_ref(), ctx);
+        let sweep_events = self.sweep.as_mut().map(Sweep::events).unwrap_or_default();
+        for event in sweep_events {
+            self.handle_sweep(event);
         }
-        self.ended();
-        dialogs::poll(self);
+        self.take_finished_jobs();
+        self.poll_path_dialog();
     }
 
     /// Waits a short time for the answer to the last request. A slow answer comes with a later frame of the window.
-    pub(super) fn wait(&mut self, ctx: &egui::Context) {
-        let until = self.asked_at + AT_ONCE;
+    pub(in crate::ui) fn wait(&mut self, ctx: &egui::Context) {
+        let until = self.requested_at + AT_ONCE;
         let mut new = false;
-        while !self.is_settled() && self.asked.is_some() {
-            let Some(sight) = self.engine.wait(until.saturating_duration_since(Instant::now())) else { break };
-            self.see(sight);
+        while !self.is_settled() && self.requested.is_some() {
+            let Some(frame_view) = self.engine.wait(until.saturating_duration_since(Instant::now())) else { break };
+            self.take_frame(frame_view);
             new = true;
         }
         if new {
-            self.textures.take(self.sight.as_ref(), ctx);
+            self.textures.take(self.frame_view.as_ref(), ctx);
             // The columns were drawn before the answer came, so they are drawn again.
             ctx.request_repaint();
         }
     }
 
     /// Takes over a processed picture.
-    fn see(&mut self, sight: FrameView) {
-        if let Some(outcome) = sight.answers.first()
-            && self.session.as_ref().is_some_and(|s| s.changes() == sight.changes)
+    fn take_frame(&mut self, frame_view: FrameView) {
+        if let Some(outcome) = frame_view.answers.first()
+            && self.session.as_ref().is_some_and(|s| s.version() == frame_view.version)
             && !outcome.bodies.is_empty()
         {
-            self.rows.refresh(sight.index, outcome.bodies.iter().map(|b| b.row.clone()).collect());
+            self.rows.set_current(frame_view.index, outcome.bodies.iter().map(|b| b.row.clone()).collect());
         }
-        self.sight = Some(sight);
+        self.frame_view = Some(frame_view);
     }
 
-    fn opened(&mut self, event: open::Event) {
+    fn handle_opening(&mut self, event: open::Event) {
         match event {
-            open::Event::Opened(opened) => {
-                let opened = *opened;
-                self.sequence = Sequence {
-                    title: opened.title,
-                    inputs: self.request.inputs.clone(),
-                    folder: opened.folder,
-                    ..Sequence::default()
-                };
-                (self.rows, self.truth) = (ResultHistory::default(), opened.truth);
-                (self.sight, self.asked, self.sweep, self.mask) = (None, None, None, None);
-                (self.worst, self.body) = (0, 0);
-                self.view = View::FIT;
-                // Messages about the previous sequence are removed; newer messages stay.
-                self.messages.drain(..self.said_before.min(self.messages.len()));
-                self.playback.go(self.request.frame, usize::MAX);
-                self.engine.open(self.request.inputs.clone());
-                // A sensor that the user opened stays if the new pictures come without one.
-                match opened.sensor {
-                    Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
-                    None if self.session.is_none() => self.say(
-                        "There is no sensor.toml here, so pictures are only shown. Open one (or drop it on the \
-                         window); `hzn init` writes one to start from.",
-                    ),
-                    None => {}
-                }
-                for note in opened.notes {
-                    self.say(note);
-                }
-            }
+            open::Event::Opened(opened) => self.begin_sequence(*opened),
             open::Event::Pictures(pictures) => {
-                self.engine.recording(pictures);
+                self.engine.set_recording(pictures);
                 self.sequence.recording = self.request.inputs.first().cloned();
             }
             open::Event::Frames(frames) => {
@@ -114,97 +80,129 @@ impl Viewer {
                     }
                 }
             }
-            open::Event::End { cut_off, note } => {
-                self.opening = None;
-                self.sequence.complete = true;
-                self.playback.go(self.playback.frame(), self.sequence.len());
-                if cut_off {
-                    let path = self.request.inputs.first().cloned();
-                    self.message(Message {
-                        text:
-                            "This recording was not closed: its run broke off, or the file was cut. What is whole is \
-                               shown."
-                                .into(),
-                        bad: true,
-                        recover: path,
-                    });
-                }
-                if self.sequence.is_empty() {
-                    self.say_bad("There is no frame in it.");
-                } else if self.sequence.entries.iter().all(|e| e.place == Place::Nowhere) {
-                    self.say(
-                        "This recording was made without pictures (--no-images): results are shown, but nothing \
-                              can be processed again.",
-                    );
-                }
-                if let Some(note) = note {
-                    self.say_bad(note);
-                }
-            }
+            open::Event::End { cut_off, note } => self.complete_sequence(cut_off, note),
             open::Event::Failed(why) => {
                 self.opening = None;
-                self.say_bad(why);
+                self.add_problem(why);
             }
         }
     }
 
-    fn swept(&mut self, event: sweep::Event) {
+    /// Replaces the sequence by one that was opened, which has no pictures yet.
+    fn begin_sequence(&mut self, opened: open::Opened) {
+        self.sequence = Sequence {
+            title: opened.title,
+            inputs: self.request.inputs.clone(),
+            folder: opened.folder,
+            ..Sequence::default()
+        };
+        (self.rows, self.truth) = (ResultHistory::default(), opened.truth);
+        (self.frame_view, self.requested, self.sweep, self.mask) = (None, None, None, None);
+        (self.worst, self.body) = (0, 0);
+        self.view = View::FIT;
+        // Messages about the previous sequence are removed; newer messages stay.
+        self.messages.drain(..self.messages_before.min(self.messages.len()));
+        self.playback.go(self.request.frame, usize::MAX);
+        self.engine.open(self.request.inputs.clone());
+        // A sensor that the user opened stays if the new pictures come without one.
+        match opened.sensor {
+            Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
+            None if self.session.is_none() => self.add_note(
+                "There is no sensor.toml, so the pictures are shown but not processed. Open one, or drop it on the \
+                 window; `hzn init` writes a first one.",
+            ),
+            None => {}
+        }
+        for note in opened.notes {
+            self.add_note(note);
+        }
+    }
+
+    /// Marks the sequence as complete, and tells the user what it lacks.
+    fn complete_sequence(&mut self, cut_off: bool, note: Option<String>) {
+        self.opening = None;
+        self.sequence.complete = true;
+        self.playback.go(self.playback.frame(), self.sequence.len());
+        if cut_off {
+            let path = self.request.inputs.first().cloned();
+            self.add_message(Message {
+                text: "This recording was not closed: its run was interrupted, or the file was cut off. All complete \
+                       frames are shown."
+                    .into(),
+                bad: true,
+                recover: path,
+            });
+        }
+        if self.sequence.is_empty() {
+            self.add_problem(format!("{}: contains no picture", self.sequence.title));
+        } else if self.sequence.entries.iter().all(|e| e.place == Place::Nowhere) {
+            self.add_note(
+                "This recording was made without pictures (--no-images): the window shows its results, but cannot \
+                 process the pictures again.",
+            );
+        }
+        if let Some(note) = note {
+            self.add_problem(note);
+        }
+    }
+
+    fn handle_sweep(&mut self, event: sweep::Event) {
         match event {
-            sweep::Event::Frame { index, changes, rows } => {
-                if self.session.as_ref().is_some_and(|s| s.changes() == changes) {
-                    self.rows.refresh(index, rows);
+            sweep::Event::Frame { index, version, rows } => {
+                if self.session.as_ref().is_some_and(|s| s.version() == version) {
+                    self.rows.set_current(index, rows);
                 }
             }
             sweep::Event::End { file, stopped } => {
                 self.sweep = None;
                 match file {
-                    Some(_) if stopped => self.say("Processing was stopped; no file was written."),
-                    Some(file) => self.say(format!("Written: {}", file.display())),
+                    Some(_) if stopped => self.add_note("Processing was stopped; no file was written."),
+                    Some(file) => self.add_note(format!("Written: {}", file.display())),
                     None => {}
                 }
             }
             sweep::Event::Failed(why) => {
                 self.sweep = None;
-                self.say_bad(why);
+                self.add_problem(why);
             }
         }
     }
 
     /// Requests the picture to show, unless the last request was the same.
-    pub(super) fn ask(&mut self) {
+    pub(in crate::ui) fn request_frame(&mut self) {
         let index = self.playback.frame();
         let Some(entry) = self.sequence.entries.get(index) else { return };
         let sessions = self.session.iter().chain(self.other.iter().map(|(_, s)| s));
-        let setup = |s: &Session| Some(Setup { config: Arc::clone(s.config()?), changes: s.changes() });
+        let setup = |s: &Session| Some(Setup { config: Arc::clone(s.config()?), version: s.version() });
         let setups: Vec<Setup> = sessions.filter_map(setup).collect();
-        let asked = Asked {
+        let key = RequestKey {
             index,
-            changes: setups.iter().map(|s| s.changes).collect(),
+            versions: setups.iter().map(|s| s.version).collect(),
             look: self.settings.look,
             undistorted: self.settings.undistorted,
             touched: self.settings.shows(Layer::Touched),
             flight: self.flight,
             title: self.sequence.title.clone(),
         };
-        if self.asked.as_ref() == Some(&asked) {
+        if self.requested.as_ref() == Some(&key) {
             return;
         }
-        if self.asked.as_ref().is_some_and(|a| a.changes != asked.changes) {
-            self.rows.forget();
+        if self.requested.as_ref().is_some_and(|last| last.versions != key.versions) {
+            self.rows.clear_current();
         }
         let ahead = |i: usize| Some((i, self.sequence.entries.get(i)?.clone()));
-        let ask = Ask {
+        let request = FrameRequest {
             index,
             entry: entry.clone(),
             setups,
-            flight: asked.flight,
-            look: asked.look,
-            undistorted: asked.undistorted,
-            touched: asked.touched,
+            flight: key.flight,
+            look: key.look,
+            undistorted: key.undistorted,
+            touched: key.touched,
             ahead: (index + 1..=index + AHEAD).filter_map(ahead).collect(),
             since: Instant::now(),
         };
-        (self.asked, self.asked_at) = (Some(asked), ask.since);
-        self.engine.ask(ask);
+        (self.requested, self.requested_at) = (Some(key), request.since);
+        self.engine.request(request);
     }
 }

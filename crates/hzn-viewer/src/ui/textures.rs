@@ -9,14 +9,14 @@ use crate::work::frame_view::Shown;
 
 /// Textures of the pictures on the graphics card.
 #[derive(Default)]
-pub(in crate::ui) struct Textures {
+pub(super) struct Textures {
     pub(super) shown: Option<(Arc<Shown>, TextureHandle)>,
     pub(super) touched: Option<(Arc<ColorImage>, TextureHandle)>,
 }
 
 impl Textures {
     /// Uploads the pictures that have changed.
-    pub(in crate::ui) fn take(&mut self, sight: Option<&FrameView>, ctx: &egui::Context) {
+    pub(super) fn take(&mut self, frame_view: Option<&FrameView>, ctx: &egui::Context) {
         // Enlarged pixels stay sharp squares; a picture that is made smaller is smoothed.
         let smooth = TextureOptions {
             magnification: TextureFilter::Nearest,
@@ -24,7 +24,7 @@ impl Textures {
             mipmap_mode: Some(TextureFilter::Linear),
             ..TextureOptions::LINEAR
         };
-        match sight.and_then(|s| s.image.as_ref()) {
+        match frame_view.and_then(|s| s.image.as_ref()) {
             None => self.shown = None,
             Some(new) => match &mut self.shown {
                 Some((old, _)) if Arc::ptr_eq(old, new) => {}
@@ -35,7 +35,7 @@ impl Textures {
                 none => *none = Some((Arc::clone(new), ctx.load_texture("picture", Arc::clone(&new.image), smooth))),
             },
         }
-        match sight.and_then(|s| s.answers.first()?.touched.as_ref()) {
+        match frame_view.and_then(|s| s.answers.first()?.touched.as_ref()) {
             None => self.touched = None,
             Some(new) => match &mut self.touched {
                 Some((old, _)) if Arc::ptr_eq(old, new) => {}

@@ -4,7 +4,7 @@ use hzn_calib::keys::Limits;
 
 /// Range of a slider, and whether its scale is logarithmic.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Knob {
+pub struct SliderRange {
     /// Left end.
     pub low: f64,
     /// Right end.
@@ -13,14 +13,14 @@ pub struct Knob {
     pub logarithmic: bool,
 }
 
-impl Knob {
-    /// Returns the slider of a value with these limits and the usual magnitude `usual`, or `None` if the value is no
-    /// number. A slider does not reach a limit that is far from the usual value; values beyond the slider can be typed.
-    pub fn from_limits(limits: &Limits, usual: f64) -> Option<Self> {
+impl SliderRange {
+    /// Returns the slider of a value with these limits and this usual magnitude, or `None` if the value is no number. A
+    /// slider does not reach a limit that is far from the usual value; values beyond the slider can be typed.
+    pub fn from_limits(limits: &Limits, magnitude: f64) -> Option<Self> {
         let Limits::Number { low, above, high } = *limits else { return None };
-        let usual = if usual.abs() > 0.0 { usual.abs() } else { 1.0 };
-        let far = low + usual * 30.0;
-        if high - low <= 40.0 * usual || (high - low <= 1.0) {
+        let magnitude = if magnitude.abs() > 0.0 { magnitude.abs() } else { 1.0 };
+        let far = low + magnitude * 30.0;
+        if high - low <= 40.0 * magnitude || (high - low <= 1.0) {
             // A limit that the value may not take itself is not offered.
             let low = if above { low + (high - low) * 1e-3 } else { low };
             // On a linear scale, the usual value would be at the very end.
@@ -28,7 +28,7 @@ impl Knob {
             return Some(Self { low, high, logarithmic });
         }
         let high = high.min(far);
-        let low = if above || low > 0.0 { low.max(usual / 30.0) } else { low };
+        let low = if above || low > 0.0 { low.max(magnitude / 30.0) } else { low };
         Some(Self { low, high, logarithmic: low >= 0.0 })
     }
 
@@ -48,28 +48,28 @@ mod tests {
 
     #[test]
     fn near_limits_are_reached_and_far_ones_are_not() {
-        let knob = |l: Limits, usual: f64| Knob::from_limits(&l, usual).unwrap();
-        assert_eq!(knob(number(0.0, false, 1.0), 0.15), Knob { low: 0.0, high: 1.0, logarithmic: false });
-        let threshold = knob(number(0.0, true, 1000.0), 3.0);
+        let range = |l: Limits, magnitude: f64| SliderRange::from_limits(&l, magnitude).unwrap();
+        assert_eq!(range(number(0.0, false, 1.0), 0.15), SliderRange { low: 0.0, high: 1.0, logarithmic: false });
+        let threshold = range(number(0.0, true, 1000.0), 3.0);
         assert_eq!((threshold.low, threshold.high, threshold.logarithmic), (0.1, 90.0, true));
-        let points = knob(number(8.0, false, f64::INFINITY), 40.0);
+        let points = range(number(8.0, false, f64::INFINITY), 40.0);
         assert_eq!((points.low, points.high), (8.0, 1208.0));
-        let height = knob(number(-50.0, false, 500.0), 10.0);
+        let height = range(number(-50.0, false, 500.0), 10.0);
         assert!(!height.logarithmic && height.low == -50.0 && height.high <= 500.0);
-        assert!(knob(number(0.0, true, 100.0), 10.0).low > 0.0);
-        let scale = knob(number(0.1, false, 10.0), 1.0);
+        assert!(range(number(0.0, true, 100.0), 10.0).low > 0.0);
+        let scale = range(number(0.1, false, 10.0), 1.0);
         assert_eq!((scale.logarithmic, scale.middle()), (true, 1.0));
-        assert!(Knob::from_limits(&Limits::Rule("words"), 1.0).is_none());
+        assert!(SliderRange::from_limits(&Limits::Rule("words"), 1.0).is_none());
     }
 
     #[test]
     fn every_slider_begins_within_its_limits() {
         for key in hzn_calib::keys::all() {
-            for usual in [0.0, 0.01, 1.0, 300.0] {
-                let Some(knob) = Knob::from_limits(&key.limits, usual) else { continue };
+            for magnitude in [0.0, 0.01, 1.0, 300.0] {
+                let Some(range) = SliderRange::from_limits(&key.limits, magnitude) else { continue };
                 let Limits::Number { low, high, .. } = key.limits else { unreachable!() };
-                assert!(knob.low < knob.high && knob.low >= low && knob.high <= high, "{} {knob:?}", key.path);
-                assert!((knob.low..=knob.high).contains(&knob.middle()), "{}", key.path);
+                assert!(range.low < range.high && range.low >= low && range.high <= high, "{} {range:?}", key.path);
+                assert!((range.low..=range.high).contains(&range.middle()), "{}", key.path);
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::model::view::{Area, Point};
 use crate::model::{Plane, View};
 
 /// Placement of a picture of this size, and the plane it is shown in.
-pub(super) struct Stage<'a> {
+pub(super) struct Placement<'a> {
     pub(super) view: View,
     pub(super) area: Area,
     pub(super) size: Point,
@@ -15,24 +15,26 @@ pub(super) struct Stage<'a> {
     pub(super) camera: Option<&'a Camera<f64>>,
 }
 
-impl Stage<'_> {
-    pub(super) fn screen(&self, p: Point) -> Option<Pos2> {
+impl Placement<'_> {
+    /// Returns the point of the screen at which a point of the camera's picture is shown.
+    pub(super) fn to_screen(&self, p: Point) -> Option<Pos2> {
         let p = match (&self.plane, self.camera) {
             (Plane::Camera, _) | (_, None) => p,
-            (plane, Some(camera)) => plane.show(camera, p)?,
+            (plane, Some(camera)) => plane.to_shown(camera, p)?,
         };
-        Some(self.place(p))
+        Some(self.shown_to_screen(p))
     }
-    pub(super) fn place(&self, p: Point) -> Pos2 {
+    /// Returns the point of the screen at which a point of the shown picture lies.
+    pub(super) fn shown_to_screen(&self, p: Point) -> Pos2 {
         let [x, y] = self.view.to_screen(self.area, self.size, p);
         pos2(x as f32, y as f32)
     }
     /// Returns the point of the camera's picture under a point of the screen.
-    pub(super) fn picture(&self, at: Pos2) -> Option<Point> {
+    pub(super) fn to_picture(&self, at: Pos2) -> Option<Point> {
         let p = self.view.to_picture(self.area, self.size, [at.x.into(), at.y.into()]);
         match (&self.plane, self.camera) {
             (Plane::Camera, _) | (_, None) => Some(p),
-            (plane, Some(camera)) => plane.of(camera, p),
+            (plane, Some(camera)) => plane.to_camera(camera, p),
         }
     }
     pub(super) fn scale(&self) -> f64 {

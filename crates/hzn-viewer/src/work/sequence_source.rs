@@ -10,28 +10,28 @@ use super::reader::Reader;
 use crate::model::{Entry, Sequence};
 
 /// Iterator over the pictures of a sequence, from the first one.
-pub(super) struct Walk {
+pub(super) struct SequenceSource {
     entries: std::vec::IntoIter<Entry>,
     reader: Reader,
 }
 
-impl Walk {
+impl SequenceSource {
     pub(super) fn new(sequence: Sequence) -> Result<Self, String> {
         let Sequence { entries, inputs, recording, .. } = sequence;
-        let pictures = recording.as_deref().map(pictures).transpose()?;
+        let pictures = recording.as_deref().map(open_pictures).transpose()?;
         Ok(Self { entries: entries.into_iter(), reader: Reader::new(inputs, pictures) })
     }
 }
 
 /// Opens a separate reader for the pictures of a recording.
-fn pictures(path: &Path) -> Result<Pictures, String> {
+fn open_pictures(path: &Path) -> Result<Pictures, String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
     // The channels of the recording are declared before the first picture.
     while index.channels() == 0 && index.next_part().map_err(|e| e.to_string())?.is_some() {}
     index.pictures().map_err(|e| e.to_string())
 }
 
-impl Source for Walk {
+impl Source for SequenceSource {
     fn next(&mut self) -> Option<anyhow::Result<Item>> {
         let Entry { name, time_s, data, place } = self.entries.next()?;
         // The window's data of the picture are complete, so nothing is looked up elsewhere.

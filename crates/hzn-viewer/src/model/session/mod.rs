@@ -10,8 +10,8 @@ use hzn_calib::keys::{self, Form, Key};
 use hzn_core::{Config, Preset};
 use toml_edit::Value;
 
+use super::atomic_file;
 use super::sheet::{self, Sheet};
-use super::whole;
 
 /// Largest number of steps that can be undone.
 const MAX_UNDO: usize = 500;
@@ -39,7 +39,7 @@ pub struct Session {
     /// Keys whose values differ from the saved text, as (section, name, body).
     differing: HashSet<(&'static str, &'static str, usize)>,
     problem: Option<Problem>,
-    changes: u64,
+    version: u64,
 }
 
 impl Session {
@@ -60,7 +60,7 @@ impl Session {
             preset: String::new(),
             differing: HashSet::new(),
             problem: None,
-            changes: 0,
+            version: 0,
         };
         session.read();
         session
@@ -100,8 +100,8 @@ impl Session {
         self.problem.as_ref()
     }
     /// Returns the number of this version of the configuration. Every version of every session has a different number.
-    pub fn changes(&self) -> u64 {
-        self.changes
+    pub fn version(&self) -> u64 {
+        self.version
     }
     /// Returns true if there are changes that are not saved.
     pub fn is_changed(&self) -> bool {
@@ -128,15 +128,16 @@ impl Session {
     }
 
     fn find<'a>(values: &'a toml::Table, section: &str, name: &str, body: usize) -> Option<&'a toml::Value> {
-        let of_body = match values.get("bodies").and_then(toml::Value::as_array) {
+        let body_values = match values.get("bodies").and_then(toml::Value::as_array) {
             Some(bodies) => bodies.get(body),
             None => values.get("body"),
         };
         if section == "body" {
-            return of_body?.get(name);
+            return body_values?.get(name);
         }
-        let own = of_body.and_then(|b| b.get(section)).filter(|_| matches!(section, "binarize" | "covariance"));
-        own.or_else(|| values.get(section))?.get(name)
+        let own_section =
+            body_values.and_then(|b| b.get(section)).filter(|_| matches!(section, "binarize" | "covariance"));
+        own_section.or_else(|| values.get(section))?.get(name)
     }
 
     /// Returns the value in effect if it is a number.
@@ -147,7 +148,7 @@ impl Session {
     /// Returns the usual magnitude of a number, a power of ten; it sets the range of a slider. It follows the saved
     /// value, so that it stays the same while the slider is moved. Without a saved value it follows the value in
     /// effect.
-    pub fn usual(&self, section: &str, name: &str, body: usize) -> f64 {
+    pub fn usual_magnitude(&self, section: &str, name: &str, body: usize) -> f64 {
         let saved = Self::find(&self.saved_values, section, name, body).and_then(number);
         match saved.or_else(|| self.number(section, name, body)) {
             Some(x) if x != 0.0 => 10f64.powf(x.abs().log10().round()),
@@ -156,10 +157,10 @@ impl Session {
     }
 
     /// Changes a value, or removes it from the text (`None`). Consecutive changes of the same key are one step, unless
-    /// [`Session::settle`] is called between them.
+    /// [`Session::end_step`] is called between them.
     pub fn set(&mut self, section: &str, name: &str, body: usize, value: Option<Value>) {
         let key = format!("{section}.{name}.{body}");
-        match self.sheet.with(sheet::Key { section, name, body }, value) {
+        match self.sheet.with_value(sheet::Key { section, name, body }, value) {
             Ok(sheet) => self.replace(sheet, Some(key)),
             Err(why) => self.problem = Some(Problem::new(&self.home, why)),
         }
@@ -167,9 +168,9 @@ impl Session {
 
     /// Sets a number. It is rounded to a whole number if the value in effect is whole.
     pub fn set_number(&mut self, key: &Key, body: usize, x: f64) {
-        let whole = matches!(self.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)))
+        let is_whole = matches!(self.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)))
             || (self.value(key.section(), key.name(), body).is_none() && key.form == Form::Whole);
-        let value = if whole { Value::from(x.round() as i64) } else { Value::from(tidy(x)) };
+        let value = if is_whole { Value::from(x.round() as i64) } else { Value::from(tidy(x)) };
         self.set(key.section(), key.name(), body, Some(value));
     }
 
@@ -209,7 +210,7 @@ impl Session {
     }
 
     /// Ends a step, for example when a slider is released.
-    pub fn settle(&mut self) {
+    pub fn end_step(&mut self) {
         self.gesture = None;
     }
 
@@ -217,7 +218,7 @@ impl Session {
     pub fn undo(&mut self) {
         if let Some(sheet) = self.undo.pop() {
             self.redo.push(std::mem::replace(&mut self.sheet, sheet));
-            self.settle();
+            self.end_step();
             self.read();
         }
     }
@@ -226,7 +227,7 @@ impl Session {
     pub fn redo(&mut self) {
         if let Some(sheet) = self.redo.pop() {
             self.undo.push(std::mem::replace(&mut self.sheet, sheet));
-            self.settle();
+            self.end_step();
             self.read();
         }
     }
@@ -241,12 +242,12 @@ impl Session {
     /// # Errors
     /// The file cannot be written; the message says why and what to do.
     pub fn save(&mut self, path: &Path) -> Result<(), String> {
-        whole::write(path, self.sheet.text().as_bytes())?;
+        atomic_file::write(path, self.sheet.text().as_bytes())?;
         self.saved = self.sheet.clone();
         self.saved_values = self.values.clone();
         self.differing.clear();
         (self.path, self.home) = (Some(path.to_owned()), path.to_owned());
-        self.settle();
+        self.end_step();
         Ok(())
     }
 
@@ -274,9 +275,9 @@ impl Session {
         self.differing.clear();
         if self.is_changed() {
             let bodies = table.as_ref().and_then(|t| t.get("bodies")?.as_array()).map_or(1, |b| b.len().max(1));
-            let of_bodies = |k: &'static Key| (0..bodies).map(move |body| (k, body));
+            let with_bodies = |k: &'static Key| (0..bodies).map(move |body| (k, body));
             let key = |(k, body): (&'static Key, usize)| sheet::Key { section: k.section(), name: k.name(), body };
-            let keys = keys::all().flat_map(of_bodies).map(key);
+            let keys = keys::all().flat_map(with_bodies).map(key);
             self.differing.extend(self.sheet.differing(&self.saved, keys).iter().map(|k| (k.section, k.name, k.body)));
         }
         match hzn_calib::sensor::parse(self.sheet.text(), &self.home) {
@@ -290,7 +291,7 @@ impl Session {
                 self.config = Some(Arc::new(sensor.config));
                 self.problem = None;
                 static VERSIONS: AtomicU64 = AtomicU64::new(1);
-                self.changes = VERSIONS.fetch_add(1, Ordering::Relaxed);
+                self.version = VERSIONS.fetch_add(1, Ordering::Relaxed);
             }
             Err(problem) => self.problem = Some(problem),
         }
@@ -321,160 +322,4 @@ fn tidy_px(x: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const TEXT: &str = "preset = \"hzn\"\n[camera]\nwidth = 640\nheight = 480\nfx_px = 500.0\nfy_px = 500.0\ncx_px = \
-                                        319.5\ncy_px = 239.5\nmodel = \"pinhole\"\n[reject]\nthreshold_px = 3.0 # \
-                                        mine\n";
-
-    fn session() -> Session {
-        Session::new(TEXT, Path::new("sensor.toml"), false)
-    }
-
-    fn threshold(s: &Session) -> f64 {
-        s.config().unwrap().reject.threshold_px
-    }
-
-    #[test]
-    fn a_change_counts_and_is_undone() {
-        let mut s = session();
-        assert!(!s.is_changed() && s.problem().is_none());
-        s.set("reject", "threshold_px", 0, Some(5.0.into()));
-        assert_eq!(threshold(&s), 5.0);
-        assert!(s.is_changed() && s.can_undo());
-        s.undo();
-        assert_eq!(threshold(&s), 3.0);
-        assert!(!s.is_changed() && s.can_redo());
-        s.redo();
-        assert_eq!(threshold(&s), 5.0);
-        s.reset();
-        assert_eq!((threshold(&s), s.is_changed()), (3.0, false));
-        s.undo();
-        assert_eq!(threshold(&s), 5.0);
-    }
-
-    #[test]
-    fn one_value_goes_back_to_the_files() {
-        let mut s = session();
-        s.set("reject", "threshold_px", 0, Some(5.0.into()));
-        s.set("gate", "max_mean", 0, Some(0.5.into()));
-        assert!(s.differs("reject", "threshold_px", 0) && !s.differs("reject", "seed", 0));
-        s.restore("reject", "threshold_px", 0);
-        s.restore("gate", "max_mean", 0);
-        assert!(!s.differs("reject", "threshold_px", 0));
-        assert_eq!((threshold(&s), s.config().unwrap().gate.max_mean), (3.0, 0.98));
-    }
-
-    #[test]
-    fn a_drag_is_one_step() {
-        let mut s = session();
-        for x in [3.1, 3.7, 4.4] {
-            s.set("reject", "threshold_px", 0, Some(x.into()));
-        }
-        s.settle();
-        s.set("reject", "threshold_px", 0, Some(9.0.into()));
-        s.set("gate", "max_mean", 0, Some(0.5.into()));
-        s.undo();
-        s.undo();
-        assert_eq!(threshold(&s), 4.4);
-        s.undo();
-        assert_eq!(threshold(&s), 3.0);
-        assert!(!s.can_undo());
-    }
-
-    #[test]
-    fn a_refused_value_is_said_and_the_last_good_one_counts() {
-        let mut s = session();
-        s.set("reject", "threshold_px", 0, Some((-1.0).into()));
-        let what = s.problem().unwrap().to_string();
-        assert!(what.contains("[reject] threshold_px") && what.contains("above 0"), "{what}");
-        assert_eq!(threshold(&s), 3.0);
-        s.undo();
-        assert!(s.problem().is_none());
-    }
-
-    #[test]
-    fn values_are_those_that_count() {
-        let s = session();
-        assert_eq!(s.number("reject", "threshold_px", 0), Some(3.0));
-        assert_eq!(s.number("candidates", "keep_points", 0), Some(600.0), "the preset's");
-        assert_eq!(s.number("select", "min_arc_px", 0), None);
-        assert_eq!(s.value("binarize", "method", 0).unwrap().as_str(), Some("otsu"));
-    }
-
-    #[test]
-    fn a_slider_reaches_as_far_while_it_is_moved_as_before() {
-        let dir = tempfile::tempdir().unwrap();
-        let mut s = session();
-        let usual = |s: &Session| s.usual("binarize", "scale", 0);
-        assert_eq!(usual(&s), 1.0);
-        s.set("binarize", "scale", 0, Some(0.15.into()));
-        assert_eq!((s.number("binarize", "scale", 0), usual(&s)), (Some(0.15), 1.0));
-        s.save(&dir.path().join("sensor.toml")).unwrap();
-        assert_eq!(usual(&s), 0.1);
-        // Without a saved value, the value in effect sets the magnitude.
-        assert_eq!(s.usual("select", "min_arc_px", 0), 1.0);
-        s.set("select", "min_arc_px", 0, Some(120.0.into()));
-        assert_eq!(s.usual("select", "min_arc_px", 0), 100.0);
-    }
-
-    #[test]
-    fn whole_numbers_stay_whole() {
-        let mut s = session();
-        let key = |path: &str| keys::find(path).unwrap();
-        s.set_number(key("candidates.keep_points"), 0, 299.7);
-        s.set_number(key("contour.line_spacing_px"), 0, 4.2);
-        s.set_number(key("reject.threshold_px"), 0, 3.0000001);
-        assert!(s.problem().is_none(), "{:?}", s.problem());
-        let config = s.config().unwrap();
-        assert_eq!((config.candidates.keep_points, config.contour.line_spacing_px), (300, Some(4)));
-        assert_eq!(threshold(&s), 3.0);
-    }
-
-    #[test]
-    fn polygons_go_into_the_text_and_back() {
-        let mut s = session();
-        let polygons = vec![vec![[10.04, 5.0], [20.0, 5.0], [10.0, 15.5]]];
-        s.set_polygons(&polygons);
-        assert_eq!(s.polygons(), [[[10.0, 5.0], [20.0, 5.0], [10.0, 15.5]]]);
-        assert!(s.sheet().text().contains("polygons_px = [[[10.0, 5.0], [20.0, 5.0], [10.0, 15.5]]]"));
-    }
-
-    #[test]
-    fn saved_is_what_is_read_again() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("sensor.toml");
-        let mut s = session();
-        s.set("reject", "threshold_px", 0, Some(5.0.into()));
-        s.save(&path).unwrap();
-        assert!(!s.is_changed());
-        let again = Session::open(&path).unwrap();
-        assert_eq!(again.config(), s.config());
-        assert_eq!(again.sheet().text(), TEXT.replace("3.0", "5.0"));
-        let nowhere = s.save(&dir.path().join("no").join("sensor.toml")).unwrap_err();
-        assert!(nowhere.contains("the folder does not exist"), "{nowhere}");
-        assert!(Session::open(&dir.path().join("none.toml")).is_err());
-    }
-
-    #[test]
-    fn under_another_preset_the_camera_stays() {
-        let mut s = session();
-        s.set("reject", "threshold_px", 0, Some(5.0.into()));
-        let other = s.under_preset(Preset::Dlr2022);
-        assert!(other.problem().is_none(), "{:?}", other.problem());
-        let (a, b) = (s.config().unwrap(), other.config().unwrap());
-        assert_eq!(a.camera, b.camera);
-        assert_eq!(**b, Config::preset(Preset::Dlr2022, a.camera.clone()));
-    }
-
-    #[test]
-    fn an_unreadable_text_is_no_end() {
-        let mut s = Session::new("preset = ", Path::new("sensor.toml"), false);
-        assert!(s.config().is_none() && s.problem().is_some());
-        s.replace(Sheet::new(TEXT), None);
-        assert!(s.config().is_some() && s.problem().is_none());
-        assert_eq!(tidy(0.000123456), 0.00012346);
-        assert_eq!(tidy(123456.7), 123457.0);
-    }
-}
+mod tests;

@@ -1,0 +1,35 @@
+//! `hzn.Expected`.
+
+use hzn_calib::FrameData;
+use hzn_core::Expected as CoreExpected;
+use pyo3::prelude::*;
+
+use crate::errors;
+use crate::state::State;
+
+#[doc = doc!("Expected")]
+#[pyclass(frozen, module = "hzn")]
+pub(crate) struct Expected {
+    pub(crate) data: FrameData,
+    pub(crate) core: CoreExpected<f64>,
+}
+
+impl Expected {
+    pub(crate) fn new(state: &State, data: FrameData, body: usize) -> PyResult<Self> {
+        let bodies = state.config.each_body().len();
+        if body >= bodies {
+            return Err(errors::config(format!("body: {body} is refused: must be 0 to {}", bodies - 1)));
+        }
+        let core = state.expect_body(body, &data)?;
+        Ok(Self { data, core })
+    }
+}
+
+#[pymethods]
+impl Expected {
+    #[doc = doc!("Expected.half_angle_deg")]
+    #[getter]
+    fn half_angle_deg(&self) -> f64 {
+        self.core.half_angle_rad().to_degrees()
+    }
+}
