@@ -6,8 +6,8 @@ use hzn_core::camera::{Camera, Config};
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pixel::ImagePoint;
 
-/// A body of half-angle `half_angle_rad` around `axis`, row by row: 10 counts of sky, 190 of ground, and an edge that is
-/// two pixels wide.
+/// A body of half-angle `half_angle_rad` around `axis`, row by row: 10 counts of sky, 190 of ground, and an edge that
+/// is two pixels wide.
 pub(crate) fn limb(lens: &Config, axis: &UnitVec3<Cam, f64>, half_angle_rad: f64) -> Vec<u8> {
     let camera = Camera::<f64>::try_new(lens).expect("the example's lens");
     let (width, height) = (usize::from(camera.width()), usize::from(camera.height()));

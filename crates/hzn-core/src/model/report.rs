@@ -17,9 +17,9 @@ pub type Reports<T> = heapless::Vec<Report<T>, MAX_BODIES>;
 ///
 /// # What to look at
 ///
-/// Check [`Self::status`] first. With [`Status::Ok`] there is a [`Self::solution`]; with any other status there is none,
-/// and [`Self::stage`], [`Self::counters`] and the verdicts of [`Self::candidates`] say how far the picture came and why it
-/// was refused.
+/// Check [`Self::status`] first. With [`Status::Ok`] there is a [`Self::solution`]; with any other status there is
+/// none, and [`Self::stage`], [`Self::counters`] and the verdicts of [`Self::candidates`] say how far the picture came
+/// and why it was refused.
 ///
 /// # Example
 ///
@@ -149,8 +149,8 @@ pub struct Free<T> {
 ///
 /// # Frames and units
 ///
-/// The axis is a unit vector in the camera frame (x right, y down, z forward). Its covariance is in rad², 3×3 and of rank 2:
-/// a direction has no error along itself. A filter uses it with any two axes perpendicular to the direction.
+/// The axis is a unit vector in the camera frame (x right, y down, z forward). Its covariance is in rad², 3×3 and of
+/// rank 2: a direction has no error along itself. A filter uses it with any two axes perpendicular to the direction.
 ///
 /// # Example
 ///

@@ -13,8 +13,8 @@ use crate::model::body::{Expected, Prior, PriorError};
 ///
 /// # Frames and units
 ///
-/// Answers are in the camera frame [`Cam`](crate::frames::Cam): x right, y down, z along the optical axis. The [`Config`] has kilometres and
-/// degrees; everything that a sensor takes or returns has metres and radians.
+/// Answers are in the camera frame [`Cam`](crate::frames::Cam): x right, y down, z along the optical axis. The
+/// [`Config`] has kilometres and degrees; everything that a sensor takes or returns has metres and radians.
 ///
 /// # Example
 ///

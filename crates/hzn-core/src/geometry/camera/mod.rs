@@ -35,8 +35,8 @@ use crate::geometry::pixel::ImagePoint;
 ///
 /// # Frames and units
 ///
-/// Pixels have their centres at integers ([`crate::pixel`]). Rays are unit vectors in the camera frame: x right, y down, z
-/// along the optical axis.
+/// Pixels have their centres at integers ([`crate::pixel`]). Rays are unit vectors in the camera frame: x right, y
+/// down, z along the optical axis.
 ///
 /// # Example
 ///

@@ -1,4 +1,5 @@
-//! The order in which the edges of a picture are examined: those at the border first, then those that search lines meet.
+//! The order in which the edges of a picture are examined: those at the border first, then those that search lines
+//! meet.
 
 use super::Search;
 use crate::base::real::Real;

@@ -91,16 +91,16 @@ pub(super) fn search<T: Real>(
     (share > T::from_f64(0.06)).then_some(Consensus { e, c, draws, all: false })
 }
 
-/// Returns the largest distance of an inlier from a drawn cone, in pixels. An error of the half-angle bends the edge by a
-/// small part of this error. The limit grows accordingly, at most by three thresholds.
+/// Returns the largest distance of an inlier from a drawn cone, in pixels. An error of the half-angle bends the edge by
+/// a small part of this error. The limit grows accordingly, at most by three thresholds.
 #[inline(always)]
 fn limit_px<T: Real>(threshold_px: T, free: bool, expected: &Expected<T>, focal_px: T) -> T {
     let bend = (sigma_alpha(expected) * focal_px * T::from_f64(0.05)).min(threshold_px * T::from_f64(3.0));
     threshold_px + if free { T::ZERO } else { bend }
 }
 
-/// Returns the cones through two points with the half-angle of cosine `cos`, or with a `free` half-angle the one through
-/// three points.
+/// Returns the cones through two points with the half-angle of cosine `cos`, or with a `free` half-angle the one
+/// through three points.
 #[inline(always)]
 fn hypotheses<T: Real>(a: &V3<T>, b: &V3<T>, third: Option<V3<T>>, free: bool, cos: T) -> [Option<(V3<T>, T)>; 2] {
     if free {

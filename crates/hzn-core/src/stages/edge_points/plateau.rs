@@ -41,8 +41,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         }
     }
 
-    /// Returns the brightness of a plateau, in units of [`Line::smoothed`], and the offset in steps where it begins. The
-    /// search begins at the border pixel (or its dark neighbour) with brightness `v` and goes outwards until the
+    /// Returns the brightness of a plateau, in units of [`Line::smoothed`], and the offset in steps where it begins.
+    /// The search begins at the border pixel (or its dark neighbour) with brightness `v` and goes outwards until the
     /// profile levels off. It has levelled off if each of two more steps changes it by less than a twelfth of the
     /// contrast to `other`.
     #[inline(always)]

@@ -1,4 +1,5 @@
-//! Fits by the methods of published systems, with the normal equations of the default method at the cone that they find.
+//! Fits by the methods of published systems, with the normal equations of the default method at the cone that they
+//! find.
 
 use super::cone::Cone;
 use super::given::cone_at;

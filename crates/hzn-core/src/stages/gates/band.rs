@@ -122,8 +122,8 @@ fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
     within
 }
 
-/// Returns the first place that is sky and from which on at least `MIN_SKY_SHARE` of the visible places are sky. At least
-/// three visible places are necessary.
+/// Returns the first place that is sky and from which on at least `MIN_SKY_SHARE` of the visible places are sky. At
+/// least three visible places are necessary.
 fn first_lasting_sky(is_sky: &[Option<bool>]) -> Option<usize> {
     let (mut first, mut sky, mut all) = (None, 0, 0);
     // The loop begins at the far end, so that each place is added to those behind it.
