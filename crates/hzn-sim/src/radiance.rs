@@ -12,7 +12,7 @@ pub(crate) struct Grid {
 }
 
 /// Returns the entry before a value in a rising list, and the position between this entry and the next one, 0 to 1.
-fn place(list: &[f64], x: f64) -> (usize, f32) {
+fn bracket(list: &[f64], x: f64) -> (usize, f32) {
     let i = list.partition_point(|v| *v <= x).clamp(1, list.len().max(2) - 1) - 1;
     match (list.get(i), list.get(i + 1)) {
         (Some(a), Some(b)) => (i, ((x - a) / (b - a)).clamp(0.0, 1.0) as f32),
@@ -22,36 +22,40 @@ fn place(list: &[f64], x: f64) -> (usize, f32) {
 
 impl Grid {
     /// Makes a grid; `value` gets a height in kilometres and a latitude in degrees.
-    pub(crate) fn of(heights_km: Vec<f64>, latitudes_deg: Vec<f64>, value: impl Fn(f64, f64) -> f64) -> Self {
+    pub(crate) fn from_function(
+        heights_km: Vec<f64>,
+        latitudes_deg: Vec<f64>,
+        value: impl Fn(f64, f64) -> f64,
+    ) -> Self {
         let values = latitudes_deg.iter().flat_map(|lat| heights_km.iter().map(|h| value(*h, *lat) as f32)).collect();
         Self { heights_km, latitudes_deg, values }
     }
 
     /// Returns the value at a height and a latitude.
-    pub(crate) fn at(&self, height_km: f64, latitude_deg: f64) -> f32 {
-        let ((i, fr), (k, fc)) = (place(&self.latitudes_deg, latitude_deg), place(&self.heights_km, height_km));
+    pub(crate) fn interpolate(&self, height_km: f64, latitude_deg: f64) -> f32 {
+        let ((i, fr), (k, fc)) = (bracket(&self.latitudes_deg, latitude_deg), bracket(&self.heights_km, height_km));
         let cell = |i: usize, k: usize| {
             let (i, k) = (i.min(self.latitudes_deg.len() - 1), k.min(self.heights_km.len() - 1));
             self.values.get(i * self.heights_km.len() + k).copied().unwrap_or(0.0)
         };
-        let along = |i: usize| cell(i, k) + fc * (cell(i, k + 1) - cell(i, k));
-        along(i) + fr * (along(i + 1) - along(i))
+        let by_height = |i: usize| cell(i, k) + fc * (cell(i, k + 1) - cell(i, k));
+        by_height(i) + fr * (by_height(i + 1) - by_height(i))
     }
 
     /// Returns the mean over the globe of the value at the lowest height.
-    pub(crate) fn deepest(&self) -> f32 {
+    pub(crate) fn lowest_mean(&self) -> f32 {
         let lowest = self.heights_km.first().copied().unwrap_or(0.0);
-        mean_over_globe(|lat| f64::from(self.at(lowest, lat))) as f32
+        mean_over_globe(|lat| f64::from(self.interpolate(lowest, lat))) as f32
     }
 
     /// Returns the outermost height in kilometres at which half of the value at the lowest height is left. Returns
     /// `None` if more than half is left at the largest height.
     pub(crate) fn half_level_km(&self, latitude_deg: f64) -> Option<f64> {
         let lowest = self.heights_km.first()?;
-        let half = 0.5 * self.at(*lowest, latitude_deg);
-        let inside = self.heights_km.iter().rposition(|h| self.at(*h, latitude_deg) > half)?;
+        let half = 0.5 * self.interpolate(*lowest, latitude_deg);
+        let inside = self.heights_km.iter().rposition(|h| self.interpolate(*h, latitude_deg) > half)?;
         let (h0, h1) = (self.heights_km.get(inside)?, self.heights_km.get(inside + 1)?);
-        let [v0, v1] = [h0, h1].map(|h| self.at(*h, latitude_deg));
+        let [v0, v1] = [h0, h1].map(|h| self.interpolate(*h, latitude_deg));
         Some(h0 + (h1 - h0) * f64::from((v0 - half) / (v0 - v1)))
     }
 }
@@ -127,7 +131,7 @@ impl Radiance {
         let (seasons, latitudes, heights) =
             (list(|r| r.season_deg.unwrap_or(0.0)), list(|r| r.latitude_deg), list(|r| r.tangent_height_km));
         if heights.len() < 2 {
-            return Err("needs rows at two tangent heights or more".into());
+            return Err("must have rows at two tangent heights or more".into());
         }
         let key = |r: &Row| [season(r), r.latitude_deg, r.tangent_height_km];
         rows.sort_by(|(n, a), (m, b)| {
@@ -136,7 +140,7 @@ impl Radiance {
         });
         let said = |[season, lat, h]: [f64; 3]| format!("{h} km at latitude {lat} and season {season} deg");
         if let Some([(first, _), (again, r)]) = rows.array_windows().find(|[(_, a), (_, b)]| key(a) == key(b)) {
-            return Err(format!("line {again}: {} stands in line {first} already", said(key(r))));
+            return Err(format!("line {again}: {} is already in line {first}", said(key(r))));
         }
         let wanted = seasons.iter().flat_map(|s| latitudes.iter().flat_map(|l| heights.iter().map(|h| [*s, *l, *h])));
         let mut have = rows.iter().map(|(_, r)| key(r));
@@ -145,7 +149,7 @@ impl Radiance {
         }
         let lowest = |r: &Row| heights.first() == Some(&r.tangent_height_km);
         if let Some((line, r)) = rows.iter().find(|(_, r)| lowest(r) && r.radiance <= 0.0) {
-            let rule = "must be above 0 at the lowest tangent height: the limb is where half of it is left";
+            let rule = "must be above 0 at the lowest tangent height: the limb is where half of this radiance is left";
             return Err(format!("line {line}: radiance = {} at {}: {rule}", r.radiance, said(key(r))));
         }
         let each = latitudes.len() * heights.len();
@@ -171,7 +175,7 @@ impl Radiance {
     }
 
     /// Returns the grid of a season in degrees. It is linear between two seasons, around the year too.
-    pub(crate) fn in_season(&self, season_deg: f64) -> Grid {
+    pub(crate) fn season_grid(&self, season_deg: f64) -> Grid {
         let season = season_deg.rem_euclid(360.0);
         let next = self.seasons.partition_point(|s| s.0 <= season);
         let n = self.seasons.len();
@@ -204,24 +208,26 @@ mod tests {
     fn between_heights_latitudes_and_seasons() {
         let table =
             Radiance::parse(&text(|season, lat| if (season == 0.0) == (lat > 0.0) { 30.0 } else { 20.0 })).unwrap();
-        let july = table.in_season(0.0);
+        let july = table.season_grid(0.0);
         assert!((july.half_level_km(90.0).unwrap() - 30.0).abs() < 1e-5);
         assert!((july.half_level_km(-90.0).unwrap() - 20.0).abs() < 1e-5);
-        assert!((table.in_season(180.0).half_level_km(90.0).unwrap() - 20.0).abs() < 1e-5);
-        assert!((july.at(27.5, 90.0) - 0.6).abs() < 1e-6 && (july.at(27.5, -90.0) - 0.0).abs() < 1e-6);
+        assert!((table.season_grid(180.0).half_level_km(90.0).unwrap() - 20.0).abs() < 1e-5);
+        assert!(
+            (july.interpolate(27.5, 90.0) - 0.6).abs() < 1e-6 && (july.interpolate(27.5, -90.0) - 0.0).abs() < 1e-6
+        );
         // The checks are half-way in latitude, half-way in season on both sides of the year, and beyond the ends.
-        assert!((july.at(27.5, 0.0) - 0.3).abs() < 1e-6);
+        assert!((july.interpolate(27.5, 0.0) - 0.3).abs() < 1e-6);
         for season in [90.0, 270.0, -90.0] {
-            assert!((table.in_season(season).at(27.5, 90.0) - 0.3).abs() < 1e-6);
+            assert!((table.season_grid(season).interpolate(27.5, 90.0) - 0.3).abs() < 1e-6);
         }
-        assert_eq!((july.at(-50.0, 10.0), july.at(99.0, 10.0)), (july.at(0.0, 10.0), 0.0));
-        assert!((july.deepest() - 0.8).abs() < 1e-6);
+        assert_eq!((july.interpolate(-50.0, 10.0), july.interpolate(99.0, 10.0)), (july.interpolate(0.0, 10.0), 0.0));
+        assert!((july.lowest_mean() - 0.8).abs() < 1e-6);
     }
 
     #[test]
     fn one_season_and_one_latitude_are_enough() {
         let table = Radiance::parse("tangent_height_km,latitude_deg,radiance\n0,0,0.5\n40,0,0\n").unwrap();
-        assert_eq!(table.in_season(77.0).half_level_km(60.0), Some(20.0));
+        assert_eq!(table.season_grid(77.0).half_level_km(60.0), Some(20.0));
     }
 
     #[test]
@@ -237,7 +243,7 @@ mod tests {
         assert!(error(&good.replace("40,", "0,")).contains("two tangent heights"));
         assert_eq!(
             error(&format!("{good}0,0,0.4\n")),
-            "line 4: 0 km at latitude 0 and season 0 deg stands in line 2 already"
+            "line 4: 0 km at latitude 0 and season 0 deg is already in line 2"
         );
         assert!(error(&format!("{good}0,10,0.4\n")).starts_with("no row for 40 km at latitude 10 and season 0 deg"));
         assert!(error(&good.replace("40,0,0\n", "40,0,0.4\n")).contains("must reach beyond the limb"));

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::detector::Plane;
 use crate::error::SceneError;
 use crate::globe::Globe;
-use crate::infrared::Warmth;
+use crate::infrared::InfraredPainter;
 use crate::motion::Motion;
 use crate::optics::Optics;
 use crate::painter::Painter;
@@ -31,7 +31,7 @@ impl Scene {
         for plane in &mut light {
             self.expose(plane, &camera);
         }
-        let blur = |plane: Plane| through_circle(plane.blurred(self.detector.psf_sigma_px), &camera);
+        let blur = |plane: Plane| apply_image_circle(plane.blurred(self.detector.psf_sigma_px), &camera);
         let light: Vec<Plane> = light.into_iter().map(blur).collect();
         Ok(self.detector.expose(&light, self.seed))
     }
@@ -39,10 +39,10 @@ impl Scene {
     /// Returns the light on every pixel before blur and exposure: one plane, or three for colours.
     pub(crate) fn light(&self) -> Result<Vec<Plane>, SceneError> {
         let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
-        let camera = beyond_circle(&self.camera)?;
+        let camera = lens_without_circle(&self.camera)?;
         let (fx, fy) = camera.focal_px();
         let pixel_rad = 1.0 / fx.min(fy);
-        let motion = self.motion.filter(|m| m.matters(pixel_rad));
+        let motion = self.motion.filter(|m| m.is_significant(pixel_rad));
         let poses = |row: usize| match &motion {
             Some(motion) => motion.poses(&self.pose, row as f64, h, pixel_rad),
             None => vec![self.pose],
@@ -52,12 +52,12 @@ impl Scene {
                 let painter = Painter::try_new(self)?;
                 let mut data = vec![0.0f32; w * h];
                 data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match &motion {
-                    None => painter.row(y as f64, row),
+                    None => painter.render_row(y as f64, row),
                     Some(_) => {
                         let poses = poses(y);
                         let mut one = vec![0.0f32; w];
                         for pose in &poses {
-                            painter.turned(pose).row(y as f64, &mut one);
+                            painter.with_pose(pose).render_row(y as f64, &mut one);
                             row.iter_mut().zip(&one).for_each(|(sum, p)| *sum += p / poses.len() as f32);
                         }
                     }
@@ -67,13 +67,15 @@ impl Scene {
             }
             World::Infrared(world) => {
                 let globe = Globe::new(&self.body);
-                let warmth = Warmth::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
+                let painter = InfraredPainter::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
                 let mut data = vec![0.0f32; w * h];
                 data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match &motion {
-                    None => warmth.row(y as f64, 1.0, row),
+                    None => painter.render_row(y as f64, 1.0, row),
                     Some(_) => {
                         let poses = poses(y);
-                        poses.iter().for_each(|p| warmth.turned(p).row(y as f64, 1.0 / poses.len() as f32, row));
+                        poses
+                            .iter()
+                            .for_each(|p| painter.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
                     }
                 });
                 vec![Plane { width: w, data }]
@@ -123,10 +125,10 @@ impl Scene {
         let shader = self.shader(world, camera)?;
         let mut pixels = vec![[0.0f32; 3]; w * h];
         pixels.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
-            None => shader.row(y as f64, 1.0, row),
+            None => shader.render_row(y as f64, 1.0, row),
             Some(motion) => {
                 let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
-                poses.iter().for_each(|p| shader.turned(p).row(y as f64, 1.0 / poses.len() as f32, row));
+                poses.iter().for_each(|p| shader.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
             }
         });
         // Stars, Moon and Sun use the poses of the middle row.
@@ -135,7 +137,7 @@ impl Scene {
         let weight = 1.0 / poses.len() as f32;
         let mut canvas = Canvas { width: w, pixels: &mut pixels };
         for pose in &poses {
-            let shader = shader.turned(pose);
+            let shader = shader.with_pose(pose);
             shader.draw_stars(&mut canvas, weight, world, world.ground.seed);
             if let Some(moon) = self.moon_ecef_m {
                 shader.draw_moon(&mut canvas, weight, moon, self.pose.position_m);
@@ -152,7 +154,7 @@ impl Scene {
         if self.optics == Optics::default() {
             return Ok(());
         }
-        let shader = self.shader(world, beyond_circle(&self.camera)?)?;
+        let shader = self.shader(world, lens_without_circle(&self.camera)?)?;
         let hidden = shader.sun_point().is_some_and(|p| self.foreground.iter().any(|f| f.contains([p.u, p.v])));
         let width = usize::from(self.camera.width);
         let mut pixels = vec![[0.0f32; 3]; width * usize::from(self.camera.height)];
@@ -187,14 +189,14 @@ impl Scene {
 
 /// Returns the lens without its image circle, or with a wider one, as far as it stays monotone. The scene continues
 /// beyond the circle, so the blur takes light from there, as with a stop close to the detector.
-pub(crate) fn beyond_circle(config: &camera::Config) -> Result<Camera<f64>, SceneError> {
+pub(crate) fn lens_without_circle(config: &camera::Config) -> Result<Camera<f64>, SceneError> {
     let with = |theta_max_deg| Camera::try_new(&camera::Config { theta_max_deg, ..config.clone() });
     let wider = config.theta_max_deg.map(|deg| deg + 3.0);
     with(None).or_else(|_| with(wider)).or_else(|_| with(config.theta_max_deg)).map_err(SceneError::from)
 }
 
 /// Removes all light beyond the image circle.
-pub(crate) fn through_circle(mut light: Plane, camera: &Camera<f64>) -> Plane {
+pub(crate) fn apply_image_circle(mut light: Plane, camera: &Camera<f64>) -> Plane {
     if let Some((c, a, b)) = camera.image_circle_px() {
         let w = light.width;
         light.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {

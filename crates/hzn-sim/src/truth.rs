@@ -194,7 +194,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
             return Err(wrong(line, Some("qw, qx, qy, qz"), "must have length 1".into()));
         }
         if !(row.half_angle_deg > 0.0 && row.half_angle_deg < 90.0) {
-            let what = format!("{} is no half-angle: above 0 and below 90 is expected", row.half_angle_deg);
+            let what = format!("{} is not a half-angle: it must be above 0 and below 90", row.half_angle_deg);
             return Err(wrong(line, Some("half_angle_deg"), what));
         }
         rows.push(row);
@@ -256,9 +256,9 @@ impl Scene {
     ///
     /// # Errors
     /// Fails like [`Scene::truth`], and if the scene does not have the body.
-    pub fn truth_of(&self, kind: Kind, file: &str, time_s: f64) -> Result<Truth, SceneError> {
+    pub fn body_truth(&self, kind: Kind, file: &str, time_s: f64) -> Result<Truth, SceneError> {
         let truth = self.truth(file, time_s)?;
-        let Some(disc) = self.disc_of(kind)? else { return Ok(truth) };
+        let Some(disc) = self.sky_disc(kind)? else { return Ok(truth) };
         let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
         let direction = UnitVec3::<Ecef, f64>::try_new(disc.direction).ok_or(SceneError::Sun)?;
         let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&direction).xyz();
@@ -278,9 +278,9 @@ impl Scene {
     /// own body, or Sun or Moon next to it.
     ///
     /// # Errors
-    /// Fails like [`Scene::truth_of`].
+    /// Fails like [`Scene::body_truth`].
     pub fn visible_px(&self, kind: Kind) -> Result<f64, SceneError> {
-        let Some(disc) = self.disc_of(kind)? else { return self.visible_limb_px() };
+        let Some(disc) = self.sky_disc(kind)? else { return self.visible_limb_px() };
         let camera = Camera::<f64>::try_new(&self.camera)?;
         let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
         let view = View::try_new(Globe::new(&self.body), &self.pose).ok_or(SceneError::Pose)?;
@@ -294,32 +294,32 @@ impl Scene {
         };
         let (w, h) = (f64::from(self.camera.width), f64::from(self.camera.height));
         const STEPS: i32 = 720;
-        let mut seen_px = 0.0;
+        let mut visible_px = 0.0;
         let mut last = None;
         for i in 0..=STEPS {
             let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(i) / f64::from(STEPS));
-            let out = a * cos + b * sin;
-            let ray = (centre + out * libm::tan(disc.half_angle_rad)).normalize();
+            let outward = a * cos + b * sin;
+            let ray = (centre + outward * libm::tan(disc.half_angle_rad)).normalize();
             let point = UnitVec3::<Ecef, f64>::try_new(ray.into()).and_then(|r| {
                 let cam = ecef_to_cam.apply(&r);
                 let p = camera.project(&cam)?;
                 let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
-                let behind = view.look(cam.xyz()).miss <= 0.0;
-                let lit = sun.is_none_or(|s| s.dot(&out) > 0.05);
+                let behind = view.intersect(cam.xyz()).miss <= 0.0;
+                let lit = sun.is_none_or(|s| s.dot(&outward) > 0.05);
                 let hidden = self.foreground.iter().any(|f| f.contains([p.u, p.v]));
                 (inside && !behind && lit && !hidden).then_some(p)
             });
             if let (Some(p), Some(q)) = (point, last) {
                 let q: ImagePoint<f64> = q;
-                seen_px += libm::hypot(p.u - q.u, p.v - q.v);
+                visible_px += libm::hypot(p.u - q.u, p.v - q.v);
             }
             last = point;
         }
-        Ok(seen_px)
+        Ok(visible_px)
     }
 
     /// Returns Sun or Moon as a disc in the sky; `None` for other kinds, and if `kind` is the scene's own body.
-    fn disc_of(&self, kind: Kind) -> Result<Option<SkyDisc>, SceneError> {
+    fn sky_disc(&self, kind: Kind) -> Result<Option<SkyDisc>, SceneError> {
         if self.body.kind == kind {
             return Ok(None);
         }
@@ -385,7 +385,7 @@ mod tests {
         );
         assert_eq!(says(text.lines().next().unwrap()), "truth.csv: has no rows");
         let shown = rows[0].half_angle_deg.to_string();
-        assert!(says(&text.replace(&shown, "97")).contains("half_angle_deg: 97 is no half-angle"));
+        assert!(says(&text.replace(&shown, "97")).contains("half_angle_deg: 97 is not a half-angle"));
         assert!(load(Path::new("/nowhere/truth.csv")).unwrap_err().to_string().ends_with("no such file"));
     }
 

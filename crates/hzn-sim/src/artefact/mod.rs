@@ -42,5 +42,5 @@ mod window;
 mod tests;
 
 pub use kind::Kind;
-pub use outcome::{Detection, FALSE_SIGMAS, GROSS_DEG, Outcome, PriorKnowledge, look};
+pub use outcome::{Detection, FALSE_SIGMAS, GROSS_DEG, Outcome, PriorKnowledge, process_trial};
 pub use trial::Trial;

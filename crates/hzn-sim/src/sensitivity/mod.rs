@@ -14,4 +14,4 @@ pub mod reference;
 pub mod sigmas;
 
 pub use design::{Design, DesignError};
-pub use sigmas::{Sigmas, Tilt};
+pub use sigmas::{DirectionSigmas, Sigmas};

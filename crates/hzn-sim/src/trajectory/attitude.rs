@@ -9,7 +9,7 @@ use hzn_core::body::Kind;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{Path, Way, from_ecef};
+use super::{Path, PreparedTrajectory, from_ecef};
 use crate::counter::{Counter, Stream};
 use crate::pose::{Look, Pose};
 use hzn_nav::ephemeris;
@@ -118,7 +118,7 @@ impl Default for Tumble {
 
 /// [`Attitude`], prepared for evaluation.
 #[derive(Debug, Clone)]
-pub(crate) enum Turn {
+pub(crate) enum PreparedAttitude {
     /// Attitudes of the vehicle relative to inertial space, every [`STEP_S`] from `from_s`.
     Steps {
         from_s: f64,
@@ -140,7 +140,7 @@ pub(crate) enum Turn {
 
 const STEP_S: f64 = 0.01;
 
-impl Turn {
+impl PreparedAttitude {
     pub(crate) fn try_new(
         attitude: &Attitude,
         path: &Path,
@@ -150,14 +150,14 @@ impl Turn {
         let refuse = |key: &str, what: &str| Err((format!("[attitude] {key}"), what.to_owned()));
         match attitude {
             Attitude::Spin(spin) => {
-                let Way::Rocket(ascent) = &path.way else {
-                    return refuse("spin", "belongs to [trajectory.rocket]");
+                let PreparedTrajectory::Rocket(ascent) = &path.way else {
+                    return refuse("spin", "is allowed only with [trajectory.rocket]");
                 };
                 if !(spin.limit_deg_s > 0.0 && spin.lateral_limit_deg_s > 0.0) {
                     return refuse("spin.limit_deg_s", "limit_deg_s and lateral_limit_deg_s must be above 0");
                 }
                 if !(spin.spin_hz.abs() <= 20.0) {
-                    return refuse("spin.spin_hz", "must be at most 20 turns a second");
+                    return refuse("spin.spin_hz", "must be at most 20 turns per second");
                 }
                 Ok(spin.steps(path, ascent, to_s, seed))
             }
@@ -166,7 +166,7 @@ impl Turn {
                     return refuse("tumble.inertia", "all three must be above 0");
                 }
                 if tumble.rates_deg_s.iter().any(|r| !(r.abs() <= 3600.0)) {
-                    return refuse("tumble.rates_deg_s", "must be at most 3600 degrees a second");
+                    return refuse("tumble.rates_deg_s", "must be at most 3600 degrees per second");
                 }
                 Ok(tumble.steps([from_s, to_s], seed))
             }
@@ -178,15 +178,17 @@ impl Turn {
             }
             Attitude::Towards(towards) => {
                 if towards.bodies.is_empty() || towards.bodies.iter().any(|b| matches!(b, Kind::Sphere)) {
-                    return refuse("towards.bodies", "must be some of \"sun\", \"moon\", \"earth\"");
+                    return refuse("towards.bodies", "must be one or more of \"sun\", \"moon\", \"earth\"");
                 }
                 let phase = Counter::new(seed, Stream::Drift).uniform(0) * TAU;
                 Ok(Self::Towards { towards: towards.clone(), from_s, to_s, phase })
             }
             Attitude::Table => match &path.way {
-                Way::Table(rows) if rows.has_attitudes() => Ok(Self::Table),
-                Way::Table(_) => refuse("table", "the file of [trajectory] table has no columns qw, qx, qy, qz"),
-                _ => refuse("table", "belongs to [trajectory.table]"),
+                PreparedTrajectory::Table(rows) if rows.has_attitudes() => Ok(Self::Table),
+                PreparedTrajectory::Table(_) => {
+                    refuse("table", "the file of [trajectory] table has no columns qw, qx, qy, qz")
+                }
+                _ => refuse("table", "is allowed only with [trajectory.table]"),
             },
         }
     }
@@ -239,7 +241,7 @@ fn quaternion(pose: &Pose) -> UnitQuaternion<f64> {
 }
 
 /// Returns the attitude whose x axis is along `x` and whose y axis is perpendicular to `up`.
-fn along(x: Vector3<f64>, up: Vector3<f64>) -> UnitQuaternion<f64> {
+fn attitude_along(x: Vector3<f64>, up: Vector3<f64>) -> UnitQuaternion<f64> {
     let x = x.normalize();
     let helper = if x.dot(&up).abs() < 0.999 * up.norm() { up } else { Vector3::new(up.y, up.z, up.x) };
     let y = helper.cross(&x).normalize();
@@ -248,7 +250,7 @@ fn along(x: Vector3<f64>, up: Vector3<f64>) -> UnitQuaternion<f64> {
 }
 
 impl Spin {
-    fn steps(&self, path: &Path, ascent: &super::rocket::Ascent, to_s: f64, seed: u64) -> Turn {
+    fn steps(&self, path: &Path, ascent: &super::rocket::Ascent, to_s: f64, seed: u64) -> PreparedAttitude {
         let draws = Counter::new(seed, Stream::Drift);
         let mut drawn = 0u64;
         let mut next = || {
@@ -279,9 +281,9 @@ impl Spin {
                 // Under thrust the long axis follows the direction of flight; after burn-out it keeps its direction in
                 // space.
                 let forward = from_ecef(path.sidereal_rad(t), &ascent.forward(t));
-                let up = from_ecef(path.sidereal_rad(t), &ascent.at(t).position_m.normalize());
+                let up = from_ecef(path.sidereal_rad(t), &ascent.point(t).position_m.normalize());
                 let lean = self.cone_deg.to_radians() * (t / burnout_s);
-                q = along(forward, up)
+                q = attitude_along(forward, up)
                     * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean)
                     * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), roll);
                 roll += rolled(t) * STEP_S;
@@ -308,12 +310,12 @@ impl Spin {
             }
             steps.push(q);
         }
-        Turn::Steps { from_s: 0.0, steps }
+        PreparedAttitude::Steps { from_s: 0.0, steps }
     }
 }
 
 impl Tumble {
-    fn steps(&self, [from_s, to_s]: [f64; 2], seed: u64) -> Turn {
+    fn steps(&self, [from_s, to_s]: [f64; 2], seed: u64) -> PreparedAttitude {
         let draws = Counter::new(seed, Stream::Drift);
         let start = [0, 1, 2, 3].map(|i| draws.normal(i));
         let mut q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(start));
@@ -332,6 +334,6 @@ impl Tumble {
             q *= UnitQuaternion::from_scaled_axis(middle * STEP_S);
             w += turn(&middle) * STEP_S;
         }
-        Turn::Steps { from_s, steps }
+        PreparedAttitude::Steps { from_s, steps }
     }
 }

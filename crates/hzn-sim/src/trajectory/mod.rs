@@ -78,7 +78,7 @@ pub(crate) fn from_ecef(sidereal_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
 
 /// A trajectory, prepared for evaluation.
 #[derive(Debug, Clone)]
-enum Way {
+enum PreparedTrajectory {
     Rocket(rocket::Ascent),
     Orbit(orbit::Ellipse),
     Table(table::TableRows),
@@ -87,8 +87,8 @@ enum Way {
 /// A flight: trajectory and attitude, prepared for evaluation.
 #[derive(Debug, Clone)]
 pub struct Path {
-    way: Way,
-    turn: attitude::Turn,
+    way: PreparedTrajectory,
+    turn: attitude::PreparedAttitude,
     camera_to_body: UnitQuaternion<f64>,
     start_unix_s: f64,
 }
@@ -110,14 +110,16 @@ impl Path {
         seed: u64,
     ) -> Result<Self, (String, String)> {
         let way = match trajectory {
-            Trajectory::Rocket(rocket) => Way::Rocket(rocket::Ascent::try_new(rocket, to_s, start_unix_s)?),
-            Trajectory::Orbit(orbit) => Way::Orbit(orbit::Ellipse::try_new(orbit, start_unix_s)?),
-            Trajectory::Table(table) => Way::Table(table.rows([from_s, to_s])?),
+            Trajectory::Rocket(rocket) => {
+                PreparedTrajectory::Rocket(rocket::Ascent::try_new(rocket, to_s, start_unix_s)?)
+            }
+            Trajectory::Orbit(orbit) => PreparedTrajectory::Orbit(orbit::Ellipse::try_new(orbit, start_unix_s)?),
+            Trajectory::Table(table) => PreparedTrajectory::Table(table.rows([from_s, to_s])?),
         };
         let [w, x, y, z] = camera_to_body_wxyz;
         let camera_to_body = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        let mut path = Self { way, turn: attitude::Turn::Table, camera_to_body, start_unix_s };
-        path.turn = attitude::Turn::try_new(attitude, &path, [from_s, to_s], seed)?;
+        let mut path = Self { way, turn: attitude::PreparedAttitude::Table, camera_to_body, start_unix_s };
+        path.turn = attitude::PreparedAttitude::try_new(attitude, &path, [from_s, to_s], seed)?;
         Ok(path)
     }
 
@@ -132,15 +134,17 @@ impl Path {
 
     pub(crate) fn point(&self, time_s: f64) -> Point {
         match &self.way {
-            Way::Rocket(ascent) => ascent.at(time_s),
-            Way::Orbit(ellipse) => ellipse.at(time_s),
-            Way::Table(rows) => rows.point(time_s),
+            PreparedTrajectory::Rocket(ascent) => ascent.point(time_s),
+            PreparedTrajectory::Orbit(ellipse) => ellipse.point(time_s),
+            PreparedTrajectory::Table(rows) => rows.point(time_s),
         }
     }
 
     fn body_to_ecef(&self, time_s: f64) -> UnitQuaternion<f64> {
         match (&self.turn, &self.way) {
-            (attitude::Turn::Table, Way::Table(rows)) => rows.camera_to_ecef(time_s) * self.camera_to_body.inverse(),
+            (attitude::PreparedAttitude::Table, PreparedTrajectory::Table(rows)) => {
+                rows.camera_to_ecef(time_s) * self.camera_to_body.inverse()
+            }
             _ => self.turn.body_to_ecef(self, time_s),
         }
     }
