@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::Path;
+use super::path::Path;
 use crate::counter::{Counter, Stream};
 
 /// An inertial measurement unit in the vehicle's axes.
@@ -237,7 +237,7 @@ mod tests {
         let mut q = path.state(70.0).body_to_ecef;
         for row in exact.rows(&path, [start, start + 9.999], 1) {
             let w = Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps);
-            let earth = q.inverse_transform_vector(&Vector3::new(0.0, 0.0, crate::trajectory::EARTH_RATE));
+            let earth = q.inverse_transform_vector(&Vector3::new(0.0, 0.0, crate::trajectory::earth::EARTH_RATE));
             q *= nalgebra::UnitQuaternion::from_scaled_axis((w - earth) * 1e-3);
         }
         let off = q.angle_to(&path.state(80.0).body_to_ecef);
@@ -274,7 +274,7 @@ mod tests {
             let s = path.state(t);
             assert_eq!(s.specific_force_mps2.norm(), 0.0);
             let body = Vector3::from(tumble.inertia).component_mul(&s.rate_radps);
-            crate::trajectory::from_ecef(path.sidereal_rad(t), &(s.body_to_ecef * body))
+            crate::trajectory::earth::from_ecef(path.sidereal_rad(t), &(s.body_to_ecef * body))
         };
         let (a, b) = (momentum(0.0), momentum(600.0));
         assert!((a - b).norm() < 1e-3 * a.norm(), "{a} {b}");

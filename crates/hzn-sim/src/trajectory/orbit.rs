@@ -6,7 +6,8 @@ use core::f64::consts::TAU;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{EARTH_RATE, MU, Point, to_ecef};
+use super::earth::{EARTH_RATE, MU, to_ecef};
+use super::point::Point;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 use hzn_nav::ephemeris;
 

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{EARTH_RATE, Point, from_ecef, gravity, to_ecef};
+use super::earth::{EARTH_RATE, from_ecef, gravity, to_ecef};
+use super::point::Point;
 use crate::globe::Globe;
 use crate::pose::position_m;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M};

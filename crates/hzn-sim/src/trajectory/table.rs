@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::Point;
+use super::earth::{EARTH_RATE, gravity};
+use super::point::Point;
 
 /// Rows of a CSV file with the columns `time_s, x_km, y_km, z_km` (ECEF). For `attitude = "table"` it also has
 /// `qw, qx, qy, qz` (camera to ECEF). Between rows, positions follow a smooth cubic and attitudes the shortest turn.
@@ -43,7 +44,7 @@ impl Table {
         Ok(())
     }
 
-    pub(crate) fn rows(&self, [from_s, to_s]: [f64; 2]) -> Result<TableRows, (String, String)> {
+    pub(crate) fn parse_rows(&self, [from_s, to_s]: [f64; 2]) -> Result<TableRows, (String, String)> {
         let file = self.file.display();
         let wrong = |what: String| ("[trajectory] table.file".to_owned(), format!("{file}: {what}"));
         let text = self.text.as_deref().ok_or_else(|| wrong("has not been read".into()))?;
@@ -135,9 +136,9 @@ impl TableRows {
         let velocity_mps = v0 + (v1 - v0) * s;
         // The specific force is the acceleration without gravity. It follows from the change of the velocity in the
         // rotating frame.
-        let earth = Vector3::new(0.0, 0.0, super::EARTH_RATE);
+        let earth = Vector3::new(0.0, 0.0, EARTH_RATE);
         let acceleration = (v1 - v0) / h + earth.cross(&velocity_mps) * 2.0 + earth.cross(&earth.cross(&position_m));
-        Point { position_m, velocity_mps, specific_force_mps2: acceleration - super::gravity(&position_m) }
+        Point { position_m, velocity_mps, specific_force_mps2: acceleration - gravity(&position_m) }
     }
 
     pub(crate) fn camera_to_ecef(&self, time_s: f64) -> UnitQuaternion<f64> {
@@ -154,7 +155,7 @@ mod tests {
     use super::*;
 
     fn rows(text: &str) -> Result<TableRows, (String, String)> {
-        Table { file: "way.csv".into(), text: Some(text.into()) }.rows([0.0, 2.0])
+        Table { file: "way.csv".into(), text: Some(text.into()) }.parse_rows([0.0, 2.0])
     }
 
     #[test]
