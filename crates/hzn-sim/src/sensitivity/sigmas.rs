@@ -9,7 +9,8 @@ use hzn_core::camera::{Camera, Model};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use serde::Serialize;
 
-use super::design::{Design, LimbSample};
+use super::design::{Design, DesignError};
+use super::limb_samples::LimbSample;
 
 /// Standard deviations of a direction in degrees (1 sigma).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -62,14 +63,22 @@ fn correlated<const N: usize>(rows: &[Row<N>]) -> SMatrix<f64, N, N> {
     x
 }
 
+impl Design {
+    /// Returns the sigmas of this design; `None` if the limb in view is too short for a direction, or if there is none.
+    ///
+    /// # Errors
+    /// Fails if the camera is invalid or not above the limb.
+    pub fn sigmas(&self) -> Result<Option<Sigmas>, DesignError> {
+        let half_angle_rad = self.half_angle_rad()?;
+        let camera = Camera::try_new(&self.camera)?;
+        let samples = self.sample_limb(&camera, half_angle_rad);
+        Ok(Sigmas::new(self, &camera, half_angle_rad, &samples))
+    }
+}
+
 impl Sigmas {
     /// Returns `None` if the points do not determine a direction with a free half-angle.
-    pub(super) fn new(
-        design: &Design,
-        camera: &Camera<f64>,
-        half_angle_rad: f64,
-        samples: &[LimbSample],
-    ) -> Option<Self> {
+    fn new(design: &Design, camera: &Camera<f64>, half_angle_rad: f64, samples: &[LimbSample]) -> Option<Self> {
         let e = Vector3::from(design.axis());
         // `tilt` points towards the optical axis and `across` is perpendicular to it. If the camera looks straight
         // down, any plane is suitable.
