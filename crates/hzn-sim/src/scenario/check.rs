@@ -4,9 +4,11 @@ use hzn_core::body::Kind;
 use hzn_core::camera::Camera;
 
 use super::{Format, Scenario, ScenarioError};
+use crate::infrared::Infrared;
 use crate::scene::World;
 use crate::texture::Clouds;
 use crate::utc;
+use crate::visible::Visible;
 
 /// A key, its value, and the smallest and largest allowed value.
 struct Limit(String, f64, [f64; 2]);
@@ -125,38 +127,45 @@ impl Scenario {
             all.extend(corners.map(|x| Limit::new("[[vehicle]] polygon_px", *x, [-1e5, 1e5])));
         }
         match &self.world {
-            World::Visible(w) => {
-                let key = |key: &str| format!("[world] visible.{key}");
-                all.extend([
-                    Limit::new(key("star_brightness"), w.star_brightness, [0.0, UNLIMITED]),
-                    Limit::new(key("ground.land"), w.ground.land, share),
-                    Limit::new(key("ground.ice_deg"), w.ground.ice_deg, [0.0, 90.0]),
-                    Limit::new(key("air.scale_height_km"), w.air.scale_height_km, [0.1, 100.0]),
-                    Limit::new(key("air.brightness"), w.air.brightness, [0.0, UNLIMITED]),
-                ]);
-                all.extend(w.air.optical_depth.map(|d| Limit::new(key("air.optical_depth"), d, [0.0, 100.0])));
-                all.extend(clouds(&key("clouds"), &w.clouds));
-            }
-            World::Infrared(w) => {
-                let key = |key: &str| format!("[world] infrared.{key}");
-                all.extend([
-                    Limit::new(key("season_deg"), w.season_deg.unwrap_or(0.0), [-360.0, 360.0]),
-                    Limit::new(key("brightness"), w.brightness, [ABOVE_ZERO, 1.0]),
-                    Limit::new(key("by_latitude"), w.by_latitude, [-0.9, 0.9]),
-                    Limit::new(key("half_level_km"), w.half_level_km, [-100.0, 300.0]),
-                    Limit::new(key("half_level_season_km"), w.half_level_season_km, [-100.0, 100.0]),
-                    Limit::new(key("scale_km"), w.scale_km, [0.01, 50.0]),
-                    Limit::new(key("space"), w.space, [0.0, 0.99]),
-                ]);
-                all.extend(w.clouds.iter().flat_map(|own| clouds(&key("clouds"), own)));
-            }
+            World::Visible(world) => all.extend(visible_limits(world)),
+            World::Infrared(world) => all.extend(infrared_limits(world)),
             World::Plain => {}
         }
         all
     }
 }
 
-fn clouds(table: &str, clouds: &Clouds) -> Vec<Limit> {
+fn visible_limits(world: &Visible) -> Vec<Limit> {
+    let Visible { ground, air, .. } = world;
+    let limit = |key: &str, value: f64, range: [f64; 2]| Limit::new(format!("[world] visible.{key}"), value, range);
+    let mut all = vec![
+        limit("star_brightness", world.star_brightness, [0.0, UNLIMITED]),
+        limit("ground.land", ground.land, [0.0, 1.0]),
+        limit("ground.ice_deg", ground.ice_deg, [0.0, 90.0]),
+        limit("air.scale_height_km", air.scale_height_km, [0.1, 100.0]),
+        limit("air.brightness", air.brightness, [0.0, UNLIMITED]),
+    ];
+    all.extend(air.optical_depth.map(|depth| limit("air.optical_depth", depth, [0.0, 100.0])));
+    all.extend(cloud_limits("[world] visible.clouds", &world.clouds));
+    all
+}
+
+fn infrared_limits(world: &Infrared) -> Vec<Limit> {
+    let limit = |key: &str, value: f64, range: [f64; 2]| Limit::new(format!("[world] infrared.{key}"), value, range);
+    let mut all = vec![
+        limit("season_deg", world.season_deg.unwrap_or(0.0), [-360.0, 360.0]),
+        limit("brightness", world.brightness, [ABOVE_ZERO, 1.0]),
+        limit("by_latitude", world.by_latitude, [-0.9, 0.9]),
+        limit("half_level_km", world.half_level_km, [-100.0, 300.0]),
+        limit("half_level_season_km", world.half_level_season_km, [-100.0, 100.0]),
+        limit("scale_km", world.scale_km, [0.01, 50.0]),
+        limit("space", world.space, [0.0, 0.99]),
+    ];
+    all.extend(world.clouds.iter().flat_map(|clouds| cloud_limits("[world] infrared.clouds", clouds)));
+    all
+}
+
+fn cloud_limits(table: &str, clouds: &Clouds) -> Vec<Limit> {
     let limit = |key: &str, value: f64, range: [f64; 2]| Limit::new(format!("{table}.{key}"), value, range);
     vec![
         limit("cover", clouds.cover, [0.0, 1.0]),
