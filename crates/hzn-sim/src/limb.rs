@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disc_is_one_closed_piece() {
+    fn a_full_disc_is_one_closed_segment() {
         let camera = Config::ideal(Model::Equidistant, 384, 288, 92.0);
         let s = Scene::new(camera, Pose::looking(position_m(0.0, 0.0, 600.0), Look::off_nadir(0.0, 0.0, 0.0)));
         let points = s.limb_points(100, EdgeNoise::None).unwrap();

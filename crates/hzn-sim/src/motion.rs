@@ -33,7 +33,7 @@ impl Motion {
     }
 
     /// Returns the time of the middle of a row's exposure, in seconds after the time of the picture.
-    pub(crate) fn row_s(&self, row: f64, rows: usize) -> f64 {
+    pub(crate) fn row_time_s(&self, row: f64, rows: usize) -> f64 {
         let last = rows.saturating_sub(1).max(1) as f64;
         self.readout_s * (row / last - 0.5)
     }
@@ -42,7 +42,7 @@ impl Motion {
     pub(crate) fn poses(&self, pose: &Pose, row: f64, rows: usize, pixel_rad: f64) -> Vec<Pose> {
         let blur_px = self.rate() * self.exposure_s / pixel_rad;
         let count = ((blur_px / STEP_PX).ceil() as usize).clamp(1, MAX_POSES);
-        let middle = self.row_s(row, rows);
+        let middle = self.row_time_s(row, rows);
         (0..count)
             .map(|i| {
                 let time_s = middle + self.exposure_s * ((i as f64 + 0.5) / count as f64 - 0.5);

@@ -44,8 +44,8 @@ impl<S: Solid> ProjectedSolid<S> {
     fn sample_ray(&self, [sx, sy, sz]: [f64; 3], u: f64, v: f64) -> Spot {
         let z = sz.max(MIN_COS);
         let (x, y) = (self.focal[0] * sx / z, self.focal[1] * sy / z);
-        let own = libm::hypot(u - self.centre[0], v - self.centre[1]);
-        let scale = if own > 1.0 { libm::hypot(x, y) / own } else { 1.0 };
+        let radius_px = libm::hypot(u - self.centre[0], v - self.centre[1]);
+        let scale = if radius_px > 1.0 { libm::hypot(x, y) / radius_px } else { 1.0 };
         self.solid.sample((x + self.centre[0]) as f32, (y + self.centre[1]) as f32, scale as f32)
     }
 }

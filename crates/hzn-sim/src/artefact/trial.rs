@@ -9,6 +9,7 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use nalgebra::{Matrix3, Vector3};
 
+use super::clear_limb::ClearLimb;
 use super::dice::Dice;
 use super::kind::Kind;
 use super::lens;
@@ -18,10 +19,9 @@ use super::shape::{Canvas, Shape};
 use crate::detector::{Detector, Plane};
 use crate::error::SceneError;
 use crate::globe::Globe;
-use crate::limb::EdgeNoise;
+use crate::image_circle::apply_image_circle;
 use crate::picture::Picture;
 use crate::pose::{Look, Pose, position_m};
-use crate::render::apply_image_circle;
 use crate::scene::{Disc, Profile, Scene, Sky};
 use crate::texture::Clouds;
 use crate::truth::Truth;
@@ -51,17 +51,6 @@ impl Part {
 const MIN_MARGIN_DEG: f64 = 3.0;
 /// Largest number of attempts to find figures that do not disturb the limb.
 const MAX_ATTEMPTS: u64 = 60;
-/// Light of a figure at the limb above which the figure disturbs it.
-const MAX_DISTURBANCE: f32 = 0.03;
-/// Largest share of the limb that may be disturbed.
-const MAX_DISTURBED_SHARE: f64 = 0.1;
-/// Number of grid points per side at which the brightness of an artefact is checked.
-const GRID: u32 = 24;
-/// Number of points along the limb at which disturbance is checked.
-const LIMB_POINTS: usize = 120;
-/// Distance from these points at which disturbance is checked too, pixels.
-const AROUND_PX: f32 = 12.0;
-
 /// One picture of an artefact, with its truth.
 pub struct Trial {
     /// The artefact in the picture.
@@ -123,44 +112,8 @@ impl Trial {
     /// # Errors
     /// Fails like [`Trial::without_limb`].
     pub fn with_limb(kind: Kind, seed: u64) -> Result<Option<Self>, SceneError> {
-        let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
-        let dice = &mut Part::Place.dice(kind, seed);
-        let position = draw_position(dice);
-        let limb_height_km = dice.between(12.0, 22.0);
-        let cone = cone(position, limb_height_km)?;
-        let lens = Camera::<f64>::try_new(&camera)?;
-        let (w, h) = (f64::from(camera.width), f64::from(camera.height));
-        // The limb passes through a point well inside the picture, in any direction.
-        let (u, v) = (dice.between(0.25, 0.75) * w, dice.between(0.25, 0.75) * h);
-        let Some(ray) = lens.unproject(ImagePoint { u, v }) else { return Ok(None) };
-        let axis = offset_direction(Vector3::from(ray.xyz()), cone.mean_half_angle_rad(), dice.turn());
-        let pose = point_axis(position, axis, Vector3::from(cone.axis.xyz()), dice.turn());
-        let mut scene = Scene::new(camera, pose);
-        scene.body.limb_height_km = limb_height_km;
-        scene.profile = Profile::Exponential { scale_km: dice.between(4.0, 8.0) };
-        scene.disc = Disc { surface: dice.between(0.35, 0.85), clouds: None, band: None };
-        set_detector(&mut scene, kind, seed);
-        if kind.is_ground() {
-            let clouds = Clouds { cover: 0.5, largest_km: 600.0, seed, ..Clouds::default() };
-            scene.disc.clouds = Some(clouds);
-        }
-        let limb = scene.limb_points(LIMB_POINTS, EdgeNoise::None)?;
-        let length_px = scene.visible_limb_px()?;
-        if length_px < 0.5 * w {
-            return Ok(None);
-        }
+        let Some((scene, clear_limb)) = draw_limb_scene(kind, seed)? else { return Ok(None) };
         let canvas = Canvas::from_camera(&scene.camera);
-        let sky = |x: f64, y: f64| {
-            let ray = lens.unproject(ImagePoint { u: x, v: y })?;
-            Some(Vector3::from(ray.xyz()).dot(&axis) < libm::cos(cone.mean_half_angle_rad()))
-        };
-        let grid: Vec<(f64, f64, bool)> = (0..GRID * GRID)
-            .filter_map(|i| {
-                let place = |k: u32, size: f64| (f64::from(k) + 0.5) / f64::from(GRID) * size;
-                let (x, y) = (place(i % GRID, w), place(i / GRID, h));
-                Some((x, y, sky(x, y)?))
-            })
-            .collect();
         for attempt in 0..MAX_ATTEMPTS {
             let figures = match kind.is_ground() {
                 true => Figures::default(),
@@ -169,21 +122,7 @@ impl Trial {
                     recipe::draw(kind, seed, dice, &canvas, &scene.camera)?
                 }
             };
-            let hurt = |p: &&crate::limb::LimbPoint| {
-                let (x, y) = (p.exact.u as f32, p.exact.v as f32);
-                let around = [(0.0, 0.0), (AROUND_PX, 0.0), (-AROUND_PX, 0.0), (0.0, AROUND_PX), (0.0, -AROUND_PX)];
-                around.iter().any(|(dx, dy)| {
-                    let spots = figures.shapes.iter().map(|s| s.sample(x + dx, y + dy));
-                    let (light, cover) = spots.fold((0.0, 0.0f32), |(l, c), s| (l + s.light, c.max(s.cover)));
-                    light > MAX_DISTURBANCE || cover > MAX_DISTURBANCE
-                })
-            };
-            let alone = limb.iter().filter(hurt).count() as f64 <= MAX_DISTURBED_SHARE * limb.len() as f64;
-            let bright: Vec<bool> =
-                grid.iter().filter(|(x, y, _)| figures.is_bright(*x, *y)).map(|(.., sky)| *sky).collect();
-            let dark = 2 * bright.iter().filter(|&&sky| sky).count() <= grid.iter().filter(|(.., sky)| *sky).count();
-            let seen = bright.len() >= 4 || matches!(kind, Kind::Moon | Kind::Clouds | Kind::Lights);
-            if alone && dark && seen {
+            if clear_limb.accepts(kind, &figures) {
                 return Self::with_figures(kind, seed, scene, true, figures, None).map(Some);
             }
         }
@@ -244,6 +183,35 @@ impl Trial {
             ..Prior::default()
         }
     }
+}
+
+/// Draws a scene with a clean limb through a point well inside the picture. Kinds of ground become the texture inside
+/// the limb. Returns `None` if this seed gives no suitable limb.
+fn draw_limb_scene(kind: Kind, seed: u64) -> Result<Option<(Scene, ClearLimb)>, SceneError> {
+    let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
+    let dice = &mut Part::Place.dice(kind, seed);
+    let position = draw_position(dice);
+    let limb_height_km = dice.between(12.0, 22.0);
+    let cone = cone(position, limb_height_km)?;
+    let half_angle_rad = cone.mean_half_angle_rad();
+    let lens = Camera::<f64>::try_new(&camera)?;
+    let (w, h) = (f64::from(camera.width), f64::from(camera.height));
+    // The limb passes through this point in any direction.
+    let (u, v) = (dice.between(0.25, 0.75) * w, dice.between(0.25, 0.75) * h);
+    let Some(ray) = lens.unproject(ImagePoint { u, v }) else { return Ok(None) };
+    let axis = offset_direction(Vector3::from(ray.xyz()), half_angle_rad, dice.turn());
+    let pose = point_axis(position, axis, Vector3::from(cone.axis.xyz()), dice.turn());
+    let mut scene = Scene::new(camera, pose);
+    scene.body.limb_height_km = limb_height_km;
+    scene.profile = Profile::Exponential { scale_km: dice.between(4.0, 8.0) };
+    scene.disc = Disc { surface: dice.between(0.35, 0.85), clouds: None, band: None };
+    set_detector(&mut scene, kind, seed);
+    if kind.is_ground() {
+        let clouds = Clouds { cover: 0.5, largest_km: 600.0, seed, ..Clouds::default() };
+        scene.disc.clouds = Some(clouds);
+    }
+    let clear_limb = ClearLimb::try_new(&scene, axis, half_angle_rad)?;
+    Ok(clear_limb.map(|clear_limb| (scene, clear_limb)))
 }
 
 /// Returns a position anywhere over the Earth, in ECEF metres, at 60 to 600 km. The altitude is uniform in its

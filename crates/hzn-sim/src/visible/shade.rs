@@ -18,7 +18,7 @@ use crate::texture::{CellCache, CloudField};
 const STRIDE: usize = 8;
 /// Largest tangent height range of a pixel, in metres, that needs only one ray. A larger range is averaged over several
 /// rays.
-const FINE_M: f64 = 2500.0;
+const MAX_PIXEL_RANGE_M: f64 = 2500.0;
 /// Height of the cloud tops above the ground for the sunlight on them, metres.
 const CLOUD_TOP_M: f32 = 6000.0;
 /// Light of the whole sky on the ground as a fraction of the Sun's light, by channel.
@@ -69,7 +69,7 @@ impl Shader {
         let limb_m = (away_m * away_m - globe.b_m * globe.b_m).max(0.0).sqrt();
         let pixel_m = limb_m * pixel_rad;
         Some(Self {
-            samples: (pixel_m / FINE_M).ceil().clamp(1.0, 6.0) as u32,
+            samples: (pixel_m / MAX_PIXEL_RANGE_M).ceil().clamp(1.0, 6.0) as u32,
             near: 2.0 * (air.top_m + 3.0 * pixel_m) / globe.b_m,
             soil: Soil::new(&world.ground, globe.a_m),
             clouds: (!world.clear).then(|| Arc::new(CloudField::new(&world.clouds, globe.a_m))),
