@@ -5,7 +5,7 @@
 //! pictures' means is its sigma.
 //!
 //! For a limb, the noise of each picture comes from its own residuals (`covariance.noise = "rms"`). The reason is that
-//! one picture may be far worse than the others, and it may not be among the measured ones. If the residuals one_body give
+//! one picture may be far worse than the others, and it may not be among the measured ones. If the residuals alone give
 //! covariances that are too small, the model below is their floor.
 //!
 //! For Sun and Moon the sensor gets a fixed model: a process along the edge with a variance and an integral length. Of

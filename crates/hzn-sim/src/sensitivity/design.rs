@@ -22,9 +22,9 @@ pub struct Design {
     pub depression_deg: f64,
     /// Turn about the optical axis in degrees.
     pub roll_deg: f64,
-    /// 1-sigma of an edge point arc_and_azimuth u and arc_and_azimuth v, in pixels.
+    /// 1-sigma of an edge point along u and along v, in pixels.
     pub sigma_px: f64,
-    /// Correlation length of the errors arc_and_azimuth the edge in pixels; 0 means white errors.
+    /// Correlation length of the errors along the edge in pixels; 0 means white errors.
     pub correlation_px: f64,
 }
 

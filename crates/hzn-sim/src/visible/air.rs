@@ -114,8 +114,9 @@ impl PreparedAir {
         libm::expf(-height_m.max(0.0) * self.per_m)
     }
 
-    /// Returns the light that the air along a ray of this optical depth sends to the camera; `transmission` is exp(−depth). The light of optically thick air comes from its upper part, where the density is
-    /// lower by 1 + depth.
+    /// Returns the light that the air along a ray of this optical depth sends to the camera; `transmission` is
+    /// exp(−depth). The light of optically thick air comes from its upper part, where the density is lower by
+    /// 1 + depth.
     #[inline(always)]
     pub(crate) fn glow(
         &self,
