@@ -142,7 +142,7 @@ fn what_cannot_be_is_said_before_anything_is_written() {
     std::fs::write(at.join("way.csv"), "time_s,x_km,y_km,z_km\n0,6383,0,0\n500,6383,0,1\n").unwrap();
     let inside = refused(&table);
     assert!(
-        inside.contains("[trajectory]: at 70.0 s the camera is at 4.9 km, inside the Earth or its limb"),
+        inside.contains("[trajectory]: at 70.0 s the camera is at 4.9 km, inside the Earth or below its limb"),
         "{inside}"
     );
 
