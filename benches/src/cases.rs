@@ -107,7 +107,7 @@ impl Plan {
             let truth = frame.truth().map_err(|e| e.to_string())?;
             frames.push(Picture {
                 bytes: fs::read(folder.join(&entry.file)).map_err(text)?,
-                known: frame.known(),
+                known: frame.prior(),
                 truth: [truth.axis_x, truth.axis_y, truth.axis_z],
             });
         }

@@ -44,8 +44,8 @@ impl Sensor {
     /// Returns the prior of a picture for this sensor.
     pub(crate) fn known(&self, frame: &FlightFrame) -> hzn_core::Prior<f64> {
         let known = match self.attitude_sigma_deg {
-            Some(sigma_deg) => frame.known_with_attitude(sigma_deg.to_radians()),
-            None => frame.known(),
+            Some(sigma_deg) => frame.prior_with_attitude(sigma_deg.to_radians()),
+            None => frame.prior(),
         };
         hzn_core::Prior {
             position_m: known.position_m.filter(|_| !self.altitude_only),
@@ -104,8 +104,8 @@ fn look_at_all<'a>(
         .frames
         .par_iter()
         .map_init(make, |horizons, frame| {
-            let truth_of = |&kind: &Kind| frame.scene.truth_of(kind, &frame.file, frame.time_s);
-            let truths: Vec<Truth> = kinds.iter().map(truth_of).collect::<Result<_, _>>()?;
+            let body_truth = |&kind: &Kind| frame.scene.body_truth(kind, &frame.file, frame.time_s);
+            let truths: Vec<Truth> = kinds.iter().map(body_truth).collect::<Result<_, _>>()?;
             let picture = picture(frame)?;
             let horizons = horizons.as_mut().map_err(|e| *e)?;
             let answers = horizons.iter_mut().zip(sensors);

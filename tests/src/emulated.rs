@@ -98,7 +98,7 @@ impl Case {
     pub fn rendered(name: String, sensor: &Config, frame: &hzn_sim::FlightFrame) -> Self {
         let picture = frame.render().expect("the scene can be rendered");
         let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: 8 bits are expected") };
-        let known = frame.known();
+        let known = frame.prior();
         let known = Prior {
             altitude_m: known.altitude_m.map(|h| h as f32),
             position_m: known.position_m.map(|p| p.map(|x| x as f32)),

@@ -3,7 +3,7 @@
 
 use hzn_core::observer::Unobserved;
 use hzn_core::{Config, HostHorizon, camera};
-use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, look};
+use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, process_trial};
 
 /// Number of pictures of each kind.
 const OF_EACH: u64 = 15;
@@ -25,7 +25,7 @@ fn outcomes(
     let mut at = |threshold_px: &Option<f64>| {
         let mut config = Config::new(trial.scene.camera.clone());
         config.reject.threshold_px = threshold_px.unwrap_or(config.reject.threshold_px);
-        look(horizon, &config, trial, &picture, told, &Unobserved).unwrap()
+        process_trial(horizon, &config, trial, &picture, told, &Unobserved).unwrap()
     };
     thresholds_px.iter().map(&mut at).collect()
 }
@@ -52,7 +52,7 @@ fn limbs_next_to_artefacts_are_found() {
     let mut horizon = horizon();
     let (mut pictures, mut answered) = (0, 0);
     for (kind, seed) in Kind::ALL.iter().flat_map(|&k| (FIRST_SEED..FIRST_SEED + OF_EACH).map(move |s| (k, s))) {
-        let Some(trial) = Trial::beside_limb(kind, seed).unwrap() else { continue };
+        let Some(trial) = Trial::with_limb(kind, seed).unwrap() else { continue };
         for o in outcomes(&mut horizon, &trial, &[None], PriorKnowledge { attitude_sigma_deg: Some(5.0) }) {
             pictures += 1;
             answered += u32::from(o.found.is_some());

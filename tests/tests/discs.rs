@@ -227,7 +227,7 @@ fn earth_and_moon_in_one_picture() {
         let expected = [0, 1].map(|which| horizon.expect_body(which, &known).unwrap());
         let reports = horizon.process_each(&picture.view(), &expected);
         for (report, (kind, limit_deg)) in reports.iter().zip([(Kind::Earth, 0.1), (Kind::Moon, 0.016)]) {
-            let truth = scene.truth_of(kind, "", 0.0).unwrap();
+            let truth = scene.body_truth(kind, "", 0.0).unwrap();
             let solution = report.solution.as_ref().unwrap_or_else(|| panic!("{kind:?} at {u} {v}: {}", report.status));
             let off_deg = solution.axis.angle_rad(&truth.axis().unwrap()).to_degrees();
             println!("{kind:?}, Moon at {u} {v}: {off_deg:.4} deg off");

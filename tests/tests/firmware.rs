@@ -95,7 +95,7 @@ fn rows_have_the_bits_of_the_picture() {
         .frames
         .iter()
         .map(|frame| Case {
-            known: Prior { altitude_m: Some(frame.known().altitude_m.unwrap_or(2e5) as f32), ..Prior::default() },
+            known: Prior { altitude_m: Some(frame.prior().altitude_m.unwrap_or(2e5) as f32), ..Prior::default() },
             ..Case::rendered(frame.file.clone(), &flight.sensor, frame)
         })
         .collect();

@@ -8,7 +8,7 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 use hzn_core::threshold::{self, Method};
 use hzn_core::{Config, HostHorizon, Prior, Report};
-use hzn_sim::painted::UnderCircle;
+use hzn_sim::painted::LensWithDiscs;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Clouds, Light, Look, Pose, Scene, Visible};
 use hzn_tests::real::Photograph;
@@ -42,14 +42,14 @@ fn seen(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report
 fn no_disc_is_lost_under_an_image_circle() {
     let (mut count, mut lost) = (0, Vec::new());
     for circle in 0..10 {
-        let under = UnderCircle::new(circle, 6);
-        for (disc, altitude_km) in &under.discs {
-            let data = under.canvas.paint(disc);
+        let with_discs = LensWithDiscs::new(circle, 6);
+        for (disc, altitude_km) in &with_discs.discs {
+            let data = with_discs.canvas.paint(disc);
             let axis = UnitVec3::try_new(disc.axis).unwrap();
             for k in 0..10 {
                 let level = disc.dark + (disc.lit - disc.dark) * (0.05 + 0.09 * f64::from(k));
-                let mut horizon = HostHorizon::boxed(&told(&under.lens, *altitude_km, level)).unwrap();
-                let report = seen(&mut horizon, &data, &under.lens);
+                let mut horizon = HostHorizon::boxed(&told(&with_discs.lens, *altitude_km, level)).unwrap();
+                let report = seen(&mut horizon, &data, &with_discs.lens);
                 let right = report.solution.is_some_and(|s| s.axis.angle_rad(&axis).to_degrees() < 0.2);
                 count += 1;
                 if !right {

@@ -20,7 +20,7 @@ fn fly(flight: &Flight, preset: Preset, change: impl Fn(&mut Config)) -> Tally {
     let mut tally = Tally::default();
     for frame in &flight.frames {
         let truth = frame.truth().unwrap();
-        let answer = look(&mut sensors.host, &frame.render().unwrap().view(), &frame.known());
+        let answer = look(&mut sensors.host, &frame.render().unwrap().view(), &frame.prior());
         if let Err(status) = &answer {
             println!("{}: {status}", frame.file);
         }

@@ -179,7 +179,7 @@ fn with_attitude(flight: &Flight) -> Tally {
     let mut tally = Tally::default();
     for frame in &flight.frames {
         let truth = frame.truth().unwrap();
-        let known = frame.known_with_attitude(5f64.to_radians());
+        let known = frame.prior_with_attitude(5f64.to_radians());
         let answer = look(&mut sensors.host, &frame.render().unwrap().view(), &known);
         tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
     }

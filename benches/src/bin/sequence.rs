@@ -168,7 +168,7 @@ fn render(folder: &Path, frames: usize) -> Result<f64, String> {
             frame.render().map_err(|e| e.to_string())?.save(&path).map_err(|e| e.to_string())?;
         }
         bytes += fs::metadata(&path).map_err(text)?.len();
-        let [x, y, z] = frame.known().position_m.unwrap_or_default().map(|m| m / 1e3);
+        let [x, y, z] = frame.prior().position_m.unwrap_or_default().map(|m| m / 1e3);
         let _ = writeln!(known, "{},{},{x},{y},{z}", frame.file, frame.time_s);
     }
     fs::write(folder.join("frames.csv"), known).map_err(text)?;

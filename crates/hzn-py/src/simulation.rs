@@ -7,7 +7,7 @@ use hzn_core::image::Layout;
 use hzn_run::scene;
 use hzn_run::source::picture::{Picture, Samples};
 use hzn_sim::evaluate::{Evaluation, pair};
-use hzn_sim::scenario::{Fit, MEASURED};
+use hzn_sim::scenario::{FIT_PICTURES, Fit};
 use hzn_sim::sensitivity::Design;
 use hzn_sim::{Flight, FlightFrame, Scenario, Truth};
 use pyo3::exceptions::PyIndexError;
@@ -57,7 +57,7 @@ impl Simulation {
     #[getter]
     fn sensor(&self, py: Python<'_>) -> PyResult<Py<Sensor>> {
         let sensor = self.sensor.get_or_try_init(py, || {
-            let fit = errors::detached(py, || Fit::measure(&self.scenario, MEASURED, &|_, _| ()))?;
+            let fit = errors::detached(py, || Fit::measure(&self.scenario, FIT_PICTURES, &|_, _| ()))?;
             let mut config = self.flight.sensor.clone();
             fit.map_err(errors::config)?.iter().for_each(|fit| fit.apply(&mut config));
             Py::new(py, Sensor::from_config(config, false)?)
@@ -72,7 +72,7 @@ impl Simulation {
         let at = if index < 0 { index + self.flight.frames.len() as isize } else { index };
         let frame = usize::try_from(at).ok().and_then(|i| self.flight.frames.get(i));
         let frame = frame.ok_or_else(|| PyIndexError::new_err(format!("frame {index} of {}", self.__len__())))?;
-        let truths = self.scenario.bodies.iter().map(|&body| frame.scene.truth_of(body, &frame.file, frame.time_s));
+        let truths = self.scenario.bodies.iter().map(|&body| frame.scene.body_truth(body, &frame.file, frame.time_s));
         Ok(SimulatedFrame {
             known: known_arguments(&self.scenario, frame),
             truths: truths.collect::<Result<_, _>>().map_err(errors::config)?,
@@ -92,7 +92,7 @@ impl Simulation {
 
 /// Returns the keyword arguments of `Sensor.process` for a picture.
 fn known_arguments(scenario: &Scenario, frame: &FlightFrame) -> Value {
-    let row = scenario.known_of(frame);
+    let row = scenario.frame_row(frame);
     let mut known = json!({
         "altitude_km": row.altitude_km,
         "position_km": [row.x_km, row.y_km, row.z_km],

@@ -23,7 +23,7 @@ use hzn_core::{
     observer::Observer,
     report::{Candidate, Solution},
 };
-use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, look};
+use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, process_trial};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 
@@ -90,7 +90,7 @@ impl Observer<f64> for Watch {
     fn verdict(&self, _: u32, _: &Candidate<f64>, _: Option<&Solution<f64>>) {}
 }
 
-struct Seen {
+struct Examined {
     kind: Kind,
     threshold: Option<f64>,
     outcome: Outcome,
@@ -103,7 +103,7 @@ fn main() -> anyhow::Result<()> {
     let kinds: Vec<Kind> = match args.kind.is_empty() {
         true => Kind::ALL.to_vec(),
         false => {
-            let named = |n: &String| Kind::from_name(n).ok_or_else(|| anyhow!("no kind {n:?}"));
+            let named = |n: &String| Kind::from_name(n).ok_or_else(|| anyhow!("unknown kind {n:?}"));
             args.kind.iter().map(named).collect::<anyhow::Result<_>>()?
         }
     };
@@ -115,15 +115,15 @@ fn main() -> anyhow::Result<()> {
     let trials: Vec<(Kind, u64)> =
         kinds.iter().flat_map(|&k| (args.first..args.first + args.count).map(move |s| (k, s))).collect();
     let make = || HostHorizon::boxed(&Config::new(hzn_core::camera::Config::ideal(Default::default(), 64, 48, 60.0)));
-    let seen: Vec<Vec<Seen>> = trials
+    let examined: Vec<Vec<Examined>> = trials
         .into_par_iter()
         .map_init(make, |horizon, (kind, seed)| {
             let horizon = horizon.as_mut().map_err(|e| *e)?;
-            one(horizon, &args, &thresholds, kind, seed)
+            examine(horizon, &args, &thresholds, kind, seed)
         })
         .collect::<anyhow::Result<_>>()?;
-    let seen: Vec<Seen> = seen.into_iter().flatten().collect();
-    for s in seen.iter().filter(|s| !s.line.is_empty()) {
+    let examined: Vec<Examined> = examined.into_iter().flatten().collect();
+    for s in examined.iter().filter(|s| !s.line.is_empty()) {
         println!("{}", s.line);
     }
     println!(
@@ -133,8 +133,8 @@ fn main() -> anyhow::Result<()> {
     for &kind in &kinds {
         for &threshold in &thresholds {
             let own: Vec<&Outcome> =
-                seen.iter().filter(|s| s.kind == kind && s.threshold == threshold).map(|s| &s.outcome).collect();
-            let count = |of: &dyn Fn(&Outcome) -> bool| own.iter().filter(|o| of(o)).count();
+                examined.iter().filter(|s| s.kind == kind && s.threshold == threshold).map(|s| &s.outcome).collect();
+            let count = |matches: &dyn Fn(&Outcome) -> bool| own.iter().filter(|o| matches(o)).count();
             println!(
                 "{:<10}{:>10}{:>9}{:>9}{:>8}{:>7}{:>10}",
                 kind.name(),
@@ -150,14 +150,14 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn one(
+fn examine(
     horizon: &mut HostHorizon,
     args: &Args,
     thresholds: &[Option<f64>],
     kind: Kind,
     seed: u64,
-) -> anyhow::Result<Vec<Seen>> {
-    let trial = if args.limb { Trial::beside_limb(kind, seed)? } else { Some(Trial::without_limb(kind, seed)?) };
+) -> anyhow::Result<Vec<Examined>> {
+    let trial = if args.limb { Trial::with_limb(kind, seed)? } else { Some(Trial::without_limb(kind, seed)?) };
     let Some(trial) = trial else { return Ok(Vec::new()) };
     let trial = if args.clean { trial.cleaned() } else { trial };
     let picture = trial.render()?;
@@ -168,8 +168,8 @@ fn one(
             config.reject.threshold_px = px;
         }
         let watch = Watch::default();
-        let told = PriorKnowledge { attitude_sigma_deg: args.attitude };
-        let outcome = look(horizon, &config, &trial, &picture, told, &watch)?;
+        let prior = PriorKnowledge { attitude_sigma_deg: args.attitude };
+        let outcome = process_trial(horizon, &config, &trial, &picture, prior, &watch)?;
         let bad = outcome.is_false() || args.limb && !outcome.is_right();
         let listed = args.all || bad && (args.list || args.png.is_some());
         let line = if listed { line(&trial, threshold, &outcome) } else { String::new() };
@@ -178,7 +178,7 @@ fn one(
             let path = folder.join(format!("{}-{seed}-{px}.png", kind.name()));
             draw(&trial, &picture, &outcome, &watch).save(&path).with_context(|| path.display().to_string())?;
         }
-        out.push(Seen { kind, threshold, outcome, line });
+        out.push(Examined { kind, threshold, outcome, line });
     }
     Ok(out)
 }
@@ -190,7 +190,7 @@ fn set(config: &Config, keys: &[String]) -> anyhow::Result<Config> {
     }
     let mut table = toml::Table::try_from(config)?;
     for key in keys {
-        let (path, _) = key.split_once('=').ok_or_else(|| anyhow!("{key}: KEY=VALUE is expected"))?;
+        let (path, _) = key.split_once('=').ok_or_else(|| anyhow!("{key}: must have the form KEY=VALUE"))?;
         let given: toml::Table = key.parse().with_context(|| path.to_owned())?;
         merge(&mut table, given);
     }

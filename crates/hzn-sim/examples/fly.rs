@@ -22,8 +22,8 @@ fn main() {
     for frame in &flight.frames {
         let truth = frame.truth().expect("the scene is valid");
         let picture = frame.render().expect("the scene is valid");
-        let known = prior_deg.map_or_else(|| frame.known(), |deg| frame.known_with_attitude(deg.to_radians()));
-        let expected = horizon.expect(&known).expect("the position is outside the Earth");
+        let prior = prior_deg.map_or_else(|| frame.prior(), |deg| frame.prior_with_attitude(deg.to_radians()));
+        let expected = horizon.expect(&prior).expect("the position is outside the Earth");
         let report = horizon.process(&picture.view(), &expected);
         let listed: Vec<&str> = report.candidates.iter().map(|c| c.verdict.name()).collect();
         let status = report.status.name();

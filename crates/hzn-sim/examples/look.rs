@@ -35,8 +35,8 @@ fn main() {
         let picture = frame.render().expect("the scene is valid");
         let took = start.elapsed();
         picture.save(&folder.join(&frame.file)).expect("the picture can be written");
-        let truth = frame.scene.truth_of(kind, &frame.file, frame.time_s).expect("the scene is valid");
-        let expected = horizon.expect(&frame.known()).expect("the position is outside the Earth");
+        let truth = frame.scene.body_truth(kind, &frame.file, frame.time_s).expect("the scene is valid");
+        let expected = horizon.expect(&frame.prior()).expect("the position is outside the Earth");
         let report = horizon.process(&picture.view(), &expected);
         let px = frame.scene.visible_px(kind).expect("the scene is valid");
         print!(

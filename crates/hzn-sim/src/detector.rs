@@ -54,13 +54,17 @@ impl Curve {
         let value = |light: f32| {
             if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * libm::powf(light, 1.0 / 2.4) - 0.055 }
         };
-        let at = |i: usize| value(i as f32 / Self::STEPS as f32);
-        Self((0..=Self::STEPS).map(|i| [at(i), (at(i + 1) - at(i)) * Self::STEPS as f32]).collect())
+        let step_value = |i: usize| value(i as f32 / Self::STEPS as f32);
+        Self(
+            (0..=Self::STEPS)
+                .map(|i| [step_value(i), (step_value(i + 1) - step_value(i)) * Self::STEPS as f32])
+                .collect(),
+        )
     }
 
     /// Returns the brightness and its slope.
     #[inline(always)]
-    fn at(&self, light: f32) -> [f32; 2] {
+    fn brightness(&self, light: f32) -> [f32; 2] {
         let x = light.clamp(0.0, 1.0) * Self::STEPS as f32;
         let [value, slope] = self.0.get(x as usize).copied().unwrap_or([1.0, 0.0]);
         [value + slope * (x - x.trunc()) * (1.0 / Self::STEPS as f32), slope]
@@ -132,14 +136,14 @@ impl Plane {
             }
         });
         let source = &self.data;
-        let at = |y: isize| &source[y.clamp(0, h as isize - 1) as usize * w..][..w];
+        let source_row = |y: isize| &source[y.clamp(0, h as isize - 1) as usize * w..][..w];
         let mut data = vec![0.0f32; w * h];
         data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-            for (p, s) in row.iter_mut().zip(at(y as isize)) {
+            for (p, s) in row.iter_mut().zip(source_row(y as isize)) {
                 *p = k[0] * s;
             }
             for (i, &weight) in k.iter().enumerate().skip(1) {
-                let (above, below) = (at(y as isize - i as isize), at(y as isize + i as isize));
+                let (above, below) = (source_row(y as isize - i as isize), source_row(y as isize + i as isize));
                 for ((p, a), b) in row.iter_mut().zip(above).zip(below) {
                     *p += weight * (a + b);
                 }
@@ -187,9 +191,10 @@ impl Detector {
         let w = light.width;
         let full = ((1u32 << bits) - 1) as f32;
         let noise = Counter::new(seed, Stream::Detector);
-        let own = self.hot_pixel_seed.wrapping_add((channel as u64) << 40);
-        let hot = Counter::new(own, Stream::HotPixels);
-        let (offsets, gains) = (Counter::new(own, Stream::FixedPattern), Counter::new(own, Stream::GainPattern));
+        let channel_seed = self.hot_pixel_seed.wrapping_add((channel as u64) << 40);
+        let hot = Counter::new(channel_seed, Stream::HotPixels);
+        let (offsets, gains) =
+            (Counter::new(channel_seed, Stream::FixedPattern), Counter::new(channel_seed, Stream::GainPattern));
         let (offset, gain) = (self.offset_pattern as f32, self.gain_pattern as f32);
         let read2 = (self.read_noise * self.read_noise) as f32;
         let shot = self.full_well_electrons.map_or(0.0, |e| 1.0 / e.max(1.0)) as f32;
@@ -210,7 +215,7 @@ impl Detector {
                         Tone::Linear => light + normal[i] * (read2 + shot * light.max(0.0)).sqrt(),
                         // The shot noise passes through the curve to first order, so one draw is enough.
                         Tone::Srgb => {
-                            let [bright, slope] = curve.at(light);
+                            let [bright, slope] = curve.brightness(light);
                             bright + normal[i] * (read2 + shot * light.clamp(0.0, 1.0) * slope * slope).sqrt()
                         }
                     };

@@ -9,15 +9,15 @@ pub enum SceneError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// The position is not outside the body and its limb height, or the attitude is not a rotation.
-    #[error("the camera must be outside the body and its limb height, and its quaternion must have a length")]
+    #[error("the camera must be outside the body and its limb height, and its quaternion must not be zero")]
     Pose,
     /// The direction to the Sun has no length.
-    #[error("the direction to the Sun must have a length")]
+    #[error("the direction to the Sun must not be zero")]
     Sun,
     /// There is no Moon in the scene.
     #[error("the scene has no Moon")]
     Moon,
     /// The picture cannot be encoded as JPEG.
-    #[error("as JPEG: {0}")]
+    #[error("cannot be encoded as JPEG: {0}")]
     Jpeg(String),
 }

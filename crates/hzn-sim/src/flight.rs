@@ -114,7 +114,7 @@ impl FlightFrame {
     pub fn render(&self) -> Result<Picture, SceneError> {
         let picture = self.scene.render()?;
         match self.jpeg_quality {
-            Some(quality) => picture.through_jpeg(quality).map_err(|e| SceneError::Jpeg(e.to_string())),
+            Some(quality) => picture.with_jpeg_losses(quality).map_err(|e| SceneError::Jpeg(e.to_string())),
             None => Ok(picture),
         }
     }
@@ -126,7 +126,7 @@ impl FlightFrame {
         self.scene.truth(&self.file, self.time_s)
     }
     /// Returns the prior that a navigation system would give the sensor: the position, no attitude.
-    pub fn known(&self) -> hzn_core::Prior<f64> {
+    pub fn prior(&self) -> hzn_core::Prior<f64> {
         hzn_core::Prior {
             altitude_m: Some(Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m)),
             position_m: Some(self.scene.pose.position_m),
@@ -134,15 +134,15 @@ impl FlightFrame {
             ..hzn_core::Prior::default()
         }
     }
-    /// Returns [`FlightFrame::known`] with an attitude that has a random error of `sigma_rad` (1-sigma, about each
+    /// Returns [`FlightFrame::prior`] with an attitude that has a random error of `sigma_rad` (1-sigma, about each
     /// axis).
-    pub fn known_with_attitude(&self, sigma_rad: f64) -> hzn_core::Prior<f64> {
+    pub fn prior_with_attitude(&self, sigma_rad: f64) -> hzn_core::Prior<f64> {
         let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
         let error_rad = [0, 1, 2].map(|i| sigma_rad * draws.normal(i));
         hzn_core::Prior {
             cam_to_ecef: self.scene.pose.disturbed(error_rad).cam_to_ecef(),
             attitude_sigma_rad: Some(sigma_rad),
-            ..self.known()
+            ..self.prior()
         }
     }
 }
@@ -180,12 +180,12 @@ impl Flight {
 }
 
 /// Returns the seed of a picture's noise.
-fn seed_of(seed: u64, index: usize) -> u64 {
+fn noise_seed(seed: u64, index: usize) -> u64 {
     seed.wrapping_mul(1_000_003).wrapping_add(index as u64)
 }
 
 /// Returns each index with its position in the flight, from 0 to 1.
-fn places(count: usize) -> impl Iterator<Item = (usize, f64)> {
+fn indexed_fractions(count: usize) -> impl Iterator<Item = (usize, f64)> {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count).map(move |i| (i, i as f64 / last))
 }
@@ -225,18 +225,18 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     // degrees of freedom) on pictures 960 to 1920 pixels wide. Clouds seen through the band correlate the errors.
     sensor.covariance = covariance::Config::told(0.1, 30.0);
     let half_s = 190.0;
-    let frames = places(count)
-        .map(|(index, place)| {
-            let time_s = 2.0 * half_s * place;
+    let frames = indexed_fractions(count)
+        .map(|(index, fraction)| {
+            let time_s = 2.0 * half_s * fraction;
             let to_apogee = (time_s - half_s) / half_s;
             let altitude_km = 240.0 - 170.0 * to_apogee * to_apogee;
             let look = Look {
-                azimuth_rad: 0.6 + 1.3 * place * TAU,
+                azimuth_rad: 0.6 + 1.3 * fraction * TAU,
                 // The limb is 7° to 16° below the horizontal, and half the picture's height is 25°.
-                depression_rad: (14.0 + 12.0 * libm::sin(1.7 * place * TAU)).to_radians(),
-                roll_rad: 0.2 + 1.5 * place * TAU,
+                depression_rad: (14.0 + 12.0 * libm::sin(1.7 * fraction * TAU)).to_radians(),
+                roll_rad: 0.2 + 1.5 * fraction * TAU,
             };
-            let position = position_m(67.9 + 0.8 * place, 21.1 - 0.3 * place, altitude_km);
+            let position = position_m(67.9 + 0.8 * fraction, 21.1 - 0.3 * fraction, altitude_km);
             let scene = Scene {
                 body: sensor.body.clone(),
                 profile: Profile::Exponential { scale_km: 4.0 },
@@ -247,7 +247,7 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
                 },
                 sky: Sky { stars: 4000, seed, ..Sky::default() },
                 detector: Detector { psf_sigma_px: 0.9, read_noise: 0.02, ..Detector::default() },
-                seed: seed_of(seed, index),
+                seed: noise_seed(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position, look))
             };
             FlightFrame { file: format!("rocket-{index:04}.png"), time_s, utc: None, scene, jpeg_quality: None }
@@ -267,19 +267,20 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
         body::Config { limb_height_km: 25.0, limb_height_sigma_km: 1.0, altitude_sigma_km: 0.1, ..sensor.body };
     // Noise dominates, so errors of neighbouring points are unrelated beyond the blur.
     sensor.covariance = covariance::Config::told(0.07, 5.0);
-    let frames = places(count)
-        .map(|(index, place)| {
-            let time_s = 5800.0 * place;
+    let frames = indexed_fractions(count)
+        .map(|(index, fraction)| {
+            let time_s = 5800.0 * fraction;
             // The orbit is polar and passes all latitudes twice.
-            let (lat_deg, lon_deg) = (80.0 * libm::sin(TAU * place), 10.0 + 24.0 * place);
-            let look = Look::off_nadir(120f64.to_radians() * place, 1.1 + 5.0 * place, FRAC_PI_2 * 3.0 * place);
+            let (lat_deg, lon_deg) = (80.0 * libm::sin(TAU * fraction), 10.0 + 24.0 * fraction);
+            let look =
+                Look::off_nadir(120f64.to_radians() * fraction, 1.1 + 5.0 * fraction, FRAC_PI_2 * 3.0 * fraction);
             let scene = Scene {
                 body: sensor.body.clone(),
                 profile: Profile::Exponential { scale_km: 5.0 },
                 disc: Disc { surface: 0.7, clouds: None, band: None },
                 sky: Sky { brightness: 0.08, ..Sky::default() },
                 detector: Detector { psf_sigma_px: 1.0, read_noise: 0.02, bits: 16, ..Detector::default() },
-                seed: seed_of(seed, index),
+                seed: noise_seed(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position_m(lat_deg, lon_deg, 600.0), look))
             };
             FlightFrame { file: format!("leo-infrared-{index:04}.png"), time_s, utc: None, scene, jpeg_quality: None }
@@ -327,9 +328,9 @@ mod tests {
     fn attitude_prior_is_off_by_about_its_sigma() {
         let frame = &rocket(320, 180, 2, 1).frames[0];
         let z = hzn_core::frames::UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
-        let told = frame.known_with_attitude(0.05).cam_to_ecef.unwrap().apply(&z);
+        let prior = frame.prior_with_attitude(0.05).cam_to_ecef.unwrap().apply(&z);
         let is = frame.scene.pose.cam_to_ecef().unwrap().apply(&z);
-        assert!((1e-3..0.3).contains(&told.angle_rad(&is)));
-        assert!(frame.known().cam_to_ecef.is_none());
+        assert!((1e-3..0.3).contains(&prior.angle_rad(&is)));
+        assert!(frame.prior().cam_to_ecef.is_none());
     }
 }

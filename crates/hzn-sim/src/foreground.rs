@@ -43,8 +43,8 @@ impl Foreground {
         }
         let mut cover = vec![0.0f32; row.len()];
         for sub in 0..SUB_ROWS {
-            let at = y as f64 - 0.5 + (f64::from(sub) + 0.5) / f64::from(SUB_ROWS);
-            for span in self.crossings(at).chunks_exact(2) {
+            let v = y as f64 - 0.5 + (f64::from(sub) + 0.5) / f64::from(SUB_ROWS);
+            for span in self.crossings(v).chunks_exact(2) {
                 // Pixel i covers i − ½ to i + ½.
                 let (from, to) = (span[0] + 0.5, span[1] + 0.5);
                 let first = from.floor().clamp(0.0, row.len() as f64) as usize;

@@ -84,13 +84,13 @@ impl View {
 
     /// Intersects the globe with the ray of direction `s` (camera frame, unit length).
     #[inline(always)]
-    pub(crate) fn look(&self, s: [f64; 3]) -> RayHit {
+    pub(crate) fn intersect(&self, s: [f64; 3]) -> RayHit {
         let sigma = self.cam_to_scaled * Vector3::from(s);
         let m = -self.y.dot(&sigma);
         let s2 = sigma.norm_squared();
         // A ray that leads away from the body is nearest to it at the camera.
-        let along = if m > 0.0 { m * m / s2 } else { 0.0 };
-        RayHit { sigma, m, s2, miss: self.outside - along }
+        let approach = if m > 0.0 { m * m / s2 } else { 0.0 };
+        RayHit { sigma, m, s2, miss: self.outside - approach }
     }
 
     /// Returns the derivative of [`RayHit::miss`] by the angle from the limb, in 1/rad.
@@ -101,30 +101,30 @@ impl View {
 
     /// Returns the point of the ray on the unit sphere: its entry, or the foot of its closest approach.
     #[inline(always)]
-    pub(crate) fn point(&self, sight: &RayHit) -> Vector3<f64> {
-        let under = -sight.miss * sight.s2;
-        if under > 0.0 {
-            self.y + sight.sigma * ((sight.m - under.sqrt()) / sight.s2)
+    pub(crate) fn point(&self, hit: &RayHit) -> Vector3<f64> {
+        let depth2 = -hit.miss * hit.s2;
+        if depth2 > 0.0 {
+            self.y + hit.sigma * ((hit.m - depth2.sqrt()) / hit.s2)
         } else {
-            self.closest(sight).normalize()
+            self.closest(hit).normalize()
         }
     }
 
-    fn closest(&self, sight: &RayHit) -> Vector3<f64> {
-        self.y + sight.sigma * (sight.m.max(0.0) / sight.s2)
+    fn closest(&self, hit: &RayHit) -> Vector3<f64> {
+        self.y + hit.sigma * (hit.m.max(0.0) / hit.s2)
     }
 
     /// Returns the height in metres of the ray's closest approach above the globe, negative for a hit. Its error is of
     /// first order in the flattening times the height, and zero at the limb.
     #[inline(always)]
-    pub(crate) fn tangent_height_m(&self, sight: &RayHit) -> f64 {
-        let k = (1.0 + sight.miss).max(0.0).sqrt();
-        sight.miss / (1.0 + k) * self.metres_a_unit(sight)
+    pub(crate) fn tangent_height_m(&self, hit: &RayHit) -> f64 {
+        let k = (1.0 + hit.miss).max(0.0).sqrt();
+        hit.miss / (1.0 + k) * self.metres_per_unit(hit)
     }
 
     /// Returns the metres along the normal per unit of the closest approach, close to the limb.
-    fn metres_a_unit(&self, sight: &RayHit) -> f64 {
-        let q = self.closest(sight);
+    fn metres_per_unit(&self, hit: &RayHit) -> f64 {
+        let q = self.closest(hit);
         let n2 = q.norm_squared();
         if n2 < 1e-12 {
             return 1.0 / self.inverse_axes.x;
@@ -134,19 +134,19 @@ impl View {
 
     /// Returns the derivative of the tangent height by (u, v) in metres per pixel. `jacobian` is the derivative of the
     /// ray, with rows x, y, z.
-    pub(crate) fn tangent_height_gradient(&self, sight: &RayHit, jacobian: &[[f64; 2]; 3]) -> [f64; 2] {
+    pub(crate) fn tangent_height_gradient(&self, hit: &RayHit, jacobian: &[[f64; 2]; 3]) -> [f64; 2] {
         // The terms follow from miss = outside − m²/s2 with dm = −y·dσ and ds2 = 2 σ·dσ.
-        let r = sight.m / sight.s2;
-        let by_sigma = self.y * (2.0 * r) + sight.sigma * (2.0 * r * r);
+        let r = hit.m / hit.s2;
+        let by_sigma = self.y * (2.0 * r) + hit.sigma * (2.0 * r * r);
         let by_ray = self.cam_to_scaled.transpose() * by_sigma;
-        let k = (1.0 + sight.miss).max(1e-12).sqrt();
-        let scale = self.metres_a_unit(sight) / (2.0 * k);
+        let k = (1.0 + hit.miss).max(1e-12).sqrt();
+        let scale = self.metres_per_unit(hit) / (2.0 * k);
         [0, 1].map(|c| scale * (by_ray.x * jacobian[0][c] + by_ray.y * jacobian[1][c] + by_ray.z * jacobian[2][c]))
     }
 
     /// Returns the direction of the ray in ECEF, a unit vector.
-    pub(crate) fn direction(&self, sight: &RayHit) -> Vector3<f64> {
-        sight.sigma.component_div(&self.inverse_axes)
+    pub(crate) fn direction(&self, hit: &RayHit) -> Vector3<f64> {
+        hit.sigma.component_div(&self.inverse_axes)
     }
 
     /// Converts a direction from ECEF (unit) to the camera frame.
@@ -164,9 +164,9 @@ impl View {
     /// Returns the distance to a point of the unit sphere in metres, and the cosine of the angle at which the ray meets
     /// the surface there.
     #[inline(always)]
-    pub(crate) fn range_m_and_incidence(&self, sight: &RayHit, point: &Vector3<f64>) -> (f64, f64) {
+    pub(crate) fn range_m_and_incidence(&self, hit: &RayHit, point: &Vector3<f64>) -> (f64, f64) {
         let scaled = (point - self.y).norm();
-        (scaled / sight.s2.sqrt(), -sight.sigma.dot(point) / sight.s2.sqrt())
+        (scaled / hit.s2.sqrt(), -hit.sigma.dot(point) / hit.s2.sqrt())
     }
 }
 
@@ -182,13 +182,13 @@ mod tests {
         let view = View::try_new(globe, &pose).unwrap();
         let ray = |u: f64, v: f64| Vector3::new(u, v, 1.0).normalize().into();
         let (u, v, e) = (0.1, 0.02, 1e-5);
-        let h = |u, v| view.tangent_height_m(&view.look(ray(u, v)));
+        let h = |u, v| view.tangent_height_m(&view.intersect(ray(u, v)));
         let jac = {
             let d = |f: [f64; 3], g: [f64; 3]| core::array::from_fn::<f64, 3, _>(|i| (f[i] - g[i]) / (2.0 * e));
             let (a, b) = (d(ray(u + e, v), ray(u - e, v)), d(ray(u, v + e), ray(u, v - e)));
             core::array::from_fn(|i| [a[i], b[i]])
         };
-        let got = view.tangent_height_gradient(&view.look(ray(u, v)), &jac);
+        let got = view.tangent_height_gradient(&view.intersect(ray(u, v)), &jac);
         let want = [(h(u + e, v) - h(u - e, v)) / (2.0 * e), (h(u, v + e) - h(u, v - e)) / (2.0 * e)];
         for i in 0..2 {
             assert!((got[i] - want[i]).abs() < 0.01 * want[1].abs(), "{got:?} {want:?}");
@@ -200,12 +200,12 @@ mod tests {
         let pose = Pose { position_m: [0.0, 0.0, -2000.0], cam_to_ecef_wxyz: [1.0, 0.0, 0.0, 0.0] };
         let view = View::try_new(Globe { a_m: 1000.0, b_m: 1000.0 }, &pose).unwrap();
         for angle in [0.1f64, 0.5, 0.6, 1.2] {
-            let sight = view.look([angle.sin(), 0.0, angle.cos()]);
-            assert!((view.tangent_height_m(&sight) - (2000.0 * angle.sin() - 1000.0)).abs() < 1e-9);
+            let hit = view.intersect([angle.sin(), 0.0, angle.cos()]);
+            assert!((view.tangent_height_m(&hit) - (2000.0 * angle.sin() - 1000.0)).abs() < 1e-9);
         }
         // A ray that leads away from the body is nearest to it at the camera.
-        assert!((view.tangent_height_m(&view.look([0.0, 0.0, -1.0])) - 1000.0).abs() < 1e-9);
-        assert!((view.point(&view.look([0.0, 0.0, 1.0])) + Vector3::z()).norm() < 1e-12);
+        assert!((view.tangent_height_m(&view.intersect([0.0, 0.0, -1.0])) - 1000.0).abs() < 1e-9);
+        assert!((view.point(&view.intersect([0.0, 0.0, 1.0])) + Vector3::z()).norm() < 1e-12);
     }
 
     #[test]
@@ -220,10 +220,10 @@ mod tests {
             let axes = core::array::from_fn(|c| rows.map(|row| row[c]));
             let view = View::try_new(globe, &Pose::from_axes(three(&case["r_ecef_m"]), axes)).unwrap();
             for ray in case["rays_c"].as_array().unwrap() {
-                let sight = view.look(three(ray));
+                let hit = view.intersect(three(ray));
                 // The miss is checked as an angle from the limb.
-                assert!((sight.miss / view.miss_per_rad()).abs() < 1e-9, "{} {:e}", case["id"], sight.miss);
-                assert!(view.tangent_height_m(&sight).abs() < 0.01);
+                assert!((hit.miss / view.miss_per_rad()).abs() < 1e-9, "{} {:e}", case["id"], hit.miss);
+                assert!(view.tangent_height_m(&hit).abs() < 0.01);
             }
         }
     }

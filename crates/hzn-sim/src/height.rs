@@ -20,7 +20,7 @@ impl LimbHeight {
     }
 
     /// Returns the height in metres at a geodetic latitude; it is constant beyond the ends of the table.
-    pub(crate) fn at_m(&self, lat_rad: f64) -> f64 {
+    pub(crate) fn height_m(&self, lat_rad: f64) -> f64 {
         let after = self.table.partition_point(|row| row.0 < lat_rad);
         match (after.checked_sub(1).and_then(|i| self.table.get(i)), self.table.get(after)) {
             (Some(&(l0, h0)), Some(&(l1, h1))) => h0 + (h1 - h0) * (lat_rad - l0) / (l1 - l0),
@@ -29,7 +29,7 @@ impl LimbHeight {
         }
     }
 
-    pub(crate) fn varies(&self) -> bool {
+    pub(crate) fn is_variable(&self) -> bool {
         !self.table.is_empty()
     }
 
@@ -46,9 +46,9 @@ mod tests {
     #[test]
     fn between_and_beyond_the_rows() {
         let h = LimbHeight { reference_m: 1.0, table: vec![(-1.0, 10.0), (0.0, 20.0), (1.0, 40.0)] };
-        let got = [-2.0, -1.0, -0.5, 0.0, 0.25, 1.0, 1.5].map(|lat| h.at_m(lat));
+        let got = [-2.0, -1.0, -0.5, 0.0, 0.25, 1.0, 1.5].map(|lat| h.height_m(lat));
         assert_eq!(got, [10.0, 10.0, 15.0, 20.0, 25.0, 40.0, 40.0]);
         assert_eq!(h.largest_departure_m(), 39.0);
-        assert_eq!(LimbHeight { reference_m: 7.0, table: Vec::new() }.at_m(0.3), 7.0);
+        assert_eq!(LimbHeight { reference_m: 7.0, table: Vec::new() }.height_m(0.3), 7.0);
     }
 }

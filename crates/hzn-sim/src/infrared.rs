@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::globe::{Globe, RayHit, View};
 use crate::pose::Pose;
 use crate::radiance::{Grid, Radiance, mean_over_globe};
-use crate::texture::{CloudField, Clouds, Drawn};
+use crate::texture::{CellCache, CloudField, Clouds};
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 use std::path::{Path, PathBuf};
@@ -85,7 +85,7 @@ impl Infrared {
 
     /// Returns the same world; if it has no season, with the season of a UTC time (seconds since 1970).
     #[must_use]
-    pub fn in_season(&self, unix_s: f64) -> Self {
+    pub fn with_season(&self, unix_s: f64) -> Self {
         Self { season_deg: self.season_deg.or(Some(Self::season_deg(unix_s))), ..self.clone() }
     }
 
@@ -95,16 +95,16 @@ impl Infrared {
     /// Fails if the table cannot be read or is invalid, and if a key of the replaced curves is set.
     pub fn read_table(&mut self, folder: &Path) -> Result<(), String> {
         let Some(table) = &self.table else { return Ok(()) };
-        let own = Self::default();
+        let default = Self::default();
         let curves = [
-            ("brightness", self.brightness, own.brightness),
-            ("by_latitude", self.by_latitude, own.by_latitude),
-            ("half_level_km", self.half_level_km, own.half_level_km),
-            ("half_level_season_km", self.half_level_season_km, own.half_level_season_km),
-            ("scale_km", self.scale_km, own.scale_km),
+            ("brightness", self.brightness, default.brightness),
+            ("by_latitude", self.by_latitude, default.by_latitude),
+            ("half_level_km", self.half_level_km, default.half_level_km),
+            ("half_level_season_km", self.half_level_season_km, default.half_level_season_km),
+            ("scale_km", self.scale_km, default.scale_km),
         ];
         if let Some((key, ..)) = curves.into_iter().find(|(_, value, default)| value != default) {
-            return Err(format!("{key} belongs to the curves in place of a table: leave it out, or the table"));
+            return Err(format!("{key} has no effect with a table: remove {key} or the table"));
         }
         let path = folder.join(table);
         let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -116,11 +116,11 @@ impl Infrared {
     /// Returns the radiances of the season.
     fn grid(&self) -> Grid {
         if let Some(radiance) = &self.radiance {
-            return radiance.in_season(self.season_deg.unwrap_or(0.0));
+            return radiance.season_grid(self.season_deg.unwrap_or(0.0));
         }
         let latitudes_deg = (0..LATITUDES).map(|i| 180.0 * i as f64 / (LATITUDES - 1) as f64 - 90.0).collect();
         let heights_km = (0..HEIGHTS).map(|i| FIRST_KM + STEP_KM * i as f64).collect();
-        Grid::of(heights_km, latitudes_deg, |height_km, latitude_deg| self.curve(height_km, latitude_deg))
+        Grid::from_function(heights_km, latitudes_deg, |height_km, latitude_deg| self.curve(height_km, latitude_deg))
     }
 
     /// Returns the mean half level over the globe, in kilometres.
@@ -174,7 +174,7 @@ impl Infrared {
 
 /// [`Infrared`], prepared for one camera.
 #[derive(Debug, Clone)]
-pub(crate) struct Warmth {
+pub(crate) struct InfraredPainter {
     camera: Camera<f64>,
     globe: Globe,
     view: View,
@@ -189,7 +189,7 @@ pub(crate) struct Warmth {
 /// Number of rays along each side of a pixel at the limb.
 const SAMPLES: i32 = 9;
 
-impl Warmth {
+impl InfraredPainter {
     pub(crate) fn try_new(world: &Infrared, camera: Camera<f64>, globe: Globe, pose: &Pose) -> Option<Self> {
         let view = View::try_new(globe, pose)?;
         let (fx, fy) = camera.focal_px();
@@ -201,7 +201,7 @@ impl Warmth {
             near: 2.0 * (1.3e5 + 3.0 * limb_m * pixel_rad) / globe.b_m,
             clouds: world.clouds.map(|c| Arc::new(CloudField::new(&c, globe.a_m))),
             space: world.space as f32,
-            disc: if world.radiance.is_some() { table.deepest() } else { world.brightness as f32 },
+            disc: if world.radiance.is_some() { table.lowest_mean() } else { world.brightness as f32 },
             table: Arc::new(table),
             camera,
             globe,
@@ -210,27 +210,27 @@ impl Warmth {
         })
     }
 
-    pub(crate) fn turned(&self, pose: &Pose) -> Self {
+    pub(crate) fn with_pose(&self, pose: &Pose) -> Self {
         Self { view: View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone()), ..self.clone() }
     }
 
-    pub(crate) fn row(&self, v: f64, weight: f32, row: &mut [f32]) {
-        let drawn = &mut Drawn::default();
+    pub(crate) fn render_row(&self, v: f64, weight: f32, row: &mut [f32]) {
+        let cache = &mut CellCache::default();
         for (x, p) in row.iter_mut().enumerate() {
             let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { continue };
-            let sight = self.view.look(ray.direction().xyz());
-            let middle = self.view.tangent_height_m(&sight);
-            let light = if sight.miss > self.near {
+            let hit = self.view.intersect(ray.direction().xyz());
+            let middle = self.view.tangent_height_m(&hit);
+            let light = if hit.miss > self.near {
                 self.space
-            } else if sight.miss < -self.near {
-                self.under(&sight, drawn).at(middle)
+            } else if hit.miss < -self.near {
+                self.locate_ground(&hit, cache).brightness(middle)
             } else {
-                let under = self.under(&sight, drawn);
-                let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
+                let ground = self.locate_ground(&hit, cache);
+                let gradient = self.view.tangent_height_gradient(&hit, &ray.jacobian());
                 let mut sum = 0.0;
                 for (i, j) in (0..SAMPLES).flat_map(|i| (0..SAMPLES).map(move |j| (i, j))) {
                     let [du, dv] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(SAMPLES) - 0.5);
-                    sum += under.at(middle + gradient[0] * du + gradient[1] * dv);
+                    sum += ground.brightness(middle + gradient[0] * du + gradient[1] * dv);
                 }
                 sum / (SAMPLES * SAMPLES) as f32
             };
@@ -239,37 +239,38 @@ impl Warmth {
     }
 
     /// Returns latitude and cloud where a ray meets or passes the globe.
-    fn under(&self, sight: &RayHit, drawn: &mut Drawn) -> Under<'_> {
-        let point = self.view.point(sight);
+    fn locate_ground(&self, hit: &RayHit, cache: &mut CellCache) -> GroundPoint<'_> {
+        let point = self.view.point(hit);
         let latitude_deg = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
         let mut cloud = None;
-        if sight.miss < 0.0
+        if hit.miss < 0.0
             && let Some(clouds) = &self.clouds
         {
-            let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
+            let (range_m, cos) = self.view.range_m_and_incidence(hit, &point);
             let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(0.02)) as f32;
             // Towards the limb, the light of the stratosphere hides the clouds.
-            let seen = (2.0 * cos * cos).min(1.0) as f32;
-            cloud = clouds.at(&point, footprint_km, drawn).map(|(cover, bright)| (cover * seen, bright * self.disc));
+            let visible = (2.0 * cos * cos).min(1.0) as f32;
+            cloud =
+                clouds.sample(&point, footprint_km, cache).map(|(cover, bright)| (cover * visible, bright * self.disc));
         }
-        Under { warmth: self, latitude_deg, cloud }
+        GroundPoint { painter: self, latitude_deg, cloud }
     }
 }
 
 /// Latitude and cloud under a ray.
-struct Under<'a> {
-    warmth: &'a Warmth,
+struct GroundPoint<'a> {
+    painter: &'a InfraredPainter,
     latitude_deg: f64,
     /// Weight and light of a cloud; `None` under a clear sky.
     cloud: Option<(f32, f32)>,
 }
 
-impl Under<'_> {
+impl GroundPoint<'_> {
     /// Returns the brightness of a ray with this tangent height in metres.
-    fn at(&self, height_m: f64) -> f32 {
-        let clear = self.warmth.table.at(height_m * 1e-3, self.latitude_deg);
+    fn brightness(&self, height_m: f64) -> f32 {
+        let clear = self.painter.table.interpolate(height_m * 1e-3, self.latitude_deg);
         let light = self.cloud.map_or(clear, |(weight, cloud)| clear + weight * (cloud - clear));
-        self.warmth.space + light * (1.0 - self.warmth.space)
+        self.painter.space + light * (1.0 - self.painter.space)
     }
 }
 

@@ -18,6 +18,7 @@
 //! | [`artefact`] | pictures with flares, windows, panels or ground instead of a limb |
 //! | `height` | height of the limb by latitude |
 //! | `render` | the light on every pixel |
+//! | `image_circle` | the image circle of the lens in a rendered picture |
 //! | [`detector`] | blur, noise, quantisation |
 //! | [`picture`] | the rendered picture, and its file |
 //! | [`limb`] | the limb as a line in the picture, and edge points on it |
@@ -39,6 +40,7 @@ pub mod flight;
 pub mod foreground;
 pub mod globe;
 mod height;
+mod image_circle;
 pub mod infrared;
 pub mod limb;
 pub mod motion;

@@ -36,7 +36,7 @@ impl Scene {
     /// pose at the middle of the exposure. For a camera inside the body the list is empty.
     pub fn tangent_heights_km(&self, rays: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
         let Some(view) = View::try_new(Globe::new(&self.body), &self.pose) else { return Vec::new() };
-        rays.into_iter().map(|ray| view.tangent_height_m(&view.look(ray)) * 1e-3).collect()
+        rays.into_iter().map(|ray| view.tangent_height_m(&view.intersect(ray)) * 1e-3).collect()
     }
 }
 
@@ -50,7 +50,7 @@ pub struct LimbPoint {
     /// Azimuth about the limb axis in radians: 0 is east of the position, π/2 is the direction axis × east.
     pub azimuth_rad: f64,
     /// Number of the uninterrupted segment of limb, from 0.
-    pub piece: usize,
+    pub segment: usize,
     /// Arc length in pixels from the start of the segment.
     pub arc_px: f64,
 }
@@ -72,10 +72,10 @@ impl LimbCircle {
     /// # Errors
     /// Fails if the camera is not outside the body and its limb height.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        Self::at_height(scene, scene.body.limb_height_km * 1e3)
+        Self::from_height(scene, scene.body.limb_height_km * 1e3)
     }
 
-    fn at_height(scene: &Scene, height_m: f64) -> Result<Self, SceneError> {
+    fn from_height(scene: &Scene, height_m: f64) -> Result<Self, SceneError> {
         let globe = Globe::new(&scene.body).raised(height_m);
         let cone = LimbCone::try_new(scene.pose.position_m, globe.a_m, globe.b_m).ok_or(SceneError::Pose)?;
         let (axis, east) = (Vector3::from(cone.axis.xyz()), Vector3::from(cone.east.xyz()));
@@ -100,32 +100,32 @@ impl LimbCircle {
 
 /// An uninterrupted visible segment of the limb.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Piece {
+pub(crate) struct Segment {
     /// (azimuth in radians, arc length from the start of the segment in pixels), both rising.
-    stations: Vec<(f64, f64)>,
+    samples: Vec<(f64, f64)>,
 }
 
-impl Piece {
+impl Segment {
     pub(crate) fn length_px(&self) -> f64 {
-        self.stations.last().map_or(0.0, |s| s.1)
+        self.samples.last().map_or(0.0, |s| s.1)
     }
     /// Returns the azimuth at an arc length.
-    fn azimuth_at(&self, arc_px: f64) -> f64 {
-        let i = self.stations.partition_point(|s| s.1 < arc_px).clamp(1, self.stations.len() - 1);
-        let ((a0, s0), (a1, s1)) = (self.stations[i - 1], self.stations[i]);
+    fn azimuth_rad(&self, arc_px: f64) -> f64 {
+        let i = self.samples.partition_point(|s| s.1 < arc_px).clamp(1, self.samples.len() - 1);
+        let ((a0, s0), (a1, s1)) = (self.samples[i - 1], self.samples[i]);
         if s1 > s0 { a0 + (a1 - a0) * (arc_px - s0) / (s1 - s0) } else { a0 }
     }
 }
 
 /// The limb of a scene through its lens.
-pub(crate) struct Walk<'a> {
+pub(crate) struct ProjectedLimb<'a> {
     scene: &'a Scene,
     camera: Camera<f64>,
     circle: LimbCircle,
     painter: Painter,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> ProjectedLimb<'a> {
     pub(crate) fn try_new(scene: &'a Scene) -> Result<Self, SceneError> {
         let camera = Camera::try_new(&scene.camera)?;
         Ok(Self { scene, camera, circle: LimbCircle::new(scene)?, painter: Painter::try_new(scene)? })
@@ -138,7 +138,7 @@ impl<'a> Walk<'a> {
             // The limb height moves the tangent point by a few kilometres, and this changes the limb height by metres.
             // Three rounds converge.
             for _ in 0..3 {
-                let Ok(circle) = LimbCircle::at_height(self.scene, self.painter.limb_height_m(ray)) else { break };
+                let Ok(circle) = LimbCircle::from_height(self.scene, self.painter.limb_height_m(ray)) else { break };
                 ray = circle.ray_ecef(azimuth_rad);
             }
         }
@@ -152,67 +152,67 @@ impl<'a> Walk<'a> {
     }
 
     /// Returns true if the point is in the picture, lit, and not behind the vehicle.
-    fn is_seen(&self, azimuth_rad: f64, p: ImagePoint<f64>) -> bool {
+    fn is_visible(&self, azimuth_rad: f64, p: ImagePoint<f64>) -> bool {
         let (w, h) = (f64::from(self.camera.width()), f64::from(self.camera.height()));
         let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
         inside
             && !self.scene.foreground.iter().any(|f| f.contains([p.u, p.v]))
-            && self.painter.lit(self.ray(azimuth_rad)) > 0.5
+            && self.painter.lit_share(self.ray(azimuth_rad)) > 0.5
     }
 
-    fn seen(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
-        self.project(azimuth_rad).filter(|p| self.is_seen(azimuth_rad, *p))
+    fn project_visible(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
+        self.project(azimuth_rad).filter(|p| self.is_visible(azimuth_rad, *p))
     }
 
     /// Returns the visible segments, with their ends located to better than a hundredth of a pixel. A segment shorter
     /// than the step in azimuth, 2π/(4·(width + height)), may be missed.
-    pub(crate) fn pieces(&self) -> Vec<Piece> {
+    pub(crate) fn visible_segments(&self) -> Vec<Segment> {
         // A limb that is a circle around the optical axis gets about two steps per pixel. Elsewhere the steps may be
         // longer, because the arc length is summed over chords.
         let steps = 4 * (usize::from(self.camera.width()) + usize::from(self.camera.height()));
-        let at = |i: usize| core::f64::consts::TAU * i as f64 / steps as f64;
-        let seen: Vec<Option<ImagePoint<f64>>> = (0..steps).map(|i| self.seen(at(i))).collect();
+        let azimuth = |i: usize| core::f64::consts::TAU * i as f64 / steps as f64;
+        let points: Vec<Option<ImagePoint<f64>>> = (0..steps).map(|i| self.project_visible(azimuth(i))).collect();
         // The loop starts at an invisible azimuth, so that it cuts no segment at azimuth zero. A limb without an
         // invisible azimuth is one segment of a full turn.
-        let Some(start) = seen.iter().position(Option::is_none) else {
-            return vec![self.piece((0..=steps).map(at).collect())];
+        let Some(start) = points.iter().position(Option::is_none) else {
+            return vec![self.measure_segment((0..=steps).map(azimuth).collect())];
         };
-        let mut pieces = Vec::new();
+        let mut segments = Vec::new();
         let mut current: Vec<f64> = Vec::new();
         for i in start..start + steps {
-            let (here, next) = (seen[i % steps], seen[(i + 1) % steps]);
+            let (here, next) = (points[i % steps], points[(i + 1) % steps]);
             match (here, next) {
-                (None, Some(_)) => current.extend([self.end(at(i + 1), at(i)), at(i + 1)]),
-                (Some(_), Some(_)) => current.push(at(i + 1)),
+                (None, Some(_)) => current.extend([self.bisect_end(azimuth(i + 1), azimuth(i)), azimuth(i + 1)]),
+                (Some(_), Some(_)) => current.push(azimuth(i + 1)),
                 (Some(_), None) => {
-                    current.push(self.end(at(i), at(i + 1)));
-                    pieces.push(self.piece(core::mem::take(&mut current)));
+                    current.push(self.bisect_end(azimuth(i), azimuth(i + 1)));
+                    segments.push(self.measure_segment(core::mem::take(&mut current)));
                 }
                 (None, None) => {}
             }
         }
-        pieces
+        segments
     }
 
     /// Returns the last visible azimuth between a visible and an invisible one.
-    fn end(&self, mut seen: f64, mut unseen: f64) -> f64 {
+    fn bisect_end(&self, mut visible: f64, mut hidden: f64) -> f64 {
         for _ in 0..24 {
-            let mid = 0.5 * (seen + unseen);
-            if self.seen(mid).is_some() { seen = mid } else { unseen = mid }
+            let mid = 0.5 * (visible + hidden);
+            if self.project_visible(mid).is_some() { visible = mid } else { hidden = mid }
         }
-        seen
+        visible
     }
 
-    fn piece(&self, azimuths_rad: Vec<f64>) -> Piece {
+    fn measure_segment(&self, azimuths_rad: Vec<f64>) -> Segment {
         let mut last: Option<ImagePoint<f64>> = None;
         let mut arc = 0.0;
-        let stations = azimuths_rad.into_iter().filter_map(|a| {
+        let samples = azimuths_rad.into_iter().filter_map(|a| {
             let p = self.project(a)?;
             arc += last.map_or(0.0, |l| libm::hypot(p.u - l.u, p.v - l.v));
             last = Some(p);
             Some((a, arc))
         });
-        Piece { stations: stations.collect() }
+        Segment { samples: samples.collect() }
     }
 }
 
@@ -223,9 +223,9 @@ impl Scene {
     /// # Errors
     /// Fails if the camera, the position or the light is invalid.
     pub fn limb_points(&self, count: usize, noise: EdgeNoise) -> Result<Vec<LimbPoint>, SceneError> {
-        let walk = Walk::try_new(self)?;
-        let pieces = walk.pieces();
-        let total: f64 = pieces.iter().map(Piece::length_px).sum();
+        let limb = ProjectedLimb::try_new(self)?;
+        let segments = limb.visible_segments();
+        let total: f64 = segments.iter().map(Segment::length_px).sum();
         if !(total > 0.0) {
             return Ok(Vec::new());
         }
@@ -234,19 +234,19 @@ impl Scene {
         let mut errors = Errors::new(self.seed, noise);
         let mut before = 0.0;
         let mut number = 0;
-        for (index, piece) in pieces.iter().enumerate() {
+        for (index, segment) in segments.iter().enumerate() {
             // The points are in the middle of `count` equal parts of the whole length.
-            while number < count && (number as f64 + 0.5) * spacing <= before + piece.length_px() {
+            while number < count && (number as f64 + 0.5) * spacing <= before + segment.length_px() {
                 let arc_px = (number as f64 + 0.5) * spacing - before;
-                let azimuth_rad = piece.azimuth_at(arc_px);
-                if let Some(exact) = walk.project(azimuth_rad) {
+                let azimuth_rad = segment.azimuth_rad(arc_px);
+                if let Some(exact) = limb.project(azimuth_rad) {
                     let [du, dv] = errors.next(index, arc_px);
                     let point = ImagePoint { u: exact.u + du, v: exact.v + dv };
-                    points.push(LimbPoint { point, exact, azimuth_rad, piece: index, arc_px });
+                    points.push(LimbPoint { point, exact, azimuth_rad, segment: index, arc_px });
                 }
                 number += 1;
             }
-            before += piece.length_px();
+            before += segment.length_px();
         }
         Ok(points)
     }
@@ -256,7 +256,7 @@ impl Scene {
     /// # Errors
     /// Fails if the camera, the position or the light is invalid.
     pub fn visible_limb_px(&self) -> Result<f64, SceneError> {
-        Ok(Walk::try_new(self)?.pieces().iter().map(Piece::length_px).sum())
+        Ok(ProjectedLimb::try_new(self)?.visible_segments().iter().map(Segment::length_px).sum())
     }
 }
 
@@ -275,7 +275,7 @@ impl Errors {
         Self { noise, u: Counter::new(seed, Stream::EdgeU), v: Counter::new(seed, Stream::EdgeV), index: 0, last: None }
     }
 
-    fn next(&mut self, piece: usize, arc_px: f64) -> [f64; 2] {
+    fn next(&mut self, segment: usize, arc_px: f64) -> [f64; 2] {
         let normal = [self.u.normal(self.index), self.v.normal(self.index)];
         self.index += 1;
         match self.noise {
@@ -284,12 +284,12 @@ impl Errors {
             EdgeNoise::GaussMarkov { variance_px2, correlation_px } => {
                 let sigma = variance_px2.max(0.0).sqrt();
                 let (rho, before) = match self.last {
-                    Some((p, arc, e)) if p == piece => (libm::exp(-(arc_px - arc) / correlation_px), e),
+                    Some((p, arc, e)) if p == segment => (libm::exp(-(arc_px - arc) / correlation_px), e),
                     _ => (0.0, [0.0; 2]),
                 };
                 let fresh = sigma * (1.0 - rho * rho).sqrt();
                 let error = [0, 1].map(|i| rho * before[i] + fresh * normal[i]);
-                self.last = Some((piece, arc_px, error));
+                self.last = Some((segment, arc_px, error));
                 error
             }
         }
@@ -334,7 +334,7 @@ mod tests {
         let cut = s.visible_limb_px().unwrap();
         assert!((39.9..45.0).contains(&(whole - cut)), "{whole} {cut}");
         let points = s.limb_points(100, EdgeNoise::None).unwrap();
-        assert!(points.iter().any(|p| p.piece == 1) && points.iter().all(|p| p.piece < 2));
+        assert!(points.iter().any(|p| p.segment == 1) && points.iter().all(|p| p.segment < 2));
         assert!(points.iter().all(|p| (p.exact.u - 320.0).abs() > 20.0));
     }
 
@@ -357,12 +357,12 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disc_is_one_closed_piece() {
+    fn a_full_disc_is_one_closed_segment() {
         let camera = Config::ideal(Model::Equidistant, 384, 288, 92.0);
         let s = Scene::new(camera, Pose::looking(position_m(0.0, 0.0, 600.0), Look::off_nadir(0.0, 0.0, 0.0)));
         let points = s.limb_points(100, EdgeNoise::None).unwrap();
         let r = 92.0 * 66.0f64.to_radians();
         assert!((s.visible_limb_px().unwrap() / (core::f64::consts::TAU * r) - 1.0).abs() < 0.02);
-        assert!(points.iter().all(|p| p.piece == 0));
+        assert!(points.iter().all(|p| p.segment == 0));
     }
 }

@@ -20,7 +20,7 @@ pub struct Motion {
 /// Distance in pixels between two of the poses that a blurred picture is averaged over.
 const STEP_PX: f64 = 1.2;
 /// Largest number of these poses.
-const MOST: usize = 48;
+const MAX_POSES: usize = 48;
 
 impl Motion {
     fn rate(&self) -> f64 {
@@ -28,12 +28,12 @@ impl Motion {
     }
 
     /// Returns true if the rotation during the picture is more than 0.02 px.
-    pub(crate) fn matters(&self, pixel_rad: f64) -> bool {
+    pub(crate) fn is_significant(&self, pixel_rad: f64) -> bool {
         self.rate() * (self.exposure_s.abs() + self.readout_s.abs()) > 0.02 * pixel_rad
     }
 
     /// Returns the time of the middle of a row's exposure, in seconds after the time of the picture.
-    pub(crate) fn row_s(&self, row: f64, rows: usize) -> f64 {
+    pub(crate) fn row_time_s(&self, row: f64, rows: usize) -> f64 {
         let last = rows.saturating_sub(1).max(1) as f64;
         self.readout_s * (row / last - 0.5)
     }
@@ -41,12 +41,12 @@ impl Motion {
     /// Returns the poses that the light of a row comes from. All have the same weight.
     pub(crate) fn poses(&self, pose: &Pose, row: f64, rows: usize, pixel_rad: f64) -> Vec<Pose> {
         let blur_px = self.rate() * self.exposure_s / pixel_rad;
-        let count = ((blur_px / STEP_PX).ceil() as usize).clamp(1, MOST);
-        let middle = self.row_s(row, rows);
+        let count = ((blur_px / STEP_PX).ceil() as usize).clamp(1, MAX_POSES);
+        let middle = self.row_time_s(row, rows);
         (0..count)
             .map(|i| {
-                let at = middle + self.exposure_s * ((i as f64 + 0.5) / count as f64 - 0.5);
-                pose.disturbed(self.rate_radps.map(|w| w * at))
+                let time_s = middle + self.exposure_s * ((i as f64 + 0.5) / count as f64 - 0.5);
+                pose.disturbed(self.rate_radps.map(|w| w * time_s))
             })
             .collect()
     }
@@ -68,6 +68,6 @@ mod tests {
         assert!((mean + 0.1).abs() < 1e-9, "{mean}");
         let span = about_z(&top[16]) - about_z(&top[0]);
         assert!((span - 0.02 * 16.0 / 17.0).abs() < 1e-9);
-        assert!(!Motion { rate_radps: [0.0; 3], ..motion }.matters(1e-3));
+        assert!(!Motion { rate_radps: [0.0; 3], ..motion }.is_significant(1e-3));
     }
 }

@@ -4,7 +4,7 @@
 //! pixel, with a linear tangent height across it. For a sharp limb the body's share of the pixel is exact.
 
 mod edge;
-mod lamp;
+mod light;
 
 use hzn_core::camera::Camera;
 use hzn_core::frames::{Cam, UnitVec3};
@@ -15,14 +15,14 @@ use crate::counter::{Counter, Stream};
 use crate::error::SceneError;
 use crate::globe::{Globe, RayHit, View};
 use crate::height::LimbHeight;
+use crate::image_circle::lens_without_circle;
 use crate::pose::Pose;
-use crate::render::beyond_circle;
 use crate::scene::{Band, Profile, Scene, Sky, World};
-use crate::texture::{CloudField, Drawn, smoothstep};
-use crate::visible::air::Prepared;
+use crate::texture::{CellCache, CloudField, smoothstep};
+use crate::visible::air::PreparedAir;
 
 use edge::Edge;
-use lamp::Lamp;
+use light::PreparedLight;
 
 /// Distance from the limb in pixels within which pixels are averaged.
 const NEAR_PX: f64 = 3.0;
@@ -37,9 +37,9 @@ pub(crate) struct Painter {
     globe: Globe,
     view: View,
     edge: Edge,
-    lamp: Lamp,
+    light: PreparedLight,
     /// The air of a visible world. Its limb still shines beyond the terminator.
-    air: Option<Prepared>,
+    air: Option<PreparedAir>,
     surface: f32,
     clouds: Option<CloudField>,
     band: Option<Band>,
@@ -54,7 +54,7 @@ pub(crate) struct Painter {
 
 impl Painter {
     pub(crate) fn try_new(scene: &Scene) -> Result<Self, SceneError> {
-        let camera = beyond_circle(&scene.camera)?;
+        let camera = lens_without_circle(&scene.camera)?;
         let height = LimbHeight::new(scene);
         let globe = Globe::new(&scene.body).raised(height.reference_m);
         let view = View::try_new(globe, &scene.pose).ok_or(SceneError::Pose)?;
@@ -71,9 +71,9 @@ impl Painter {
                 // To first order, the miss is twice the height in units of the radius.
                 + 2.2 * height.largest_departure_m() / globe.b_m,
             edge: Edge::new(scene.profile),
-            lamp: Lamp::try_new(scene, globe)?,
+            light: PreparedLight::try_new(scene, globe)?,
             air: match &scene.world {
-                World::Visible(world) => Some(Prepared::new(&world.air, globe.a_m)),
+                World::Visible(world) => Some(PreparedAir::new(&world.air, globe.a_m)),
                 World::Plain | World::Infrared(_) => None,
             },
             surface: scene.disc.surface as f32,
@@ -96,27 +96,27 @@ impl Painter {
 
     /// Returns the limb height in metres at the latitude where this ray (ECEF, unit) meets or passes the body.
     pub(crate) fn limb_height_m(&self, ecef: [f64; 3]) -> f64 {
-        let lat = |cam: UnitVec3<Cam, f64>| self.latitude_rad(&self.view.look(cam.xyz()));
-        self.height.at_m(self.to_camera(ecef).map_or(0.0, lat))
+        let lat = |cam: UnitVec3<Cam, f64>| self.latitude_rad(&self.view.intersect(cam.xyz()));
+        self.height.height_m(self.to_camera(ecef).map_or(0.0, lat))
     }
 
     /// Returns the share of light that falls where this ray (ECEF, unit) meets or passes the body, 0 to 1.
-    pub(crate) fn lit(&self, ecef: [f64; 3]) -> f32 {
+    pub(crate) fn lit_share(&self, ecef: [f64; 3]) -> f32 {
         self.to_camera(ecef).map_or(0.0, |cam| {
-            let sight = self.view.look(cam.xyz());
-            let point = self.view.point(&sight);
-            match (&self.air, &self.lamp) {
-                (Some(air), Lamp::Sun { direction, .. }) => {
+            let hit = self.view.intersect(cam.xyz());
+            let point = self.view.point(&hit);
+            match (&self.air, &self.light) {
+                (Some(air), PreparedLight::Sun { direction, .. }) => {
                     let mu0 = self.view.normal(&point).dot(direction) as f32;
-                    air.sunlight(air.sun_path(mu0), air.thin(self.height.reference_m as f32))[1]
+                    air.sunlight(air.sun_path(mu0), air.density_ratio(self.height.reference_m as f32))[1]
                 }
-                _ => self.lamp.at(&self.view, &sight, &point),
+                _ => self.light.share(&self.view, &hit, &point),
             }
         })
     }
 
     /// Returns the same scene from another pose.
-    pub(crate) fn turned(&self, pose: &Pose) -> Self {
+    pub(crate) fn with_pose(&self, pose: &Pose) -> Self {
         let view = View::try_new(self.globe, pose).unwrap_or_else(|| self.view.clone());
         Self { view, ..self.clone() }
     }
@@ -125,10 +125,10 @@ impl Painter {
     ///
     /// Away from the limb, rays are interpolated between every [`STRIDE`]th one. They are accurate to a hundredth of a
     /// pixel, which is enough for clouds. Close to the limb every pixel has an exact ray.
-    pub(crate) fn row(&self, v: f64, row: &mut [f32]) {
+    pub(crate) fn render_row(&self, v: f64, row: &mut [f32]) {
         let ray = |x: usize| self.camera.ray(ImagePoint { u: x as f64, v }).map(|r| Vector3::from(r.direction().xyz()));
         let mut next = ray(0);
-        let drawn = &mut Drawn::default();
+        let cache = &mut CellCache::default();
         for (block, pixels) in row.chunks_mut(STRIDE).enumerate() {
             let start = block * STRIDE;
             let (first, last) = (next, ray(start + STRIDE));
@@ -136,9 +136,9 @@ impl Painter {
             for (i, p) in pixels.iter_mut().enumerate() {
                 *p = match (first, last) {
                     (Some(a), Some(b)) => {
-                        self.roughly((a + (b - a) * (i as f64 / STRIDE as f64)).into(), start + i, v, drawn)
+                        self.render_interpolated((a + (b - a) * (i as f64 / STRIDE as f64)).into(), start + i, v, cache)
                     }
-                    _ => self.exactly(start + i, v, drawn),
+                    _ => self.render_exact(start + i, v, cache),
                 };
             }
         }
@@ -146,65 +146,65 @@ impl Painter {
 
     /// Renders a pixel whose ray is approximately `s`.
     #[inline(always)]
-    fn roughly(&self, s: [f64; 3], x: usize, v: f64, drawn: &mut Drawn) -> f32 {
-        let sight = self.view.look(s);
-        if sight.miss.abs() <= self.near {
-            return self.exactly(x, v, drawn);
+    fn render_interpolated(&self, s: [f64; 3], x: usize, v: f64, cache: &mut CellCache) -> f32 {
+        let hit = self.view.intersect(s);
+        if hit.miss.abs() <= self.near {
+            return self.render_exact(x, v, cache);
         }
-        let cover = if sight.miss <= 0.0 { 1.0 } else { self.edge.at(self.above_limb_m(&sight)) };
-        self.blend(cover, &sight, drawn)
+        let cover = if hit.miss <= 0.0 { 1.0 } else { self.edge.share(self.height_above_limb_m(&hit)) };
+        self.blend(cover, &hit, cache)
     }
 
     /// Renders a pixel with its exact ray, averaged over the pixel's area.
-    fn exactly(&self, x: usize, v: f64, drawn: &mut Drawn) -> f32 {
+    fn render_exact(&self, x: usize, v: f64, cache: &mut CellCache) -> f32 {
         // Pixels that the lens does not see are sky, so that no dark rim is blurred inward.
         let Some(ray) = self.camera.ray(ImagePoint { u: x as f64, v }) else { return self.sky };
-        let sight = self.view.look(ray.direction().xyz());
-        let gradient = self.view.tangent_height_gradient(&sight, &ray.jacobian());
-        self.blend(self.edge.mean(self.above_limb_m(&sight), gradient), &sight, drawn)
+        let hit = self.view.intersect(ray.direction().xyz());
+        let gradient = self.view.tangent_height_gradient(&hit, &ray.jacobian());
+        self.blend(self.edge.mean_share(self.height_above_limb_m(&hit), gradient), &hit, cache)
     }
 
     /// Returns the tangent height of a ray above the limb height at its latitude, metres.
     #[inline(always)]
-    fn above_limb_m(&self, sight: &RayHit) -> f64 {
-        let above_reference = self.view.tangent_height_m(sight);
-        if !self.height.varies() {
+    fn height_above_limb_m(&self, hit: &RayHit) -> f64 {
+        let above_reference = self.view.tangent_height_m(hit);
+        if !self.height.is_variable() {
             return above_reference;
         }
-        above_reference + self.height.reference_m - self.height.at_m(self.latitude_rad(sight))
+        above_reference + self.height.reference_m - self.height.height_m(self.latitude_rad(hit))
     }
 
     /// Returns the geodetic latitude of the point that a ray meets or passes, radians.
-    fn latitude_rad(&self, sight: &RayHit) -> f64 {
-        libm::asin(self.view.normal(&self.view.point(sight)).z.clamp(-1.0, 1.0))
+    fn latitude_rad(&self, hit: &RayHit) -> f64 {
+        libm::asin(self.view.normal(&self.view.point(hit)).z.clamp(-1.0, 1.0))
     }
 
     /// Blends sky and body; the body has the weight `cover`.
     #[inline(always)]
-    fn blend(&self, cover: f32, sight: &RayHit, drawn: &mut Drawn) -> f32 {
+    fn blend(&self, cover: f32, hit: &RayHit, cache: &mut CellCache) -> f32 {
         if cover <= 1e-4 {
             return self.sky;
         }
-        self.sky + cover * (self.body(sight, drawn) - self.sky)
+        self.sky + cover * (self.body_brightness(hit, cache) - self.sky)
     }
 
     /// Returns the brightness of the body where the ray meets or passes it.
-    fn body(&self, sight: &RayHit, drawn: &mut Drawn) -> f32 {
-        let point = self.view.point(sight);
-        let lit = self.lamp.at(&self.view, sight, &point);
+    fn body_brightness(&self, hit: &RayHit, cache: &mut CellCache) -> f32 {
+        let point = self.view.point(hit);
+        let lit = self.light.share(&self.view, hit, &point);
         if lit <= 0.0 {
             return self.sky;
         }
         let air = self.band.map_or(0.0, |b| {
-            let depth_km = (-self.above_limb_m(sight) * 1e-3).max(0.0);
+            let depth_km = (-self.height_above_limb_m(hit) * 1e-3).max(0.0);
             let fade = ((b.depth_km - depth_km) / b.fade_km.max(1e-6) + 0.5).clamp(0.0, 1.0);
             smoothstep(fade as f32)
         });
         let ground = match &self.clouds {
             Some(clouds) if air < 1.0 => {
-                let (range_m, cos) = self.view.range_m_and_incidence(sight, &point);
+                let (range_m, cos) = self.view.range_m_and_incidence(hit, &point);
                 let footprint_km = (range_m * 1e-3 * self.pixel_rad / cos.max(1e-3)) as f32;
-                clouds.over(self.surface, &point, footprint_km.min(self.radius_km), drawn)
+                clouds.blend_over(self.surface, &point, footprint_km.min(self.radius_km), cache)
             }
             _ => self.surface,
         };
@@ -222,9 +222,9 @@ impl Painter {
             let r = (1.0 - z * z).sqrt();
             let Some(cam) = self.view.to_camera(Vector3::new(r * cos, r * sin, z)) else { continue };
             let Some(p) = self.camera.project(&cam) else { continue };
-            let seen = 1.0 - self.edge.at(self.above_limb_m(&self.view.look(cam.xyz())));
+            let visible = 1.0 - self.edge.share(self.height_above_limb_m(&self.view.intersect(cam.xyz())));
             // The stars are evenly distributed over five magnitudes.
-            let light = sky.star_brightness as f32 * libm::exp(-4.6 * c) as f32 * seen;
+            let light = sky.star_brightness as f32 * libm::exp(-4.6 * c) as f32 * visible;
             let (x, y) = (p.u.floor(), p.v.floor());
             let (fx, fy) = ((p.u - x) as f32, (p.v - y) as f32);
             for (dx, dy, weight) in [

@@ -101,7 +101,7 @@ impl Picture {
     ///
     /// # Errors
     /// Fails if the encoder refuses the picture.
-    pub fn jpeg(&self, quality: u8) -> Result<Vec<u8>, image::ImageError> {
+    pub fn encode_jpeg(&self, quality: u8) -> Result<Vec<u8>, image::ImageError> {
         let mut file = Vec::new();
         let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, quality.clamp(1, 100));
         let colour = if self.channels == 1 { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
@@ -116,9 +116,9 @@ impl Picture {
     /// Returns the picture as it is read back from a JPEG file of this quality.
     ///
     /// # Errors
-    /// Fails like [`Picture::jpeg`].
-    pub fn through_jpeg(&self, quality: u8) -> Result<Self, image::ImageError> {
-        let read = image::load_from_memory_with_format(&self.jpeg(quality)?, image::ImageFormat::Jpeg)?;
+    /// Fails like [`Picture::encode_jpeg`].
+    pub fn with_jpeg_losses(&self, quality: u8) -> Result<Self, image::ImageError> {
+        let read = image::load_from_memory_with_format(&self.encode_jpeg(quality)?, image::ImageFormat::Jpeg)?;
         let data = if self.channels == 1 { read.into_luma8().into_raw() } else { read.into_rgb8().into_raw() };
         Ok(Self { bits: 8, samples: Samples::Bytes(data), ..*self })
     }
@@ -160,7 +160,7 @@ mod tests {
         let samples = Samples::Bytes((0..3 * 64 * 48).map(|i| 40 + (i / 3 % 64) as u8 * 3).collect());
         let picture = Picture { width: 64, height: 48, channels: 3, bits: 8, samples };
         let worst = |quality| {
-            let back = picture.through_jpeg(quality).unwrap();
+            let back = picture.with_jpeg_losses(quality).unwrap();
             assert_eq!((back.width, back.height, back.channels, back.bits), (64, 48, 3, 8));
             let off = |x, y| back.at(x, y).abs_diff(picture.at(x, y));
             (0..48).flat_map(|y| (0..64).map(move |x| (x, y))).map(|(x, y)| off(x, y)).max().unwrap()

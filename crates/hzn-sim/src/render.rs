@@ -3,14 +3,15 @@
 //! The painter of each world paints it row by row. This module turns the rows into light on a detector: motion, vehicle
 //! parts in view, stray light, fall-off, image circle, exposure.
 
-use hzn_core::camera::{self, Camera};
+use hzn_core::camera::Camera;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::detector::Plane;
 use crate::error::SceneError;
 use crate::globe::Globe;
-use crate::infrared::Warmth;
+use crate::image_circle::{apply_image_circle, lens_without_circle};
+use crate::infrared::{Infrared, InfraredPainter};
 use crate::motion::Motion;
 use crate::optics::Optics;
 use crate::painter::Painter;
@@ -31,68 +32,91 @@ impl Scene {
         for plane in &mut light {
             self.expose(plane, &camera);
         }
-        let blur = |plane: Plane| through_circle(plane.blurred(self.detector.psf_sigma_px), &camera);
+        let blur = |plane: Plane| apply_image_circle(plane.blurred(self.detector.psf_sigma_px), &camera);
         let light: Vec<Plane> = light.into_iter().map(blur).collect();
         Ok(self.detector.expose(&light, self.seed))
     }
 
     /// Returns the light on every pixel before blur and exposure: one plane, or three for colours.
     pub(crate) fn light(&self) -> Result<Vec<Plane>, SceneError> {
-        let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
-        let camera = beyond_circle(&self.camera)?;
-        let (fx, fy) = camera.focal_px();
-        let pixel_rad = 1.0 / fx.min(fy);
-        let motion = self.motion.filter(|m| m.matters(pixel_rad));
-        let poses = |row: usize| match &motion {
-            Some(motion) => motion.poses(&self.pose, row as f64, h, pixel_rad),
-            None => vec![self.pose],
-        };
+        let camera = lens_without_circle(&self.camera)?;
+        let motion = self.motion.filter(|m| m.is_significant(pixel_rad(&camera)));
         let mut planes = match &self.world {
-            World::Plain => {
-                let painter = Painter::try_new(self)?;
-                let mut data = vec![0.0f32; w * h];
-                data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match &motion {
-                    None => painter.row(y as f64, row),
-                    Some(_) => {
-                        let poses = poses(y);
-                        let mut one = vec![0.0f32; w];
-                        for pose in &poses {
-                            painter.turned(pose).row(y as f64, &mut one);
-                            row.iter_mut().zip(&one).for_each(|(sum, p)| *sum += p / poses.len() as f32);
-                        }
-                    }
-                });
-                painter.draw_stars(&self.sky, w, &mut data);
-                vec![Plane { width: w, data }]
-            }
-            World::Infrared(world) => {
-                let globe = Globe::new(&self.body);
-                let warmth = Warmth::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
-                let mut data = vec![0.0f32; w * h];
-                data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match &motion {
-                    None => warmth.row(y as f64, 1.0, row),
-                    Some(_) => {
-                        let poses = poses(y);
-                        poses.iter().for_each(|p| warmth.turned(p).row(y as f64, 1.0 / poses.len() as f32, row));
-                    }
-                });
-                vec![Plane { width: w, data }]
-            }
-            World::Visible(world) => self.visible(world, camera, motion.as_ref())?,
+            World::Plain => vec![self.render_plain(&camera, motion.as_ref())?],
+            World::Infrared(world) => vec![self.render_infrared(world, camera, motion.as_ref())?],
+            World::Visible(world) => self.render_visible(world, camera, motion.as_ref())?,
         };
-        for plane in &mut planes {
-            plane.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+        self.draw_foreground(&mut planes);
+        if let World::Visible(world) = &self.world
+            && world.sun_in_view
+        {
+            self.add_glare(world, &mut planes)?;
+        }
+        self.match_channels(&mut planes);
+        Ok(planes)
+    }
+
+    /// Renders a body of uniform brightness, and the stars.
+    fn render_plain(&self, camera: &Camera<f64>, motion: Option<&Motion>) -> Result<Plane, SceneError> {
+        let (w, h) = self.size();
+        let painter = Painter::try_new(self)?;
+        let mut data = vec![0.0f32; w * h];
+        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
+            None => painter.render_row(y as f64, row),
+            Some(motion) => {
+                let poses = motion.poses(&self.pose, y as f64, h, pixel_rad(camera));
+                let mut one = vec![0.0f32; w];
+                for pose in &poses {
+                    painter.with_pose(pose).render_row(y as f64, &mut one);
+                    row.iter_mut().zip(&one).for_each(|(sum, p)| *sum += p / poses.len() as f32);
+                }
+            }
+        });
+        painter.draw_stars(&self.sky, w, &mut data);
+        Ok(Plane { width: w, data })
+    }
+
+    /// Renders the Earth in the infrared.
+    fn render_infrared(
+        &self,
+        world: &Infrared,
+        camera: Camera<f64>,
+        motion: Option<&Motion>,
+    ) -> Result<Plane, SceneError> {
+        let (w, h) = self.size();
+        let pixel_rad = pixel_rad(&camera);
+        let globe = Globe::new(&self.body);
+        let painter = InfraredPainter::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
+        let mut data = vec![0.0f32; w * h];
+        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
+            None => painter.render_row(y as f64, 1.0, row),
+            Some(motion) => {
+                let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
+                poses.iter().for_each(|p| painter.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
+            }
+        });
+        Ok(Plane { width: w, data })
+    }
+
+    /// Returns the numbers of columns and rows.
+    fn size(&self) -> (usize, usize) {
+        (usize::from(self.camera.width), usize::from(self.camera.height))
+    }
+
+    /// Draws the parts of the vehicle in front of everything.
+    fn draw_foreground(&self, planes: &mut [Plane]) {
+        for plane in planes {
+            plane.data.par_chunks_mut(plane.width).enumerate().for_each(|(y, row)| {
                 for f in &self.foreground {
                     f.draw_row(y, row);
                 }
             });
         }
-        if let World::Visible(world) = &self.world
-            && world.sun_in_view
-        {
-            self.glare(world, &mut planes)?;
-        }
-        // A grey camera sees the mean of the colours. A colour camera sees a grey world as three equal planes.
+    }
+
+    /// Gives the planes the channels of the detector. A grey camera sees the mean of the colours. A colour camera sees
+    /// a grey world as three equal planes.
+    fn match_channels(&self, planes: &mut Vec<Plane>) {
         if self.detector.colour {
             while planes.len() < 3 {
                 planes.extend(planes.first().cloned());
@@ -101,7 +125,6 @@ impl Scene {
             r.data.iter_mut().zip(&g.data).zip(&b.data).for_each(|((r, g), b)| *r = (*r + g + b) / 3.0);
             planes.truncate(1);
         }
-        Ok(planes)
     }
 
     /// Returns the shader of a visible world for the scene's own pose.
@@ -116,17 +139,21 @@ impl Scene {
     }
 
     /// Renders the Earth and the sky with stars, Moon and Sun.
-    fn visible(&self, world: &Visible, camera: Camera<f64>, motion: Option<&Motion>) -> Result<Vec<Plane>, SceneError> {
-        let (w, h) = (usize::from(self.camera.width), usize::from(self.camera.height));
-        let (fx, fy) = camera.focal_px();
-        let pixel_rad = 1.0 / fx.min(fy);
+    fn render_visible(
+        &self,
+        world: &Visible,
+        camera: Camera<f64>,
+        motion: Option<&Motion>,
+    ) -> Result<Vec<Plane>, SceneError> {
+        let (w, h) = self.size();
+        let pixel_rad = pixel_rad(&camera);
         let shader = self.shader(world, camera)?;
         let mut pixels = vec![[0.0f32; 3]; w * h];
         pixels.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
-            None => shader.row(y as f64, 1.0, row),
+            None => shader.render_row(y as f64, 1.0, row),
             Some(motion) => {
                 let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
-                poses.iter().for_each(|p| shader.turned(p).row(y as f64, 1.0 / poses.len() as f32, row));
+                poses.iter().for_each(|p| shader.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
             }
         });
         // Stars, Moon and Sun use the poses of the middle row.
@@ -135,7 +162,7 @@ impl Scene {
         let weight = 1.0 / poses.len() as f32;
         let mut canvas = Canvas { width: w, pixels: &mut pixels };
         for pose in &poses {
-            let shader = shader.turned(pose);
+            let shader = shader.with_pose(pose);
             shader.draw_stars(&mut canvas, weight, world, world.ground.seed);
             if let Some(moon) = self.moon_ecef_m {
                 shader.draw_moon(&mut canvas, weight, moon, self.pose.position_m);
@@ -148,14 +175,14 @@ impl Scene {
     }
 
     /// Adds the stray light of the Sun. A part of the vehicle hides it only if it is in front of the Sun itself.
-    fn glare(&self, world: &Visible, planes: &mut [Plane]) -> Result<(), SceneError> {
+    fn add_glare(&self, world: &Visible, planes: &mut [Plane]) -> Result<(), SceneError> {
         if self.optics == Optics::default() {
             return Ok(());
         }
-        let shader = self.shader(world, beyond_circle(&self.camera)?)?;
+        let shader = self.shader(world, lens_without_circle(&self.camera)?)?;
         let hidden = shader.sun_point().is_some_and(|p| self.foreground.iter().any(|f| f.contains([p.u, p.v])));
-        let width = usize::from(self.camera.width);
-        let mut pixels = vec![[0.0f32; 3]; width * usize::from(self.camera.height)];
+        let (width, height) = self.size();
+        let mut pixels = vec![[0.0f32; 3]; width * height];
         shader.draw_glare(&mut Canvas { width, pixels: &mut pixels }, &self.optics, hidden);
         for (c, plane) in planes.iter_mut().enumerate() {
             plane.data.iter_mut().zip(&pixels).for_each(|(p, add)| *p += add[c]);
@@ -185,27 +212,8 @@ impl Scene {
     }
 }
 
-/// Returns the lens without its image circle, or with a wider one, as far as it stays monotone. The scene continues
-/// beyond the circle, so the blur takes light from there, as with a stop close to the detector.
-pub(crate) fn beyond_circle(config: &camera::Config) -> Result<Camera<f64>, SceneError> {
-    let with = |theta_max_deg| Camera::try_new(&camera::Config { theta_max_deg, ..config.clone() });
-    let wider = config.theta_max_deg.map(|deg| deg + 3.0);
-    with(None).or_else(|_| with(wider)).or_else(|_| with(config.theta_max_deg)).map_err(SceneError::from)
-}
-
-/// Removes all light beyond the image circle.
-pub(crate) fn through_circle(mut light: Plane, camera: &Camera<f64>) -> Plane {
-    if let Some((c, a, b)) = camera.image_circle_px() {
-        let w = light.width;
-        light.data.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
-            let dy = (y as f64 - c.v) / b;
-            for (x, p) in row.iter_mut().enumerate() {
-                let dx = (x as f64 - c.u) / a;
-                if dx * dx + dy * dy > 1.0 {
-                    *p = 0.0;
-                }
-            }
-        });
-    }
-    light
+/// Returns the larger of the two angles that a pixel in the middle covers, radians.
+fn pixel_rad(camera: &Camera<f64>) -> f64 {
+    let (fx, fy) = camera.focal_px();
+    1.0 / fx.min(fy)
 }

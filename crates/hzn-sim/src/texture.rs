@@ -34,7 +34,7 @@ type Lanes<T> = [T; LANES];
 /// Fractal value noise on the unit sphere.
 #[derive(Debug, Clone)]
 struct Fractal {
-    fours: Vec<Octaves>,
+    groups: Vec<Octaves>,
 }
 
 /// A group of neighbouring octaves, from the larger to the smaller. Octaves beyond the last one have size 0.
@@ -50,13 +50,13 @@ struct Octaves {
 /// Random values that were drawn for the last point, one entry per [`Octaves`]. The next point is usually in the same
 /// cells.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Drawn(Vec<Cells>);
+pub(crate) struct CellCache(Vec<Cells>);
 
 /// The cells of one [`Octaves`], by axis, and the random values at their corners. The corner index counts x fastest and
 /// z slowest.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cells {
-    drawn: bool,
+    is_drawn: bool,
     floor: [Lanes<i32>; 3],
     corner: [Lanes<f32>; 8],
 }
@@ -69,39 +69,45 @@ impl Fractal {
         let amplitude = |i: usize| rough.powi(i as i32);
         // The variances of the octaves add up.
         let root = (0..count).map(|i| amplitude(i) * amplitude(i)).sum::<f32>().sqrt();
-        let mut fours = vec![Octaves::default(); count.div_ceil(LANES)];
+        let mut groups = vec![Octaves::default(); count.div_ceil(LANES)];
         for i in 0..count {
             let size_km = largest_km / f64::from(1u32 << i);
-            let (four, lane) = (&mut fours[i / LANES], i % LANES);
-            four.size_km[lane] = size_km as f32;
-            four.frequency[lane] = (radius_m / 1e3 / size_km) as f32;
-            four.amplitude[lane] = amplitude(i) * (1.0 / (unit * root));
-            four.salt[lane] = hash3([i as i32, seed as i32, (seed >> 32) as i32], salt);
+            let (group, lane) = (&mut groups[i / LANES], i % LANES);
+            group.size_km[lane] = size_km as f32;
+            group.frequency[lane] = (radius_m / 1e3 / size_km) as f32;
+            group.amplitude[lane] = amplitude(i) * (1.0 / (unit * root));
+            group.salt[lane] = hash3([i as i32, seed as i32, (seed >> 32) as i32], salt);
         }
-        Self { fours }
+        Self { groups }
     }
 
     /// Returns the amplitudes, from the largest octave on.
     fn amplitudes(&self) -> impl DoubleEndedIterator<Item = f32> {
-        self.fours.iter().flat_map(|four| four.amplitude)
+        self.groups.iter().flat_map(|group| group.amplitude)
     }
 
     /// Calls `each` with the number and the value of one octave after the other at a point. It stops when `each`
     /// returns false, or when the octaves are finer than `footprint_km`.
     #[inline(always)]
-    fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn, mut each: impl FnMut(usize, f32) -> bool) {
+    fn visit_octaves(
+        &self,
+        point: &Vector3<f64>,
+        footprint_km: f32,
+        cache: &mut CellCache,
+        mut each: impl FnMut(usize, f32) -> bool,
+    ) {
         let p = [point.x as f32, point.y as f32, point.z as f32];
-        if drawn.0.len() != self.fours.len() {
-            drawn.0 = vec![Cells::default(); self.fours.len()];
+        if cache.0.len() != self.groups.len() {
+            cache.0 = vec![Cells::default(); self.groups.len()];
         }
-        for (n, (four, cells)) in self.fours.iter().zip(&mut drawn.0).enumerate() {
-            let keep = four.size_km.map(|size| (size / footprint_km - 1.0).clamp(0.0, 1.0));
+        for (n, (group, cells)) in self.groups.iter().zip(&mut cache.0).enumerate() {
+            let keep = group.size_km.map(|size| (size / footprint_km - 1.0).clamp(0.0, 1.0));
             if keep[0] <= 0.0 {
                 return;
             }
-            let noise = four.noise(p, cells);
+            let noise = group.noise(p, cells);
             for i in 0..LANES {
-                if keep[i] <= 0.0 || !each(LANES * n + i, keep[i] * four.amplitude[i] * (noise[i] - 0.5)) {
+                if keep[i] <= 0.0 || !each(LANES * n + i, keep[i] * group.amplitude[i] * (noise[i] - 0.5)) {
                     return;
                 }
             }
@@ -124,7 +130,7 @@ impl Octaves {
         });
         // The comparison works in lanes, because a comparison of arrays would call the library.
         let changed = floor.iter().flatten().zip(cells.floor.iter().flatten()).fold(0, |all, (a, b)| all | (a ^ b));
-        if changed != 0 || !cells.drawn {
+        if changed != 0 || !cells.is_drawn {
             cells.draw(floor, &self.salt);
         }
         let t: [Lanes<f32>; 3] =
@@ -144,7 +150,7 @@ impl Cells {
     fn draw(&mut self, floor: [Lanes<i32>; 3], salt: &Lanes<u32>) {
         for (i, &salt) in salt.iter().enumerate() {
             let [x, y, z] = floor.map(|f| f[i]);
-            if self.drawn && self.floor.map(|f| f[i]) == [x, y, z] {
+            if self.is_drawn && self.floor.map(|f| f[i]) == [x, y, z] {
                 continue;
             }
             for (corner, value) in self.corner.iter_mut().enumerate() {
@@ -152,7 +158,7 @@ impl Cells {
                 value[i] = (hash3([x.wrapping_add(dx), y.wrapping_add(dy), z.wrapping_add(dz)], salt) >> 8) as f32;
             }
         }
-        (self.drawn, self.floor) = (true, floor);
+        (self.is_drawn, self.floor) = (true, floor);
     }
 }
 
@@ -198,17 +204,23 @@ impl CloudField {
 
     /// Returns the brightness at a point of the unit sphere over ground of brightness `ground`. `footprint_km` is the
     /// size of a pixel on the ground. Finer detail is left out, because it would only flicker.
-    pub(crate) fn over(&self, ground: f32, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> f32 {
-        match self.at(point, footprint_km, drawn) {
+    pub(crate) fn blend_over(
+        &self,
+        ground: f32,
+        point: &Vector3<f64>,
+        footprint_km: f32,
+        cache: &mut CellCache,
+    ) -> f32 {
+        match self.sample(point, footprint_km, cache) {
             Some((cover, bright)) => ground + cover * (bright - ground),
             None => ground,
         }
     }
 
     /// Returns the hidden share of the ground, 0 to 1, and the brightness of the cloud there; `None` under a clear sky.
-    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> Option<(f32, f32)> {
+    pub(crate) fn sample(&self, point: &Vector3<f64>, footprint_km: f32, cache: &mut CellCache) -> Option<(f32, f32)> {
         let (mut sum, mut fine, mut clear) = (0.0f32, 0.0f32, false);
-        self.fractal.at(point, footprint_km, drawn, |i, share| {
+        self.fractal.visit_octaves(point, footprint_km, cache, |i, share| {
             clear = self.rest.get(i).is_some_and(|rest| sum + rest < self.threshold - self.edge);
             sum += share;
             if i >= 2 {
@@ -239,9 +251,9 @@ impl Relief {
 
     /// Returns the value at a point, without detail finer than `footprint_km`.
     #[inline]
-    pub(crate) fn at(&self, point: &Vector3<f64>, footprint_km: f32, drawn: &mut Drawn) -> f32 {
+    pub(crate) fn sample(&self, point: &Vector3<f64>, footprint_km: f32, cache: &mut CellCache) -> f32 {
         let mut sum = 0.0;
-        self.0.at(point, footprint_km, drawn, |_, share| {
+        self.0.visit_octaves(point, footprint_km, cache, |_, share| {
             sum += share;
             true
         });
@@ -280,7 +292,7 @@ mod tests {
                     let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(n);
                     let (s, c) = libm::sincos(f64::from(i) * 2.399_963);
                     let r = (1.0 - z * z).sqrt();
-                    field.over(0.0, &Vector3::new(r * c, r * s, z), 1.0, &mut Drawn::default()) > 0.25
+                    field.blend_over(0.0, &Vector3::new(r * c, r * s, z), 1.0, &mut CellCache::default()) > 0.25
                 })
                 .count();
             let share = lit as f64 / f64::from(n);
@@ -290,10 +302,10 @@ mod tests {
 
     #[test]
     fn noise_is_continuous_across_cells() {
-        let four = Octaves { frequency: [1.0; LANES], salt: [1, 2, 3, 4], ..Octaves::default() };
-        let at = |x: f32| four.noise([x, 0.3, 0.7], &mut Cells::default());
+        let group = Octaves { frequency: [1.0; LANES], salt: [1, 2, 3, 4], ..Octaves::default() };
+        let noise = |x: f32| group.noise([x, 0.3, 0.7], &mut Cells::default());
         for x in [-2.0f32, -1.0, 0.0, 3.0] {
-            let (a, b) = (at(x - 1e-4), at(x + 1e-4));
+            let (a, b) = (noise(x - 1e-4), noise(x + 1e-4));
             assert!((0..LANES).all(|i| (a[i] - b[i]).abs() < 1e-3));
         }
     }
@@ -301,12 +313,15 @@ mod tests {
     #[test]
     fn what_was_drawn_before_does_not_matter() {
         let relief = Relief::new([700.0, 3.0], 0.7, 6.371e6, 5);
-        let mut drawn = Drawn::default();
+        let mut cache = CellCache::default();
         for i in 0..3000 {
             let (s, c) = libm::sincos(2e-4 * f64::from(i));
             let p = Vector3::new(0.6 * c, 0.6 * s, 0.8);
             let footprint_km = 0.3 + 0.01 * i as f32;
-            assert_eq!(relief.at(&p, footprint_km, &mut drawn), relief.at(&p, footprint_km, &mut Drawn::default()));
+            assert_eq!(
+                relief.sample(&p, footprint_km, &mut cache),
+                relief.sample(&p, footprint_km, &mut CellCache::default())
+            );
         }
     }
 }

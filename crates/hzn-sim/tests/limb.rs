@@ -52,7 +52,7 @@ fn crossings(points: &[LimbPoint], transposed: bool, width: f64, height: f64) ->
     let swap = |p: &LimbPoint| if transposed { (p.exact.v, p.exact.u) } else { (p.exact.u, p.exact.v) };
     let (width, height) = if transposed { (height, width) } else { (width, height) };
     let mut found = Vec::new();
-    for pair in points.windows(2).filter(|pair| pair[0].piece == pair[1].piece) {
+    for pair in points.windows(2).filter(|pair| pair[0].segment == pair[1].segment) {
         let ((u0, v0), (u1, v1)) = (swap(&pair[0]), swap(&pair[1]));
         let row = v0.max(v1).floor();
         if v0.min(v1) < row && (v1 - v0).abs() > 0.8 * (u1 - u0).abs() {

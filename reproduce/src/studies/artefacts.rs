@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use hzn_core::{Config, HostHorizon};
 use hzn_core::{observer::Unobserved, verdict::Verdict};
-use hzn_sim::artefact::{FALSE_SIGMAS, GROSS_DEG, Kind, Outcome, PriorKnowledge, Trial, look};
+use hzn_sim::artefact::{FALSE_SIGMAS, GROSS_DEG, Kind, Outcome, PriorKnowledge, Trial, process_trial};
 use rayon::prelude::*;
 
 use super::Effort;
@@ -60,7 +60,7 @@ fn seen(horizon: &mut HostHorizon, trial: &Trial, settings: &[Setting]) -> anyho
     let picture = trial.render()?;
     let one = |s: &Setting| {
         let told = PriorKnowledge { attitude_sigma_deg: s.attitude.then_some(ATTITUDE_DEG) };
-        Ok(look(horizon, &sensor(trial, s.threshold_px), trial, &picture, told, &Unobserved)?)
+        Ok(process_trial(horizon, &sensor(trial, s.threshold_px), trial, &picture, told, &Unobserved)?)
     };
     settings.iter().map(one).collect()
 }
@@ -175,7 +175,7 @@ fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
     let settings = [Setting::DEFAULT, Setting { attitude: true, ..Setting::DEFAULT }];
     // Some seeds have no room for both limb and artefact, so 50 % more seeds are tried.
     let all = each(seeds(of_each + of_each / 2), |horizon, kind, seed| {
-        let Some(trial) = Trial::beside_limb(kind, seed)? else { return Ok(None) };
+        let Some(trial) = Trial::with_limb(kind, seed)? else { return Ok(None) };
         let with = seen(horizon, &trial, &settings)?;
         let alone = seen(horizon, &trial.cleaned(), &settings[..1])?;
         Ok(Some((kind, with, alone)))

@@ -49,7 +49,7 @@ impl Rendered {
         let flight = scenario.flight()?;
         let pictures: Vec<Picture> = flight.frames.par_iter().map(FlightFrame::render).collect::<Result<_, _>>()?;
         let seen: Vec<_> = flight.frames.iter().zip(&pictures).collect();
-        let fit = Fit::of_pictures(scenario, &seen).into_iter().next();
+        let fit = Fit::measure_pictures(scenario, &seen).into_iter().next();
         let mut rendered = Self { flight, pictures, fit, calibration: Err(anyhow!("not measured")), rates };
         rendered.calibration = rendered.calibrate(rates);
         Ok(rendered)
@@ -64,7 +64,7 @@ impl Rendered {
             || HostHorizon::boxed(&wide),
             |horizon, (frame, picture)| {
                 let horizon = horizon.as_mut().ok()?;
-                let known = frame.known();
+                let known = frame.prior();
                 let known = hzn_core::Prior { rate_rad_s: known.rate_rad_s.filter(|_| rates), ..known };
                 let expected = horizon.expect(&known).ok()?;
                 let points = Points::default();

@@ -169,7 +169,7 @@ pub(super) fn spherical_earth(_: &Effort) -> anyhow::Result<Section> {
         (20_000.0, [0.0465, 0.0112, 0.0352]),
     ]
     .map(|(km, reference)| {
-        let v = Vertical::at(45.0, km, 0.0);
+        let v = Vertical::from_position(45.0, km, 0.0);
         let ours = v.map_or([f64::NAN; 3], |v| {
             [v.geocentric_to_geodetic_deg, v.geocentric_to_axis_deg, v.geodetic_to_axis_deg]
         });
@@ -181,7 +181,7 @@ pub(super) fn spherical_earth(_: &Effort) -> anyhow::Result<Section> {
     for km in [100.0, 240.0, 600.0, 2000.0] {
         let points = (0..=90).map(|i| {
             let latitude = f64::from(i);
-            (latitude, Vertical::at(latitude, km, 0.0).map_or(f64::NAN, |v| v.geocentric_to_axis_deg))
+            (latitude, Vertical::from_position(latitude, km, 0.0).map_or(f64::NAN, |v| v.geocentric_to_axis_deg))
         });
         chart = chart.with(Series::new(format!("{km} km"), Style::Line, points));
     }

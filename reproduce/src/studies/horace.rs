@@ -7,7 +7,7 @@ use hzn_core::{Config, body};
 use hzn_sim::evaluate::Evaluation;
 use hzn_sim::flight::rocket;
 use hzn_sim::pose::position_m;
-use hzn_sim::scenario::MEASURED;
+use hzn_sim::scenario::FIT_PICTURES;
 use hzn_sim::trajectory::Attitude;
 use hzn_sim::{Flight, Look, Pose, Scenario};
 
@@ -144,7 +144,7 @@ fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
          1024×768, 27.0°×20.4°, T+75 s to T+215 s of a flight to 90 km, exposed for 1 ms, at 0.2, 1 and 2 turns a \
          second; and at 2 with the Sun 4° above the horizontal, so that it passes through the picture. Position told. \
          `hzn` is told nothing else, which is **out of sample**. `hzn, told` and `horace-2015` are told what was \
-         measured at one turn a second on {MEASURED} pictures of other seeds, {told}: **in-sample** for the scene, out \
+         measured at one turn a second on {FIT_PICTURES} pictures of other seeds, {told}: **in-sample** for the scene, out \
          of sample for the pictures."
     ));
     let mut rows = Vec::new();

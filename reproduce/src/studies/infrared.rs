@@ -6,7 +6,7 @@ use hzn_core::{Config, body};
 use hzn_sim::evaluate::{Case, Evaluation};
 use hzn_sim::flight::leo_infrared;
 use hzn_sim::pose::position_m;
-use hzn_sim::scenario::MEASURED;
+use hzn_sim::scenario::FIT_PICTURES;
 use hzn_sim::{Flight, Look, Pose};
 
 use super::{Effort, OTHER_SEEDS, halton, preset, simulated};
@@ -156,7 +156,7 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
          off it: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb half-level \
          25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. Goals: 0.04° \
          RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5° 0.015° and 0.03°; NEES 1 to 4. \
-         Measured on {MEASURED} pictures of other seeds and told to the sensor: {told}; where it is told one height, ± \
+         Measured on {FIT_PICTURES} pictures of other seeds and told to the sensor: {told}; where it is told one height, ± \
          {LIMB_SIGMA_KM} km. The sensor.toml of the scene has the height by latitude."
     ));
     s.text(OTHER_SEEDS);

@@ -10,7 +10,7 @@ use hzn_core::image::{Channel, Grey, ImageView, Layout};
 use hzn_core::threshold::{self, Method};
 use hzn_core::{Config, HostHorizon, Prior};
 use hzn_sim::Scenario;
-use hzn_sim::painted::UnderCircle;
+use hzn_sim::painted::LensWithDiscs;
 use rayon::prelude::*;
 
 use super::Effort;
@@ -53,15 +53,15 @@ pub(super) fn lost_discs(effort: &Effort) -> anyhow::Result<Section> {
 
 /// Returns for each disc at each threshold whether its whole outline is in view, and whether the disc was found.
 fn under_a_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
-    let under = UnderCircle::new(number, DISCS);
+    let with_discs = LensWithDiscs::new(number, DISCS);
     let mut out = Vec::new();
-    for (disc, altitude_km) in &under.discs {
-        let data = under.canvas.paint(disc);
+    for (disc, altitude_km) in &with_discs.discs {
+        let data = with_discs.canvas.paint(disc);
         let axis = UnitVec3::<Cam, f64>::try_new(disc.axis).context("the axis has a direction")?;
-        let whole = under.canvas.outline_in_view(disc, 4.0) == 1.0;
+        let whole = with_discs.canvas.outline_in_view(disc, 4.0) == 1.0;
         for k in 0..LEVELS {
             let part = 0.05 + 0.045 * f64::from(k);
-            let mut config = Config::new(under.lens.clone());
+            let mut config = Config::new(with_discs.lens.clone());
             config.body = body::Config {
                 kind: Kind::EarthSphere,
                 altitude_km: Some(*altitude_km),
@@ -73,7 +73,7 @@ fn under_a_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
             let level = disc.dark + (disc.lit - disc.dark) * part;
             config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
             let mut horizon = HostHorizon::boxed(&config)?;
-            let layout = Layout::packed(under.lens.width.into(), under.lens.height.into(), 1, 8);
+            let layout = Layout::packed(with_discs.lens.width.into(), with_discs.lens.height.into(), 1, 8);
             let expected = horizon.expect(&Prior::default())?;
             let report = horizon.process(&Grey::try_new(&data, layout)?, &expected);
             let right = report.solution.is_some_and(|found| found.axis.angle_rad(&axis).to_degrees() < 0.2);

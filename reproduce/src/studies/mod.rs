@@ -14,7 +14,7 @@ use anyhow::{Context, anyhow};
 use hzn_core::Preset;
 use hzn_core::body::Kind;
 use hzn_core::{Config, body, covariance};
-use hzn_sim::scenario::{Fit, MEASURED};
+use hzn_sim::scenario::{FIT_PICTURES, Fit};
 use hzn_sim::{Flight, Scenario};
 
 use crate::document::{Document, Section};
@@ -101,7 +101,7 @@ fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
     let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
     scenario.capture.frames = u32::try_from(count)?;
     let mut flight = scenario.flight().with_context(|| name.to_owned())?;
-    let fits = Fit::measure(&scenario, MEASURED, &|_, _| ()).with_context(|| name.to_owned())?;
+    let fits = Fit::measure(&scenario, FIT_PICTURES, &|_, _| ()).with_context(|| name.to_owned())?;
     fits.iter().for_each(|fit| fit.apply(&mut flight.sensor));
     let told = |body: Kind| {
         let Some(fit) = fits.iter().find(|fit| fit.body == body) else { return "nothing could be measured".to_owned() };

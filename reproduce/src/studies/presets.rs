@@ -88,7 +88,7 @@ fn usual_level(flight: &Flight) -> anyhow::Result<f64> {
     let mut levels = Vec::new();
     for frame in flight.frames.iter().step_by(step) {
         let picture: Picture = frame.render()?;
-        let expected = horizon.expect(&frame.known())?;
+        let expected = horizon.expect(&frame.prior())?;
         let report = horizon.process(&picture.view(), &expected);
         levels.push(f64::from(report.level) / f64::from(picture.view().full_scale()));
     }

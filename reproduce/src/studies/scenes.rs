@@ -3,7 +3,7 @@
 use hzn_core::Preset;
 use hzn_sim::Flight;
 use hzn_sim::evaluate::Case;
-use hzn_sim::scenario::MEASURED;
+use hzn_sim::scenario::FIT_PICTURES;
 
 use super::{Effort, OTHER_SEEDS, preset, simulated};
 use crate::document::Section;
@@ -32,7 +32,7 @@ fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight)
     }
     s.table(["scene", "sensor"].into_iter().chain(HEADS), rows);
     s.text(format!(
-        "{OTHER_SEEDS} Measured on {MEASURED} pictures of other seeds and told to the sensor: {}.",
+        "{OTHER_SEEDS} Measured on {FIT_PICTURES} pictures of other seeds and told to the sensor: {}.",
         told.join("; ")
     ));
     if !bad.is_empty() {

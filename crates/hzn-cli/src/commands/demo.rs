@@ -120,7 +120,7 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
     }
     let mut known = String::from("file,time_s,x_km,y_km,z_km\n");
     for frame in &flight.frames {
-        let [x, y, z] = frame.known().position_m.unwrap_or_default().map(|m| m / 1e3);
+        let [x, y, z] = frame.prior().position_m.unwrap_or_default().map(|m| m / 1e3);
         known.push_str(&format!("{},{},{x},{y},{z}\n", frame.file, frame.time_s));
     }
     let path = folder.join("frames.csv");

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
-use hzn_sim::scenario::{BUILTIN, Fit, MEASURED};
+use hzn_sim::scenario::{BUILTIN, FIT_PICTURES, Fit};
 use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
 
@@ -135,9 +135,9 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
     if !quiet {
         tell::line(format_args!("measuring limb height and noise on other pictures of the scene ..."));
     }
-    let progress = Mutex::new(Progress::new(Some(MEASURED.into()), 0, quiet));
+    let progress = Mutex::new(Progress::new(Some(FIT_PICTURES.into()), 0, quiet));
     let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
-    let fits = Fit::measure(scenario, MEASURED, &seen).map_err(|e| scene::refused(name, &e))?;
+    let fits = Fit::measure(scenario, FIT_PICTURES, &seen).map_err(|e| scene::refused(name, &e))?;
     if let Ok(p) = progress.into_inner() {
         p.finish();
     }
@@ -187,9 +187,11 @@ fn tables(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Sto
     let mut known = table("frames.csv")?;
     let mut truth = table("truth.csv")?;
     for frame in &flight.frames {
-        known.serialize(scenario.known_of(frame)).map_err(failed)?;
+        known.serialize(scenario.frame_row(frame)).map_err(failed)?;
         for &kind in &scenario.bodies {
-            truth.serialize(frame.scene.truth_of(kind, &frame.file, frame.time_s).map_err(failed)?).map_err(failed)?;
+            truth
+                .serialize(frame.scene.body_truth(kind, &frame.file, frame.time_s).map_err(failed)?)
+                .map_err(failed)?;
         }
     }
     known.flush()?;
@@ -244,7 +246,7 @@ fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
     let part = folder.join(format!(".part-{}", frame.file));
     let picture = frame.scene.render().map_err(failed)?;
     let saved = match frame.jpeg_quality {
-        Some(quality) => picture.jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),
+        Some(quality) => picture.encode_jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),
         None => picture.save(&part),
     };
     saved.map_err(|e| sink::not_saved(&path, &e))?;
@@ -259,7 +261,7 @@ fn summary(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), St
         let mut seen = 0;
         let mut body = String::new();
         for frame in &flight.frames {
-            let truth = frame.scene.truth_of(kind, &frame.file, frame.time_s).map_err(failed)?;
+            let truth = frame.scene.body_truth(kind, &frame.file, frame.time_s).map_err(failed)?;
             seen += usize::from(truth.has_limb());
             body = truth.body;
         }

@@ -22,7 +22,7 @@ pub(super) struct Circle {
 }
 
 /// Returns the middle of a circle with this radius in pixels whose edge passes through a point inside the picture.
-fn through(dice: &mut Dice, canvas: &Canvas, radius: f64) -> [f32; 2] {
+fn middle_of_circle_in_view(dice: &mut Dice, canvas: &Canvas, radius: f64) -> [f32; 2] {
     let (x, y) = (dice.between(0.08, 0.92) * canvas.width, dice.between(0.08, 0.92) * canvas.height);
     let (sin, cos) = libm::sincos(dice.turn());
     [(x + radius * cos) as f32, (y + radius * sin) as f32]
@@ -33,7 +33,7 @@ impl Circle {
     /// separately. The light is 0.1 to 1 and fades by up to 90 % towards one side.
     pub(super) fn ring(dice: &mut Dice, canvas: &Canvas) -> Self {
         let radius = dice.between_log(0.15, 3.0) * canvas.diagonal;
-        let middle = through(dice, canvas, radius);
+        let middle = middle_of_circle_in_view(dice, canvas, radius);
         let (sin, cos) = libm::sincos(dice.turn());
         Self {
             middle,
@@ -60,12 +60,12 @@ impl Circle {
 
     fn ghost(dice: &mut Dice, canvas: &Canvas, low: f64, high: f64) -> Self {
         let radius = dice.between_log(low, high) * canvas.diagonal;
-        let middle = through(dice, canvas, radius);
-        Self::filled(dice, middle, radius, (0.1, 1.0))
+        let middle = middle_of_circle_in_view(dice, canvas, radius);
+        Self::disc_around(dice, middle, radius, (0.1, 1.0))
     }
 
     /// Draws a disc around `middle`.
-    pub(super) fn filled(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
+    pub(super) fn disc_around(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
         let (sin, cos) = libm::sincos(dice.turn());
         Self {
             middle,
@@ -80,22 +80,22 @@ impl Circle {
     }
 
     /// Draws a ring around `middle`.
-    pub(super) fn drawn_around(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
+    pub(super) fn ring_around(dice: &mut Dice, middle: [f32; 2], radius_px: f64, light: (f64, f64)) -> Self {
         Self {
             width: Some(dice.between_log(3.0, 30.0) as f32),
             rim: 0.0,
-            ..Self::filled(dice, middle, radius_px, light)
+            ..Self::disc_around(dice, middle, radius_px, light)
         }
     }
 
     /// Returns the middle and the radius in pixels.
-    pub(super) fn place(&self) -> ([f64; 2], f64) {
+    pub(super) fn middle_and_radius(&self) -> ([f64; 2], f64) {
         (self.middle.map(f64::from), f64::from(self.radius))
     }
 }
 
 impl Shape for Circle {
-    fn at(&self, x: f32, y: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         // This form keeps the digits of large radii in single precision.
         let radius = self.radius;

@@ -77,7 +77,7 @@ impl Clouds {
 }
 
 impl Shape for Clouds {
-    fn at(&self, x: f32, y: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (s, t) = (x * self.along[0] + y * self.along[1], (y * self.along[0] - x * self.along[1]) * self.stretch);
         let noise = self.noise(s, t);
         let mut thick = step(noise - self.level, self.edge);

@@ -63,7 +63,7 @@ impl Glare {
 }
 
 impl Shape for Glare {
-    fn at(&self, x: f32, y: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let along = dx * self.axis[0] + dy * self.axis[1];
         let across = (dy * self.axis[0] - dx * self.axis[1]) * self.stretch;

@@ -16,12 +16,12 @@ impl Lights {
     /// up to 3 clouds lit by lightning, of 10 to 150 px. Lamps are 0.5 to 2.5 px large, with a light of 0.05 to 2.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let mut spots = Vec::new();
-        let place = |dice: &mut Dice| [dice.between(0.0, canvas.width), dice.between(0.0, canvas.height)];
+        let position = |dice: &mut Dice| [dice.between(0.0, canvas.width), dice.between(0.0, canvas.height)];
         let lamp = |dice: &mut Dice, x: f64, y: f64| {
             ([x as f32, y as f32], dice.between_log(0.5, 2.5) as f32, dice.between_log(0.05, 2.0) as f32)
         };
         for _ in 0..dice.count(1, 12) {
-            let [x, y] = place(dice);
+            let [x, y] = position(dice);
             let size = dice.between_log(0.005, 0.12) * canvas.diagonal;
             for _ in 0..dice.count(10, 120) {
                 let (dx, dy) = (size * dice.normal(), size * dice.normal());
@@ -29,20 +29,20 @@ impl Lights {
             }
         }
         for _ in 0..dice.count(0, 3) {
-            let [x, y] = place(dice);
+            let [x, y] = position(dice);
             let (turn, bend) = (dice.turn(), dice.between(-2.0, 2.0) / canvas.diagonal);
             let (spacing, length) = (dice.between(2.0, 15.0), dice.between(0.2, 1.2) * canvas.diagonal);
-            let (mut at, mut heading, mut gone) = ([x, y], turn, 0.0);
-            while gone < length {
+            let (mut position, mut heading, mut travelled) = ([x, y], turn, 0.0);
+            while travelled < length {
                 let (sin, cos) = libm::sincos(heading);
-                at = [at[0] + spacing * cos, at[1] + spacing * sin];
+                position = [position[0] + spacing * cos, position[1] + spacing * sin];
                 heading += bend * spacing;
-                gone += spacing;
-                spots.push(lamp(dice, at[0], at[1]));
+                travelled += spacing;
+                spots.push(lamp(dice, position[0], position[1]));
             }
         }
         for _ in 0..dice.count(0, 3) {
-            let [x, y] = place(dice);
+            let [x, y] = position(dice);
             spots.push((
                 [x as f32, y as f32],
                 dice.between_log(10.0, 150.0) as f32,
@@ -63,21 +63,21 @@ impl Lights {
 }
 
 impl Shape for Lights {
-    fn at(&self, x: f32, y: f32) -> Spot {
-        let of = |(p, size, light): &([f32; 2], f32, f32)| {
+    fn sample(&self, x: f32, y: f32) -> Spot {
+        let light = |(p, size, light): &([f32; 2], f32, f32)| {
             let (dx, dy) = ((x - p[0]) / size, (y - p[1]) / size);
             light * libm::expf(-0.5 * (dx * dx + dy * dy))
         };
-        Spot { light: self.spots.iter().map(of).sum(), cover: 0.0 }
+        Spot { light: self.spots.iter().map(light).sum(), cover: 0.0 }
     }
 
     fn paint(&self, plane: &mut Plane) {
         let (w, h) = (plane.width as i32, plane.height() as i32);
         for &(p, size, light) in &self.spots {
             // The light beyond four sigma is left out.
-            let range = |c: f32, most: i32| {
+            let range = |c: f32, end: i32| {
                 let (low, high) = ((c - 4.0 * size).floor() as i32, (c + 4.0 * size).ceil() as i32);
-                low.clamp(0, most)..(high + 1).clamp(0, most)
+                low.clamp(0, end)..(high + 1).clamp(0, end)
             };
             for y in range(p[1], h) {
                 for x in range(p[0], w) {

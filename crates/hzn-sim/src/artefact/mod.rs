@@ -12,6 +12,7 @@
 //! | `solid` | objects in space as a lens shows them: panels and windows |
 //! | `circle`, `polygon`, `streak`, `glare`, `panel`, `window`, `moon`, `clouds` and more | one figure each |
 //! | `recipe` | the figures of a kind |
+//! | `clear_limb` | the check that figures leave a limb clear |
 //! | `trial` | a picture with its truth: without a limb, or with one and the artefact next to it |
 //! | `outcome` | a sensor's result for a trial, and whether it is false |
 //! | `dice` | random numbers in sequence |
@@ -20,6 +21,7 @@
 //! full scale. Each figure's `draw` documents its ranges.
 
 mod circle;
+mod clear_limb;
 mod clouds;
 mod dice;
 mod glare;
@@ -42,5 +44,5 @@ mod window;
 mod tests;
 
 pub use kind::Kind;
-pub use outcome::{Detection, FALSE_SIGMAS, GROSS_DEG, Outcome, PriorKnowledge, look};
+pub use outcome::{Detection, FALSE_SIGMAS, GROSS_DEG, Outcome, PriorKnowledge, process_trial};
 pub use trial::Trial;

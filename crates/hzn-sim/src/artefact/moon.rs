@@ -44,7 +44,7 @@ impl Moon {
 }
 
 impl Shape for Moon {
-    fn at(&self, x: f32, y: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let distance = (dx * dx + dy * dy).sqrt();
         let ratio = distance / self.radius.max(0.5);

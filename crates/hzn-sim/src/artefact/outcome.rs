@@ -75,17 +75,17 @@ fn is_right(miss: &Miss) -> bool {
 ///
 /// # Errors
 /// Fails if the configuration is refused, or if the position is invalid.
-pub fn look(
+pub fn process_trial(
     horizon: &mut HostHorizon,
     config: &Config,
     trial: &Trial,
     picture: &Picture,
-    told: PriorKnowledge,
+    prior: PriorKnowledge,
     observer: &impl Observer<f64>,
 ) -> Result<Outcome, SceneError> {
     horizon.reconfigure(config)?;
-    let known = trial.known(told.attitude_sigma_deg);
-    let expected = horizon.expect(&known).map_err(|_| SceneError::Pose)?;
+    let prior = trial.prior(prior.attitude_sigma_deg);
+    let expected = horizon.expect(&prior).map_err(|_| SceneError::Pose)?;
     let report = horizon.process_observed(&picture.view(), &expected, observer);
     let truth = &trial.truth;
     let found = report.solution.as_ref().and_then(|s| {

@@ -55,7 +55,7 @@ impl Panel {
 }
 
 impl Solid for Panel {
-    fn seen(&self, x: f32, y: f32, scale: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32, scale: f32) -> Spot {
         let soft = self.soft * scale;
         let inside = |(n, offset): &([f32; 2], f32)| offset - x * n[0] - y * n[1];
         let within = self.sides.iter().map(inside).fold(f32::INFINITY, f32::min);

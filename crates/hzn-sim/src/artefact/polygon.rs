@@ -31,11 +31,11 @@ impl Polygon {
         let apothem = dice.between_log(0.1, 3.0) * canvas.diagonal;
         let (x, y) = (dice.between(0.08, 0.92) * canvas.width, dice.between(0.08, 0.92) * canvas.height);
         let (sin, cos) = libm::sincos(dice.turn());
-        Self::placed(dice, [(x + apothem * cos) as f32, (y + apothem * sin) as f32], apothem, (0.1, 1.0))
+        Self::draw_around(dice, [(x + apothem * cos) as f32, (y + apothem * sin) as f32], apothem, (0.1, 1.0))
     }
 
     /// Draws a polygon around `middle`.
-    pub(super) fn placed(dice: &mut Dice, middle: [f32; 2], apothem_px: f64, light: (f64, f64)) -> Self {
+    pub(super) fn draw_around(dice: &mut Dice, middle: [f32; 2], apothem_px: f64, light: (f64, f64)) -> Self {
         let corners = f64::from(dice.count(5, 9));
         Self {
             middle,
@@ -64,7 +64,7 @@ impl Polygon {
 }
 
 impl Shape for Polygon {
-    fn at(&self, x: f32, y: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let angle = libm::atan2f(dy, dx) - self.first;
         let off = angle - self.sector * (angle / self.sector).round();

@@ -12,7 +12,7 @@ use super::moon::Moon;
 use super::panel::Panel;
 use super::polygon::Polygon;
 use super::shape::{Canvas, Shape};
-use super::solid::Standing;
+use super::solid::ProjectedSolid;
 use super::streak::Streak;
 use super::vignetted::Vignetted;
 use super::window::Window;
@@ -28,18 +28,18 @@ pub(super) struct Figures {
 impl Figures {
     /// Returns true if a point in pixels is lit or covered.
     pub(super) fn is_bright(&self, x: f64, y: f64) -> bool {
-        self.shapes.iter().map(|s| s.at(x as f32, y as f32)).any(|s| s.light > 0.05 || s.cover > 0.5)
+        self.shapes.iter().map(|s| s.sample(x as f32, y as f32)).any(|s| s.light > 0.05 || s.cover > 0.5)
     }
 
     fn add(&mut self, shape: impl Shape + 'static) {
         self.shapes.push(Box::new(shape));
     }
-    fn vignetted(&mut self, ghost: Vignetted) {
+    fn add_vignetted(&mut self, ghost: Vignetted) {
         self.discs.extend(ghost.circles());
         self.add(ghost);
     }
-    fn disc(&mut self, circle: Circle) {
-        self.discs.push(circle.place());
+    fn add_disc(&mut self, circle: Circle) {
+        self.discs.push(circle.middle_and_radius());
         self.add(circle);
     }
 }
@@ -52,31 +52,31 @@ pub(super) fn draw(
     canvas: &Canvas,
     camera: &camera::Config,
 ) -> Result<Figures, SceneError> {
-    let mut out = Figures::default();
+    let mut figures = Figures::default();
     let flare = matches!(kind, Kind::Ring | Kind::Disc | Kind::Polygon | Kind::Streak);
     for _ in 0..if flare && dice.chance(0.25) { 2 } else { 1 } {
         match kind {
-            Kind::Ring => out.add(Circle::ring(dice, canvas)),
-            Kind::Disc => out.disc(Circle::disc(dice, canvas)),
-            Kind::Polygon => out.add(Polygon::draw(dice, canvas)),
-            Kind::Streak => out.add(Streak::draw(dice, canvas)),
-            Kind::FarDisc => out.disc(Circle::far_disc(dice, canvas)),
-            Kind::Chain => chain(&mut out, dice, canvas),
-            Kind::Glare => out.add(Glare::draw(dice, canvas)),
-            Kind::Panel => out.add(Standing::try_new(Panel::draw(dice, canvas), camera)?),
-            Kind::Window => out.add(Standing::try_new(Window::draw(dice, canvas), camera)?),
-            Kind::Moon => out.add(Moon::draw(dice, canvas)),
-            Kind::Clouds => out.add(Clouds::draw(dice, canvas, seed)),
-            Kind::Lights => out.add(Lights::draw(dice, canvas)),
-            Kind::Vignetted => out.vignetted(Vignetted::draw(dice, canvas)),
+            Kind::Ring => figures.add(Circle::ring(dice, canvas)),
+            Kind::Disc => figures.add_disc(Circle::disc(dice, canvas)),
+            Kind::Polygon => figures.add(Polygon::draw(dice, canvas)),
+            Kind::Streak => figures.add(Streak::draw(dice, canvas)),
+            Kind::FarDisc => figures.add_disc(Circle::far_disc(dice, canvas)),
+            Kind::Chain => draw_chain(&mut figures, dice, canvas),
+            Kind::Glare => figures.add(Glare::draw(dice, canvas)),
+            Kind::Panel => figures.add(ProjectedSolid::try_new(Panel::draw(dice, canvas), camera)?),
+            Kind::Window => figures.add(ProjectedSolid::try_new(Window::draw(dice, canvas), camera)?),
+            Kind::Moon => figures.add(Moon::draw(dice, canvas)),
+            Kind::Clouds => figures.add(Clouds::draw(dice, canvas, seed)),
+            Kind::Lights => figures.add(Lights::draw(dice, canvas)),
+            Kind::Vignetted => figures.add_vignetted(Vignetted::draw(dice, canvas)),
         }
     }
-    Ok(out)
+    Ok(figures)
 }
 
 /// Draws three to eight discs, rings and polygons of 0.01 to 0.6 diagonals, like reflections of the surfaces of a lens.
 /// They are on the line from a source of light through the principal point, with a light of 0.03 to 0.6 each.
-fn chain(out: &mut Figures, dice: &mut Dice, canvas: &Canvas) {
+fn draw_chain(figures: &mut Figures, dice: &mut Dice, canvas: &Canvas) {
     let source = [dice.between(-0.4, 1.4) * canvas.width, dice.between(-0.4, 1.4) * canvas.height];
     let [cx, cy] = canvas.centre;
     for _ in 0..dice.count(3, 8) {
@@ -85,10 +85,10 @@ fn chain(out: &mut Figures, dice: &mut Dice, canvas: &Canvas) {
         let radius = dice.between_log(0.01, 0.6) * canvas.diagonal;
         let light = (0.03, 0.6);
         match dice.count(0, 3) {
-            0 => out.add(Circle::drawn_around(dice, middle, radius, light)),
-            1 => out.add(Polygon::placed(dice, middle, radius, light)),
-            _ => out.disc(Circle::filled(dice, middle, radius, light)),
+            0 => figures.add(Circle::ring_around(dice, middle, radius, light)),
+            1 => figures.add(Polygon::draw_around(dice, middle, radius, light)),
+            _ => figures.add_disc(Circle::disc_around(dice, middle, radius, light)),
         }
     }
-    out.add(Glare::source(dice, canvas, source.map(|v| v as f32)));
+    figures.add(Glare::source(dice, canvas, source.map(|v| v as f32)));
 }

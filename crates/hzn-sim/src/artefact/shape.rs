@@ -1,5 +1,7 @@
 //! Light and cover of a figure at a point of the picture.
 
+use hzn_core::camera;
+
 use crate::detector::Plane;
 
 /// Effect of a figure on a pixel: 1 − `cover` of the light behind it is left, and `light` is added.
@@ -24,17 +26,25 @@ pub(super) struct Canvas {
     pub(super) focal_px: f64,
 }
 
+impl Canvas {
+    pub(super) fn from_camera(camera: &camera::Config) -> Self {
+        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        let diagonal = libm::hypot(width, height);
+        Self { width, height, diagonal, centre: [camera.cx_px, camera.cy_px], focal_px: camera.fx_px }
+    }
+}
+
 /// A figure in the picture.
 pub(super) trait Shape: Send + Sync {
     /// Returns the spot at a point in pixels.
-    fn at(&self, x: f32, y: f32) -> Spot;
+    fn sample(&self, x: f32, y: f32) -> Spot;
 
     /// Paints the figure onto a picture.
     fn paint(&self, plane: &mut Plane) {
         let width = plane.width;
         for (y, row) in plane.data.chunks_mut(width).enumerate() {
             for (x, pixel) in row.iter_mut().enumerate() {
-                let spot = self.at(x as f32, y as f32);
+                let spot = self.sample(x as f32, y as f32);
                 *pixel = *pixel * (1.0 - spot.cover) + spot.light;
             }
         }

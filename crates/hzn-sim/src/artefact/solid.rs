@@ -10,12 +10,12 @@ use crate::error::SceneError;
 /// An object drawn for a pinhole camera with the lens's focal length and principal point.
 pub(super) trait Solid: Send + Sync {
     /// Returns the spot at a point of the pinhole picture. `scale` is the number of its pixels per pixel of the lens.
-    fn seen(&self, x: f32, y: f32, scale: f32) -> Spot;
+    fn sample(&self, x: f32, y: f32, scale: f32) -> Spot;
 }
 
 /// An object as a lens shows it.
 #[derive(Debug, Clone)]
-pub(super) struct Standing<S> {
+pub(super) struct ProjectedSolid<S> {
     solid: S,
     lens: Camera<f64>,
     focal: [f64; 2],
@@ -27,9 +27,9 @@ pub(super) struct Standing<S> {
 const STRIDE: usize = 8;
 /// Smallest cosine of the angle off the axis. Directions farther off the axis count as this angle, because a pinhole
 /// sees no farther.
-const LEAST_COS: f64 = 0.03;
+const MIN_COS: f64 = 0.03;
 
-impl<S: Solid> Standing<S> {
+impl<S: Solid> ProjectedSolid<S> {
     pub(super) fn try_new(solid: S, config: &camera::Config) -> Result<Self, SceneError> {
         let lens = Camera::try_new(config)?;
         let (focal, centre) = ([config.fx_px, config.fy_px], [config.cx_px, config.cy_px]);
@@ -41,19 +41,19 @@ impl<S: Solid> Standing<S> {
     }
 
     /// Returns the spot along a ray that is seen at the point (u, v) of the picture.
-    fn along(&self, [sx, sy, sz]: [f64; 3], u: f64, v: f64) -> Spot {
-        let z = sz.max(LEAST_COS);
+    fn sample_ray(&self, [sx, sy, sz]: [f64; 3], u: f64, v: f64) -> Spot {
+        let z = sz.max(MIN_COS);
         let (x, y) = (self.focal[0] * sx / z, self.focal[1] * sy / z);
-        let own = libm::hypot(u - self.centre[0], v - self.centre[1]);
-        let scale = if own > 1.0 { libm::hypot(x, y) / own } else { 1.0 };
-        self.solid.seen((x + self.centre[0]) as f32, (y + self.centre[1]) as f32, scale as f32)
+        let radius_px = libm::hypot(u - self.centre[0], v - self.centre[1]);
+        let scale = if radius_px > 1.0 { libm::hypot(x, y) / radius_px } else { 1.0 };
+        self.solid.sample((x + self.centre[0]) as f32, (y + self.centre[1]) as f32, scale as f32)
     }
 }
 
-impl<S: Solid> Shape for Standing<S> {
-    fn at(&self, x: f32, y: f32) -> Spot {
+impl<S: Solid> Shape for ProjectedSolid<S> {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (u, v) = (f64::from(x), f64::from(y));
-        self.ray(u, v).map_or(Spot::default(), |s| self.along(s, u, v))
+        self.ray(u, v).map_or(Spot::default(), |s| self.sample_ray(s, u, v))
     }
 
     fn paint(&self, plane: &mut Plane) {
@@ -72,7 +72,7 @@ impl<S: Solid> Shape for Standing<S> {
                         (Some(a), Some(b)) => Some([0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * part)),
                         _ => self.ray(u, v),
                     };
-                    let spot = ray.map_or(Spot::default(), |s| self.along(s, u, v));
+                    let spot = ray.map_or(Spot::default(), |s| self.sample_ray(s, u, v));
                     *pixel = *pixel * (1.0 - spot.cover) + spot.light;
                 }
             }

@@ -53,7 +53,7 @@ impl Streak {
 }
 
 impl Shape for Streak {
-    fn at(&self, x: f32, y: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (dx, dy) = (x - self.origin[0], y - self.origin[1]);
         let s = dx * self.along[0] + dy * self.along[1];
         let t = dy * self.along[0] - dx * self.along[1];

@@ -33,7 +33,7 @@ fn skies_without_a_limb_have_none_and_show_something() {
 #[test]
 fn limbs_are_in_view_next_to_artefacts() {
     for &kind in Kind::ALL {
-        let trials: Vec<Trial> = (0..12).filter_map(|seed| Trial::beside_limb(kind, seed).unwrap()).collect();
+        let trials: Vec<Trial> = (0..12).filter_map(|seed| Trial::with_limb(kind, seed).unwrap()).collect();
         assert!(trials.len() >= 3, "{}: {}", kind.name(), trials.len());
         for trial in trials {
             assert!(trial.truth.has_limb(), "{trial:?}");
@@ -46,10 +46,10 @@ fn a_prior_attitude_is_off_by_its_sigma() {
     let trials = (0..200).map(|seed| Trial::without_limb(Kind::Ring, seed).unwrap());
     let squares: Vec<f64> = trials
         .map(|t| {
-            let told = t.known(Some(5.0)).cam_to_ecef.unwrap();
+            let prior = t.prior(Some(5.0)).cam_to_ecef.unwrap();
             let truth = t.scene.pose.cam_to_ecef().unwrap();
             let z = hzn_core::frames::UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
-            told.apply(&z).angle_rad(&truth.apply(&z)).to_degrees().powi(2)
+            prior.apply(&z).angle_rad(&truth.apply(&z)).to_degrees().powi(2)
         })
         .collect();
     let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();

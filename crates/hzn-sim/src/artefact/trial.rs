@@ -9,6 +9,7 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use nalgebra::{Matrix3, Vector3};
 
+use super::clear_limb::ClearLimb;
 use super::dice::Dice;
 use super::kind::Kind;
 use super::lens;
@@ -18,10 +19,9 @@ use super::shape::{Canvas, Shape};
 use crate::detector::{Detector, Plane};
 use crate::error::SceneError;
 use crate::globe::Globe;
-use crate::limb::EdgeNoise;
+use crate::image_circle::apply_image_circle;
 use crate::picture::Picture;
 use crate::pose::{Look, Pose, position_m};
-use crate::render::through_circle;
 use crate::scene::{Disc, Profile, Scene, Sky};
 use crate::texture::Clouds;
 use crate::truth::Truth;
@@ -48,20 +48,9 @@ impl Part {
 }
 
 /// Smallest angle between the picture and the limb if no limb may be in view, degrees.
-const MARGIN_DEG: f64 = 3.0;
+const MIN_MARGIN_DEG: f64 = 3.0;
 /// Largest number of attempts to find figures that do not disturb the limb.
-const TRIES: u64 = 60;
-/// Light of a figure at the limb above which the figure disturbs it.
-const DISTURBED: f32 = 0.03;
-/// Largest share of the limb that may be disturbed.
-const SHARE: f64 = 0.1;
-/// Number of grid points per side at which the brightness of an artefact is checked.
-const GRID: u32 = 24;
-/// Number of points along the limb at which disturbance is checked.
-const PLACES: usize = 120;
-/// Distance from these points at which disturbance is checked too, pixels.
-const AROUND_PX: f32 = 12.0;
-
+const MAX_ATTEMPTS: u64 = 60;
 /// One picture of an artefact, with its truth.
 pub struct Trial {
     /// The artefact in the picture.
@@ -95,24 +84,24 @@ impl Trial {
     pub fn without_limb(kind: Kind, seed: u64) -> Result<Self, SceneError> {
         let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
         let dice = &mut Part::Place.dice(kind, seed);
-        let position = place(dice);
+        let position = draw_position(dice);
         let half_angle = cone(position, 30.0)?.half_angles_rad();
         let corner_rad = farthest_rad(&camera)?;
         let off_nadir = if kind.is_ground() {
-            let most = half_angle.0.min(half_angle.1) - corner_rad - (MARGIN_DEG + 1.5).to_radians();
-            dice.between(0.0, most.max(0.0))
+            let max_rad = half_angle.0.min(half_angle.1) - corner_rad - (MIN_MARGIN_DEG + 1.5).to_radians();
+            dice.between(0.0, max_rad.max(0.0))
         } else {
-            let least = half_angle.0.max(half_angle.1) + corner_rad + MARGIN_DEG.to_radians();
-            dice.between(least.min(PI), PI)
+            let min_rad = half_angle.0.max(half_angle.1) + corner_rad + MIN_MARGIN_DEG.to_radians();
+            dice.between(min_rad.min(PI), PI)
         };
         let (azimuth, roll) = (dice.turn(), dice.turn());
         let mut scene = Scene::new(camera, Pose::looking(position, Look::off_nadir(off_nadir, azimuth, roll)));
-        finish(&mut scene, kind, seed);
-        let canvas = canvas_of(&scene.camera);
+        set_detector(&mut scene, kind, seed);
+        let canvas = Canvas::from_camera(&scene.camera);
         let dice = &mut Part::Figures.dice(kind, seed);
         let figures = recipe::draw(kind, seed, dice, &canvas, &scene.camera)?;
         let stars = (!kind.is_ground()).then(|| Lights::stars(dice, &canvas));
-        Self::drawn(kind, seed, scene, false, figures, stars)
+        Self::with_figures(kind, seed, scene, false, figures, stars)
     }
 
     /// Makes a picture of a clean limb with the artefact next to it. The whole limb is lit, and it crosses the picture
@@ -122,46 +111,10 @@ impl Trial {
     ///
     /// # Errors
     /// Fails like [`Trial::without_limb`].
-    pub fn beside_limb(kind: Kind, seed: u64) -> Result<Option<Self>, SceneError> {
-        let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
-        let dice = &mut Part::Place.dice(kind, seed);
-        let position = place(dice);
-        let limb_height_km = dice.between(12.0, 22.0);
-        let cone = cone(position, limb_height_km)?;
-        let lens = Camera::<f64>::try_new(&camera)?;
-        let (w, h) = (f64::from(camera.width), f64::from(camera.height));
-        // The limb passes through a point well inside the picture, in any direction.
-        let (u, v) = (dice.between(0.25, 0.75) * w, dice.between(0.25, 0.75) * h);
-        let Some(ray) = lens.unproject(ImagePoint { u, v }) else { return Ok(None) };
-        let axis = aside(Vector3::from(ray.xyz()), cone.mean_half_angle_rad(), dice.turn());
-        let pose = pointing(position, axis, Vector3::from(cone.axis.xyz()), dice.turn());
-        let mut scene = Scene::new(camera, pose);
-        scene.body.limb_height_km = limb_height_km;
-        scene.profile = Profile::Exponential { scale_km: dice.between(4.0, 8.0) };
-        scene.disc = Disc { surface: dice.between(0.35, 0.85), clouds: None, band: None };
-        finish(&mut scene, kind, seed);
-        if kind.is_ground() {
-            let clouds = Clouds { cover: 0.5, largest_km: 600.0, seed, ..Clouds::default() };
-            scene.disc.clouds = Some(clouds);
-        }
-        let limb = scene.limb_points(PLACES, EdgeNoise::None)?;
-        let length_px = scene.visible_limb_px()?;
-        if length_px < 0.5 * w {
-            return Ok(None);
-        }
-        let canvas = canvas_of(&scene.camera);
-        let sky = |x: f64, y: f64| {
-            let ray = lens.unproject(ImagePoint { u: x, v: y })?;
-            Some(Vector3::from(ray.xyz()).dot(&axis) < libm::cos(cone.mean_half_angle_rad()))
-        };
-        let grid: Vec<(f64, f64, bool)> = (0..GRID * GRID)
-            .filter_map(|i| {
-                let place = |k: u32, size: f64| (f64::from(k) + 0.5) / f64::from(GRID) * size;
-                let (x, y) = (place(i % GRID, w), place(i / GRID, h));
-                Some((x, y, sky(x, y)?))
-            })
-            .collect();
-        for attempt in 0..TRIES {
+    pub fn with_limb(kind: Kind, seed: u64) -> Result<Option<Self>, SceneError> {
+        let Some((scene, clear_limb)) = draw_limb_scene(kind, seed)? else { return Ok(None) };
+        let canvas = Canvas::from_camera(&scene.camera);
+        for attempt in 0..MAX_ATTEMPTS {
             let figures = match kind.is_ground() {
                 true => Figures::default(),
                 false => {
@@ -169,28 +122,14 @@ impl Trial {
                     recipe::draw(kind, seed, dice, &canvas, &scene.camera)?
                 }
             };
-            let hurt = |p: &&crate::limb::LimbPoint| {
-                let (x, y) = (p.exact.u as f32, p.exact.v as f32);
-                let around = [(0.0, 0.0), (AROUND_PX, 0.0), (-AROUND_PX, 0.0), (0.0, AROUND_PX), (0.0, -AROUND_PX)];
-                around.iter().any(|(dx, dy)| {
-                    let spots = figures.shapes.iter().map(|s| s.at(x + dx, y + dy));
-                    let (light, cover) = spots.fold((0.0, 0.0f32), |(l, c), s| (l + s.light, c.max(s.cover)));
-                    light > DISTURBED || cover > DISTURBED
-                })
-            };
-            let alone = limb.iter().filter(hurt).count() as f64 <= SHARE * limb.len() as f64;
-            let bright: Vec<bool> =
-                grid.iter().filter(|(x, y, _)| figures.is_bright(*x, *y)).map(|(.., sky)| *sky).collect();
-            let dark = 2 * bright.iter().filter(|&&sky| sky).count() <= grid.iter().filter(|(.., sky)| *sky).count();
-            let seen = bright.len() >= 4 || matches!(kind, Kind::Moon | Kind::Clouds | Kind::Lights);
-            if alone && dark && seen {
-                return Self::drawn(kind, seed, scene, true, figures, None).map(Some);
+            if clear_limb.accepts(kind, &figures) {
+                return Self::with_figures(kind, seed, scene, true, figures, None).map(Some);
             }
         }
         Ok(None)
     }
 
-    fn drawn(
+    fn with_figures(
         kind: Kind,
         seed: u64,
         scene: Scene,
@@ -199,7 +138,7 @@ impl Trial {
         stars: Option<Lights>,
     ) -> Result<Self, SceneError> {
         let truth = scene.truth(&format!("{}-{seed}.png", kind.name()), 0.0)?;
-        let disc_half_angles_rad = half_angles_rad(&Camera::try_new(&scene.camera)?, &figures.discs);
+        let disc_half_angles_rad = fit_half_angles_rad(&Camera::try_new(&scene.camera)?, &figures.discs);
         Ok(Self { kind, seed, scene, limb, truth, disc_half_angles_rad, figures, stars })
     }
 
@@ -226,13 +165,13 @@ impl Trial {
         for shape in &self.figures.shapes {
             shape.paint(&mut plane);
         }
-        let plane = through_circle(plane.blurred(self.scene.detector.psf_sigma_px), &lens);
+        let plane = apply_image_circle(plane.blurred(self.scene.detector.psf_sigma_px), &lens);
         Ok(self.scene.detector.expose(&[plane], self.scene.seed))
     }
 
     /// Returns the prior that a navigation system would give: the position. With `attitude_sigma_deg` it also has an
     /// attitude with this error (1σ) about each axis.
-    pub fn known(&self, attitude_sigma_deg: Option<f64>) -> Prior<f64> {
+    pub fn prior(&self, attitude_sigma_deg: Option<f64>) -> Prior<f64> {
         let pose = &self.scene.pose;
         let dice = &mut Part::Attitude.dice(self.kind, self.seed);
         let sigma_rad = attitude_sigma_deg.map(f64::to_radians);
@@ -246,9 +185,38 @@ impl Trial {
     }
 }
 
+/// Draws a scene with a clean limb through a point well inside the picture. Kinds of ground become the texture inside
+/// the limb. Returns `None` if this seed gives no suitable limb.
+fn draw_limb_scene(kind: Kind, seed: u64) -> Result<Option<(Scene, ClearLimb)>, SceneError> {
+    let camera = lens::draw(&mut Part::Lens.dice(kind, seed), kind);
+    let dice = &mut Part::Place.dice(kind, seed);
+    let position = draw_position(dice);
+    let limb_height_km = dice.between(12.0, 22.0);
+    let cone = cone(position, limb_height_km)?;
+    let half_angle_rad = cone.mean_half_angle_rad();
+    let lens = Camera::<f64>::try_new(&camera)?;
+    let (w, h) = (f64::from(camera.width), f64::from(camera.height));
+    // The limb passes through this point in any direction.
+    let (u, v) = (dice.between(0.25, 0.75) * w, dice.between(0.25, 0.75) * h);
+    let Some(ray) = lens.unproject(ImagePoint { u, v }) else { return Ok(None) };
+    let axis = offset_direction(Vector3::from(ray.xyz()), half_angle_rad, dice.turn());
+    let pose = point_axis(position, axis, Vector3::from(cone.axis.xyz()), dice.turn());
+    let mut scene = Scene::new(camera, pose);
+    scene.body.limb_height_km = limb_height_km;
+    scene.profile = Profile::Exponential { scale_km: dice.between(4.0, 8.0) };
+    scene.disc = Disc { surface: dice.between(0.35, 0.85), clouds: None, band: None };
+    set_detector(&mut scene, kind, seed);
+    if kind.is_ground() {
+        let clouds = Clouds { cover: 0.5, largest_km: 600.0, seed, ..Clouds::default() };
+        scene.disc.clouds = Some(clouds);
+    }
+    let clear_limb = ClearLimb::try_new(&scene, axis, half_angle_rad)?;
+    Ok(clear_limb.map(|clear_limb| (scene, clear_limb)))
+}
+
 /// Returns a position anywhere over the Earth, in ECEF metres, at 60 to 600 km. The altitude is uniform in its
 /// logarithm.
-fn place(dice: &mut Dice) -> [f64; 3] {
+fn draw_position(dice: &mut Dice) -> [f64; 3] {
     let lat_deg = libm::asin(dice.between(-1.0, 1.0)).to_degrees();
     position_m(lat_deg, dice.between(-180.0, 180.0), dice.between_log(60.0, 600.0))
 }
@@ -268,14 +236,8 @@ fn farthest_rad(camera: &camera::Config) -> Result<f64, SceneError> {
     Ok(corners.into_iter().fold(0.0, f64::max))
 }
 
-fn canvas_of(camera: &camera::Config) -> Canvas {
-    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-    let diagonal = libm::hypot(width, height);
-    Canvas { width, height, diagonal, centre: [camera.cx_px, camera.cy_px], focal_px: camera.fx_px }
-}
-
 /// Sets detector, sky and noise: blur 0.5 to 1.4 px, noise 0.2 to 2.5 % of full scale, sky brightness up to 6 %.
-fn finish(scene: &mut Scene, kind: Kind, seed: u64) {
+fn set_detector(scene: &mut Scene, kind: Kind, seed: u64) {
     let dice = &mut Part::Detector.dice(kind, seed);
     let full_well = dice.chance(0.5).then(|| dice.between_log(1e3, 3e4));
     scene.detector = Detector {
@@ -289,22 +251,22 @@ fn finish(scene: &mut Scene, kind: Kind, seed: u64) {
 }
 
 /// Returns a unit vector at an angle from another one, in a direction about it.
-fn aside(from: Vector3<f64>, angle_rad: f64, turn_rad: f64) -> Vector3<f64> {
-    let [a, b] = across(from);
+fn offset_direction(from: Vector3<f64>, angle_rad: f64, turn_rad: f64) -> Vector3<f64> {
+    let [a, b] = perpendicular(from);
     let (sin, cos) = libm::sincos(turn_rad);
     from * libm::cos(angle_rad) + (a * cos + b * sin) * libm::sin(angle_rad)
 }
 
 /// Returns two unit vectors perpendicular to a third one, right-handed with it.
-fn across(e: Vector3<f64>) -> [Vector3<f64>; 2] {
+fn perpendicular(e: Vector3<f64>) -> [Vector3<f64>; 2] {
     let a = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
     [a, e.cross(&a)]
 }
 
 /// Returns a camera whose `axis` (camera frame) points along `to` (ECEF), turned about it.
-fn pointing(position_m: [f64; 3], axis: Vector3<f64>, to: Vector3<f64>, turn_rad: f64) -> Pose {
+fn point_axis(position_m: [f64; 3], axis: Vector3<f64>, to: Vector3<f64>, turn_rad: f64) -> Pose {
     let frame = |e: Vector3<f64>, turn: f64| {
-        let [a, b] = across(e);
+        let [a, b] = perpendicular(e);
         let (sin, cos) = libm::sincos(turn);
         Matrix3::from_columns(&[e, a * cos + b * sin, b * cos - a * sin])
     };
@@ -313,7 +275,7 @@ fn pointing(position_m: [f64; 3], axis: Vector3<f64>, to: Vector3<f64>, turn_rad
 }
 
 /// Returns the half-angles of the cones that fit discs of the picture (middle and radius in pixels).
-fn half_angles_rad(lens: &Camera<f64>, discs: &[([f64; 2], f64)]) -> Vec<f64> {
+fn fit_half_angles_rad(lens: &Camera<f64>, discs: &[([f64; 2], f64)]) -> Vec<f64> {
     let (w, h) = (f64::from(lens.width()), f64::from(lens.height()));
     let half_angle = |&(middle, radius): &([f64; 2], f64)| {
         let steps = 6_000;
@@ -336,9 +298,9 @@ fn half_angles_rad(lens: &Camera<f64>, discs: &[([f64; 2], f64)]) -> Vec<f64> {
         // The axis is on the side of the lit disc.
         let towards = |r: &Vector3<f64>| {
             let p = lens.project(&UnitVec3::try_new((r + normal * 0.01).into())?)?;
-            let at = |p: ImagePoint<f64>| libm::hypot(p.u - middle[0], p.v - middle[1]);
+            let distance = |p: ImagePoint<f64>| libm::hypot(p.u - middle[0], p.v - middle[1]);
             let own = lens.project(&UnitVec3::try_new((*r).into())?)?;
-            Some(at(p) < at(own))
+            Some(distance(p) < distance(own))
         };
         let middle_ray = rays.get(rays.len() / 2)?;
         let sign = if towards(middle_ray)? { 1.0 } else { -1.0 };

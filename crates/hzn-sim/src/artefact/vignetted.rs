@@ -23,7 +23,7 @@ impl Vignetted {
     /// times its radius, whose middle is 0.2 to 1.2 radii away, blurred by 0.5 to 6 px.
     pub(super) fn draw(dice: &mut Dice, canvas: &Canvas) -> Self {
         let disc = Circle::disc(dice, canvas);
-        let (middle, radius) = disc.place();
+        let (middle, radius) = disc.middle_and_radius();
         let (sin, cos) = libm::sincos(dice.turn());
         let away = dice.between(0.2, 1.2) * radius;
         let rim = [(middle[0] + away * cos) as f32, (middle[1] + away * sin) as f32];
@@ -40,12 +40,12 @@ impl Vignetted {
     /// Returns the middles and radii of the two circles in pixels.
     pub(super) fn circles(&self) -> [([f64; 2], f64); 2] {
         let (middle, radius, _) = self.rim;
-        [self.disc.place(), (middle.map(f64::from), f64::from(radius))]
+        [self.disc.middle_and_radius(), (middle.map(f64::from), f64::from(radius))]
     }
 }
 
 impl Shape for Vignetted {
-    fn at(&self, x: f32, y: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32) -> Spot {
         let (middle, radius, soft) = self.rim;
         let (dx, dy) = (x - middle[0], y - middle[1]);
         let within = step(radius - (dx * dx + dy * dy).sqrt(), soft);
@@ -54,7 +54,7 @@ impl Shape for Vignetted {
         }
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let more = (dx * self.along[0] + dy * self.along[1]) * (1.0 / self.stretch - 1.0);
-        let spot = self.disc.at(x + more * self.along[0], y + more * self.along[1]);
+        let spot = self.disc.sample(x + more * self.along[0], y + more * self.along[1]);
         Spot { light: spot.light * within, ..spot }
     }
 }

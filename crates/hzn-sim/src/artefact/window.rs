@@ -29,11 +29,11 @@ impl Window {
         let half = [dice.between_log(0.15, 0.9), dice.between_log(0.15, 0.9)].map(|h| h * canvas.diagonal);
         let porthole = dice.chance(0.3);
         let half = if porthole { [half[0]; 2] } else { half };
-        let least = half[0].min(half[1]);
+        let shorter = half[0].min(half[1]);
         let (sin, cos) = libm::sincos(dice.turn());
         let (a, b) = libm::sincos(dice.turn());
         let slope = dice.between(0.0, 0.3) / canvas.diagonal;
-        let corner = if porthole { least } else { least * dice.between(0.0, 1.0) };
+        let corner = if porthole { shorter } else { shorter * dice.between(0.0, 1.0) };
         // (s, t) is a point on the frame's edge, in the frame's axes: on a side or, in one of four, on the arc of a
         // corner.
         let straight = [half[0] - corner, half[1] - corner];
@@ -61,7 +61,7 @@ impl Window {
 }
 
 impl Solid for Window {
-    fn seen(&self, x: f32, y: f32, scale: f32) -> Spot {
+    fn sample(&self, x: f32, y: f32, scale: f32) -> Spot {
         let soft = self.soft * scale;
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let s = (dx * self.along[0] + dy * self.along[1]).abs() - self.half[0] + self.corner;

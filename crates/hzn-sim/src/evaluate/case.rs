@@ -36,7 +36,7 @@ pub struct MeasuredDirection {
 }
 
 /// Returns true for Sun and Moon, which have no nadir.
-fn in_the_sky(body: &str) -> bool {
+fn is_in_sky(body: &str) -> bool {
     body == Kind::Sun.name() || body == Kind::Moon.name()
 }
 
@@ -66,7 +66,7 @@ pub struct Case {
 impl Case {
     /// Returns the name of [`Self::off_axis_deg`] for this body.
     pub fn off_axis_name(&self) -> &'static str {
-        if in_the_sky(&self.body) { "off axis" } else { "off nadir" }
+        if is_in_sky(&self.body) { "off axis" } else { "off nadir" }
     }
 }
 
@@ -123,7 +123,7 @@ impl Miss {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Mismatch {
     /// An answer whose picture has no truth.
-    #[error("{file} ({body}) is among the results but has no row in the truth: another sequence?")]
+    #[error("{file} ({body}) is among the results but has no row in the truth: is the truth of another sequence?")]
     NoTruth {
         /// Name of the picture.
         file: String,
@@ -149,7 +149,7 @@ pub enum Mismatch {
         body: String,
     },
     /// A picture and body that occur twice.
-    #[error("{file} ({body}) stands twice {among}")]
+    #[error("{file} ({body}) occurs twice {among}")]
     Twice {
         /// Name of the picture.
         file: String,
@@ -164,7 +164,7 @@ pub enum Mismatch {
 }
 
 /// Returns the name without folders, as in truth.csv.
-fn base(file: &str) -> &str {
+fn base_name(file: &str) -> &str {
     file.rsplit(['/', '\\']).next().unwrap_or(file)
 }
 
@@ -176,7 +176,7 @@ fn base(file: &str) -> &str {
 pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -> Result<Vec<Case>, Mismatch> {
     let mut by_name: HashMap<(&str, &str), &Answer> = HashMap::new();
     for a in answers {
-        let (file, body) = (base(&a.file), a.body.as_str());
+        let (file, body) = (base_name(&a.file), a.body.as_str());
         if by_name.insert((file, body), a).is_some() {
             return Err(Mismatch::Twice { file: file.into(), body: body.into(), among: "among the results" });
         }
@@ -190,7 +190,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
         bodies.push(&t.body);
     }
     for a in answers {
-        let (file, body) = (base(&a.file).to_owned(), a.body.clone());
+        let (file, body) = (base_name(&a.file).to_owned(), a.body.clone());
         match true_bodies.get(file.as_str()).map(Vec::as_slice) {
             None => return Err(Mismatch::NoTruth { file, body }),
             Some(bodies) if bodies.contains(&body.as_str()) => {}
@@ -213,7 +213,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
             time_s: t.time_s,
             limb: t.has_limb(),
             status: answer.status.name(),
-            altitude_km: (!in_the_sky(&t.body)).then_some(t.altitude_km),
+            altitude_km: (!is_in_sky(&t.body)).then_some(t.altitude_km),
             off_axis_deg: axis[0].hypot(axis[1]).atan2(axis[2]).to_degrees(),
             limb_in_view_px: camera.map(|c| limb_in_view_px(c, axis, t.half_angle_deg.to_radians())),
             miss: answer.found.and_then(|f| {
@@ -234,16 +234,16 @@ pub fn limb_in_view_px(camera: &Camera<f64>, axis: [f64; 3], half_angle_rad: f64
     let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
     let b2 = e.cross(&b1);
     let (sin, cos) = half_angle_rad.sin_cos();
-    let at = |step: usize| {
+    let project = |step: usize| {
         let (s, c) = (step as f64 * core::f64::consts::TAU / STEPS as f64).sin_cos();
         let p = camera.project(&UnitVec3::try_new((e * cos + (b1 * c + b2 * s) * sin).into())?)?;
         let inside = |x: f64, size: u16| x >= -0.5 && x <= f64::from(size) - 0.5;
         (inside(p.u, camera.width()) && inside(p.v, camera.height())).then_some(p)
     };
-    let mut last = at(0);
+    let mut last = project(0);
     let mut length = 0.0;
     for step in 1..=STEPS {
-        let next = at(step % STEPS);
+        let next = project(step % STEPS);
         if let (Some(a), Some(b)) = (last, next) {
             length += (b.u - a.u).hypot(b.v - a.v);
         }

@@ -8,7 +8,7 @@ use super::case::Case;
 use super::honesty::Honesty;
 
 /// HORACE counts an answer as a success if radius and centre are right within this fraction of the radius.
-const HORACE_PART: f64 = 0.1;
+const HORACE_TOLERANCE: f64 = 0.1;
 /// Approximate number of rows in a group.
 const ROWS: f64 = 6.0;
 
@@ -105,8 +105,8 @@ impl Evaluation {
                 bodies.push(&case.body);
             }
         }
-        let of = |body: &&str| cases.iter().filter(|c| c.body == **body).collect::<Vec<_>>();
-        bodies.iter().map(|body| Self::new(&of(body))).collect()
+        let cases_about = |body: &&str| cases.iter().filter(|c| c.body == **body).collect::<Vec<_>>();
+        bodies.iter().map(|body| Self::new(&cases_about(body))).collect()
     }
 
     /// Evaluates the cases of one body.
@@ -118,7 +118,7 @@ impl Evaluation {
         for case in with_limb.iter().filter(|c| c.miss.is_none()) {
             *unanswered.entry(case.status).or_default() += 1;
         }
-        let hits = with_limb.iter().filter(|c| horace_counts(c)).count();
+        let hits = with_limb.iter().filter(|c| is_horace_success(c)).count();
         let off_axis = cases.first().map_or("off axis", |c| c.off_axis_name());
         let success = hits as f64 / with_limb.len() as f64;
         Self {
@@ -152,10 +152,10 @@ impl Evaluation {
     }
 }
 
-fn horace_counts(case: &Case) -> bool {
+fn is_horace_success(case: &Case) -> bool {
     case.miss.is_some_and(|m| {
-        let radius = m.half_angle_ratio.is_none_or(|r| (r - 1.0).abs() <= HORACE_PART);
-        radius && m.half_angles <= HORACE_PART
+        let radius = m.half_angle_ratio.is_none_or(|r| (r - 1.0).abs() <= HORACE_TOLERANCE);
+        radius && m.half_angles <= HORACE_TOLERANCE
     })
 }
 
@@ -230,12 +230,12 @@ impl Group {
     }
 }
 
-/// Returns the smallest of 1, 2, 5, 10, … (times a power of ten) that is at least `at_least`. Returns `None` if
-/// `at_least` is not positive and finite.
-pub(super) fn nice_step(at_least: f64) -> Option<f64> {
-    if !(at_least > 0.0 && at_least.is_finite()) {
+/// Returns the smallest of 1, 2, 5, 10, … (times a power of ten) that is at least `min`. Returns `None` if
+/// `min` is not positive and finite.
+pub(super) fn nice_step(min: f64) -> Option<f64> {
+    if !(min > 0.0 && min.is_finite()) {
         return None;
     }
-    let decade = 10f64.powf(at_least.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|step| *step >= at_least * (1.0 - 1e-9))
+    let decade = 10f64.powf(min.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|step| *step >= min * (1.0 - 1e-9))
 }

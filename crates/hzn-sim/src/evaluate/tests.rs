@@ -123,8 +123,13 @@ fn what_does_not_belong_together_is_named() {
 #[test]
 fn bodies_are_evaluated_apart_and_unasked_ones_passed_over() {
     let body = |b: &str| Truth { body: b.into(), ..truth("a", 1) };
-    let of = |b: &str, x: f64| Answer { body: b.into(), ..answer("a", x, 0.0) };
-    let cases = pair(&[of("earth", 0.1), of("moon", 0.5)], &[body("earth"), body("sun"), body("moon")], None).unwrap();
+    let answer_about = |b: &str, x: f64| Answer { body: b.into(), ..answer("a", x, 0.0) };
+    let cases = pair(
+        &[answer_about("earth", 0.1), answer_about("moon", 0.5)],
+        &[body("earth"), body("sun"), body("moon")],
+        None,
+    )
+    .unwrap();
     let all = Evaluation::by_body(&cases);
     assert_eq!(all.iter().map(|e| (e.body.as_str(), e.frames)).collect::<Vec<_>>(), [("earth", 1), ("moon", 1)]);
     // The Moon has no nadir, and the camera has no altitude above it.

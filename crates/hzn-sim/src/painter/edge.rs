@@ -25,7 +25,7 @@ impl Edge {
 
     /// Returns the share at a height in metres above the limb.
     #[inline(always)]
-    pub(super) fn at(&self, height_m: f64) -> f32 {
+    pub(super) fn share(&self, height_m: f64) -> f32 {
         match *self {
             Self::Sharp => f32::from(u8::from(height_m <= 0.0)),
             Self::Exponential { per_m, knee_m } => {
@@ -37,14 +37,14 @@ impl Edge {
     }
 
     /// Returns the mean share over a pixel with this height in its middle and this gradient in metres per pixel.
-    pub(super) fn mean(&self, height_m: f64, [gu, gv]: [f64; 2]) -> f32 {
+    pub(super) fn mean_share(&self, height_m: f64, [gu, gv]: [f64; 2]) -> f32 {
         match self {
             Self::Sharp => {
                 let slope = libm::hypot(gu, gv);
                 if slope > 0.0 {
                     half_plane(-height_m / slope, gu / slope, gv / slope) as f32
                 } else {
-                    self.at(height_m)
+                    self.share(height_m)
                 }
             }
             Self::Exponential { .. } => {
@@ -52,7 +52,7 @@ impl Edge {
                 for i in 0..SAMPLES {
                     for j in 0..SAMPLES {
                         let [du, dv] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(SAMPLES) - 0.5);
-                        sum += self.at(height_m + gu * du + gv * dv);
+                        sum += self.share(height_m + gu * du + gv * dv);
                     }
                 }
                 sum / (SAMPLES * SAMPLES) as f32
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn half_brightness_is_at_the_limb_height() {
         let edge = Edge::new(Profile::Exponential { scale_km: 7.0 });
-        assert!((edge.at(0.0) - 0.5).abs() < 1e-6 && edge.at(-1e4) == 1.0);
-        assert!((edge.at(7e3) - 0.5 / core::f32::consts::E).abs() < 1e-6);
+        assert!((edge.share(0.0) - 0.5).abs() < 1e-6 && edge.share(-1e4) == 1.0);
+        assert!((edge.share(7e3) - 0.5 / core::f32::consts::E).abs() < 1e-6);
     }
 }

@@ -29,7 +29,7 @@ impl Default for Exposure {
 }
 
 /// Factor by which pictures are reduced to measure their mean light.
-const REDUCED: f64 = 24.0;
+const REDUCTION: f64 = 24.0;
 
 impl Exposure {
     /// Sets the exposure of scenes that are in the order of time.
@@ -57,7 +57,7 @@ impl Exposure {
 /// Returns the mean light of a picture at a gain of 1, from a picture of only a few thousand pixels.
 fn mean_light(scene: &Scene) -> Result<f64, SceneError> {
     let c = &scene.camera;
-    let scale = REDUCED.min(f64::from(c.width.min(c.height)) / 8.0).max(1.0);
+    let scale = REDUCTION.min(f64::from(c.width.min(c.height)) / 8.0).max(1.0);
     let mut small = scene.clone();
     let size = |n: u16| ((f64::from(n) / scale).round() as u16).max(2);
     let centre = |c: f64| (c + 0.5) / scale - 0.5;

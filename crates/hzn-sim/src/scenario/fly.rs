@@ -15,7 +15,7 @@ use crate::utc;
 use hzn_nav::ephemeris;
 
 /// Largest number of pictures over which the exposure is followed before a wanted picture.
-const LEADS_MOST: f64 = 32.0;
+const MAX_LEADS: f64 = 32.0;
 /// Width in pixels by which a mask extends beyond the hidden part, because edges are blurred.
 const MASK_MARGIN_PX: f64 = 4.0;
 
@@ -46,22 +46,22 @@ impl Scenario {
         sensor.camera.readout_s = self.shutter.readout_s;
         let body = |kind: Kind| hzn_core::body::Config {
             altitude_sigma_km: self.known.position_sigma_km.max(0.05),
-            ..self.body_of(kind)
+            ..self.body_config(kind)
         };
         match self.bodies.as_slice() {
             [one] => sensor.body = body(*one),
             // There are at most three bodies; `check` refuses more.
             several => {
-                let own = |kind: Kind| hzn_core::body::Config {
+                let with_threshold = |kind: Kind| hzn_core::body::Config {
                     binarize: Some(hzn_core::Config::preset(preset(kind), self.camera.clone()).binarize),
                     ..body(kind)
                 };
-                sensor.bodies = several.iter().map(|&kind| own(kind)).collect();
+                sensor.bodies = several.iter().map(|&kind| with_threshold(kind)).collect();
                 sensor.body = hzn_core::body::Config::default();
             }
         }
         for part in self.vehicle.iter().filter(|p| p.masked) {
-            let polygon: region::Polygon = grown(&part.polygon_px, MASK_MARGIN_PX).into_iter().collect();
+            let polygon: region::Polygon = grow_polygon(&part.polygon_px, MASK_MARGIN_PX).into_iter().collect();
             // `check` refuses more than eight masks.
             let _ = sensor.mask.polygons_px.push(polygon);
         }
@@ -73,13 +73,13 @@ impl Scenario {
     /// # Errors
     /// Fails if a value is out of its limits, if the camera is inside the Earth, or if no picture shows the body.
     pub fn flight(&self) -> Result<Flight, ScenarioError> {
-        self.flight_at(&self.times_s())
+        self.flight_with_times(&self.times_s())
     }
 
     /// Returns [`Scenario::flight`] with pictures at these times instead of the times of the capture. Trajectory and
     /// attitude are those of the whole capture. The exposure follows the pictures that the capture would take before
     /// each of these.
-    pub(super) fn flight_at(&self, times_s: &[f64]) -> Result<Flight, ScenarioError> {
+    pub(super) fn flight_with_times(&self, times_s: &[f64]) -> Result<Flight, ScenarioError> {
         self.check()?;
         let sensor = self.sensor();
         sensor.check().map_err(|e| ScenarioError::new("[[vehicle]]", e.to_string()))?;
@@ -87,14 +87,14 @@ impl Scenario {
         let (mut scenes, mut wanted) = (Vec::with_capacity(times_s.len()), Vec::with_capacity(times_s.len()));
         for (index, &time_s) in times_s.iter().enumerate() {
             let before = scenes.last().map_or(f64::NEG_INFINITY, |(last_s, _)| *last_s);
-            for lead_s in self.leads_s(before, time_s) {
+            for lead_s in self.lead_times_s(before, time_s) {
                 scenes.push((lead_s, self.scene(&path, index, lead_s)?));
                 wanted.push(false);
             }
             scenes.push((time_s, self.scene(&path, index, time_s)?));
             wanted.push(true);
         }
-        self.something_is_seen(&scenes)?;
+        self.check_visible(&scenes)?;
         self.exposure.set(&mut scenes).map_err(|e| ScenarioError::new("[exposure]", e.to_string()))?;
         let frames = scenes
             .into_iter()
@@ -114,17 +114,17 @@ impl Scenario {
 
     /// Returns the times of the capture's pictures before a wanted picture: later than the picture before it, and
     /// within the memory of the exposure controller.
-    fn leads_s(&self, before_s: f64, time_s: f64) -> Vec<f64> {
+    fn lead_times_s(&self, before_s: f64, time_s: f64) -> Vec<f64> {
         let [from_s, to_s] = self.span_s();
         let every_s = (to_s - from_s) / f64::from(self.capture.frames.saturating_sub(1).max(1));
         if self.exposure.target_mean.is_none() || !(every_s > 0.0) {
             return Vec::new();
         }
         // After 4.6 lags, 1 % of a step is left.
-        let most = (4.6 * self.exposure.lag_s / every_s).ceil().min(LEADS_MOST) as u32;
-        let at = |k: u32| time_s - f64::from(k) * every_s;
+        let count = (4.6 * self.exposure.lag_s / every_s).ceil().min(MAX_LEADS) as u32;
+        let lead_s = |k: u32| time_s - f64::from(k) * every_s;
         // The times are rounded, so half a step is allowed.
-        (1..=most).rev().map(at).filter(|&t| t >= from_s && t > before_s + 0.5 * every_s).collect()
+        (1..=count).rev().map(lead_s).filter(|&t| t >= from_s && t > before_s + 0.5 * every_s).collect()
     }
 
     fn scene(&self, path: &Path, index: usize, time_s: f64) -> Result<Scene, ScenarioError> {
@@ -132,11 +132,11 @@ impl Scenario {
         let unix_s = path.unix_s(time_s);
         let mut scene = Scene::new(self.camera.clone(), pose);
         // The camera flies around the Earth for every body that it looks for.
-        scene.body = self.body_of(Kind::Earth);
+        scene.body = self.body_config(Kind::Earth);
         let altitude_km = crate::Globe::new(&scene.body).altitude_m(pose.position_m) * 1e-3;
         if !(altitude_km > scene.body.limb_height_km) {
             let what = format!(
-                "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the Earth or its limb of {:.1} km",
+                "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the Earth or below its limb at {:.1} km",
                 scene.body.limb_height_km
             );
             return Err(ScenarioError::new("[trajectory]", what));
@@ -153,7 +153,7 @@ impl Scenario {
                 if let Some(clouds) = &mut world.clouds {
                     clouds.seed = clouds.seed.wrapping_add(self.seed);
                 }
-                *world = world.in_season(unix_s);
+                *world = world.with_season(unix_s);
                 scene.limb_height_by_latitude_km = world.half_level_by_latitude_km();
             }
             World::Plain => {}
@@ -176,7 +176,7 @@ impl Scenario {
     }
 
     /// Refuses a scenario in which the sensor's first body is never in view.
-    fn something_is_seen(&self, scenes: &[(f64, Scene)]) -> Result<(), ScenarioError> {
+    fn check_visible(&self, scenes: &[(f64, Scene)]) -> Result<(), ScenarioError> {
         let kind = self.bodies.first().copied().unwrap_or_default();
         // About 200 pictures represent thousands.
         let step = (scenes.len() / 200).max(1);
@@ -187,20 +187,20 @@ impl Scenario {
         }
         let name = kind.name();
         let what = format!(
-            "the limb of the {name} is lit and in view in none of the pictures: check off-nadir angle, field of view, \
-             and the time of day (utc)"
+            "no picture shows a lit limb of the {name}: check the off-nadir angle, the field of view, and the time of day \
+             (utc)"
         );
         Err(ScenarioError::new("[attitude]", what))
     }
 
     /// Returns the row of frames.csv for a picture: the position with its error, and the attitude with its error if
     /// `[known]` has one.
-    pub fn known_of(&self, frame: &FlightFrame) -> crate::flight::FrameRow {
+    pub fn frame_row(&self, frame: &FlightFrame) -> crate::flight::FrameRow {
         let draws = Counter::new(frame.scene.seed, Stream::Gnss);
         let error_m = [0, 1, 2].map(|i| self.known.position_sigma_km * 1e3 * draws.normal(i));
-        let mut seen = frame.clone();
-        (0..3).for_each(|i| seen.scene.pose.position_m[i] += error_m[i]);
-        let mut row = seen.row();
+        let mut measured = frame.clone();
+        (0..3).for_each(|i| measured.scene.pose.position_m[i] += error_m[i]);
+        let mut row = measured.row();
         if let Some(sigma_deg) = self.known.attitude_sigma_deg {
             let draws = Counter::new(frame.scene.seed, Stream::AttitudePrior);
             let error_rad = [0, 1, 2].map(|i| sigma_deg.to_radians() * draws.normal(i));
@@ -213,7 +213,7 @@ impl Scenario {
 }
 
 /// Returns a polygon with its corners moved outward, away from their middle.
-fn grown(corners: &[[f64; 2]], by_px: f64) -> Vec<[f64; 2]> {
+fn grow_polygon(corners: &[[f64; 2]], by_px: f64) -> Vec<[f64; 2]> {
     let n = corners.len().max(1) as f64;
     let middle = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / n);
     corners

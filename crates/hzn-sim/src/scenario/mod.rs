@@ -10,7 +10,7 @@ mod fly;
 mod noise;
 
 pub use exposure::Exposure;
-pub use noise::{Fit, MEASURED};
+pub use noise::{FIT_PICTURES, Fit};
 
 use std::path::{Path as FilePath, PathBuf};
 
@@ -34,7 +34,11 @@ pub const BUILTIN: [(&str, &str, &str); 8] = [
         "sounding rocket with the Sun, lens ghosts and payload in view, colour JPEG 1920x1080",
         include_str!("builtin/rocket.toml"),
     ),
-    ("rocket-clean", "such a flight at noon without them, grey 1920x1080", include_str!("builtin/rocket-clean.toml")),
+    (
+        "rocket-clean",
+        "sounding rocket at noon without Sun, ghosts and payload in view, grey 1920x1080",
+        include_str!("builtin/rocket-clean.toml"),
+    ),
     (
         "leo-infrared",
         "infrared Earth sensor in low orbit, from nadir to 120 degrees off it, 384x288",
@@ -260,11 +264,11 @@ impl Scenario {
             World::Infrared(world) => world.table.as_mut().map(|table| ("radiance", table)),
             World::Plain => None,
         };
-        let way = match &mut self.trajectory {
+        let trajectory = match &mut self.trajectory {
             Trajectory::Table(table) => Some(("trajectory", &mut table.file)),
             Trajectory::Rocket(_) | Trajectory::Orbit(_) => None,
         };
-        world.into_iter().chain(way).collect()
+        world.into_iter().chain(trajectory).collect()
     }
 
     /// Returns UTC of time 0 in seconds since 1970.
@@ -293,15 +297,15 @@ impl Scenario {
     }
 
     /// Returns the sensor's configuration of a body, with the limb height of the simulated limb.
-    pub fn body_of(&self, kind: Kind) -> body::Config {
+    pub fn body_config(&self, kind: Kind) -> body::Config {
         let limb_height_km = match (&self.world, kind) {
             (_, Kind::Sun | Kind::Moon) => 0.0,
             (World::Visible(w), _) => w.air.half_height_km([1.0 / 3.0; 3], EARTH_MEAN_RADIUS_M / 1e3),
-            (World::Infrared(w), _) => w.in_season(self.start_unix_s()).mean_half_level_km(),
+            (World::Infrared(w), _) => w.with_season(self.start_unix_s()).mean_half_level_km(),
             (World::Plain, _) => body::Config::default().limb_height_km,
         };
         let by_latitude = match (&self.world, kind) {
-            (World::Infrared(w), Kind::Earth) => w.in_season(self.start_unix_s()).half_level_by_latitude_km(),
+            (World::Infrared(w), Kind::Earth) => w.with_season(self.start_unix_s()).half_level_by_latitude_km(),
             _ => Vec::new(),
         };
         let limb_height_by_latitude_km = by_latitude.into_iter().collect();

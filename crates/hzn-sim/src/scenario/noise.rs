@@ -54,15 +54,15 @@ const OTHER_SEED: u64 = 7919;
 /// Number of other seeds that are measured.
 const SEEDS: u64 = 16;
 /// Default number of pictures on which a [`Fit`] is measured.
-pub const MEASURED: u32 = 32;
+pub const FIT_PICTURES: u32 = 32;
 /// Integral lengths that are tested, pixels.
 const LENGTHS_PX: [f64; 7] = [10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0];
 /// Largest mean NEES of a settled model: 2 times the square of 1.15.
-const NEES_MOST: f64 = 2.645;
+const MAX_NEES: f64 = 2.645;
 /// Smallest sigma of an edge point, pixels.
-const LEAST_PX: f64 = 0.02;
+const MIN_SIGMA_PX: f64 = 0.02;
 /// Largest number of times that the sigmas are scaled.
-const ROUNDS: u32 = 4;
+const MAX_ROUNDS: u32 = 4;
 /// An answer with a larger error is wrong, not noisy: 2 degrees.
 const GROSS_RAD: f64 = std::f64::consts::PI / 90.0;
 
@@ -81,7 +81,7 @@ impl Fit {
         for i in 1..=SEEDS {
             let other = Scenario { seed: scenario.seed.wrapping_add(i * OTHER_SEED), ..scenario.clone() };
             // With another drift the limb may stay out of view; such a seed is skipped.
-            flights.extend(other.flight_at(&spread_s(scenario.span_s(), i - 1, pictures)).ok());
+            flights.extend(other.flight_with_times(&picture_times_s(scenario.span_s(), i - 1, pictures)).ok());
         }
         let frames: Vec<&FlightFrame> = flights.iter().flat_map(|f| &f.frames).collect();
         let mut rendered = Vec::with_capacity(frames.len());
@@ -89,90 +89,92 @@ impl Fit {
             rendered.push(frame.render().map_err(|e| ScenarioError::new("[trajectory]", e.to_string()))?);
             progress(rendered.len(), frames.len());
         }
-        Ok(Self::of_pictures(scenario, &frames.into_iter().zip(&rendered).collect::<Vec<_>>()))
+        Ok(Self::measure_pictures(scenario, &frames.into_iter().zip(&rendered).collect::<Vec<_>>()))
     }
 
     /// Measures the noise model, like [`Fit::measure`], on pictures that are already rendered, each with its frame.
-    pub fn of_pictures(scenario: &Scenario, seen: &[(&FlightFrame, &Picture)]) -> Vec<Self> {
+    pub fn measure_pictures(scenario: &Scenario, pictures: &[(&FlightFrame, &Picture)]) -> Vec<Self> {
         let sensor = scenario.sensor();
-        let alone = |body: &body::Config| Config { body: body.clone(), bodies: Default::default(), ..sensor.clone() };
-        sensor.each_body().iter().filter_map(|body| Self::new(scenario, &alone(body), seen)).collect()
+        let for_body =
+            |body: &body::Config| Config { body: body.clone(), bodies: Default::default(), ..sensor.clone() };
+        sensor.each_body().iter().filter_map(|body| Self::new(scenario, &for_body(body), pictures)).collect()
     }
 
     /// Measures the noise model of the one body that the sensor looks for.
-    fn new(scenario: &Scenario, alone: &Config, seen: &[(&FlightFrame, &Picture)]) -> Option<Self> {
-        let kind = alone.body.kind;
+    fn new(scenario: &Scenario, one_body: &Config, pictures: &[(&FlightFrame, &Picture)]) -> Option<Self> {
+        let kind = one_body.body.kind;
         // In the first pass the limb height is unknown, and the points scatter by a pixel.
-        let mut sensor = alone.clone();
+        let mut sensor = one_body.clone();
         sensor.body.limb_height_sigma_km = 8.0;
-        let first = look(scenario, &sensor, seen);
+        let first = process_all(scenario, &sensor, pictures);
         // Wrong answers would add points that are not on the limb.
-        let most = 4.0 * median(first.iter().map(|l| l.error_rad));
-        let answered: Vec<&Looked> = first.iter().filter(|l| l.error_rad <= most.min(0.02)).collect();
+        let max_rad = 4.0 * median(first.iter().map(|l| l.error_rad));
+        let answered: Vec<&Processed> = first.iter().filter(|l| l.error_rad <= max_rad.min(0.02)).collect();
         if answered.len() < 4 {
             return None;
         }
-        let mut pictures: Vec<Edge> =
-            answered.iter().filter_map(|l| Edge::new(kind, l, sensor.body.limb_height_km)).collect();
+        let mut edges: Vec<EdgeErrors> =
+            answered.iter().filter_map(|l| EdgeErrors::new(kind, l, sensor.body.limb_height_km)).collect();
         // A picture whose mean is far from all others has an answer on another edge; its direction is right by chance.
-        let middle = median(pictures.iter().map(|p| p.mean_km));
-        let usual = median(pictures.iter().map(|p| (p.mean_km - middle).abs()));
-        pictures.retain(|p| (p.mean_km - middle).abs() <= 6.0 * usual.max(0.1));
+        let middle = median(edges.iter().map(|p| p.mean_km));
+        let usual = median(edges.iter().map(|p| (p.mean_km - middle).abs()));
+        edges.retain(|p| (p.mean_km - middle).abs() <= 6.0 * usual.max(0.1));
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
-        let heights: Vec<f64> = pictures.iter().map(|p| p.mean_km).collect();
+        let heights: Vec<f64> = edges.iter().map(|p| p.mean_km).collect();
         let height_km = mean(&heights);
         let spread_km =
             (heights.iter().map(|h| (h - height_km) * (h - height_km)).sum::<f64>() / heights.len() as f64).sqrt();
-        let variance = mean(&pictures.iter().map(|p| p.variance_px2).collect::<Vec<_>>());
-        let disc = matches!(kind, Kind::Sun | Kind::Moon);
+        let variance = mean(&edges.iter().map(|p| p.variance_px2).collect::<Vec<_>>());
+        let is_disc = matches!(kind, Kind::Sun | Kind::Moon);
         let fit = Self {
             body: kind,
-            limb_height_km: if disc { 0.0 } else { sensor.body.limb_height_km + height_km },
-            limb_height_sigma_km: if disc { 0.0 } else { spread_km.max(0.2) },
+            limb_height_km: if is_disc { 0.0 } else { sensor.body.limb_height_km + height_km },
+            limb_height_sigma_km: if is_disc { 0.0 } else { spread_km.max(0.2) },
             noise: Noise::Told,
-            sigma_px: variance.sqrt().max(LEAST_PX),
+            sigma_px: variance.sqrt().max(MIN_SIGMA_PX),
             correlation_px: f64::NAN,
             nees: f64::NAN,
-            frames: [answered.len(), seen.len()],
+            frames: [answered.len(), pictures.len()],
         };
         // The sigma of the limb height contains the error that the points of a picture share. The only floor left is
         // the floor for rounding.
-        let by_picture = Self { noise: Noise::Rms, sigma_px: LEAST_PX, correlation_px: 0.0, ..fit };
-        let noise = if disc { Noise::Told } else { Noise::Rms };
-        let by_itself = (!disc).then(|| by_picture.settled(scenario, alone, seen)).flatten();
-        let by_itself = by_itself.filter(|(fit, _)| fit.nees <= NEES_MOST);
+        let by_picture = Self { noise: Noise::Rms, sigma_px: MIN_SIGMA_PX, correlation_px: 0.0, ..fit };
+        let noise = if is_disc { Noise::Told } else { Noise::Rms };
+        let by_itself = (!is_disc).then(|| by_picture.settle(scenario, one_body, pictures)).flatten();
+        let by_itself = by_itself.filter(|(fit, _)| fit.nees <= MAX_NEES);
         // Errors that the residuals do not show, for example light that clips along the limb, need a floor.
         by_itself.map(|(fit, _)| fit).or_else(|| {
             let floors = LENGTHS_PX.map(|length| Self { noise, correlation_px: length, ..fit });
-            let settled = floors.into_iter().map(|model| model.settled(scenario, alone, seen));
+            let settled = floors.into_iter().map(|model| model.settle(scenario, one_body, pictures));
             settled.flatten().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(fit, _)| fit)
         })
     }
 
     /// Scales the sigmas until the errors of the answers are as large as their covariance. Also returns how unlikely
     /// these errors are: twice the mean negative log-likelihood, without a constant.
-    fn settled(
+    fn settle(
         mut self,
         scenario: &Scenario,
-        alone: &Config,
-        seen: &[(&FlightFrame, &Picture)],
+        one_body: &Config,
+        pictures: &[(&FlightFrame, &Picture)],
     ) -> Option<(Self, f64)> {
         let mut unlikely = f64::NAN;
-        for round in 0..=ROUNDS {
-            let mut sensor = alone.clone();
+        for round in 0..=MAX_ROUNDS {
+            let mut sensor = one_body.clone();
             self.apply(&mut sensor);
-            let looked = look(scenario, &sensor, seen);
-            let usable: Vec<&Looked> =
-                looked.iter().filter(|l| l.nees.is_finite() && l.error_rad < GROSS_RAD).collect();
+            let processed = process_all(scenario, &sensor, pictures);
+            let usable: Vec<&Processed> =
+                processed.iter().filter(|l| l.nees.is_finite() && l.error_rad < GROSS_RAD).collect();
             if usable.len() < 4 {
                 return None;
             }
-            let mean = |of: &dyn Fn(&Looked) -> f64| usable.iter().map(|l| of(l)).sum::<f64>() / usable.len() as f64;
+            let mean =
+                |value: &dyn Fn(&Processed) -> f64| usable.iter().map(|l| value(l)).sum::<f64>() / usable.len() as f64;
             self.nees = mean(&|l| l.nees);
             unlikely = mean(&|l| l.log_det) + self.nees;
             let scale = (self.nees / 2.0).sqrt().clamp(0.5, 2.5);
             // The reported values belong to the last model, settled or not.
-            if (0.85..1.15).contains(&scale) || round == ROUNDS {
+            if (0.85..1.15).contains(&scale) || round == MAX_ROUNDS {
                 break;
             }
             self.sigma_px *= scale;
@@ -211,12 +213,12 @@ impl Fit {
     }
 }
 
-/// Returns the times of the pictures of seed number `which` (from 0). The pictures of all seeds together are
+/// Returns the times of the pictures of seed number `seed_index` (from 0). The pictures of all seeds together are
 /// `pictures`, spread evenly over the whole span. The pictures of one seed are far apart.
-fn spread_s([from_s, to_s]: [f64; 2], which: u64, pictures: u32) -> Vec<f64> {
-    let each = u64::from(pictures).div_ceil(SEEDS).max(2);
-    let place = |k: u64| ((k * SEEDS + which) as f64 + 0.5) / (each * SEEDS) as f64;
-    (0..each).map(|k| from_s + (to_s - from_s) * place(k)).collect()
+fn picture_times_s([from_s, to_s]: [f64; 2], seed_index: u64, pictures: u32) -> Vec<f64> {
+    let count = u64::from(pictures).div_ceil(SEEDS).max(2);
+    let fraction = |k: u64| ((k * SEEDS + seed_index) as f64 + 0.5) / (count * SEEDS) as f64;
+    (0..count).map(|k| from_s + (to_s - from_s) * fraction(k)).collect()
 }
 
 /// Returns the middle value.
@@ -227,7 +229,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The sensor's answer to one picture, compared with the truth.
-struct Looked<'a> {
+struct Processed<'a> {
     frame: &'a FlightFrame,
     /// Edge points of the answer with their weights, in order.
     points: Weighted,
@@ -237,32 +239,36 @@ struct Looked<'a> {
     log_det: f64,
 }
 
-fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &[(&'a FlightFrame, &Picture)]) -> Vec<Looked<'a>> {
+fn process_all<'a>(
+    scenario: &Scenario,
+    sensor: &Config,
+    pictures: &[(&'a FlightFrame, &Picture)],
+) -> Vec<Processed<'a>> {
     let config = sensor.clone();
     // A host sensor has some megabytes and is made on the stack before it is moved. The stack of a thread may be too
     // small.
     let make = move || HostHorizon::new(&config).map(Box::new);
     let made = std::thread::Builder::new().stack_size(64 << 20).spawn(make).map(std::thread::JoinHandle::join);
     let Ok(Ok(Ok(mut horizon))) = made else { return Vec::new() };
-    let mut out = Vec::new();
-    for (frame, picture) in seen {
-        let Ok(truth) = frame.scene.truth_of(sensor.body.kind, &frame.file, frame.time_s) else { continue };
-        let known = match scenario.known.attitude_sigma_deg {
-            Some(deg) => frame.known_with_attitude(deg.to_radians()),
-            None => frame.known(),
+    let mut processed = Vec::new();
+    for (frame, picture) in pictures {
+        let Ok(truth) = frame.scene.body_truth(sensor.body.kind, &frame.file, frame.time_s) else { continue };
+        let prior = match scenario.known.attitude_sigma_deg {
+            Some(deg) => frame.prior_with_attitude(deg.to_radians()),
+            None => frame.prior(),
         };
-        let Ok(expected) = horizon.expect(&known) else { continue };
-        let watch = Points::default();
-        let report = horizon.process_observed(&picture.view(), &expected, &watch);
+        let Ok(expected) = horizon.expect(&prior) else { continue };
+        let points = Points::default();
+        let report = horizon.process_observed(&picture.view(), &expected, &points);
         let (Some(solution), Some(axis), true) = (report.solution, truth.axis(), truth.has_limb()) else { continue };
-        let points = watch.of_candidate(solution.candidate);
+        let points = points.of_candidate(solution.candidate);
         let p = solution.covariance.rows();
         let e = Vector3::from(solution.axis.xyz());
         // The covariance has rank 2, so its null direction is filled before the inversion.
         let scale = p[0][0] + p[1][1] + p[2][2];
         let full = Matrix3::from_fn(|i, j| p[i][j] + scale * e[i] * e[j]);
         let d = Vector3::from(axis.xyz()) - e;
-        out.push(Looked {
+        processed.push(Processed {
             frame,
             points: points.into_iter().filter(|p| p.1 > 0.0).collect(),
             error_rad: solution.axis.angle_rad(&axis),
@@ -270,28 +276,28 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &[(&'a FlightFrame, &Pic
             log_det: (full.determinant() / scale).ln(),
         });
     }
-    out
+    processed
 }
 
 /// Errors of the edge points of one picture.
-struct Edge {
+struct EdgeErrors {
     /// Mean height above the assumed limb, kilometres.
     mean_km: f64,
     /// Mean square of the errors along the normal, without their mean.
     variance_px2: f64,
 }
 
-impl Edge {
-    fn new(kind: Kind, looked: &Looked<'_>, limb_height_km: f64) -> Option<Self> {
-        let scene = &looked.frame.scene;
+impl EdgeErrors {
+    fn new(kind: Kind, processed: &Processed<'_>, limb_height_km: f64) -> Option<Self> {
+        let scene = &processed.frame.scene;
         let readout_s = scene.motion.map_or(0.0, |motion| motion.readout_s);
         let camera = Camera::<f64>::try_new(&camera::Config { readout_s, ..scene.camera.clone() }).ok()?;
         // The rays are for the time of the middle row, because the truth holds for that time.
-        let camera = camera.turning(looked.frame.known().rate_rad_s);
+        let camera = camera.turning(processed.frame.prior().rate_rad_s);
         let view = View::try_new(Globe::new(&scene.body).raised(limb_height_km * 1e3), &scene.pose)?;
-        let truth = scene.truth_of(kind, "", 0.0).ok()?;
+        let truth = scene.body_truth(kind, "", 0.0).ok()?;
         let axis: UnitVec3<_, f64> = truth.axis()?;
-        let disc = matches!(kind, Kind::Sun | Kind::Moon);
+        let is_disc = matches!(kind, Kind::Sun | Kind::Moon);
         // `higher_km` is the height of the scene's limb at a latitude above the mean limb.
         let levels = match &scene.world {
             World::Infrared(world) => Some((world.half_levels(), world.mean_half_level_km())),
@@ -302,22 +308,22 @@ impl Edge {
             levels.as_ref().map_or(0.0, |(half_level_km, mean_km)| half_level_km(latitude_deg) - mean_km)
         };
         // (distance outside the limb, the same per pixel, weight)
-        let off: Vec<(f64, f64, f64)> = looked
+        let off: Vec<(f64, f64, f64)> = processed
             .points
             .iter()
             .filter_map(|&([u, v], weight)| {
                 let ray = camera.ray(ImagePoint { u, v })?;
                 let jacobian = ray.jacobian();
-                if disc {
+                if is_disc {
                     let s = ray.direction();
                     let by: [f64; 2] = [0, 1].map(|c| (0..3).map(|i| jacobian[i][c] * axis.xyz()[i]).sum::<f64>());
                     let angle = s.angle_rad(&axis);
                     let slope = libm::hypot(by[0], by[1]) / libm::sin(angle).max(1e-9);
                     return Some((angle - truth.half_angle_deg.to_radians(), slope, weight));
                 }
-                let sight = view.look(ray.direction().xyz());
-                let [gu, gv] = view.tangent_height_gradient(&sight, &jacobian);
-                let off_km = view.tangent_height_m(&sight) * 1e-3 - higher_km(&view.normal(&view.point(&sight)));
+                let hit = view.intersect(ray.direction().xyz());
+                let [gu, gv] = view.tangent_height_gradient(&hit, &jacobian);
+                let off_km = view.tangent_height_m(&hit) * 1e-3 - higher_km(&view.normal(&view.point(&hit)));
                 Some((off_km, libm::hypot(gu, gv) * 1e-3, weight))
             })
             .collect();
@@ -337,12 +343,12 @@ mod tests {
 
     #[test]
     fn pictures_are_spread_over_the_whole_capture() {
-        let mut all: Vec<f64> = (0..SEEDS).flat_map(|i| spread_s([60.0, 380.0], i, MEASURED)).collect();
+        let mut all: Vec<f64> = (0..SEEDS).flat_map(|i| picture_times_s([60.0, 380.0], i, FIT_PICTURES)).collect();
         all.sort_by(f64::total_cmp);
-        assert_eq!(all.len(), MEASURED as usize);
+        assert_eq!(all.len(), FIT_PICTURES as usize);
         assert!(all.windows(2).all(|w| (w[1] - w[0] - 10.0).abs() < 1e-9), "{all:?}");
         assert_eq!((all[0], all[31]), (65.0, 375.0));
-        assert_eq!(spread_s([0.0, 32.0], 3, 1), [3.5, 19.5], "at least two a seed");
+        assert_eq!(picture_times_s([0.0, 32.0], 3, 1), [3.5, 19.5], "at least two a seed");
     }
 
     /// The start sigma is so large that four scalings do not bring it down to the errors.
@@ -352,7 +358,7 @@ mod tests {
         scenario.capture.frames = 8;
         let flight = scenario.flight().unwrap();
         let pictures: Vec<_> = flight.frames.iter().map(|f| f.render().unwrap()).collect();
-        let seen: Vec<_> = flight.frames.iter().zip(&pictures).collect();
+        let pairs: Vec<_> = flight.frames.iter().zip(&pictures).collect();
         let mut sensor = scenario.sensor();
         // Open gates accept the answers for every covariance.
         sensor.select.max_sigma_deg = 90.0;
@@ -367,13 +373,13 @@ mod tests {
             nees: f64::NAN,
             frames: [8, 8],
         };
-        let (fit, _) = start.settled(&scenario, &sensor, &seen).unwrap();
+        let (fit, _) = start.settle(&scenario, &sensor, &pairs).unwrap();
         assert!(fit.nees < 1.4, "{fit:?} settled");
-        let mut told = sensor.clone();
-        fit.apply(&mut told);
-        let looked = look(&scenario, &told, &seen);
+        let mut fitted = sensor.clone();
+        fit.apply(&mut fitted);
+        let processed = process_all(&scenario, &fitted, &pairs);
         let nees: Vec<f64> =
-            looked.iter().filter(|l| l.error_rad < GROSS_RAD).map(|l| l.nees).filter(|n| n.is_finite()).collect();
+            processed.iter().filter(|l| l.error_rad < GROSS_RAD).map(|l| l.nees).filter(|n| n.is_finite()).collect();
         assert_eq!(fit.nees, nees.iter().sum::<f64>() / nees.len() as f64);
     }
 }

@@ -16,7 +16,7 @@ fn built_in_scenes_are_valid_and_show_their_bodies() {
         flight.sensor.check().unwrap();
         let bodies = scenario.bodies.clone();
         for kind in bodies {
-            let seen = flight.frames.iter().filter(|f| f.scene.truth_of(kind, "", 0.0).unwrap().has_limb()).count();
+            let seen = flight.frames.iter().filter(|f| f.scene.body_truth(kind, "", 0.0).unwrap().has_limb()).count();
             println!("{name}: {kind:?} in {seen} of {}", flight.frames.len());
             assert!(seen >= 8, "{name} {kind:?}: {seen}");
         }
@@ -73,17 +73,20 @@ fn what_is_refused_is_named() {
         "[exposure] limits: 3 is refused: must be above 0, at most 2"
     );
     assert!(error(&|s| s.detector.bits = 7).starts_with("[detector] bits: 7 is refused"));
-    assert!(error(&|s| s.attitude = Attitude::Spin(Default::default())).contains("belongs to [trajectory.rocket]"));
+    assert!(
+        error(&|s| s.attitude = Attitude::Spin(Default::default()))
+            .contains("is allowed only with [trajectory.rocket]")
+    );
     let inside = error(&|s| {
         s.trajectory = Trajectory::Orbit(crate::trajectory::Orbit { perigee_km: 50.0, ..Default::default() });
         s.world = World::Infrared(crate::Infrared { half_level_km: 70.0, ..Default::default() });
     });
-    assert!(inside.contains("inside the Earth or its limb"), "{inside}");
+    assert!(inside.contains("inside the Earth or below its limb"), "{inside}");
     let nothing = error(&|s| {
         s.attitude =
             Attitude::Pointing(crate::trajectory::Pointing { off_nadir_deg: [180.0; 2], ..Default::default() });
     });
-    assert!(nothing.contains("in none of the pictures"), "{nothing}");
+    assert!(nothing.contains("no picture shows a lit limb of the earth"), "{nothing}");
     let unknown = toml::from_str::<Scenario>(&BUILTIN[0].2.replace("[imu]", "[imu]\nrate = 3")).unwrap_err();
     assert!(unknown.to_string().contains("unknown field `rate`"), "{unknown}");
 }
@@ -108,13 +111,13 @@ fn frames_csv_says_what_is_known_and_no_more() {
     let mut s = Scenario::builtin("leo-infrared").unwrap();
     s.capture.frames = 3;
     let flight = s.flight().unwrap();
-    let row = s.known_of(&flight.frames[1]);
+    let row = s.frame_row(&flight.frames[1]);
     assert!(row.qw.is_none() && row.utc.as_deref() == Some("2021-07-15T00:48:20.000Z"), "{:?}", row.utc);
     s.known = Known { position_sigma_km: 0.1, attitude_sigma_deg: Some(5.0) };
-    let told = s.known_of(&flight.frames[1]);
-    assert!(told.x_km != row.x_km && (told.x_km - row.x_km).abs() < 0.5);
+    let noisy = s.frame_row(&flight.frames[1]);
+    assert!(noisy.x_km != row.x_km && (noisy.x_km - row.x_km).abs() < 0.5);
     let [w, x, y, z] = flight.frames[1].scene.pose.cam_to_ecef_wxyz;
-    let dot = told.qw.unwrap() * w + told.qx.unwrap() * x + told.qy.unwrap() * y + told.qz.unwrap() * z;
+    let dot = noisy.qw.unwrap() * w + noisy.qx.unwrap() * x + noisy.qy.unwrap() * y + noisy.qz.unwrap() * z;
     let off_deg = 2.0 * libm::acos(dot.abs().min(1.0)).to_degrees();
     assert!((1.0..25.0).contains(&off_deg), "{off_deg}");
 }

@@ -47,7 +47,7 @@ pub struct Vertical {
 impl Vertical {
     /// Returns the angles at a geodetic latitude (degrees) and an altitude (kilometres). Returns `None` if the altitude
     /// is not above `limb_height_km`.
-    pub fn at(latitude_deg: f64, altitude_km: f64, limb_height_km: f64) -> Option<Self> {
+    pub fn from_position(latitude_deg: f64, altitude_km: f64, limb_height_km: f64) -> Option<Self> {
         let latitude = latitude_deg.to_radians();
         let position = from_geodetic(latitude, 0.0, altitude_km * 1e3, WGS84_A_M, WGS84_B_M);
         let d = limb_height_km * 1e3;
@@ -94,15 +94,15 @@ mod tests {
             (2000.0, 0.1464, 0.1114, 0.0350),
             (20_000.0, 0.0465, 0.0112, 0.0352),
         ] {
-            let v = Vertical::at(45.0, altitude, 0.0).unwrap();
+            let v = Vertical::from_position(45.0, altitude, 0.0).unwrap();
             assert!((v.geocentric_to_geodetic_deg - geodetic).abs() < 1e-4, "{altitude} {v:?}");
             assert!((v.geocentric_to_axis_deg - axis).abs() < 1e-4, "{altitude} {v:?}");
             assert!((v.geodetic_to_axis_deg - rest).abs() < 1e-4, "{altitude} {v:?}");
         }
         for (altitude, spread) in [(100.0, 0.033), (240.0, 0.050), (600.0, 0.071), (2000.0, 0.095), (20_000.0, 0.045)] {
-            let v = Vertical::at(0.0, altitude, 0.0).unwrap();
+            let v = Vertical::from_position(0.0, altitude, 0.0).unwrap();
             assert!((v.half_angle_spread_deg - spread).abs() < 1e-3, "{altitude} {v:?}");
         }
-        assert!(Vertical::at(10.0, 5.0, 10.0).is_none());
+        assert!(Vertical::from_position(10.0, 5.0, 10.0).is_none());
     }
 }

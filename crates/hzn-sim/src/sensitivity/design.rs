@@ -1,20 +1,7 @@
 //! Camera, body and position of a sensor that does not exist yet.
 
-use core::f64::consts::TAU;
-
-use hzn_core::camera::{self, Camera};
+use hzn_core::camera;
 use hzn_core::error::ConfigError;
-use hzn_core::frames::UnitVec3;
-use hzn_core::pixel::ImagePoint;
-use nalgebra::Vector3;
-
-use super::sigmas::Sigmas;
-
-/// Number of steps around the cone to find its visible segments; a segment between two steps is missed.
-const STEPS: usize = 16_384;
-/// Largest number of points on a visible segment of the limb. On longer segments the points are more than a pixel
-/// apart.
-const MOST_POINTS: f64 = 20_000.0;
 
 /// A camera above a sphere.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,14 +44,6 @@ pub enum DesignError {
     },
 }
 
-/// A point of the limb in the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Station {
-    pub(super) point: ImagePoint<f64>,
-    /// Length of limb from the point before, in pixels; `None` at the first point of a segment.
-    pub(super) step_px: Option<f64>,
-}
-
 impl Design {
     /// Returns the half-angle of the limb's cone in radians: sin α = (R + d)/(R + H).
     ///
@@ -93,89 +72,4 @@ impl Design {
     pub fn dip_deg(&self) -> Result<f64, DesignError> {
         Ok(90.0 - self.half_angle_rad()?.to_degrees())
     }
-
-    /// Returns the sigmas of this design; `None` if the limb in view is too short for a direction, or if there is none.
-    ///
-    /// # Errors
-    /// Fails if the camera is invalid or not above the limb.
-    pub fn sigmas(&self) -> Result<Option<Sigmas>, DesignError> {
-        let half_angle_rad = self.half_angle_rad()?;
-        let camera = Camera::try_new(&self.camera)?;
-        let stations = self.stations(&camera, half_angle_rad);
-        Ok(Sigmas::new(self, &camera, half_angle_rad, &stations))
-    }
-
-    /// Returns the limb in view as points one pixel apart.
-    pub(super) fn stations(&self, camera: &Camera<f64>, half_angle_rad: f64) -> Vec<Station> {
-        let e = Vector3::from(self.axis());
-        let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
-        let b2 = e.cross(&b1);
-        let (sin, cos) = half_angle_rad.sin_cos();
-        let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
-        let at = |azimuth: f64| {
-            let (s, c) = azimuth.sin_cos();
-            let p = camera.project(&UnitVec3::try_new((e * cos + (b1 * c + b2 * s) * sin).into())?)?;
-            (p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5).then_some(p)
-        };
-        let mut stations = Vec::new();
-        for azimuths in pieces(&at) {
-            let points: Vec<(f64, ImagePoint<f64>)> = azimuths.iter().filter_map(|&a| Some((a, at(a)?))).collect();
-            // Each entry has (arc length, azimuth) along the segment.
-            let mut arc = 0.0;
-            let mut along = Vec::with_capacity(points.len());
-            for (i, (azimuth, p)) in points.iter().enumerate() {
-                if let Some((_, before)) = i.checked_sub(1).and_then(|j| points.get(j)) {
-                    arc += (p.u - before.u).hypot(p.v - before.v);
-                }
-                along.push((arc, *azimuth));
-            }
-            let count = arc.round().clamp(1.0, MOST_POINTS);
-            let spacing = arc / count;
-            let mut place = along.windows(2);
-            let mut segment = place.next();
-            for i in 0..count as usize {
-                let target = (i as f64 + 0.5) * spacing;
-                while segment.is_some_and(|s| s[1].0 < target) {
-                    segment = place.next();
-                }
-                let Some([(a0, phi0), (a1, phi1)]) = segment else { break };
-                let azimuth = phi0 + (phi1 - phi0) * (target - a0) / (a1 - a0).max(1e-12);
-                if let Some(point) = at(azimuth) {
-                    stations.push(Station { point, step_px: (i > 0).then_some(spacing) });
-                }
-            }
-        }
-        stations
-    }
-}
-
-/// Returns the visible ranges of azimuth as rising azimuths in radians. Bisection locates their ends.
-fn pieces(at: &impl Fn(f64) -> Option<ImagePoint<f64>>) -> Vec<Vec<f64>> {
-    let azimuth = |i: usize| TAU * i as f64 / STEPS as f64;
-    let seen: Vec<bool> = (0..STEPS).map(|i| at(azimuth(i)).is_some()).collect();
-    let Some(start) = seen.iter().position(|s| !s) else {
-        return vec![(0..=STEPS).map(azimuth).collect()];
-    };
-    let end = |mut inside: f64, mut outside: f64| {
-        for _ in 0..40 {
-            let mid = 0.5 * (inside + outside);
-            if at(mid).is_some() { inside = mid } else { outside = mid }
-        }
-        inside
-    };
-    let mut out = Vec::new();
-    let mut piece: Vec<f64> = Vec::new();
-    for i in start..start + STEPS {
-        let (here, next) = (seen[i % STEPS], seen[(i + 1) % STEPS]);
-        if !here && next {
-            piece.push(end(azimuth(i + 1), azimuth(i)));
-        }
-        if next {
-            piece.push(azimuth(i + 1));
-        } else if here {
-            piece.push(end(azimuth(i), azimuth(i + 1)));
-            out.push(core::mem::take(&mut piece));
-        }
-    }
-    out
 }

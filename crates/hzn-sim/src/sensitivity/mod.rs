@@ -3,15 +3,17 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`design`] | camera, body and position; the limb as points one pixel apart |
+//! | [`design`] | camera, body and position |
+//! | `limb_samples` | the limb in view as points one pixel apart |
 //! | [`sigmas`] | the covariance of these points with correlated errors |
 //! | [`mod@reference`] | published results, computed independently of this program |
 //! | [`chart`] | the conic that is seen from each altitude; the error of a spherical Earth |
 
 pub mod chart;
 pub mod design;
+mod limb_samples;
 pub mod reference;
 pub mod sigmas;
 
 pub use design::{Design, DesignError};
-pub use sigmas::{Sigmas, Tilt};
+pub use sigmas::{DirectionSigmas, Sigmas};

@@ -9,11 +9,12 @@ use hzn_core::camera::{Camera, Model};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use serde::Serialize;
 
-use super::design::{Design, Station};
+use super::design::{Design, DesignError};
+use super::limb_samples::LimbSample;
 
 /// Standard deviations of a direction in degrees (1 sigma).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Tilt {
+pub struct DirectionSigmas {
     /// Sigma in the plane of optical axis and body: the pitch of a camera that looks along the horizon.
     pub pitch_deg: f64,
     /// Sigma across that plane: the roll about the optical axis of a camera that looks along the horizon.
@@ -28,15 +29,15 @@ pub struct Sigmas {
     /// Length of limb in the picture, in pixels.
     pub limb_px: f64,
     /// Sigmas with a fitted half-angle.
-    pub free: Tilt,
+    pub free: DirectionSigmas,
     /// Sigmas with the fitted half-angle fused with the half-angle from altitude and limb height, by their sigmas. `hzn
     /// run` reports these.
-    pub fused: Tilt,
+    pub fused: DirectionSigmas,
     /// Sigmas with an exactly known half-angle.
-    pub known: Tilt,
+    pub known: DirectionSigmas,
     /// Sigmas by equation 33 of Braun & Barf 2022 (unweighted least squares in the plane of a pinhole picture); `None`
     /// for other lenses.
-    pub braun_barf: Option<Tilt>,
+    pub braun_barf: Option<DirectionSigmas>,
     /// The overbound of their equation 37: one sigma for every direction.
     pub braun_barf_bound_deg: Option<f64>,
 }
@@ -62,14 +63,22 @@ fn correlated<const N: usize>(rows: &[Row<N>]) -> SMatrix<f64, N, N> {
     x
 }
 
+impl Design {
+    /// Returns the sigmas of this design; `None` if the limb in view is too short for a direction, or if there is none.
+    ///
+    /// # Errors
+    /// Fails if the camera is invalid or not above the limb.
+    pub fn sigmas(&self) -> Result<Option<Sigmas>, DesignError> {
+        let half_angle_rad = self.half_angle_rad()?;
+        let camera = Camera::try_new(&self.camera)?;
+        let samples = self.sample_limb(&camera, half_angle_rad);
+        Ok(Sigmas::new(self, &camera, half_angle_rad, &samples))
+    }
+}
+
 impl Sigmas {
     /// Returns `None` if the points do not determine a direction with a free half-angle.
-    pub(super) fn new(
-        design: &Design,
-        camera: &Camera<f64>,
-        half_angle_rad: f64,
-        stations: &[Station],
-    ) -> Option<Self> {
+    fn new(design: &Design, camera: &Camera<f64>, half_angle_rad: f64, samples: &[LimbSample]) -> Option<Self> {
         let e = Vector3::from(design.axis());
         // `tilt` points towards the optical axis and `across` is perpendicular to it. If the camera looks straight
         // down, any plane is suitable.
@@ -77,26 +86,26 @@ impl Sigmas {
         let tilt = (z - e * e.z).try_normalize(1e-9).unwrap_or_else(|| (Vector3::y() - e * e.y).normalize());
         let across = e.cross(&tilt);
         let variance = design.sigma_px * design.sigma_px;
-        let rho = |s: &Station| match s.step_px {
+        let rho = |s: &LimbSample| match s.step_px {
             Some(step) if design.correlation_px > 0.0 => (-step / design.correlation_px).exp(),
             _ => 0.0,
         };
-        let mut rows = Vec::with_capacity(stations.len());
+        let mut rows = Vec::with_capacity(samples.len());
         let mut normal = Matrix3::zeros();
         let mut plane = Plane::default();
         let is_pinhole = design.camera.model == Model::Pinhole;
-        for station in stations {
-            let ray = camera.ray(station.point)?;
+        for sample in samples {
+            let ray = camera.ray(sample.point)?;
             let s = Vector3::from(ray.direction().xyz());
             let j = ray.jacobian();
-            let by = |column: usize| (0..3).map(|i| j[i][column] * e[i]).sum::<f64>();
-            let g = Vector2::new(by(0), by(1));
+            let derivative = |column: usize| (0..3).map(|i| j[i][column] * e[i]).sum::<f64>();
+            let g = Vector2::new(derivative(0), derivative(1));
             let w = 1.0 / g.norm_squared().max(1e-300);
             let h = Vector3::new(tilt.dot(&s), across.dot(&s), -1.0);
             normal += h * h.transpose() * w;
-            rows.push(Row { q: h * w, g, rho: rho(station) });
+            rows.push(Row { q: h * w, g, rho: rho(sample) });
             if is_pinhole {
-                plane.add(&s, &e, half_angle_rad.cos(), design.camera.fx_px, rho(station));
+                plane.add(&s, &e, half_angle_rad.cos(), design.camera.fx_px, rho(sample));
             }
         }
         let x = correlated(&rows) * variance;
@@ -107,16 +116,17 @@ impl Sigmas {
         let known = n2 * x.fixed_view::<2, 2>(0, 0) * n2;
         let k = free.column(2) / (free[(2, 2)] + Self::variance_cos(design, half_angle_rad));
         let fused = free - k * free.row(2);
-        let tilt_of = |p: Matrix2<f64>| Tilt { pitch_deg: root_deg(p.m11), roll_deg: root_deg(p.m22) };
+        let direction_sigmas =
+            |p: Matrix2<f64>| DirectionSigmas { pitch_deg: root_deg(p.m11), roll_deg: root_deg(p.m22) };
         let upper = |p: Matrix3<f64>| p.fixed_view::<2, 2>(0, 0).into_owned();
         let paper = is_pinhole.then(|| plane.covariance(variance)).flatten();
         let sigmas = Self {
             half_angle_deg: half_angle_rad.to_degrees(),
-            limb_px: stations.len() as f64 * stations.iter().find_map(|s| s.step_px).unwrap_or(1.0),
-            free: tilt_of(upper(free)),
-            fused: tilt_of(upper(fused)),
-            known: tilt_of(known),
-            braun_barf: paper.map(|p| Tilt {
+            limb_px: samples.len() as f64 * samples.iter().find_map(|s| s.step_px).unwrap_or(1.0),
+            free: direction_sigmas(upper(free)),
+            fused: direction_sigmas(upper(fused)),
+            known: direction_sigmas(known),
+            braun_barf: paper.map(|p| DirectionSigmas {
                 pitch_deg: root_deg(tilt.dot(&(p * tilt))),
                 roll_deg: root_deg(across.dot(&(p * across))),
             }),

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::Path;
+use super::path::Path;
 use crate::counter::{Counter, Stream};
 
 /// An inertial measurement unit in the vehicle's axes.
@@ -114,15 +114,16 @@ fn times(rate_hz: f64, [from_s, to_s]: [f64; 2]) -> impl Iterator<Item = (u64, f
 impl Imu {
     /// Fails for the first value that is out of its limits.
     pub(crate) fn check(&self) -> Result<(), (String, String)> {
+        let rate_is_valid = self.rate_hz > 0.0 && self.rate_hz <= 10_000.0;
         let all = [
-            ("rate_hz", self.rate_hz, self.rate_hz > 0.0 && self.rate_hz <= 10_000.0),
-            ("gyro_range_deg_s", self.gyro_range_deg_s, self.gyro_range_deg_s > 0.0),
-            ("accel_range_mps2", self.accel_range_mps2, self.accel_range_mps2 > 0.0),
-            ("gyro_noise_deg_s", self.gyro_noise_deg_s, self.gyro_noise_deg_s >= 0.0),
-            ("accel_noise_mps2", self.accel_noise_mps2, self.accel_noise_mps2 >= 0.0),
+            ("rate_hz", self.rate_hz, rate_is_valid, "above 0, at most 10000"),
+            ("gyro_range_deg_s", self.gyro_range_deg_s, self.gyro_range_deg_s > 0.0, "above 0"),
+            ("accel_range_mps2", self.accel_range_mps2, self.accel_range_mps2 > 0.0, "above 0"),
+            ("gyro_noise_deg_s", self.gyro_noise_deg_s, self.gyro_noise_deg_s >= 0.0, "0 or more"),
+            ("accel_noise_mps2", self.accel_noise_mps2, self.accel_noise_mps2 >= 0.0, "0 or more"),
         ];
-        match all.into_iter().find(|(_, _, ok)| !ok) {
-            Some((key, value, _)) => Err((format!("[imu] {key}"), format!("{value} is refused: must be above 0"))),
+        match all.into_iter().find(|(.., is_valid, _)| !is_valid) {
+            Some((key, value, _, rule)) => Err((format!("[imu] {key}"), format!("{value} is refused: must be {rule}"))),
             None => Ok(()),
         }
     }
@@ -138,7 +139,7 @@ impl Imu {
             let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
             let first = 6 + 6 * i;
             let mut saturated = false;
-            let mut say = |truth: Vector3<f64>, first: u64, noise: f64, step: f64, range: f64| -> [f64; 3] {
+            let mut measure = |truth: Vector3<f64>, first: u64, noise: f64, step: f64, range: f64| -> [f64; 3] {
                 core::array::from_fn(|a| {
                     let value = truth[a] + noise * draws.normal(first + a as u64);
                     let stepped = if step > 0.0 { (value / step).round() * step } else { value };
@@ -146,7 +147,7 @@ impl Imu {
                     stepped.clamp(-range, range)
                 })
             };
-            let gyro = say(
+            let gyro = measure(
                 state.rate_radps + gyro_bias,
                 first,
                 rad(imu.gyro_noise_deg_s),
@@ -154,7 +155,7 @@ impl Imu {
                 rad(imu.gyro_range_deg_s),
             );
             let accel =
-                say(force + accel_bias, first + 3, imu.accel_noise_mps2, imu.accel_step_mps2, imu.accel_range_mps2);
+                measure(force + accel_bias, first + 3, imu.accel_noise_mps2, imu.accel_step_mps2, imu.accel_range_mps2);
             ImuRow {
                 time_s,
                 gyro_x_radps: gyro[0],
@@ -213,8 +214,8 @@ mod tests {
         let path = rocket();
         assert!((path.state(50.0).rate_radps.x / (3.0 * core::f64::consts::TAU) - 1.0).abs() < 0.01);
         let limit = 0.9f64.to_radians() * 1.1;
-        let most = (60..430).map(|t| path.state(f64::from(t)).rate_radps.amax()).fold(0.0, f64::max);
-        assert!(most < limit && most > 0.4 * limit, "{most}");
+        let largest = (60..430).map(|t| path.state(f64::from(t)).rate_radps.amax()).fold(0.0, f64::max);
+        assert!(largest < limit && largest > 0.4 * limit, "{largest}");
         // Under thrust the force is along the vehicle, except for the angle `cone_deg`.
         let state = path.state(30.0);
         let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
@@ -236,7 +237,7 @@ mod tests {
         let mut q = path.state(70.0).body_to_ecef;
         for row in exact.rows(&path, [start, start + 9.999], 1) {
             let w = Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps);
-            let earth = q.inverse_transform_vector(&Vector3::new(0.0, 0.0, crate::trajectory::EARTH_RATE));
+            let earth = q.inverse_transform_vector(&Vector3::new(0.0, 0.0, crate::trajectory::earth::EARTH_RATE));
             q *= nalgebra::UnitQuaternion::from_scaled_axis((w - earth) * 1e-3);
         }
         let off = q.angle_to(&path.state(80.0).body_to_ecef);
@@ -273,7 +274,7 @@ mod tests {
             let s = path.state(t);
             assert_eq!(s.specific_force_mps2.norm(), 0.0);
             let body = Vector3::from(tumble.inertia).component_mul(&s.rate_radps);
-            crate::trajectory::from_ecef(path.sidereal_rad(t), &(s.body_to_ecef * body))
+            crate::trajectory::earth::from_ecef(path.sidereal_rad(t), &(s.body_to_ecef * body))
         };
         let (a, b) = (momentum(0.0), momentum(600.0));
         assert!((a - b).norm() < 1e-3 * a.norm(), "{a} {b}");

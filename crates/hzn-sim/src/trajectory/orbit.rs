@@ -6,7 +6,8 @@ use core::f64::consts::TAU;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{EARTH_RATE, MU, Point, to_ecef};
+use super::earth::{EARTH_RATE, MU, to_ecef};
+use super::point::Point;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 use hzn_nav::ephemeris;
 
@@ -84,7 +85,7 @@ impl Ellipse {
         })
     }
 
-    pub(crate) fn at(&self, time_s: f64) -> Point {
+    pub(crate) fn point(&self, time_s: f64) -> Point {
         let (e, a) = (self.eccentricity, self.semi_axis_m);
         let mean = (self.mean_anomaly_rad + self.rate_radps * time_s).rem_euclid(TAU);
         // Newton's steps solve Kepler's equation. From this start they converge for every ellipse.
@@ -115,15 +116,15 @@ mod tests {
         let orbit = Orbit { perigee_km: 500.0, apogee_km: Some(39_000.0), inclination_deg: 63.4, ..Orbit::default() };
         let ellipse = Ellipse::try_new(&orbit, 1.6e9).unwrap();
         let period_s = TAU / ellipse.rate_radps;
-        assert!((ellipse.at(0.0).position_m.norm() - 6.871_008_8e6).abs() < 1.0);
-        assert!((ellipse.at(period_s / 2.0).position_m.norm() - 45.371_008_8e6).abs() < 1.0);
+        assert!((ellipse.point(0.0).position_m.norm() - 6.871_008_8e6).abs() < 1.0);
+        assert!((ellipse.point(period_s / 2.0).position_m.norm() - 45.371_008_8e6).abs() < 1.0);
         for i in 0..20 {
-            let p = ellipse.at(period_s * f64::from(i) / 20.0);
+            let p = ellipse.point(period_s * f64::from(i) / 20.0);
             let v = p.velocity_mps + Vector3::new(0.0, 0.0, EARTH_RATE).cross(&p.position_m);
             let energy = 0.5 * v.norm_squared() - MU / p.position_m.norm();
             assert!((energy / (-MU / (2.0 * ellipse.semi_axis_m)) - 1.0).abs() < 1e-9);
         }
-        let d = (ellipse.at(100.01).position_m - ellipse.at(99.99).position_m) / 0.02;
-        assert!((d - ellipse.at(100.0).velocity_mps).norm() < 1e-3);
+        let d = (ellipse.point(100.01).position_m - ellipse.point(99.99).position_m) / 0.02;
+        assert!((d - ellipse.point(100.0).velocity_mps).norm() < 1e-3);
     }
 }

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{EARTH_RATE, Point, from_ecef, gravity, to_ecef};
+use super::earth::{EARTH_RATE, from_ecef, gravity, to_ecef};
+use super::point::Point;
 use crate::globe::Globe;
 use crate::pose::position_m;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M};
@@ -131,8 +132,8 @@ impl Ascent {
                 steps.push([x, v, force(t, &x, &v)]);
             }
             // Two more seconds are kept for the interpolation.
-            let over = if to_s.is_finite() { t > to_s + 2.0 } else { t > 60.0 && altitude < highest };
-            if over || (t > 60.0 && altitude < 0.0) {
+            let is_over = if to_s.is_finite() { t > to_s + 2.0 } else { t > 60.0 && altitude < highest };
+            if is_over || (t > 60.0 && altitude < 0.0) {
                 return (steps, highest);
             }
             // The integration is a Runge-Kutta method of fourth order.
@@ -150,7 +151,7 @@ impl Ascent {
 
     /// Interpolates between two steps. The position follows Hermite's cubic, which matches position and velocity at
     /// both steps. Velocity and specific force are linear.
-    pub(crate) fn at(&self, time_s: f64) -> Point {
+    pub(crate) fn point(&self, time_s: f64) -> Point {
         let place = (time_s / STEP_S).clamp(0.0, (self.steps.len().saturating_sub(2)) as f64);
         let i = place as usize;
         let s = place - i as f64;
@@ -175,7 +176,7 @@ impl Ascent {
 
     /// Returns the unit direction of the velocity through the air (ECEF) at a time; before 8 s, the direction at 8 s.
     pub(crate) fn forward(&self, time_s: f64) -> Vector3<f64> {
-        let p = self.at(time_s.max(8.0));
+        let p = self.point(time_s.max(8.0));
         p.velocity_mps.normalize()
     }
 }
@@ -188,16 +189,16 @@ mod tests {
     fn as_high_as_asked_for_and_free_in_between() {
         let ascent = Ascent::try_new(&Rocket::default(), 430.0, 1_560_421_800.0).unwrap();
         let globe = Globe { a_m: WGS84_A_M, b_m: WGS84_B_M };
-        let altitude_km = |t: f64| globe.altitude_m(ascent.at(t).position_m.into()) / 1e3;
+        let altitude_km = |t: f64| globe.altitude_m(ascent.point(t).position_m.into()) / 1e3;
         let highest = (0..4300).map(|i| altitude_km(f64::from(i) * 0.1)).fold(0.0, f64::max);
         assert!((highest - 238.0).abs() < 0.05, "{highest}");
         // The published coast is T+60 s to T+430 s, above about 70 to 80 km.
         assert!((60.0..95.0).contains(&altitude_km(60.0)) && (60.0..95.0).contains(&altitude_km(430.0)));
-        assert_eq!(ascent.at(100.0).specific_force_mps2.norm(), 0.0);
-        assert!(ascent.at(20.0).specific_force_mps2.norm() > 20.0);
+        assert_eq!(ascent.point(100.0).specific_force_mps2.norm(), 0.0);
+        assert!(ascent.point(20.0).specific_force_mps2.norm() > 20.0);
         // The velocity is the derivative of the position.
-        let d = (ascent.at(200.01).position_m - ascent.at(199.99).position_m) / 0.02;
-        assert!((d - ascent.at(200.0).velocity_mps).norm() < 1e-3);
+        let d = (ascent.point(200.01).position_m - ascent.point(199.99).position_m) / 0.02;
+        assert!((d - ascent.point(200.0).velocity_mps).norm() < 1e-3);
     }
 
     #[test]

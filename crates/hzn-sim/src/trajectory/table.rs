@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::Point;
+use super::earth::{EARTH_RATE, gravity};
+use super::point::Point;
 
 /// Rows of a CSV file with the columns `time_s, x_km, y_km, z_km` (ECEF). For `attitude = "table"` it also has
 /// `qw, qx, qy, qz` (camera to ECEF). Between rows, positions follow a smooth cubic and attitudes the shortest turn.
@@ -43,10 +44,10 @@ impl Table {
         Ok(())
     }
 
-    pub(crate) fn rows(&self, [from_s, to_s]: [f64; 2]) -> Result<TableRows, (String, String)> {
+    pub(crate) fn parse_rows(&self, [from_s, to_s]: [f64; 2]) -> Result<TableRows, (String, String)> {
         let file = self.file.display();
         let wrong = |what: String| ("[trajectory] table.file".to_owned(), format!("{file}: {what}"));
-        let text = self.text.as_deref().ok_or_else(|| wrong("was not read".into()))?;
+        let text = self.text.as_deref().ok_or_else(|| wrong("has not been read".into()))?;
         let mut reader =
             csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
         let mut points: Vec<(f64, Vector3<f64>)> = Vec::new();
@@ -71,18 +72,19 @@ impl Table {
                     turns.push(UnitQuaternion::from_quaternion(q));
                 }
                 [None, None, None, None] => {}
-                _ => return Err(wrong(format!("row {line}: qw, qx, qy, qz belong together"))),
+                _ => return Err(wrong(format!("row {line}: give all of qw, qx, qy, qz or none"))),
             }
         }
         if points.len() < 2 {
-            return Err(wrong("needs two rows or more".into()));
+            return Err(wrong("must have two rows or more".into()));
         }
         if !turns.is_empty() && turns.len() != points.len() {
-            return Err(wrong("some rows have an attitude and some have none".into()));
+            return Err(wrong("some rows have an attitude and others do not".into()));
         }
         let (first, last) = (points[0].0, points[points.len() - 1].0);
         if from_s < first || to_s > last {
-            let what = format!("the pictures from {from_s} s to {to_s} s reach beyond {file}: {first} s to {last} s");
+            let what =
+                format!("the pictures are from {from_s} s to {to_s} s, but {file} covers only {first} s to {last} s");
             return Err(("[capture]".into(), what));
         }
         Ok(TableRows { points, turns })
@@ -102,7 +104,7 @@ impl TableRows {
     }
 
     /// Returns the row before a time, and the position between this row and the next one, 0 to 1.
-    fn place(&self, time_s: f64) -> (usize, f64) {
+    fn bracket(&self, time_s: f64) -> (usize, f64) {
         let i = self.points.partition_point(|p| p.0 <= time_s).clamp(1, self.points.len() - 1) - 1;
         let (t0, t1) = (self.points[i].0, self.points[i + 1].0);
         (i, ((time_s - t0) / (t1 - t0)).clamp(0.0, 1.0))
@@ -124,7 +126,7 @@ impl TableRows {
     }
 
     pub(crate) fn point(&self, time_s: f64) -> Point {
-        let (i, s) = self.place(time_s);
+        let (i, s) = self.bracket(time_s);
         let h = self.points[i + 1].0 - self.points[i].0;
         let (x0, x1, v0, v1) = (self.points[i].1, self.points[i + 1].1, self.velocity(i), self.velocity(i + 1));
         let position_m = x0 * ((1.0 + 2.0 * s) * (1.0 - s) * (1.0 - s))
@@ -134,13 +136,13 @@ impl TableRows {
         let velocity_mps = v0 + (v1 - v0) * s;
         // The specific force is the acceleration without gravity. It follows from the change of the velocity in the
         // rotating frame.
-        let earth = Vector3::new(0.0, 0.0, super::EARTH_RATE);
+        let earth = Vector3::new(0.0, 0.0, EARTH_RATE);
         let acceleration = (v1 - v0) / h + earth.cross(&velocity_mps) * 2.0 + earth.cross(&earth.cross(&position_m));
-        Point { position_m, velocity_mps, specific_force_mps2: acceleration - super::gravity(&position_m) }
+        Point { position_m, velocity_mps, specific_force_mps2: acceleration - gravity(&position_m) }
     }
 
     pub(crate) fn camera_to_ecef(&self, time_s: f64) -> UnitQuaternion<f64> {
-        let (i, s) = self.place(time_s);
+        let (i, s) = self.bracket(time_s);
         match (self.turns.get(i), self.turns.get(i + 1)) {
             (Some(a), Some(b)) => a.try_slerp(b, s, 1e-9).unwrap_or(*a),
             _ => UnitQuaternion::identity(),
@@ -153,7 +155,7 @@ mod tests {
     use super::*;
 
     fn rows(text: &str) -> Result<TableRows, (String, String)> {
-        Table { file: "way.csv".into(), text: Some(text.into()) }.rows([0.0, 2.0])
+        Table { file: "way.csv".into(), text: Some(text.into()) }.parse_rows([0.0, 2.0])
     }
 
     #[test]
@@ -169,7 +171,7 @@ mod tests {
     fn what_is_wrong_is_named() {
         let error = |text: &str| rows(text).unwrap_err().1;
         assert!(error("time_s,x_km,y_km,z_km\n0,7000,0,0\n0,7000,0,0\n").contains("row 3: time_s must rise"));
-        assert!(error("time_s,x_km,y_km,z_km\n0,7000,0,0\n1,7000,0,0\n").contains("reach beyond way.csv"));
+        assert!(error("time_s,x_km,y_km,z_km\n0,7000,0,0\n1,7000,0,0\n").contains("way.csv covers only 0 s to 1 s"));
         assert!(error("time_s,x_km,y_km\n0,7000,0\n").contains("z_km"));
     }
 }

@@ -32,8 +32,8 @@ impl Air {
     pub fn half_height_km(&self, weights: [f64; 3], radius_km: f64) -> f64 {
         let chord = 2.0 * self.grazing(radius_km);
         let bright = |h_km: f64| -> f64 {
-            let thin = libm::exp(-h_km / self.scale_height_km);
-            (0..3).map(|c| weights[c] * (1.0 - libm::exp(-self.optical_depth[c] * chord * thin))).sum()
+            let density_ratio = libm::exp(-h_km / self.scale_height_km);
+            (0..3).map(|c| weights[c] * (1.0 - libm::exp(-self.optical_depth[c] * chord * density_ratio))).sum()
         };
         let (mut low, mut high) = (-100.0, 200.0);
         for _ in 0..60 {
@@ -46,7 +46,7 @@ impl Air {
 
 /// [`Air`] around one globe, prepared for rendering.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Prepared {
+pub(crate) struct PreparedAir {
     depth: [f32; 3],
     per_m: f32,
     pub(crate) brightness: f32,
@@ -58,7 +58,7 @@ pub(crate) struct Prepared {
     pub(crate) top_m: f64,
 }
 
-impl Prepared {
+impl PreparedAir {
     pub(crate) fn new(air: &Air, radius_m: f64) -> Self {
         let scale_m = air.scale_height_km.max(1e-3) * 1e3;
         Self {
@@ -83,45 +83,52 @@ impl Prepared {
 
     /// Returns the transmission of a ray with this optical depth, by channel.
     #[inline(always)]
-    pub(crate) fn clear(depth: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn transmission(depth: [f32; 3]) -> [f32; 3] {
         depth.map(|d| libm::expf(-d))
     }
 
     /// Returns the optical depth of a ray that passes at a tangent height, by channel.
     #[inline(always)]
-    pub(crate) fn past(&self, height_m: f32) -> [f32; 3] {
-        let thin = 2.0 * self.grazing * libm::expf(-height_m * self.per_m);
-        self.depth.map(|d| d * thin)
+    pub(crate) fn limb_depth(&self, height_m: f32) -> [f32; 3] {
+        let path = 2.0 * self.grazing * libm::expf(-height_m * self.per_m);
+        self.depth.map(|d| d * path)
     }
 
     /// Returns the optical depth of a ray that meets the ground at this cosine of the zenith angle, by channel.
     #[inline(always)]
-    pub(crate) fn down(&self, mu: f32) -> [f32; 3] {
+    pub(crate) fn ground_depth(&self, mu: f32) -> [f32; 3] {
         let path = 1.0 / (mu * mu + 1.0 / (self.grazing * self.grazing)).sqrt();
         self.depth.map(|d| d * path)
     }
 
-    /// Returns the sunlight at a height as a fraction of the sunlight in space, by channel. `thin` is exp(−height/scale
-    /// height).
+    /// Returns the sunlight at a height as a fraction of the sunlight in space, by channel. `density_ratio` is
+    /// exp(−height/scale height).
     #[inline(always)]
-    pub(crate) fn sunlight(&self, sun_path: f32, thin: f32) -> [f32; 3] {
-        self.depth.map(|d| libm::expf(-(d * thin * sun_path).min(60.0)))
+    pub(crate) fn sunlight(&self, sun_path: f32, density_ratio: f32) -> [f32; 3] {
+        self.depth.map(|d| libm::expf(-(d * density_ratio * sun_path).min(60.0)))
     }
 
     /// Returns exp(−height/scale height).
     #[inline(always)]
-    pub(crate) fn thin(&self, height_m: f32) -> f32 {
+    pub(crate) fn density_ratio(&self, height_m: f32) -> f32 {
         libm::expf(-height_m.max(0.0) * self.per_m)
     }
 
-    /// Returns the light that the air along a ray of this optical depth sends to the camera; `clear` = exp(−depth) is
-    /// the transmission of the ray. The light of optically thick air comes from its upper part, where the density is
-    /// lower by 1 + depth.
+    /// Returns the light that the air along a ray of this optical depth sends to the camera; `transmission` is
+    /// exp(−depth). The light of optically thick air comes from its upper part, where the density is lower by
+    /// 1 + depth.
     #[inline(always)]
-    pub(crate) fn glow(&self, depth: [f32; 3], clear: [f32; 3], thin: f32, sun_path: f32, phase: f32) -> [f32; 3] {
+    pub(crate) fn glow(
+        &self,
+        depth: [f32; 3],
+        transmission: [f32; 3],
+        density_ratio: f32,
+        sun_path: f32,
+        phase: f32,
+    ) -> [f32; 3] {
         core::array::from_fn(|c| {
-            let sun = libm::expf(-(self.depth[c] * thin / (1.0 + depth[c]) * sun_path).min(60.0));
-            self.brightness * phase * sun * (1.0 - clear[c])
+            let sun = libm::expf(-(self.depth[c] * density_ratio / (1.0 + depth[c]) * sun_path).min(60.0));
+            self.brightness * phase * sun * (1.0 - transmission[c])
         })
     }
 }
@@ -143,9 +150,9 @@ mod tests {
 
     #[test]
     fn the_sun_sets_red_and_then_goes_out() {
-        let air = Prepared::new(&Air::default(), 6.371e6);
-        let at = |deg: f64| air.sunlight(air.sun_path(libm::sin(deg.to_radians()) as f32), 1.0);
-        let (noon, low, night) = (at(90.0), at(2.0), at(-4.0));
+        let air = PreparedAir::new(&Air::default(), 6.371e6);
+        let sunlight = |deg: f64| air.sunlight(air.sun_path(libm::sin(deg.to_radians()) as f32), 1.0);
+        let (noon, low, night) = (sunlight(90.0), sunlight(2.0), sunlight(-4.0));
         assert!((noon[1] - (-0.097f32).exp()).abs() < 1e-3);
         assert!(low[0] > 2.0 * low[1] && low[1] > 2.0 * low[2]);
         assert!(night.iter().all(|&x| x < 1e-6));

@@ -10,7 +10,7 @@ use super::Visible;
 use super::shade::Shader;
 use crate::counter::{Counter, Stream};
 use crate::optics::{GHOSTS, Optics};
-use crate::texture::{Drawn, Relief, smoothstep};
+use crate::texture::{CellCache, Relief, smoothstep};
 
 /// Number of rays along each side of a pixel of a disc.
 const SAMPLES: i32 = 4;
@@ -48,7 +48,7 @@ struct Disc {
 
 impl Disc {
     /// Returns two unit vectors perpendicular to the centre and to each other.
-    fn across(&self) -> [Vector3<f64>; 2] {
+    fn perpendicular(&self) -> [Vector3<f64>; 2] {
         let helper = if self.centre.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
         let a = self.centre.cross(&helper).normalize();
         [a, self.centre.cross(&a)]
@@ -63,17 +63,17 @@ impl Shader {
     }
 
     /// Returns the share of the Sun's light that passes the Earth and its air, by channel.
-    pub(crate) fn sun_left(&self) -> [f32; 3] {
+    pub(crate) fn sun_transmission(&self) -> [f32; 3] {
         let Some(centre) = self.view.to_camera(self.sun) else { return [0.0; 3] };
         let disc = Disc { centre: centre.xyz().into(), half_angle: SUN_RADIUS_KM / AU_KM };
-        let [a, b] = disc.across();
+        let [a, b] = disc.perpendicular();
         let mut sum = [0.0f32; 3];
         for i in 0..16 {
             let r = disc.half_angle * ((f64::from(i) + 0.5) / 16.0).sqrt();
             let (sin, cos) = libm::sincos(2.399_963 * f64::from(i));
-            let left = self.through(&(disc.centre + (a * cos + b * sin) * r).normalize());
+            let transmission = self.transmission(&(disc.centre + (a * cos + b * sin) * r).normalize());
             for c in 0..3 {
-                sum[c] += left[c] / 16.0;
+                sum[c] += transmission[c] / 16.0;
             }
         }
         sum
@@ -97,14 +97,14 @@ impl Shader {
         let Some(sun) = self.view.to_camera(self.sun) else { return };
         let disc = Disc { centre: centre.xyz().into(), half_angle: libm::asin(MOON_RADIUS_KM * 1e3 / to.norm()) };
         let sun = Vector3::from(sun.xyz());
-        let mut drawn = Drawn::default();
+        let mut cache = CellCache::default();
         let maria = Relief::new([1500.0, 60.0], 0.6, MOON_RADIUS_KM * 1e3, 5);
-        let [a, b] = disc.across();
+        let [a, b] = disc.perpendicular();
         self.draw_disc(canvas, weight, &disc, |[x, y], r2| {
             let depth = (1.0 - r2).max(0.0).sqrt();
             let normal = a * x + b * y - disc.centre * depth;
             let (mu0, mu) = (normal.dot(&sun).max(0.0) as f32, depth as f32);
-            let dark = smoothstep((0.5 + 0.4 * maria.at(&normal, 20.0, &mut drawn)).clamp(0.0, 1.0));
+            let dark = smoothstep((0.5 + 0.4 * maria.sample(&normal, 20.0, &mut cache)).clamp(0.0, 1.0));
             let albedo = MOON[0] + (MOON[1] - MOON[0]) * dark;
             // This is the law of Lommel and Seeliger: a full moon is not darker towards its limb.
             let light = albedo * 2.0 * mu0 / (mu0 + mu + 1e-3);
@@ -119,7 +119,7 @@ impl Shader {
         disc: &Disc,
         mut light: impl FnMut([f64; 2], f64) -> [f32; 3],
     ) {
-        let [a, b] = disc.across();
+        let [a, b] = disc.perpendicular();
         let rim: Vec<ImagePoint<f64>> = (0..16)
             .filter_map(|i| {
                 let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(i) / 16.0);
@@ -150,9 +150,9 @@ impl Shader {
                     if r2 >= 1.0 || behind {
                         continue;
                     }
-                    let (light, left) = (light(across, r2), self.through(&s));
+                    let (light, transmission) = (light(across, r2), self.transmission(&s));
                     for c in 0..3 {
-                        sum[c] += weight * light[c] * left[c] / (SAMPLES * SAMPLES) as f32;
+                        sum[c] += weight * light[c] * transmission[c] / (SAMPLES * SAMPLES) as f32;
                     }
                 }
                 canvas.add(x, y, sum);
@@ -172,13 +172,13 @@ impl Shader {
             let Some(p) = self.camera().project(&cam) else { continue };
             // The stars are evenly distributed over five magnitudes.
             let light = weight * world.star_brightness as f32 * libm::exp(-4.6 * c) as f32;
-            let left = self.through(&cam.xyz().into()).map(|l| l * light);
+            let transmission = self.transmission(&cam.xyz().into()).map(|l| l * light);
             let (x, y) = (p.u.floor(), p.v.floor());
             let (fx, fy) = ((p.u - x) as f32, (p.v - y) as f32);
             for (dx, dy, part) in
                 [(0, 0, (1.0 - fx) * (1.0 - fy)), (1, 0, fx * (1.0 - fy)), (0, 1, (1.0 - fx) * fy), (1, 1, fx * fy)]
             {
-                canvas.add(x as i64 + dx, y as i64 + dy, left.map(|l| l * part));
+                canvas.add(x as i64 + dx, y as i64 + dy, transmission.map(|l| l * part));
             }
         }
     }
@@ -187,13 +187,13 @@ impl Shader {
     /// through the principal point.
     pub(crate) fn draw_glare(&self, canvas: &mut Canvas<'_>, optics: &Optics, hidden: bool) {
         let Some(direction) = self.view.to_camera(self.sun) else { return };
-        let left = self.sun_left();
+        let transmission = self.sun_transmission();
         // The light on the lens falls with the Sun's angle off the axis; a Sun behind the camera gives none.
         let on_lens = direction.xyz()[2].max(0.0) as f32;
-        if hidden || on_lens <= 0.0 || left.iter().all(|&l| l < 1e-4) {
+        if hidden || on_lens <= 0.0 || transmission.iter().all(|&l| l < 1e-4) {
             return;
         }
-        let veil = left.map(|l| l * on_lens * on_lens * optics.veil as f32);
+        let veil = transmission.map(|l| l * on_lens * on_lens * optics.veil as f32);
         let w = canvas.width;
         canvas.pixels.par_iter_mut().for_each(|p| {
             for c in 0..3 {
@@ -238,7 +238,7 @@ impl Shader {
                     }
                 }
                 for c in 0..3 {
-                    p[c] += light[c] * left[c];
+                    p[c] += light[c] * transmission[c];
                 }
             }
         });

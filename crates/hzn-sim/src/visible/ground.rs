@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::texture::{Drawn, Relief, smoothstep};
+use crate::texture::{CellCache, Relief, smoothstep};
 
 /// The ground without its clouds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -72,7 +72,7 @@ impl Texture {
     }
 
     /// Interpolates between four pixels; the longitude wraps around.
-    fn at(&self, lon_rad: f64, lat_rad: f64) -> [f32; 3] {
+    fn interpolate(&self, lon_rad: f64, lat_rad: f64) -> [f32; 3] {
         let u = (lon_rad / core::f64::consts::TAU + 0.5) * self.width as f64 - 0.5;
         let v = (0.5 - lat_rad / core::f64::consts::PI) * self.height as f64 - 0.5;
         let (x, y) = (u.floor(), v.floor());
@@ -124,22 +124,22 @@ impl Soil {
     }
 
     /// Returns the reflectance by channel and the share of open sea, at a point of the unit sphere with this normal.
-    pub(crate) fn at(
+    pub(crate) fn sample(
         &self,
         point: &Vector3<f64>,
         normal: &Vector3<f64>,
         footprint_km: f32,
-        [continents, plants]: &mut [Drawn; 2],
+        [continents, plants]: &mut [CellCache; 2],
     ) -> ([f32; 3], f32) {
         if let Some(texture) = &self.texture {
-            let colour = texture.at(libm::atan2(normal.y, normal.x), libm::asin(normal.z.clamp(-1.0, 1.0)));
+            let colour = texture.interpolate(libm::atan2(normal.y, normal.x), libm::asin(normal.z.clamp(-1.0, 1.0)));
             // Dark and blue ground counts as water.
             let sea =
                 ((colour[2] - 1.2 * colour[0]) * 20.0).clamp(0.0, 1.0) * ((0.25 - colour[0]) * 8.0).clamp(0.0, 1.0);
             return (colour, sea);
         }
-        let height = self.continents.at(point, footprint_km, continents) - self.sea_level;
-        let dry = self.plants.at(point, footprint_km, plants);
+        let height = self.continents.sample(point, footprint_km, continents) - self.sea_level;
+        let dry = self.plants.sample(point, footprint_km, plants);
         let sin_lat = normal.z.abs() as f32;
         // Deserts are under the descending air of the horse latitudes.
         let belt = 1.0 - ((sin_lat - 0.40).abs() * 5.0).min(1.0);
@@ -169,11 +169,11 @@ mod tests {
             })
         });
         let texture = Texture::new(&picture);
-        assert_eq!(texture.at(-1.5, 0.3), [1.0, 0.0, 0.0]);
-        assert_eq!(texture.at(1.5, 0.3), [0.0, 1.0, 0.0]);
-        assert_eq!(texture.at(0.5, -1.5), [0.0, 0.0, 1.0]);
+        assert_eq!(texture.interpolate(-1.5, 0.3), [1.0, 0.0, 0.0]);
+        assert_eq!(texture.interpolate(1.5, 0.3), [0.0, 1.0, 0.0]);
+        assert_eq!(texture.interpolate(0.5, -1.5), [0.0, 0.0, 1.0]);
         // The map wraps around at the date line.
-        let seam = texture.at(core::f64::consts::PI, 0.3);
+        let seam = texture.interpolate(core::f64::consts::PI, 0.3);
         assert!((seam[0] - 0.5).abs() < 1e-6 && (seam[1] - 0.5).abs() < 1e-6);
     }
 
@@ -188,7 +188,7 @@ mod tests {
                     let (s, c) = libm::sincos(f64::from(i) * 2.399_963);
                     let r = (1.0 - z * z).sqrt();
                     let p = Vector3::new(r * c, r * s, z);
-                    soil.at(&p, &p, 10.0, &mut Default::default()).1
+                    soil.sample(&p, &p, 10.0, &mut Default::default()).1
                 })
                 .sum();
             let share = 1.0 - f64::from(sea) / f64::from(n);

@@ -67,7 +67,7 @@ pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
         for i in 0..=18 {
             let latitude = 5.0 * f64::from(i);
             let refused = || usage(format!("--altitude: {km} km is not above the limb at {limb_height_km} km"));
-            rows.push((latitude, km, Vertical::at(latitude, km, limb_height_km).ok_or_else(refused)?));
+            rows.push((latitude, km, Vertical::from_position(latitude, km, limb_height_km).ok_or_else(refused)?));
         }
     }
     let mut table = Table::default();

@@ -10,7 +10,7 @@ use crate::texture::smoothstep;
 
 /// [`Light`], prepared for rendering.
 #[derive(Debug, Clone)]
-pub(super) enum Lamp {
+pub(super) enum PreparedLight {
     Full,
     Sun {
         direction: Vector3<f64>,
@@ -26,7 +26,7 @@ pub(super) enum Lamp {
     },
 }
 
-impl Lamp {
+impl PreparedLight {
     pub(super) fn try_new(scene: &Scene, globe: Globe) -> Result<Self, SceneError> {
         Ok(match scene.light {
             Light::Full => Self::Full,
@@ -44,7 +44,7 @@ impl Lamp {
 
     /// Returns the share of light that falls where the ray meets the body, 0 to 1.
     #[inline(always)]
-    pub(super) fn at(&self, view: &View, sight: &RayHit, point: &Vector3<f64>) -> f32 {
+    pub(super) fn share(&self, view: &View, hit: &RayHit, point: &Vector3<f64>) -> f32 {
         let x = match self {
             Self::Full => return 1.0,
             Self::Sun { direction, twilight_rad } => {
@@ -52,7 +52,7 @@ impl Lamp {
                 elevation / twilight_rad.max(1e-9)
             }
             Self::Sector { east, south, axis, centre_rad, half_width_rad, fade_rad } => {
-                let ray = view.direction(sight);
+                let ray = view.direction(hit);
                 let across = ray - axis * ray.dot(axis);
                 let off = libm::atan2(across.dot(south), across.dot(east)) - centre_rad;
                 let off = (off - core::f64::consts::TAU * (off / core::f64::consts::TAU).round()).abs();

@@ -1,0 +1,71 @@
+//! The truth about a scene: a row of truth.csv, and the file.
+
+mod file;
+mod row;
+mod scene;
+
+pub use file::{TruthError, load, parse};
+pub use row::Truth;
+pub use scene::LIMB_IN_VIEW_PX;
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::pose::{Look, Pose, position_m};
+    use crate::scene::{Light, Scene};
+    use hzn_core::camera::{Config, Model};
+
+    fn scene(look: Look) -> Scene {
+        Scene::new(Config::ideal(Model::Pinhole, 640, 480, 400.0), Pose::looking(position_m(0.0, 0.0, 200.0), look))
+    }
+
+    #[test]
+    fn a_table_is_read_back_and_wrong_cells_are_named() {
+        let rows = [scene(Look::default()).truth("a.png", 1.5).unwrap()];
+        let mut table = csv::Writer::from_writer(Vec::new());
+        rows.iter().for_each(|r| table.serialize(r).unwrap());
+        let text = String::from_utf8(table.into_inner().unwrap()).unwrap();
+        let path = Path::new("truth.csv");
+        let read = parse(&text, path).unwrap();
+        assert_eq!((read[0].file.as_str(), read[0].sun_x, read[0].axis_y), ("a.png", None, rows[0].axis_y));
+        let says = |text: &str| parse(text, path).unwrap_err().to_string();
+        assert_eq!(says(&text.replace(",1.5,", ",soon,")), "truth.csv:2: time_s: invalid float literal");
+        assert_eq!(says(&text.replace(",1.5,", ",nan,")), "truth.csv:2: time_s: NaN is not a finite number");
+        assert_eq!(
+            says(&text.replace("axis_x", "x")),
+            "truth.csv:1: axis_x: this column is missing; is it a truth.csv?"
+        );
+        assert_eq!(says(text.lines().next().unwrap()), "truth.csv: has no rows");
+        let shown = rows[0].half_angle_deg.to_string();
+        assert!(says(&text.replace(&shown, "97")).contains("half_angle_deg: 97 is not a half-angle"));
+        assert!(load(Path::new("/nowhere/truth.csv")).unwrap_err().to_string().ends_with("no such file"));
+    }
+
+    #[test]
+    fn straight_down_at_the_equator() {
+        let t = scene(Look::off_nadir(0.0, 0.0, 0.0)).truth("a.png", 1.5).unwrap();
+        assert!((t.axis_z - 1.0).abs() < 1e-12 && (t.altitude_km - 200.0).abs() < 1e-6);
+        assert_eq!((t.limb, t.body.as_str(), t.file.as_str(), t.time_s), (0, "earth", "a.png", 1.5));
+        // sin α = (R + 17 km)/(R + 200 km). The radius R lies between the two radii of curvature of the ellipsoid.
+        let alpha = |r: f64| ((r + 17.0) / (r + 200.0)).asin().to_degrees();
+        assert!(t.half_angle_deg > alpha(6330.0) && t.half_angle_deg < alpha(6380.0));
+    }
+
+    #[test]
+    fn level_camera_sees_the_limb_and_the_axis_below() {
+        let t = scene(Look { depression_rad: 0.2, ..Look::default() }).truth("", 0.0).unwrap();
+        assert!(t.has_limb() && t.axis_y > 0.97 && t.axis_z > 0.19 && t.sun_x.is_none());
+        // A camera that looks up sees no limb.
+        assert!(!scene(Look { depression_rad: -0.8, ..Look::default() }).truth("", 0.0).unwrap().has_limb());
+    }
+
+    #[test]
+    fn an_unlit_limb_does_not_count() {
+        let mut s = scene(Look { depression_rad: 0.2, ..Look::default() });
+        s.light = Light::Sun { direction: [-1.0, 0.0, 0.0], twilight_rad: 0.1 };
+        let t = s.truth("", 0.0).unwrap();
+        assert!(!t.has_limb() && t.sun_y.is_some_and(|y| y > 0.97));
+    }
+}

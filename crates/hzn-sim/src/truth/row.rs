@@ -1,0 +1,60 @@
+//! The truth about one picture: a row of truth.csv.
+
+use hzn_core::frames::{Cam, UnitVec3};
+use serde::{Deserialize, Serialize};
+
+/// The truth about one picture; the fields are the columns of truth.csv, in their order.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Truth {
+    /// Name of the picture's file, without its folder.
+    pub file: String,
+    /// Time in seconds.
+    pub time_s: f64,
+    /// The body's kind as in sensor.toml.
+    pub body: String,
+    /// 1 when at least 50 px of lit limb are in view and not behind the vehicle, else 0.
+    pub limb: u8,
+    /// Limb axis in the camera frame, first component of the unit vector. For spheres it is the direction to the
+    /// centre.
+    pub axis_x: f64,
+    /// Second component of the axis.
+    pub axis_y: f64,
+    /// Third component of the axis.
+    pub axis_z: f64,
+    /// Half-angle of the limb's cone in degrees. For an ellipsoid, its cot² is the mean of the cot² of the two
+    /// principal half-angles.
+    pub half_angle_deg: f64,
+    /// Altitude of the camera above the surface in kilometres (geodetic for `earth`).
+    pub altitude_km: f64,
+    /// Direction to the Sun in the camera frame, first component of the unit vector; empty if the scene has no Sun.
+    pub sun_x: Option<f64>,
+    /// Second component of the direction to the Sun.
+    pub sun_y: Option<f64>,
+    /// Third component of the direction to the Sun.
+    pub sun_z: Option<f64>,
+    /// Direction to the Moon in the camera frame, first component of the unit vector; empty if the scene has no Moon.
+    pub moon_x: Option<f64>,
+    /// Second component of the direction to the Moon.
+    pub moon_y: Option<f64>,
+    /// Third component of the direction to the Moon.
+    pub moon_z: Option<f64>,
+    /// Attitude as a quaternion from camera to ECEF: scalar part.
+    pub qw: f64,
+    /// First vector component of the attitude.
+    pub qx: f64,
+    /// Second vector component of the attitude.
+    pub qy: f64,
+    /// Third vector component of the attitude.
+    pub qz: f64,
+}
+
+impl Truth {
+    /// Returns the limb axis in the camera frame; `None` if the row holds no direction.
+    pub fn axis(&self) -> Option<UnitVec3<Cam, f64>> {
+        UnitVec3::try_new([self.axis_x, self.axis_y, self.axis_z])
+    }
+    /// Returns true if the picture shows enough limb for an answer.
+    pub fn has_limb(&self) -> bool {
+        self.limb != 0
+    }
+}

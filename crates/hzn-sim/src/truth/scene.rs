@@ -1,0 +1,168 @@
+//! The truth about a scene.
+
+use hzn_core::body::{AU_KM, Kind, MOON_RADIUS_KM, SUN_RADIUS_KM};
+use hzn_core::camera::Camera;
+use hzn_core::ellipsoid::LimbCone;
+use hzn_core::frames::{Ecef, UnitVec3};
+use hzn_core::pixel::ImagePoint;
+use nalgebra::Vector3;
+
+use super::row::Truth;
+use crate::error::SceneError;
+use crate::globe::{Globe, View};
+use crate::scene::{Light, Scene};
+
+/// Smallest length of visible limb with which a picture counts as showing a limb, in pixels.
+pub const LIMB_IN_VIEW_PX: f64 = 50.0;
+
+impl Scene {
+    /// Returns the truth of the scene, for the name and time of a picture.
+    ///
+    /// # Errors
+    /// Fails if the camera, the position or the light is invalid.
+    pub fn truth(&self, file: &str, time_s: f64) -> Result<Truth, SceneError> {
+        let globe = Globe::new(&self.body);
+        let raised = globe.raised(self.body.limb_height_km * 1e3);
+        let cone = LimbCone::try_new(self.pose.position_m, raised.a_m, raised.b_m).ok_or(SceneError::Pose)?;
+        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
+        let moon = self.moon_ecef_m.and_then(|moon| {
+            let to = [0, 1, 2].map(|i| moon[i] - self.pose.position_m[i]);
+            Some(ecef_to_cam.apply(&UnitVec3::<Ecef, f64>::try_new(to)?).xyz())
+        });
+        let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&cone.axis).xyz();
+        let sun = match self.light {
+            Light::Sun { direction, .. } => {
+                let direction = UnitVec3::<Ecef, f64>::try_new(direction).ok_or(SceneError::Sun)?;
+                Some(ecef_to_cam.apply(&direction).xyz())
+            }
+            Light::Full | Light::Sector { .. } => None,
+        };
+        let [qw, qx, qy, qz] = self.pose.unit_quaternion_wxyz();
+        Ok(Truth {
+            file: file.to_owned(),
+            time_s,
+            body: self.body.kind.name().to_owned(),
+            limb: u8::from(self.visible_limb_px()? >= LIMB_IN_VIEW_PX),
+            axis_x,
+            axis_y,
+            axis_z,
+            half_angle_deg: cone.mean_half_angle_rad().to_degrees(),
+            altitude_km: globe.altitude_m(self.pose.position_m) * 1e-3,
+            sun_x: sun.map(|s| s[0]),
+            sun_y: sun.map(|s| s[1]),
+            sun_z: sun.map(|s| s[2]),
+            moon_x: moon.map(|m| m[0]),
+            moon_y: moon.map(|m| m[1]),
+            moon_z: moon.map(|m| m[2]),
+            qw,
+            qx,
+            qy,
+            qz,
+        })
+    }
+
+    /// Returns the truth about Sun or Moon in a scene whose camera flies around the Earth. For every other kind it is
+    /// [`Scene::truth`].
+    ///
+    /// # Errors
+    /// Fails like [`Scene::truth`], and if the scene does not have the body.
+    pub fn body_truth(&self, kind: Kind, file: &str, time_s: f64) -> Result<Truth, SceneError> {
+        let truth = self.truth(file, time_s)?;
+        let Some(disc) = self.sky_disc(kind)? else { return Ok(truth) };
+        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
+        let direction = UnitVec3::<Ecef, f64>::try_new(disc.direction).ok_or(SceneError::Sun)?;
+        let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&direction).xyz();
+        Ok(Truth {
+            body: kind.name().to_owned(),
+            limb: u8::from(self.visible_px(kind)? >= LIMB_IN_VIEW_PX),
+            axis_x,
+            axis_y,
+            axis_z,
+            half_angle_deg: disc.half_angle_rad.to_degrees(),
+            altitude_km: disc.distance_m * 1e-3 - disc.radius_km,
+            ..truth
+        })
+    }
+
+    /// Returns the length in pixels of the limb that is in the picture, lit and not hidden. `kind` selects the scene's
+    /// own body, or Sun or Moon next to it.
+    ///
+    /// # Errors
+    /// Fails like [`Scene::body_truth`].
+    pub fn visible_px(&self, kind: Kind) -> Result<f64, SceneError> {
+        let Some(disc) = self.sky_disc(kind)? else { return self.visible_limb_px() };
+        let camera = Camera::<f64>::try_new(&self.camera)?;
+        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
+        let view = View::try_new(Globe::new(&self.body), &self.pose).ok_or(SceneError::Pose)?;
+        let centre = Vector3::from(disc.direction);
+        let helper = if centre.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+        let a = centre.cross(&helper).normalize();
+        let b = centre.cross(&a);
+        let sun = match (kind, self.light) {
+            (Kind::Moon, Light::Sun { direction, .. }) => Some(Vector3::from(direction)),
+            _ => None,
+        };
+        let (w, h) = (f64::from(self.camera.width), f64::from(self.camera.height));
+        const STEPS: i32 = 720;
+        let mut visible_px = 0.0;
+        let mut last = None;
+        for i in 0..=STEPS {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(i) / f64::from(STEPS));
+            let outward = a * cos + b * sin;
+            let ray = (centre + outward * libm::tan(disc.half_angle_rad)).normalize();
+            let point = UnitVec3::<Ecef, f64>::try_new(ray.into()).and_then(|r| {
+                let cam = ecef_to_cam.apply(&r);
+                let p = camera.project(&cam)?;
+                let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
+                let behind = view.intersect(cam.xyz()).miss <= 0.0;
+                let lit = sun.is_none_or(|s| s.dot(&outward) > 0.05);
+                let hidden = self.foreground.iter().any(|f| f.contains([p.u, p.v]));
+                (inside && !behind && lit && !hidden).then_some(p)
+            });
+            if let (Some(p), Some(q)) = (point, last) {
+                let q: ImagePoint<f64> = q;
+                visible_px += libm::hypot(p.u - q.u, p.v - q.v);
+            }
+            last = point;
+        }
+        Ok(visible_px)
+    }
+
+    /// Returns Sun or Moon as a disc in the sky; `None` for other kinds, and if `kind` is the scene's own body.
+    fn sky_disc(&self, kind: Kind) -> Result<Option<SkyDisc>, SceneError> {
+        if self.body.kind == kind {
+            return Ok(None);
+        }
+        match kind {
+            Kind::Sun => match self.light {
+                Light::Sun { direction, .. } => {
+                    let direction = Vector3::from(direction).try_normalize(1e-12).ok_or(SceneError::Sun)?;
+                    let distance_m = AU_KM * 1e3;
+                    Ok(Some(SkyDisc::new(direction * distance_m, SUN_RADIUS_KM)))
+                }
+                Light::Full | Light::Sector { .. } => Err(SceneError::Sun),
+            },
+            Kind::Moon => {
+                let moon = Vector3::from(self.moon_ecef_m.ok_or(SceneError::Moon)?);
+                Ok(Some(SkyDisc::new(moon - Vector3::from(self.pose.position_m), MOON_RADIUS_KM)))
+            }
+            _ => Ok(None),
+        }
+    }
+}
+
+/// A distant body as the camera sees it.
+struct SkyDisc {
+    direction: [f64; 3],
+    distance_m: f64,
+    half_angle_rad: f64,
+    radius_km: f64,
+}
+
+impl SkyDisc {
+    fn new(to_m: Vector3<f64>, radius_km: f64) -> Self {
+        let distance_m = to_m.norm();
+        let half_angle_rad = libm::asin((radius_km * 1e3 / distance_m).min(1.0));
+        Self { direction: (to_m / distance_m).into(), distance_m, half_angle_rad, radius_km }
+    }
+}
