@@ -152,7 +152,7 @@ impl Frames {
             let own = altitude_at_km(row.position_km?, kind, radius_km)?;
             if own > FARTHEST_RADII * radius_km {
                 let what =
-                    format!("the position is at {own:.0} km: x_km, y_km, z_km are kilometres, are these metres?");
+                    format!("the position is at {own:.0} km; x_km, y_km, z_km are kilometres: are the values in metres?");
                 return Some(self.problem(row, what));
             }
             let h = row.altitude_km?;
@@ -177,14 +177,14 @@ impl Frames {
         let far = |row: &&FrameData| row.altitude_km.is_some_and(|h| h > plausible::far_km(kind, radius_km));
         if let Some(row) = self.rows.iter().find(far) {
             let h = row.altitude_km.unwrap_or_default();
-            let what = format!("altitude_km is {h}: farther than limbs are taken from; is it in metres?");
+            let what = format!("altitude_km is {h}, which is implausibly large; is it in metres?");
             return Some(self.problem(row, what));
         }
         let known: Vec<_> = self.rows.iter().filter_map(|r| Some((r, r.time_s?, r.altitude_km?))).collect();
         let rate = |(a, b): (&(_, f64, f64), &(_, f64, f64))| (b.2 - a.2) / (b.1 - a.1);
         let pairs = known.iter().zip(known.iter().skip(1)).filter(|(a, b)| b.1 > a.1);
         let (row, km_s) = pairs.map(|pair| (pair.1.0, rate(pair))).find(|(_, rate)| rate.abs() > FASTEST_KM_S)?;
-        let what = format!("altitude_km changes by {km_s:.0} km a second, which nothing does; is it in metres?");
+        let what = format!("altitude_km changes by {km_s:.0} km/s, which is implausible; is it in metres?");
         Some(self.problem(row, what))
     }
 
@@ -238,7 +238,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
             let what = format!("unknown column, not used{hint}");
             warnings.push(Problem::new(path, what).at_line(1).in_field(name));
         } else if columns.insert(name, i).is_some() {
-            return Err(Problem::new(path, "this column stands twice").at_line(1).in_field(name));
+            return Err(Problem::new(path, "this column exists twice").at_line(1).in_field(name));
         }
     }
     if !columns.contains_key("file") {
@@ -286,7 +286,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
         }
         if let Some(&first) = frames.by_file.get(&row.file) {
             let before: usize = frames.rows.get(first).map_or(0, |r| r.line);
-            return Err(row.problem("file", &format!("stands in line {before} too; a picture has one row")));
+            return Err(row.problem("file", &format!("is also in line {before}; each picture has only one row")));
         }
         frames.by_file.insert(row.file.clone(), frames.rows.len());
         let time_s = data.time_s.or(data.utc_s);
@@ -338,7 +338,7 @@ impl Row<'_> {
 
     fn utc(&self, cell: Option<&str>) -> Result<Option<f64>, Problem> {
         let Some(cell) = cell else { return Ok(None) };
-        let what = format!("{cell:?} is no UTC time such as 2020-11-20T08:30:00Z");
+        let what = format!("{cell:?} is not a UTC time; write it as 2020-11-20T08:30:00Z");
         time::unix_seconds(cell).map(Some).ok_or_else(|| self.problem("utc", &what))
     }
 
@@ -400,7 +400,7 @@ mod tests {
         );
         assert_eq!(
             read("file\na.png\na.png\n").unwrap_err(),
-            "frames.csv:3: a.png file: stands in line 2 too; a picture has one row"
+            "frames.csv:3: a.png file: is also in line 2; each picture has only one row"
         );
         assert_eq!(
             read("name,altitude\na,1\n").unwrap_err(),
@@ -444,11 +444,11 @@ mod tests {
         let balloon = "file,time_s,altitude_km\na,0,300\nb,60,600\nc,120,3900\n";
         let told = odd(balloon, Kind::Earth);
         assert_eq!(told.len(), 1);
-        assert!(told[0].starts_with("frames.csv:4: c: altitude_km changes by 55 km a second"), "{told:?}");
+        assert!(told[0].starts_with("frames.csv:4: c: altitude_km changes by 55 km/s"), "{told:?}");
         let orbit = odd("file,altitude_km\na,517500\nb,517600\n", Kind::Earth);
         assert_eq!(
             orbit,
-            ["frames.csv:2: a: altitude_km is 517500: farther than limbs are taken from; is it in metres?"]
+            ["frames.csv:2: a: altitude_km is 517500, which is implausibly large; is it in metres?"]
         );
         assert!(odd("file,time_s,altitude_km\na,0,60\nb,1,61.5\nc,1,90\n", Kind::Earth).is_empty());
         let moon = odd("file,altitude_km\na,100\nb,100\n", Kind::Moon);
@@ -460,6 +460,6 @@ mod tests {
         let f = read("file,x_km,y_km,z_km\na,6778137,0,0\nb,6778.137,0,0\n").unwrap();
         let odd = f.check_altitudes(Kind::Earth, 6371.0);
         assert_eq!(odd.len(), 1);
-        assert!(odd[0].to_string().contains("are these metres?"), "{}", odd[0]);
+        assert!(odd[0].to_string().contains("are the values in metres?"), "{}", odd[0]);
     }
 }

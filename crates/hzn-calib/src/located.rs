@@ -98,7 +98,7 @@ pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), 
             _ => continue,
         };
         if place.items > most {
-            let what = format!("{} {what}, at most {most} can be given", place.items);
+            let what = format!("has {} {what}; at most {most} are allowed", place.items);
             return Err(Problem::new(path, what).at_offset(text, place.key.start).in_field(place.field()));
         }
     }
@@ -161,7 +161,7 @@ pub(crate) fn meaning(
         let what = if p.len() == 1 {
             format!("the section [{first}] is missing")
         } else if p.first().is_some_and(|s| s == "camera") {
-            "missing; give it, or take the calibration from a `file`".to_owned()
+            "missing; write it, or use a `file` with the calibration".to_owned()
         } else {
             "missing".to_owned()
         };

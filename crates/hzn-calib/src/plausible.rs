@@ -51,7 +51,7 @@ pub fn doubts(config: &Config) -> Vec<Doubt> {
         && mount.q_body_from_camera_wxyz == [0.0, 0.0, 0.0, 1.0]
     {
         let what =
-            "is half a turn about the optical axis, as the scalar comes first; no rotation at all is [1, 0, 0, 0]";
+            "is half a turn about the optical axis, because the scalar comes first; no rotation is [1, 0, 0, 0]";
         doubts.push(Doubt::new("mount.q_body_from_camera_wxyz", what));
     }
     let several = !config.bodies.is_empty();
@@ -76,7 +76,7 @@ fn of_body(body: &body::Config) -> Option<Doubt> {
     }
     let far = km > far_km(body.kind, body.mean_radius_km());
     far.then(|| {
-        Doubt::new("body.altitude_km", format!("{km} km is farther than limbs are taken from: is it in metres?"))
+        Doubt::new("body.altitude_km", format!("{km} km is implausibly large: is it in metres?"))
     })
 }
 
@@ -85,8 +85,8 @@ fn of_body(body: &body::Config) -> Option<Doubt> {
 pub fn unused_altitude(body: body::Kind) -> Option<String> {
     match body {
         body::Kind::Moon => Some(format!(
-            "is not used: kind = \"moon\" is the Moon as a disc of half a degree, seen from about the Earth; for a \
-                                         camera in orbit about the Moon write kind = \"sphere\" and radius_km = {}",
+            "is not used: kind = \"moon\" is the Moon as a disc of half a degree, as seen from near the Earth; for a \
+             camera in orbit around the Moon write kind = \"sphere\" and radius_km = {}",
             body::MOON_RADIUS_KM
         )),
         body::Kind::Sun => Some("is not used: kind = \"sun\" is the Sun as a disc of half a degree".to_owned()),
@@ -126,7 +126,7 @@ fn centre(c: &camera::Config) -> Option<Doubt> {
         let [a, b] = [(c.cx_px + 0.5) / w * 2.0, (c.cy_px + 0.5) / h * 2.0];
         if a > 0.0 && b > 0.0 && (a / b - 1.0).abs() < 0.2 {
             let [w, h] = [w * a, h * b].map(f64::round);
-            format!(": is the calibration that of pictures of about {w} x {h} px?")
+            format!(": is the calibration for pictures of about {w} x {h} px?")
         } else {
             ": was the picture cut from a larger one?".to_owned()
         }
@@ -149,8 +149,8 @@ fn focal(c: &camera::Config) -> Option<Doubt> {
     };
     if 2.0 * half > widest && c.theta_max_deg.is_none() {
         let what = format!(
-            "{} px over {} px of width is a field of view of {:.0} degrees: is it in millimetres? (divide those by the \
-             width of a pixel)",
+            "{} px over {} px of width is a field of view of {:.0} degrees: is it in millimetres? (divide millimetres \
+             by the width of a pixel)",
             c.fx_px,
             c.width,
             2.0 * half
@@ -225,9 +225,8 @@ pub(crate) fn five_coefficients(c: &camera::Config) -> Option<String> {
     let plausible = !in_px || (first / c.fx_px - 1.0).abs() < 0.2;
     plausible.then(|| {
         format!(
-            "five coefficients that begin with the angle's first power, as in Braun & Barf 2022; hzn's four follow it: \
-             write \
-             {focal}k = [{}] (`hzn camera convert --braun-barf` does it)",
+            "has five coefficients that begin with the angle's first power, as in Braun & Barf 2022; hzn has only the \
+             four higher ones: write {focal}k = [{}] (`hzn camera convert --braun-barf` converts them)",
             k.join(", ")
         )
     })
@@ -255,7 +254,7 @@ mod tests {
         assert_eq!(hd([1200.0; 2], [963.2, 536.7]), "");
         assert_eq!(hd([1200.0; 2], [1100.0, 500.0]), "");
         assert!(hd([1200.0; 2], [536.7, 963.2]).contains("are cx_px and cy_px, or width and height, swapped?"));
-        assert!(hd([1200.0; 2], [480.0, 270.0]).contains("that of pictures of about 961 x 541 px?"));
+        assert!(hd([1200.0; 2], [480.0, 270.0]).contains("is the calibration for pictures of about 961 x 541 px?"));
         assert!(hd([1200.0; 2], [0.5, 0.5]).contains("counted in pixels from the picture's upper left corner"));
         assert!(hd([1200.0; 2], [1800.0, 540.0]).contains("was the picture cut from a larger one?"));
         assert!(hd([1200.0, 675.0], [960.0, 540.0]).contains("fy_px = 675 make pixels that are not square"));

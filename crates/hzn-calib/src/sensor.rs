@@ -63,10 +63,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
         let wrong = |what: &str| Problem::new(path, what).at_offset(text, key.span().start).in_field("[[bodies]]");
         let count = several.get_ref().as_array().map_or(0, |a| a.len());
         if table.get_ref().contains_key("body") {
-            return Err(wrong("stands beside [body]; one body is a [body], several are all [[bodies]]"));
+            return Err(wrong("cannot be combined with [body]; write one body as [body], or all bodies as [[bodies]]"));
         }
         if count > MAX_BODIES {
-            let what = format!("{count} are too many; at most {MAX_BODIES} are looked for in one picture");
+            let what = format!("{count} are too many; at most {MAX_BODIES} bodies are possible");
             return Err(wrong(&what));
         }
     }
@@ -181,8 +181,8 @@ pub(crate) fn camera_from_file(
     let name = take(camera, "camera");
     let theta_max = take(camera, "theta_max_deg");
     if let Some((key, _)) = camera.iter().find(|(key, _)| !BESIDE_FILE.contains(&&**key.get_ref())) {
-        let what = "cannot stand beside `file`, which brings the whole calibration; only camera, theta_max_deg, \
-                    readout_s and the calibration's sigmas may";
+        let what = "cannot be next to `file`, which has the whole calibration; only camera, theta_max_deg, readout_s, \
+                    covariance and the calibration's sigmas may be";
         let field = format!("[camera] {}", key.get_ref());
         return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
     }
@@ -287,10 +287,11 @@ mod tests {
         );
         assert_eq!(
             error(&format!("[body]\nkind = \"earth\"\n{two}")),
-            "sensor.toml:11: [[bodies]]: stands beside [body]; one body is a [body], several are all [[bodies]]"
+            "sensor.toml:11: [[bodies]]: cannot be combined with [body]; write one body as [body], or all bodies as \
+             [[bodies]]"
         );
         let four = "[[bodies]]\nkind = \"earth\"\n".repeat(4);
-        assert_eq!(error(&four), "sensor.toml:9: [[bodies]]: 4 are too many; at most 3 are looked for in one picture");
+        assert_eq!(error(&four), "sensor.toml:9: [[bodies]]: 4 are too many; at most 3 bodies are possible");
     }
 
     #[test]
@@ -360,12 +361,12 @@ mod tests {
         let moon = warned(format!("{CAMERA}[body]\nkind = \"moon\"\naltitude_km = 100\n"));
         assert!(moon.starts_with("s.toml:11: [body] altitude_km: is not used: kind = \"moon\""), "{moon}");
         let two = "[[bodies]]\naltitude_km = 400\n[[bodies]]\nkind = \"sphere\"\nradius_km = 1\naltitude_km = 100\n";
-        assert!(warned(format!("{CAMERA}{two}")).starts_with("s.toml:14: [[bodies]] 2 altitude_km: 100 km is farther"));
+        assert!(warned(format!("{CAMERA}{two}")).starts_with("s.toml:14: [[bodies]] 2 altitude_km: 100 km is implausibly"));
         // The preset `moon` gives no warning.
         assert_eq!(warned(format!("preset = \"moon\"\n{CAMERA}")), "");
         let five = CAMERA.replace("pinhole", "kannala-brandt") + "k = [1.0, -0.055, 0.011, -0.0035, 0.0002]\n";
         let message = parse(&five, Path::new("s.toml")).unwrap_err().to_string();
-        assert!(message.starts_with("s.toml:9: [camera] k: five coefficients that begin with"), "{message}");
+        assert!(message.starts_with("s.toml:9: [camera] k: has five coefficients that begin with"), "{message}");
     }
 
     #[test]
@@ -399,39 +400,39 @@ mod tests {
     fn lists_that_are_too_long_bring_their_number_and_the_limit() {
         let list = |item: &str, n: usize| format!("[{}]", vec![item; n].join(", "));
         let k = parse(&format!("{CAMERA}k = {}\n", list("0.0", 12)), Path::new("s.toml")).unwrap_err();
-        assert_eq!(k.to_string(), "s.toml:9: [camera] k: 12 numbers, at most 5 can be given");
+        assert_eq!(k.to_string(), "s.toml:9: [camera] k: has 12 numbers; at most 5 are allowed");
         let polygon = |corners: usize| list("[1, 2]", corners);
         assert_eq!(
             error(&format!("[mask]\npolygons_px = {}\n", list(&polygon(3), 50))),
-            "sensor.toml:10: [mask] polygons_px: 50 polygons, at most 8 can be given"
+            "sensor.toml:10: [mask] polygons_px: has 50 polygons; at most 8 are allowed"
         );
         assert_eq!(
             error(&format!("[mask]\npolygons_px = [\n{},\n{}]\n", polygon(3), polygon(100))),
-            "sensor.toml:12: [mask] polygons_px 2: 100 corners, at most 16 can be given"
+            "sensor.toml:12: [mask] polygons_px 2: has 100 corners; at most 16 are allowed"
         );
         let rows = format!("limb_height_by_latitude_km = {}\n", list("[0, 20]", 17));
         assert_eq!(
             error(&format!("[body]\n{rows}")),
-            "sensor.toml:10: [body] limb_height_by_latitude_km: 17 rows, at most 16 can be given"
+            "sensor.toml:10: [body] limb_height_by_latitude_km: has 17 rows; at most 16 are allowed"
         );
         assert_eq!(
             error(&format!("[[bodies]]\nkind = \"sun\"\n[[bodies]]\n{rows}")),
-            "sensor.toml:12: [[bodies]] 2 limb_height_by_latitude_km: 17 rows, at most 16 can be given"
+            "sensor.toml:12: [[bodies]] 2 limb_height_by_latitude_km: has 17 rows; at most 16 are allowed"
         );
         // serde alone would read the first numbers of these lists and ignore the others.
         for (text, what) in [
             (
                 "[mount]\nq_body_from_camera_wxyz = [1, 0, 0, 0, 0]\n",
-                "[mount] q_body_from_camera_wxyz: 5 numbers, at most 4",
+                "[mount] q_body_from_camera_wxyz: has 5 numbers; at most 4",
             ),
-            ("[mask]\npolygons_px = [[[1, 2], [3, 4, 5], [5, 6]]]\n", "[mask] polygons_px 1.2: 3 numbers, at most 2"),
+            ("[mask]\npolygons_px = [[[1, 2], [3, 4, 5], [5, 6]]]\n", "[mask] polygons_px 1.2: has 3 numbers; at most 2"),
             (
                 "[body]\nlimb_height_by_latitude_km = [[0, 20, 1]]\n",
-                "[body] limb_height_by_latitude_km 1: 3 numbers, at most 2",
+                "[body] limb_height_by_latitude_km 1: has 3 numbers; at most 2",
             ),
-            ("[select]\naltitude_limits_km = [1, 2, 3]\n", "[select] altitude_limits_km: 3 numbers, at most 2"),
+            ("[select]\naltitude_limits_km = [1, 2, 3]\n", "[select] altitude_limits_km: has 3 numbers; at most 2"),
         ] {
-            assert_eq!(error(text), format!("sensor.toml:10: {what} can be given"));
+            assert_eq!(error(text), format!("sensor.toml:10: {what} are allowed"));
         }
         // Lists of exactly the maximum length are accepted.
         assert!(parse(&format!("{CAMERA}k = {}\n", list("0.0", 5)), Path::new("s.toml")).is_ok());
@@ -445,7 +446,7 @@ mod tests {
         assert_eq!(message(""), "s.toml: camera: the section [camera] is missing");
         assert_eq!(
             message("[camera]\nwidth = 3\nheight = 3\nfx_px = 3\ncx_px = 1\ncy_px = 1\n"),
-            "s.toml:1: [camera] fy_px: missing; give it, or take the calibration from a `file`"
+            "s.toml:1: [camera] fy_px: missing; write it, or use a `file` with the calibration"
         );
         assert_eq!(message("[camera\n"), "s.toml:1:8: not valid TOML: unclosed table, expected `]`");
         assert!(load(Path::new("/nowhere/s.toml")).unwrap_err().to_string().contains("hzn init"));
@@ -463,7 +464,7 @@ mod tests {
         let config = load(&path).unwrap().config;
         assert_eq!((config.camera.fy_px, config.camera.theta_max_deg, config.reject.seed), (301.0, Some(50.0), 7));
         std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\nwidth = 50\n").unwrap();
-        assert!(load(&path).unwrap_err().to_string().contains(":3: [camera] width: cannot stand beside"));
+        assert!(load(&path).unwrap_err().to_string().contains(":3: [camera] width: cannot be next to `file`"));
         std::fs::write(&path, "[camera]\nfile = \"other.yaml\"\n").unwrap();
         assert!(load(&path).unwrap_err().to_string().contains("no such file (paths are relative"));
     }

@@ -145,7 +145,7 @@ impl Exif {
             mm * width.hypot(height) / film_width.hypot(film_height)
         };
         let rounded = 100.0 * 0.5 / mm / SQRT_3;
-        Some(Focal { px, percent: EXIF_PERCENT.hypot(rounded), from: format!("EXIF: as {mm} mm on 35 mm film") })
+        Some(Focal { px, percent: EXIF_PERCENT.hypot(rounded), from: format!("EXIF: equivalent to {mm} mm on 35 mm film") })
     }
 }
 
@@ -162,14 +162,14 @@ pub fn sensor_toml(known: &Known) -> Result<Start, String> {
     let lens = match (known.lens, known.fov_deg) {
         (Some(lens), _) => lens,
         (None, Some(fov)) if fov > PINHOLE_UNSAID_DEG => {
-            return Err(format!("--fov {fov}: a lens so wide may be either; say --lens fisheye or --lens pinhole"));
+            return Err(format!("--fov {fov}: a lens of this width may be a fisheye or a pinhole; add --lens fisheye or --lens pinhole"));
         }
         (None, _) => Model::Pinhole,
     };
     let exif = known.exif.focal([width, height]);
     let stated = known.fov_deg.map(|fov| {
         let px =
-            focal_px(lens, width, fov).ok_or_else(|| format!("--fov {fov}: a pinhole sees less than 180 degrees"))?;
+            focal_px(lens, width, fov).ok_or_else(|| format!("--fov {fov}: the field of view of a pinhole must be below 180 degrees"))?;
         Ok::<_, String>(Focal { px, percent: STATED_PERCENT, from: format!("the field of view, {fov} degrees wide") })
     });
     let (focal, warnings, beside) = choose(stated.transpose()?, exif, lens, width)?;
@@ -203,8 +203,8 @@ fn choose(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: f64) -
             let beside = format!("{}: {:.1} px, {other:.1} degrees wide ({off_percent:+.1} %)", exif.from, exif.px);
             let warnings = if off_percent.abs() > 3.0 * stated.percent.hypot(exif.percent) {
                 vec![format!(
-                    "the picture's {beside}, which the field of view contradicts: it counts over the whole width; was \
-                     it stated for the diagonal, another lens, or another mode of the camera?"
+                    "the picture's {beside} contradicts the field of view, which is over the whole width; was it \
+                     stated for the diagonal, another lens, or another mode of the camera?"
                 )]
             } else {
                 Vec::new()
@@ -214,8 +214,8 @@ fn choose(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: f64) -
         (Some(stated), None) => Ok((stated, Vec::new(), None)),
         (None, Some(exif)) => Ok((exif, Vec::new(), None)),
         (None, None) => {
-            Err("the picture does not say its focal length (EXIF): give the field of view over the whole width, \
-                             such as --fov 60, and --lens fisheye or pinhole"
+            Err("the picture has no focal length (EXIF); add the field of view over the whole width, for example \
+                 --fov 60, and --lens fisheye or --lens pinhole"
                 .into())
         }
     }
@@ -227,9 +227,10 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
     let mut t = String::new();
     let _ = write!(
         t,
-        "# A start for a camera that nobody calibrated, by `hzn init`. What is not known stands as a sigma: answers \
-         are as uncertain as\n\
-         # the lens. A calibration makes them sharper: `hzn camera convert`, and both sigmas smaller or away.\n\
+        "# A sensor.toml for a camera without a calibration, by `hzn init`. Unknown properties of the lens are sigmas, \
+         which the covariance\n\
+         # of the answers includes. A calibration reduces them: `hzn camera convert`, with both sigmas smaller or \
+         removed.\n\
          # Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png\n\
          # Every other key with its default:  hzn init -o all.toml\n\
          \n\
@@ -246,23 +247,23 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
         start.lens.name(),
         match start.lens {
             Model::Pinhole => "            # an ideal lens without distortion",
-            _ => "        # an ideal fisheye: the angle off axis grows evenly with the radius",
+            _ => "        # an ideal fisheye: the angle off axis is proportional to the radius",
         }
     );
     let _ = write!(t, "# From {}", focal.from);
     let _ = match beside {
-        Some(beside) => writeln!(t, "; beside it {beside}."),
+        Some(beside) => writeln!(t, "; for comparison, {beside}."),
         None => writeln!(t, "; {:.1} degrees wide.", start.fov_deg),
     };
     let _ = write!(t, "fx_px = {:.1}\nfy_px = {:.1}\n", start.focal_px, start.focal_px);
     let _ = write!(t, "cx_px = {cx:.1}                 # the picture's centre\ncy_px = {cy:.1}\n");
     let _ = write!(
         t,
-        "# 1-sigma of the focal length: {:.1} % for {}, and {shape_percent:.1} % for what a real lens differs\n\
-         # from an ideal one over this field.\n\
+        "# 1-sigma of the focal length: {:.1} % for {}, and {shape_percent:.1} % for the difference\n\
+         # of a real lens from an ideal one over this field of view.\n\
          focal_sigma_percent = {:.1}\n\
-         # 1-sigma of the principal point, each axis: 1.5 % of the width. It turns every answer alike. More where \
-         pictures were cropped.\n\
+         # 1-sigma of the principal point, each axis: 1.5 % of the width. It turns all answers by the same angle.\n\
+         # Increase it for cropped pictures.\n\
          centre_sigma_px = {:.1}\n",
         focal.percent,
         if focal.percent < EXIF_PERCENT {
@@ -276,8 +277,8 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
     if start.lens == Model::Equidistant {
         let _ = writeln!(
             t,
-            "# theta_max_deg = {:.0}            # where the image circle ends within the picture: its radius in \
-             degrees off axis",
+            "# theta_max_deg = {:.0}            # radius of the image circle in degrees off axis, if its rim is in the \
+             picture",
             0.5 * start.fov_deg
         );
     }
@@ -286,15 +287,15 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
     let _ = match known.altitude_km {
         Some(km) => write!(
             t,
-            "altitude_km = {km}\naltitude_sigma_km = {:.1}        # 1-sigma: 2 % of it, for all pictures; frames.csv \
-             gives each its own\n",
+            "altitude_km = {km}\naltitude_sigma_km = {:.1}        # 1-sigma: 2 % of the altitude, for all \
+             pictures; frames.csv can give each picture its altitude\n",
             (ALTITUDE_PART * km).max(0.5)
         ),
         None => write!(
             t,
-            "# Every picture needs an altitude in kilometres: the columns file, altitude_km of a frames.csv beside the \
-             pictures (or x_km,\n\
-             # y_km, z_km), or for all of them\n# altitude_km = 400.0\n"
+            "# Every picture needs an altitude in kilometres. Write it into the columns file, altitude_km (or x_km, \
+             y_km, z_km)\n\
+             # of a frames.csv next to the pictures, or here for all pictures:\n# altitude_km = 400.0\n"
         ),
     };
     t
@@ -364,7 +365,7 @@ mod tests {
         let both = |fov| sensor_toml(&known(Some(fov), None, d4())).unwrap();
         // EXIF: 35.6 degrees over the width.
         let agreed = both(37.0);
-        assert!(agreed.warnings.is_empty() && agreed.text.contains("beside it EXIF"), "{}", agreed.text);
+        assert!(agreed.warnings.is_empty() && agreed.text.contains("for comparison, EXIF"), "{}", agreed.text);
         assert!((agreed.fov_deg - 37.0).abs() < 1e-9);
         assert!(both(60.0).warnings[0].contains("contradicts"));
         // The stated value overrides EXIF.
@@ -376,7 +377,7 @@ mod tests {
         let refused = |fov, lens, exif| sensor_toml(&known(fov, lens, exif)).unwrap_err();
         assert!(refused(None, None, Exif::default()).contains("--fov"));
         assert!(refused(Some(92.0), None, Exif::default()).contains("--lens"));
-        assert!(refused(Some(180.0), Some(Model::Pinhole), Exif::default()).contains("less than 180"));
+        assert!(refused(Some(180.0), Some(Model::Pinhole), Exif::default()).contains("below 180"));
         assert!(refused(Some(f64::NAN), None, Exif::default()).contains("between"));
         assert!(refused(Some(0.0), None, Exif::default()).contains("between"));
     }

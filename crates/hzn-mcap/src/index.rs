@@ -360,7 +360,7 @@ impl Pictures {
         };
         let broken = |why: &str| InputImage { time_s: place.log_time_s(), image: Err(why.to_owned()) };
         let Some(message) = message.as_deref().and_then(Message::parse) else {
-            return Ok(broken("the recording does not hold it any more, or is damaged there"));
+            return Ok(broken("the recording does not contain the picture any more, or is damaged at its place"));
         };
         let kind = self.kinds.get(&place.channel);
         let Some((kind, decode)) = kind.and_then(|k| Some((k, decoder(&k.schema, &k.encoding)?))) else {

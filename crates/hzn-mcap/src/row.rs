@@ -273,7 +273,7 @@ mod status_name {
         Status::ALL
             .into_iter()
             .find(|s| s.name() == name)
-            .ok_or_else(|| de::Error::invalid_value(de::Unexpected::Str(&name), &"the name of a status, such as ok"))
+            .ok_or_else(|| de::Error::invalid_value(de::Unexpected::Str(&name), &"the name of a status, for example ok"))
     }
 }
 

@@ -250,7 +250,7 @@ fn outputs_are_not_replaced_unasked() {
     let other = dir.path().join("other.mcap");
     drop(Writer::create(&other, &options()).unwrap());
     let e = Writer::create(&other, &options()).unwrap_err();
-    assert!(matches!(e, Error::Unfinished { .. }) && e.to_string().contains("continue it"), "{e}");
+    assert!(matches!(e, Error::Unfinished { .. }) && e.to_string().contains("continue that run"), "{e}");
 }
 
 #[test]

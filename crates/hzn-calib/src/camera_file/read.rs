@@ -71,9 +71,8 @@ impl File<'_> {
     fn unknown(&self) -> Problem {
         Problem::new(
             self.path,
-            "is no camera file that is known here: a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
-             resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height) or ROS's camera_info \
-             is expected",
+            "is not a known camera file; expected is a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
+             resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height) or ROS's camera_info",
         )
     }
 
@@ -145,7 +144,7 @@ impl File<'_> {
         let named = self.path.file_name().is_some_and(|n| n.to_string_lossy().to_lowercase().contains("fisheye"));
         let lens = match (stated, flag) {
             (Some(lens), Some(flag)) if flag != (lens == Lens::Fisheye) => {
-                let what = "says another lens than distortion_model; leave the wrong one of them out";
+                let what = "contradicts distortion_model; remove the wrong one of the two";
                 return Err(self.problem("fisheye_model", what));
             }
             (Some(lens), _) => lens,
@@ -169,7 +168,7 @@ impl File<'_> {
             return Err(self.problem(key, "a 3x3 matrix is expected"));
         };
         if [fx, fy, cx, cy] == [0.0; 4] {
-            return Err(self.problem(key, "is all zeros, as of a camera that was not calibrated; calibrate it first"));
+            return Err(self.problem(key, "is all zeros: the camera is not calibrated; calibrate it first"));
         }
         if below != 0.0 || last != [0.0, 0.0, 1.0] {
             let what = "must be [fx, 0, cx; 0, fy, cy; 0, 0, 1]";
@@ -223,25 +222,25 @@ impl File<'_> {
         let count = given.values.as_ref().map(Vec::len);
         match (lens, count, given.meant()) {
             (Lens::None, _, 0) => Ok(Model::Pinhole),
-            (Lens::None, _, n) => wrong(format!("{n} coefficients, but distortion_model does not say of which lens")),
+            (Lens::None, _, n) => wrong(format!("there are {n} coefficients, but distortion_model does not name the lens")),
             (Lens::Fisheye, None, _) => wrong("missing: a fisheye lens has four, k1 to k4".into()),
             (Lens::PlumbBob, None | Some(0), _) => Ok(Model::Pinhole),
             (Lens::PlumbBob, Some(n), 0) if n >= 4 => Ok(Model::Pinhole),
             (Lens::Radtan, None, _) => wrong("missing: this lens has k1, k2, p1, p2".into()),
             (Lens::Fisheye, Some(n), meant) if n < 4 || meant > 4 => {
-                wrong(format!("{n} coefficients, but a fisheye lens has four, k1 to k4; is it another lens?"))
+                wrong(format!("there are {n} coefficients, but a fisheye lens has four, k1 to k4; is it another lens?"))
             }
             (Lens::Fisheye, ..) => Ok(Model::KannalaBrandt),
             (Lens::Radtan | Lens::PlumbBob, Some(n), _) if n < 4 => wrong(format!(
-                "{n} coefficients, but this lens has k1, k2, p1, p2 and k3; write 0 for what it does without"
+                "there are {n} coefficients, but this lens has five: k1, k2, p1, p2, k3; write 0 for the unused ones"
             )),
             (Lens::Radtan | Lens::PlumbBob | Lens::Rational, Some(n), meant) if meant > 5 => wrong(format!(
-                "{n} coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; calibrate without the higher \
-                 ones (plumb_bob, or a fisheye lens)"
+                "there are {n} coefficients, but hzn supports five of this lens: k1, k2, p1, p2, k3; calibrate \
+                 without the higher ones (plumb_bob, or a fisheye lens)"
             )),
             (Lens::Rational, None, _) => wrong("missing: this lens has k1, k2, p1, p2, k3, k4, k5, k6".into()),
             (Lens::Rational, Some(n), _) if n < 8 => {
-                wrong(format!("{n} coefficients, but rational_polynomial has eight; is it plumb_bob?"))
+                wrong(format!("there are {n} coefficients, but rational_polynomial has eight; is it plumb_bob?"))
             }
             (Lens::Radtan | Lens::PlumbBob | Lens::Rational, ..) => Ok(Model::BrownConrady),
         }
@@ -425,8 +424,8 @@ mod tests {
         let error = |text: String| read(&text).unwrap_err();
         assert_eq!(
             eight("0.2").unwrap_err(),
-            "cam.yaml: distortion_coefficients: 8 coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; \
-             calibrate without the higher ones (plumb_bob, or a fisheye lens)"
+            "cam.yaml: distortion_coefficients: there are 8 coefficients, but hzn supports five of this lens: k1, k2, \
+             p1, p2, k3; calibrate without the higher ones (plumb_bob, or a fisheye lens)"
         );
         assert_eq!(
             error(written("thin_prism", four, 4)),
@@ -438,11 +437,11 @@ mod tests {
         // The shape of D is checked.
         assert_eq!(
             error(written("equidistant", &format!("{four}, 0.1"), 5)),
-            "cam.yaml: distortion_coefficients: 5 coefficients, but a fisheye lens has four, k1 to k4; is it another \
-             lens?"
+            "cam.yaml: distortion_coefficients: there are 5 coefficients, but a fisheye lens has four, k1 to k4; is \
+             it another lens?"
         );
         assert!(
-            error(written("plumb_bob", "-0.05, 0.01", 2)).contains("2 coefficients, but this lens has k1, k2, p1,")
+            error(written("plumb_bob", "-0.05, 0.01", 2)).contains("2 coefficients, but this lens has five: k1, k2,")
         );
         assert!(error(written("rational_polynomial", four, 4)).contains("is it plumb_bob?"));
         assert!(error(written("plumb_bob", four, 5)).contains("has 4 numbers, but rows and cols say 1 x 5"));
@@ -455,7 +454,7 @@ mod tests {
         assert_eq!(read(echoed).unwrap(), c);
         assert_eq!(read(&echoed.replace("\nd:", "\nD:").replace("\nk:", "\nK:")).unwrap(), c);
         let none = "height: 480\nwidth: 640\ndistortion_model: ''\nD: []\nK: [0, 0, 0, 0, 0, 0, 0, 0, 0]\n";
-        assert!(read(none).unwrap_err().contains("K: is all zeros, as of a camera that was not calibrated"));
+        assert!(read(none).unwrap_err().contains("K: is all zeros: the camera is not calibrated"));
     }
 
     #[test]
@@ -466,7 +465,7 @@ mod tests {
         assert_eq!(read(&format!("{text}fisheye_model: 0\n")).unwrap().model, Model::BrownConrady);
         assert_eq!(parse(text, Path::new("fisheye.yaml"), None).unwrap().model, Model::KannalaBrandt);
         let both = format!("{text}fisheye_model: 1\ndistortion_model: plumb_bob\n");
-        assert!(read(&both).unwrap_err().contains("fisheye_model: says another lens than distortion_model"));
+        assert!(read(&both).unwrap_err().contains("fisheye_model: contradicts distortion_model"));
         let turned =
             text.replace("[[300, 0, 320], [0, 300, 240], [0, 0, 1]]", "[[300, 0, 0], [0, 300, 0], [320, 240, 1]]");
         assert!(read(&turned).unwrap_err().contains("it is transposed, as MATLAB keeps it"));
@@ -477,7 +476,7 @@ mod tests {
         assert!(
             read(&chain.replace("coefs", "coeffs").replace("  distortion_model: radtan\n", ""))
                 .unwrap_err()
-                .contains("distortion_model does not say of which lens")
+                .contains("distortion_model does not name the lens")
         );
     }
 

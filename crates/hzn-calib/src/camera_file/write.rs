@@ -39,7 +39,7 @@ impl fmt::Display for Format {
 
 impl fmt::Display for Unfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} has no place in a {}", self.what, self.format)
+        write!(f, "the format {} cannot express {}", self.format, self.what)
     }
 }
 
@@ -144,7 +144,7 @@ fn intrinsics(c: &Config) -> [f64; 4] {
 fn four(c: &Config, format: Format) -> Result<Vec<f64>, Unfit> {
     refuse_own_projection(c, format)?;
     if c.model == Model::BrownConrady && c.coefficient(4) != 0.0 {
-        return Err(Unfit { what: "k3, the fifth coefficient of brown-conrady,", format });
+        return Err(Unfit { what: "k3, the fifth coefficient of brown-conrady", format });
     }
     Ok(match (c.model, format) {
         (Model::Pinhole, Format::Kalibr) => Vec::new(),
@@ -210,7 +210,7 @@ mod tests {
         let mut camera = cameras().remove(1);
         camera.k.push(0.01).unwrap();
         let refused = write(&camera, Format::Kalibr).unwrap_err().to_string();
-        assert_eq!(refused, "k3, the fifth coefficient of brown-conrady, has no place in a Kalibr camchain");
+        assert_eq!(refused, "the format Kalibr camchain cannot express k3, the fifth coefficient of brown-conrady");
         let text = write(&camera, Format::OpenCv).unwrap();
         assert_eq!(parse(&text, Path::new("c.yaml"), None).unwrap(), camera);
     }
@@ -221,7 +221,7 @@ mod tests {
         camera.model = Model::DoubleSphere;
         camera.k = [-0.18, 0.59].into_iter().collect();
         let refused = write(&camera, Format::OpenCv).unwrap_err().to_string();
-        assert_eq!(refused, "the double sphere lens has no place in a OpenCV YAML");
+        assert_eq!(refused, "the format OpenCV YAML cannot express the double sphere lens");
         assert!(write(&camera, Format::Euroc).is_err() && write(&camera, Format::Kalibr).is_ok());
     }
 

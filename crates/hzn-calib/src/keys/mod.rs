@@ -13,7 +13,7 @@ pub use hzn_core::keys::{Choice, Form, Key, Limits, Table, Value};
 /// The key for the starting values, which is above all sections.
 const PRESET: Key = Key {
     path: "preset",
-    doc: "Starting values; keys that are written in the file count instead of them.\n",
+    doc: "Starting values; keys in the file override them.\n",
     form: Form::Word,
     limits: Limits::Choice,
     choices: Preset::CHOICES,
@@ -27,8 +27,8 @@ const PRESET: Key = Key {
 const CAMERA_FILE: [Key; 2] = [
     Key {
         path: "camera.file",
-        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file, relative to this one, which brings the calibration; \
-              next to it stand only `theta_max_deg`, `readout_s`, the sigmas and `covariance`.\n",
+        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration; its path is relative to this \
+              file, and only `camera`, `theta_max_deg`, `readout_s`, the sigmas and `covariance` may be next to it.\n",
         form: Form::Word,
         limits: Limits::Rule("a path"),
         choices: &[],
@@ -39,12 +39,12 @@ const CAMERA_FILE: [Key; 2] = [
     },
     Key {
         path: "camera.camera",
-        doc: "Which camera of `file` it is, by its name there.\n",
+        doc: "Name of the camera in `file`.\n",
         form: Form::Word,
         limits: Limits::Rule("a name in the file"),
         choices: &[],
         feature: None,
-        unset: Some("the only one"),
+        unset: Some("the first one"),
         example: Some("\"cam0\""),
         flight: None,
     },

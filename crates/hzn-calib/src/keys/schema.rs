@@ -18,8 +18,7 @@ pub fn json() -> Value {
             "type": "array",
             "maxItems": hzn_core::report::MAX_BODIES,
             "items": {"$ref": "#/properties/body"},
-            "description": "Several bodies in one picture instead of [body], in the order in which they are looked \
-                            for.",
+            "description": "Several bodies in one picture, instead of [body]. The sensor looks for them in this order.",
         }),
     );
     json!({

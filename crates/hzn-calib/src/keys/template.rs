@@ -10,8 +10,9 @@ const WIDTH: usize = 118;
 pub fn text() -> String {
     let defaults = defaults();
     let mut out = comment(
-        "A horizon sensor. [camera] must be yours; every other value is the default: a key that you leave out counts \
-         as it stands here. Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png",
+        "A horizon sensor. Write your camera into [camera]. Every other value is the default: a key that you remove \
+         keeps the value that it has here. Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay \
+         out.png",
     );
     out.push('\n');
     out += &entry(&super::PRESET, &defaults);
@@ -25,8 +26,8 @@ pub fn text() -> String {
         }
         if table.name == "body" {
             out += &comment(
-                "Several bodies in one picture: a [[bodies]] for each instead of [body], with the same keys and, where \
-                 they differ, its own [bodies.binarize] and [bodies.covariance].",
+                "For several bodies in one picture, write one [[bodies]] for each instead of [body]. It has the same \
+                 keys, and may have a [bodies.binarize] and a [bodies.covariance].",
             );
         }
     }

@@ -42,26 +42,26 @@ impl fmt::Display for Refusal {
         match self {
             Self::TooFew { answered, least } => write!(
                 f,
-                "{answered} pictures were answered, but at least {least} are needed: the scatter between pictures \
-                 cannot be told from fewer; take more pictures of the flight"
+                "{answered} pictures have an answer, but at least {least} are needed to determine the scatter between \
+                 pictures; take more pictures of the flight"
             ),
             Self::TooVague { sigma_km, most_km, pictures } => write!(
                 f,
-                "the limb height comes out to ± {sigma_km:.1} km from {pictures} pictures, but ± {most_km:.1} km is \
-                 needed to say more than the default: sigma falls with the root of the number of pictures and with the \
-                 square of the field of view; take more pictures, or ones with a longer limb"
+                "{pictures} pictures give the limb height to ± {sigma_km:.1} km, but ± {most_km:.1} km is needed to \
+                 improve on the default. Sigma falls with the root of the number of pictures and with the square of \
+                 the field of view; take more pictures, or pictures with a longer limb"
             ),
             Self::Apart { apart, pictures } => write!(
                 f,
-                "{apart} of {pictures} pictures measure limb heights that do not belong to those of the others: wrong \
-                 edges, or altitudes that belong to other pictures; look at some with `hzn explain`"
+                "{apart} of {pictures} pictures measure limb heights that disagree with the others. Either edges are \
+                 wrong, or altitudes belong to other pictures; examine some of them with `hzn explain`"
             ),
             Self::Alarm { chi2, most } => write!(
                 f,
-                "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2:.1} a \
-                 degree of freedom, at most {most:.1} is consistent. Something moves from picture to picture that the \
-                 model does not have: a rolling shutter (camera.readout_s and rates), altitudes or times of other \
-                 pictures, the lens"
+                "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2:.1} per \
+                 degree of freedom, but at most {most:.1} is consistent. Possible reasons that the model does not \
+                 have: a rolling shutter (camera.readout_s and rates), altitudes or times of other pictures, a lens \
+                 that changes"
             ),
         }
     }

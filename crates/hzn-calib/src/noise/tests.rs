@@ -153,7 +153,7 @@ fn what_pictures_do_not_tell_is_refused_with_the_number() {
     let noise = Noise(0.3, 40.0, 0.5);
     let few = Calibration::new(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();
     assert_eq!(few, Refusal::TooFew { answered: 11, least: 12 });
-    assert!(few.to_string().starts_with("11 pictures were answered, but at least 12 are needed"), "{few}");
+    assert!(few.to_string().starts_with("11 pictures have an answer, but at least 12 are needed"), "{few}");
     // Sigma grows with the inverse square of the field of view.
     let narrow = Calibration::new(&earth(), &flight(24, 15.0, 18.7, 0.0, noise, 6)).unwrap_err();
     assert!(matches!(narrow, Refusal::TooVague { sigma_km, .. } if sigma_km > 3.5), "{narrow:?}");
