@@ -230,10 +230,7 @@ fn what_looks_wrong_is_a_warning_and_the_run_goes_on() {
         "{swapped}"
     );
     let metres = told("altitude_km = 400.0", "altitude_km = 400000.0");
-    assert!(
-        metres.contains("[body] altitude_km: 400000 km is implausibly large: is it in metres?"),
-        "{metres}"
-    );
+    assert!(metres.contains("[body] altitude_km: 400000 km is implausibly large: is it in metres?"), "{metres}");
     let moon = told("earth-sphere", "moon");
     insta::assert_snapshot!(moon.lines().next().unwrap(), @r#"warning: in/sensor.toml:14: [body] altitude_km: is not used: kind = "moon" is the Moon as a disc of half a degree, as seen from near the Earth; for a camera in orbit around the Moon write kind = "sphere" and radius_km = 1737.4"#);
     // With the Moon as a second body, the altitude is still the altitude above the Earth.
