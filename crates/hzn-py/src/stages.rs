@@ -31,7 +31,7 @@ impl Expected {
         if body >= bodies {
             return Err(errors::config(format!("body: {body} is refused: the sensor's are 0 to {}", bodies - 1)));
         }
-        let core = state.core.expect_body(body, &data.to_frame(None)).map_err(errors::config)?;
+        let core = state.core.expect_body(body, &data.to_prior(None)).map_err(errors::config)?;
         Ok(Self { data, core })
     }
 }

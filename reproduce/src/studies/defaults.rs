@@ -1,7 +1,7 @@
 //! Honesty of a sensor that nobody tuned: what a user gets who knows the camera and where it is, and nothing else.
 
 use anyhow::{Context, anyhow};
-use hzn_calib::noise::{self, Calibration, Points, Sighting};
+use hzn_calib::noise::{self, Calibration, PointRecorder, Sighting};
 use hzn_core::body;
 use hzn_core::camera::Camera;
 use hzn_core::{Config, HostHorizon};
@@ -56,7 +56,7 @@ impl Rendered {
 
     /// What `hzn calibrate noise` makes of the pictures with their positions, and their rates of rotation or not.
     fn calibrate(&self, rates: bool) -> anyhow::Result<Calibration> {
-        let wide = noise::looks_with(&self.untold()).context("no body with a limb height")?;
+        let wide = noise::config_for_calibration(&self.untold()).context("no body with a limb height")?;
         let camera = Camera::try_new(&wide.camera)?;
         let each = self.flight.frames.par_iter().zip(&self.pictures).map_init(
             || HostHorizon::boxed(&wide),
@@ -65,9 +65,9 @@ impl Rendered {
                 let known = frame.known();
                 let known = hzn_core::Prior { rate_rad_s: known.rate_rad_s.filter(|_| rates), ..known };
                 let expected = horizon.expect(&known).ok()?;
-                let points = Points::default();
+                let points = PointRecorder::default();
                 let solution = horizon.process_observed(&picture.view(), &expected, &points).solution?;
-                let points = points.of_candidate(solution.candidate);
+                let points = points.candidate_points(solution.candidate);
                 Sighting::measure(&frame.file, &camera, &wide.body, &known, &points, &solution)
             },
         );

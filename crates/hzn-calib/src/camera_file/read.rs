@@ -5,6 +5,8 @@ use std::path::Path;
 use hzn_core::camera::{Config, Model};
 use serde_json::Value;
 
+use super::lens::{Coefficients, Lens};
+use super::values::{matrix, number, numbers};
 use crate::Problem;
 use crate::nearest::suggestion;
 
@@ -109,19 +111,19 @@ impl File<'_> {
         } else {
             "distortion_coeffs"
         };
-        let given = Coefficients { values: self.coefficients(camera.get(key), &field(key))?, field: field(key) };
+        let coefficients = Coefficients { values: self.coefficients(camera.get(key), &field(key))?, field: field(key) };
         let lens = self.stated_lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
         if let Some((model, _)) = own {
-            if given.meant() > 0 {
+            if coefficients.significant_len() > 0 {
                 return Err(
                     self.problem(&field(key), format!("{projection} has no further distortion; calibrate with none"))
                 );
             }
-            let given = Coefficients { values: Some(k), field: field("intrinsics") };
-            return self.camera(model, [width, height], [fx, fy, cx, cy], &given);
+            let coefficients = Coefficients { values: Some(k), field: field("intrinsics") };
+            return self.camera(model, [width, height], [fx, fy, cx, cy], &coefficients);
         }
-        let model = self.model(lens, &given)?;
-        self.camera(model, [width, height], [fx, fy, cx, cy], &given)
+        let model = self.model(lens, &coefficients)?;
+        self.camera(model, [width, height], [fx, fy, cx, cy], &coefficients)
     }
 
     /// Reads OpenCV's files, and ROS's camera_info as its calibrator writes it or as its topic shows it.
@@ -133,7 +135,7 @@ impl File<'_> {
         let (key, value) = either(&["camera_matrix", "K", "k"]);
         let [fx, fy, cx, cy] = self.intrinsics(value, key)?;
         let (key, value) = either(&["distortion_coefficients", "D", "d"]);
-        let given = Coefficients { values: self.coefficients(Some(value), key)?, field: key.to_owned() };
+        let coefficients = Coefficients { values: self.coefficients(Some(value), key)?, field: key.to_owned() };
         let size = |names: &[&'static str]| {
             let (key, value) = either(names);
             number(value).ok_or_else(|| self.problem(key, "missing: add the picture's size in pixels to the file"))
@@ -150,16 +152,16 @@ impl File<'_> {
             (Some(lens), _) => lens,
             (None, Some(true)) => Lens::Fisheye,
             (None, None) if named => Lens::Fisheye,
-            (None, None) if given.meant() == 4 => {
+            (None, None) if coefficients.significant_len() == 4 => {
                 let what = "four coefficients are k1 to k4 of a fisheye lens (cv2.fisheye) or k1, k2, p1, p2 of \
                             Brown-Conrady (cv2.calibrateCamera): add `fisheye_model: 1` or `fisheye_model: 0` to the \
                             file";
-                return Err(self.problem(&given.field, what));
+                return Err(self.problem(&coefficients.field, what));
             }
             (None, _) => Lens::PlumbBob,
         };
-        let model = self.model(lens, &given)?;
-        self.camera(model, size, [fx, fy, cx, cy], &given)
+        let model = self.model(lens, &coefficients)?;
+        self.camera(model, size, [fx, fy, cx, cy], &coefficients)
     }
 
     /// Returns fx, fy, cx, cy of a camera matrix, in pixels.
@@ -208,42 +210,12 @@ impl File<'_> {
         let Some(word) = word.and_then(Value::as_str).map(str::trim).filter(|word| !word.is_empty()) else {
             return Ok(None);
         };
-        let known = LENSES.iter().find(|(name, _)| name.eq_ignore_ascii_case(word));
-        let names: Vec<&str> = LENSES.iter().map(|(name, _)| *name).collect();
-        known.map(|(_, lens)| Some(*lens)).ok_or_else(|| {
-            let what = format!("{word:?} is a lens that hzn does not have{}", suggestion(word, &names));
-            self.problem(field, what)
-        })
+        Lens::find(word).map(Some).map_err(|what| self.problem(field, what))
     }
 
     /// Returns hzn's model for the lens. The number of coefficients must fit that model.
-    fn model(&self, lens: Lens, given: &Coefficients) -> Result<Model, Problem> {
-        let wrong = |what: String| Err(self.problem(&given.field, what));
-        let count = given.values.as_ref().map(Vec::len);
-        match (lens, count, given.meant()) {
-            (Lens::None, _, 0) => Ok(Model::Pinhole),
-            (Lens::None, _, n) => wrong(format!("there are {n} coefficients, but distortion_model does not name the lens")),
-            (Lens::Fisheye, None, _) => wrong("missing: a fisheye lens has four, k1 to k4".into()),
-            (Lens::PlumbBob, None | Some(0), _) => Ok(Model::Pinhole),
-            (Lens::PlumbBob, Some(n), 0) if n >= 4 => Ok(Model::Pinhole),
-            (Lens::Radtan, None, _) => wrong("missing: this lens has k1, k2, p1, p2".into()),
-            (Lens::Fisheye, Some(n), meant) if n < 4 || meant > 4 => {
-                wrong(format!("there are {n} coefficients, but a fisheye lens has four, k1 to k4; is it another lens?"))
-            }
-            (Lens::Fisheye, ..) => Ok(Model::KannalaBrandt),
-            (Lens::Radtan | Lens::PlumbBob, Some(n), _) if n < 4 => wrong(format!(
-                "there are {n} coefficients, but this lens has five: k1, k2, p1, p2, k3; write 0 for the unused ones"
-            )),
-            (Lens::Radtan | Lens::PlumbBob | Lens::Rational, Some(n), meant) if meant > 5 => wrong(format!(
-                "there are {n} coefficients, but hzn supports five of this lens: k1, k2, p1, p2, k3; calibrate \
-                 without the higher ones (plumb_bob, or a fisheye lens)"
-            )),
-            (Lens::Rational, None, _) => wrong("missing: this lens has k1, k2, p1, p2, k3, k4, k5, k6".into()),
-            (Lens::Rational, Some(n), _) if n < 8 => {
-                wrong(format!("there are {n} coefficients, but rational_polynomial has eight; is it plumb_bob?"))
-            }
-            (Lens::Radtan | Lens::PlumbBob | Lens::Rational, ..) => Ok(Model::BrownConrady),
-        }
+    fn model(&self, lens: Lens, coefficients: &Coefficients) -> Result<Model, Problem> {
+        lens.to_model(coefficients).map_err(|what| self.problem(&coefficients.field, what))
     }
 
     fn camera(
@@ -251,79 +223,16 @@ impl File<'_> {
         model: Model,
         size: [f64; 2],
         [fx, fy, cx, cy]: [f64; 4],
-        given: &Coefficients,
+        coefficients: &Coefficients,
     ) -> Result<Config, Problem> {
         let whole = |x: f64| (x.fract() == 0.0 && (2.0..=65535.0).contains(&x)).then_some(x as u16);
         let [Some(width), Some(height)] = size.map(whole) else {
             return Err(self.problem("resolution", "width and height must be whole numbers from 2 to 65535"));
         };
-        let k = given.values.iter().flatten().copied().take(model.coefficients().len()).collect();
+        let k = coefficients.values.iter().flatten().copied().take(model.coefficients().len()).collect();
         let ideal = Config::ideal(model, width, height, fx);
         Ok(Config { fx_px: fx, fy_px: fy, cx_px: cx, cy_px: cy, k, ..ideal })
     }
-}
-
-/// A lens in the terms of other tools.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Lens {
-    /// No distortion.
-    None,
-    /// k1 to k4, coefficients of the angle off axis.
-    Fisheye,
-    /// k1, k2, p1, p2. Kalibr always writes them.
-    Radtan,
-    /// k1, k2, p1, p2, k3. OpenCV writes no coefficients for a lens without distortion.
-    PlumbBob,
-    /// Three more coefficients in the denominator, which hzn's lens does not have.
-    Rational,
-}
-
-/// The names of the lenses in the files.
-const LENSES: &[(&str, Lens)] = &[
-    ("equidistant", Lens::Fisheye),
-    ("fisheye", Lens::Fisheye),
-    ("kannala_brandt", Lens::Fisheye),
-    ("radtan", Lens::Radtan),
-    ("radial-tangential", Lens::Radtan),
-    ("plumb_bob", Lens::PlumbBob),
-    ("rational_polynomial", Lens::Rational),
-    ("none", Lens::None),
-];
-
-/// Coefficients of a lens, and the field that they come from.
-struct Coefficients {
-    values: Option<Vec<f64>>,
-    field: String,
-}
-
-impl Coefficients {
-    /// Returns the number of coefficients up to the last one that is not 0.
-    fn meant(&self) -> usize {
-        self.values.iter().flatten().enumerate().filter(|(_, k)| **k != 0.0).map(|(i, _)| i + 1).max().unwrap_or(0)
-    }
-}
-
-fn numbers(value: &Value) -> Option<Vec<f64>> {
-    value.as_array()?.iter().map(number).collect()
-}
-
-/// Reads a number. YAML 1.1 writers may omit the decimal point, as in `1e-05`. A stricter reader takes this for a text,
-/// so a text with a number is accepted too.
-fn number(value: &Value) -> Option<f64> {
-    value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
-}
-
-/// Reads an OpenCV matrix (its `data`), a list, or a list of rows, and flattens it.
-fn matrix(value: &Value) -> Option<Vec<f64>> {
-    let list = value.get("data").unwrap_or(value).as_array()?;
-    let mut out = Vec::new();
-    for item in list {
-        match item {
-            Value::Array(row) => out.extend(row.iter().map(number).collect::<Option<Vec<_>>>()?),
-            item => out.push(number(item)?),
-        }
-    }
-    Some(out)
 }
 
 #[cfg(test)]

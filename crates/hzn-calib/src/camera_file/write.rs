@@ -19,7 +19,7 @@ pub enum Format {
 
 /// Error of a lens that the format cannot express.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unfit {
+pub struct UnsupportedLens {
     /// The part of the lens that the format cannot express.
     pub what: &'static str,
     /// The format.
@@ -37,21 +37,21 @@ impl fmt::Display for Format {
     }
 }
 
-impl fmt::Display for Unfit {
+impl fmt::Display for UnsupportedLens {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "the format {} cannot express {}", self.format, self.what)
     }
 }
 
-impl std::error::Error for Unfit {}
+impl std::error::Error for UnsupportedLens {}
 
 /// Writes a calibration as text. Only a sensor.toml has `theta_max_deg`; the other formats omit it.
 ///
 /// # Errors
 /// The format does not have the lens.
-pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
+pub fn write(camera: &Config, format: Format) -> Result<String, UnsupportedLens> {
     match format {
-        Format::Sensor => Ok(sensor(camera)),
+        Format::Sensor => Ok(write_sensor(camera)),
         Format::Kalibr => {
             let own = match camera.model {
                 Model::DoubleSphere => Some("ds"),
@@ -59,7 +59,7 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
                 _ => None,
             };
             let mut out = format!("cam0:\n  cam_overlaps: []\n  camera_model: {}\n", own.unwrap_or("pinhole"));
-            let k = if own.is_some() { Vec::new() } else { four(camera, format)? };
+            let k = if own.is_some() { Vec::new() } else { four_coefficients(camera, format)? };
             let model = match camera.model {
                 _ if own.is_some() => "none",
                 Model::Pinhole => "none",
@@ -77,7 +77,7 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
             Ok(out)
         }
         Format::Euroc => {
-            let k = four(camera, format)?;
+            let k = four_coefficients(camera, format)?;
             let model = if camera.model.is_planar() { "radial-tangential" } else { "equidistant" };
             Ok(format!(
                 "sensor_type: camera\nresolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: {}\n\
@@ -88,11 +88,11 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
                 list(&k)
             ))
         }
-        Format::OpenCv => opencv(camera),
+        Format::OpenCv => write_opencv(camera),
     }
 }
 
-fn sensor(c: &Config) -> String {
+fn write_sensor(c: &Config) -> String {
     let Config { width, height, .. } = c;
     let mut out = format!("[camera]\nwidth = {width}\nheight = {height}\nmodel = \"{}\"\n", c.model.name());
     for (key, value) in [("fx_px", c.fx_px), ("fy_px", c.fy_px), ("cx_px", c.cx_px), ("cy_px", c.cy_px)] {
@@ -107,7 +107,7 @@ fn sensor(c: &Config) -> String {
     out
 }
 
-fn opencv(c: &Config) -> Result<String, Unfit> {
+fn write_opencv(c: &Config) -> Result<String, UnsupportedLens> {
     refuse_own_projection(c, Format::OpenCv)?;
     let fisheye = matches!(c.model, Model::KannalaBrandt | Model::Equidistant);
     let count = if fisheye { 4 } else { 5 };
@@ -128,10 +128,10 @@ fn opencv(c: &Config) -> Result<String, Unfit> {
 }
 
 /// Refuses the lenses that only Kalibr can express: the projections with coefficients of their own.
-fn refuse_own_projection(c: &Config, format: Format) -> Result<(), Unfit> {
+fn refuse_own_projection(c: &Config, format: Format) -> Result<(), UnsupportedLens> {
     match c.model {
-        Model::DoubleSphere => Err(Unfit { what: "the double sphere lens", format }),
-        Model::Eucm => Err(Unfit { what: "the enhanced unified camera model", format }),
+        Model::DoubleSphere => Err(UnsupportedLens { what: "the double sphere lens", format }),
+        Model::Eucm => Err(UnsupportedLens { what: "the enhanced unified camera model", format }),
         _ => Ok(()),
     }
 }
@@ -141,10 +141,10 @@ fn intrinsics(c: &Config) -> [f64; 4] {
 }
 
 /// Returns the four coefficients that Kalibr and EuRoC have.
-fn four(c: &Config, format: Format) -> Result<Vec<f64>, Unfit> {
+fn four_coefficients(c: &Config, format: Format) -> Result<Vec<f64>, UnsupportedLens> {
     refuse_own_projection(c, format)?;
     if c.model == Model::BrownConrady && c.coefficient(4) != 0.0 {
-        return Err(Unfit { what: "k3, the fifth coefficient of brown-conrady", format });
+        return Err(UnsupportedLens { what: "k3, the fifth coefficient of brown-conrady", format });
     }
     Ok(match (c.model, format) {
         (Model::Pinhole, Format::Kalibr) => Vec::new(),

@@ -6,7 +6,7 @@ use super::{Key, Table, default_of, defaults, extra, limits_in_words, sections};
 const MARKS: [&str; 2] = ["<!-- keys: `cargo xtask keys` writes this table -->\n", "<!-- end of keys -->\n"];
 
 /// Returns a page with the current table between its marks; `None` if the page has no marks.
-pub fn inserted(page: &str) -> Option<String> {
+pub fn insert_table(page: &str) -> Option<String> {
     let [begin, end] = MARKS;
     let (before, rest) = page.split_once(begin)?;
     let (_, after) = rest.split_once(end)?;

@@ -1,7 +1,7 @@
 //! The commented sensor.toml to start from.
 
 use super::table::about;
-use super::{Key, Limits, default_of, defaults, extra, limits_in_words, sections, wrapped};
+use super::{Key, Limits, default_of, defaults, extra, limits_in_words, sections, wrap};
 
 /// Length of a comment line, in characters.
 const WIDTH: usize = 118;
@@ -35,7 +35,7 @@ pub fn text() -> String {
 }
 
 fn comment(text: &str) -> String {
-    wrapped(text, WIDTH).iter().map(|line| format!("# {line}\n")).collect()
+    wrap(text, WIDTH).iter().map(|line| format!("# {line}\n")).collect()
 }
 
 /// Writes a key with its meaning and its values above it. A key without a default is commented out.

@@ -23,17 +23,17 @@ const EQUIVALENT_STEPS: u32 = 40;
 /// Correlation length of a sensor that measures the edge noise in each picture, as a fraction of the arc.
 const SENSOR_ARC: f64 = 1.0 / 12.0;
 /// Points with a smaller weight are skipped: at half weight they are about 2.7 sigma off.
-const LEAST_WEIGHT: f64 = 0.5;
+const MIN_WEIGHT: f64 = 0.5;
 /// Floor of the sigma of an edge point, in pixels.
-pub(super) const LEAST_PX: f64 = 0.03;
+pub(super) const MIN_SIGMA_PX: f64 = 0.03;
 /// Largest variance of a model, in mean squares of the residuals. The residuals do not support a larger one.
-const MOST_VARIANCE: f64 = 4.0;
+const MAX_VARIANCE: f64 = 4.0;
 
 /// The result of one noise model for one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Score {
     /// −2 ln of the restricted likelihood, up to a constant.
-    pub(super) unlikely: f64,
+    pub(super) minus_two_ln_likelihood: f64,
     /// σ², px².
     pub(super) variance_px2: f64,
 }
@@ -42,27 +42,28 @@ pub(super) struct Score {
 pub(super) type Scores = [[Score; WHITE.len()]; LENGTHS_PX.len()];
 
 /// Returns the scores of a picture's residuals; `None` if there are too few or all are zero.
-pub(super) fn scores(cone: &Cone) -> Option<Scores> {
-    let mut scores = [[Score { unlikely: f64::INFINITY, variance_px2: f64::NAN }; WHITE.len()]; LENGTHS_PX.len()];
+pub(super) fn score_models(cone: &Cone) -> Option<Scores> {
+    let mut scores =
+        [[Score { minus_two_ln_likelihood: f64::INFINITY, variance_px2: f64::NAN }; WHITE.len()]; LENGTHS_PX.len()];
     for (scores, length) in scores.iter_mut().zip(LENGTHS_PX) {
         let decays: Vec<f64> = cone.rows.iter().map(|r| decay(r.step_px, length)).collect();
         for (score, white) in scores.iter_mut().zip(WHITE) {
-            *score = score_of(&cone.rows, &decays, white)?;
+            *score = score_model(&cone.rows, &decays, white)?;
         }
     }
     Some(scores)
 }
 
 /// Returns the score of one model for one picture.
-fn score_of(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
-    let freedom = rows.iter().filter(|r| r.weight >= LEAST_WEIGHT).count() as f64 - 3.0;
+fn score_model(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
+    let freedom = rows.iter().filter(|r| r.weight >= MIN_WEIGHT).count() as f64 - 3.0;
     // The Kalman filter's prediction of the correlated part at the next point, for r and the three columns of H, and
     // the variance of that prediction in units of σ².
     let (mut ahead, mut spread) = ([0.0f64; 4], 1.0 - white);
     let (mut log_det, mut rr) = (0.0, 0.0);
     let (mut hr, mut hh) = (Vector3::zeros(), Matrix3::zeros());
     for (row, decay) in rows.iter().zip(decays) {
-        if row.weight < LEAST_WEIGHT {
+        if row.weight < MIN_WEIGHT {
             ahead = ahead.map(|x| x * decay);
             spread = decay * decay * spread + (1.0 - decay * decay) * (1.0 - white);
             continue;
@@ -86,12 +87,15 @@ fn score_of(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
         return None;
     }
     let log_det_h: f64 = 2.0 * information.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-    Some(Score { unlikely: freedom * (q / freedom).ln() + log_det + log_det_h, variance_px2: q / freedom })
+    Some(Score {
+        minus_two_ln_likelihood: freedom * (q / freedom).ln() + log_det + log_det_h,
+        variance_px2: q / freedom,
+    })
 }
 
 /// Returns the shortest correlation length, in pixels, at which an exponential process with `sigma_px` gives the fitted
 /// cos α at least this `variance`. If no length does, the result is the length with the largest variance.
-pub(super) fn equivalent_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
+pub(super) fn equivalent_length_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
     let most_px = LIKELY_ARC * cone.arc_px();
     let mut nearest = (0.0, 0.0);
     for k in 0..=EQUIVALENT_STEPS {
@@ -119,15 +123,18 @@ pub(super) fn variance_of_cos(cone: &Cone, scores: &Scores) -> f64 {
     };
     let each = || {
         scores.iter().zip(LENGTHS_PX).flat_map(move |(scores, length)| {
-            scores.iter().zip(WHITE).map(move |(score, white)| (score, length, white, score.unlikely + prior(length)))
+            scores
+                .iter()
+                .zip(WHITE)
+                .map(move |(score, white)| (score, length, white, score.minus_two_ln_likelihood + prior(length)))
         })
     };
-    let least = each().map(|(.., unlikely)| unlikely).fold(f64::INFINITY, f64::min);
+    let least = each().map(|(.., minus_two_ln_likelihood)| minus_two_ln_likelihood).fold(f64::INFINITY, f64::min);
     let (mut sum, mut total) = (0.0, 0.0);
-    for (score, length, white, unlikely) in each() {
-        let likely = (-0.5 * (unlikely - least)).exp();
+    for (score, length, white, minus_two_ln_likelihood) in each() {
+        let likely = (-0.5 * (minus_two_ln_likelihood - least)).exp();
         if likely > 1e-6 {
-            let variance = score.variance_px2.min(MOST_VARIANCE * mean_square).max(LEAST_PX * LEAST_PX);
+            let variance = score.variance_px2.min(MAX_VARIANCE * mean_square).max(MIN_SIGMA_PX * MIN_SIGMA_PX);
             sum += likely * cone.variance_of_cos(variance.sqrt(), length, white);
             total += likely;
         }

@@ -3,7 +3,7 @@
 use hzn_core::body::Kind;
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
-use super::calibration::{Calibration, digits};
+use super::calibration::{Calibration, round_to_written_digits};
 
 /// Comments of a calibration begin with this mark; the next calibration replaces them.
 const MARK: &str = "# calibrated:";
@@ -34,15 +34,15 @@ pub fn into_sensor_toml(text: &str, calibration: &Calibration, source: &str) -> 
     let mut keys = Vec::new();
     let several = document.contains_key("bodies");
     if several {
-        let body = body_of(&mut document, calibration.body)?;
-        put_all(body, limb(calibration, source), "[[bodies]]", &mut keys);
+        let body = find_body(&mut document, calibration.body)?;
+        put_all(body, limb_lines(calibration, source), "[[bodies]]", &mut keys);
         body.remove_rows(calibration);
         let noise = body.entry("covariance").or_insert_with(toml_edit::table);
         let noise = noise.as_table_like_mut().ok_or("[bodies.covariance] is not a section")?;
         put_all(noise, noise_lines(calibration), "[bodies.covariance]", &mut keys);
     } else {
         let body = section(&mut document, "body")?;
-        put_all(body, limb(calibration, source), "[body]", &mut keys);
+        put_all(body, limb_lines(calibration, source), "[body]", &mut keys);
         body.remove_rows(calibration);
         put_all(section(&mut document, "covariance")?, noise_lines(calibration), "[covariance]", &mut keys);
     }
@@ -59,12 +59,16 @@ fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn 
 }
 
 /// Returns the calibrated body in `[[bodies]]`.
-fn body_of(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike, String> {
+fn find_body(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike, String> {
     let name = kind.name();
     let is_it = |table: &Table| table.get("kind").map_or("earth", |k| k.as_str().unwrap_or_default()) == name;
     let bodies = document.get_mut("bodies").and_then(Item::as_array_of_tables_mut);
     let bodies = bodies.ok_or("[[bodies]] is not a list of sections")?;
-    bodies.iter_mut().find(|t| is_it(t)).map(|t| t as &mut dyn TableLike).ok_or(format!("there is no [[bodies]] of kind {name}"))
+    bodies
+        .iter_mut()
+        .find(|t| is_it(t))
+        .map(|t| t as &mut dyn TableLike)
+        .ok_or(format!("there is no [[bodies]] of kind {name}"))
 }
 
 /// Removes the text that a calibration makes invalid.
@@ -81,7 +85,7 @@ impl RemoveRows for dyn TableLike + '_ {
     }
 }
 
-fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
+fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
     let h = &calibration.height;
     let counted = calibration.pictures.iter().filter(|p| p.counts).count();
     let mut parts = vec![
@@ -96,10 +100,10 @@ fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
     let mut lines = vec![
         Line {
             key: "limb_height_km",
-            value: digits(h.km).into(),
+            value: round_to_written_digits(h.km).into(),
             why: format!("measured on {counted} pictures of {source} by `hzn calibrate noise`"),
         },
-        Line { key: "limb_height_sigma_km", value: digits(h.sigma_km).into(), why: parts.join(", ") },
+        Line { key: "limb_height_sigma_km", value: round_to_written_digits(h.sigma_km).into(), why: parts.join(", ") },
         Line {
             key: "clipped_height_km",
             value: 0.0.into(),
@@ -107,7 +111,7 @@ fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
         },
     ];
     if !h.by_latitude.is_empty() {
-        let row = |[deg, km, _]: &[f64; 3]| Array::from_iter([*deg, digits(*km)]);
+        let row = |[deg, km, _]: &[f64; 3]| Array::from_iter([*deg, round_to_written_digits(*km)]);
         let sigmas: Vec<String> =
             h.by_latitude.iter().map(|[deg, _, sigma]| format!("{deg:.0}° ± {sigma:.2}")).collect();
         lines.push(Line {
@@ -123,11 +127,15 @@ fn noise_lines(calibration: &Calibration) -> Vec<Line> {
     let e = &calibration.edge;
     let length = "correlation length that gives the fit the same variance as the residuals of each picture".to_owned();
     vec![
-        Line { key: "sigma_px", value: digits(e.sigma_px).into(), why: "RMS of the residuals along the limb".into() },
-        Line { key: "correlation_px", value: digits(e.correlation_px).into(), why: length },
+        Line {
+            key: "sigma_px",
+            value: round_to_written_digits(e.sigma_px).into(),
+            why: "RMS of the residuals along the limb".into(),
+        },
+        Line { key: "correlation_px", value: round_to_written_digits(e.correlation_px).into(), why: length },
         Line {
             key: "bias_px",
-            value: digits(e.bias_px).into(),
+            value: round_to_written_digits(e.bias_px).into(),
             why: "residuals do not show a common shift of all points; it is assumed to be equal to their RMS, and at \
                   least 0.1 px"
                 .into(),

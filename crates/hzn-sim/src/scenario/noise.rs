@@ -13,7 +13,7 @@
 //! answers are as large as their covariance. (The points themselves do not determine the length. The error that turns
 //! an answer is the same along the whole edge, and it is small compared with the noise of a point.)
 
-use hzn_calib::noise::{Points, Weighted};
+use hzn_calib::noise::{PointRecorder, WeightedPoints};
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera};
 use hzn_core::covariance::{self, Noise};
@@ -230,7 +230,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 struct Looked<'a> {
     frame: &'a FlightFrame,
     /// Edge points of the answer with their weights, in order.
-    points: Weighted,
+    points: WeightedPoints,
     error_rad: f64,
     nees: f64,
     /// Logarithm of the covariance's determinant.
@@ -252,10 +252,10 @@ fn look<'a>(scenario: &Scenario, sensor: &Config, seen: &[(&'a FlightFrame, &Pic
             None => frame.known(),
         };
         let Ok(expected) = horizon.expect(&known) else { continue };
-        let watch = Points::default();
+        let watch = PointRecorder::default();
         let report = horizon.process_observed(&picture.view(), &expected, &watch);
         let (Some(solution), Some(axis), true) = (report.solution, truth.axis(), truth.has_limb()) else { continue };
-        let points = watch.of_candidate(solution.candidate);
+        let points = watch.candidate_points(solution.candidate);
         let p = solution.covariance.rows();
         let e = Vector3::from(solution.axis.xyz());
         // The covariance has rank 2, so its null direction is filled before the inversion.
