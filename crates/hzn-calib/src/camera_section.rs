@@ -16,9 +16,9 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
     let Some(section) = table.get_mut("camera") else { return Ok(None) };
     let DeValue::Table(camera) = section.get_mut() else { return Ok(None) };
     let Some((file, span)) = take(camera, "file") else { return Ok(None) };
-    let here = |what: String| Problem::new(path, what).at_offset(text, span.start).in_field("[camera] file");
+    let refused = |what: String| Problem::new(path, what).at_offset(text, span.start).in_field("[camera] file");
     let Some(file) = file.as_str() else {
-        return Err(here("must be the path of a camera file, in quotes".into()));
+        return Err(refused("must be the path of a camera file, in quotes".into()));
     };
     let name = take(camera, "camera");
     let theta_max = take(camera, "theta_max_deg");
@@ -30,7 +30,7 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
     }
     let file = path.parent().unwrap_or(Path::new("")).join(file);
     if !file.exists() {
-        return Err(here(format!("{}: no such file (paths are relative to the sensor.toml)", file.display())));
+        return Err(refused(format!("{}: no such file (paths are relative to the sensor.toml)", file.display())));
     }
     let mut config = camera_file::load(&file, name.as_ref().and_then(|(n, _)| n.as_str()))?;
     if let Some((value, span)) = theta_max {

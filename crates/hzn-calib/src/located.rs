@@ -84,7 +84,7 @@ pub(crate) fn check_list_lengths(text: &str, path: &Path, places: &[KeyPlace]) -
     const ROWS: &str = "limb_height_by_latitude_km";
     for place in places {
         let parts: Vec<&str> = place.path.iter().map(String::as_str).collect();
-        let (most, what) = match parts[..] {
+        let (max, what) = match parts[..] {
             // The limit is that of `brown-conrady`.
             ["camera", "k"] => (5, "numbers"),
             ["mount", "q_body_from_camera_wxyz"] => (4, "numbers"),
@@ -97,8 +97,8 @@ pub(crate) fn check_list_lengths(text: &str, path: &Path, places: &[KeyPlace]) -
             | ["select", "altitude_limits_km"] => (2, "numbers"),
             _ => continue,
         };
-        if place.items > most {
-            let what = format!("has {} {what}; at most {most} are allowed", place.items);
+        if place.items > max {
+            let what = format!("has {} {what}; at most {max} are allowed", place.items);
             return Err(Problem::new(path, what).at_offset(text, place.key.start).in_field(place.field()));
         }
     }
@@ -143,18 +143,18 @@ pub(crate) fn translate_serde_error(
     let mut quoted = message.split('`').skip(1).step_by(2);
     let first = quoted.next().unwrap_or_default();
     let valid: Vec<&str> = quoted.collect();
-    let own = place.map(KeyPlace::field).unwrap_or_default();
+    let field = place.map(KeyPlace::field).unwrap_or_default();
     let problem = if message.starts_with("unknown field") {
         let valid: Vec<&str> = match place.map(|p| p.path.as_slice()) {
             Some([_]) => valid.into_iter().chain(extra_keys.iter().copied()).collect(),
             Some([section, _]) if section == "camera" => valid.into_iter().chain(["file"]).collect(),
             _ => valid,
         };
-        let what = if own.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
-        Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(own)
+        let what = if field.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
+        Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(field)
     } else if message.starts_with("unknown variant") {
         let what = format!("{first:?} is not a valid value{}", suggestion(first, &valid));
-        Problem::new(path, what).in_field(own)
+        Problem::new(path, what).in_field(field)
     } else if message.starts_with("missing field") {
         let mut p: Vec<String> = place.map(|p| p.path.clone()).unwrap_or_default();
         p.push(first.to_owned());
@@ -167,22 +167,22 @@ pub(crate) fn translate_serde_error(
         };
         Problem::new(path, what).in_field(field_name(&p))
     } else {
-        let what = whole_number(message, place).unwrap_or_else(|| {
+        let what = explain_whole_number(message, place).unwrap_or_else(|| {
             message
                 .replace("expected f64", "expected a number")
                 .replace("floating point `", "number `")
                 .replace('\n', "; ")
         });
         let problem = Problem::new(path, what);
-        if own.is_empty() { problem } else { problem.in_field(own) }
+        if field.is_empty() { problem } else { problem.in_field(field) }
     };
     attach(problem)
 }
 
 /// Returns the message for a wrong value of a whole-number key, with the limits of that key; `None` for other keys.
-fn whole_number(message: &str, place: Option<&KeyPlace>) -> Option<String> {
-    let (given, expected) = message.split_once(", expected ")?;
-    let most = match expected {
+fn explain_whole_number(message: &str, place: Option<&KeyPlace>) -> Option<String> {
+    let (found, expected) = message.split_once(", expected ")?;
+    let max = match expected {
         "u8" => f64::from(u8::MAX),
         "u16" => f64::from(u16::MAX),
         "u32" => f64::from(u32::MAX),
@@ -190,13 +190,13 @@ fn whole_number(message: &str, place: Option<&KeyPlace>) -> Option<String> {
     };
     let key = place.and_then(|p| keys::find_parts(&p.path));
     let rule = match key.map(|key| &key.limits) {
-        Some(Limits::Number { low, high, .. }) => format!("between {low} and {}", high.min(most)),
+        Some(Limits::Number { low, high, .. }) => format!("between {low} and {}", high.min(max)),
         Some(Limits::Rule(words)) if words.contains(" to ") => (*words).to_owned(),
-        _ => format!("between 0 and {most}"),
+        _ => format!("between 0 and {max}"),
     };
-    Some(match given.strip_prefix("invalid value: integer `").and_then(|n| n.strip_suffix('`')) {
+    Some(match found.strip_prefix("invalid value: integer `").and_then(|n| n.strip_suffix('`')) {
         Some(number) => format!("{number} is refused: must be {rule}"),
-        None => format!("{}: must be a whole number, {rule}", given.replace("floating point `", "number `")),
+        None => format!("{}: must be a whole number, {rule}", found.replace("floating point `", "number `")),
     })
 }
 

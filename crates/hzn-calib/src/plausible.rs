@@ -73,8 +73,8 @@ fn check_body(body: &body::Config) -> Option<Implausible> {
     if let Some(what) = explain_unused_altitude(body.kind) {
         return Some(Implausible::new("body.altitude_km", what));
     }
-    let far = km > max_altitude_km(body.kind, body.mean_radius_km());
-    far.then(|| Implausible::new("body.altitude_km", format!("{km} km is implausibly large: is it in metres?")))
+    let is_far = km > max_altitude_km(body.kind, body.mean_radius_km());
+    is_far.then(|| Implausible::new("body.altitude_km", format!("{km} km is implausibly large: is it in metres?")))
 }
 
 /// Returns the warning for an altitude of the Sun or the Moon, whose half-angle does not depend on it. The result is
@@ -108,15 +108,15 @@ fn check_camera(c: &camera::Config) -> Vec<Implausible> {
 
 fn check_centre(c: &camera::Config) -> Option<Implausible> {
     let (w, h) = (f64::from(c.width), f64::from(c.height));
-    let off = |x: f64, y: f64| ((x + 0.5) / w - 0.5).abs().max(((y + 0.5) / h - 0.5).abs());
-    if off(c.cx_px, c.cy_px) <= MAX_OFF_CENTRE {
+    let offset = |x: f64, y: f64| ((x + 0.5) / w - 0.5).abs().max(((y + 0.5) / h - 0.5).abs());
+    if offset(c.cx_px, c.cy_px) <= MAX_OFF_CENTRE {
         return None;
     }
-    let at = format!("the centre ({}, {}) is far from the middle of {} x {} px", c.cx_px, c.cy_px, c.width, c.height);
+    let what = format!("the centre ({}, {}) is far from the middle of {} x {} px", c.cx_px, c.cy_px, c.width, c.height);
     let unit = 0.0..=1.0;
     let why = if unit.contains(&c.cx_px) && unit.contains(&c.cy_px) {
         "; it is counted in pixels from the picture's upper left corner".to_owned()
-    } else if off(c.cy_px, c.cx_px) <= MAX_OFF_CENTRE / 2.0 {
+    } else if offset(c.cy_px, c.cx_px) <= MAX_OFF_CENTRE / 2.0 {
         ": are cx_px and cy_px, or width and height, swapped?".to_owned()
     } else {
         // The centre may be the middle of a picture of another size.
@@ -128,7 +128,7 @@ fn check_centre(c: &camera::Config) -> Option<Implausible> {
             ": was the picture cut from a larger one?".to_owned()
         }
     };
-    Some(Implausible::new("camera.cx_px", at + &why))
+    Some(Implausible::new("camera.cx_px", what + &why))
 }
 
 fn check_focal(c: &camera::Config) -> Option<Implausible> {
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn swapped_and_absurd_cameras_are_told() {
+    fn swapped_and_absurd_cameras_are_reported() {
         let hd = |focal, centre| warnings(&camera(Model::Pinhole, [1920, 1080], focal, centre, &[]));
         assert_eq!(hd([1200.0; 2], [963.2, 536.7]), "");
         assert_eq!(hd([1200.0; 2], [1100.0, 500.0]), "");
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn coefficients_in_another_order_are_told() {
+    fn coefficients_in_another_order_are_reported() {
         let with = |model, k: &[f64]| camera(model, [1920, 1080], [1235.0; 2], [963.0, 537.0], k);
         assert!(
             warnings(&with(Model::KannalaBrandt, &[1.0, -0.055, 0.011, -0.0035])).contains("leave the 1 of the first")
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn altitudes_in_metres_and_of_the_moon_are_told() {
+    fn altitudes_in_metres_and_of_the_moon_are_reported() {
         let with = |kind, km| {
             let radius_km = (kind == body::Kind::Sphere).then_some(1737.4);
             let body = body::Config { kind, radius_km, altitude_km: Some(km), ..body::Config::default() };

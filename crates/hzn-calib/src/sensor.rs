@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn misspelt_names_bring_the_right_one() {
+    fn misspelt_names_suggest_the_right_one() {
         assert_eq!(
             error("[reject]\nthreshold_pxx = 3.0\n"),
             "sensor.toml:10: [reject] threshold_pxx: unknown key; did you mean threshold_px?"
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_values_bring_the_limit() {
+    fn wrong_values_name_the_limit() {
         assert_eq!(
             error("[reject]\nthreshold_px = -3\n"),
             "sensor.toml:10: [reject] threshold_px: -3 is refused: must be above 0"
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_bring_the_limits_of_their_key() {
+    fn whole_numbers_name_the_limits_of_their_key() {
         let width = |value: &str| {
             let text = CAMERA.replace("width = 640", &format!("width = {value}"));
             parse(&text, Path::new("s.toml")).unwrap_err().to_string()
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_that_are_too_long_bring_their_number_and_the_limit() {
+    fn lists_that_are_too_long_name_their_number_and_the_limit() {
         let list = |item: &str, n: usize| format!("[{}]", vec![item; n].join(", "));
         let k = parse(&format!("{CAMERA}k = {}\n", list("0.0", 12)), Path::new("s.toml")).unwrap_err();
         assert_eq!(k.to_string(), "s.toml:9: [camera] k: has 12 numbers; at most 5 are allowed");

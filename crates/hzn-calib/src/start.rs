@@ -236,9 +236,9 @@ fn write_text(
     shape_percent: f64,
 ) -> String {
     let mut text = String::from(
-        "# A sensor.toml for a camera without a calibration, by `hzn init`. Unknown properties of the lens are sigmas,\n\
-         # which the covariance of the answers includes. A calibration reduces them: `hzn camera convert`, with both\n\
-         # sigmas smaller or removed.\n\
+        "# A sensor.toml for a camera without a calibration, by `hzn init`. Unknown properties of the lens are\n\
+         # sigmas, which the covariance of the answers includes. A calibration reduces them: `hzn camera convert`,\n\
+         # with both sigmas smaller or removed.\n\
          # Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png\n\
          # Every other key with its default:  hzn init -o all.toml\n\
          \n\
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_loads_and_is_the_camera_that_was_told() {
+    fn what_is_written_loads_and_is_the_camera_of_the_facts() {
         for (fov, lens) in [(92.0, Model::Pinhole), (92.0, Model::Equidistant), (180.0, Model::Equidistant)] {
             let start = write_sensor_toml(&known(Some(fov), Some(lens), Exif::default())).unwrap();
             let config = crate::sensor::parse(&start.text, Path::new("s.toml")).unwrap().config;
@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contradiction_is_told_and_agreement_is_not() {
+    fn a_contradiction_is_reported_and_agreement_is_not() {
         let both = |fov| write_sensor_toml(&known(Some(fov), None, d4())).unwrap();
         // EXIF: 35.6 degrees over the width.
         let agreed = both(37.0);
@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_refused_with_what_to_say() {
+    fn impossible_facts_are_refused_with_a_remedy() {
         let refused = |fov, lens, exif| write_sensor_toml(&known(fov, lens, exif)).unwrap_err();
         assert!(refused(None, None, Exif::default()).contains("--fov"));
         assert!(refused(Some(92.0), None, Exif::default()).contains("--lens"));

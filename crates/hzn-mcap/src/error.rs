@@ -97,7 +97,9 @@ pub enum Error {
         path: PathBuf,
     },
     /// An earlier write failed; the recording takes no further frames.
-    #[error("an earlier write to {} failed: finished frames are kept there; resume the run to continue", path.display())]
+    #[error(
+        "an earlier write to {} failed: finished frames are kept there; resume the run to continue", path.display()
+    )]
     AfterFailure {
         /// The unfinished file.
         path: PathBuf,
@@ -105,7 +107,7 @@ pub enum Error {
 }
 
 /// Returns the folder of `path`; the current folder if `path` has none.
-pub(crate) fn folder_of(path: &Path) -> PathBuf {
+pub(crate) fn parent_folder(path: &Path) -> PathBuf {
     match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
         _ => PathBuf::from("."),
@@ -116,7 +118,7 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
 pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
     match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            Error::DiskFull { folder: folder_of(path), part: path.to_path_buf() }
+            Error::DiskFull { folder: parent_folder(path), part: path.to_path_buf() }
         }
         io::ErrorKind::FileTooLarge => {
             let what = "the file exceeds the largest allowed size (ulimit -f); finished frames are kept; resume the \
@@ -126,7 +128,7 @@ pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
         io::ErrorKind::PermissionDenied
         | io::ErrorKind::NotFound
         | io::ErrorKind::NotADirectory
-        | io::ErrorKind::ReadOnlyFilesystem => Error::Folder { folder: folder_of(path), source },
+        | io::ErrorKind::ReadOnlyFilesystem => Error::Folder { folder: parent_folder(path), source },
         _ => Error::Write { path: path.to_path_buf(), source },
     }
 }

@@ -203,16 +203,16 @@ impl Index {
     fn read_plain_chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
         let start = self.position;
         let end = start + 9 + length;
-        let mut at = start + 9 + 40;
-        let whole = self.file.get_ref().metadata()?.len() >= end;
-        while whole && at + 9 <= end {
+        let mut offset = start + 9 + 40;
+        let is_whole = self.file.get_ref().metadata()?.len() >= end;
+        while is_whole && offset + 9 <= end {
             let mut head = [0; 9];
             if !fill(&mut self.file, &mut head)? {
                 break;
             }
             let mut f = Fields(&head);
             let (Some(op), Some(length)) = (f.u8(), f.u64()) else { break };
-            if op == 0 || length > end - at - 9 {
+            if op == 0 || length > end - offset - 9 {
                 self.broken_chunks += 1;
                 break;
             }
@@ -232,7 +232,7 @@ impl Index {
                         break;
                     }
                 }
-                if let Err(e) = self.add_message(&Message { data: &data, ..m }, Some(start), at, found) {
+                if let Err(e) = self.add_message(&Message { data: &data, ..m }, Some(start), offset, found) {
                     return Ok(Err(e));
                 }
             } else if matches!(op, Op::SCHEMA | Op::CHANNEL) {
@@ -244,11 +244,11 @@ impl Index {
                 skip = 0;
             }
             self.file.seek_relative(skip as i64)?;
-            at += 9 + length;
+            offset += 9 + length;
         }
         self.file.seek(SeekFrom::Start(end))?;
         self.position = end;
-        Ok(Ok(whole))
+        Ok(Ok(is_whole))
     }
 
     fn add_message(

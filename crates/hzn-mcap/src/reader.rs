@@ -46,7 +46,8 @@ pub struct Reader {
 /// Parts of frames by their sequence number, in the order of the file.
 type Parts<T> = BTreeMap<u32, VecDeque<T>>;
 
-fn take<T>(parts: &mut Parts<T>, sequence: u32) -> Option<T> {
+/// Takes the first part of a frame.
+fn take_part<T>(parts: &mut Parts<T>, sequence: u32) -> Option<T> {
     let queue = parts.get_mut(&sequence)?;
     let part = queue.pop_front();
     if queue.is_empty() {
@@ -183,9 +184,9 @@ impl Reader {
                     self.ready.push_back(FrameRecord {
                         row,
                         candidates,
-                        image: take(&mut self.images, m.sequence),
-                        annotations: take(&mut annotations, m.sequence).unwrap_or_default(),
-                        attitude: take(&mut attitudes, m.sequence),
+                        image: take_part(&mut self.images, m.sequence),
+                        annotations: take_part(&mut annotations, m.sequence).unwrap_or_default(),
+                        attitude: take_part(&mut attitudes, m.sequence),
                         prior,
                         log: logs.remove(&m.sequence).unwrap_or_default().into(),
                     });

@@ -289,19 +289,26 @@ mod tests {
     }
 
     fn report<T: Real>(status: Status) -> Report<T> {
-        let of = T::from_f64;
+        let number = T::from_f64;
         let solution = Solution {
-            axis: UnitVec3::try_new([of(0.0), of(0.6), of(0.8)]).unwrap(),
-            covariance: Cov3::from_upper([of(4e-8), of(0.0), of(0.0), of(1e-8), of(0.0), of(0.0)]),
+            axis: UnitVec3::try_new([number(0.0), number(0.6), number(0.8)]).unwrap(),
+            covariance: Cov3::from_upper([
+                number(4e-8),
+                number(0.0),
+                number(0.0),
+                number(1e-8),
+                number(0.0),
+                number(0.0),
+            ]),
             axis_ecef: None,
-            axis_body: UnitVec3::try_new([of(-0.5), of(0.0), of(0.75f64.sqrt())]),
-            half_angle_rad: of(1.3),
-            fused_half_angle_rad: of(1.3),
-            altitude_m: Some((of(240e3), of(1e3))),
+            axis_body: UnitVec3::try_new([number(-0.5), number(0.0), number(0.75f64.sqrt())]),
+            half_angle_rad: number(1.3),
+            fused_half_angle_rad: number(1.3),
+            altitude_m: Some((number(240e3), number(1e3))),
             free: None,
-            rms_px: of(f64::NAN),
+            rms_px: number(f64::NAN),
             inliers: 500,
-            arc_px: of(900.0),
+            arc_px: number(900.0),
             candidate: 0,
         };
         Report {
@@ -334,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_stands_only_beside_ok() {
+    fn only_ok_has_an_axis() {
         for status in Status::ALL {
             let row = Row::from_report::<f64>(&meta(), &report(status), None);
             assert_eq!(row.axis().is_some(), status == Status::Ok);

@@ -272,7 +272,7 @@ fn errors_name_the_place_and_the_way_out() {
 /// A full disk, simulated by the system's `/dev/full`.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_said_and_nothing_else_happens() {
+fn a_full_disk_is_reported_and_nothing_else_happens() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("out.mcap");
     std::os::unix::fs::symlink("/dev/full", part_path(&path)).unwrap();
@@ -312,7 +312,7 @@ fn our_recordings_are_an_input_too() {
 }
 
 #[test]
-fn raw_pictures_stand_on_the_same_topic() {
+fn raw_pictures_are_on_the_same_topic() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("out.mcap");
     let mut record = frame(2);

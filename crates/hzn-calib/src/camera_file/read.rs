@@ -45,7 +45,7 @@ pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Prob
         problem
     })?;
     let file = File { path };
-    let Value::Object(top) = &value else { return Err(file.unknown()) };
+    let Value::Object(top) = &value else { return Err(file.unknown_format()) };
     let numbered =
         |k: &str| k.strip_prefix("cam").is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
     let cameras: Vec<&str> = top.keys().map(String::as_str).filter(|k| numbered(k)).collect();
@@ -53,11 +53,13 @@ pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Prob
         (Some(name), _) if !cameras.contains(&name) => {
             Err(Problem::new(path, format!("has no camera {name:?}{}", suggestion(name, &cameras))))
         }
-        (Some(name), _) => file.kalibr(&top[name], name),
-        (None, Some(first)) => file.kalibr(&top[*first], first),
-        (None, None) if top.contains_key("intrinsics") => file.kalibr(&value, ""),
-        (None, None) if ["camera_matrix", "K", "k"].iter().any(|key| top.contains_key(*key)) => file.opencv(&value),
-        _ => Err(file.unknown()),
+        (Some(name), _) => file.read_kalibr(&top[name], name),
+        (None, Some(first)) => file.read_kalibr(&top[*first], first),
+        (None, None) if top.contains_key("intrinsics") => file.read_kalibr(&value, ""),
+        (None, None) if ["camera_matrix", "K", "k"].iter().any(|key| top.contains_key(*key)) => {
+            file.read_opencv(&value)
+        }
+        _ => Err(file.unknown_format()),
     }
 }
 
@@ -70,7 +72,7 @@ impl File<'_> {
         Problem::new(self.path, what).in_field(field)
     }
 
-    fn unknown(&self) -> Problem {
+    fn unknown_format(&self) -> Problem {
         Problem::new(
             self.path,
             "is not a known camera file; expected is a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
@@ -78,11 +80,12 @@ impl File<'_> {
         )
     }
 
-    fn kalibr(&self, camera: &Value, name: &str) -> Result<Config, Problem> {
+    /// Reads one camera of a Kalibr camchain, or EuRoC's sensor.yaml, which has no `name`.
+    fn read_kalibr(&self, camera: &Value, name: &str) -> Result<Config, Problem> {
         let field = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
         let list = |key: &str| numbers(&camera[key]);
         let projection = camera["camera_model"].as_str().unwrap_or("pinhole");
-        let own = match projection {
+        let special = match projection {
             "pinhole" => None,
             "ds" => Some((Model::DoubleSphere, "xi, alpha")),
             "eucm" => Some((Model::Eucm, "alpha, beta")),
@@ -94,7 +97,8 @@ impl File<'_> {
             }
         };
         // The projections with coefficients of their own have them before the focal lengths.
-        let (names, count) = own.map_or(("four numbers ".to_owned(), 0), |(_, k)| (format!("six numbers {k}, "), 2));
+        let (names, count) =
+            special.map_or(("four numbers ".to_owned(), 0), |(_, k)| (format!("six numbers {k}, "), 2));
         let intrinsics = list("intrinsics").filter(|v| v.len() == 4 + count);
         let Some((k, [fx, fy, cx, cy])) = intrinsics.and_then(|v| {
             let (k, rest) = v.split_at(count);
@@ -111,37 +115,38 @@ impl File<'_> {
         } else {
             "distortion_coeffs"
         };
-        let coefficients = Coefficients { values: self.coefficients(camera.get(key), &field(key))?, field: field(key) };
-        let lens = self.stated_lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
-        if let Some((model, _)) = own {
+        let coefficients =
+            Coefficients { values: self.read_coefficients(camera.get(key), &field(key))?, field: field(key) };
+        let lens = self.read_lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
+        if let Some((model, _)) = special {
             if coefficients.significant_len() > 0 {
                 return Err(
                     self.problem(&field(key), format!("{projection} has no further distortion; calibrate with none"))
                 );
             }
             let coefficients = Coefficients { values: Some(k), field: field("intrinsics") };
-            return self.camera(model, [width, height], [fx, fy, cx, cy], &coefficients);
+            return self.build_config(model, [width, height], [fx, fy, cx, cy], &coefficients);
         }
-        let model = self.model(lens, &coefficients)?;
-        self.camera(model, [width, height], [fx, fy, cx, cy], &coefficients)
+        let model = self.choose_model(lens, &coefficients)?;
+        self.build_config(model, [width, height], [fx, fy, cx, cy], &coefficients)
     }
 
     /// Reads OpenCV's files, and ROS's camera_info as its calibrator writes it or as its topic shows it.
-    fn opencv(&self, top: &Value) -> Result<Config, Problem> {
-        let either = |names: &[&'static str]| {
+    fn read_opencv(&self, top: &Value) -> Result<Config, Problem> {
+        let find_first = |names: &[&'static str]| {
             let found = names.iter().find_map(|name| top.get(*name).map(|value| (*name, value)));
             found.unwrap_or((names.first().copied().unwrap_or_default(), &Value::Null))
         };
-        let (key, value) = either(&["camera_matrix", "K", "k"]);
-        let [fx, fy, cx, cy] = self.intrinsics(value, key)?;
-        let (key, value) = either(&["distortion_coefficients", "D", "d"]);
-        let coefficients = Coefficients { values: self.coefficients(Some(value), key)?, field: key.to_owned() };
+        let (key, value) = find_first(&["camera_matrix", "K", "k"]);
+        let [fx, fy, cx, cy] = self.read_intrinsics(value, key)?;
+        let (key, value) = find_first(&["distortion_coefficients", "D", "d"]);
+        let coefficients = Coefficients { values: self.read_coefficients(Some(value), key)?, field: key.to_owned() };
         let size = |names: &[&'static str]| {
-            let (key, value) = either(names);
+            let (key, value) = find_first(names);
             number(value).ok_or_else(|| self.problem(key, "missing: add the picture's size in pixels to the file"))
         };
         let size = [size(&["image_width", "width"])?, size(&["image_height", "height"])?];
-        let stated = self.stated_lens(top.get("distortion_model"), "distortion_model")?;
+        let stated = self.read_lens(top.get("distortion_model"), "distortion_model")?;
         let flag = top.get("fisheye_model").map(|f| f.as_f64() == Some(1.0) || f.as_bool() == Some(true));
         let named = self.path.file_name().is_some_and(|n| n.to_string_lossy().to_lowercase().contains("fisheye"));
         let lens = match (stated, flag) {
@@ -160,12 +165,12 @@ impl File<'_> {
             }
             (None, _) => Lens::PlumbBob,
         };
-        let model = self.model(lens, &coefficients)?;
-        self.camera(model, size, [fx, fy, cx, cy], &coefficients)
+        let model = self.choose_model(lens, &coefficients)?;
+        self.build_config(model, size, [fx, fy, cx, cy], &coefficients)
     }
 
     /// Returns fx, fy, cx, cy of a camera matrix, in pixels.
-    fn intrinsics(&self, value: &Value, key: &str) -> Result<[f64; 4], Problem> {
+    fn read_intrinsics(&self, value: &Value, key: &str) -> Result<[f64; 4], Problem> {
         let Some(Ok([fx, skew, cx, below, fy, cy, last @ ..])) = matrix(value).map(<[f64; 9]>::try_from) else {
             return Err(self.problem(key, "a 3x3 matrix is expected"));
         };
@@ -185,7 +190,7 @@ impl File<'_> {
     }
 
     /// Returns the coefficients, which must be a single row or column. The result is `None` if the file has none.
-    fn coefficients(&self, value: Option<&Value>, field: &str) -> Result<Option<Vec<f64>>, Problem> {
+    fn read_coefficients(&self, value: Option<&Value>, field: &str) -> Result<Option<Vec<f64>>, Problem> {
         let Some(value) = value.filter(|v| !v.is_null()) else { return Ok(None) };
         let Some(values) = matrix(value) else {
             return Err(self.problem(field, "a list of numbers is expected"));
@@ -206,7 +211,7 @@ impl File<'_> {
     }
 
     /// Returns the lens that `distortion_model` names; `None` if the word is missing or empty.
-    fn stated_lens(&self, word: Option<&Value>, field: &str) -> Result<Option<Lens>, Problem> {
+    fn read_lens(&self, word: Option<&Value>, field: &str) -> Result<Option<Lens>, Problem> {
         let Some(word) = word.and_then(Value::as_str).map(str::trim).filter(|word| !word.is_empty()) else {
             return Ok(None);
         };
@@ -214,19 +219,20 @@ impl File<'_> {
     }
 
     /// Returns hzn's model for the lens. The number of coefficients must fit that model.
-    fn model(&self, lens: Lens, coefficients: &Coefficients) -> Result<Model, Problem> {
+    fn choose_model(&self, lens: Lens, coefficients: &Coefficients) -> Result<Model, Problem> {
         lens.to_model(coefficients).map_err(|what| self.problem(&coefficients.field, what))
     }
 
-    fn camera(
+    /// Builds the configuration; `size` is width and height.
+    fn build_config(
         &self,
         model: Model,
         size: [f64; 2],
         [fx, fy, cx, cy]: [f64; 4],
         coefficients: &Coefficients,
     ) -> Result<Config, Problem> {
-        let whole = |x: f64| (x.fract() == 0.0 && (2.0..=65535.0).contains(&x)).then_some(x as u16);
-        let [Some(width), Some(height)] = size.map(whole) else {
+        let to_whole = |x: f64| (x.fract() == 0.0 && (2.0..=65535.0).contains(&x)).then_some(x as u16);
+        let [Some(width), Some(height)] = size.map(to_whole) else {
             return Err(self.problem("resolution", "width and height must be whole numbers from 2 to 65535"));
         };
         let k = coefficients.values.iter().flatten().copied().take(model.coefficients().len()).collect();

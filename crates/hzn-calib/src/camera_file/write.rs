@@ -53,15 +53,15 @@ pub fn write(camera: &Config, format: Format) -> Result<String, UnsupportedLens>
     match format {
         Format::Sensor => Ok(write_sensor(camera)),
         Format::Kalibr => {
-            let own = match camera.model {
+            let special = match camera.model {
                 Model::DoubleSphere => Some("ds"),
                 Model::Eucm => Some("eucm"),
                 _ => None,
             };
-            let mut out = format!("cam0:\n  cam_overlaps: []\n  camera_model: {}\n", own.unwrap_or("pinhole"));
-            let k = if own.is_some() { Vec::new() } else { four_coefficients(camera, format)? };
+            let mut out = format!("cam0:\n  cam_overlaps: []\n  camera_model: {}\n", special.unwrap_or("pinhole"));
+            let k = if special.is_some() { Vec::new() } else { four_coefficients(camera, format)? };
             let model = match camera.model {
-                _ if own.is_some() => "none",
+                _ if special.is_some() => "none",
                 Model::Pinhole => "none",
                 planar if planar.is_planar() => "radtan",
                 _ => "equidistant",
@@ -69,8 +69,8 @@ pub fn write(camera: &Config, format: Format) -> Result<String, UnsupportedLens>
             let _ = write!(
                 out,
                 "  distortion_coeffs: {}\n  distortion_model: {model}\n  intrinsics: {}\n  resolution: [{}, {}]\n",
-                list(&k),
-                list(&[own.map_or(&[][..], |_| &camera.k), &intrinsics(camera)[..]].concat()),
+                format_list(&k),
+                format_list(&[special.map_or(&[][..], |_| &camera.k), &intrinsics(camera)[..]].concat()),
                 camera.width,
                 camera.height
             );
@@ -84,8 +84,8 @@ pub fn write(camera: &Config, format: Format) -> Result<String, UnsupportedLens>
                  distortion_model: {model}\ndistortion_coefficients: {}\n",
                 camera.width,
                 camera.height,
-                list(&intrinsics(camera)),
-                list(&k)
+                format_list(&intrinsics(camera)),
+                format_list(&k)
             ))
         }
         Format::OpenCv => write_opencv(camera),
@@ -96,13 +96,13 @@ fn write_sensor(c: &Config) -> String {
     let Config { width, height, .. } = c;
     let mut out = format!("[camera]\nwidth = {width}\nheight = {height}\nmodel = \"{}\"\n", c.model.name());
     for (key, value) in [("fx_px", c.fx_px), ("fy_px", c.fy_px), ("cx_px", c.cx_px), ("cy_px", c.cy_px)] {
-        let _ = writeln!(out, "{key} = {}", number(value));
+        let _ = writeln!(out, "{key} = {}", format_number(value));
     }
     if !c.k.is_empty() {
-        let _ = writeln!(out, "k = {}", list(&c.k));
+        let _ = writeln!(out, "k = {}", format_list(&c.k));
     }
     if let Some(deg) = c.theta_max_deg {
-        let _ = writeln!(out, "theta_max_deg = {}", number(deg));
+        let _ = writeln!(out, "theta_max_deg = {}", format_number(deg));
     }
     out
 }
@@ -114,7 +114,7 @@ fn write_opencv(c: &Config) -> Result<String, UnsupportedLens> {
     let k: Vec<f64> = (0..count).map(|i| c.coefficient(i)).collect();
     let [fx, fy, cx, cy] = intrinsics(c);
     let matrix = |rows: usize, cols: usize, data: &[f64]| {
-        format!("!!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: {}", list(data))
+        format!("!!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: {}", format_list(data))
     };
     Ok(format!(
         "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\nfisheye_model: {}\ncamera_matrix: {}\n\
@@ -152,13 +152,13 @@ fn four_coefficients(c: &Config, format: Format) -> Result<Vec<f64>, Unsupported
     })
 }
 
-fn list(numbers: &[f64]) -> String {
-    format!("[{}]", numbers.iter().map(|&x| number(x)).collect::<Vec<_>>().join(", "))
+fn format_list(numbers: &[f64]) -> String {
+    format!("[{}]", numbers.iter().map(|&x| format_number(x)).collect::<Vec<_>>().join(", "))
 }
 
 /// Formats a number so that it is read back to the last bit. YAML 1.1 and OpenCV read `1e-5` as a word, so a decimal
 /// point is added.
-fn number(x: f64) -> String {
+fn format_number(x: f64) -> String {
     let text = format!("{x:?}");
     match text.split_once('e') {
         Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
@@ -227,6 +227,9 @@ mod tests {
 
     #[test]
     fn numbers_have_a_point() {
-        assert_eq!((number(1e-7), number(300.0), number(1.5e-9)), ("1.0e-7".into(), "300.0".into(), "1.5e-9".into()));
+        assert_eq!(
+            (format_number(1e-7), format_number(300.0), format_number(1.5e-9)),
+            ("1.0e-7".into(), "300.0".into(), "1.5e-9".into())
+        );
     }
 }

@@ -43,19 +43,19 @@ impl Frames {
     /// Returns warnings for values that are possible but look wrong: altitude and position of a row that differ by more
     /// than 0.1 km, altitudes and positions that are probably in metres, and altitudes that are not used.
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
-        let odd = |row: &FrameData| {
-            let own = altitude_at_km(row.position_km?, kind, radius_km)?;
-            if own > MAX_DISTANCE_RADII * radius_km {
+        let contradiction = |row: &FrameData| {
+            let km = altitude_at_km(row.position_km?, kind, radius_km)?;
+            if km > MAX_DISTANCE_RADII * radius_km {
                 let what = format!(
-                    "the position is at {own:.0} km; x_km, y_km, z_km are kilometres: are the values in metres?"
+                    "the position is at {km:.0} km; x_km, y_km, z_km are kilometres: are the values in metres?"
                 );
                 return Some(self.problem(row, what));
             }
-            let h = row.altitude_km?;
-            let what = format!("altitude_km is {h} but the position is at {own:.3} km; the position is used");
-            ((own - h).abs() > 0.1).then(|| self.problem(row, what))
+            let altitude_km = row.altitude_km?;
+            let what = format!("altitude_km is {altitude_km} but the position is at {km:.3} km; the position is used");
+            ((km - altitude_km).abs() > 0.1).then(|| self.problem(row, what))
         };
-        let mut warnings: Vec<Problem> = self.rows.iter().filter_map(odd).collect();
+        let mut warnings: Vec<Problem> = self.rows.iter().filter_map(contradiction).collect();
         warnings.extend(self.suspect_metres(kind, radius_km));
         if let (Some(what), Some(row)) =
             (plausible::explain_unused_altitude(kind), self.rows.iter().find(|r| r.altitude_km.is_some()))
@@ -70,8 +70,9 @@ impl Frames {
         if plausible::explain_unused_altitude(kind).is_some() {
             return None;
         }
-        let far = |row: &&FrameData| row.altitude_km.is_some_and(|h| h > plausible::max_altitude_km(kind, radius_km));
-        if let Some(row) = self.rows.iter().find(far) {
+        let is_far =
+            |row: &&FrameData| row.altitude_km.is_some_and(|h| h > plausible::max_altitude_km(kind, radius_km));
+        if let Some(row) = self.rows.iter().find(is_far) {
             let h = row.altitude_km.unwrap_or_default();
             let what = format!("altitude_km is {h}, which is implausibly large; is it in metres?");
             return Some(self.problem(row, what));
@@ -97,36 +98,36 @@ mod tests {
     }
 
     #[test]
-    fn altitude_and_position_that_disagree_are_said() {
+    fn altitude_and_position_that_disagree_are_reported() {
         let f = read("file,altitude_km,x_km,y_km,z_km\na,400,6778.137,0,0\nb,401,6778.137,0,0\n").unwrap();
-        let odd = f.check_altitudes(Kind::Earth, 6371.0);
-        assert_eq!(odd.len(), 1);
-        assert!(odd[0].to_string().starts_with("frames.csv:3: b: altitude_km is 401 but"), "{}", odd[0]);
+        let warnings = f.check_altitudes(Kind::Earth, 6371.0);
+        assert_eq!(warnings.len(), 1);
+        assert!(warnings[0].to_string().starts_with("frames.csv:3: b: altitude_km is 401 but"), "{}", warnings[0]);
     }
 
     #[test]
     fn altitudes_in_metres_are_suspected_once() {
-        let odd = |text: &str, kind| {
+        let warnings = |text: &str, kind| {
             let all = read(text).unwrap().check_altitudes(kind, 6371.0);
             all.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
         // A balloon: no altitude is too large, but the ascent is too fast.
         let balloon = "file,time_s,altitude_km\na,0,300\nb,60,600\nc,120,3900\n";
-        let told = odd(balloon, Kind::Earth);
-        assert_eq!(told.len(), 1);
-        assert!(told[0].starts_with("frames.csv:4: c: altitude_km changes by 55 km/s"), "{told:?}");
-        let orbit = odd("file,altitude_km\na,517500\nb,517600\n", Kind::Earth);
+        let found = warnings(balloon, Kind::Earth);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].starts_with("frames.csv:4: c: altitude_km changes by 55 km/s"), "{found:?}");
+        let orbit = warnings("file,altitude_km\na,517500\nb,517600\n", Kind::Earth);
         assert_eq!(orbit, ["frames.csv:2: a: altitude_km is 517500, which is implausibly large; is it in metres?"]);
-        assert!(odd("file,time_s,altitude_km\na,0,60\nb,1,61.5\nc,1,90\n", Kind::Earth).is_empty());
-        let moon = odd("file,altitude_km\na,100\nb,100\n", Kind::Moon);
+        assert!(warnings("file,time_s,altitude_km\na,0,60\nb,1,61.5\nc,1,90\n", Kind::Earth).is_empty());
+        let moon = warnings("file,altitude_km\na,100\nb,100\n", Kind::Moon);
         assert!(moon.len() == 1 && moon[0].contains("altitude_km is not used: kind = \"moon\""), "{moon:?}");
     }
 
     #[test]
     fn metres_are_suspected() {
         let f = read("file,x_km,y_km,z_km\na,6778137,0,0\nb,6778.137,0,0\n").unwrap();
-        let odd = f.check_altitudes(Kind::Earth, 6371.0);
-        assert_eq!(odd.len(), 1);
-        assert!(odd[0].to_string().contains("are the values in metres?"), "{}", odd[0]);
+        let warnings = f.check_altitudes(Kind::Earth, 6371.0);
+        assert_eq!(warnings.len(), 1);
+        assert!(warnings[0].to_string().contains("are the values in metres?"), "{}", warnings[0]);
     }
 }

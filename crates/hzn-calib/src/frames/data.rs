@@ -88,15 +88,15 @@ impl Frames {
 
     /// Returns the problem with a row that hzn-core refused, with the refused value.
     pub fn problem_of_prior(&self, row: &FrameData, error: PriorError) -> Problem {
-        let given = match error {
+        let value = match error {
             PriorError::Altitude => row.altitude_km.map(|h| format!("{h}")),
             PriorError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             PriorError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
             PriorError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             PriorError::NoAltitude | PriorError::BelowLimb { .. } | PriorError::NoBody => None,
         };
-        let given = given.map(|given| format!(", not {given}")).unwrap_or_default();
-        self.problem(row, format!("{error}{given}"))
+        let refused = value.map(|value| format!(", not {value}")).unwrap_or_default();
+        self.problem(row, format!("{error}{refused}"))
     }
 
     /// Returns a problem with one row. It names the line and the picture.

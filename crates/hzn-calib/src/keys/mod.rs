@@ -61,12 +61,12 @@ pub fn sections() -> impl Iterator<Item = &'static Table> {
 
 /// Returns every key, in the order of the documents.
 pub fn all() -> impl Iterator<Item = &'static Key> {
-    let of = |table: &'static Table| table.keys.iter().chain(extra(table.name));
-    core::iter::once(&PRESET).chain(sections().flat_map(of))
+    let keys = |table: &'static Table| table.keys.iter().chain(keys_of_file(table.name));
+    core::iter::once(&PRESET).chain(sections().flat_map(keys))
 }
 
 /// Returns the keys of a section that exist only in the file.
-fn extra(section: &str) -> &'static [Key] {
+fn keys_of_file(section: &str) -> &'static [Key] {
     if section == "camera" { &CAMERA_FILE } else { &[] }
 }
 
@@ -97,9 +97,9 @@ pub(crate) fn find_parts(path: &[String]) -> Option<&'static Key> {
 pub fn limits_in_words(key: &Key) -> String {
     match key.limits {
         Limits::Number { low, above, high } => {
-            let low = format!("{}{}", if above { "above " } else { "" }, short(low));
+            let low = format!("{}{}", if above { "above " } else { "" }, format_number(low));
             match (high.is_finite(), above) {
-                (true, _) => format!("{low} to {}", short(high)),
+                (true, _) => format!("{low} to {}", format_number(high)),
                 (false, true) => low,
                 (false, false) => format!("{low} or more"),
             }
@@ -111,7 +111,7 @@ pub fn limits_in_words(key: &Key) -> String {
 }
 
 /// Formats a number without a trailing `.0`; whole millions are written as powers of ten.
-fn short(x: f64) -> String {
+fn format_number(x: f64) -> String {
     if x.abs() >= 1e6 && x.abs() % 1e6 == 0.0 { format!("{x:e}") } else { x.to_string() }.replace('-', "−")
 }
 

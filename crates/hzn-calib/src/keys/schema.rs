@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::table::about;
-use super::{Form, Key, Limits, PRESET, Table, default_of, defaults, extra, sections};
+use super::{Form, Key, Limits, PRESET, Table, default_of, defaults, keys_of_file, sections};
 
 /// Returns the schema, in the draft 2020-12.
 pub fn json() -> Value {
@@ -33,7 +33,7 @@ pub fn json() -> Value {
 }
 
 fn section(table: &Table, defaults: &toml::Table) -> Value {
-    let keys = || table.keys.iter().chain(extra(table.name));
+    let keys = || table.keys.iter().chain(keys_of_file(table.name));
     let properties: Map<_, _> = keys().map(|key| (key.name().to_owned(), property(key, defaults))).collect();
     let mut schema = json!({
         "type": "object",

@@ -1,7 +1,7 @@
 //! The commented sensor.toml to start from.
 
 use super::table::about;
-use super::{Key, Limits, default_of, defaults, extra, limits_in_words, sections, wrap};
+use super::{Key, Limits, default_of, defaults, keys_of_file, limits_in_words, sections, wrap};
 
 /// Length of a comment line, in characters.
 const WIDTH: usize = 118;
@@ -21,7 +21,7 @@ pub fn text() -> String {
         out += &comment(&about(table));
         // `[mount]` is commented out, because it is optional and has no default.
         out += &format!("{}[{}]\n", if table.name == "mount" { "# " } else { "" }, table.name);
-        for key in table.keys.iter().chain(extra(table.name)) {
+        for key in table.keys.iter().chain(keys_of_file(table.name)) {
             out += &entry(key, &defaults);
         }
         if table.name == "body" {

@@ -71,19 +71,19 @@ fn limits_are_checked() {
                     _ => x,
                 };
                 // A file writes whole numbers for whole fields.
-                let taken = |x: f64| {
+                let is_accepted = |x: f64| {
                     refused(key, &list(format!("{x:.0}"))).is_none() && x.fract() == 0.0
                         || refused(key, &list(format!("{x:?}"))).is_none()
                 };
                 let inside = if above { low + 1e-3_f64.max(if high.is_infinite() { 1.0 } else { 0.0 }) } else { low };
                 let of_lens = key.section() == "camera";
-                assert!(taken(inside) || of_lens, "{} = {inside} is refused", key.path);
+                assert!(is_accepted(inside) || of_lens, "{} = {inside} is refused", key.path);
                 let outside = low - if above { 0.0 } else { 1.0 };
-                assert!(!taken(outside), "{} = {outside} is taken", key.path);
+                assert!(!is_accepted(outside), "{} = {outside} is taken", key.path);
                 if high.is_finite() {
                     let why = refused(key, &list(format!("{high:?}")));
-                    assert!(taken(high) || of_lens, "{} = {high} is refused: {why:?}", key.path);
-                    assert!(!taken(high * 2.0 + 1.0), "{} = {} is taken", key.path, high * 2.0 + 1.0);
+                    assert!(is_accepted(high) || of_lens, "{} = {high} is refused: {why:?}", key.path);
+                    assert!(!is_accepted(high * 2.0 + 1.0), "{} = {} is taken", key.path, high * 2.0 + 1.0);
                 }
                 checked += 1;
             }

@@ -39,8 +39,8 @@ pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
 }
 
 /// Returns the RMS in pixels of the bend that all edges may have in common: the amplitude of the strongest next shape
-/// in the mean of their residuals, or its standard error if that is larger. `edges` has the amplitudes of each edge, from
-/// [`shapes_px`].
+/// in the mean of their residuals, or its standard error if that is larger. `edges` has the amplitudes of each edge
+/// ([`shapes_px`]).
 pub(super) fn common_bend_px<'a>(edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone) -> f64 {
     let n = edges.len().max(1) as f64;
     let amplitude = |k: usize| {

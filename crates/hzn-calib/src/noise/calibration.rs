@@ -216,12 +216,12 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting]) -> Height {
     let Solved { h, covariance, scatter2, .. } = &profile.solved;
     let (n, parameters) = (sightings.len() as f64, h.len());
     // The mean weights of the parameters over all pictures.
-    let mut seen = vec![0.0; parameters];
+    let mut mean_weights = vec![0.0; parameters];
     for s in sightings {
-        seen.iter_mut().zip(profile.weights(s)).for_each(|(sum, weight)| *sum += weight / n);
+        mean_weights.iter_mut().zip(profile.weights(s)).for_each(|(sum, weight)| *sum += weight / n);
     }
-    let km = seen.iter().zip(h.iter()).map(|(a, h)| a * h).sum();
-    let weight = |i: usize, j: usize| seen.get(i).zip(seen.get(j)).map_or(0.0, |(a, b)| a * b);
+    let km = mean_weights.iter().zip(h.iter()).map(|(a, h)| a * h).sum();
+    let weight = |i: usize, j: usize| mean_weights.get(i).zip(mean_weights.get(j)).map_or(0.0, |(a, b)| a * b);
     let mean_variance: f64 = (0..parameters)
         .flat_map(|i| (0..parameters).map(move |j| (i, j)))
         .map(|(i, j)| weight(i, j) * covariance[(i, j)])

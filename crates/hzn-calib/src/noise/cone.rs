@@ -84,12 +84,12 @@ impl Cone {
         }
         let (mut e, mut c) = (Vector3::from(axis), cos);
         for _ in 0..ITERATIONS {
-            let at = Self::evaluate(&edge_points, e, c, azimuth)?;
-            let sum: Vector3<f64> = at.rows.iter().map(|r| r.h * (r.weight * r.r_px)).sum();
-            let step = at.inverse * sum;
+            let cone = Self::evaluate(&edge_points, e, c, azimuth)?;
+            let sum: Vector3<f64> = cone.rows.iter().map(|r| r.h * (r.weight * r.r_px)).sum();
+            let step = cone.inverse * sum;
             let (b1, b2) = basis(&e);
             e = (e + b1 * step.x + b2 * step.y).try_normalize(1e-12)?;
-            c += at.to_cos.dot(&step);
+            c += cone.to_cos.dot(&step);
             if step.norm() < 1e-13 {
                 break;
             }

@@ -44,19 +44,19 @@ const STEPS: i32 = 8;
 pub(super) fn solve(all: &[Measured]) -> Option<Solved> {
     let parameters = all.first()?.weights.len();
     let freedom = all.len().checked_sub(parameters).filter(|n| *n > 0)? as f64;
-    let usual = all.iter().map(|m| m.variance_km2).sum::<f64>() / all.len() as f64;
-    let tries = (-3 * STEPS..=3 * STEPS).map(|k| usual * 10f64.powf(2.0 * f64::from(k) / f64::from(STEPS)));
+    let mean_variance_km2 = all.iter().map(|m| m.variance_km2).sum::<f64>() / all.len() as f64;
+    let tries = (-3 * STEPS..=3 * STEPS).map(|k| mean_variance_km2 * 10f64.powf(2.0 * f64::from(k) / f64::from(STEPS)));
     let scored = |scatter2: f64| solve_with_scatter(all, scatter2).map(|found| (found.restricted, scatter2));
     let best = std::iter::once(0.0).chain(tries).filter_map(scored).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let scatter2 = refine(best, &scored);
     let found = solve_with_scatter(all, scatter2)?;
-    let own = solve_with_scatter(all, 0.0)?;
+    let without_scatter = solve_with_scatter(all, 0.0)?;
     Some(Solved {
         h: found.h,
         covariance: found.covariance,
         scatter2,
         minus_two_ln_likelihood: found.minus_two_ln_likelihood,
-        chi2: own.square / freedom,
+        chi2: without_scatter.square / freedom,
     })
 }
 
@@ -98,8 +98,8 @@ fn solve_with_scatter(all: &[Measured], scatter2: f64) -> Option<WeightedSolutio
     }
     let information = normal.cholesky()?;
     let h = information.solve(&right);
-    let off = |m: &Measured| m.km - m.weights.iter().zip(h.iter()).map(|(a, h)| a * h).sum::<f64>();
-    let square = all.iter().map(|m| off(m).powi(2) / (m.variance_km2 + scatter2)).sum::<f64>();
+    let residual = |m: &Measured| m.km - m.weights.iter().zip(h.iter()).map(|(a, h)| a * h).sum::<f64>();
+    let square = all.iter().map(|m| residual(m).powi(2) / (m.variance_km2 + scatter2)).sum::<f64>();
     let log_det: f64 = 2.0 * information.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
     let minus_two_ln_likelihood = log_variances + square;
     let restricted = minus_two_ln_likelihood + log_det;

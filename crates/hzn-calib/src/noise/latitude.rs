@@ -83,16 +83,16 @@ fn rows_are_determined(profile: &Profile, sightings: &[&Sighting]) -> bool {
 
 /// Returns the latitudes of the first and the last row, in degrees; `None` if a picture has no latitudes.
 fn span_deg(sightings: &[&Sighting]) -> Option<[f64; 2]> {
-    let mut seen: Vec<(f64, f64)> =
+    let mut latitudes: Vec<(f64, f64)> =
         sightings.iter().flat_map(|s| s.latitudes.iter().map(|(deg, share)| (*deg, share.abs()))).collect();
     if sightings.iter().any(|s| s.latitudes.is_empty()) {
         return None;
     }
-    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = seen.iter().map(|s| s.1).sum();
+    latitudes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = latitudes.iter().map(|s| s.1).sum();
     let below = |part: f64| {
         let mut sum = 0.0;
-        seen.iter().find(|s| {
+        latitudes.iter().find(|s| {
             sum += s.1;
             sum >= part * total
         })

@@ -42,8 +42,8 @@ impl fmt::Display for Refusal {
         match self {
             Self::TooFew { answered, min_pictures } => write!(
                 f,
-                "{answered} pictures have an answer, but at least {min_pictures} are needed to determine the scatter between \
-                 pictures; take more pictures of the flight"
+                "{answered} pictures have an answer, but at least {min_pictures} are needed to determine the scatter \
+                 between pictures; take more pictures of the flight"
             ),
             Self::TooVague { sigma_km, max_km, pictures } => write!(
                 f,
@@ -53,8 +53,8 @@ impl fmt::Display for Refusal {
             ),
             Self::Inconsistent { inconsistent, pictures } => write!(
                 f,
-                "{inconsistent} of {pictures} pictures measure limb heights that disagree with the others. Either edges are \
-                 wrong, or altitudes belong to other pictures; examine some of them with `hzn explain`"
+                "{inconsistent} of {pictures} pictures measure limb heights that disagree with the others. Either \
+                 edges are wrong, or altitudes belong to other pictures; examine some of them with `hzn explain`"
             ),
             Self::Alarm { chi2, max_chi2 } => write!(
                 f,

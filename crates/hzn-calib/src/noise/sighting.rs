@@ -148,7 +148,7 @@ pub fn shares(
 impl Geometry {
     fn new(body: &body::Config, prior: &Prior<f64>) -> Option<Self> {
         let limb_m = body.limb_height_km * 1e3;
-        let given = prior.altitude_m.or(body.altitude_km.map(|km| km * 1e3));
+        let altitude_m = prior.altitude_m.or(body.altitude_km.map(|km| km * 1e3));
         let radius_m = body.mean_radius_km() * 1e3;
         let sphere = |distance_m: f64| Self {
             distance_m,
@@ -174,20 +174,20 @@ impl Geometry {
             }
             (Kind::EarthSphere | Kind::Sphere, Some([x, y, z])) => sphere(x.hypot(y).hypot(z)),
             (Kind::Earth, None) => {
-                let geometry = sphere(radius_m + given?);
+                let geometry = sphere(radius_m + altitude_m?);
                 // The latitude is unknown: the mean squares of the effects of radius and shape are taken over all
                 // latitudes.
                 let (mut radius2, mut harmonic2) = (0.0, 0.0);
                 for k in 0..LATITUDES {
                     let latitude = core::f64::consts::PI * (k as f64 / (LATITUDES - 1) as f64 - 0.5);
-                    let cone = limb_cone(from_geodetic(latitude, 0.0, given?, WGS84_A_M, WGS84_B_M), limb_m)?;
+                    let cone = limb_cone(from_geodetic(latitude, 0.0, altitude_m?, WGS84_A_M, WGS84_B_M), limb_m)?;
                     let off_m = geometry.distance_m * (cone.mean_half_angle_rad().sin() - geometry.sin_expected);
                     radius2 += off_m * off_m / LATITUDES as f64;
                     harmonic2 += second_harmonic_cos(&cone).powi(2) / LATITUDES as f64;
                 }
                 Self { radius_sigma_m: radius2.sqrt(), second_harmonic_cos: harmonic2.sqrt(), ..geometry }
             }
-            (_, None) => sphere(radius_m + given?),
+            (_, None) => sphere(radius_m + altitude_m?),
             (_, Some(_)) => return None,
         };
         (geometry.sin_expected < 1.0 && geometry.sin_expected > 0.0).then_some(geometry)
@@ -217,11 +217,11 @@ fn latitudes(geometry: &Geometry, cone: &Cone, prior: &Prior<f64>, attitude_sigm
     };
     match prior.cam_to_ecef {
         Some(attitude) if attitude_sigma_rad < USELESS_ATTITUDE_RAD => {
-            let seen = cone.rays.iter().zip(cone.shares()).filter_map(|(ray, share)| {
+            let visible = cone.rays.iter().zip(cone.shares()).filter_map(|(ray, share)| {
                 let ray = hzn_core::frames::UnitVec3::try_new([ray.x, ray.y, ray.z])?;
                 Some((latitude(Vector3::from(attitude.apply(&ray).xyz())), share))
             });
-            seen.collect()
+            visible.collect()
         }
         _ => {
             let axis = Vector3::from(limb.axis.xyz());

@@ -134,7 +134,7 @@ fn height_scatter_and_noise_are_found_within_their_errors() {
 }
 
 #[test]
-fn heights_are_as_far_off_as_their_sigmas_say() {
+fn errors_of_heights_agree_with_their_sigmas() {
     let sightings = flight(60, 90.0, 18.7, 0.0, Noise(0.2, 20.0, 0.7), 3);
     let c = Calibration::new(&earth(), &sightings).unwrap();
     // Sigma is conservative, because it is averaged over lengths up to the arc.
@@ -149,7 +149,7 @@ fn pictures_that_contradict_each_other_raise_the_alarm() {
 }
 
 #[test]
-fn what_pictures_do_not_tell_is_refused_with_the_number() {
+fn what_pictures_do_not_determine_is_refused_with_the_number() {
     let noise = Noise(0.3, 40.0, 0.5);
     let few = Calibration::new(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();
     assert_eq!(few, Refusal::TooFew { answered: 11, min_pictures: 12 });
@@ -257,7 +257,7 @@ fn variance_of_the_cone_is_that_of_dense_matrices() {
 }
 
 #[test]
-fn a_longer_focal_length_makes_the_limb_as_much_higher_as_is_said() {
+fn a_longer_focal_length_raises_the_limb_as_predicted() {
     let config = camera(90.0);
     let camera = Camera::try_new(&config).unwrap();
     let longer =
@@ -270,9 +270,9 @@ fn a_longer_focal_length_makes_the_limb_as_much_higher_as_is_said() {
     let at = |camera: &Camera<f64>| {
         Sighting::measure("p", camera, &earth(), &prior, &points, &solution(axis, alpha)).unwrap()
     };
-    let (told, changed) = (at(&camera), at(&longer.unwrap()));
-    let grown = changed.limb_height_km - told.limb_height_km;
-    assert!((grown / (told.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", told.km_per_focal);
+    let (before, after) = (at(&camera), at(&longer.unwrap()));
+    let grown = after.limb_height_km - before.limb_height_km;
+    assert!((grown / (before.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", before.km_per_focal);
 }
 
 const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px \

@@ -35,21 +35,22 @@ pub fn into_sensor_toml(text: &str, calibration: &Calibration, source: &str) -> 
     let several = document.contains_key("bodies");
     if several {
         let body = find_body(&mut document, calibration.body)?;
-        put_all(body, limb_lines(calibration, source), "[[bodies]]", &mut keys);
+        write_lines(body, limb_lines(calibration, source), "[[bodies]]", &mut keys);
         body.remove_rows(calibration);
         let noise = body.entry("covariance").or_insert_with(toml_edit::table);
         let noise = noise.as_table_like_mut().ok_or("[bodies.covariance] is not a section")?;
-        put_all(noise, noise_lines(calibration), "[bodies.covariance]", &mut keys);
+        write_lines(noise, noise_lines(calibration), "[bodies.covariance]", &mut keys);
     } else {
-        let body = section(&mut document, "body")?;
-        put_all(body, limb_lines(calibration, source), "[body]", &mut keys);
+        let body = find_section(&mut document, "body")?;
+        write_lines(body, limb_lines(calibration, source), "[body]", &mut keys);
         body.remove_rows(calibration);
-        put_all(section(&mut document, "covariance")?, noise_lines(calibration), "[covariance]", &mut keys);
+        write_lines(find_section(&mut document, "covariance")?, noise_lines(calibration), "[covariance]", &mut keys);
     }
     Ok(Written { text: document.to_string(), keys })
 }
 
-fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
+/// Returns a section, which is added if it is missing.
+fn find_section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
     let item = document.entry(name).or_insert_with(|| Item::Table(Table::new()));
     // An inline table cannot have comments.
     if let Item::Value(Value::InlineTable(table)) = item {
@@ -143,7 +144,7 @@ fn noise_lines(calibration: &Calibration) -> Vec<Line> {
     ]
 }
 
-fn put_all(table: &mut dyn TableLike, lines: Vec<Line>, section: &str, keys: &mut Vec<String>) {
+fn write_lines(table: &mut dyn TableLike, lines: Vec<Line>, section: &str, keys: &mut Vec<String>) {
     for Line { key, mut value, why } in lines {
         keys.push(format!("{section} {key} = {}", value.to_string().trim()));
         match table.get_mut(key) {
