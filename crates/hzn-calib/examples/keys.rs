@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let root = Path::new(&root);
     let page = root.join("book/reference/sensor-toml.md");
     let text = fs::read_to_string(&page)?;
-    fs::write(&page, table::inserted(&text).ok_or("the page has no marks for the table")?)?;
+    fs::write(&page, table::insert_table(&text).ok_or("the page has no marks for the table")?)?;
     fs::write(root.join("crates/hzn-calib/src/template.toml"), template::text())?;
     let schema = serde_json::to_string_pretty(&schema::json())? + "\n";
     fs::write(root.join("book/reference/sensor.schema.json"), schema)?;

@@ -7,8 +7,9 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
 use crate::Problem;
-use crate::located::{meaning, places, syntax, too_long};
-use crate::sensor::{camera_from_file, fill};
+use crate::camera_section::camera_from_file;
+use crate::located::{check_list_lengths, find_places, translate_serde_error, translate_syntax_error};
+use crate::merge::merge_missing;
 
 /// Reads `text` as a `T`. `path` is used in messages, and the path of a camera `file` is relative to its folder.
 /// `check` tests the value after it has been read. It returns the key, as `[section] key`, and the rule that is broken.
@@ -20,9 +21,9 @@ pub fn parse<T: DeserializeOwned>(
     path: &Path,
     check: impl FnOnce(&T) -> Result<(), (String, String)>,
 ) -> Result<T, Problem> {
-    let mut table = DeTable::parse(text).map_err(|e| syntax(&e, text, path))?;
-    let places = places(table.get_ref());
-    too_long(text, path, &places)?;
+    let mut table = DeTable::parse(text).map_err(|e| translate_syntax_error(&e, text, path))?;
+    let places = find_places(table.get_ref());
+    check_list_lengths(text, path, &places)?;
     let camera = match camera_from_file(table.get_mut(), text, path)? {
         Some(camera) => toml::to_string(&camera).unwrap_or_default(),
         None => String::new(),
@@ -32,9 +33,10 @@ pub fn parse<T: DeserializeOwned>(
         && let Some(DeValue::Table(own)) = table.get_mut().get_mut("camera").map(toml::Spanned::get_mut)
     {
         // The keys next to `file` are kept.
-        fill(own, camera.into_inner());
+        merge_missing(own, camera.into_inner());
     }
-    let value = T::deserialize(toml::Deserializer::from(table)).map_err(|e| meaning(&e, text, path, &places, &[]))?;
+    let value = T::deserialize(toml::Deserializer::from(table))
+        .map_err(|e| translate_serde_error(&e, text, path, &places, &[]))?;
     check(&value).map_err(|(field, what)| {
         let problem = Problem::new(path, what).in_field(field.clone());
         let parts: Vec<&str> = field.split(|c: char| "[]. ".contains(c)).filter(|part| !part.is_empty()).collect();

@@ -8,17 +8,19 @@
 //!
 //! [`document`] reads TOML files of other crates with the same checks, for example scene.toml.
 //!
-//! [`start`] writes a sensor.toml for a camera that nobody calibrated.
+//! [`start`] writes a sensor.toml for a camera without a calibration.
 //!
 //! Every error is a [`Problem`]: it names the file, the line, the field and what was expected. For a misspelt name it
 //! suggests the nearest valid one. [`template`] is a commented sensor.toml to start from; [`keys`] describes every key.
 //! [`noise`] measures limb height and noise on the pictures of a flight.
 
 pub mod camera_file;
+mod camera_section;
 pub mod document;
 pub mod frames;
 pub mod keys;
 mod located;
+mod merge;
 mod nearest;
 pub mod noise;
 pub mod plausible;

@@ -13,7 +13,7 @@ use crate::keys::{self, Limits};
 use crate::nearest::suggestion;
 
 /// A key, or a list within a list, with its place: the dotted path, the bytes of the key and the bytes of the value.
-pub(crate) struct Place {
+pub(crate) struct KeyPlace {
     pub(crate) path: Vec<String>,
     pub(crate) key: Range<usize>,
     value: Range<usize>,
@@ -21,7 +21,7 @@ pub(crate) struct Place {
     items: usize,
 }
 
-impl Place {
+impl KeyPlace {
     fn field(&self) -> String {
         field_name(&self.path)
     }
@@ -48,17 +48,17 @@ fn field_name(path: &[String]) -> String {
 }
 
 /// Returns every key of the file, including those of inner tables, and the lists within lists.
-pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
-    fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<Place>) {
+pub(crate) fn find_places(table: &DeTable<'_>) -> Vec<KeyPlace> {
+    fn walk(table: &DeTable<'_>, path: &mut Vec<String>, out: &mut Vec<KeyPlace>) {
         for (key, value) in table {
             path.push(key.get_ref().to_string());
             enter(value.get_ref(), [key.span(), value.span()], path, out);
             path.pop();
         }
     }
-    fn enter(value: &DeValue<'_>, [key, span]: [Range<usize>; 2], path: &mut Vec<String>, out: &mut Vec<Place>) {
+    fn enter(value: &DeValue<'_>, [key, span]: [Range<usize>; 2], path: &mut Vec<String>, out: &mut Vec<KeyPlace>) {
         let items = value.as_array().map_or(0, |items| items.len());
-        out.push(Place { path: path.clone(), key, value: span, items });
+        out.push(KeyPlace { path: path.clone(), key, value: span, items });
         match value {
             DeValue::Table(inner) => walk(inner, path, out),
             DeValue::Array(items) => {
@@ -80,11 +80,11 @@ pub(crate) fn places(table: &DeTable<'_>) -> Vec<Place> {
 
 /// Refuses the first list that is longer than the sensor's limit. serde alone would refuse some lists without their
 /// length, and would read only the first values of others.
-pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), Problem> {
+pub(crate) fn check_list_lengths(text: &str, path: &Path, places: &[KeyPlace]) -> Result<(), Problem> {
     const ROWS: &str = "limb_height_by_latitude_km";
     for place in places {
         let parts: Vec<&str> = place.path.iter().map(String::as_str).collect();
-        let (most, what) = match parts[..] {
+        let (max, what) = match parts[..] {
             // The limit is that of `brown-conrady`.
             ["camera", "k"] => (5, "numbers"),
             ["mount", "q_body_from_camera_wxyz"] => (4, "numbers"),
@@ -97,8 +97,8 @@ pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), 
             | ["select", "altitude_limits_km"] => (2, "numbers"),
             _ => continue,
         };
-        if place.items > most {
-            let what = format!("{} {what}, at most {most} can be given", place.items);
+        if place.items > max {
+            let what = format!("has {} {what}; at most {max} are allowed", place.items);
             return Err(Problem::new(path, what).at_offset(text, place.key.start).in_field(place.field()));
         }
     }
@@ -106,13 +106,13 @@ pub(crate) fn too_long(text: &str, path: &Path, places: &[Place]) -> Result<(), 
 }
 
 /// Returns the innermost key whose name or value contains the byte `offset`.
-fn place_of(places: &[Place], offset: usize) -> Option<&Place> {
-    let holds = |p: &&Place| p.key.contains(&offset) || p.value.contains(&offset);
+fn find_place(places: &[KeyPlace], offset: usize) -> Option<&KeyPlace> {
+    let holds = |p: &&KeyPlace| p.key.contains(&offset) || p.value.contains(&offset);
     places.iter().filter(holds).max_by_key(|p| p.path.len())
 }
 
 /// Converts an error of the TOML syntax.
-pub(crate) fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
+pub(crate) fn translate_syntax_error(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
     let problem = Problem::new(path, format!("not valid TOML: {}", error.message().replace('\n', "; ")));
     match error.span() {
         Some(span) => problem.at_exactly(text, span.start),
@@ -120,20 +120,20 @@ pub(crate) fn syntax(error: &toml::de::Error, text: &str, path: &Path) -> Proble
     }
 }
 
-/// Translates serde's error into the terms of the file. `taken` are top-level keys that serde does not know.
-pub(crate) fn meaning(
+/// Translates serde's error into the terms of the file. `extra_keys` are top-level keys that serde does not know.
+pub(crate) fn translate_serde_error(
     error: &toml::de::Error,
     text: &str,
     path: &Path,
-    places: &[Place],
-    taken: &[&'static str],
+    places: &[KeyPlace],
+    extra_keys: &[&'static str],
 ) -> Problem {
     let message = error.message();
     let offset = error.span().map(|s| s.start);
     let place = match error.span() {
         // The place is the table that lacks the field, which may be the whole file.
         Some(span) if message.starts_with("missing field") => places.iter().find(|p| p.value == span),
-        _ => offset.and_then(|o| place_of(places, o)),
+        _ => offset.and_then(|o| find_place(places, o)),
     };
     let attach = |p: Problem| match offset {
         // An error of the whole table, for example a missing section, points to the first byte. Its place is not shown.
@@ -143,46 +143,46 @@ pub(crate) fn meaning(
     let mut quoted = message.split('`').skip(1).step_by(2);
     let first = quoted.next().unwrap_or_default();
     let valid: Vec<&str> = quoted.collect();
-    let own = place.map(Place::field).unwrap_or_default();
+    let field = place.map(KeyPlace::field).unwrap_or_default();
     let problem = if message.starts_with("unknown field") {
         let valid: Vec<&str> = match place.map(|p| p.path.as_slice()) {
-            Some([_]) => valid.into_iter().chain(taken.iter().copied()).collect(),
+            Some([_]) => valid.into_iter().chain(extra_keys.iter().copied()).collect(),
             Some([section, _]) if section == "camera" => valid.into_iter().chain(["file"]).collect(),
             _ => valid,
         };
-        let what = if own.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
-        Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(own)
+        let what = if field.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
+        Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(field)
     } else if message.starts_with("unknown variant") {
         let what = format!("{first:?} is not a valid value{}", suggestion(first, &valid));
-        Problem::new(path, what).in_field(own)
+        Problem::new(path, what).in_field(field)
     } else if message.starts_with("missing field") {
         let mut p: Vec<String> = place.map(|p| p.path.clone()).unwrap_or_default();
         p.push(first.to_owned());
         let what = if p.len() == 1 {
             format!("the section [{first}] is missing")
         } else if p.first().is_some_and(|s| s == "camera") {
-            "missing; give it, or take the calibration from a `file`".to_owned()
+            "missing; write it, or use a `file` with the calibration".to_owned()
         } else {
             "missing".to_owned()
         };
         Problem::new(path, what).in_field(field_name(&p))
     } else {
-        let what = whole_number(message, place).unwrap_or_else(|| {
+        let what = explain_whole_number(message, place).unwrap_or_else(|| {
             message
                 .replace("expected f64", "expected a number")
                 .replace("floating point `", "number `")
                 .replace('\n', "; ")
         });
         let problem = Problem::new(path, what);
-        if own.is_empty() { problem } else { problem.in_field(own) }
+        if field.is_empty() { problem } else { problem.in_field(field) }
     };
     attach(problem)
 }
 
 /// Returns the message for a wrong value of a whole-number key, with the limits of that key; `None` for other keys.
-fn whole_number(message: &str, place: Option<&Place>) -> Option<String> {
-    let (given, expected) = message.split_once(", expected ")?;
-    let most = match expected {
+fn explain_whole_number(message: &str, place: Option<&KeyPlace>) -> Option<String> {
+    let (found, expected) = message.split_once(", expected ")?;
+    let max = match expected {
         "u8" => f64::from(u8::MAX),
         "u16" => f64::from(u16::MAX),
         "u32" => f64::from(u32::MAX),
@@ -190,30 +190,37 @@ fn whole_number(message: &str, place: Option<&Place>) -> Option<String> {
     };
     let key = place.and_then(|p| keys::find_parts(&p.path));
     let rule = match key.map(|key| &key.limits) {
-        Some(Limits::Number { low, high, .. }) => format!("between {low} and {}", high.min(most)),
+        Some(Limits::Number { low, high, .. }) => format!("between {low} and {}", high.min(max)),
         Some(Limits::Rule(words)) if words.contains(" to ") => (*words).to_owned(),
-        _ => format!("between 0 and {most}"),
+        _ => format!("between 0 and {max}"),
     };
-    Some(match given.strip_prefix("invalid value: integer `").and_then(|n| n.strip_suffix('`')) {
+    Some(match found.strip_prefix("invalid value: integer `").and_then(|n| n.strip_suffix('`')) {
         Some(number) => format!("{number} is refused: must be {rule}"),
-        None => format!("{}: must be a whole number, {rule}", given.replace("floating point `", "number `")),
+        None => format!("{}: must be a whole number, {rule}", found.replace("floating point `", "number `")),
     })
 }
 
 /// Converts an error of hzn-core, with the place of the value.
-pub(crate) fn refused(error: &ConfigError, text: &str, path: &Path, places: &[Place]) -> Problem {
+pub(crate) fn translate_config_error(error: &ConfigError, text: &str, path: &Path, places: &[KeyPlace]) -> Problem {
     let what = match error.limit {
         // The value is missing.
         rule @ (Limit::Rule(_) | Limit::Feature { .. }) if error.value.is_nan() => rule.to_string(),
         rule if error.value.is_nan() => format!("nan is refused: {rule}"),
         rule => format!("{} is refused: {rule}", error.value),
     };
-    at_key(error.field, error.body, what, text, path, places)
+    problem_at_key(error.field, error.body, what, text, path, places)
 }
 
 /// Returns a problem with a key in hzn-core's notation, for example `camera.fx_px`. `body` is the index in
 /// `[[bodies]]`.
-pub(crate) fn at_key(key: &str, body: Option<u8>, what: String, text: &str, path: &Path, places: &[Place]) -> Problem {
+pub(crate) fn problem_at_key(
+    key: &str,
+    body: Option<u8>,
+    what: String,
+    text: &str,
+    path: &Path,
+    places: &[KeyPlace],
+) -> Problem {
     let mut parts: Vec<String> = key.split('.').map(str::to_owned).collect();
     if let Some(which) = body {
         // hzn-core writes `body.` before the body's own keys, but not before its threshold and its edge errors.

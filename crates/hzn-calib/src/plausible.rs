@@ -10,7 +10,7 @@ use hzn_core::pixel::ImagePoint;
 
 /// A value that looks wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Doubt {
+pub struct Implausible {
     /// The key of sensor.toml, for example `camera.fx_px`.
     pub key: &'static str,
     /// Index of the body in `[[bodies]]`, from 0; `None` if there is only a `[body]`.
@@ -19,7 +19,7 @@ pub struct Doubt {
     pub what: String,
 }
 
-impl Doubt {
+impl Implausible {
     fn new(key: &'static str, what: impl Into<String>) -> Self {
         Self { key, body: None, what: what.into() }
     }
@@ -27,66 +27,63 @@ impl Doubt {
 
 /// Largest usual distance of the principal point from the picture's middle, as a fraction of the side. A cropped
 /// picture may exceed it.
-const OFF_CENTRE: f64 = 0.2;
+const MAX_OFF_CENTRE: f64 = 0.2;
 /// Largest usual relative difference between the focal lengths along x and y, because pixels are square.
-const SQUARE: f64 = 0.2;
+const MAX_FOCAL_DIFFERENCE: f64 = 0.2;
 /// Largest usual field of view of a pinhole lens from side to side, in degrees.
-const WIDEST_PINHOLE_DEG: f64 = 150.0;
+const MAX_PINHOLE_FOV_DEG: f64 = 150.0;
 /// Largest usual field of view of a fisheye lens, in degrees.
-const WIDEST_FISHEYE_DEG: f64 = 250.0;
+const MAX_FISHEYE_FOV_DEG: f64 = 250.0;
 /// Smallest usual field of view, in degrees. Telescopes have a smaller one, and no limb in view.
-const NARROWEST_DEG: f64 = 0.5;
+const MIN_FOV_DEG: f64 = 0.5;
 /// Largest usual tangential coefficient. It comes from a small tilt of the lens.
-const TANGENTIAL: f64 = 0.05;
+const MAX_TANGENTIAL: f64 = 0.05;
 /// Largest usual altitude, in radii of the body. From farther away a body is a disc of less than 3 degrees, and
 /// pictures of the Earth from beyond geostationary orbit are rare.
-const FAR_RADII: f64 = 40.0;
+const MAX_ALTITUDE_RADII: f64 = 40.0;
 /// Largest usual altitude above the Earth, in kilometres: just beyond geostationary orbit.
-pub(crate) const FAR_KM: f64 = 40_000.0;
+pub(crate) const MAX_ALTITUDE_KM: f64 = 40_000.0;
 
 /// Returns every value of a sensor that looks wrong.
-pub fn doubts(config: &Config) -> Vec<Doubt> {
-    let mut doubts = of_camera(&config.camera);
+pub fn find_implausible(config: &Config) -> Vec<Implausible> {
+    let mut found = check_camera(&config.camera);
     if let Some(mount) = &config.mount
         && mount.q_body_from_camera_wxyz == [0.0, 0.0, 0.0, 1.0]
     {
-        let what =
-            "is half a turn about the optical axis, as the scalar comes first; no rotation at all is [1, 0, 0, 0]";
-        doubts.push(Doubt::new("mount.q_body_from_camera_wxyz", what));
+        let what = "is half a turn about the optical axis, because the scalar comes first; no rotation is [1, 0, 0, 0]";
+        found.push(Implausible::new("mount.q_body_from_camera_wxyz", what));
     }
     let several = !config.bodies.is_empty();
     for (which, body) in (0u8..).zip(config.each_body()) {
-        doubts.extend(of_body(body).map(|doubt| Doubt { body: several.then_some(which), ..doubt }));
+        found.extend(check_body(body).map(|implausible| Implausible { body: several.then_some(which), ..implausible }));
     }
-    doubts
+    found
 }
 
 /// Returns the altitude in kilometres above which it is probably in metres.
-pub(crate) fn far_km(body: body::Kind, radius_km: f64) -> f64 {
+pub(crate) fn max_altitude_km(body: body::Kind, radius_km: f64) -> f64 {
     match body {
-        body::Kind::Earth | body::Kind::EarthSphere => FAR_KM,
-        _ => FAR_RADII * radius_km,
+        body::Kind::Earth | body::Kind::EarthSphere => MAX_ALTITUDE_KM,
+        _ => MAX_ALTITUDE_RADII * radius_km,
     }
 }
 
-fn of_body(body: &body::Config) -> Option<Doubt> {
+fn check_body(body: &body::Config) -> Option<Implausible> {
     let km = body.altitude_km?;
-    if let Some(what) = unused_altitude(body.kind) {
-        return Some(Doubt::new("body.altitude_km", what));
+    if let Some(what) = explain_unused_altitude(body.kind) {
+        return Some(Implausible::new("body.altitude_km", what));
     }
-    let far = km > far_km(body.kind, body.mean_radius_km());
-    far.then(|| {
-        Doubt::new("body.altitude_km", format!("{km} km is farther than limbs are taken from: is it in metres?"))
-    })
+    let is_far = km > max_altitude_km(body.kind, body.mean_radius_km());
+    is_far.then(|| Implausible::new("body.altitude_km", format!("{km} km is implausibly large: is it in metres?")))
 }
 
 /// Returns the warning for an altitude of the Sun or the Moon, whose half-angle does not depend on it. The result is
 /// `None` for other bodies.
-pub fn unused_altitude(body: body::Kind) -> Option<String> {
+pub fn explain_unused_altitude(body: body::Kind) -> Option<String> {
     match body {
         body::Kind::Moon => Some(format!(
-            "is not used: kind = \"moon\" is the Moon as a disc of half a degree, seen from about the Earth; for a \
-                                         camera in orbit about the Moon write kind = \"sphere\" and radius_km = {}",
+            "is not used: kind = \"moon\" is the Moon as a disc of half a degree, as seen from near the Earth; for a \
+             camera in orbit around the Moon write kind = \"sphere\" and radius_km = {}",
             body::MOON_RADIUS_KM
         )),
         body::Kind::Sun => Some("is not used: kind = \"sun\" is the Sun as a disc of half a degree".to_owned()),
@@ -94,73 +91,73 @@ pub fn unused_altitude(body: body::Kind) -> Option<String> {
     }
 }
 
-fn of_camera(c: &camera::Config) -> Vec<Doubt> {
-    let mut doubts = Vec::new();
-    doubts.extend(centre(c));
-    doubts.extend(focal(c));
-    doubts.extend(coefficients(c));
+fn check_camera(c: &camera::Config) -> Vec<Implausible> {
+    let mut found = Vec::new();
+    found.extend(check_centre(c));
+    found.extend(check_focal(c));
+    found.extend(check_coefficients(c));
     if let Some(deg) = c.theta_max_deg {
         let wide = half_width_deg(c);
         if deg < std::f64::consts::PI && wide.is_some_and(|wide| wide > 3.0 * deg) {
             let what = format!("an image circle of {deg} degrees leaves out most of the picture: is it in radians?");
-            doubts.push(Doubt::new("camera.theta_max_deg", what));
+            found.push(Implausible::new("camera.theta_max_deg", what));
         }
     }
-    doubts
+    found
 }
 
-fn centre(c: &camera::Config) -> Option<Doubt> {
+fn check_centre(c: &camera::Config) -> Option<Implausible> {
     let (w, h) = (f64::from(c.width), f64::from(c.height));
-    let off = |x: f64, y: f64| ((x + 0.5) / w - 0.5).abs().max(((y + 0.5) / h - 0.5).abs());
-    if off(c.cx_px, c.cy_px) <= OFF_CENTRE {
+    let offset = |x: f64, y: f64| ((x + 0.5) / w - 0.5).abs().max(((y + 0.5) / h - 0.5).abs());
+    if offset(c.cx_px, c.cy_px) <= MAX_OFF_CENTRE {
         return None;
     }
-    let at = format!("the centre ({}, {}) is far from the middle of {} x {} px", c.cx_px, c.cy_px, c.width, c.height);
+    let what = format!("the centre ({}, {}) is far from the middle of {} x {} px", c.cx_px, c.cy_px, c.width, c.height);
     let unit = 0.0..=1.0;
     let why = if unit.contains(&c.cx_px) && unit.contains(&c.cy_px) {
         "; it is counted in pixels from the picture's upper left corner".to_owned()
-    } else if off(c.cy_px, c.cx_px) <= OFF_CENTRE / 2.0 {
+    } else if offset(c.cy_px, c.cx_px) <= MAX_OFF_CENTRE / 2.0 {
         ": are cx_px and cy_px, or width and height, swapped?".to_owned()
     } else {
         // The centre may be the middle of a picture of another size.
         let [a, b] = [(c.cx_px + 0.5) / w * 2.0, (c.cy_px + 0.5) / h * 2.0];
         if a > 0.0 && b > 0.0 && (a / b - 1.0).abs() < 0.2 {
             let [w, h] = [w * a, h * b].map(f64::round);
-            format!(": is the calibration that of pictures of about {w} x {h} px?")
+            format!(": is the calibration for pictures of about {w} x {h} px?")
         } else {
             ": was the picture cut from a larger one?".to_owned()
         }
     };
-    Some(Doubt::new("camera.cx_px", at + &why))
+    Some(Implausible::new("camera.cx_px", what + &why))
 }
 
-fn focal(c: &camera::Config) -> Option<Doubt> {
+fn check_focal(c: &camera::Config) -> Option<Implausible> {
     let ratio = c.fx_px / c.fy_px;
-    if (ratio - 1.0).abs() > SQUARE && (1.0 / ratio - 1.0).abs() > SQUARE {
+    if (ratio - 1.0).abs() > MAX_FOCAL_DIFFERENCE && (1.0 / ratio - 1.0).abs() > MAX_FOCAL_DIFFERENCE {
         let what =
             format!("{} and fy_px = {} make pixels that are not square: is one of them wrong?", c.fx_px, c.fy_px);
-        return Some(Doubt::new("camera.fx_px", what));
+        return Some(Implausible::new("camera.fx_px", what));
     }
     let half = half_width_deg(c)?;
     let widest = if c.model == Model::Pinhole || c.model == Model::BrownConrady {
-        WIDEST_PINHOLE_DEG
+        MAX_PINHOLE_FOV_DEG
     } else {
-        WIDEST_FISHEYE_DEG
+        MAX_FISHEYE_FOV_DEG
     };
     if 2.0 * half > widest && c.theta_max_deg.is_none() {
         let what = format!(
-            "{} px over {} px of width is a field of view of {:.0} degrees: is it in millimetres? (divide those by the \
-             width of a pixel)",
+            "{} px over {} px of width is a field of view of {:.0} degrees: is it in millimetres? (divide millimetres \
+             by the width of a pixel)",
             c.fx_px,
             c.width,
             2.0 * half
         );
-        return Some(Doubt::new("camera.fx_px", what));
+        return Some(Implausible::new("camera.fx_px", what));
     }
-    (2.0 * half < NARROWEST_DEG).then(|| {
+    (2.0 * half < MIN_FOV_DEG).then(|| {
         let what =
             format!("{} px over {} px of width is a field of view of {:.2} degrees", c.fx_px, c.width, 2.0 * half);
-        Doubt::new("camera.fx_px", what)
+        Implausible::new("camera.fx_px", what)
     })
 }
 
@@ -193,17 +190,17 @@ fn linear_half_width_deg(c: &camera::Config) -> f64 {
     if c.model.is_planar() { half.atan().to_degrees() } else { half.to_degrees() }
 }
 
-fn coefficients(c: &camera::Config) -> Option<Doubt> {
+fn check_coefficients(c: &camera::Config) -> Option<Implausible> {
     let k = c.k.as_slice();
     match (c.model, k) {
-        (Model::KannalaBrandt, [first, ..]) if (first - 1.0).abs() < 1e-9 => Some(Doubt::new(
+        (Model::KannalaBrandt, [first, ..]) if (first - 1.0).abs() < 1e-9 => Some(Implausible::new(
             "camera.k",
             "begins with 1: k1 is the coefficient of the angle's third power; leave the 1 of the first power out",
         )),
         (Model::BrownConrady, [_, _, p1, p2, rest @ ..])
-            if p1.abs().max(p2.abs()) > TANGENTIAL && rest.iter().all(|k3| k3.abs() <= p1.abs().max(p2.abs())) =>
+            if p1.abs().max(p2.abs()) > MAX_TANGENTIAL && rest.iter().all(|k3| k3.abs() <= p1.abs().max(p2.abs())) =>
         {
-            Some(Doubt::new(
+            Some(Implausible::new(
                 "camera.k",
                 format!("has tangential coefficients {p1} and {p2}, which are large: the order is k1, k2, p1, p2, k3"),
             ))
@@ -214,7 +211,7 @@ fn coefficients(c: &camera::Config) -> Option<Doubt> {
 
 /// Returns the message for a fisheye lens with five coefficients instead of four. They are those of Braun & Barf 2022,
 /// (13); the message has hzn's coefficients for the same lens.
-pub(crate) fn five_coefficients(c: &camera::Config) -> Option<String> {
+pub(crate) fn explain_five_coefficients(c: &camera::Config) -> Option<String> {
     let [first, higher @ ..] = c.k.as_slice() else { return None };
     if c.model != Model::KannalaBrandt || higher.len() != 4 || higher.last() == Some(&0.0) {
         return None;
@@ -225,9 +222,8 @@ pub(crate) fn five_coefficients(c: &camera::Config) -> Option<String> {
     let plausible = !in_px || (first / c.fx_px - 1.0).abs() < 0.2;
     plausible.then(|| {
         format!(
-            "five coefficients that begin with the angle's first power, as in Braun & Barf 2022; hzn's four follow it: \
-             write \
-             {focal}k = [{}] (`hzn camera convert --braun-barf` does it)",
+            "has five coefficients that begin with the angle's first power, as in Braun & Barf 2022; hzn has only the \
+             four higher ones: write {focal}k = [{}] (`hzn camera convert --braun-barf` converts them)",
             k.join(", ")
         )
     })
@@ -244,47 +240,51 @@ mod tests {
         c
     }
 
-    fn told(c: &camera::Config) -> String {
-        let doubts = of_camera(c);
-        doubts.iter().map(|d| format!("{}: {}", d.key, d.what)).collect::<Vec<_>>().join("\n")
+    fn warnings(c: &camera::Config) -> String {
+        let found = check_camera(c);
+        found.iter().map(|d| format!("{}: {}", d.key, d.what)).collect::<Vec<_>>().join("\n")
     }
 
     #[test]
-    fn swapped_and_absurd_cameras_are_told() {
-        let hd = |focal, centre| told(&camera(Model::Pinhole, [1920, 1080], focal, centre, &[]));
+    fn swapped_and_absurd_cameras_are_reported() {
+        let hd = |focal, centre| warnings(&camera(Model::Pinhole, [1920, 1080], focal, centre, &[]));
         assert_eq!(hd([1200.0; 2], [963.2, 536.7]), "");
         assert_eq!(hd([1200.0; 2], [1100.0, 500.0]), "");
         assert!(hd([1200.0; 2], [536.7, 963.2]).contains("are cx_px and cy_px, or width and height, swapped?"));
-        assert!(hd([1200.0; 2], [480.0, 270.0]).contains("that of pictures of about 961 x 541 px?"));
+        assert!(hd([1200.0; 2], [480.0, 270.0]).contains("is the calibration for pictures of about 961 x 541 px?"));
         assert!(hd([1200.0; 2], [0.5, 0.5]).contains("counted in pixels from the picture's upper left corner"));
         assert!(hd([1200.0; 2], [1800.0, 540.0]).contains("was the picture cut from a larger one?"));
         assert!(hd([1200.0, 675.0], [960.0, 540.0]).contains("fy_px = 675 make pixels that are not square"));
         assert!(hd([8.0; 2], [960.0, 540.0]).contains("field of view of 179 degrees: is it in millimetres?"));
         assert!(hd([500_000.0; 2], [960.0, 540.0]).contains("field of view of 0.22 degrees"));
         // HORACE's camera, a telescope for the Moon, and a fisheye lens with its image circle.
-        assert_eq!(told(&camera(Model::Pinhole, [1024, 768], [2133.0; 2], [511.5, 383.5], &[])), "");
-        assert_eq!(told(&camera(Model::Pinhole, [2048, 1944], [9200.0; 2], [1023.5, 971.5], &[])), "");
+        assert_eq!(warnings(&camera(Model::Pinhole, [1024, 768], [2133.0; 2], [511.5, 383.5], &[])), "");
+        assert_eq!(warnings(&camera(Model::Pinhole, [2048, 1944], [9200.0; 2], [1023.5, 971.5], &[])), "");
         let fisheye =
             camera(Model::KannalaBrandt, [1440, 1080], [458.0; 2], [719.5, 539.5], &[-0.05, 0.01, -0.003, 0.0]);
-        assert_eq!(told(&fisheye), "");
-        let circle = |deg| told(&camera::Config { theta_max_deg: Some(deg), ..fisheye.clone() });
+        assert_eq!(warnings(&fisheye), "");
+        let circle = |deg| warnings(&camera::Config { theta_max_deg: Some(deg), ..fisheye.clone() });
         assert_eq!(circle(90.0), "");
         assert!(
             circle(1.57).contains("an image circle of 1.57 degrees leaves out most of the picture: is it in radians?")
         );
-        assert!(told(&camera(Model::Equidistant, [1440, 1080], [4.0; 2], [719.5, 539.5], &[])).contains("millimetres"));
+        assert!(
+            warnings(&camera(Model::Equidistant, [1440, 1080], [4.0; 2], [719.5, 539.5], &[])).contains("millimetres")
+        );
     }
 
     #[test]
-    fn coefficients_in_another_order_are_told() {
+    fn coefficients_in_another_order_are_reported() {
         let with = |model, k: &[f64]| camera(model, [1920, 1080], [1235.0; 2], [963.0, 537.0], k);
-        assert!(told(&with(Model::KannalaBrandt, &[1.0, -0.055, 0.011, -0.0035])).contains("leave the 1 of the first"));
-        assert_eq!(told(&with(Model::BrownConrady, &[-0.3, 0.1, 0.001, -0.002, -0.02])), "");
         assert!(
-            told(&with(Model::BrownConrady, &[-0.3, 0.1, -0.09, 0.001, -0.002]))
+            warnings(&with(Model::KannalaBrandt, &[1.0, -0.055, 0.011, -0.0035])).contains("leave the 1 of the first")
+        );
+        assert_eq!(warnings(&with(Model::BrownConrady, &[-0.3, 0.1, 0.001, -0.002, -0.02])), "");
+        assert!(
+            warnings(&with(Model::BrownConrady, &[-0.3, 0.1, -0.09, 0.001, -0.002]))
                 .contains("order is k1, k2, p1, p2, k3")
         );
-        let five = |k: &[f64]| five_coefficients(&with(Model::KannalaBrandt, k));
+        let five = |k: &[f64]| explain_five_coefficients(&with(Model::KannalaBrandt, k));
         assert!(
             five(&[1.0, -0.055, 0.011, -0.0035, 0.0002])
                 .unwrap()
@@ -296,11 +296,11 @@ mod tests {
     }
 
     #[test]
-    fn altitudes_in_metres_and_of_the_moon_are_told() {
+    fn altitudes_in_metres_and_of_the_moon_are_reported() {
         let with = |kind, km| {
             let radius_km = (kind == body::Kind::Sphere).then_some(1737.4);
             let body = body::Config { kind, radius_km, altitude_km: Some(km), ..body::Config::default() };
-            of_body(&body).map(|d| d.what).unwrap_or_default()
+            check_body(&body).map(|d| d.what).unwrap_or_default()
         };
         assert_eq!(with(body::Kind::Earth, 35_786.0) + &with(body::Kind::Sphere, 100.0), "");
         assert!(with(body::Kind::Earth, 230_000.0).contains("is it in metres?"));

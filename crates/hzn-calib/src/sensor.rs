@@ -4,7 +4,6 @@
 //! takes the calibration from another tool's file (see [`crate::camera_file`]). Its path is relative to the
 //! sensor.toml. `camera = "cam1"` next to it selects one of several cameras.
 
-use std::ops::Range;
 use std::path::Path;
 
 use hzn_core::camera::{self, Camera, Model};
@@ -14,9 +13,14 @@ use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
-use crate::located::{at_key, meaning, places, refused, syntax, too_long};
+use crate::camera_section::camera_from_file;
+use crate::located::{
+    check_list_lengths, find_places, problem_at_key, translate_config_error, translate_serde_error,
+    translate_syntax_error,
+};
+use crate::merge::{merge_missing, take};
 use crate::nearest::suggestion;
-use crate::{Problem, camera_file, plausible};
+use crate::{Problem, plausible};
 
 /// A sensor.toml that was read and checked.
 #[derive(Debug, Clone)]
@@ -50,27 +54,17 @@ pub fn load(path: &Path) -> Result<Sensor, Problem> {
 /// # Errors
 /// The first error in the text.
 pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
-    let mut table = DeTable::parse(text).map_err(|e| syntax(&e, text, path))?;
+    let mut table = DeTable::parse(text).map_err(|e| translate_syntax_error(&e, text, path))?;
     // The place of every key, for errors that are found after the table is consumed.
-    let places = places(table.get_ref());
+    let places = find_places(table.get_ref());
     let preset = match take(table.get_mut(), "preset") {
         None => Preset::default(),
-        Some((value, span)) => preset_named(value.as_str().unwrap_or_default())
+        Some((value, span)) => find_preset(value.as_str().unwrap_or_default())
             .map_err(|what| Problem::new(path, what).at_offset(text, span.start).in_field("preset"))?,
     };
     let starting_values = starting_values(preset);
-    if let Some((key, several)) = table.get_ref().get_key_value("bodies") {
-        let wrong = |what: &str| Problem::new(path, what).at_offset(text, key.span().start).in_field("[[bodies]]");
-        let count = several.get_ref().as_array().map_or(0, |a| a.len());
-        if table.get_ref().contains_key("body") {
-            return Err(wrong("stands beside [body]; one body is a [body], several are all [[bodies]]"));
-        }
-        if count > MAX_BODIES {
-            let what = format!("{count} are too many; at most {MAX_BODIES} are looked for in one picture");
-            return Err(wrong(&what));
-        }
-    }
-    too_long(text, path, &places)?;
+    check_bodies(table.get_ref(), text, path)?;
+    check_list_lengths(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
         // `Config` requires a camera. This one is a placeholder; the camera of the file replaces it below. The keys
@@ -79,30 +73,45 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
         if let (Ok(stand_in), Some(DeValue::Table(own))) =
             (stand_in, table.get_mut().get_mut("camera").map(toml::Spanned::get_mut))
         {
-            fill(own, stand_in.into_inner());
+            merge_missing(own, stand_in.into_inner());
         }
     }
     if let Ok(values) = DeTable::parse(&starting_values) {
-        fill(table.get_mut(), values.into_inner());
+        merge_missing(table.get_mut(), values.into_inner());
     }
     let mut config = Config::deserialize(toml::Deserializer::from(table))
-        .map_err(|e| meaning(&e, text, path, &places, &["preset"]))?;
+        .map_err(|e| translate_serde_error(&e, text, path, &places, &["preset"]))?;
     if let Some(camera) = from_file {
         let camera::Config { focal_sigma_percent, centre_sigma_px, readout_s, .. } = config.camera;
         let covariance = config.camera.covariance.take();
         config.camera = camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, ..camera };
     }
-    if let Some(what) = plausible::five_coefficients(&config.camera) {
-        return Err(at_key("camera.k", None, what, text, path, &places));
+    if let Some(what) = plausible::explain_five_coefficients(&config.camera) {
+        return Err(problem_at_key("camera.k", None, what, text, path, &places));
     }
-    check(&config).map_err(|e| refused(&e, text, path, &places))?;
-    let warning = |doubt: plausible::Doubt| at_key(doubt.key, doubt.body, doubt.what, text, path, &places);
-    let warnings = plausible::doubts(&config).into_iter().map(warning).collect();
+    check(&config).map_err(|e| translate_config_error(&e, text, path, &places))?;
+    let warning =
+        |found: plausible::Implausible| problem_at_key(found.key, found.body, found.what, text, path, &places);
+    let warnings = plausible::find_implausible(&config).into_iter().map(warning).collect();
     Ok(Sensor { config, text: text.to_owned(), warnings })
 }
 
+/// Refuses `[[bodies]]` together with `[body]`, and too many of them.
+fn check_bodies(table: &DeTable<'_>, text: &str, path: &Path) -> Result<(), Problem> {
+    let Some((key, bodies)) = table.get_key_value("bodies") else { return Ok(()) };
+    let refused = |what: &str| Err(Problem::new(path, what).at_offset(text, key.span().start).in_field("[[bodies]]"));
+    if table.contains_key("body") {
+        return refused("cannot be combined with [body]; write one body as [body], or all bodies as [[bodies]]");
+    }
+    let count = bodies.get_ref().as_array().map_or(0, |bodies| bodies.len());
+    if count > MAX_BODIES {
+        return refused(&format!("{count} are too many; at most {MAX_BODIES} bodies are possible"));
+    }
+    Ok(())
+}
+
 /// Returns the preset of that name, or the reason why it cannot be used.
-fn preset_named(name: &str) -> Result<Preset, String> {
+fn find_preset(name: &str) -> Result<Preset, String> {
     let preset = Preset::named(name).ok_or_else(|| {
         let names: Vec<&str> = Preset::ALL.iter().map(|p| p.name()).collect();
         format!("no preset {name:?}{}", suggestion(name, &names))
@@ -122,30 +131,6 @@ fn starting_values(preset: Preset) -> String {
     table.to_string()
 }
 
-/// Adds to `table` the entries of `values` that it does not have. The added entries have no place in the file.
-pub(crate) fn fill<'i>(table: &mut DeTable<'i>, values: DeTable<'i>) {
-    for (key, value) in values {
-        match (table.get_mut(key.get_ref().as_ref()), value.into_inner()) {
-            (Some(own), value) => {
-                if let (DeValue::Table(own), DeValue::Table(values)) = (own.get_mut(), value) {
-                    fill(own, values);
-                }
-            }
-            (None, value) => {
-                let value = match value {
-                    DeValue::Table(values) => {
-                        let mut inner = DeTable::new();
-                        fill(&mut inner, values);
-                        DeValue::Table(inner)
-                    }
-                    other => other,
-                };
-                table.insert(toml::Spanned::new(0..0, key.into_inner()), toml::Spanned::new(0..0, value));
-            }
-        }
-    }
-}
-
 /// Checks everything that `Horizon::new` checks.
 ///
 /// # Errors
@@ -153,57 +138,6 @@ pub(crate) fn fill<'i>(table: &mut DeTable<'i>, values: DeTable<'i>) {
 pub fn check(config: &Config) -> Result<(), ConfigError> {
     config.check()?;
     Camera::<f64>::try_new(&config.camera).map(|_| ())
-}
-
-fn take<'i>(table: &mut DeTable<'i>, name: &str) -> Option<(DeValue<'i>, Range<usize>)> {
-    table.remove(name).map(|value| {
-        let span = value.span();
-        (value.into_inner(), span)
-    })
-}
-
-/// The keys of `[camera]` that camera files do not have. They may be next to `file`.
-const BESIDE_FILE: [&str; 4] = ["focal_sigma_percent", "centre_sigma_px", "covariance", "readout_s"];
-
-/// Takes `file` and its options out of the `[camera]` table and loads the calibration; `None` if there is no `file`.
-pub(crate) fn camera_from_file(
-    table: &mut DeTable<'_>,
-    text: &str,
-    path: &Path,
-) -> Result<Option<hzn_core::camera::Config>, Problem> {
-    let Some(section) = table.get_mut("camera") else { return Ok(None) };
-    let DeValue::Table(camera) = section.get_mut() else { return Ok(None) };
-    let Some((file, span)) = take(camera, "file") else { return Ok(None) };
-    let here = |what: String| Problem::new(path, what).at_offset(text, span.start).in_field("[camera] file");
-    let Some(file) = file.as_str() else {
-        return Err(here("must be the path of a camera file, in quotes".into()));
-    };
-    let name = take(camera, "camera");
-    let theta_max = take(camera, "theta_max_deg");
-    if let Some((key, _)) = camera.iter().find(|(key, _)| !BESIDE_FILE.contains(&&**key.get_ref())) {
-        let what = "cannot stand beside `file`, which brings the whole calibration; only camera, theta_max_deg, \
-                    readout_s and the calibration's sigmas may";
-        let field = format!("[camera] {}", key.get_ref());
-        return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
-    }
-    let file = path.parent().unwrap_or(Path::new("")).join(file);
-    if !file.exists() {
-        return Err(here(format!("{}: no such file (paths are relative to the sensor.toml)", file.display())));
-    }
-    let mut config = camera_file::load(&file, name.as_ref().and_then(|(n, _)| n.as_str()))?;
-    if let Some((value, span)) = theta_max {
-        let number = match &value {
-            DeValue::Float(x) => x.as_str().replace('_', "").parse().ok(),
-            DeValue::Integer(x) => x.as_str().replace('_', "").parse().ok(),
-            _ => None,
-        };
-        let Some(deg) = number else {
-            let what = "must be a number of degrees";
-            return Err(Problem::new(path, what).at_offset(text, span.start).in_field("[camera] theta_max_deg"));
-        };
-        config.theta_max_deg = Some(deg);
-    }
-    Ok(Some(config))
 }
 
 #[cfg(test)]
@@ -287,14 +221,15 @@ mod tests {
         );
         assert_eq!(
             error(&format!("[body]\nkind = \"earth\"\n{two}")),
-            "sensor.toml:11: [[bodies]]: stands beside [body]; one body is a [body], several are all [[bodies]]"
+            "sensor.toml:11: [[bodies]]: cannot be combined with [body]; write one body as [body], or all bodies as \
+             [[bodies]]"
         );
         let four = "[[bodies]]\nkind = \"earth\"\n".repeat(4);
-        assert_eq!(error(&four), "sensor.toml:9: [[bodies]]: 4 are too many; at most 3 are looked for in one picture");
+        assert_eq!(error(&four), "sensor.toml:9: [[bodies]]: 4 are too many; at most 3 bodies are possible");
     }
 
     #[test]
-    fn misspelt_names_bring_the_right_one() {
+    fn misspelt_names_suggest_the_right_one() {
         assert_eq!(
             error("[reject]\nthreshold_pxx = 3.0\n"),
             "sensor.toml:10: [reject] threshold_pxx: unknown key; did you mean threshold_px?"
@@ -313,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_values_bring_the_limit() {
+    fn wrong_values_name_the_limit() {
         assert_eq!(
             error("[reject]\nthreshold_px = -3\n"),
             "sensor.toml:10: [reject] threshold_px: -3 is refused: must be above 0"
@@ -360,16 +295,18 @@ mod tests {
         let moon = warned(format!("{CAMERA}[body]\nkind = \"moon\"\naltitude_km = 100\n"));
         assert!(moon.starts_with("s.toml:11: [body] altitude_km: is not used: kind = \"moon\""), "{moon}");
         let two = "[[bodies]]\naltitude_km = 400\n[[bodies]]\nkind = \"sphere\"\nradius_km = 1\naltitude_km = 100\n";
-        assert!(warned(format!("{CAMERA}{two}")).starts_with("s.toml:14: [[bodies]] 2 altitude_km: 100 km is farther"));
+        assert!(
+            warned(format!("{CAMERA}{two}")).starts_with("s.toml:14: [[bodies]] 2 altitude_km: 100 km is implausibly")
+        );
         // The preset `moon` gives no warning.
         assert_eq!(warned(format!("preset = \"moon\"\n{CAMERA}")), "");
         let five = CAMERA.replace("pinhole", "kannala-brandt") + "k = [1.0, -0.055, 0.011, -0.0035, 0.0002]\n";
         let message = parse(&five, Path::new("s.toml")).unwrap_err().to_string();
-        assert!(message.starts_with("s.toml:9: [camera] k: five coefficients that begin with"), "{message}");
+        assert!(message.starts_with("s.toml:9: [camera] k: has five coefficients that begin with"), "{message}");
     }
 
     #[test]
-    fn whole_numbers_bring_the_limits_of_their_key() {
+    fn whole_numbers_name_the_limits_of_their_key() {
         let width = |value: &str| {
             let text = CAMERA.replace("width = 640", &format!("width = {value}"));
             parse(&text, Path::new("s.toml")).unwrap_err().to_string()
@@ -396,42 +333,45 @@ mod tests {
     }
 
     #[test]
-    fn lists_that_are_too_long_bring_their_number_and_the_limit() {
+    fn lists_that_are_too_long_name_their_number_and_the_limit() {
         let list = |item: &str, n: usize| format!("[{}]", vec![item; n].join(", "));
         let k = parse(&format!("{CAMERA}k = {}\n", list("0.0", 12)), Path::new("s.toml")).unwrap_err();
-        assert_eq!(k.to_string(), "s.toml:9: [camera] k: 12 numbers, at most 5 can be given");
+        assert_eq!(k.to_string(), "s.toml:9: [camera] k: has 12 numbers; at most 5 are allowed");
         let polygon = |corners: usize| list("[1, 2]", corners);
         assert_eq!(
             error(&format!("[mask]\npolygons_px = {}\n", list(&polygon(3), 50))),
-            "sensor.toml:10: [mask] polygons_px: 50 polygons, at most 8 can be given"
+            "sensor.toml:10: [mask] polygons_px: has 50 polygons; at most 8 are allowed"
         );
         assert_eq!(
             error(&format!("[mask]\npolygons_px = [\n{},\n{}]\n", polygon(3), polygon(100))),
-            "sensor.toml:12: [mask] polygons_px 2: 100 corners, at most 16 can be given"
+            "sensor.toml:12: [mask] polygons_px 2: has 100 corners; at most 16 are allowed"
         );
         let rows = format!("limb_height_by_latitude_km = {}\n", list("[0, 20]", 17));
         assert_eq!(
             error(&format!("[body]\n{rows}")),
-            "sensor.toml:10: [body] limb_height_by_latitude_km: 17 rows, at most 16 can be given"
+            "sensor.toml:10: [body] limb_height_by_latitude_km: has 17 rows; at most 16 are allowed"
         );
         assert_eq!(
             error(&format!("[[bodies]]\nkind = \"sun\"\n[[bodies]]\n{rows}")),
-            "sensor.toml:12: [[bodies]] 2 limb_height_by_latitude_km: 17 rows, at most 16 can be given"
+            "sensor.toml:12: [[bodies]] 2 limb_height_by_latitude_km: has 17 rows; at most 16 are allowed"
         );
         // serde alone would read the first numbers of these lists and ignore the others.
         for (text, what) in [
             (
                 "[mount]\nq_body_from_camera_wxyz = [1, 0, 0, 0, 0]\n",
-                "[mount] q_body_from_camera_wxyz: 5 numbers, at most 4",
+                "[mount] q_body_from_camera_wxyz: has 5 numbers; at most 4",
             ),
-            ("[mask]\npolygons_px = [[[1, 2], [3, 4, 5], [5, 6]]]\n", "[mask] polygons_px 1.2: 3 numbers, at most 2"),
+            (
+                "[mask]\npolygons_px = [[[1, 2], [3, 4, 5], [5, 6]]]\n",
+                "[mask] polygons_px 1.2: has 3 numbers; at most 2",
+            ),
             (
                 "[body]\nlimb_height_by_latitude_km = [[0, 20, 1]]\n",
-                "[body] limb_height_by_latitude_km 1: 3 numbers, at most 2",
+                "[body] limb_height_by_latitude_km 1: has 3 numbers; at most 2",
             ),
-            ("[select]\naltitude_limits_km = [1, 2, 3]\n", "[select] altitude_limits_km: 3 numbers, at most 2"),
+            ("[select]\naltitude_limits_km = [1, 2, 3]\n", "[select] altitude_limits_km: has 3 numbers; at most 2"),
         ] {
-            assert_eq!(error(text), format!("sensor.toml:10: {what} can be given"));
+            assert_eq!(error(text), format!("sensor.toml:10: {what} are allowed"));
         }
         // Lists of exactly the maximum length are accepted.
         assert!(parse(&format!("{CAMERA}k = {}\n", list("0.0", 5)), Path::new("s.toml")).is_ok());
@@ -445,7 +385,7 @@ mod tests {
         assert_eq!(message(""), "s.toml: camera: the section [camera] is missing");
         assert_eq!(
             message("[camera]\nwidth = 3\nheight = 3\nfx_px = 3\ncx_px = 1\ncy_px = 1\n"),
-            "s.toml:1: [camera] fy_px: missing; give it, or take the calibration from a `file`"
+            "s.toml:1: [camera] fy_px: missing; write it, or use a `file` with the calibration"
         );
         assert_eq!(message("[camera\n"), "s.toml:1:8: not valid TOML: unclosed table, expected `]`");
         assert!(load(Path::new("/nowhere/s.toml")).unwrap_err().to_string().contains("hzn init"));
@@ -463,7 +403,7 @@ mod tests {
         let config = load(&path).unwrap().config;
         assert_eq!((config.camera.fy_px, config.camera.theta_max_deg, config.reject.seed), (301.0, Some(50.0), 7));
         std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\nwidth = 50\n").unwrap();
-        assert!(load(&path).unwrap_err().to_string().contains(":3: [camera] width: cannot stand beside"));
+        assert!(load(&path).unwrap_err().to_string().contains(":3: [camera] width: cannot be next to `file`"));
         std::fs::write(&path, "[camera]\nfile = \"other.yaml\"\n").unwrap();
         assert!(load(&path).unwrap_err().to_string().contains("no such file (paths are relative"));
     }

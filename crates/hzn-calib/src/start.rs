@@ -28,13 +28,13 @@ const STATED_PERCENT: f64 = 5.0 / SQRT_3;
 const EXIF_PERCENT: f64 = 10.0 / SQRT_3;
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 /// 1-sigma of the principal point, as a fraction of the width.
-const CENTRE_PART: f64 = 0.015;
+const CENTRE_FRACTION: f64 = 0.015;
 /// 1-sigma of an altitude that is given once for all pictures, as a fraction of it. Orbits are not circular.
-const ALTITUDE_PART: f64 = 0.02;
+const ALTITUDE_FRACTION: f64 = 0.02;
 /// Sides of the 35 mm film, in millimetres.
 const FILM_MM: [f64; 2] = [36.0, 24.0];
 /// Largest stated field of view, in degrees, for which a pinhole is assumed if the lens is not given.
-const PINHOLE_UNSAID_DEG: f64 = 90.0;
+const MAX_PINHOLE_DEFAULT_DEG: f64 = 90.0;
 
 /// EXIF data of a picture about the lens; every field may be missing.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -57,7 +57,7 @@ pub struct Exif {
 
 /// Known properties of a camera.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Known {
+pub struct CameraFacts {
     /// Columns and rows of its pictures.
     pub size_px: [u32; 2],
     /// Stated field of view over the whole width, in degrees.
@@ -73,7 +73,7 @@ pub struct Known {
 
 /// A sensor.toml to start from, with its main values.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Start {
+pub struct StartConfig {
     /// Text of the file.
     pub text: String,
     /// Lens model.
@@ -145,7 +145,11 @@ impl Exif {
             mm * width.hypot(height) / film_width.hypot(film_height)
         };
         let rounded = 100.0 * 0.5 / mm / SQRT_3;
-        Some(Focal { px, percent: EXIF_PERCENT.hypot(rounded), from: format!("EXIF: as {mm} mm on 35 mm film") })
+        Some(Focal {
+            px,
+            percent: EXIF_PERCENT.hypot(rounded),
+            from: format!("EXIF: equivalent to {mm} mm on 35 mm film"),
+        })
     }
 }
 
@@ -154,31 +158,33 @@ impl Exif {
 /// # Errors
 /// There is no focal length, the lens cannot have the field of view, or the field of view is so wide that the lens must
 /// be given.
-pub fn sensor_toml(known: &Known) -> Result<Start, String> {
-    let [width, height] = known.size_px.map(f64::from);
-    if let Some(fov) = known.fov_deg.filter(|f| !(*f > 0.1 && *f <= 300.0)) {
+pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
+    let [width, height] = facts.size_px.map(f64::from);
+    if let Some(fov) = facts.fov_deg.filter(|f| !(*f > 0.1 && *f <= 300.0)) {
         return Err(format!("--fov {fov}: must lie between 0.1 and 300 degrees"));
     }
-    let lens = match (known.lens, known.fov_deg) {
+    let lens = match (facts.lens, facts.fov_deg) {
         (Some(lens), _) => lens,
-        (None, Some(fov)) if fov > PINHOLE_UNSAID_DEG => {
-            return Err(format!("--fov {fov}: a lens so wide may be either; say --lens fisheye or --lens pinhole"));
+        (None, Some(fov)) if fov > MAX_PINHOLE_DEFAULT_DEG => {
+            return Err(format!(
+                "--fov {fov}: a lens of this width may be a fisheye or a pinhole; add --lens fisheye or --lens pinhole"
+            ));
         }
         (None, _) => Model::Pinhole,
     };
-    let exif = known.exif.focal([width, height]);
-    let stated = known.fov_deg.map(|fov| {
-        let px =
-            focal_px(lens, width, fov).ok_or_else(|| format!("--fov {fov}: a pinhole sees less than 180 degrees"))?;
+    let exif = facts.exif.focal([width, height]);
+    let stated = facts.fov_deg.map(|fov| {
+        let px = focal_px(lens, width, fov)
+            .ok_or_else(|| format!("--fov {fov}: the field of view of a pinhole must be below 180 degrees"))?;
         Ok::<_, String>(Focal { px, percent: STATED_PERCENT, from: format!("the field of view, {fov} degrees wide") })
     });
-    let (focal, warnings, beside) = choose(stated.transpose()?, exif, lens, width)?;
+    let (focal, warnings, comparison) = choose_focal(stated.transpose()?, exif, lens, width)?;
     let fov = fov_deg(lens, width, focal.px);
     let half_rad = (0.5 * fov).to_radians();
     let shape_percent = 100.0 * half_rad * half_rad / 24.0;
     let focal_sigma_percent = (focal.percent.hypot(shape_percent) * 10.0).ceil() / 10.0;
-    let centre_sigma_px = (CENTRE_PART * width).ceil();
-    let start = Start {
+    let centre_sigma_px = (CENTRE_FRACTION * width).ceil();
+    let start = StartConfig {
         text: String::new(),
         lens,
         focal_px: focal.px,
@@ -187,57 +193,71 @@ pub fn sensor_toml(known: &Known) -> Result<Start, String> {
         centre_sigma_px,
         warnings,
     };
-    let text = written(known, &start, &focal, beside.as_deref(), shape_percent);
-    Ok(Start { text, ..start })
+    let text = write_text(facts, &start, &focal, comparison.as_deref(), shape_percent);
+    Ok(StartConfig { text, ..start })
 }
 
 /// The chosen focal length, warnings, and a note about the other focal length.
 type Chosen = (Focal, Vec<String>, Option<String>);
 
 /// Chooses the focal length: a stated field of view overrides EXIF, which is only compared with it.
-fn choose(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: f64) -> Result<Chosen, String> {
+fn choose_focal(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: f64) -> Result<Chosen, String> {
     match (stated, exif) {
         (Some(stated), Some(exif)) => {
             let off_percent = 100.0 * (exif.px / stated.px - 1.0);
             let other = fov_deg(lens, width, exif.px);
-            let beside = format!("{}: {:.1} px, {other:.1} degrees wide ({off_percent:+.1} %)", exif.from, exif.px);
+            let comparison = format!("{}: {:.1} px, {other:.1} degrees wide ({off_percent:+.1} %)", exif.from, exif.px);
             let warnings = if off_percent.abs() > 3.0 * stated.percent.hypot(exif.percent) {
                 vec![format!(
-                    "the picture's {beside}, which the field of view contradicts: it counts over the whole width; was \
-                     it stated for the diagonal, another lens, or another mode of the camera?"
+                    "the picture's {comparison} contradicts the field of view, which is over the whole width; was it \
+                     stated for the diagonal, another lens, or another mode of the camera?"
                 )]
             } else {
                 Vec::new()
             };
-            Ok((stated, warnings, Some(beside)))
+            Ok((stated, warnings, Some(comparison)))
         }
         (Some(stated), None) => Ok((stated, Vec::new(), None)),
         (None, Some(exif)) => Ok((exif, Vec::new(), None)),
         (None, None) => {
-            Err("the picture does not say its focal length (EXIF): give the field of view over the whole width, \
-                             such as --fov 60, and --lens fisheye or pinhole"
+            Err("the picture has no focal length (EXIF); add the field of view over the whole width, for example \
+                 --fov 60, and --lens fisheye or --lens pinhole"
                 .into())
         }
     }
 }
 
-fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, shape_percent: f64) -> String {
-    let [width, height] = known.size_px;
-    let [cx, cy] = [width, height].map(|n| 0.5 * (f64::from(n) - 1.0));
-    let mut t = String::new();
-    let _ = write!(
-        t,
-        "# A start for a camera that nobody calibrated, by `hzn init`. What is not known stands as a sigma: answers \
-         are as uncertain as\n\
-         # the lens. A calibration makes them sharper: `hzn camera convert`, and both sigmas smaller or away.\n\
+/// Writes the text of the file; `comparison` is the note about the focal length that is not used.
+fn write_text(
+    facts: &CameraFacts,
+    start: &StartConfig,
+    focal: &Focal,
+    comparison: Option<&str>,
+    shape_percent: f64,
+) -> String {
+    let mut text = String::from(
+        "# A sensor.toml for a camera without a calibration, by `hzn init`. Unknown properties of the lens are\n\
+         # sigmas, which the covariance of the answers includes. A calibration reduces them: `hzn camera convert`,\n\
+         # with both sigmas smaller or removed.\n\
          # Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png\n\
          # Every other key with its default:  hzn init -o all.toml\n\
          \n\
          preset = \"hzn\"\n\
          \n\
-         [camera]\n"
+         [camera]\n",
     );
-    if let Some(camera) = &known.exif.camera {
+    text += &write_camera_model(facts, start);
+    text += &write_focal_and_centre(facts, start, focal, comparison);
+    text += &write_camera_sigmas(start, focal, shape_percent);
+    text += &write_body(facts.altitude_km);
+    text
+}
+
+/// Writes the size of the pictures and the lens.
+fn write_camera_model(facts: &CameraFacts, start: &StartConfig) -> String {
+    let [width, height] = facts.size_px;
+    let mut t = String::new();
+    if let Some(camera) = &facts.exif.camera {
         let _ = writeln!(t, "# {}", camera.replace(['\n', '\r'], " "));
     }
     let _ = write!(
@@ -246,23 +266,33 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
         start.lens.name(),
         match start.lens {
             Model::Pinhole => "            # an ideal lens without distortion",
-            _ => "        # an ideal fisheye: the angle off axis grows evenly with the radius",
+            _ => "        # an ideal fisheye: the angle off axis is proportional to the radius",
         }
     );
-    let _ = write!(t, "# From {}", focal.from);
-    let _ = match beside {
-        Some(beside) => writeln!(t, "; beside it {beside}."),
+    t
+}
+
+/// Writes the focal length with its source, and the picture's centre as the principal point.
+fn write_focal_and_centre(facts: &CameraFacts, start: &StartConfig, focal: &Focal, comparison: Option<&str>) -> String {
+    let [cx, cy] = facts.size_px.map(|n| 0.5 * (f64::from(n) - 1.0));
+    let mut t = format!("# From {}", focal.from);
+    let _ = match comparison {
+        Some(comparison) => writeln!(t, "; for comparison, {comparison}."),
         None => writeln!(t, "; {:.1} degrees wide.", start.fov_deg),
     };
     let _ = write!(t, "fx_px = {:.1}\nfy_px = {:.1}\n", start.focal_px, start.focal_px);
     let _ = write!(t, "cx_px = {cx:.1}                 # the picture's centre\ncy_px = {cy:.1}\n");
-    let _ = write!(
-        t,
-        "# 1-sigma of the focal length: {:.1} % for {}, and {shape_percent:.1} % for what a real lens differs\n\
-         # from an ideal one over this field.\n\
+    t
+}
+
+/// Writes the sigmas of the lens, and for a fisheye the key of its image circle.
+fn write_camera_sigmas(start: &StartConfig, focal: &Focal, shape_percent: f64) -> String {
+    let mut t = format!(
+        "# 1-sigma of the focal length: {:.1} % for {}, and {shape_percent:.1} % for the difference\n\
+         # of a real lens from an ideal one over this field of view.\n\
          focal_sigma_percent = {:.1}\n\
-         # 1-sigma of the principal point, each axis: 1.5 % of the width. It turns every answer alike. More where \
-         pictures were cropped.\n\
+         # 1-sigma of the principal point, each axis: 1.5 % of the width. It turns all answers by the same angle.\n\
+         # Increase it for cropped pictures.\n\
          centre_sigma_px = {:.1}\n",
         focal.percent,
         if focal.percent < EXIF_PERCENT {
@@ -276,25 +306,31 @@ fn written(known: &Known, start: &Start, focal: &Focal, beside: Option<&str>, sh
     if start.lens == Model::Equidistant {
         let _ = writeln!(
             t,
-            "# theta_max_deg = {:.0}            # where the image circle ends within the picture: its radius in \
-             degrees off axis",
+            "# theta_max_deg = {:.0}            # radius of the image circle in degrees off axis, if its rim is in the \
+             picture",
             0.5 * start.fov_deg
         );
     }
-    let _ =
-        write!(t, "\n[body]\nkind = \"earth\"                 # earth (WGS-84) | earth-sphere | sun | moon | sphere\n");
-    let _ = match known.altitude_km {
+    t
+}
+
+/// Writes `[body]` with the altitude, or with a comment that says where altitudes belong.
+fn write_body(altitude_km: Option<f64>) -> String {
+    let mut t = String::from(
+        "\n[body]\nkind = \"earth\"                 # earth (WGS-84) | earth-sphere | sun | moon | sphere\n",
+    );
+    let _ = match altitude_km {
         Some(km) => write!(
             t,
-            "altitude_km = {km}\naltitude_sigma_km = {:.1}        # 1-sigma: 2 % of it, for all pictures; frames.csv \
-             gives each its own\n",
-            (ALTITUDE_PART * km).max(0.5)
+            "altitude_km = {km}\naltitude_sigma_km = {:.1}        # 1-sigma: 2 % of the altitude, for all pictures; \
+             frames.csv can give each picture its altitude\n",
+            (ALTITUDE_FRACTION * km).max(0.5)
         ),
         None => write!(
             t,
-            "# Every picture needs an altitude in kilometres: the columns file, altitude_km of a frames.csv beside the \
-             pictures (or x_km,\n\
-             # y_km, z_km), or for all of them\n# altitude_km = 400.0\n"
+            "# Every picture needs an altitude in kilometres. Write it into the columns file, altitude_km (or x_km, \
+             y_km, z_km)\n\
+             # of a frames.csv next to the pictures, or here for all pictures:\n# altitude_km = 400.0\n"
         ),
     };
     t
@@ -306,8 +342,8 @@ mod tests {
 
     use super::*;
 
-    fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> Known {
-        Known { size_px: [4928, 2768], fov_deg, lens, exif, altitude_km: Some(418.0) }
+    fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> CameraFacts {
+        CameraFacts { size_px: [4928, 2768], fov_deg, lens, exif, altitude_km: Some(418.0) }
     }
 
     /// The Nikon D4 on the ISS, 20 November 2020.
@@ -323,9 +359,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_loads_and_is_the_camera_that_was_told() {
+    fn what_is_written_loads_and_is_the_camera_of_the_facts() {
         for (fov, lens) in [(92.0, Model::Pinhole), (92.0, Model::Equidistant), (180.0, Model::Equidistant)] {
-            let start = sensor_toml(&known(Some(fov), Some(lens), Exif::default())).unwrap();
+            let start = write_sensor_toml(&known(Some(fov), Some(lens), Exif::default())).unwrap();
             let config = crate::sensor::parse(&start.text, Path::new("s.toml")).unwrap().config;
             let camera = hzn_core::camera::Camera::<f64>::try_new(&config.camera).unwrap();
             // The middle of the right edge, half a pixel beyond the centre of the last column.
@@ -340,43 +376,43 @@ mod tests {
 
     #[test]
     fn exif_gives_the_nominal_focal_length_by_either_way() {
-        let start = sensor_toml(&known(None, None, d4())).unwrap();
+        let start = write_sensor_toml(&known(None, None, d4())).unwrap();
         assert!((start.focal_px - 7666.0).abs() < 1.0, "{}", start.focal_px);
         // The limb gives 7100 px, which is within two sigmas.
         assert!((start.focal_px / 7100.0 - 1.0) < 0.02 * start.focal_sigma_percent, "{start:?}");
-        let film = sensor_toml(&known(None, None, Exif { plane_px_per_mm: None, ..d4() })).unwrap();
+        let film = write_sensor_toml(&known(None, None, Exif { plane_px_per_mm: None, ..d4() })).unwrap();
         assert!((film.focal_px - 7666.0).abs() < 1.0, "{}", film.focal_px);
         assert!(film.focal_sigma_percent >= start.focal_sigma_percent);
         // A third of the size: the number of columns in EXIF shows the scale.
-        let small = Known { size_px: [1600, 899], ..known(None, None, d4()) };
-        assert!((sensor_toml(&small).unwrap().focal_px - 7666.0 * 1600.0 / 4928.0).abs() < 1.0);
+        let small = CameraFacts { size_px: [1600, 899], ..known(None, None, d4()) };
+        assert!((write_sensor_toml(&small).unwrap().focal_px - 7666.0 * 1600.0 / 4928.0).abs() < 1.0);
         // A wrong EXIF value: pixels of 10 nm.
         let odd = Exif { plane_px_per_mm: Some(1e5), ..d4() };
-        assert!((sensor_toml(&known(None, None, odd)).unwrap().focal_px - 7666.0).abs() < 1.0);
+        assert!((write_sensor_toml(&known(None, None, odd)).unwrap().focal_px - 7666.0).abs() < 1.0);
         // A telephone: its 4:3 picture is compared by the diagonal.
         let phone = Exif { focal_35mm_mm: Some(26.0), ..Exif::default() };
-        let phone = sensor_toml(&Known { size_px: [4000, 3000], ..known(None, None, phone) }).unwrap();
+        let phone = write_sensor_toml(&CameraFacts { size_px: [4000, 3000], ..known(None, None, phone) }).unwrap();
         assert!((phone.focal_px - 26.0 * 5000.0 / 43.267).abs() < 1.0, "{}", phone.focal_px);
     }
 
     #[test]
-    fn a_contradiction_is_told_and_agreement_is_not() {
-        let both = |fov| sensor_toml(&known(Some(fov), None, d4())).unwrap();
+    fn a_contradiction_is_reported_and_agreement_is_not() {
+        let both = |fov| write_sensor_toml(&known(Some(fov), None, d4())).unwrap();
         // EXIF: 35.6 degrees over the width.
         let agreed = both(37.0);
-        assert!(agreed.warnings.is_empty() && agreed.text.contains("beside it EXIF"), "{}", agreed.text);
+        assert!(agreed.warnings.is_empty() && agreed.text.contains("for comparison, EXIF"), "{}", agreed.text);
         assert!((agreed.fov_deg - 37.0).abs() < 1e-9);
         assert!(both(60.0).warnings[0].contains("contradicts"));
         // The stated value overrides EXIF.
-        assert!(agreed.focal_sigma_percent < sensor_toml(&known(None, None, d4())).unwrap().focal_sigma_percent);
+        assert!(agreed.focal_sigma_percent < write_sensor_toml(&known(None, None, d4())).unwrap().focal_sigma_percent);
     }
 
     #[test]
-    fn what_cannot_be_is_refused_with_what_to_say() {
-        let refused = |fov, lens, exif| sensor_toml(&known(fov, lens, exif)).unwrap_err();
+    fn impossible_facts_are_refused_with_a_remedy() {
+        let refused = |fov, lens, exif| write_sensor_toml(&known(fov, lens, exif)).unwrap_err();
         assert!(refused(None, None, Exif::default()).contains("--fov"));
         assert!(refused(Some(92.0), None, Exif::default()).contains("--lens"));
-        assert!(refused(Some(180.0), Some(Model::Pinhole), Exif::default()).contains("less than 180"));
+        assert!(refused(Some(180.0), Some(Model::Pinhole), Exif::default()).contains("below 180"));
         assert!(refused(Some(f64::NAN), None, Exif::default()).contains("between"));
         assert!(refused(Some(0.0), None, Exif::default()).contains("between"));
     }
@@ -384,7 +420,7 @@ mod tests {
     #[test]
     fn a_wider_lens_is_less_certain() {
         let sigma = |fov| {
-            sensor_toml(&known(Some(fov), Some(Model::Equidistant), Exif::default())).unwrap().focal_sigma_percent
+            write_sensor_toml(&known(Some(fov), Some(Model::Equidistant), Exif::default())).unwrap().focal_sigma_percent
         };
         assert!(
             sigma(40.0) < sigma(92.0) && sigma(92.0) < sigma(180.0),
@@ -398,7 +434,7 @@ mod tests {
 
     #[test]
     fn without_an_altitude_the_file_says_what_to_do() {
-        let start = sensor_toml(&Known { altitude_km: None, ..known(None, None, d4()) }).unwrap();
+        let start = write_sensor_toml(&CameraFacts { altitude_km: None, ..known(None, None, d4()) }).unwrap();
         assert!(start.text.contains("frames.csv") && !start.text.contains("\naltitude_km"), "{}", start.text);
         let config = crate::sensor::parse(&start.text, Path::new("s.toml")).unwrap().config;
         assert_eq!(config.body.altitude_km, None);

@@ -80,7 +80,7 @@ impl SensorArgs {
             // With the changed text, a recording is processed again with the same altitude.
             sensor.text = with_altitude(&sensor.text, km, &taken);
             hzn_calib::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
-            let doubts = plausible::doubts(&sensor.config);
+            let doubts = plausible::find_implausible(&sensor.config);
             if let Some(doubt) = doubts.iter().find(|d| d.key == "body.altitude_km") {
                 tell::warning(format_args!("--altitude-km: {}", doubt.what));
             }

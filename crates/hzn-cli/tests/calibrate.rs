@@ -91,7 +91,7 @@ fn a_flight_tells_limb_height_and_noise_or_why_not() {
     let (code, stdout, stderr) =
         hzn(at, &[&["calibrate", "noise"], &few[..], &["--sensor", "mine.toml", "-o", "few.toml", "-q"]].concat());
     assert_eq!(code, 1, "{stdout}{stderr}");
-    assert!(stderr.contains("5 pictures were answered, but at least 12 are needed"), "{stderr}");
+    assert!(stderr.contains("5 pictures have an answer, but at least 12 are needed"), "{stderr}");
 
     // The altitudes are wrong: alternately 10 km too low and too high.
     let mut rows = csv::Reader::from_path(at.join("flight/frames.csv")).unwrap();

@@ -151,9 +151,9 @@ mod tests {
         };
         for pen_px in [0.5, 1.0, 2.5] {
             let m = annotations(&a, &[], pen_px, 0);
-            let of = |kind: &str| m.points.iter().filter(|p| p.metadata[0].value == kind).collect::<Vec<_>>();
-            assert_eq!(of("edge")[0].points, [Point2 { x: 0.5, y: 0.5 }, Point2 { x: 1.5, y: 2.75 }]);
-            let cross = &of("axis")[1].points;
+            let points = |kind: &str| m.points.iter().filter(|p| p.metadata[0].value == kind).collect::<Vec<_>>();
+            assert_eq!(points("edge")[0].points, [Point2 { x: 0.5, y: 0.5 }, Point2 { x: 1.5, y: 2.75 }]);
+            let cross = &points("axis")[1].points;
             let mid = |f: fn(&Point2) -> f64| cross.iter().map(f).sum::<f64>() / 4.0;
             assert_eq!((mid(|p| p.x), mid(|p| p.y)), (100.5, 50.5));
             assert_eq!(parse(&m.encode_to_vec()).unwrap(), a);
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn the_answer_stands_in_the_picture() {
+    fn the_answer_is_written_in_the_picture() {
         let meta = RowMeta { index: 0, file: "a.png".into(), time_s: None, body: "earth".into(), altitude_km: None };
         let mut row = Row::unprocessed(&meta, Status::Unreadable, "cut off");
         assert_eq!(caption(&row), "unreadable: cut off");

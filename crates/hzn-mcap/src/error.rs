@@ -13,15 +13,15 @@ pub enum Error {
         path: PathBuf,
     },
     /// The file of an unfinished run exists next to the output.
-    #[error("{} is left from an unfinished run: continue it, or start over", path.display())]
+    #[error("{} is from an unfinished run: continue that run, or start over", path.display())]
     Unfinished {
         /// The unfinished file.
         path: PathBuf,
     },
     /// The disk is full.
     #[error(
-        "no space left on the disk of {}: free some or write elsewhere; finished frames are kept in {}, and --resume \
-         goes on from there",
+        "no space is left on the disk of {}: free some space, or write elsewhere; finished frames are kept in {}, and \
+         --resume continues from there",
         folder.display(), part.display()
     )]
     DiskFull {
@@ -77,7 +77,7 @@ pub enum Error {
         path: PathBuf,
     },
     /// The unfinished file was not written by hzn, so it cannot be continued.
-    #[error("{} is no recording of hzn: choose another name for the output", path.display())]
+    #[error("{} is not a recording of hzn: choose another name for the output", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
@@ -97,7 +97,9 @@ pub enum Error {
         path: PathBuf,
     },
     /// An earlier write failed; the recording takes no further frames.
-    #[error("an earlier write to {} failed: finished frames are kept there, and a resumed run goes on", path.display())]
+    #[error(
+        "an earlier write to {} failed: finished frames are kept there; resume the run to continue", path.display()
+    )]
     AfterFailure {
         /// The unfinished file.
         path: PathBuf,
@@ -105,7 +107,7 @@ pub enum Error {
 }
 
 /// Returns the folder of `path`; the current folder if `path` has none.
-pub(crate) fn folder_of(path: &Path) -> PathBuf {
+pub(crate) fn parent_folder(path: &Path) -> PathBuf {
     match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
         _ => PathBuf::from("."),
@@ -116,17 +118,17 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
 pub(crate) fn while_writing(path: &Path, source: io::Error) -> Error {
     match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            Error::DiskFull { folder: folder_of(path), part: path.to_path_buf() }
+            Error::DiskFull { folder: parent_folder(path), part: path.to_path_buf() }
         }
         io::ErrorKind::FileTooLarge => {
-            let what = "larger than files may be here (ulimit -f); finished frames are kept; resume the run to go on \
-                        with them";
+            let what = "the file exceeds the largest allowed size (ulimit -f); finished frames are kept; resume the \
+                        run to continue with them";
             Error::Write { path: path.to_path_buf(), source: io::Error::new(io::ErrorKind::FileTooLarge, what) }
         }
         io::ErrorKind::PermissionDenied
         | io::ErrorKind::NotFound
         | io::ErrorKind::NotADirectory
-        | io::ErrorKind::ReadOnlyFilesystem => Error::Folder { folder: folder_of(path), source },
+        | io::ErrorKind::ReadOnlyFilesystem => Error::Folder { folder: parent_folder(path), source },
         _ => Error::Write { path: path.to_path_buf(), source },
     }
 }

@@ -20,7 +20,7 @@ pub struct FrameRecord {
     /// Attitude of the camera, if it is known.
     pub attitude: Option<Attitude>,
     /// The prior of the picture. With it the same answer can be computed again.
-    pub given: Given,
+    pub prior: PicturePrior,
     /// Messages about this frame.
     pub log: Vec<LogLine>,
 }
@@ -34,7 +34,7 @@ impl FrameRecord {
             image: None,
             annotations: Annotations::default(),
             attitude: None,
-            given: Given::default(),
+            prior: PicturePrior::default(),
             log: Vec::new(),
         }
     }
@@ -155,7 +155,7 @@ pub struct Attitude {
 /// The prior of a picture: the columns of frames.csv as numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Given {
+pub struct PicturePrior {
     /// UTC in seconds since 1970.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub utc_s: Option<f64>,

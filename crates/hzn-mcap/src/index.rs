@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::container::{Chunk, Fields, MAGIC, MAX_RECORD_BYTES, Message, Op, Record};
 use crate::error::Error;
-use crate::frame::{CandidateEdge, Given};
+use crate::frame::{CandidateEdge, PicturePrior};
 use crate::images::{InputImage, decoder};
 use crate::messages;
 use crate::row::Row;
@@ -46,7 +46,7 @@ pub enum IndexEntry {
     /// A picture, which is not read yet.
     Picture(Place),
     /// The result of one picture and body.
-    Report(Box<Row>, Vec<CandidateEdge>, Given),
+    Report(Box<Row>, Vec<CandidateEdge>, PicturePrior),
 }
 
 /// A channel with pictures: its topic, schema and encoding.
@@ -97,13 +97,13 @@ impl Index {
             complete: false,
             broken_chunks: 0,
         };
-        while let Some((op, length)) = index.head().map_err(read)? {
+        while let Some((op, length)) = index.read_head().map_err(read)? {
             if matches!(op, Op::CHUNK | Op::MESSAGE | Op::DATA_END) {
                 index.file.seek_relative(-9).map_err(read)?;
                 break;
             }
-            let Some(content) = index.content(length).map_err(read)? else { break };
-            index.outside(op, &content);
+            let Some(content) = index.read_content(length).map_err(read)? else { break };
+            index.read_declaration(op, &content);
         }
         Ok(index)
     }
@@ -141,67 +141,78 @@ impl Index {
     }
 
     fn step(&mut self, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
-        let Some((op, length)) = self.head()? else { return Ok(Ok(false)) };
+        let Some((op, length)) = self.read_head()? else { return Ok(Ok(false)) };
         match op {
             Op::DATA_END => {
                 self.complete = true;
                 Ok(Ok(false))
             }
-            Op::CHUNK => self.chunk(length, found),
+            Op::CHUNK => self.read_chunk(length, found),
             Op::MESSAGE => {
                 let start = self.position;
-                let Some(content) = self.content(length)? else { return Ok(Ok(false)) };
+                let Some(content) = self.read_content(length)? else { return Ok(Ok(false)) };
                 let message = Message::parse(&content);
-                Ok(message.map_or(Ok(()), |m| self.message(&m, None, start, found)).map(|()| true))
+                Ok(message.map_or(Ok(()), |m| self.add_message(&m, None, start, found)).map(|()| true))
             }
             _ => {
-                let Some(content) = self.content(length)? else { return Ok(Ok(false)) };
-                self.outside(op, &content);
+                let Some(content) = self.read_content(length)? else { return Ok(Ok(false)) };
+                self.read_declaration(op, &content);
                 Ok(Ok(true))
             }
         }
     }
 
-    fn chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
-        let start = self.position;
+    fn read_chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
         // Times, sizes and CRC, the name of the compression and the length of the records.
         let mut head = [0; 40];
         if length < 40 || !fill(&mut self.file, &mut head)? {
             return Ok(Ok(false));
         }
-        if head.get(28..32) != Some(&[0; 4]) {
-            self.file.seek_relative(-40)?;
-            let Some(content) = self.content(length)? else { return Ok(Ok(false)) };
-            let Some((chunk, plain)) = Chunk::parse(&Record { op: Op::CHUNK, content }) else {
-                self.broken_chunks += 1;
-                return Ok(Ok(true));
-            };
-            for (op, _, content) in &chunk.index.declared {
-                self.outside(*op, content);
-            }
-            let mut rest = Fields(&plain);
-            while let Some((offset, op, content)) = next_record(&mut rest, plain.len()) {
-                if op == Op::MESSAGE
-                    && let Some(m) = Message::parse(content)
-                    && let Err(e) = self.message(&m, Some(start), offset, found)
-                {
-                    return Ok(Err(e));
-                }
-            }
-            return Ok(Ok(true));
+        if head.get(28..32) == Some(&[0; 4]) {
+            return self.read_plain_chunk(length, found);
         }
-        // The records are not compressed: only their heads are read.
+        self.file.seek_relative(-40)?;
+        self.read_compressed_chunk(length, found)
+    }
+
+    /// Reads a compressed chunk as a whole.
+    fn read_compressed_chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
+        let start = self.position;
+        let Some(content) = self.read_content(length)? else { return Ok(Ok(false)) };
+        let Some((chunk, plain)) = Chunk::parse(&Record { op: Op::CHUNK, content }) else {
+            self.broken_chunks += 1;
+            return Ok(Ok(true));
+        };
+        for (op, _, content) in &chunk.index.declared {
+            self.read_declaration(*op, content);
+        }
+        let mut rest = Fields(&plain);
+        while let Some((offset, op, content)) = next_record(&mut rest, plain.len()) {
+            if op == Op::MESSAGE
+                && let Some(m) = Message::parse(content)
+                && let Err(e) = self.add_message(&m, Some(start), offset, found)
+            {
+                return Ok(Err(e));
+            }
+        }
+        Ok(Ok(true))
+    }
+
+    /// Reads the heads of the records in an uncompressed chunk, and the data of its reports. The first 40 bytes of the
+    /// chunk are read already.
+    fn read_plain_chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
+        let start = self.position;
         let end = start + 9 + length;
-        let mut at = start + 9 + 40;
-        let whole = self.file.get_ref().metadata()?.len() >= end;
-        while whole && at + 9 <= end {
+        let mut offset = start + 9 + 40;
+        let is_whole = self.file.get_ref().metadata()?.len() >= end;
+        while is_whole && offset + 9 <= end {
             let mut head = [0; 9];
             if !fill(&mut self.file, &mut head)? {
                 break;
             }
             let mut f = Fields(&head);
             let (Some(op), Some(length)) = (f.u8(), f.u64()) else { break };
-            if op == 0 || length > end - at - 9 {
+            if op == 0 || length > end - offset - 9 {
                 self.broken_chunks += 1;
                 break;
             }
@@ -221,7 +232,7 @@ impl Index {
                         break;
                     }
                 }
-                if let Err(e) = self.message(&Message { data: &data, ..m }, Some(start), at, found) {
+                if let Err(e) = self.add_message(&Message { data: &data, ..m }, Some(start), offset, found) {
                     return Ok(Err(e));
                 }
             } else if matches!(op, Op::SCHEMA | Op::CHANNEL) {
@@ -229,18 +240,18 @@ impl Index {
                 if !fill(&mut self.file, &mut content)? {
                     break;
                 }
-                self.outside(op, &content);
+                self.read_declaration(op, &content);
                 skip = 0;
             }
             self.file.seek_relative(skip as i64)?;
-            at += 9 + length;
+            offset += 9 + length;
         }
         self.file.seek(SeekFrom::Start(end))?;
         self.position = end;
-        Ok(Ok(whole))
+        Ok(Ok(is_whole))
     }
 
-    fn message(
+    fn add_message(
         &mut self,
         m: &Message<'_>,
         chunk: Option<u64>,
@@ -252,8 +263,8 @@ impl Index {
                 path: self.path.clone(),
                 detail: format!("report of frame {}: {e}", m.sequence),
             };
-            let (row, candidates, given) = messages::parse_report(m.data).map_err(broken)?;
-            found.push(IndexEntry::Report(Box::new(row), candidates, given));
+            let (row, candidates, prior) = messages::parse_report(m.data).map_err(broken)?;
+            found.push(IndexEntry::Report(Box::new(row), candidates, prior));
         } else if self.pictures.contains_key(&m.channel) {
             let (channel, log_time_ns, sequence) = (m.channel, m.log_time_ns, m.sequence);
             found.push(IndexEntry::Picture(Place { chunk, message: at, channel, log_time_ns, sequence }));
@@ -271,7 +282,7 @@ impl Index {
     }
 
     /// Reads a record outside of chunks, or one that a chunk declares.
-    fn outside(&mut self, op: u8, content: &[u8]) {
+    fn read_declaration(&mut self, op: u8, content: &[u8]) {
         let mut f = Fields(content);
         match op {
             Op::SCHEMA => {
@@ -303,7 +314,7 @@ impl Index {
     }
 
     /// Reads kind and length of the record at `position`.
-    fn head(&mut self) -> io::Result<Option<(u8, u64)>> {
+    fn read_head(&mut self) -> io::Result<Option<(u8, u64)>> {
         let mut head = [0; 9];
         if !fill(&mut self.file, &mut head)? {
             return Ok(None);
@@ -314,7 +325,7 @@ impl Index {
     }
 
     /// Reads the content of the record after its head; `None` if the file ends before.
-    fn content(&mut self, length: u64) -> io::Result<Option<Vec<u8>>> {
+    fn read_content(&mut self, length: u64) -> io::Result<Option<Vec<u8>>> {
         let mut content = Vec::new();
         // The stated length may be wrong in a broken file, so no memory is reserved for it.
         (&mut self.file).take(length).read_to_end(&mut content)?;
@@ -355,12 +366,12 @@ impl Pictures {
     pub fn read(&mut self, place: &Place) -> Result<InputImage, Error> {
         let read = |source| Error::Read { path: self.path.clone(), source };
         let message = match place.chunk {
-            None => record_at(&mut self.file, place.message).map_err(read)?.map(|r| r.content),
-            Some(at) => message_in_chunk(&mut self.file, at, place.message).map_err(read)?,
+            None => read_record(&mut self.file, place.message).map_err(read)?.map(|r| r.content),
+            Some(at) => read_message_in_chunk(&mut self.file, at, place.message).map_err(read)?,
         };
         let broken = |why: &str| InputImage { time_s: place.log_time_s(), image: Err(why.to_owned()) };
         let Some(message) = message.as_deref().and_then(Message::parse) else {
-            return Ok(broken("the recording does not hold it any more, or is damaged there"));
+            return Ok(broken("the recording does not contain the picture any more, or is damaged at its place"));
         };
         let kind = self.kinds.get(&place.channel);
         let Some((kind, decode)) = kind.and_then(|k| Some((k, decoder(&k.schema, &k.encoding)?))) else {
@@ -375,7 +386,7 @@ impl Pictures {
     }
 }
 
-fn record_at(file: &mut File, at: u64) -> io::Result<Option<Record>> {
+fn read_record(file: &mut File, at: u64) -> io::Result<Option<Record>> {
     file.seek(SeekFrom::Start(at))?;
     let mut head = [0; 9];
     if !fill(file, &mut head)? {
@@ -393,16 +404,16 @@ fn record_at(file: &mut File, at: u64) -> io::Result<Option<Record>> {
 
 /// Returns the content of a message. `message` is its offset in the file, or in the uncompressed records of the chunk
 /// at `chunk` if that is compressed.
-fn message_in_chunk(file: &mut File, chunk: u64, message: u64) -> io::Result<Option<Vec<u8>>> {
+fn read_message_in_chunk(file: &mut File, chunk: u64, message: u64) -> io::Result<Option<Vec<u8>>> {
     file.seek(SeekFrom::Start(chunk + 9 + 28))?;
     let mut length = [0; 4];
     if !fill(file, &mut length)? {
         return Ok(None);
     }
     if length == [0; 4] {
-        return Ok(record_at(file, message)?.map(|r| r.content));
+        return Ok(read_record(file, message)?.map(|r| r.content));
     }
-    let Some((_, plain)) = record_at(file, chunk)?.as_ref().and_then(Chunk::parse) else { return Ok(None) };
+    let Some((_, plain)) = read_record(file, chunk)?.as_ref().and_then(Chunk::parse) else { return Ok(None) };
     let mut rest = Fields(plain.get(message as usize..).unwrap_or_default());
     Ok(next_record(&mut rest, plain.len()).map(|(_, _, content)| content.to_vec()))
 }

@@ -9,7 +9,7 @@ use hzn_core::camera;
 use prost::Message;
 use serde_json::{Map, Value};
 
-use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine};
+use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior};
 use crate::row::Row;
 use crate::topics::Topic;
 
@@ -43,19 +43,19 @@ pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     };
     map.retain(|_, v| !v.is_null());
     map.insert("candidate_edges".into(), serde_json::to_value(&frame.candidates).unwrap_or_default());
-    if frame.given != Given::default() {
-        map.insert("given".into(), serde_json::to_value(frame.given).unwrap_or_default());
+    if frame.prior != PicturePrior::default() {
+        map.insert("given".into(), serde_json::to_value(frame.prior).unwrap_or_default());
     }
     serde_json::to_vec(&map).unwrap_or_default()
 }
 
 /// Reads a report: the row, the candidates, and the prior of the picture.
-pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, Given), serde_json::Error> {
+pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, PicturePrior), serde_json::Error> {
     let mut value: Value = serde_json::from_slice(data)?;
     let mut part = |key: &str| value.as_object_mut().and_then(|map| map.remove(key));
     let edges = part("candidate_edges").unwrap_or(Value::Array(Vec::new()));
-    let given = part("given").map_or(Ok(Given::default()), serde_json::from_value)?;
-    Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?, given))
+    let prior = part("given").map_or(Ok(PicturePrior::default()), serde_json::from_value)?;
+    Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?, prior))
 }
 
 /// Appends a picture as a message. The bytes are copied only once, directly into the buffer, because pictures are

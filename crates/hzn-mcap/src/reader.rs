@@ -46,7 +46,8 @@ pub struct Reader {
 /// Parts of frames by their sequence number, in the order of the file.
 type Parts<T> = BTreeMap<u32, VecDeque<T>>;
 
-fn take<T>(parts: &mut Parts<T>, sequence: u32) -> Option<T> {
+/// Takes the first part of a frame.
+fn take_part<T>(parts: &mut Parts<T>, sequence: u32) -> Option<T> {
     let queue = parts.get_mut(&sequence)?;
     let part = queue.pop_front();
     if queue.is_empty() {
@@ -87,7 +88,7 @@ impl Reader {
                     reader.peeked = Some(record);
                     break;
                 }
-                _ => reader.outside(&record),
+                _ => reader.read_declaration(&record),
             }
         }
         Ok(reader)
@@ -110,8 +111,8 @@ impl Reader {
         self.broken_chunks
     }
 
-    /// Reads a record outside of chunks.
-    fn outside(&mut self, record: &Record) {
+    /// Reads a record outside of chunks, or one that a chunk declares.
+    fn read_declaration(&mut self, record: &Record) {
         let mut f = Fields(&record.content);
         match record.op {
             Op::SCHEMA => {
@@ -142,13 +143,13 @@ impl Reader {
     }
 
     /// Assembles frames from the messages of a chunk.
-    fn chunk(&mut self, record: &Record) -> Result<(), Error> {
+    fn read_chunk(&mut self, record: &Record) -> Result<(), Error> {
         let Some((chunk, plain)) = Chunk::parse(record) else {
             self.broken_chunks += 1;
             return Ok(());
         };
         for (op, _, content) in chunk.index.declared {
-            self.outside(&Record { op, content });
+            self.read_declaration(&Record { op, content });
         }
         let mut annotations = Parts::<Annotations>::new();
         let mut attitudes = Parts::<Attitude>::new();
@@ -178,15 +179,15 @@ impl Reader {
                     logs.entry(m.sequence).or_default().push_back(line);
                 }
                 Topic::Report => {
-                    let (row, candidates, given) =
+                    let (row, candidates, prior) =
                         messages::parse_report(m.data).map_err(|e| broken("report", e.to_string()))?;
                     self.ready.push_back(FrameRecord {
                         row,
                         candidates,
-                        image: take(&mut self.images, m.sequence),
-                        annotations: take(&mut annotations, m.sequence).unwrap_or_default(),
-                        attitude: take(&mut attitudes, m.sequence),
-                        given,
+                        image: take_part(&mut self.images, m.sequence),
+                        annotations: take_part(&mut annotations, m.sequence).unwrap_or_default(),
+                        attitude: take_part(&mut attitudes, m.sequence),
+                        prior,
                         log: logs.remove(&m.sequence).unwrap_or_default().into(),
                     });
                 }
@@ -207,12 +208,12 @@ impl Reader {
         };
         let Some(record) = record else { return Ok(false) };
         match record.op {
-            Op::CHUNK => self.chunk(&record)?,
+            Op::CHUNK => self.read_chunk(&record)?,
             Op::DATA_END => {
                 self.complete = true;
                 return Ok(false);
             }
-            _ => self.outside(&record),
+            _ => self.read_declaration(&record),
         }
         Ok(true)
     }
@@ -242,6 +243,6 @@ impl Iterator for Reader {
 }
 
 /// Counts the reports in the uncompressed records of a chunk; `channel` is the channel of the reports.
-pub(crate) fn reports(plain: &[u8], channel: u16) -> u64 {
+pub(crate) fn count_reports(plain: &[u8], channel: u16) -> u64 {
     Chunk::messages(plain).filter(|m: &Message<'_>| m.channel == channel).count() as u64
 }

@@ -1,15 +1,15 @@
 //! Closes and continues recordings that were cut off.
 
 use std::fs::{self, File};
-use std::io::{BufReader, BufWriter, Read};
+use std::io::{self, BufReader, BufWriter, Read};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Container, Fields, MAGIC, Op, Scanner};
+use crate::container::{Chunk, Container, Fields, MAGIC, Op, Record, Scanner};
 use crate::error::{Error, while_writing};
 use crate::part::{open_part, part_path};
-use crate::reader::{Contents, Reader, reports};
+use crate::reader::{Contents, Reader, count_reports};
 use crate::topics::Topic;
-use crate::writer::{LIBRARY, Options, Writer, open, refuse_existing};
+use crate::writer::{LIBRARY, Options, Writer, open_container, refuse_existing};
 
 /// Result of [`recover`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,8 +57,8 @@ pub fn recover_while(
     let (input, output) = (input.as_ref(), output.as_ref());
     refuse_existing(output)?;
     let part = part_path(output);
-    let mut out = open(&part).map_err(|e| while_writing(&part, e))?;
-    let closed = copy(input, &mut out, &part, &mut wanted).and_then(|found| {
+    let mut out = open_container(&part).map_err(|e| while_writing(&part, e))?;
+    let closed = copy_frames(input, &mut out, &part, &mut wanted).and_then(|found| {
         out.finish().map_err(|e| while_writing(&part, e))?;
         fs::rename(&part, output).map_err(|e| while_writing(output, e))?;
         Ok(found)
@@ -90,12 +90,12 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
         return fresh();
     }
     // The old file stays locked until its frames are in the new file.
-    let held = open_part(&part).map_err(|e| while_writing(&part, e))?;
-    match origin(&held).map_err(|source| Error::Read { path: part.clone(), source })? {
+    let lock = open_part(&part).map_err(|e| while_writing(&part, e))?;
+    match find_origin(&lock).map_err(|source| Error::Read { path: part.clone(), source })? {
         Origin::Ours => {}
         // The file has no frames yet, so nothing is lost.
         Origin::Cut => {
-            drop(held);
+            drop(lock);
             return fresh();
         }
         Origin::Other => return Err(Error::Foreign { path: part }),
@@ -104,7 +104,7 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     match reader.sensor_toml() {
         // The file was cut off before the sensor.toml was written.
         None => {
-            drop(held);
+            drop(lock);
             return fresh();
         }
         Some(text) if text != options.sensor_toml => return Err(Error::OtherSensor { path: part }),
@@ -119,8 +119,8 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     let copy_path = PathBuf::from(copy_path);
     // Errors name the old file, because it has all frames until the new one replaces it.
     let failed = |e| while_writing(&part, e);
-    let copied = open(&copy_path).map_err(failed).and_then(|mut out| {
-        let found = copy(&part, &mut out, &part, &mut |_, _| true)?;
+    let copied = open_container(&copy_path).map_err(failed).and_then(|mut out| {
+        let found = copy_frames(&part, &mut out, &part, &mut |_, _| true)?;
         out.flush().map_err(failed)?;
         fs::rename(&copy_path, &part).map_err(failed)?;
         Ok((found, out))
@@ -129,7 +129,7 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
         let _ = fs::remove_file(&copy_path);
     }
     let (found, out) = copied?;
-    Ok(Resumed { frames: found.frames, last_index, writer: Writer::on(out, path, &part, options) })
+    Ok(Resumed { frames: found.frames, last_index, writer: Writer::with_container(out, path, &part, options) })
 }
 
 /// The program that began a file.
@@ -140,7 +140,8 @@ enum Origin {
     Other,
 }
 
-fn origin(mut file: &File) -> std::io::Result<Origin> {
+/// Finds the program that began a file by its first bytes.
+fn find_origin(mut file: &File) -> io::Result<Origin> {
     let mut beginning = Vec::new();
     file.by_ref().take(256).read_to_end(&mut beginning)?;
     let mut fields = Fields(&beginning);
@@ -158,7 +159,7 @@ fn origin(mut file: &File) -> std::io::Result<Origin> {
 }
 
 /// Copies the complete records of `input` up to the last finished frame.
-fn copy(
+fn copy_frames(
     input: &Path,
     out: &mut Container<BufWriter<File>>,
     part: &Path,
@@ -171,58 +172,75 @@ fn copy(
     let mut scanner = scanner.ok_or_else(|| Error::NotMcap { path: input.to_path_buf() })?;
     let write = |e| while_writing(part, e);
 
-    let mut found = Recovered::default();
-    let mut report_channel = None;
-    let mut waiting: Vec<Chunk> = Vec::new();
+    let mut copier = FrameCopier { out, found: Recovered::default(), report_channel: None, waiting: Vec::new() };
     let mut kept_to = scanner.position();
     while let Some(record) = scanner.next().map_err(read)? {
         if !wanted(scanner.position(), size) {
             return Err(Error::Stopped { path: input.to_path_buf() });
         }
+        if record.op == Op::DATA_END {
+            copier.found.was_complete = true;
+            copier.write_waiting().map_err(write)?;
+            kept_to = size;
+            break;
+        }
+        if copier.add(&record).map_err(write)? {
+            kept_to = scanner.position();
+        }
+    }
+    Ok(Recovered { dropped_bytes: size.saturating_sub(kept_to), ..copier.found })
+}
+
+/// Copies a recording, record by record.
+struct FrameCopier<'a> {
+    out: &'a mut Container<BufWriter<File>>,
+    found: Recovered,
+    /// Channel of the reports, if it is declared.
+    report_channel: Option<u16>,
+    /// Chunks with pictures, which wait for their reports.
+    waiting: Vec<Chunk>,
+}
+
+impl FrameCopier<'_> {
+    /// Adds a record that is not the end of the data. It returns `false` if the record waits for another.
+    fn add(&mut self, record: &Record) -> io::Result<bool> {
         match record.op {
-            Op::DATA_END => {
-                found.was_complete = true;
-                kept_to = size;
-                break;
-            }
-            Op::CHUNK => match Chunk::parse(&record) {
-                Some((chunk, plain)) => {
-                    for (op, _, content) in &chunk.index.declared {
-                        if *op == Op::CHANNEL {
-                            report_channel = report_channel.or(report_id(content));
-                        }
-                    }
-                    let frames = report_channel.map_or(0, |id| reports(&plain, id));
-                    if report_channel.is_some() && frames == 0 {
-                        // Pictures wait for their reports.
-                        waiting.push(chunk);
-                        continue;
-                    }
-                    for chunk in waiting.drain(..).chain([chunk]) {
-                        out.chunk(&chunk).map_err(write)?;
-                    }
-                    found.frames += frames;
-                }
-                None => found.broken_chunks += 1,
+            Op::CHUNK => match Chunk::parse(record) {
+                Some((chunk, plain)) => return self.add_chunk(chunk, &plain),
+                None => self.found.broken_chunks += 1,
             },
             // The message indexes are written again.
             Op::MESSAGE_INDEX => {}
             op => {
                 if op == Op::CHANNEL {
-                    report_channel = report_channel.or(report_id(&record.content));
+                    self.report_channel = self.report_channel.or(report_id(&record.content));
                 }
-                out.copy(&record).map_err(write)?;
+                self.out.copy(record)?;
             }
         }
-        kept_to = scanner.position();
+        Ok(true)
     }
-    if found.was_complete {
-        for chunk in waiting {
-            out.chunk(&chunk).map_err(write)?;
+
+    /// Writes a chunk and the chunks that wait for it, unless it has to wait too.
+    fn add_chunk(&mut self, chunk: Chunk, plain: &[u8]) -> io::Result<bool> {
+        for (op, _, content) in &chunk.index.declared {
+            if *op == Op::CHANNEL {
+                self.report_channel = self.report_channel.or(report_id(content));
+            }
         }
+        let frames = self.report_channel.map_or(0, |id| count_reports(plain, id));
+        self.waiting.push(chunk);
+        if self.report_channel.is_some() && frames == 0 {
+            return Ok(false);
+        }
+        self.write_waiting()?;
+        self.found.frames += frames;
+        Ok(true)
     }
-    found.dropped_bytes = size.saturating_sub(kept_to);
-    Ok(found)
+
+    fn write_waiting(&mut self) -> io::Result<()> {
+        self.waiting.drain(..).try_for_each(|chunk| self.out.chunk(&chunk))
+    }
 }
 
 /// Returns the id of a channel record if its topic is that of the reports.

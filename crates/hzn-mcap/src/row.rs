@@ -49,8 +49,8 @@ macro_rules! columns {
                 &[$((stringify!($name), <$ty as Cell>::JSON, <$ty as Cell>::ALWAYS, concat!($($doc),+))),+];
 
             /// Creates a row with empty cells.
-            fn blank() -> Self {
-                Self { $($name: Cell::blank(),)+ }
+            fn empty_cells() -> Self {
+                Self { $($name: Cell::empty(),)+ }
             }
         }
     };
@@ -62,15 +62,15 @@ trait Cell {
     const JSON: &'static str;
     /// Whether every row has a value in this cell.
     const ALWAYS: bool = true;
-    fn blank() -> Self;
+    fn empty() -> Self;
 }
 
 macro_rules! cells {
-    ($($ty:ty, $json:literal, $blank:expr;)+) => {$(
+    ($($ty:ty, $json:literal, $empty:expr;)+) => {$(
         impl Cell for $ty {
             const JSON: &'static str = $json;
-            fn blank() -> Self {
-                $blank
+            fn empty() -> Self {
+                $empty
             }
         }
     )+};
@@ -87,7 +87,7 @@ cells! {
 impl<T: Cell> Cell for Option<T> {
     const JSON: &'static str = T::JSON;
     const ALWAYS: bool = false;
-    fn blank() -> Self {
+    fn empty() -> Self {
         None
     }
 }
@@ -177,21 +177,22 @@ impl Row {
             dropped: Some(c.dropped),
             level: (report.level > 0).then_some(report.level),
             elapsed_us,
-            ..Self::empty(meta, report.status)
+            ..Self::without_answer(meta, report.status)
         };
         match (&report.solution, report.status) {
-            (Some(solution), Status::Ok) => row.answer(solution),
-            _ => row.detail = detail(report),
+            (Some(solution), Status::Ok) => row.set_answer(solution),
+            _ => row.detail = describe(report),
         }
         row
     }
 
     /// Creates the row of a picture that was not processed, for example because it could not be read.
     pub fn unprocessed(meta: &RowMeta, status: Status, reason: impl Into<String>) -> Self {
-        Self { detail: reason.into(), ..Self::empty(meta, status) }
+        Self { detail: reason.into(), ..Self::without_answer(meta, status) }
     }
 
-    fn empty(meta: &RowMeta, status: Status) -> Self {
+    /// Creates a row with the data of the picture and the status.
+    fn without_answer(meta: &RowMeta, status: Status) -> Self {
         Self {
             index: meta.index,
             file: meta.file.clone(),
@@ -199,26 +200,26 @@ impl Row {
             body: meta.body.clone(),
             status,
             altitude_km: meta.altitude_km.and_then(finite),
-            ..Self::blank()
+            ..Self::empty_cells()
         }
     }
 
-    fn answer<T: Real>(&mut self, s: &Solution<T>) {
-        let of = |x: T| finite(x.to_f64());
+    fn set_answer<T: Real>(&mut self, s: &Solution<T>) {
+        let number = |x: T| finite(x.to_f64());
         let deg = |x: T| finite(x.to_f64().to_degrees());
-        [self.axis_x, self.axis_y, self.axis_z] = s.axis.xyz().map(of);
+        [self.axis_x, self.axis_y, self.axis_z] = s.axis.xyz().map(number);
         [self.cov_xx, self.cov_xy, self.cov_xz, self.cov_yy, self.cov_yz, self.cov_zz] =
-            s.covariance.upper_rad2.map(of);
+            s.covariance.upper_rad2.map(number);
         self.sigma_max_deg = deg(s.covariance.sigma_max_rad());
         if let Some(e) = &s.axis_ecef {
-            [self.axis_e_x, self.axis_e_y, self.axis_e_z] = e.xyz().map(of);
+            [self.axis_e_x, self.axis_e_y, self.axis_e_z] = e.xyz().map(number);
         }
         self.half_angle_deg = deg(s.half_angle_rad);
         if let Some((altitude_m, sigma_m)) = s.altitude_m {
             let km = |x: T| finite(x.to_f64() / 1e3);
             (self.altitude_est_km, self.altitude_est_sigma_km) = (km(altitude_m), km(sigma_m));
         }
-        self.rms_px = of(s.rms_px);
+        self.rms_px = number(s.rms_px);
         self.inliers = Some(s.inliers);
         if let Some(body) = &s.axis_body {
             let [roll, pitch] = roll_pitch_deg(body);
@@ -248,7 +249,7 @@ fn finite(x: f64) -> Option<f64> {
 }
 
 /// Describes the last stage, the verdict of each candidate, and the number of looks if there was more than one.
-fn detail<T: Real>(report: &Report<T>) -> String {
+fn describe<T: Real>(report: &Report<T>) -> String {
     let mut text = format!("ended at {}", report.stage.name());
     if report.counters.looks > 1 {
         text.push_str(&format!(" in {} looks", report.counters.looks));
@@ -270,10 +271,9 @@ mod status_name {
     }
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Status, D::Error> {
         let name = String::deserialize(d)?;
-        Status::ALL
-            .into_iter()
-            .find(|s| s.name() == name)
-            .ok_or_else(|| de::Error::invalid_value(de::Unexpected::Str(&name), &"the name of a status, such as ok"))
+        Status::ALL.into_iter().find(|s| s.name() == name).ok_or_else(|| {
+            de::Error::invalid_value(de::Unexpected::Str(&name), &"the name of a status, for example ok")
+        })
     }
 }
 
@@ -289,19 +289,26 @@ mod tests {
     }
 
     fn report<T: Real>(status: Status) -> Report<T> {
-        let of = T::from_f64;
+        let number = T::from_f64;
         let solution = Solution {
-            axis: UnitVec3::try_new([of(0.0), of(0.6), of(0.8)]).unwrap(),
-            covariance: Cov3::from_upper([of(4e-8), of(0.0), of(0.0), of(1e-8), of(0.0), of(0.0)]),
+            axis: UnitVec3::try_new([number(0.0), number(0.6), number(0.8)]).unwrap(),
+            covariance: Cov3::from_upper([
+                number(4e-8),
+                number(0.0),
+                number(0.0),
+                number(1e-8),
+                number(0.0),
+                number(0.0),
+            ]),
             axis_ecef: None,
-            axis_body: UnitVec3::try_new([of(-0.5), of(0.0), of(0.75f64.sqrt())]),
-            half_angle_rad: of(1.3),
-            fused_half_angle_rad: of(1.3),
-            altitude_m: Some((of(240e3), of(1e3))),
+            axis_body: UnitVec3::try_new([number(-0.5), number(0.0), number(0.75f64.sqrt())]),
+            half_angle_rad: number(1.3),
+            fused_half_angle_rad: number(1.3),
+            altitude_m: Some((number(240e3), number(1e3))),
             free: None,
-            rms_px: of(f64::NAN),
+            rms_px: number(f64::NAN),
             inliers: 500,
-            arc_px: of(900.0),
+            arc_px: number(900.0),
             candidate: 0,
         };
         Report {
@@ -334,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_stands_only_beside_ok() {
+    fn only_ok_has_an_axis() {
         for status in Status::ALL {
             let row = Row::from_report::<f64>(&meta(), &report(status), None);
             assert_eq!(row.axis().is_some(), status == Status::Ok);

@@ -79,18 +79,18 @@ impl Topic {
     }
     /// Returns name, encoding and bytes of the schema, and the encoding of the messages.
     pub(crate) fn schema(self) -> (String, String, Vec<u8>, &'static str) {
-        fn of<M: Encode>() -> (String, String, Vec<u8>, &'static str) {
+        fn protobuf<M: Encode>() -> (String, String, Vec<u8>, &'static str) {
             M::get_schema().map_or_else(Default::default, |s| (s.name, s.encoding, s.data.into_owned(), "protobuf"))
         }
         match self {
             Self::Report => ("hzn.Report".into(), "jsonschema".into(), report_schema().to_string().into(), "json"),
-            Self::Image => of::<CompressedImage>(),
-            Self::Calibration => of::<CameraCalibration>(),
-            Self::Annotations => of::<ImageAnnotations>(),
-            Self::Axis => of::<PoseInFrame>(),
-            Self::Transform => of::<FrameTransform>(),
-            Self::Log => of::<Log>(),
-            Self::RawImage => of::<RawImage>(),
+            Self::Image => protobuf::<CompressedImage>(),
+            Self::Calibration => protobuf::<CameraCalibration>(),
+            Self::Annotations => protobuf::<ImageAnnotations>(),
+            Self::Axis => protobuf::<PoseInFrame>(),
+            Self::Transform => protobuf::<FrameTransform>(),
+            Self::Log => protobuf::<Log>(),
+            Self::RawImage => protobuf::<RawImage>(),
         }
     }
 }

@@ -71,11 +71,17 @@ impl Writer {
                 return Err(Error::Unfinished { path: part });
             }
         }
-        let container = begin(&part, options).map_err(|e| while_writing(&part, e))?;
-        Ok(Self::on(container, path, &part, options))
+        let container = begin_recording(&part, options).map_err(|e| while_writing(&part, e))?;
+        Ok(Self::with_container(container, path, &part, options))
     }
 
-    pub(crate) fn on(container: Container<BufWriter<File>>, path: &Path, part: &Path, options: &Options) -> Self {
+    /// Creates a writer on a container that is open already.
+    pub(crate) fn with_container(
+        container: Container<BufWriter<File>>,
+        path: &Path,
+        part: &Path,
+        options: &Options,
+    ) -> Self {
         Self {
             container: Some(container),
             path: path.to_path_buf(),
@@ -269,13 +275,14 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
 pub(crate) const LIBRARY: &str = "hzn";
 
 /// Opens an empty file for a container.
-pub(crate) fn open(part: &Path) -> std::io::Result<Container<BufWriter<File>>> {
+pub(crate) fn open_container(part: &Path) -> std::io::Result<Container<BufWriter<File>>> {
     let file = create_part(part)?;
     Container::try_new(BufWriter::with_capacity(1 << 16, file), &format!("{LIBRARY} {}", env!("CARGO_PKG_VERSION")))
 }
 
-fn begin(part: &Path, options: &Options) -> std::io::Result<Container<BufWriter<File>>> {
-    let mut container = open(part)?;
+/// Opens a file and writes what comes before its first message.
+fn begin_recording(part: &Path, options: &Options) -> std::io::Result<Container<BufWriter<File>>> {
+    let mut container = open_container(part)?;
     container.attach(SENSOR_TOML, "application/toml", options.sensor_toml.as_bytes())?;
     let mut metadata = options.metadata.clone();
     metadata.insert("hzn_mcap_version".into(), env!("CARGO_PKG_VERSION").into());

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use hzn_core::camera;
 use hzn_core::status::Status;
 use hzn_mcap::{
-    Annotations, Attitude, CandidateEdge, Contents, EncodedImage, Error, FrameRecord, Given, ImageFormat, ImageReader,
-    Index, IndexEntry, LogLevel, LogLine, Options, Place, Reader, Row, RowMeta, Writer, part_path, recover, resume,
+    Annotations, Attitude, CandidateEdge, Contents, EncodedImage, Error, FrameRecord, ImageFormat, ImageReader, Index,
+    IndexEntry, LogLevel, LogLine, Options, PicturePrior, Place, Reader, Row, RowMeta, Writer, part_path, recover,
+    resume,
 };
 
 const SENSOR: &str = "preset = \"hzn\"\n";
@@ -63,7 +64,11 @@ fn frame(i: u64) -> FrameRecord {
         attitude: i
             .is_multiple_of(2)
             .then_some(Attitude { q_ecef_from_camera_wxyz: [0.5, 0.5, 0.5, 0.5], position_m: [6.6e6, f, 0.0] }),
-        given: Given { altitude_km: Some(230.0), position_km: Some([6601.0, f, 0.1]), ..Given::default() },
+        prior: PicturePrior {
+            altitude_km: Some(230.0),
+            position_km: Some([6601.0, f, 0.1]),
+            ..PicturePrior::default()
+        },
         log: vec![LogLine { level: LogLevel::Warning, message: format!("frame {i}") }],
     }
 }
@@ -250,7 +255,7 @@ fn outputs_are_not_replaced_unasked() {
     let other = dir.path().join("other.mcap");
     drop(Writer::create(&other, &options()).unwrap());
     let e = Writer::create(&other, &options()).unwrap_err();
-    assert!(matches!(e, Error::Unfinished { .. }) && e.to_string().contains("continue it"), "{e}");
+    assert!(matches!(e, Error::Unfinished { .. }) && e.to_string().contains("continue that run"), "{e}");
 }
 
 #[test]
@@ -267,7 +272,7 @@ fn errors_name_the_place_and_the_way_out() {
 /// A full disk, simulated by the system's `/dev/full`.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_said_and_nothing_else_happens() {
+fn a_full_disk_is_reported_and_nothing_else_happens() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("out.mcap");
     std::os::unix::fs::symlink("/dev/full", part_path(&path)).unwrap();
@@ -307,7 +312,7 @@ fn our_recordings_are_an_input_too() {
 }
 
 #[test]
-fn raw_pictures_stand_on_the_same_topic() {
+fn raw_pictures_are_on_the_same_topic() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("out.mcap");
     let mut record = frame(2);
@@ -333,16 +338,16 @@ fn frames_are_finished_within_the_interval() {
 }
 
 /// Returns everything that an index finds, and the index.
-fn index(path: &Path) -> (Vec<Place>, Vec<(Row, Given)>, Index) {
+fn index(path: &Path) -> (Vec<Place>, Vec<(Row, PicturePrior)>, Index) {
     let (mut pictures, mut rows) = (vec![], vec![]);
     let mut index = Index::open(path).unwrap();
     while let Some(part) = index.next_part().unwrap() {
         for found in part {
             match found {
                 IndexEntry::Picture(place) => pictures.push(place),
-                IndexEntry::Report(row, candidates, given) => {
+                IndexEntry::Report(row, candidates, prior) => {
                     assert_eq!(candidates, frame(row.index).candidates);
-                    rows.push((*row, given));
+                    rows.push((*row, prior));
                 }
             }
         }
@@ -357,7 +362,7 @@ fn any_picture_is_found_by_its_place() {
     let (pictures, rows, found) = index(&path);
     assert!(found.is_complete());
     assert_eq!(found.sensor_toml(), Some(SENSOR));
-    assert_eq!(rows, (0..11).map(frame).map(|f| (f.row, f.given)).collect::<Vec<_>>());
+    assert_eq!(rows, (0..11).map(frame).map(|f| (f.row, f.prior)).collect::<Vec<_>>());
     let mut reader = found.pictures().unwrap();
     // Backwards, because any order must work.
     for place in pictures.iter().rev() {

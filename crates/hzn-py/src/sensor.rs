@@ -46,7 +46,7 @@ impl Sensor {
     fn new(py: Python<'_>, flight: bool, sections: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let none = PyDict::new(py);
         let config = read_sections(sections.unwrap_or(&none))?;
-        let doubts = plausible::doubts(&config);
+        let doubts = plausible::find_implausible(&config);
         doubts.iter().try_for_each(|doubt| errors::warn(py, format_args!("{}: {}", doubt.key, doubt.what)))?;
         Self::from_config(config, flight)
     }

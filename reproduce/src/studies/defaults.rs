@@ -1,7 +1,7 @@
 //! Measures the honesty of a sensor that is not tuned: its user knows the camera and its position, and nothing else.
 
 use anyhow::{Context, anyhow};
-use hzn_calib::noise::{self, Calibration, Points, Sighting};
+use hzn_calib::noise::{self, Calibration, PointRecorder, Sighting};
 use hzn_core::body;
 use hzn_core::camera::Camera;
 use hzn_core::{Config, HostHorizon};
@@ -58,7 +58,7 @@ impl Rendered {
     /// Calibrates as `hzn calibrate noise` does, from the pictures, their positions and, if `rates` is true, their
     /// rates of rotation.
     fn calibrate(&self, rates: bool) -> anyhow::Result<Calibration> {
-        let wide = noise::looks_with(&self.untold()).context("no body with a limb height")?;
+        let wide = noise::config_for_calibration(&self.untold()).context("no body with a limb height")?;
         let camera = Camera::try_new(&wide.camera)?;
         let each = self.flight.frames.par_iter().zip(&self.pictures).map_init(
             || HostHorizon::boxed(&wide),
@@ -67,9 +67,9 @@ impl Rendered {
                 let known = frame.prior();
                 let known = hzn_core::Prior { rate_rad_s: known.rate_rad_s.filter(|_| rates), ..known };
                 let expected = horizon.expect(&known).ok()?;
-                let points = Points::default();
+                let points = PointRecorder::default();
                 let solution = horizon.process_observed(&picture.view(), &expected, &points).solution?;
-                let points = points.of_candidate(solution.candidate);
+                let points = points.candidate_points(solution.candidate);
                 Sighting::measure(&frame.file, &camera, &wide.body, &known, &points, &solution)
             },
         );

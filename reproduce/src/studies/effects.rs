@@ -166,7 +166,7 @@ fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
 /// each point in the fitted height. The mean over the pictures is weighted by the inverse variance of each picture's
 /// height.
 fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
-    let wide = noise::looks_with(&flight.untold()).context("no body with a limb height")?;
+    let wide = noise::config_for_calibration(&flight.untold()).context("no body with a limb height")?;
     let camera = Camera::try_new(&wide.camera)?;
     let each = flight.flight.frames.par_iter().zip(&flight.pictures).map_init(
         || HostHorizon::boxed(&wide),
@@ -176,9 +176,9 @@ fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
             let turning = camera.turning(known.rate_rad_s);
             let known = hzn_core::Prior { rate_rad_s: None, ..known };
             let expected = horizon.expect(&known).ok()?;
-            let watch = noise::Points::default();
+            let watch = noise::PointRecorder::default();
             let solution = horizon.process_observed(&picture.view(), &expected, &watch).solution?;
-            let points = watch.of_candidate(solution.candidate);
+            let points = watch.candidate_points(solution.candidate);
             let sighting = noise::Sighting::measure(&frame.file, &camera, &wide.body, &known, &points, &solution)?;
             let (rays, shares): (Vec<_>, Vec<_>) = noise::shares(&turning, &points, &solution)?.into_iter().unzip();
             let heights = frame.scene.tangent_heights_km(rays);

@@ -15,13 +15,15 @@
 //!
 //! [`load`] reads a file, [`write()`] writes one; [`from_braun_barf`] converts the five coefficients of that paper.
 
+mod lens;
 mod read;
+mod values;
 mod write;
 
 use hzn_core::camera::{Config, Model};
 
 pub use read::{load, parse};
-pub use write::{Format, Unfit, write};
+pub use write::{Format, UnsupportedLens, write};
 
 /// Returns the lens of Braun & Barf 2022, (13), with the distance from the centre in pixels
 /// r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹ and θ in radians.

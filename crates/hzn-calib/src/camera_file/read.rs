@@ -5,6 +5,8 @@ use std::path::Path;
 use hzn_core::camera::{Config, Model};
 use serde_json::Value;
 
+use super::lens::{Coefficients, Lens};
+use super::values::{matrix, number, numbers};
 use crate::Problem;
 use crate::nearest::suggestion;
 
@@ -43,7 +45,7 @@ pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Prob
         problem
     })?;
     let file = File { path };
-    let Value::Object(top) = &value else { return Err(file.unknown()) };
+    let Value::Object(top) = &value else { return Err(file.unknown_format()) };
     let numbered =
         |k: &str| k.strip_prefix("cam").is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
     let cameras: Vec<&str> = top.keys().map(String::as_str).filter(|k| numbered(k)).collect();
@@ -51,11 +53,13 @@ pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Prob
         (Some(name), _) if !cameras.contains(&name) => {
             Err(Problem::new(path, format!("has no camera {name:?}{}", suggestion(name, &cameras))))
         }
-        (Some(name), _) => file.kalibr(&top[name], name),
-        (None, Some(first)) => file.kalibr(&top[*first], first),
-        (None, None) if top.contains_key("intrinsics") => file.kalibr(&value, ""),
-        (None, None) if ["camera_matrix", "K", "k"].iter().any(|key| top.contains_key(*key)) => file.opencv(&value),
-        _ => Err(file.unknown()),
+        (Some(name), _) => file.read_kalibr(&top[name], name),
+        (None, Some(first)) => file.read_kalibr(&top[*first], first),
+        (None, None) if top.contains_key("intrinsics") => file.read_kalibr(&value, ""),
+        (None, None) if ["camera_matrix", "K", "k"].iter().any(|key| top.contains_key(*key)) => {
+            file.read_opencv(&value)
+        }
+        _ => Err(file.unknown_format()),
     }
 }
 
@@ -68,20 +72,20 @@ impl File<'_> {
         Problem::new(self.path, what).in_field(field)
     }
 
-    fn unknown(&self) -> Problem {
+    fn unknown_format(&self) -> Problem {
         Problem::new(
             self.path,
-            "is no camera file that is known here: a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
-             resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height) or ROS's camera_info \
-             is expected",
+            "is not a known camera file; expected is a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
+             resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height) or ROS's camera_info",
         )
     }
 
-    fn kalibr(&self, camera: &Value, name: &str) -> Result<Config, Problem> {
+    /// Reads one camera of a Kalibr camchain, or EuRoC's sensor.yaml, which has no `name`.
+    fn read_kalibr(&self, camera: &Value, name: &str) -> Result<Config, Problem> {
         let field = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
         let list = |key: &str| numbers(&camera[key]);
         let projection = camera["camera_model"].as_str().unwrap_or("pinhole");
-        let own = match projection {
+        let special = match projection {
             "pinhole" => None,
             "ds" => Some((Model::DoubleSphere, "xi, alpha")),
             "eucm" => Some((Model::Eucm, "alpha, beta")),
@@ -93,7 +97,8 @@ impl File<'_> {
             }
         };
         // The projections with coefficients of their own have them before the focal lengths.
-        let (names, count) = own.map_or(("four numbers ".to_owned(), 0), |(_, k)| (format!("six numbers {k}, "), 2));
+        let (names, count) =
+            special.map_or(("four numbers ".to_owned(), 0), |(_, k)| (format!("six numbers {k}, "), 2));
         let intrinsics = list("intrinsics").filter(|v| v.len() == 4 + count);
         let Some((k, [fx, fy, cx, cy])) = intrinsics.and_then(|v| {
             let (k, rest) = v.split_at(count);
@@ -110,66 +115,67 @@ impl File<'_> {
         } else {
             "distortion_coeffs"
         };
-        let given = Coefficients { values: self.coefficients(camera.get(key), &field(key))?, field: field(key) };
-        let lens = self.stated_lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
-        if let Some((model, _)) = own {
-            if given.meant() > 0 {
+        let coefficients =
+            Coefficients { values: self.read_coefficients(camera.get(key), &field(key))?, field: field(key) };
+        let lens = self.read_lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
+        if let Some((model, _)) = special {
+            if coefficients.significant_len() > 0 {
                 return Err(
                     self.problem(&field(key), format!("{projection} has no further distortion; calibrate with none"))
                 );
             }
-            let given = Coefficients { values: Some(k), field: field("intrinsics") };
-            return self.camera(model, [width, height], [fx, fy, cx, cy], &given);
+            let coefficients = Coefficients { values: Some(k), field: field("intrinsics") };
+            return self.build_config(model, [width, height], [fx, fy, cx, cy], &coefficients);
         }
-        let model = self.model(lens, &given)?;
-        self.camera(model, [width, height], [fx, fy, cx, cy], &given)
+        let model = self.choose_model(lens, &coefficients)?;
+        self.build_config(model, [width, height], [fx, fy, cx, cy], &coefficients)
     }
 
     /// Reads OpenCV's files, and ROS's camera_info as its calibrator writes it or as its topic shows it.
-    fn opencv(&self, top: &Value) -> Result<Config, Problem> {
-        let either = |names: &[&'static str]| {
+    fn read_opencv(&self, top: &Value) -> Result<Config, Problem> {
+        let find_first = |names: &[&'static str]| {
             let found = names.iter().find_map(|name| top.get(*name).map(|value| (*name, value)));
             found.unwrap_or((names.first().copied().unwrap_or_default(), &Value::Null))
         };
-        let (key, value) = either(&["camera_matrix", "K", "k"]);
-        let [fx, fy, cx, cy] = self.intrinsics(value, key)?;
-        let (key, value) = either(&["distortion_coefficients", "D", "d"]);
-        let given = Coefficients { values: self.coefficients(Some(value), key)?, field: key.to_owned() };
+        let (key, value) = find_first(&["camera_matrix", "K", "k"]);
+        let [fx, fy, cx, cy] = self.read_intrinsics(value, key)?;
+        let (key, value) = find_first(&["distortion_coefficients", "D", "d"]);
+        let coefficients = Coefficients { values: self.read_coefficients(Some(value), key)?, field: key.to_owned() };
         let size = |names: &[&'static str]| {
-            let (key, value) = either(names);
+            let (key, value) = find_first(names);
             number(value).ok_or_else(|| self.problem(key, "missing: add the picture's size in pixels to the file"))
         };
         let size = [size(&["image_width", "width"])?, size(&["image_height", "height"])?];
-        let stated = self.stated_lens(top.get("distortion_model"), "distortion_model")?;
+        let stated = self.read_lens(top.get("distortion_model"), "distortion_model")?;
         let flag = top.get("fisheye_model").map(|f| f.as_f64() == Some(1.0) || f.as_bool() == Some(true));
         let named = self.path.file_name().is_some_and(|n| n.to_string_lossy().to_lowercase().contains("fisheye"));
         let lens = match (stated, flag) {
             (Some(lens), Some(flag)) if flag != (lens == Lens::Fisheye) => {
-                let what = "says another lens than distortion_model; leave the wrong one of them out";
+                let what = "contradicts distortion_model; remove the wrong one of the two";
                 return Err(self.problem("fisheye_model", what));
             }
             (Some(lens), _) => lens,
             (None, Some(true)) => Lens::Fisheye,
             (None, None) if named => Lens::Fisheye,
-            (None, None) if given.meant() == 4 => {
+            (None, None) if coefficients.significant_len() == 4 => {
                 let what = "four coefficients are k1 to k4 of a fisheye lens (cv2.fisheye) or k1, k2, p1, p2 of \
                             Brown-Conrady (cv2.calibrateCamera): add `fisheye_model: 1` or `fisheye_model: 0` to the \
                             file";
-                return Err(self.problem(&given.field, what));
+                return Err(self.problem(&coefficients.field, what));
             }
             (None, _) => Lens::PlumbBob,
         };
-        let model = self.model(lens, &given)?;
-        self.camera(model, size, [fx, fy, cx, cy], &given)
+        let model = self.choose_model(lens, &coefficients)?;
+        self.build_config(model, size, [fx, fy, cx, cy], &coefficients)
     }
 
     /// Returns fx, fy, cx, cy of a camera matrix, in pixels.
-    fn intrinsics(&self, value: &Value, key: &str) -> Result<[f64; 4], Problem> {
+    fn read_intrinsics(&self, value: &Value, key: &str) -> Result<[f64; 4], Problem> {
         let Some(Ok([fx, skew, cx, below, fy, cy, last @ ..])) = matrix(value).map(<[f64; 9]>::try_from) else {
             return Err(self.problem(key, "a 3x3 matrix is expected"));
         };
         if [fx, fy, cx, cy] == [0.0; 4] {
-            return Err(self.problem(key, "is all zeros, as of a camera that was not calibrated; calibrate it first"));
+            return Err(self.problem(key, "is all zeros: the camera is not calibrated; calibrate it first"));
         }
         if below != 0.0 || last != [0.0, 0.0, 1.0] {
             let what = "must be [fx, 0, cx; 0, fy, cy; 0, 0, 1]";
@@ -184,7 +190,7 @@ impl File<'_> {
     }
 
     /// Returns the coefficients, which must be a single row or column. The result is `None` if the file has none.
-    fn coefficients(&self, value: Option<&Value>, field: &str) -> Result<Option<Vec<f64>>, Problem> {
+    fn read_coefficients(&self, value: Option<&Value>, field: &str) -> Result<Option<Vec<f64>>, Problem> {
         let Some(value) = value.filter(|v| !v.is_null()) else { return Ok(None) };
         let Some(values) = matrix(value) else {
             return Err(self.problem(field, "a list of numbers is expected"));
@@ -205,126 +211,34 @@ impl File<'_> {
     }
 
     /// Returns the lens that `distortion_model` names; `None` if the word is missing or empty.
-    fn stated_lens(&self, word: Option<&Value>, field: &str) -> Result<Option<Lens>, Problem> {
+    fn read_lens(&self, word: Option<&Value>, field: &str) -> Result<Option<Lens>, Problem> {
         let Some(word) = word.and_then(Value::as_str).map(str::trim).filter(|word| !word.is_empty()) else {
             return Ok(None);
         };
-        let known = LENSES.iter().find(|(name, _)| name.eq_ignore_ascii_case(word));
-        let names: Vec<&str> = LENSES.iter().map(|(name, _)| *name).collect();
-        known.map(|(_, lens)| Some(*lens)).ok_or_else(|| {
-            let what = format!("{word:?} is a lens that hzn does not have{}", suggestion(word, &names));
-            self.problem(field, what)
-        })
+        Lens::find(word).map(Some).map_err(|what| self.problem(field, what))
     }
 
     /// Returns hzn's model for the lens. The number of coefficients must fit that model.
-    fn model(&self, lens: Lens, given: &Coefficients) -> Result<Model, Problem> {
-        let wrong = |what: String| Err(self.problem(&given.field, what));
-        let count = given.values.as_ref().map(Vec::len);
-        match (lens, count, given.meant()) {
-            (Lens::None, _, 0) => Ok(Model::Pinhole),
-            (Lens::None, _, n) => wrong(format!("{n} coefficients, but distortion_model does not say of which lens")),
-            (Lens::Fisheye, None, _) => wrong("missing: a fisheye lens has four, k1 to k4".into()),
-            (Lens::PlumbBob, None | Some(0), _) => Ok(Model::Pinhole),
-            (Lens::PlumbBob, Some(n), 0) if n >= 4 => Ok(Model::Pinhole),
-            (Lens::Radtan, None, _) => wrong("missing: this lens has k1, k2, p1, p2".into()),
-            (Lens::Fisheye, Some(n), meant) if n < 4 || meant > 4 => {
-                wrong(format!("{n} coefficients, but a fisheye lens has four, k1 to k4; is it another lens?"))
-            }
-            (Lens::Fisheye, ..) => Ok(Model::KannalaBrandt),
-            (Lens::Radtan | Lens::PlumbBob, Some(n), _) if n < 4 => wrong(format!(
-                "{n} coefficients, but this lens has k1, k2, p1, p2 and k3; write 0 for what it does without"
-            )),
-            (Lens::Radtan | Lens::PlumbBob | Lens::Rational, Some(n), meant) if meant > 5 => wrong(format!(
-                "{n} coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; calibrate without the higher \
-                 ones (plumb_bob, or a fisheye lens)"
-            )),
-            (Lens::Rational, None, _) => wrong("missing: this lens has k1, k2, p1, p2, k3, k4, k5, k6".into()),
-            (Lens::Rational, Some(n), _) if n < 8 => {
-                wrong(format!("{n} coefficients, but rational_polynomial has eight; is it plumb_bob?"))
-            }
-            (Lens::Radtan | Lens::PlumbBob | Lens::Rational, ..) => Ok(Model::BrownConrady),
-        }
+    fn choose_model(&self, lens: Lens, coefficients: &Coefficients) -> Result<Model, Problem> {
+        lens.to_model(coefficients).map_err(|what| self.problem(&coefficients.field, what))
     }
 
-    fn camera(
+    /// Builds the configuration; `size` is width and height.
+    fn build_config(
         &self,
         model: Model,
         size: [f64; 2],
         [fx, fy, cx, cy]: [f64; 4],
-        given: &Coefficients,
+        coefficients: &Coefficients,
     ) -> Result<Config, Problem> {
-        let whole = |x: f64| (x.fract() == 0.0 && (2.0..=65535.0).contains(&x)).then_some(x as u16);
-        let [Some(width), Some(height)] = size.map(whole) else {
+        let to_whole = |x: f64| (x.fract() == 0.0 && (2.0..=65535.0).contains(&x)).then_some(x as u16);
+        let [Some(width), Some(height)] = size.map(to_whole) else {
             return Err(self.problem("resolution", "width and height must be whole numbers from 2 to 65535"));
         };
-        let k = given.values.iter().flatten().copied().take(model.coefficients().len()).collect();
+        let k = coefficients.values.iter().flatten().copied().take(model.coefficients().len()).collect();
         let ideal = Config::ideal(model, width, height, fx);
         Ok(Config { fx_px: fx, fy_px: fy, cx_px: cx, cy_px: cy, k, ..ideal })
     }
-}
-
-/// A lens in the terms of other tools.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Lens {
-    /// No distortion.
-    None,
-    /// k1 to k4, coefficients of the angle off axis.
-    Fisheye,
-    /// k1, k2, p1, p2. Kalibr always writes them.
-    Radtan,
-    /// k1, k2, p1, p2, k3. OpenCV writes no coefficients for a lens without distortion.
-    PlumbBob,
-    /// Three more coefficients in the denominator, which hzn's lens does not have.
-    Rational,
-}
-
-/// The names of the lenses in the files.
-const LENSES: &[(&str, Lens)] = &[
-    ("equidistant", Lens::Fisheye),
-    ("fisheye", Lens::Fisheye),
-    ("kannala_brandt", Lens::Fisheye),
-    ("radtan", Lens::Radtan),
-    ("radial-tangential", Lens::Radtan),
-    ("plumb_bob", Lens::PlumbBob),
-    ("rational_polynomial", Lens::Rational),
-    ("none", Lens::None),
-];
-
-/// Coefficients of a lens, and the field that they come from.
-struct Coefficients {
-    values: Option<Vec<f64>>,
-    field: String,
-}
-
-impl Coefficients {
-    /// Returns the number of coefficients up to the last one that is not 0.
-    fn meant(&self) -> usize {
-        self.values.iter().flatten().enumerate().filter(|(_, k)| **k != 0.0).map(|(i, _)| i + 1).max().unwrap_or(0)
-    }
-}
-
-fn numbers(value: &Value) -> Option<Vec<f64>> {
-    value.as_array()?.iter().map(number).collect()
-}
-
-/// Reads a number. YAML 1.1 writers may omit the decimal point, as in `1e-05`. A stricter reader takes this for a text,
-/// so a text with a number is accepted too.
-fn number(value: &Value) -> Option<f64> {
-    value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
-}
-
-/// Reads an OpenCV matrix (its `data`), a list, or a list of rows, and flattens it.
-fn matrix(value: &Value) -> Option<Vec<f64>> {
-    let list = value.get("data").unwrap_or(value).as_array()?;
-    let mut out = Vec::new();
-    for item in list {
-        match item {
-            Value::Array(row) => out.extend(row.iter().map(number).collect::<Option<Vec<_>>>()?),
-            item => out.push(number(item)?),
-        }
-    }
-    Some(out)
 }
 
 #[cfg(test)]
@@ -425,8 +339,8 @@ mod tests {
         let error = |text: String| read(&text).unwrap_err();
         assert_eq!(
             eight("0.2").unwrap_err(),
-            "cam.yaml: distortion_coefficients: 8 coefficients, but of this lens hzn has five, k1, k2, p1, p2, k3; \
-             calibrate without the higher ones (plumb_bob, or a fisheye lens)"
+            "cam.yaml: distortion_coefficients: there are 8 coefficients, but hzn supports five of this lens: k1, k2, \
+             p1, p2, k3; calibrate without the higher ones (plumb_bob, or a fisheye lens)"
         );
         assert_eq!(
             error(written("thin_prism", four, 4)),
@@ -438,11 +352,11 @@ mod tests {
         // The shape of D is checked.
         assert_eq!(
             error(written("equidistant", &format!("{four}, 0.1"), 5)),
-            "cam.yaml: distortion_coefficients: 5 coefficients, but a fisheye lens has four, k1 to k4; is it another \
-             lens?"
+            "cam.yaml: distortion_coefficients: there are 5 coefficients, but a fisheye lens has four, k1 to k4; is \
+             it another lens?"
         );
         assert!(
-            error(written("plumb_bob", "-0.05, 0.01", 2)).contains("2 coefficients, but this lens has k1, k2, p1,")
+            error(written("plumb_bob", "-0.05, 0.01", 2)).contains("2 coefficients, but this lens has five: k1, k2,")
         );
         assert!(error(written("rational_polynomial", four, 4)).contains("is it plumb_bob?"));
         assert!(error(written("plumb_bob", four, 5)).contains("has 4 numbers, but rows and cols say 1 x 5"));
@@ -455,7 +369,7 @@ mod tests {
         assert_eq!(read(echoed).unwrap(), c);
         assert_eq!(read(&echoed.replace("\nd:", "\nD:").replace("\nk:", "\nK:")).unwrap(), c);
         let none = "height: 480\nwidth: 640\ndistortion_model: ''\nD: []\nK: [0, 0, 0, 0, 0, 0, 0, 0, 0]\n";
-        assert!(read(none).unwrap_err().contains("K: is all zeros, as of a camera that was not calibrated"));
+        assert!(read(none).unwrap_err().contains("K: is all zeros: the camera is not calibrated"));
     }
 
     #[test]
@@ -466,7 +380,7 @@ mod tests {
         assert_eq!(read(&format!("{text}fisheye_model: 0\n")).unwrap().model, Model::BrownConrady);
         assert_eq!(parse(text, Path::new("fisheye.yaml"), None).unwrap().model, Model::KannalaBrandt);
         let both = format!("{text}fisheye_model: 1\ndistortion_model: plumb_bob\n");
-        assert!(read(&both).unwrap_err().contains("fisheye_model: says another lens than distortion_model"));
+        assert!(read(&both).unwrap_err().contains("fisheye_model: contradicts distortion_model"));
         let turned =
             text.replace("[[300, 0, 320], [0, 300, 240], [0, 0, 1]]", "[[300, 0, 0], [0, 300, 0], [320, 240, 1]]");
         assert!(read(&turned).unwrap_err().contains("it is transposed, as MATLAB keeps it"));
@@ -477,7 +391,7 @@ mod tests {
         assert!(
             read(&chain.replace("coefs", "coeffs").replace("  distortion_model: radtan\n", ""))
                 .unwrap_err()
-                .contains("distortion_model does not say of which lens")
+                .contains("distortion_model does not name the lens")
         );
     }
 

@@ -19,7 +19,7 @@ pub enum Format {
 
 /// Error of a lens that the format cannot express.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unfit {
+pub struct UnsupportedLens {
     /// The part of the lens that the format cannot express.
     pub what: &'static str,
     /// The format.
@@ -37,31 +37,31 @@ impl fmt::Display for Format {
     }
 }
 
-impl fmt::Display for Unfit {
+impl fmt::Display for UnsupportedLens {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} has no place in a {}", self.what, self.format)
+        write!(f, "the format {} cannot express {}", self.format, self.what)
     }
 }
 
-impl std::error::Error for Unfit {}
+impl std::error::Error for UnsupportedLens {}
 
 /// Writes a calibration as text. Only a sensor.toml has `theta_max_deg`; the other formats omit it.
 ///
 /// # Errors
 /// The format does not have the lens.
-pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
+pub fn write(camera: &Config, format: Format) -> Result<String, UnsupportedLens> {
     match format {
-        Format::Sensor => Ok(sensor(camera)),
+        Format::Sensor => Ok(write_sensor(camera)),
         Format::Kalibr => {
-            let own = match camera.model {
+            let special = match camera.model {
                 Model::DoubleSphere => Some("ds"),
                 Model::Eucm => Some("eucm"),
                 _ => None,
             };
-            let mut out = format!("cam0:\n  cam_overlaps: []\n  camera_model: {}\n", own.unwrap_or("pinhole"));
-            let k = if own.is_some() { Vec::new() } else { four(camera, format)? };
+            let mut out = format!("cam0:\n  cam_overlaps: []\n  camera_model: {}\n", special.unwrap_or("pinhole"));
+            let k = if special.is_some() { Vec::new() } else { four_coefficients(camera, format)? };
             let model = match camera.model {
-                _ if own.is_some() => "none",
+                _ if special.is_some() => "none",
                 Model::Pinhole => "none",
                 planar if planar.is_planar() => "radtan",
                 _ => "equidistant",
@@ -69,52 +69,52 @@ pub fn write(camera: &Config, format: Format) -> Result<String, Unfit> {
             let _ = write!(
                 out,
                 "  distortion_coeffs: {}\n  distortion_model: {model}\n  intrinsics: {}\n  resolution: [{}, {}]\n",
-                list(&k),
-                list(&[own.map_or(&[][..], |_| &camera.k), &intrinsics(camera)[..]].concat()),
+                format_list(&k),
+                format_list(&[special.map_or(&[][..], |_| &camera.k), &intrinsics(camera)[..]].concat()),
                 camera.width,
                 camera.height
             );
             Ok(out)
         }
         Format::Euroc => {
-            let k = four(camera, format)?;
+            let k = four_coefficients(camera, format)?;
             let model = if camera.model.is_planar() { "radial-tangential" } else { "equidistant" };
             Ok(format!(
                 "sensor_type: camera\nresolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: {}\n\
                  distortion_model: {model}\ndistortion_coefficients: {}\n",
                 camera.width,
                 camera.height,
-                list(&intrinsics(camera)),
-                list(&k)
+                format_list(&intrinsics(camera)),
+                format_list(&k)
             ))
         }
-        Format::OpenCv => opencv(camera),
+        Format::OpenCv => write_opencv(camera),
     }
 }
 
-fn sensor(c: &Config) -> String {
+fn write_sensor(c: &Config) -> String {
     let Config { width, height, .. } = c;
     let mut out = format!("[camera]\nwidth = {width}\nheight = {height}\nmodel = \"{}\"\n", c.model.name());
     for (key, value) in [("fx_px", c.fx_px), ("fy_px", c.fy_px), ("cx_px", c.cx_px), ("cy_px", c.cy_px)] {
-        let _ = writeln!(out, "{key} = {}", number(value));
+        let _ = writeln!(out, "{key} = {}", format_number(value));
     }
     if !c.k.is_empty() {
-        let _ = writeln!(out, "k = {}", list(&c.k));
+        let _ = writeln!(out, "k = {}", format_list(&c.k));
     }
     if let Some(deg) = c.theta_max_deg {
-        let _ = writeln!(out, "theta_max_deg = {}", number(deg));
+        let _ = writeln!(out, "theta_max_deg = {}", format_number(deg));
     }
     out
 }
 
-fn opencv(c: &Config) -> Result<String, Unfit> {
+fn write_opencv(c: &Config) -> Result<String, UnsupportedLens> {
     refuse_own_projection(c, Format::OpenCv)?;
     let fisheye = matches!(c.model, Model::KannalaBrandt | Model::Equidistant);
     let count = if fisheye { 4 } else { 5 };
     let k: Vec<f64> = (0..count).map(|i| c.coefficient(i)).collect();
     let [fx, fy, cx, cy] = intrinsics(c);
     let matrix = |rows: usize, cols: usize, data: &[f64]| {
-        format!("!!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: {}", list(data))
+        format!("!!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: {}", format_list(data))
     };
     Ok(format!(
         "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\nfisheye_model: {}\ncamera_matrix: {}\n\
@@ -128,10 +128,10 @@ fn opencv(c: &Config) -> Result<String, Unfit> {
 }
 
 /// Refuses the lenses that only Kalibr can express: the projections with coefficients of their own.
-fn refuse_own_projection(c: &Config, format: Format) -> Result<(), Unfit> {
+fn refuse_own_projection(c: &Config, format: Format) -> Result<(), UnsupportedLens> {
     match c.model {
-        Model::DoubleSphere => Err(Unfit { what: "the double sphere lens", format }),
-        Model::Eucm => Err(Unfit { what: "the enhanced unified camera model", format }),
+        Model::DoubleSphere => Err(UnsupportedLens { what: "the double sphere lens", format }),
+        Model::Eucm => Err(UnsupportedLens { what: "the enhanced unified camera model", format }),
         _ => Ok(()),
     }
 }
@@ -141,10 +141,10 @@ fn intrinsics(c: &Config) -> [f64; 4] {
 }
 
 /// Returns the four coefficients that Kalibr and EuRoC have.
-fn four(c: &Config, format: Format) -> Result<Vec<f64>, Unfit> {
+fn four_coefficients(c: &Config, format: Format) -> Result<Vec<f64>, UnsupportedLens> {
     refuse_own_projection(c, format)?;
     if c.model == Model::BrownConrady && c.coefficient(4) != 0.0 {
-        return Err(Unfit { what: "k3, the fifth coefficient of brown-conrady,", format });
+        return Err(UnsupportedLens { what: "k3, the fifth coefficient of brown-conrady", format });
     }
     Ok(match (c.model, format) {
         (Model::Pinhole, Format::Kalibr) => Vec::new(),
@@ -152,13 +152,13 @@ fn four(c: &Config, format: Format) -> Result<Vec<f64>, Unfit> {
     })
 }
 
-fn list(numbers: &[f64]) -> String {
-    format!("[{}]", numbers.iter().map(|&x| number(x)).collect::<Vec<_>>().join(", "))
+fn format_list(numbers: &[f64]) -> String {
+    format!("[{}]", numbers.iter().map(|&x| format_number(x)).collect::<Vec<_>>().join(", "))
 }
 
 /// Formats a number so that it is read back to the last bit. YAML 1.1 and OpenCV read `1e-5` as a word, so a decimal
 /// point is added.
-fn number(x: f64) -> String {
+fn format_number(x: f64) -> String {
     let text = format!("{x:?}");
     match text.split_once('e') {
         Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
@@ -210,7 +210,7 @@ mod tests {
         let mut camera = cameras().remove(1);
         camera.k.push(0.01).unwrap();
         let refused = write(&camera, Format::Kalibr).unwrap_err().to_string();
-        assert_eq!(refused, "k3, the fifth coefficient of brown-conrady, has no place in a Kalibr camchain");
+        assert_eq!(refused, "the format Kalibr camchain cannot express k3, the fifth coefficient of brown-conrady");
         let text = write(&camera, Format::OpenCv).unwrap();
         assert_eq!(parse(&text, Path::new("c.yaml"), None).unwrap(), camera);
     }
@@ -221,12 +221,15 @@ mod tests {
         camera.model = Model::DoubleSphere;
         camera.k = [-0.18, 0.59].into_iter().collect();
         let refused = write(&camera, Format::OpenCv).unwrap_err().to_string();
-        assert_eq!(refused, "the double sphere lens has no place in a OpenCV YAML");
+        assert_eq!(refused, "the format OpenCV YAML cannot express the double sphere lens");
         assert!(write(&camera, Format::Euroc).is_err() && write(&camera, Format::Kalibr).is_ok());
     }
 
     #[test]
     fn numbers_have_a_point() {
-        assert_eq!((number(1e-7), number(300.0), number(1.5e-9)), ("1.0e-7".into(), "300.0".into(), "1.5e-9".into()));
+        assert_eq!(
+            (format_number(1e-7), format_number(300.0), format_number(1.5e-9)),
+            ("1.0e-7".into(), "300.0".into(), "1.5e-9".into())
+        );
     }
 }

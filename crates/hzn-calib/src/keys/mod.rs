@@ -13,7 +13,7 @@ pub use hzn_core::keys::{Choice, Form, Key, Limits, Table, Value};
 /// The key for the starting values, which is above all sections.
 const PRESET: Key = Key {
     path: "preset",
-    doc: "Starting values; keys that are written in the file count instead of them.\n",
+    doc: "Starting values; keys in the file override them.\n",
     form: Form::Word,
     limits: Limits::Choice,
     choices: Preset::CHOICES,
@@ -27,8 +27,8 @@ const PRESET: Key = Key {
 const CAMERA_FILE: [Key; 2] = [
     Key {
         path: "camera.file",
-        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file, relative to this one, which brings the calibration; \
-              next to it stand only `theta_max_deg`, `readout_s`, the sigmas and `covariance`.\n",
+        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration; its path is relative to this \
+              file, and only `camera`, `theta_max_deg`, `readout_s`, the sigmas and `covariance` may be next to it.\n",
         form: Form::Word,
         limits: Limits::Rule("a path"),
         choices: &[],
@@ -39,12 +39,12 @@ const CAMERA_FILE: [Key; 2] = [
     },
     Key {
         path: "camera.camera",
-        doc: "Which camera of `file` it is, by its name there.\n",
+        doc: "Name of the camera in `file`.\n",
         form: Form::Word,
         limits: Limits::Rule("a name in the file"),
         choices: &[],
         feature: None,
-        unset: Some("the only one"),
+        unset: Some("the first one"),
         example: Some("\"cam0\""),
         flight: None,
     },
@@ -61,12 +61,12 @@ pub fn sections() -> impl Iterator<Item = &'static Table> {
 
 /// Returns every key, in the order of the documents.
 pub fn all() -> impl Iterator<Item = &'static Key> {
-    let of = |table: &'static Table| table.keys.iter().chain(extra(table.name));
-    core::iter::once(&PRESET).chain(sections().flat_map(of))
+    let keys = |table: &'static Table| table.keys.iter().chain(keys_of_file(table.name));
+    core::iter::once(&PRESET).chain(sections().flat_map(keys))
 }
 
 /// Returns the keys of a section that exist only in the file.
-fn extra(section: &str) -> &'static [Key] {
+fn keys_of_file(section: &str) -> &'static [Key] {
     if section == "camera" { &CAMERA_FILE } else { &[] }
 }
 
@@ -97,9 +97,9 @@ pub(crate) fn find_parts(path: &[String]) -> Option<&'static Key> {
 pub fn limits_in_words(key: &Key) -> String {
     match key.limits {
         Limits::Number { low, above, high } => {
-            let low = format!("{}{}", if above { "above " } else { "" }, short(low));
+            let low = format!("{}{}", if above { "above " } else { "" }, format_number(low));
             match (high.is_finite(), above) {
-                (true, _) => format!("{low} to {}", short(high)),
+                (true, _) => format!("{low} to {}", format_number(high)),
                 (false, true) => low,
                 (false, false) => format!("{low} or more"),
             }
@@ -111,7 +111,7 @@ pub fn limits_in_words(key: &Key) -> String {
 }
 
 /// Formats a number without a trailing `.0`; whole millions are written as powers of ten.
-fn short(x: f64) -> String {
+fn format_number(x: f64) -> String {
     if x.abs() >= 1e6 && x.abs() % 1e6 == 0.0 { format!("{x:e}") } else { x.to_string() }.replace('-', "−")
 }
 
@@ -132,7 +132,7 @@ fn default_of(key: &Key, defaults: &toml::Table) -> Option<String> {
 }
 
 /// Breaks a text into lines of at most `width` characters.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
+fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::table::about;
-use super::{Form, Key, Limits, PRESET, Table, default_of, defaults, extra, sections};
+use super::{Form, Key, Limits, PRESET, Table, default_of, defaults, keys_of_file, sections};
 
 /// Returns the schema, in the draft 2020-12.
 pub fn json() -> Value {
@@ -18,8 +18,7 @@ pub fn json() -> Value {
             "type": "array",
             "maxItems": hzn_core::report::MAX_BODIES,
             "items": {"$ref": "#/properties/body"},
-            "description": "Several bodies in one picture instead of [body], in the order in which they are looked \
-                            for.",
+            "description": "Several bodies in one picture, instead of [body]. The sensor looks for them in this order.",
         }),
     );
     json!({
@@ -34,7 +33,7 @@ pub fn json() -> Value {
 }
 
 fn section(table: &Table, defaults: &toml::Table) -> Value {
-    let keys = || table.keys.iter().chain(extra(table.name));
+    let keys = || table.keys.iter().chain(keys_of_file(table.name));
     let properties: Map<_, _> = keys().map(|key| (key.name().to_owned(), property(key, defaults))).collect();
     let mut schema = json!({
         "type": "object",

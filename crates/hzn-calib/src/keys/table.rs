@@ -1,12 +1,12 @@
 //! The table of keys in the documentation.
 
-use super::{Key, Table, default_of, defaults, extra, limits_in_words, sections};
+use super::{Key, Table, default_of, defaults, keys_of_file, limits_in_words, sections};
 
 /// The lines that enclose the table on its page.
 const MARKS: [&str; 2] = ["<!-- keys: `cargo xtask keys` writes this table -->\n", "<!-- end of keys -->\n"];
 
 /// Returns a page with the current table between its marks; `None` if the page has no marks.
-pub fn inserted(page: &str) -> Option<String> {
+pub fn insert_table(page: &str) -> Option<String> {
     let [begin, end] = MARKS;
     let (before, rest) = page.split_once(begin)?;
     let (_, after) = rest.split_once(end)?;
@@ -20,7 +20,7 @@ pub fn markdown() -> String {
     out += &row(&super::PRESET, &defaults);
     for table in sections() {
         out += &format!("| **[{}]** | {} | | | |\n", table.name, about(table));
-        for key in table.keys.iter().chain(extra(table.name)) {
+        for key in table.keys.iter().chain(keys_of_file(table.name)) {
             out += &row(key, &defaults);
         }
     }

@@ -1,7 +1,7 @@
 //! The commented sensor.toml to start from.
 
 use super::table::about;
-use super::{Key, Limits, default_of, defaults, extra, limits_in_words, sections, wrapped};
+use super::{Key, Limits, default_of, defaults, keys_of_file, limits_in_words, sections, wrap};
 
 /// Length of a comment line, in characters.
 const WIDTH: usize = 118;
@@ -10,8 +10,9 @@ const WIDTH: usize = 118;
 pub fn text() -> String {
     let defaults = defaults();
     let mut out = comment(
-        "A horizon sensor. [camera] must be yours; every other value is the default: a key that you leave out counts \
-         as it stands here. Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png",
+        "A horizon sensor. Write your camera into [camera]. Every other value is the default: a key that you remove \
+         keeps the value that it has here. Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay \
+         out.png",
     );
     out.push('\n');
     out += &entry(&super::PRESET, &defaults);
@@ -20,13 +21,13 @@ pub fn text() -> String {
         out += &comment(&about(table));
         // `[mount]` is commented out, because it is optional and has no default.
         out += &format!("{}[{}]\n", if table.name == "mount" { "# " } else { "" }, table.name);
-        for key in table.keys.iter().chain(extra(table.name)) {
+        for key in table.keys.iter().chain(keys_of_file(table.name)) {
             out += &entry(key, &defaults);
         }
         if table.name == "body" {
             out += &comment(
-                "Several bodies in one picture: a [[bodies]] for each instead of [body], with the same keys and, where \
-                 they differ, its own [bodies.binarize] and [bodies.covariance].",
+                "For several bodies in one picture, write one [[bodies]] for each instead of [body]. It has the same \
+                 keys, and may have a [bodies.binarize] and a [bodies.covariance].",
             );
         }
     }
@@ -34,7 +35,7 @@ pub fn text() -> String {
 }
 
 fn comment(text: &str) -> String {
-    wrapped(text, WIDTH).iter().map(|line| format!("# {line}\n")).collect()
+    wrap(text, WIDTH).iter().map(|line| format!("# {line}\n")).collect()
 }
 
 /// Writes a key with its meaning and its values above it. A key without a default is commented out.

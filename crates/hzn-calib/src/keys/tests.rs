@@ -71,19 +71,19 @@ fn limits_are_checked() {
                     _ => x,
                 };
                 // A file writes whole numbers for whole fields.
-                let taken = |x: f64| {
+                let is_accepted = |x: f64| {
                     refused(key, &list(format!("{x:.0}"))).is_none() && x.fract() == 0.0
                         || refused(key, &list(format!("{x:?}"))).is_none()
                 };
                 let inside = if above { low + 1e-3_f64.max(if high.is_infinite() { 1.0 } else { 0.0 }) } else { low };
                 let of_lens = key.section() == "camera";
-                assert!(taken(inside) || of_lens, "{} = {inside} is refused", key.path);
+                assert!(is_accepted(inside) || of_lens, "{} = {inside} is refused", key.path);
                 let outside = low - if above { 0.0 } else { 1.0 };
-                assert!(!taken(outside), "{} = {outside} is taken", key.path);
+                assert!(!is_accepted(outside), "{} = {outside} is taken", key.path);
                 if high.is_finite() {
                     let why = refused(key, &list(format!("{high:?}")));
-                    assert!(taken(high) || of_lens, "{} = {high} is refused: {why:?}", key.path);
-                    assert!(!taken(high * 2.0 + 1.0), "{} = {} is taken", key.path, high * 2.0 + 1.0);
+                    assert!(is_accepted(high) || of_lens, "{} = {high} is refused: {why:?}", key.path);
+                    assert!(!is_accepted(high * 2.0 + 1.0), "{} = {} is taken", key.path, high * 2.0 + 1.0);
                 }
                 checked += 1;
             }
@@ -113,7 +113,7 @@ fn documents_are_as_the_keys_say() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let say = "run `cargo xtask keys` and look at the difference";
     let page = std::fs::read_to_string(root.join("book/reference/sensor-toml.md")).unwrap();
-    assert!(table::inserted(&page).as_ref() == Some(&page), "{say}");
+    assert!(table::insert_table(&page).as_ref() == Some(&page), "{say}");
     assert!(crate::template::SENSOR_TOML == template::text(), "{say}");
     let schema = std::fs::read_to_string(root.join("book/reference/sensor.schema.json")).unwrap();
     assert!(serde_json::from_str::<serde_json::Value>(&schema).unwrap() == schema::json(), "{say}");

@@ -8,7 +8,6 @@
 //! RMS 1). The bend is assumed to be as strong as the strongest of these.
 
 use super::cone::Cone;
-use super::sighting::Sighting;
 
 /// Number of shapes that are examined in the mean residuals.
 pub(super) const SHAPES: usize = 3;
@@ -24,7 +23,7 @@ fn next_shapes(x: f64) -> [f64; SHAPES] {
 }
 
 /// Returns the Legendre polynomial of degree 2 at x from −1 to 1, scaled to an RMS of 1.
-pub(super) fn bend(x: f64) -> f64 {
+pub(super) fn bend_shape(x: f64) -> f64 {
     5.0f64.sqrt() * 0.5 * (3.0 * x * x - 1.0)
 }
 
@@ -40,16 +39,17 @@ pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
 }
 
 /// Returns the RMS in pixels of the bend that all edges may have in common: the amplitude of the strongest next shape
-/// in the mean of their residuals, or its standard error if that is larger.
-pub(super) fn common_px(sightings: &[&Sighting]) -> f64 {
-    let n = sightings.len().max(1) as f64;
-    let of = |k: usize| {
-        let values = || sightings.iter().filter_map(move |s| s.shapes_px.get(k));
+/// in the mean of their residuals, or its standard error if that is larger. `edges` has the amplitudes of each edge
+/// ([`shapes_px`]).
+pub(super) fn common_bend_px<'a>(edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone) -> f64 {
+    let n = edges.len().max(1) as f64;
+    let amplitude = |k: usize| {
+        let values = || edges.clone().filter_map(move |shapes| shapes.get(k));
         let mean = values().sum::<f64>() / n;
         let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0).max(1.0));
         mean.abs().max(variance.sqrt())
     };
-    (0..SHAPES).map(of).fold(0.0, f64::max)
+    (0..SHAPES).map(amplitude).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -61,7 +61,7 @@ mod tests {
         let at = |i: i32| f64::from(i) / 5000.0 - 1.0 + 1e-4;
         let all = |x: f64| {
             let [a, b, c] = next_shapes(x);
-            [1.0, 3.0f64.sqrt() * x, bend(x), a, b, c]
+            [1.0, 3.0f64.sqrt() * x, bend_shape(x), a, b, c]
         };
         for i in 0..6 {
             for j in 0..6 {

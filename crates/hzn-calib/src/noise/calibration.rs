@@ -4,27 +4,25 @@ use hzn_core::Config;
 use hzn_core::body::{self, Kind};
 
 use super::bend;
-use super::edge::{LEAST_PX, LENGTHS_PX, WHITE};
-use super::height::Solved;
+use super::edge::{LENGTHS_PX, MIN_SIGMA_PX, WHITE};
+use super::height::{MAX_SIGMA_KM, Measured, Solved, solve};
 use super::lag;
-use super::latitude::{Profile, profile};
+use super::latitude::{Profile, fit_profile};
 use super::refusal::Refusal;
 use super::sighting::Sighting;
 
 /// Smallest number of pictures with an answer. With fewer pictures the scatter is not known to a quarter.
-pub const LEAST_PICTURES: usize = 12;
-/// Largest 1-sigma of the limb height from the pictures' own errors, in kilometres: half of the sigma that a sensor
-/// assumes for an unmeasured limb.
-pub(super) const MOST_SIGMA_KM: f64 = 3.5;
+pub const MIN_PICTURES: usize = 12;
 /// Floor of the common shift of an edge, in pixels: the default of `covariance.sigma_px`. Blur and threshold move the
 /// middle of an edge by fractions of a pixel, even if the edge is smooth.
-const LEAST_SHIFT_PX: f64 = 0.1;
-/// An alarm is raised if the mean square of the residuals over their variances is larger.
-const ALARM: f64 = 2.0;
-/// A picture is excluded if its limb height is more than this many sigmas from the median of all: it has another edge.
-const APART: f64 = 6.0;
+const MIN_SHIFT_PX: f64 = 0.1;
+/// Largest mean square of the residuals over their variances without an alarm.
+const MAX_CHI2: f64 = 2.0;
+/// Largest distance of a picture's limb height from the median of all, in sigmas. A picture farther away has another
+/// edge and is excluded.
+const MAX_DEVIATION_SIGMAS: f64 = 6.0;
 /// Largest fraction of excluded pictures. With more of them the calibration is refused.
-const MOST_APART: f64 = 0.2;
+const MAX_INCONSISTENT: f64 = 0.2;
 /// Limb height and 1-sigma of the sensor during the calibration, in kilometres: wide enough for any limb.
 const WIDE_KM: [f64; 2] = [15.0, 30.0];
 /// Largest sigma of a direction during the calibration, in degrees: every direction counts.
@@ -33,7 +31,7 @@ const ANY_SIGMA_DEG: f64 = 90.0;
 /// Returns the configuration for the pictures of a calibration: the sensor with a very wide prior of the limb height.
 /// It looks for one body, the first whose half-angle depends on the limb height. The result is `None` if there is no
 /// such body.
-pub fn looks_with(sensor: &Config) -> Option<Config> {
+pub fn config_for_calibration(sensor: &Config) -> Option<Config> {
     let which = sensor.each_body().iter().position(|b| !b.half_angle_is_free())?;
     let mut wide = sensor.clone();
     wide.body = sensor.each_body().get(which)?.clone();
@@ -136,61 +134,61 @@ impl Calibration {
     /// # Errors
     /// The flight does not determine limb height and noise: see [`Refusal`].
     pub fn new(body: &body::Config, sightings: &[Sighting]) -> Result<Self, Refusal> {
-        let few = |answered: usize| Refusal::TooFew { answered, least: LEAST_PICTURES };
-        if sightings.len() < LEAST_PICTURES {
+        let few = |answered: usize| Refusal::TooFew { answered, min_pictures: MIN_PICTURES };
+        if sightings.len() < MIN_PICTURES {
             return Err(few(sightings.len()));
         }
-        let together: Vec<&Sighting> = together(sightings);
-        let apart = sightings.len() - together.len();
-        if apart as f64 > MOST_APART * sightings.len() as f64 {
-            return Err(Refusal::Apart { apart, pictures: sightings.len() });
+        let consistent = find_consistent(sightings);
+        let inconsistent = sightings.len() - consistent.len();
+        if inconsistent as f64 > MAX_INCONSISTENT * sightings.len() as f64 {
+            return Err(Refusal::Inconsistent { inconsistent, pictures: sightings.len() });
         }
-        let vague = |sigma_km: f64| Refusal::TooVague { sigma_km, most_km: MOST_SIGMA_KM, pictures: together.len() };
-        let profile = profile(&together).ok_or(vague(f64::INFINITY))?;
-        let height = height(&profile, &together);
-        if height.statistical_km > MOST_SIGMA_KM {
+        let vague = |sigma_km: f64| Refusal::TooVague { sigma_km, max_km: MAX_SIGMA_KM, pictures: consistent.len() };
+        let profile = fit_profile(&consistent).ok_or(vague(f64::INFINITY))?;
+        let height = combine_heights(&profile, &consistent);
+        if height.statistical_km > MAX_SIGMA_KM {
             return Err(vague(height.statistical_km));
         }
-        let counts = |s: &Sighting| together.iter().any(|t| std::ptr::eq(*t, s));
+        let counts = |s: &Sighting| consistent.iter().any(|t| std::ptr::eq(*t, s));
         let picture = |s: &Sighting| Picture {
             name: s.name.clone(),
             km: s.limb_height_km,
             sigma_km: s.sigma_km,
-            explained_km: profile.explains_km(s),
+            explained_km: profile.fitted_km(s),
             counts: counts(s),
         };
         Ok(Self {
             body: body.kind,
             height,
-            edge: edge(&together),
+            edge: combine_edges(&consistent),
             chi2: profile.solved.chi2,
-            focal: focal(&profile, &together),
+            focal: fit_focal(&profile, &consistent),
             pictures: sightings.iter().map(picture).collect(),
-            correlation: lag::correlation(together.iter().map(|s| &s.lags)),
+            correlation: lag::correlation(consistent.iter().map(|s| &s.lags)),
         })
     }
 
     /// Returns the alarm if the pictures do not agree with each other.
     pub fn alarm(&self) -> Option<Refusal> {
-        (self.chi2 > ALARM).then_some(Refusal::Alarm { chi2: self.chi2, most: ALARM })
+        (self.chi2 > MAX_CHI2).then_some(Refusal::Alarm { chi2: self.chi2, max_chi2: MAX_CHI2 })
     }
 
     /// Writes the values into a sensor that looks for the body, as [`super::into_sensor_toml`] does for the file.
     pub fn apply(&self, sensor: &mut Config) {
         let several = !sensor.bodies.is_empty();
         let noise = hzn_core::covariance::Config {
-            sigma_px: digits(self.edge.sigma_px),
-            correlation_px: digits(self.edge.correlation_px),
-            bias_px: digits(self.edge.bias_px),
+            sigma_px: round_to_written_digits(self.edge.sigma_px),
+            correlation_px: round_to_written_digits(self.edge.correlation_px),
+            bias_px: round_to_written_digits(self.edge.bias_px),
             ..sensor.covariance
         };
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
-        body.limb_height_km = digits(self.height.km);
-        body.limb_height_sigma_km = digits(self.height.sigma_km);
+        body.limb_height_km = round_to_written_digits(self.height.km);
+        body.limb_height_sigma_km = round_to_written_digits(self.height.sigma_km);
         // The measured height already includes the effect of clipped limbs.
         body.clipped_height_km = 0.0;
         body.limb_height_by_latitude_km =
-            self.height.by_latitude.iter().map(|[deg, km, _]| [*deg, digits(*km)]).collect();
+            self.height.by_latitude.iter().map(|[deg, km, _]| [*deg, round_to_written_digits(*km)]).collect();
         if several {
             body.covariance = Some(noise);
         } else {
@@ -200,36 +198,39 @@ impl Calibration {
 }
 
 /// Rounds to the three decimals that are written.
-pub(super) fn digits(x: f64) -> f64 {
+pub(super) fn round_to_written_digits(x: f64) -> f64 {
     (x * 1e3).round() / 1e3
 }
 
 /// Returns the sightings without those whose height disagrees with all others.
-fn together(all: &[Sighting]) -> Vec<&Sighting> {
+fn find_consistent(all: &[Sighting]) -> Vec<&Sighting> {
     let middle_km = median(all.iter().map(|s| s.limb_height_km));
-    let usual_km = 1.4826 * median(all.iter().map(|s| (s.limb_height_km - middle_km).abs()));
-    let is_near = |s: &&Sighting| (s.limb_height_km - middle_km).abs() <= APART * usual_km.hypot(s.sigma_km).max(0.1);
+    let typical_km = 1.4826 * median(all.iter().map(|s| (s.limb_height_km - middle_km).abs()));
+    let is_near = |s: &&Sighting| {
+        (s.limb_height_km - middle_km).abs() <= MAX_DEVIATION_SIGMAS * typical_km.hypot(s.sigma_km).max(0.1)
+    };
     all.iter().filter(is_near).collect()
 }
 
-fn height(profile: &Profile, sightings: &[&Sighting]) -> Height {
+fn combine_heights(profile: &Profile, sightings: &[&Sighting]) -> Height {
     let Solved { h, covariance, scatter2, .. } = &profile.solved;
     let (n, parameters) = (sightings.len() as f64, h.len());
     // The mean weights of the parameters over all pictures.
-    let mut seen = vec![0.0; parameters];
+    let mut mean_weights = vec![0.0; parameters];
     for s in sightings {
-        seen.iter_mut().zip(profile.parts(s)).for_each(|(sum, part)| *sum += part / n);
+        mean_weights.iter_mut().zip(profile.weights(s)).for_each(|(sum, weight)| *sum += weight / n);
     }
-    let km = seen.iter().zip(h.iter()).map(|(a, h)| a * h).sum();
-    let of = |i: usize, j: usize| seen.get(i).zip(seen.get(j)).map_or(0.0, |(a, b)| a * b);
+    let km = mean_weights.iter().zip(h.iter()).map(|(a, h)| a * h).sum();
+    let weight = |i: usize, j: usize| mean_weights.get(i).zip(mean_weights.get(j)).map_or(0.0, |(a, b)| a * b);
     let mean_variance: f64 = (0..parameters)
         .flat_map(|i| (0..parameters).map(move |j| (i, j)))
-        .map(|(i, j)| of(i, j) * covariance[(i, j)])
+        .map(|(i, j)| weight(i, j) * covariance[(i, j)])
         .sum();
-    let mean_square = |of: &dyn Fn(&Sighting) -> f64| sightings.iter().map(|s| of(s).powi(2)).sum::<f64>() / n;
+    let mean_square = |value: &dyn Fn(&Sighting) -> f64| sightings.iter().map(|s| value(s).powi(2)).sum::<f64>() / n;
     let (statistical_km, scatter_km) = (mean_variance.sqrt(), scatter2.sqrt());
-    let shift_km = mean_square(&|s| s.rms_px.max(LEAST_SHIFT_PX) * s.km_per_px).sqrt();
-    let bend_km = bend::common_px(sightings) * mean_square(&|s| s.km_per_bend_px).sqrt();
+    let shift_km = mean_square(&|s| s.rms_px.max(MIN_SHIFT_PX) * s.km_per_px).sqrt();
+    let bend_km =
+        bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px)) * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
     let rows = profile.latitudes_deg.iter().enumerate();
     let row = |(k, deg): (usize, &f64)| [*deg, h[k], covariance[(k, k)].sqrt()];
@@ -247,37 +248,36 @@ fn height(profile: &Profile, sightings: &[&Sighting]) -> Height {
 }
 
 /// Computes sigma and length, and the most likely (L, ν) of all pictures together, each picture with its own σ.
-fn edge(sightings: &[&Sighting]) -> Edge {
+fn combine_edges(sightings: &[&Sighting]) -> Edge {
     let n = sightings.len() as f64;
-    let unlikely = |i: usize, j: usize| sightings.iter().map(|s| s.scores[i][j].unlikely).sum::<f64>();
+    let cost = |i: usize, j: usize| sightings.iter().map(|s| s.scores[i][j].minus_two_ln_likelihood).sum::<f64>();
     let models = (0..LENGTHS_PX.len()).flat_map(|i| (0..WHITE.len()).map(move |j| (i, j)));
-    let (i, j) = models.min_by(|a, b| unlikely(a.0, a.1).total_cmp(&unlikely(b.0, b.1))).unwrap_or_default();
+    let (i, j) = models.min_by(|a, b| cost(a.0, a.1).total_cmp(&cost(b.0, b.1))).unwrap_or_default();
     let rms_px = (sightings.iter().map(|s| s.rms_px * s.rms_px).sum::<f64>() / n).sqrt();
     Edge {
-        sigma_px: rms_px.max(LEAST_PX),
+        sigma_px: rms_px.max(MIN_SIGMA_PX),
         correlation_px: median(sightings.iter().map(|s| s.correlation_px)),
         length_px: LENGTHS_PX[i],
         white: WHITE[j],
-        bias_px: rms_px.max(LEAST_SHIFT_PX),
+        bias_px: rms_px.max(MIN_SHIFT_PX),
     }
 }
 
 /// Fits d_i = A_i h − D_i ε: the relative focal length error ε together with the heights and the scatter.
-fn focal(profile: &Profile, sightings: &[&Sighting]) -> Option<Focal> {
-    use super::height::{Measured, solve};
+fn fit_focal(profile: &Profile, sightings: &[&Sighting]) -> Option<Focal> {
     let measured: Vec<Measured> = sightings
         .iter()
         .map(|s| {
-            let mut of = profile.parts(s);
-            of.push(-s.km_per_focal * 1e-2);
-            Measured { km: s.limb_height_km, variance_km2: s.sigma_km * s.sigma_km, of }
+            let mut weights = profile.weights(s);
+            weights.push(-s.km_per_focal * 1e-2);
+            Measured { km: s.limb_height_km, variance_km2: s.sigma_km * s.sigma_km, weights }
         })
         .collect();
     let solved = solve(&measured)?;
-    let place = solved.h.len().checked_sub(1)?;
+    let last = solved.h.len().checked_sub(1)?;
     let mean = sightings.iter().map(|s| s.km_per_focal).sum::<f64>() / sightings.len() as f64;
-    let sigma_percent = solved.covariance[(place, place)].sqrt();
-    sigma_percent.is_finite().then_some(Focal { percent: solved.h[place], sigma_percent, km_per_permille: mean * 1e-3 })
+    let sigma_percent = solved.covariance[(last, last)].sqrt();
+    sigma_percent.is_finite().then_some(Focal { percent: solved.h[last], sigma_percent, km_per_permille: mean * 1e-3 })
 }
 
 /// Returns the median; for an even number of values it is the upper of the two middle values.

@@ -15,14 +15,14 @@ use nalgebra::{Matrix3, Vector3};
 /// Largest number of iterations of the fit, which starts at the pipeline's answer.
 const ITERATIONS: usize = 8;
 /// Smallest number of points. Fewer points agree with almost any cone.
-const LEAST_POINTS: usize = 24;
+const MIN_POINTS: usize = 24;
 
 /// An edge point with a weight.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct EdgePoint {
     ray: Vector3<f64>,
     /// Derivatives of the ray by u and by v.
-    by: [Vector3<f64>; 2],
+    derivatives: [Vector3<f64>; 2],
     /// Offset from the principal point, in pixels.
     off_px: [f64; 2],
     weight: f64,
@@ -78,40 +78,41 @@ impl Cone {
         cos: f64,
         azimuth: Option<&Azimuth>,
     ) -> Option<Self> {
-        let places = places(camera, points);
-        if places.len() < LEAST_POINTS {
+        let edge_points = locate_edge_points(camera, points);
+        if edge_points.len() < MIN_POINTS {
             return None;
         }
         let (mut e, mut c) = (Vector3::from(axis), cos);
         for _ in 0..ITERATIONS {
-            let at = Self::at(&places, e, c, azimuth)?;
-            let sum: Vector3<f64> = at.rows.iter().map(|r| r.h * (r.weight * r.r_px)).sum();
-            let step = at.inverse * sum;
+            let cone = Self::evaluate(&edge_points, e, c, azimuth)?;
+            let sum: Vector3<f64> = cone.rows.iter().map(|r| r.h * (r.weight * r.r_px)).sum();
+            let step = cone.inverse * sum;
             let (b1, b2) = basis(&e);
             e = (e + b1 * step.x + b2 * step.y).try_normalize(1e-12)?;
-            c += at.to_cos.dot(&step);
+            c += cone.to_cos.dot(&step);
             if step.norm() < 1e-13 {
                 break;
             }
         }
-        Self::at(&places, e, c, azimuth)
+        Self::evaluate(&edge_points, e, c, azimuth)
     }
 
-    fn at(places: &[Place], axis: Vector3<f64>, cos: f64, azimuth: Option<&Azimuth>) -> Option<Self> {
+    /// Computes the rows and the normal equations at an axis and cos α.
+    fn evaluate(points: &[EdgePoint], axis: Vector3<f64>, cos: f64, azimuth: Option<&Azimuth>) -> Option<Self> {
         let (b1, b2) = basis(&axis);
-        let slope = |p: &Place| axis.dot(&p.by[0]).hypot(axis.dot(&p.by[1])).max(1e-12);
+        let slope = |p: &EdgePoint| axis.dot(&p.derivatives[0]).hypot(axis.dot(&p.derivatives[1])).max(1e-12);
         let (mut m, mut total) = ([0.0; 2], 0.0);
-        for p in places {
+        for p in points {
             let w = p.weight / slope(p).powi(2);
             m = [m[0] + w * p.ray.dot(&b1), m[1] + w * p.ray.dot(&b2)];
             total += w;
         }
         let m = m.map(|m| m / total);
-        let row = |p: &Place| {
+        let row = |p: &EdgePoint| {
             let (g, d) = (slope(p), p.ray.dot(&axis));
             let (x, y) = (p.ray.dot(&b1), p.ray.dot(&b2));
             let offset = azimuth.map_or(0.0, |a| a.offset(&p.ray, &axis));
-            let by = [axis.dot(&p.by[0]), axis.dot(&p.by[1])];
+            let slopes = [axis.dot(&p.derivatives[0]), axis.dot(&p.derivatives[1])];
             Row {
                 h: Vector3::new(x - m[0], y - m[1], -1.0) / g,
                 r_px: (cos + offset - d) / g,
@@ -120,15 +121,15 @@ impl Cone {
                 step_px: p.step_px,
                 along: 0.0,
                 azimuth_rad: y.atan2(x),
-                by_focal_px: (by[0] * p.off_px[0] + by[1] * p.off_px[1]) / g,
+                by_focal_px: (slopes[0] * p.off_px[0] + slopes[1] * p.off_px[1]) / g,
             }
         };
-        let mut rows: Vec<Row> = places.iter().map(row).collect();
-        let whole: f64 = places.iter().map(|p| p.step_px).sum();
-        let mut way = 0.0;
+        let mut rows: Vec<Row> = points.iter().map(row).collect();
+        let total_px: f64 = points.iter().map(|p| p.step_px).sum();
+        let mut passed_px = 0.0;
         for row in &mut rows {
-            row.along = 2.0 * way / whole.max(1e-12) - 1.0;
-            way += row.step_px;
+            row.along = 2.0 * passed_px / total_px.max(1e-12) - 1.0;
+            passed_px += row.step_px;
         }
         let normal: Matrix3<f64> = rows.iter().map(|r| r.h * r.h.transpose() * r.weight).sum();
         Some(Self {
@@ -136,7 +137,7 @@ impl Cone {
             inverse: normal.try_inverse()?,
             to_cos: Vector3::new(m[0], m[1], 1.0),
             weight: rows.iter().map(|r| r.weight).sum(),
-            rays: places.iter().map(|p| p.ray).collect(),
+            rays: points.iter().map(|p| p.ray).collect(),
             rows,
         })
     }
@@ -158,7 +159,7 @@ impl Cone {
     }
 
     /// Returns the change of the fitted cos α if every r grows by `signal` (pixels).
-    pub(super) fn cos_by(&self, signal: impl Fn(&Row) -> f64) -> f64 {
+    pub(super) fn change_of_cos(&self, signal: impl Fn(&Row) -> f64) -> f64 {
         let sum: Vector3<f64> = self.rows.iter().map(|r| r.h * (r.weight * signal(r))).sum();
         self.to_cos.dot(&(self.inverse * sum))
     }
@@ -191,24 +192,24 @@ pub(super) fn decay(step_px: f64, length_px: f64) -> f64 {
 }
 
 /// Returns the points that have a weight and a ray, each with the distance to the next.
-fn places(camera: &Camera<f64>, points: &[([f64; 2], f64)]) -> Vec<Place> {
+fn locate_edge_points(camera: &Camera<f64>, points: &[([f64; 2], f64)]) -> Vec<EdgePoint> {
     let centre = camera.principal_point();
     let kept = points.iter().filter(|(_, weight)| *weight > 0.0);
-    let mut places: Vec<([f64; 2], Place)> = kept
+    let mut located: Vec<([f64; 2], EdgePoint)> = kept
         .filter_map(|&([u, v], weight)| {
             let ray = camera.ray(ImagePoint { u, v })?;
             let j = ray.jacobian();
-            let by = [0, 1].map(|k| Vector3::new(j[0][k], j[1][k], j[2][k]));
+            let derivatives = [0, 1].map(|k| Vector3::new(j[0][k], j[1][k], j[2][k]));
             let off_px = [u - centre.u, v - centre.v];
             let ray = Vector3::from(ray.direction().xyz());
-            Some(([u, v], Place { ray, by, off_px, weight, step_px: 0.0 }))
+            Some(([u, v], EdgePoint { ray, derivatives, off_px, weight, step_px: 0.0 }))
         })
         .collect();
-    let ahead: Vec<[f64; 2]> = places.iter().skip(1).map(|p| p.0).collect();
-    for ((here, place), next) in places.iter_mut().zip(ahead) {
-        place.step_px = (next[0] - here[0]).hypot(next[1] - here[1]);
+    let ahead: Vec<[f64; 2]> = located.iter().skip(1).map(|p| p.0).collect();
+    for ((here, point), next) in located.iter_mut().zip(ahead) {
+        point.step_px = (next[0] - here[0]).hypot(next[1] - here[1]);
     }
-    places.into_iter().map(|p| p.1).collect()
+    located.into_iter().map(|p| p.1).collect()
 }
 
 /// Returns two unit vectors that are perpendicular to `e` and to each other.
@@ -229,8 +230,8 @@ pub(super) struct Azimuth {
 
 impl Azimuth {
     /// Creates the offsets for a limb cone from the camera's attitude; `None` without an attitude.
-    pub(super) fn new(cone: &LimbCone<f64>, frame: &Prior<f64>) -> Option<Self> {
-        let east: UnitVec3<_, f64> = frame.cam_to_ecef?.inverse().apply(&cone.east);
+    pub(super) fn new(cone: &LimbCone<f64>, prior: &Prior<f64>) -> Option<Self> {
+        let east: UnitVec3<_, f64> = prior.cam_to_ecef?.inverse().apply(&cone.east);
         Some(Self {
             east: Vector3::from(east.xyz()),
             cot2_east: cone.cot2_east,

@@ -6,6 +6,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// Largest 1-sigma of a limb height from the pictures' own errors, in kilometres: half of the sigma that a sensor
+/// assumes for an unmeasured limb.
+pub(super) const MAX_SIGMA_KM: f64 = 3.5;
+
 /// A measured height.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Measured {
@@ -14,7 +18,7 @@ pub(super) struct Measured {
     /// Variance of the height from edge noise alone, in km².
     pub(super) variance_km2: f64,
     /// Row A_i: the weights of the parameters in this height.
-    pub(super) of: Vec<f64>,
+    pub(super) weights: Vec<f64>,
 }
 
 /// The fitted parameters with their covariance.
@@ -28,7 +32,7 @@ pub(super) struct Solved {
     pub(super) scatter2: f64,
     /// −2 ln of the (not restricted) likelihood at the solution, for the comparison of models with different
     /// parameters.
-    pub(super) unlikely: f64,
+    pub(super) minus_two_ln_likelihood: f64,
     /// Mean square of the residuals over their own variances, without the scatter: χ² per degree of freedom.
     pub(super) chi2: f64,
 }
@@ -38,65 +42,74 @@ const STEPS: i32 = 8;
 
 /// Fits the parameters. The result is `None` if the measurements do not determine them.
 pub(super) fn solve(all: &[Measured]) -> Option<Solved> {
-    let parameters = all.first()?.of.len();
+    let parameters = all.first()?.weights.len();
     let freedom = all.len().checked_sub(parameters).filter(|n| *n > 0)? as f64;
-    let usual = all.iter().map(|m| m.variance_km2).sum::<f64>() / all.len() as f64;
-    let tries = (-3 * STEPS..=3 * STEPS).map(|k| usual * 10f64.powf(2.0 * f64::from(k) / f64::from(STEPS)));
-    let scored = |scatter2: f64| at(all, scatter2).map(|found| (found.restricted, scatter2));
+    let mean_variance_km2 = all.iter().map(|m| m.variance_km2).sum::<f64>() / all.len() as f64;
+    let tries = (-3 * STEPS..=3 * STEPS).map(|k| mean_variance_km2 * 10f64.powf(2.0 * f64::from(k) / f64::from(STEPS)));
+    let scored = |scatter2: f64| solve_with_scatter(all, scatter2).map(|found| (found.restricted, scatter2));
     let best = std::iter::once(0.0).chain(tries).filter_map(scored).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let scatter2 = refined(best, &scored);
-    let found = at(all, scatter2)?;
-    let own = at(all, 0.0)?;
+    let scatter2 = refine(best, &scored);
+    let found = solve_with_scatter(all, scatter2)?;
+    let without_scatter = solve_with_scatter(all, 0.0)?;
     Some(Solved {
         h: found.h,
         covariance: found.covariance,
         scatter2,
-        unlikely: found.unlikely,
-        chi2: own.square / freedom,
+        minus_two_ln_likelihood: found.minus_two_ln_likelihood,
+        chi2: without_scatter.square / freedom,
     })
 }
 
 /// Refines the best τ² by 12 halvings of its logarithmic step.
-fn refined((mut least, mut at): (f64, f64), scored: &dyn Fn(f64) -> Option<(f64, f64)>) -> f64 {
+fn refine((mut min, mut scatter2): (f64, f64), scored: &dyn Fn(f64) -> Option<(f64, f64)>) -> f64 {
     let mut factor = 10f64.powf(2.0 / f64::from(STEPS));
     for _ in 0..12 {
         factor = factor.sqrt();
-        for next in [at * factor, at / factor].into_iter().filter_map(scored) {
-            if next.0 < least {
-                (least, at) = next;
+        for next in [scatter2 * factor, scatter2 / factor].into_iter().filter_map(scored) {
+            if next.0 < min {
+                (min, scatter2) = next;
             }
         }
     }
-    at
+    scatter2
 }
 
-struct At {
+/// The weighted solution for one value of τ².
+struct WeightedSolution {
     h: DVector<f64>,
     covariance: DMatrix<f64>,
     /// Σ w (d − A h)².
     square: f64,
-    unlikely: f64,
+    minus_two_ln_likelihood: f64,
+    /// −2 ln of the restricted likelihood.
     restricted: f64,
 }
 
-fn at(all: &[Measured], scatter2: f64) -> Option<At> {
-    let parameters = all.first()?.of.len();
+/// Solves for the parameters with a known variance τ² of the scatter.
+fn solve_with_scatter(all: &[Measured], scatter2: f64) -> Option<WeightedSolution> {
+    let parameters = all.first()?.weights.len();
     let (mut normal, mut right) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
     let mut log_variances = 0.0;
     for m in all {
-        let (row, variance) = (DVector::from_column_slice(&m.of), m.variance_km2 + scatter2);
+        let (row, variance) = (DVector::from_column_slice(&m.weights), m.variance_km2 + scatter2);
         normal += &row * row.transpose() / variance;
         right += row * (m.km / variance);
         log_variances += variance.ln();
     }
     let information = normal.cholesky()?;
     let h = information.solve(&right);
-    let off = |m: &Measured| m.km - m.of.iter().zip(h.iter()).map(|(a, h)| a * h).sum::<f64>();
-    let square = all.iter().map(|m| off(m).powi(2) / (m.variance_km2 + scatter2)).sum::<f64>();
+    let residual = |m: &Measured| m.km - m.weights.iter().zip(h.iter()).map(|(a, h)| a * h).sum::<f64>();
+    let square = all.iter().map(|m| residual(m).powi(2) / (m.variance_km2 + scatter2)).sum::<f64>();
     let log_det: f64 = 2.0 * information.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-    let unlikely = log_variances + square;
-    let restricted = unlikely + log_det;
-    (restricted.is_finite()).then(|| At { covariance: information.inverse(), h, square, unlikely, restricted })
+    let minus_two_ln_likelihood = log_variances + square;
+    let restricted = minus_two_ln_likelihood + log_det;
+    (restricted.is_finite()).then(|| WeightedSolution {
+        covariance: information.inverse(),
+        h,
+        square,
+        minus_two_ln_likelihood,
+        restricted,
+    })
 }
 
 #[cfg(test)]
@@ -104,7 +117,7 @@ mod tests {
     use super::*;
 
     fn measured(values: &[(f64, f64)]) -> Vec<Measured> {
-        values.iter().map(|&(km, sigma)| Measured { km, variance_km2: sigma * sigma, of: vec![1.0] }).collect()
+        values.iter().map(|&(km, sigma)| Measured { km, variance_km2: sigma * sigma, weights: vec![1.0] }).collect()
     }
 
     #[test]
@@ -131,7 +144,7 @@ mod tests {
     fn too_few_or_blind_measurements_say_nothing() {
         assert!(solve(&measured(&[(10.0, 1.0)])).is_none());
         let blind: Vec<Measured> =
-            (0..5).map(|_| Measured { km: 1.0, variance_km2: 1.0, of: vec![0.5, 0.5] }).collect();
+            (0..5).map(|_| Measured { km: 1.0, variance_km2: 1.0, weights: vec![0.5, 0.5] }).collect();
         assert!(solve(&blind).is_none());
     }
 }

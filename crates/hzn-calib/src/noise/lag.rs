@@ -18,14 +18,14 @@ impl Lags {
     pub(super) fn new(cone: &Cone) -> Self {
         let mut lags = Self { sums: [0.0; CLASSES], counts: [0.0; CLASSES] };
         for (i, one) in cone.rows.iter().enumerate() {
-            let mut away = 0.0;
+            let mut distance_px = 0.0;
             for other in cone.rows.get(i..).unwrap_or_default() {
                 let weight = one.weight * other.weight;
-                let class = if away > 0.0 { 1 + (away / WIDTH_PX) as usize } else { 0 };
+                let class = if distance_px > 0.0 { 1 + (distance_px / WIDTH_PX) as usize } else { 0 };
                 let (Some(sum), Some(count)) = (lags.sums.get_mut(class), lags.counts.get_mut(class)) else { break };
                 *sum += weight * one.r_px * other.r_px;
                 *count += weight;
-                away += other.step_px;
+                distance_px += other.step_px;
             }
         }
         lags

@@ -25,8 +25,8 @@ mod sighting;
 mod tests;
 mod write;
 
-pub use calibration::{Calibration, Edge, Focal, Height, LEAST_PICTURES, Picture, looks_with};
-pub use points::{Points, Weighted};
+pub use calibration::{Calibration, Edge, Focal, Height, MIN_PICTURES, Picture, config_for_calibration};
+pub use points::{PointRecorder, WeightedPoints};
 pub use refusal::Refusal;
 pub use sighting::{Sighting, shares};
 pub use write::{Written, into_sensor_toml};

@@ -62,7 +62,7 @@ pub struct Sighting {
 }
 
 /// The camera's position relative to the body; distances in metres.
-struct Place {
+struct Geometry {
     /// R + H of the sphere that replaces the body.
     distance_m: f64,
     sin_expected: f64,
@@ -72,59 +72,59 @@ struct Place {
     /// 1-sigma of the limb height from the unknown radius, in metres.
     radius_sigma_m: f64,
     /// Half the difference of the cosines of the half-angles along the meridian and east.
-    uneven_cos: f64,
+    second_harmonic_cos: f64,
 }
 
 impl Sighting {
     /// Measures the limb height from a picture's answer. `points` are the answer's edge points (pixels) with their
-    /// weights, `body` is the sensor's configuration of the body, and `frame` is the prior of the picture. The result
+    /// weights, `body` is the sensor's configuration of the body, and `prior` is the prior of the picture. The result
     /// is `None` for Sun and Moon, whose half-angle does not depend on a height. It is also `None` without an altitude,
     /// and if the points do not determine a cone.
     pub fn measure(
         name: &str,
         camera: &Camera<f64>,
         body: &body::Config,
-        frame: &Prior<f64>,
+        prior: &Prior<f64>,
         points: &[([f64; 2], f64)],
         solution: &Solution<f64>,
     ) -> Option<Self> {
         if body.half_angle_is_free() {
             return None;
         }
-        let place = Place::new(body, frame)?;
-        let camera = &camera.turning(frame.rate_rad_s);
-        let attitude_sigma = frame.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
+        let geometry = Geometry::new(body, prior)?;
+        let camera = &camera.turning(prior.rate_rad_s);
+        let attitude_sigma = prior.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
         let known =
-            Prior { cam_to_ecef: frame.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*frame };
-        let azimuth = place.cone.as_ref().and_then(|cone| Azimuth::new(cone, &known));
+            Prior { cam_to_ecef: prior.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*prior };
+        let azimuth = geometry.cone.as_ref().and_then(|cone| Azimuth::new(cone, &known));
         let cone = Cone::fit(camera, points, solution.axis.xyz(), solution.half_angle_rad.cos(), azimuth.as_ref())?;
         let sin = (1.0 - cone.cos * cone.cos).sqrt();
         if !(sin > 0.0 && cone.cos > 0.0) {
             return None;
         }
-        let height_m = place.limb_m + place.distance_m * (sin - place.sin_expected);
-        let by_cos_m = -place.distance_m * cone.cos / sin;
-        let scores = edge::scores(&cone)?;
+        let height_m = geometry.limb_m + geometry.distance_m * (sin - geometry.sin_expected);
+        let by_cos_m = -geometry.distance_m * cone.cos / sin;
+        let scores = edge::score_models(&cone)?;
         // If north is unknown, the full second harmonic of the limb is an error; with an attitude only a part of it is.
-        let left = if azimuth.is_some() { (2.0 * attitude_sigma).min(1.0) } else { 1.0 };
-        let uneven = left * place.uneven_cos;
-        let harmonic = |of: fn(f64) -> f64| cone.cos_by(|row| of(2.0 * row.azimuth_rad) / row.slope);
+        let unknown = if azimuth.is_some() { (2.0 * attitude_sigma).min(1.0) } else { 1.0 };
+        let harmonic_cos = unknown * geometry.second_harmonic_cos;
+        let harmonic = |wave: fn(f64) -> f64| cone.change_of_cos(|row| wave(2.0 * row.azimuth_rad) / row.slope);
         let (c, s) = (harmonic(f64::cos), harmonic(f64::sin));
         let noise = edge::variance_of_cos(&cone, &scores);
-        let variance_cos = noise + 0.5 * uneven * uneven * (c * c + s * s);
+        let variance_cos = noise + 0.5 * harmonic_cos * harmonic_cos * (c * c + s * s);
         Some(Self {
             name: name.to_owned(),
             limb_height_km: height_m / 1e3,
             sigma_km: by_cos_m.abs() * variance_cos.sqrt() / 1e3,
-            radius_sigma_km: place.radius_sigma_m / 1e3,
-            km_per_px: by_cos_m.abs() * cone.cos_per_px().max(cone.cos_by(|_| 1.0).abs()) / 1e3,
-            km_per_bend_px: by_cos_m.abs() * cone.cos_by(|row| bend::bend(row.along)).abs() / 1e3,
+            radius_sigma_km: geometry.radius_sigma_m / 1e3,
+            km_per_px: by_cos_m.abs() * cone.cos_per_px().max(cone.change_of_cos(|_| 1.0).abs()) / 1e3,
+            km_per_bend_px: by_cos_m.abs() * cone.change_of_cos(|row| bend::bend_shape(row.along)).abs() / 1e3,
             shapes_px: bend::shapes_px(&cone),
-            km_per_focal: by_cos_m * cone.cos_by(|row| row.by_focal_px) / 1e3,
+            km_per_focal: by_cos_m * cone.change_of_cos(|row| row.by_focal_px) / 1e3,
             rms_px: cone.rms_px(),
             arc_px: cone.arc_px(),
-            correlation_px: edge::equivalent_px(&cone, cone.rms_px(), noise),
-            latitudes: latitudes(&place, &cone, &known, attitude_sigma),
+            correlation_px: edge::equivalent_length_px(&cone, cone.rms_px(), noise),
+            latitudes: latitudes(&geometry, &cone, &known, attitude_sigma),
             lags: Lags::new(&cone),
             scores,
         })
@@ -145,10 +145,10 @@ pub fn shares(
     Some(cone.rays.iter().map(|ray| (*ray).into()).zip(cone.shares()).collect())
 }
 
-impl Place {
-    fn new(body: &body::Config, frame: &Prior<f64>) -> Option<Self> {
+impl Geometry {
+    fn new(body: &body::Config, prior: &Prior<f64>) -> Option<Self> {
         let limb_m = body.limb_height_km * 1e3;
-        let given = frame.altitude_m.or(body.altitude_km.map(|km| km * 1e3));
+        let altitude_m = prior.altitude_m.or(body.altitude_km.map(|km| km * 1e3));
         let radius_m = body.mean_radius_km() * 1e3;
         let sphere = |distance_m: f64| Self {
             distance_m,
@@ -157,57 +157,57 @@ impl Place {
             cone: None,
             position_m: None,
             radius_sigma_m: 0.0,
-            uneven_cos: 0.0,
+            second_harmonic_cos: 0.0,
         };
-        let place = match (body.kind, frame.position_m) {
+        let geometry = match (body.kind, prior.position_m) {
             (Kind::Earth, Some(position)) => {
-                let cone = raised(position, limb_m)?;
+                let cone = limb_cone(position, limb_m)?;
                 let (altitude, _) = geodetic(position, WGS84_A_M, WGS84_B_M);
                 let sin = cone.mean_half_angle_rad().sin();
                 let radius = (sin * altitude - limb_m) / (1.0 - sin);
                 Self {
                     cone: Some(cone),
                     position_m: Some(position),
-                    uneven_cos: uneven_cos(&cone),
+                    second_harmonic_cos: second_harmonic_cos(&cone),
                     ..Self { sin_expected: sin, ..sphere(radius + altitude) }
                 }
             }
             (Kind::EarthSphere | Kind::Sphere, Some([x, y, z])) => sphere(x.hypot(y).hypot(z)),
             (Kind::Earth, None) => {
-                let place = sphere(radius_m + given?);
+                let geometry = sphere(radius_m + altitude_m?);
                 // The latitude is unknown: the mean squares of the effects of radius and shape are taken over all
                 // latitudes.
-                let (mut radius2, mut uneven2) = (0.0, 0.0);
+                let (mut radius2, mut harmonic2) = (0.0, 0.0);
                 for k in 0..LATITUDES {
                     let latitude = core::f64::consts::PI * (k as f64 / (LATITUDES - 1) as f64 - 0.5);
-                    let cone = raised(from_geodetic(latitude, 0.0, given?, WGS84_A_M, WGS84_B_M), limb_m)?;
-                    let off_m = place.distance_m * (cone.mean_half_angle_rad().sin() - place.sin_expected);
+                    let cone = limb_cone(from_geodetic(latitude, 0.0, altitude_m?, WGS84_A_M, WGS84_B_M), limb_m)?;
+                    let off_m = geometry.distance_m * (cone.mean_half_angle_rad().sin() - geometry.sin_expected);
                     radius2 += off_m * off_m / LATITUDES as f64;
-                    uneven2 += uneven_cos(&cone).powi(2) / LATITUDES as f64;
+                    harmonic2 += second_harmonic_cos(&cone).powi(2) / LATITUDES as f64;
                 }
-                Self { radius_sigma_m: radius2.sqrt(), uneven_cos: uneven2.sqrt(), ..place }
+                Self { radius_sigma_m: radius2.sqrt(), second_harmonic_cos: harmonic2.sqrt(), ..geometry }
             }
-            (_, None) => sphere(radius_m + given?),
+            (_, None) => sphere(radius_m + altitude_m?),
             (_, Some(_)) => return None,
         };
-        (place.sin_expected < 1.0 && place.sin_expected > 0.0).then_some(place)
+        (geometry.sin_expected < 1.0 && geometry.sin_expected > 0.0).then_some(geometry)
     }
 }
 
-fn raised(position_m: [f64; 3], limb_m: f64) -> Option<LimbCone<f64>> {
+fn limb_cone(position_m: [f64; 3], limb_m: f64) -> Option<LimbCone<f64>> {
     LimbCone::try_new(position_m, WGS84_A_M + limb_m, WGS84_B_M + limb_m)
 }
 
 /// Returns the amplitude of the second harmonic of cos α.
-fn uneven_cos(cone: &LimbCone<f64>) -> f64 {
+fn second_harmonic_cos(cone: &LimbCone<f64>) -> f64 {
     let (east, meridian) = cone.half_angles_rad();
     0.5 * (meridian.cos() - east.cos())
 }
 
 /// Returns latitudes of the limb, in degrees, with their shares: those of the points if the attitude is known, else
 /// those of the whole ring.
-fn latitudes(place: &Place, cone: &Cone, frame: &Prior<f64>, attitude_sigma_rad: f64) -> Vec<(f64, f64)> {
-    let (Some(position), Some(limb)) = (place.position_m, &place.cone) else { return Vec::new() };
+fn latitudes(geometry: &Geometry, cone: &Cone, prior: &Prior<f64>, attitude_sigma_rad: f64) -> Vec<(f64, f64)> {
+    let (Some(position), Some(limb)) = (geometry.position_m, &geometry.cone) else { return Vec::new() };
     let camera = Vector3::from(position);
     // The point of a ray that is nearest to the Earth's centre. Apart from the flattening, its latitude is that of the
     // limb.
@@ -215,13 +215,13 @@ fn latitudes(place: &Place, cone: &Cone, frame: &Prior<f64>, attitude_sigma_rad:
         let p = camera - ray * camera.dot(&ray);
         geodetic([p.x, p.y, p.z], WGS84_A_M, WGS84_B_M).1.to_degrees()
     };
-    match frame.cam_to_ecef {
+    match prior.cam_to_ecef {
         Some(attitude) if attitude_sigma_rad < USELESS_ATTITUDE_RAD => {
-            let seen = cone.rays.iter().zip(cone.shares()).filter_map(|(ray, share)| {
+            let visible = cone.rays.iter().zip(cone.shares()).filter_map(|(ray, share)| {
                 let ray = hzn_core::frames::UnitVec3::try_new([ray.x, ray.y, ray.z])?;
                 Some((latitude(Vector3::from(attitude.apply(&ray).xyz())), share))
             });
-            seen.collect()
+            visible.collect()
         }
         _ => {
             let axis = Vector3::from(limb.axis.xyz());

@@ -7,7 +7,7 @@ use hzn_core::frames::{Cov3, UnitVec3};
 use hzn_core::{Config, Prior, Solution};
 use nalgebra::Vector3;
 
-use super::{Calibration, Refusal, Sighting, Weighted, cone, edge, into_sensor_toml};
+use super::{Calibration, Refusal, Sighting, WeightedPoints, cone, edge, into_sensor_toml};
 
 /// A generator of normal random numbers that gives the same sequence on every machine.
 struct Draws(u64);
@@ -42,10 +42,10 @@ fn limb(
     cos: &dyn Fn(&Vector3<f64>) -> f64,
     noise: Noise,
     draws: &mut Draws,
-) -> Weighted {
+) -> WeightedPoints {
     let (b1, b2) = cone::basis(&axis);
     let Noise(sigma, length, white) = noise;
-    let mut points: Weighted = Vec::new();
+    let mut points: WeightedPoints = Vec::new();
     let (mut correlated, mut last) = (draws.normal(), None::<[f64; 2]>);
     let steps = 5_000;
     for k in 0..steps {
@@ -104,9 +104,9 @@ fn flight(count: usize, fov_deg: f64, limb_km: f64, scatter_km: f64, noise: Nois
         let below = alpha + (0.1 * k as f64).sin() * 0.1;
         let axis = Vector3::new(0.3 * below.sin(), 0.954 * below.sin(), below.cos()).normalize();
         let points = limb(&camera, axis, &|_| alpha.cos(), noise, &mut draws);
-        let frame = Prior { altitude_m: Some(altitude_km * 1e3), ..Prior::default() };
+        let prior = Prior { altitude_m: Some(altitude_km * 1e3), ..Prior::default() };
         // The start differs from the solution.
-        Sighting::measure("p", &camera, &earth(), &frame, &points, &solution(axis, alpha + 1e-3))
+        Sighting::measure("p", &camera, &earth(), &prior, &points, &solution(axis, alpha + 1e-3))
     });
     each.collect()
 }
@@ -134,7 +134,7 @@ fn height_scatter_and_noise_are_found_within_their_errors() {
 }
 
 #[test]
-fn heights_are_as_far_off_as_their_sigmas_say() {
+fn errors_of_heights_agree_with_their_sigmas() {
     let sightings = flight(60, 90.0, 18.7, 0.0, Noise(0.2, 20.0, 0.7), 3);
     let c = Calibration::new(&earth(), &sightings).unwrap();
     // Sigma is conservative, because it is averaged over lengths up to the arc.
@@ -149,18 +149,21 @@ fn pictures_that_contradict_each_other_raise_the_alarm() {
 }
 
 #[test]
-fn what_pictures_do_not_tell_is_refused_with_the_number() {
+fn what_pictures_do_not_determine_is_refused_with_the_number() {
     let noise = Noise(0.3, 40.0, 0.5);
     let few = Calibration::new(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();
-    assert_eq!(few, Refusal::TooFew { answered: 11, least: 12 });
-    assert!(few.to_string().starts_with("11 pictures were answered, but at least 12 are needed"), "{few}");
+    assert_eq!(few, Refusal::TooFew { answered: 11, min_pictures: 12 });
+    assert!(few.to_string().starts_with("11 pictures have an answer, but at least 12 are needed"), "{few}");
     // Sigma grows with the inverse square of the field of view.
     let narrow = Calibration::new(&earth(), &flight(24, 15.0, 18.7, 0.0, noise, 6)).unwrap_err();
     assert!(matches!(narrow, Refusal::TooVague { sigma_km, .. } if sigma_km > 3.5), "{narrow:?}");
     // A third of the pictures has other edges.
     let mut mixed = flight(16, 90.0, 18.7, 0.0, noise, 7);
     mixed.iter_mut().skip(11).for_each(|s| s.limb_height_km += 90.0);
-    assert_eq!(Calibration::new(&earth(), &mixed).unwrap_err(), Refusal::Apart { apart: 5, pictures: 16 });
+    assert_eq!(
+        Calibration::new(&earth(), &mixed).unwrap_err(),
+        Refusal::Inconsistent { inconsistent: 5, pictures: 16 }
+    );
 }
 
 /// A limb whose height depends on latitude. The camera looks straight down from a polar orbit and sees the whole limb.
@@ -175,14 +178,14 @@ fn a_flight_over_all_latitudes_gives_rows() {
         .filter_map(|k| {
             let latitude = (-80.0 + 160.0 * k as f64 / 23.0f64).to_radians();
             let position = from_geodetic(latitude, 0.3, 600e3, WGS84_A_M, WGS84_B_M);
-            let frame = Prior { position_m: Some(position), ..Prior::default() };
+            let prior = Prior { position_m: Some(position), ..Prior::default() };
             // The mean height of the ring, because the whole limb is visible.
             let limb_m = height_km(latitude.to_degrees()) * 1e3 * 0.91 + 25e3 * 0.09;
             let cone = LimbCone::try_new(position, WGS84_A_M + limb_m, WGS84_B_M + limb_m)?;
             let axis = Vector3::new(0.05, 0.02, 1.0).normalize();
             let alpha = cone.mean_half_angle_rad();
             let points = limb(&camera, axis, &|_| alpha.cos(), Noise(0.05, 10.0, 0.8), &mut draws);
-            Sighting::measure("p", &camera, &body, &frame, &points, &solution(axis, alpha))
+            Sighting::measure("p", &camera, &body, &prior, &points, &solution(axis, alpha))
         })
         .collect();
     let c = Calibration::new(&body, &sightings).unwrap();
@@ -206,13 +209,13 @@ fn a_flight_at_one_latitude_gives_no_rows() {
     let sightings: Vec<Sighting> = (0..24)
         .filter_map(|k| {
             let position = from_geodetic((67.9 + 0.05 * f64::from(k)).to_radians(), 0.3, 200e3, WGS84_A_M, WGS84_B_M);
-            let frame = Prior { position_m: Some(position), ..Prior::default() };
+            let prior = Prior { position_m: Some(position), ..Prior::default() };
             let limb_m = 15e3 + 500.0 * f64::from(k);
             let cone = LimbCone::try_new(position, WGS84_A_M + limb_m, WGS84_B_M + limb_m)?;
             let alpha = cone.mean_half_angle_rad();
             let axis = Vector3::new(0.3 * alpha.sin(), 0.954 * alpha.sin(), alpha.cos()).normalize();
             let points = limb(&camera, axis, &|_| alpha.cos(), Noise(0.02, 10.0, 0.8), &mut draws);
-            Sighting::measure("p", &camera, &body, &frame, &points, &solution(axis, alpha))
+            Sighting::measure("p", &camera, &body, &prior, &points, &solution(axis, alpha))
         })
         .collect();
     assert_eq!(sightings.len(), 24);
@@ -250,11 +253,11 @@ fn variance_of_the_cone_is_that_of_dense_matrices() {
     assert!((found / dense - 1.0).abs() < 1e-9, "{found} {dense}");
     let shares: f64 = cone.shares().iter().sum();
     assert!((shares - 1.0).abs() < 1e-9, "{shares}");
-    assert!(edge::variance_of_cos(&cone, &edge::scores(&cone).unwrap()) > 0.0);
+    assert!(edge::variance_of_cos(&cone, &edge::score_models(&cone).unwrap()) > 0.0);
 }
 
 #[test]
-fn a_longer_focal_length_makes_the_limb_as_much_higher_as_is_said() {
+fn a_longer_focal_length_raises_the_limb_as_predicted() {
     let config = camera(90.0);
     let camera = Camera::try_new(&config).unwrap();
     let longer =
@@ -263,13 +266,13 @@ fn a_longer_focal_length_makes_the_limb_as_much_higher_as_is_said() {
     let alpha = ((radius + 20.0) / (radius + 200.0)).asin();
     let axis = Vector3::new(0.1, alpha.sin(), alpha.cos()).normalize();
     let points = limb(&camera, axis, &|_| alpha.cos(), Noise(1e-4, 10.0, 0.5), &mut Draws(10));
-    let frame = Prior { altitude_m: Some(200e3), ..Prior::default() };
+    let prior = Prior { altitude_m: Some(200e3), ..Prior::default() };
     let at = |camera: &Camera<f64>| {
-        Sighting::measure("p", camera, &earth(), &frame, &points, &solution(axis, alpha)).unwrap()
+        Sighting::measure("p", camera, &earth(), &prior, &points, &solution(axis, alpha)).unwrap()
     };
-    let (told, changed) = (at(&camera), at(&longer.unwrap()));
-    let grown = changed.limb_height_km - told.limb_height_km;
-    assert!((grown / (told.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", told.km_per_focal);
+    let (before, after) = (at(&camera), at(&longer.unwrap()));
+    let grown = after.limb_height_km - before.limb_height_km;
+    assert!((grown / (before.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", before.km_per_focal);
 }
 
 const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px \
@@ -308,6 +311,6 @@ fn of_several_bodies_the_earth_gets_its_own_noise() {
     let mut applied = crate::sensor::parse(&bodies, std::path::Path::new("sensor.toml")).unwrap().config;
     c.apply(&mut applied);
     assert_eq!(read, applied);
-    let wide = super::looks_with(&read).unwrap();
+    let wide = super::config_for_calibration(&read).unwrap();
     assert_eq!((wide.body.kind, wide.bodies.len(), wide.body.limb_height_sigma_km), (Kind::EarthSphere, 0, 30.0));
 }

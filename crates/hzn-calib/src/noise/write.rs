@@ -3,7 +3,7 @@
 use hzn_core::body::Kind;
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
-use super::calibration::{Calibration, digits};
+use super::calibration::{Calibration, round_to_written_digits};
 
 /// Comments of a calibration begin with this mark; the next calibration replaces them.
 const MARK: &str = "# calibrated:";
@@ -30,41 +30,46 @@ struct Line {
 /// The text is not valid TOML, something other than a section has the name of a section, or `[[bodies]]` does not have
 /// the body.
 pub fn into_sensor_toml(text: &str, calibration: &Calibration, source: &str) -> Result<Written, String> {
-    let mut document: DocumentMut = text.parse().map_err(|e| format!("is no TOML: {e}"))?;
+    let mut document: DocumentMut = text.parse().map_err(|e| format!("is not valid TOML: {e}"))?;
     let mut keys = Vec::new();
     let several = document.contains_key("bodies");
     if several {
-        let body = body_of(&mut document, calibration.body)?;
-        put_all(body, limb(calibration, source), "[[bodies]]", &mut keys);
+        let body = find_body(&mut document, calibration.body)?;
+        write_lines(body, limb_lines(calibration, source), "[[bodies]]", &mut keys);
         body.remove_rows(calibration);
         let noise = body.entry("covariance").or_insert_with(toml_edit::table);
-        let noise = noise.as_table_like_mut().ok_or("[bodies.covariance] is no section")?;
-        put_all(noise, noise_lines(calibration), "[bodies.covariance]", &mut keys);
+        let noise = noise.as_table_like_mut().ok_or("[bodies.covariance] is not a section")?;
+        write_lines(noise, noise_lines(calibration), "[bodies.covariance]", &mut keys);
     } else {
-        let body = section(&mut document, "body")?;
-        put_all(body, limb(calibration, source), "[body]", &mut keys);
+        let body = find_section(&mut document, "body")?;
+        write_lines(body, limb_lines(calibration, source), "[body]", &mut keys);
         body.remove_rows(calibration);
-        put_all(section(&mut document, "covariance")?, noise_lines(calibration), "[covariance]", &mut keys);
+        write_lines(find_section(&mut document, "covariance")?, noise_lines(calibration), "[covariance]", &mut keys);
     }
     Ok(Written { text: document.to_string(), keys })
 }
 
-fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
+/// Returns a section, which is added if it is missing.
+fn find_section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
     let item = document.entry(name).or_insert_with(|| Item::Table(Table::new()));
     // An inline table cannot have comments.
     if let Item::Value(Value::InlineTable(table)) = item {
         *item = Item::Table(table.clone().into_table());
     }
-    item.as_table_like_mut().ok_or(format!("{name} is no section"))
+    item.as_table_like_mut().ok_or(format!("{name} is not a section"))
 }
 
 /// Returns the calibrated body in `[[bodies]]`.
-fn body_of(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike, String> {
+fn find_body(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLike, String> {
     let name = kind.name();
     let is_it = |table: &Table| table.get("kind").map_or("earth", |k| k.as_str().unwrap_or_default()) == name;
     let bodies = document.get_mut("bodies").and_then(Item::as_array_of_tables_mut);
-    let bodies = bodies.ok_or("[[bodies]] is no list of sections")?;
-    bodies.iter_mut().find(|t| is_it(t)).map(|t| t as &mut dyn TableLike).ok_or(format!("no [[bodies]] of kind {name}"))
+    let bodies = bodies.ok_or("[[bodies]] is not a list of sections")?;
+    bodies
+        .iter_mut()
+        .find(|t| is_it(t))
+        .map(|t| t as &mut dyn TableLike)
+        .ok_or(format!("there is no [[bodies]] of kind {name}"))
 }
 
 /// Removes the text that a calibration makes invalid.
@@ -81,39 +86,39 @@ impl RemoveRows for dyn TableLike + '_ {
     }
 }
 
-fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
+fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
     let h = &calibration.height;
     let counted = calibration.pictures.iter().filter(|p| p.counts).count();
     let mut parts = vec![
-        format!("{:.2} km edge noise over all pictures", h.statistical_km),
-        format!("{:.2} km scatter between them", h.scatter_km),
-        format!("{:.2} km a shift of all edges by their RMS, 0.1 px at least", h.shift_km),
-        format!("{:.2} km a bend that all edges share", h.bend_km),
+        format!("{:.2} km from edge noise over all pictures", h.statistical_km),
+        format!("{:.2} km from the scatter between them", h.scatter_km),
+        format!("{:.2} km from a shift of all edges by their RMS, at least 0.1 px", h.shift_km),
+        format!("{:.2} km from a bend that all edges have in common", h.bend_km),
     ];
     if h.radius_km > 0.0 {
-        parts.push(format!("{:.2} km the radius, unknown without a position", h.radius_km));
+        parts.push(format!("{:.2} km from the radius, which is unknown without a position", h.radius_km));
     }
     let mut lines = vec![
         Line {
             key: "limb_height_km",
-            value: digits(h.km).into(),
+            value: round_to_written_digits(h.km).into(),
             why: format!("measured on {counted} pictures of {source} by `hzn calibrate noise`"),
         },
-        Line { key: "limb_height_sigma_km", value: digits(h.sigma_km).into(), why: parts.join(", ") },
+        Line { key: "limb_height_sigma_km", value: round_to_written_digits(h.sigma_km).into(), why: parts.join(", ") },
         Line {
             key: "clipped_height_km",
             value: 0.0.into(),
-            why: "the measured height has the pictures' clipping in it".into(),
+            why: "the measured height includes the effect of clipping".into(),
         },
     ];
     if !h.by_latitude.is_empty() {
-        let row = |[deg, km, _]: &[f64; 3]| Array::from_iter([*deg, digits(*km)]);
+        let row = |[deg, km, _]: &[f64; 3]| Array::from_iter([*deg, round_to_written_digits(*km)]);
         let sigmas: Vec<String> =
             h.by_latitude.iter().map(|[deg, _, sigma]| format!("{deg:.0}° ± {sigma:.2}")).collect();
         lines.push(Line {
             key: "limb_height_by_latitude_km",
             value: Array::from_iter(h.by_latitude.iter().map(row)).into(),
-            why: format!("the same by latitude, for frames with a position; {} km", sigmas.join(", ")),
+            why: format!("the limb height by latitude, for pictures with a position; {} km", sigmas.join(", ")),
         });
     }
     lines
@@ -121,21 +126,25 @@ fn limb(calibration: &Calibration, source: &str) -> Vec<Line> {
 
 fn noise_lines(calibration: &Calibration) -> Vec<Line> {
     let e = &calibration.edge;
-    let length = "one length that says of the fit what the residuals of each picture say of it".to_owned();
+    let length = "correlation length that gives the fit the same variance as the residuals of each picture".to_owned();
     vec![
-        Line { key: "sigma_px", value: digits(e.sigma_px).into(), why: "RMS of the residuals along the limb".into() },
-        Line { key: "correlation_px", value: digits(e.correlation_px).into(), why: length },
+        Line {
+            key: "sigma_px",
+            value: round_to_written_digits(e.sigma_px).into(),
+            why: "RMS of the residuals along the limb".into(),
+        },
+        Line { key: "correlation_px", value: round_to_written_digits(e.correlation_px).into(), why: length },
         Line {
             key: "bias_px",
-            value: digits(e.bias_px).into(),
-            why: "what shifts all points alike cannot be seen in residuals: taken for as large as their RMS, and 0.1 \
-                  px at least"
+            value: round_to_written_digits(e.bias_px).into(),
+            why: "residuals do not show a common shift of all points; it is assumed to be equal to their RMS, and at \
+                  least 0.1 px"
                 .into(),
         },
     ]
 }
 
-fn put_all(table: &mut dyn TableLike, lines: Vec<Line>, section: &str, keys: &mut Vec<String>) {
+fn write_lines(table: &mut dyn TableLike, lines: Vec<Line>, section: &str, keys: &mut Vec<String>) {
     for Line { key, mut value, why } in lines {
         keys.push(format!("{section} {key} = {}", value.to_string().trim()));
         match table.get_mut(key) {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::start::{self, Known};
+use hzn_calib::start::{self, CameraFacts};
 use hzn_core::camera::Model;
 
 use crate::exit::{Exit, Outcome, Stop, usage};
@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(Exit::Done);
     }
     let known = known(args)?;
-    let start = start::sensor_toml(&known).map_err(usage)?;
+    let start = start::write_sensor_toml(&known).map_err(usage)?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
     if known.exif.turned {
@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Collects what the pictures and the command line say about the camera.
-fn known(args: &Args) -> Result<Known, Stop> {
+fn known(args: &Args) -> Result<CameraFacts, Stop> {
     let mut source = source::open(&args.pictures, None, None)?;
     source.notes().iter().for_each(tell::warning);
     let size_px = one_size(source.as_ref())?;
@@ -117,7 +117,7 @@ fn known(args: &Args) -> Result<Known, Stop> {
         _ => start::Exif::default(),
     };
     let size_px = [size_px.0, size_px.1];
-    Ok(Known { size_px, fov_deg: args.fov, lens: args.lens.map(Model::from), exif, altitude_km: args.altitude })
+    Ok(CameraFacts { size_px, fov_deg: args.fov, lens: args.lens.map(Model::from), exif, altitude_km: args.altitude })
 }
 
 /// Returns the size of the pictures. Refuses pictures of different sizes.

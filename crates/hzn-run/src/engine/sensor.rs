@@ -209,7 +209,7 @@ fn half_angles<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, co
 }
 
 fn frame<T: Real>(data: Option<&FrameData>) -> Prior<T> {
-    data.map(|d| d.to_frame(None)).unwrap_or_default()
+    data.map(|d| d.to_prior(None)).unwrap_or_default()
 }
 
 fn run<
@@ -310,7 +310,7 @@ pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result
         for half_angle in sensor.expected_half_angles_rad(Some(row)) {
             match half_angle {
                 Ok(_) | Err(PriorError::NoAltitude | PriorError::BelowLimb { .. }) => {}
-                Err(why) => return Err(frames.refused(row, why)),
+                Err(why) => return Err(frames.problem_of_prior(row, why)),
             }
         }
     }

@@ -7,7 +7,7 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::{Config, Solution, body};
 use hzn_mcap::{
-    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, Given, ImageFormat, LogLevel, LogLine, Row,
+    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior, Row,
     RowMeta,
 };
 use hzn_sim::evaluate;
@@ -52,7 +52,7 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
     let mut records: Vec<FrameRecord> = rows(frame, config).into_iter().map(FrameRecord::new).collect();
     if let Some(first) = records.first_mut() {
         if let Some(data) = &frame.data {
-            first.given = given(data);
+            first.prior = given(data);
             first.attitude = data.camera_to_ecef_wxyz.map(|q| Attitude {
                 q_ecef_from_camera_wxyz: q,
                 position_m: data.position_km.unwrap_or_default().map(|km| km * 1e3),
@@ -87,8 +87,8 @@ pub fn answer(row: &Row) -> evaluate::Answer {
 }
 
 /// Converts a row of frames.csv to the prior that recordings store.
-fn given(data: &FrameData) -> Given {
-    Given {
+fn given(data: &FrameData) -> PicturePrior {
+    PicturePrior {
         utc_s: data.utc_s,
         altitude_km: data.altitude_km,
         position_km: data.position_km,
@@ -100,7 +100,7 @@ fn given(data: &FrameData) -> Given {
 }
 
 /// Returns the row of frames.csv for a picture, from the prior that a recording stores.
-pub fn frame_data(row: &Row, given: &Given) -> FrameData {
+pub fn frame_data(row: &Row, given: &PicturePrior) -> FrameData {
     FrameData {
         file: row.file.clone(),
         line: 0,

@@ -66,7 +66,7 @@ fn holds(path: &Path) -> Result<Holds, hzn_mcap::Error> {
 }
 
 fn item(record: FrameRecord) -> Item {
-    let data: FrameData = sink::frame_data(&record.row, &record.given);
+    let data: FrameData = sink::frame_data(&record.row, &record.prior);
     let picture = record.image.map_or_else(|| Payload::Broken("the recording holds no picture of it".into()), payload);
     Item { name: record.row.file, time: TimeSource::Table, data: Some(data), payload: picture }
 }

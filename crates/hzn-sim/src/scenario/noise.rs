@@ -13,7 +13,7 @@
 //! answers are as large as their covariance. (The points themselves do not determine the length. The error that turns
 //! an answer is the same along the whole edge, and it is small compared with the noise of a point.)
 
-use hzn_calib::noise::{Points, Weighted};
+use hzn_calib::noise::{PointRecorder, WeightedPoints};
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera};
 use hzn_core::covariance::{self, Noise};
@@ -232,7 +232,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 struct Processed<'a> {
     frame: &'a FlightFrame,
     /// Edge points of the answer with their weights, in order.
-    points: Weighted,
+    points: WeightedPoints,
     error_rad: f64,
     nees: f64,
     /// Logarithm of the covariance's determinant.
@@ -258,10 +258,10 @@ fn process_all<'a>(
             None => frame.prior(),
         };
         let Ok(expected) = horizon.expect(&prior) else { continue };
-        let points = Points::default();
+        let points = PointRecorder::default();
         let report = horizon.process_observed(&picture.view(), &expected, &points);
         let (Some(solution), Some(axis), true) = (report.solution, truth.axis(), truth.has_limb()) else { continue };
-        let points = points.of_candidate(solution.candidate);
+        let points = points.candidate_points(solution.candidate);
         let p = solution.covariance.rows();
         let e = Vector3::from(solution.axis.xyz());
         // The covariance has rank 2, so its null direction is filled before the inversion.

@@ -75,7 +75,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut notes = source.notes();
     notes.extend(settle_input(source.as_mut(), &mut sensor)?);
     check_size(source.as_ref(), &sensor)?;
-    let Some(config) = noise::looks_with(&sensor.config) else {
+    let Some(config) = noise::config_for_calibration(&sensor.config) else {
         return Err(usage("the sensor looks for Sun and Moon only, whose limb has no height to measure"));
     };
     let wide = Sensor { config, ..sensor.clone() };
@@ -142,7 +142,7 @@ fn sighting(frame: &Finished, camera: &Camera<f64>, body: &body::Config) -> Opti
     let solution = report.solution.as_ref()?;
     let edges = frame.traces.as_ref()?.each.first()?.edges();
     let edge = edges.iter().find(|e| e.candidate == solution.candidate)?;
-    let points: noise::Weighted = edge.points.iter().copied().zip(edge.weights.iter().copied()).collect();
-    let known = frame.data.as_ref().map_or_else(Prior::default, |d| d.to_frame(None));
+    let points: noise::WeightedPoints = edge.points.iter().copied().zip(edge.weights.iter().copied()).collect();
+    let known = frame.data.as_ref().map_or_else(Prior::default, |d| d.to_prior(None));
     Sighting::measure(&frame.name, camera, body, &known, &points, solution)
 }

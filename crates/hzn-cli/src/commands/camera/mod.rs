@@ -35,7 +35,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     match &args.command {
         Command::Show { file } => {
             let config = load(file)?;
-            for doubt in hzn_calib::plausible::doubts(&config) {
+            for doubt in hzn_calib::plausible::find_implausible(&config) {
                 tell::warning(format_args!("{}: {}: {}", file.display(), doubt.key, doubt.what));
             }
             tell::result(describe(&config)?)?;

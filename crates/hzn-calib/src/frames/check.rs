@@ -1,0 +1,133 @@
+//! Finds altitudes and positions in a frames.csv that are possible but look wrong.
+
+use hzn_core::Config;
+use hzn_core::body::Kind;
+use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
+
+use super::data::{FrameData, Frames};
+use crate::{Problem, plausible};
+
+/// Largest plausible distance of a camera, in radii of the body: about twice the Moon's distance from the Earth.
+const MAX_DISTANCE_RADII: f64 = 120.0;
+/// Largest plausible rate of the altitude, in km/s. Objects that fly by the Earth reach 11 to 20 km/s.
+const MAX_CLIMB_KM_S: f64 = 30.0;
+
+/// Returns the altitude in kilometres of a position (ECEF, kilometres): above WGS-84 for `earth`, else above the
+/// radius. The result is `None` for Sun and Moon, because a position relative to the Earth does not give their
+/// distance.
+pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Option<f64> {
+    match kind {
+        Kind::Earth => Some(geodetic(position_km.map(|km| km * 1e3), WGS84_A_M, WGS84_B_M).0 / 1e3),
+        Kind::Sun | Kind::Moon => None,
+        _ => Some(position_km.iter().map(|x| x * x).sum::<f64>().sqrt() - radius_km),
+    }
+}
+
+impl Frames {
+    /// Runs [`Self::check_altitudes`] for every body of a sensor. A warning is returned only once.
+    pub fn check_sensor(&self, config: &Config) -> Vec<Problem> {
+        let bodies = config.each_body();
+        // If Sun or Moon are sought together with the Earth, the altitudes are those above the Earth.
+        let only_free = bodies.iter().all(|b| b.half_angle_is_free());
+        let mut warnings: Vec<Problem> = Vec::new();
+        for body in bodies.iter().filter(|b| only_free || !b.half_angle_is_free()) {
+            for warning in self.check_altitudes(body.kind, body.mean_radius_km()) {
+                if !warnings.contains(&warning) {
+                    warnings.push(warning);
+                }
+            }
+        }
+        warnings
+    }
+
+    /// Returns warnings for values that are possible but look wrong: altitude and position of a row that differ by more
+    /// than 0.1 km, altitudes and positions that are probably in metres, and altitudes that are not used.
+    pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
+        let contradiction = |row: &FrameData| {
+            let km = altitude_at_km(row.position_km?, kind, radius_km)?;
+            if km > MAX_DISTANCE_RADII * radius_km {
+                let what = format!(
+                    "the position is at {km:.0} km; x_km, y_km, z_km are kilometres: are the values in metres?"
+                );
+                return Some(self.problem(row, what));
+            }
+            let altitude_km = row.altitude_km?;
+            let what = format!("altitude_km is {altitude_km} but the position is at {km:.3} km; the position is used");
+            ((km - altitude_km).abs() > 0.1).then(|| self.problem(row, what))
+        };
+        let mut warnings: Vec<Problem> = self.rows.iter().filter_map(contradiction).collect();
+        warnings.extend(self.suspect_metres(kind, radius_km));
+        if let (Some(what), Some(row)) =
+            (plausible::explain_unused_altitude(kind), self.rows.iter().find(|r| r.altitude_km.is_some()))
+        {
+            warnings.push(self.problem(row, format!("altitude_km {what}")));
+        }
+        warnings
+    }
+
+    /// Returns one warning if altitudes, or their change from row to row, are probably in metres.
+    fn suspect_metres(&self, kind: Kind, radius_km: f64) -> Option<Problem> {
+        if plausible::explain_unused_altitude(kind).is_some() {
+            return None;
+        }
+        let is_far =
+            |row: &&FrameData| row.altitude_km.is_some_and(|h| h > plausible::max_altitude_km(kind, radius_km));
+        if let Some(row) = self.rows.iter().find(is_far) {
+            let h = row.altitude_km.unwrap_or_default();
+            let what = format!("altitude_km is {h}, which is implausibly large; is it in metres?");
+            return Some(self.problem(row, what));
+        }
+        let known: Vec<_> = self.rows.iter().filter_map(|r| Some((r, r.time_s?, r.altitude_km?))).collect();
+        let rate = |(a, b): (&(_, f64, f64), &(_, f64, f64))| (b.2 - a.2) / (b.1 - a.1);
+        let pairs = known.iter().zip(known.iter().skip(1)).filter(|(a, b)| b.1 > a.1);
+        let (row, km_s) = pairs.map(|pair| (pair.1.0, rate(pair))).find(|(_, rate)| rate.abs() > MAX_CLIMB_KM_S)?;
+        let what = format!("altitude_km changes by {km_s:.0} km/s, which is implausible; is it in metres?");
+        Some(self.problem(row, what))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::frames::parse;
+
+    fn read(text: &str) -> Result<Frames, String> {
+        parse(text, Path::new("frames.csv")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn altitude_and_position_that_disagree_are_reported() {
+        let f = read("file,altitude_km,x_km,y_km,z_km\na,400,6778.137,0,0\nb,401,6778.137,0,0\n").unwrap();
+        let warnings = f.check_altitudes(Kind::Earth, 6371.0);
+        assert_eq!(warnings.len(), 1);
+        assert!(warnings[0].to_string().starts_with("frames.csv:3: b: altitude_km is 401 but"), "{}", warnings[0]);
+    }
+
+    #[test]
+    fn altitudes_in_metres_are_suspected_once() {
+        let warnings = |text: &str, kind| {
+            let all = read(text).unwrap().check_altitudes(kind, 6371.0);
+            all.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        // A balloon: no altitude is too large, but the ascent is too fast.
+        let balloon = "file,time_s,altitude_km\na,0,300\nb,60,600\nc,120,3900\n";
+        let found = warnings(balloon, Kind::Earth);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].starts_with("frames.csv:4: c: altitude_km changes by 55 km/s"), "{found:?}");
+        let orbit = warnings("file,altitude_km\na,517500\nb,517600\n", Kind::Earth);
+        assert_eq!(orbit, ["frames.csv:2: a: altitude_km is 517500, which is implausibly large; is it in metres?"]);
+        assert!(warnings("file,time_s,altitude_km\na,0,60\nb,1,61.5\nc,1,90\n", Kind::Earth).is_empty());
+        let moon = warnings("file,altitude_km\na,100\nb,100\n", Kind::Moon);
+        assert!(moon.len() == 1 && moon[0].contains("altitude_km is not used: kind = \"moon\""), "{moon:?}");
+    }
+
+    #[test]
+    fn metres_are_suspected() {
+        let f = read("file,x_km,y_km,z_km\na,6778137,0,0\nb,6778.137,0,0\n").unwrap();
+        let warnings = f.check_altitudes(Kind::Earth, 6371.0);
+        assert_eq!(warnings.len(), 1);
+        assert!(warnings[0].to_string().contains("are the values in metres?"), "{}", warnings[0]);
+    }
+}

@@ -1,0 +1,106 @@
+//! The rows of a frames.csv.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use hzn_core::Prior;
+use hzn_core::body::PriorError;
+use hzn_core::frames::{Rotation, UnitVec3};
+use hzn_core::real::Real;
+
+use crate::Problem;
+
+/// One row: the prior of one picture.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameData {
+    /// Name of the picture.
+    pub file: String,
+    /// Line of the row in the file, from 1.
+    pub line: usize,
+    /// Time in seconds: `time_s`, or `utc` since 1970 if `time_s` is empty.
+    pub time_s: Option<f64>,
+    /// `utc` in seconds since 1970.
+    pub utc_s: Option<f64>,
+    /// Altitude in kilometres: geodetic above WGS-84 for `earth`, else above the radius.
+    pub altitude_km: Option<f64>,
+    /// Position in ECEF, kilometres.
+    pub position_km: Option<[f64; 3]>,
+    /// Prior attitude, camera to ECEF, scalar first.
+    pub camera_to_ecef_wxyz: Option<[f64; 4]>,
+    /// 1-sigma of that attitude in degrees.
+    pub attitude_sigma_deg: Option<f64>,
+    /// Direction to the Sun in the camera frame.
+    pub sun_camera: Option<[f64; 3]>,
+    /// Rate of rotation of the camera in the camera frame, rad/s.
+    pub rate_rad_s: Option<[f64; 3]>,
+}
+
+impl FrameData {
+    /// Converts the row to a prior of the pipeline, in metres and radians. `altitude_km` of the row overrides
+    /// `default_altitude_km`.
+    pub fn to_prior<T: Real>(&self, default_altitude_km: Option<f64>) -> Prior<T> {
+        Prior {
+            altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::from_f64(km * 1e3)),
+            position_m: self.position_km.map(|p| p.map(|km| T::from_f64(km * 1e3))),
+            cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::from_f64))),
+            attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::from_f64(deg.to_radians())),
+            level: None,
+            sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))),
+            last: None,
+            rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::from_f64)),
+        }
+    }
+}
+
+/// A frames.csv that was read.
+#[derive(Debug, Clone, Default)]
+pub struct Frames {
+    /// The file.
+    pub path: PathBuf,
+    /// Rows in the file's order.
+    pub rows: Vec<FrameData>,
+    /// Warnings, which do not stop the run.
+    pub warnings: Vec<Problem>,
+    by_file: HashMap<String, usize>,
+}
+
+impl Frames {
+    /// Creates a file without rows.
+    pub(super) fn new(path: &Path) -> Self {
+        Self { path: path.to_owned(), ..Self::default() }
+    }
+
+    /// Appends a row. Its picture must not have a row yet.
+    pub(super) fn push(&mut self, row: FrameData) {
+        self.by_file.insert(row.file.clone(), self.rows.len());
+        self.rows.push(row);
+    }
+
+    /// Returns the row of the picture with this name.
+    pub fn get(&self, file: &str) -> Option<&FrameData> {
+        self.by_file.get(file).and_then(|&i| self.rows.get(i))
+    }
+
+    /// Returns whether any picture has a time. The file is then the only clock of the sequence.
+    pub fn has_times(&self) -> bool {
+        self.rows.iter().any(|row| row.time_s.is_some())
+    }
+
+    /// Returns the problem with a row that hzn-core refused, with the refused value.
+    pub fn problem_of_prior(&self, row: &FrameData, error: PriorError) -> Problem {
+        let value = match error {
+            PriorError::Altitude => row.altitude_km.map(|h| format!("{h}")),
+            PriorError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
+            PriorError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
+            PriorError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
+            PriorError::NoAltitude | PriorError::BelowLimb { .. } | PriorError::NoBody => None,
+        };
+        let refused = value.map(|value| format!(", not {value}")).unwrap_or_default();
+        self.problem(row, format!("{error}{refused}"))
+    }
+
+    /// Returns a problem with one row. It names the line and the picture.
+    pub fn problem(&self, row: &FrameData, what: impl std::fmt::Display) -> Problem {
+        Problem::new(&self.path, format!("{what}")).at_line(row.line).in_field(row.file.clone())
+    }
+}

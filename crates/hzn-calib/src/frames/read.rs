@@ -1,0 +1,279 @@
+//! Reads a frames.csv.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use csv::StringRecord;
+
+use super::data::{FrameData, Frames};
+use crate::nearest::nearest;
+use crate::{Problem, time};
+
+/// Names of the columns that are read.
+pub const COLUMNS: &[&str] = &[
+    "file",
+    "time_s",
+    "utc",
+    "altitude_km",
+    "x_km",
+    "y_km",
+    "z_km",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "attitude_sigma_deg",
+    "sun_x",
+    "sun_y",
+    "sun_z",
+    "rate_x",
+    "rate_y",
+    "rate_z",
+];
+
+/// Reads a frames.csv.
+///
+/// # Errors
+/// The file cannot be read, the column `file` is missing, a cell is not a finite number, a vector is incomplete, or a
+/// picture has two rows.
+pub fn load(path: &Path) -> Result<Frames, Problem> {
+    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => Problem::new(path, "no such file"),
+        _ => Problem::new(path, format!("cannot be read: {e}")),
+    })?;
+    parse(&text, path)
+}
+
+/// Reads a frames.csv as [`load`] does, but from text; `path` is only used in messages.
+///
+/// # Errors
+/// The errors are those of [`load`].
+pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
+    // Spreadsheet programs write a byte-order mark first.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|e| translate_csv_error(&e, path))?.clone();
+    let mut frames = Frames::new(path);
+    let columns = Columns::find(&header, path, &mut frames.warnings)?;
+    for record in reader.records() {
+        let record = record.map_err(|e| translate_csv_error(&e, path))?;
+        let row = Row::new(&record, &columns, path)?;
+        let data = row.read()?;
+        if let Some(before) = frames.get(&row.file) {
+            return Err(row.problem("file", &format!("is also in line {}; each picture has only one row", before.line)));
+        }
+        let time_s = data.time_s.or(data.utc_s);
+        frames.push(FrameData { time_s, ..data });
+    }
+    Ok(frames)
+}
+
+fn translate_csv_error(error: &csv::Error, path: &Path) -> Problem {
+    let line = error.position().map(|p| p.line() as usize);
+    let what = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("this row has {len} cells, but the header has {expected_len} columns")
+        }
+        csv::ErrorKind::Utf8 { .. } => "is not UTF-8 text".to_owned(),
+        _ => format!("not valid CSV: {error}"),
+    };
+    let problem = Problem::new(path, what);
+    match line {
+        Some(line) => problem.at_line(line),
+        None => problem,
+    }
+}
+
+/// The known columns of a file: their names and places.
+struct Columns(HashMap<&'static str, usize>);
+
+impl Columns {
+    /// Finds the columns by the header. Unknown columns give warnings.
+    fn find(header: &StringRecord, path: &Path, warnings: &mut Vec<Problem>) -> Result<Self, Problem> {
+        let mut columns = HashMap::new();
+        for (i, name) in header.iter().enumerate() {
+            let Some(&known) = COLUMNS.iter().find(|known| **known == name) else {
+                let hint =
+                    nearest(name, COLUMNS.iter().copied()).map(|n| format!("; did you mean {n}?")).unwrap_or_default();
+                let what = format!("unknown column, not used{hint}");
+                warnings.push(Problem::new(path, what).at_line(1).in_field(name));
+                continue;
+            };
+            if columns.insert(known, i).is_some() {
+                return Err(Problem::new(path, "this column exists twice").at_line(1).in_field(name));
+            }
+        }
+        if columns.contains_key("file") { Ok(Self(columns)) } else { Err(without_file_column(header, path)) }
+    }
+
+    /// Returns the cell of a column; `None` if it is empty or the column is missing.
+    fn cell<'a>(&self, record: &'a StringRecord, name: &str) -> Option<&'a str> {
+        self.0.get(name).and_then(|&i| record.get(i)).filter(|c| !c.is_empty())
+    }
+}
+
+/// Returns the problem of a header without the column `file`. A header in one cell has another separator.
+fn without_file_column(header: &StringRecord, path: &Path) -> Problem {
+    let found: Vec<&str> = header.iter().collect();
+    let other = [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| header.iter().any(|name| name.contains(*c)));
+    let hint =
+        other.map(|(_, what)| format!("; columns are separated by commas here, not by {what}")).unwrap_or_default();
+    let what =
+        format!("the column `file` is missing (found: {}); it names the picture of each row{hint}", found.join(", "));
+    Problem::new(path, what).at_line(1)
+}
+
+/// The row that is being read.
+struct Row<'a> {
+    record: &'a StringRecord,
+    columns: &'a Columns,
+    path: &'a Path,
+    line: usize,
+    file: String,
+}
+
+impl<'a> Row<'a> {
+    fn new(record: &'a StringRecord, columns: &'a Columns, path: &'a Path) -> Result<Self, Problem> {
+        let line = record.position().map_or(0, |p| p.line() as usize);
+        let file = columns.cell(record, "file").unwrap_or_default().to_owned();
+        let row = Self { record, columns, path, line, file };
+        if row.file.is_empty() {
+            return Err(row.problem("file", "is empty; it must name the picture"));
+        }
+        Ok(row)
+    }
+
+    /// Reads the cells. A quaternion must have the length 1, and the direction to the Sun a length above 0.
+    fn read(&self) -> Result<FrameData, Problem> {
+        let data = FrameData {
+            file: self.file.clone(),
+            line: self.line,
+            time_s: self.number("time_s")?,
+            utc_s: self.utc()?,
+            altitude_km: self.number("altitude_km")?,
+            position_km: self.vector(["x_km", "y_km", "z_km"])?,
+            camera_to_ecef_wxyz: self.vector(["qw", "qx", "qy", "qz"])?,
+            attitude_sigma_deg: self.number("attitude_sigma_deg")?,
+            sun_camera: self.vector(["sun_x", "sun_y", "sun_z"])?,
+            rate_rad_s: self.vector(["rate_x", "rate_y", "rate_z"])?,
+        };
+        let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if data.camera_to_ecef_wxyz.is_some_and(|q| (length(&q) - 1.0).abs() > 0.01) {
+            return Err(self.problem("qw, qx, qy, qz", "the quaternion's length must be 1"));
+        }
+        if data.sun_camera.is_some_and(|s| length(&s) < 1e-9) {
+            return Err(
+                self.problem("sun_x, sun_y, sun_z", "has no direction; leave the cells empty if it is not known")
+            );
+        }
+        Ok(data)
+    }
+
+    fn cell(&self, column: &str) -> Option<&'a str> {
+        self.columns.cell(self.record, column)
+    }
+
+    fn problem(&self, column: &str, what: &str) -> Problem {
+        let field = if self.file.is_empty() { column.to_owned() } else { format!("{} {column}", self.file) };
+        Problem::new(self.path, what).at_line(self.line).in_field(field)
+    }
+
+    fn number(&self, column: &str) -> Result<Option<f64>, Problem> {
+        let Some(cell) = self.cell(column) else { return Ok(None) };
+        match cell.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(Some(x)),
+            _ if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+                Err(self.problem(column, &format!("{cell:?} has a decimal comma; write a point")))
+            }
+            _ => Err(self
+                .problem(column, &format!("{cell:?} is not a finite number; leave the cell empty if it is not known"))),
+        }
+    }
+
+    fn utc(&self) -> Result<Option<f64>, Problem> {
+        let Some(cell) = self.cell("utc") else { return Ok(None) };
+        let what = format!("{cell:?} is not a UTC time; write it as 2020-11-20T08:30:00Z");
+        time::unix_seconds(cell).map(Some).ok_or_else(|| self.problem("utc", &what))
+    }
+
+    /// Reads a vector; `None` if all of its cells are empty.
+    fn vector<const N: usize>(&self, names: [&str; N]) -> Result<Option<[f64; N]>, Problem> {
+        let mut out = [0.0; N];
+        let mut missing = Vec::new();
+        for (slot, name) in out.iter_mut().zip(names) {
+            match self.number(name)? {
+                Some(x) => *slot = x,
+                None => missing.push(name),
+            }
+        }
+        match missing.len() {
+            0 => Ok(Some(out)),
+            n if n == N => Ok(None),
+            _ => Err(self.problem(&missing.join(", "), &format!("missing: {} belong together", names.join(", ")))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Frames, String> {
+        parse(text, Path::new("frames.csv")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn columns_by_name_and_empty_cells() {
+        let f = read("altitude_km,file,utc,note\n230,a.png,1970-01-01T00:00:02Z,x\n,b.png,,\n").unwrap();
+        assert_eq!(f.get("a.png").unwrap().altitude_km, Some(230.0));
+        assert_eq!(f.get("a.png").unwrap().time_s, Some(2.0));
+        assert_eq!(f.get("b.png").unwrap().altitude_km, None);
+        assert!(f.get("c.png").is_none());
+        assert_eq!(f.warnings[0].to_string(), "frames.csv:1: note: unknown column, not used");
+    }
+
+    #[test]
+    fn wrong_cells_name_row_and_column() {
+        assert_eq!(
+            read("file,altitude_km\na.png,230\nb.png,NaN\n").unwrap_err(),
+            "frames.csv:3: b.png altitude_km: \"NaN\" is not a finite number; leave the cell empty if it is not known"
+        );
+        assert_eq!(
+            read("file,x_km,y_km,z_km\na.png,1,,3\n").unwrap_err(),
+            "frames.csv:2: a.png y_km: missing: x_km, y_km, z_km belong together"
+        );
+        assert_eq!(
+            read("file\na.png\na.png\n").unwrap_err(),
+            "frames.csv:3: a.png file: is also in line 2; each picture has only one row"
+        );
+        assert_eq!(
+            read("name,altitude\na,1\n").unwrap_err(),
+            "frames.csv:1: the column `file` is missing (found: name, altitude); it names the picture of each row"
+        );
+        assert_eq!(
+            read("file,time_s\na\n").unwrap_err(),
+            "frames.csv:2: this row has 1 cells, but the header has 2 columns"
+        );
+        assert!(read("file,qw,qx,qy,qz\na,2,0,0,0\n").unwrap_err().contains("length must be 1"));
+        assert!(
+            read("file,sun_x,sun_y,sun_z\na,0,0,0\n").unwrap_err().contains("sun_x, sun_y, sun_z: has no direction")
+        );
+        // Spreadsheet programs of some countries write semicolons and decimal commas.
+        assert!(
+            read("file;altitude_km\r\na;1,5\r\n").unwrap_err().ends_with("separated by commas here, not by semicolons")
+        );
+        assert!(read("file\taltitude_km\n").unwrap_err().ends_with("not by tabs"));
+        assert!(
+            read("file,altitude_km\na,\"400,5\"\n")
+                .unwrap_err()
+                .contains("\"400,5\" has a decimal comma; write a point")
+        );
+    }
+
+    #[test]
+    fn rates_go_to_the_prior() {
+        let f = read("file,altitude_km,rate_x,rate_y,rate_z\na.png,230,0.1,-0.2,0.3\nb.png,230,,,\n").unwrap();
+        assert_eq!(f.rows[0].to_prior::<f64>(None).rate_rad_s, Some([0.1, -0.2, 0.3]));
+        assert_eq!(f.rows[1].to_prior::<f64>(None).rate_rad_s, None);
+    }
+}
