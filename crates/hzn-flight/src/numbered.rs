@@ -1,6 +1,7 @@
 //! Enumerations with frozen numbers, because the numbers are in packets.
 
-/// Makes an enumeration from its variants, each with a number and a word, and the items `ALL`, `from_number` and `name`.
+/// Makes an enumeration from its variants, each with a number and a word. It gets the items `ALL`, `from_number` and
+/// `name`.
 macro_rules! numbered_enum {
     (
         $(#[$doc:meta])*

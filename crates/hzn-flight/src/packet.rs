@@ -165,8 +165,8 @@ impl Inbox {
     pub fn is_waiting(&self) -> bool {
         self.len > 0
     }
-    /// Passes the next packet to `handle`, or `None` for a broken packet. Returns the result of `handle`; `None` if there
-    /// is no packet yet.
+    /// Passes the next packet to `handle`, or `None` for a broken packet. Returns the result of `handle`; `None` if
+    /// there is no packet yet.
     pub fn next<R>(&mut self, handle: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
         let (used, result) = match scan(self.bytes.get(..self.len).unwrap_or_default()) {
             // A full inbox without a packet cannot become one.
