@@ -262,7 +262,7 @@ fn an_exchange_over_the_line() {
             said.contains("picture of wrong size (1000, 307200)") && said.contains("pictures lost (3, 0)"),
             "{said}"
         );
-        assert!(said.contains("(set): value refused, nothing changed"), "{said}");
+        assert!(said.contains("(set): value refused; nothing changed"), "{said}");
         assert!(said.contains("standby to shut-down mode"), "{said}");
         assert!(!said.contains("broken packets") && !said.contains("lost on the way"), "{said}");
         let housekeeping = std::fs::read_to_string(bench.path("hk.csv")).unwrap();

@@ -26,8 +26,6 @@ const STILL_LONG: &[&str] = &[
     "crates/hzn-core/src/stages/fit/mod.rs",
     "crates/hzn-core/src/stages/gates/mod.rs",
     "crates/hzn-core/src/stages/threshold.rs",
-    "crates/hzn-flight/src/flight.rs",
-    "crates/hzn-flight/tests/flight.rs",
     "crates/hzn-run/src/engine/mod.rs",
 ];
 

@@ -88,7 +88,7 @@ pub struct PictureAnswer {
 }
 
 /// Most looks that the packet can show.
-const MOST_LOOKS: u32 = 16;
+const MAX_LOOKS: u32 = 16;
 
 impl PictureAnswer {
     /// Makes the answer from a report.
@@ -125,7 +125,7 @@ impl PictureAnswer {
         Self {
             status: report.status as u8,
             stage: report.stage as u8,
-            looks: c.looks.clamp(1, MOST_LOOKS) as u8,
+            looks: c.looks.clamp(1, MAX_LOOKS) as u8,
             level: report.level,
             followed: c.followed,
             candidates: c.candidates,
@@ -140,14 +140,14 @@ impl PictureAnswer {
     }
 
     /// Returns the report in double precision, as on a workstation; `None` if a number in it has no meaning.
-    pub fn report(&self) -> Option<Report<f64>> {
+    pub fn to_report(&self) -> Option<Report<f64>> {
         let mut candidates = Candidates::default();
         for (place, e) in (0..).zip(self.edges.iter().flatten()) {
             let verdict = *Verdict::ALL.get(usize::from(e.verdict))?;
             // Telemetry has no candidate numbers. Only the chosen candidate can be at a place other than its number.
-            let own = self.direction.filter(|_| verdict == Verdict::Chosen).map(|d| d.candidate);
+            let chosen = self.direction.filter(|_| verdict == Verdict::Chosen).map(|d| d.candidate);
             let candidate = Candidate {
-                number: own.unwrap_or(place),
+                number: chosen.unwrap_or(place),
                 length_px: e.length_px,
                 points: e.points,
                 inliers: e.inliers,
@@ -156,14 +156,14 @@ impl PictureAnswer {
             };
             candidates.push(candidate).ok()?;
         }
-        let unit = |v: [f32; 3]| v.map(f64::from);
+        let widen = |v: [f32; 3]| v.map(f64::from);
         let solution = match &self.direction {
             None => None,
             Some(d) => Some(Solution {
-                axis: UnitVec3::try_new(unit(d.axis))?,
+                axis: UnitVec3::try_new(widen(d.axis))?,
                 covariance: Cov3::from_upper(d.cov.map(f64::from)),
-                axis_ecef: UnitVec3::try_new(unit(d.axis_ecef)),
-                axis_body: UnitVec3::try_new(unit(d.axis_body)),
+                axis_ecef: UnitVec3::try_new(widen(d.axis_ecef)),
+                axis_body: UnitVec3::try_new(widen(d.axis_body)),
                 half_angle_rad: d.half_angle_rad.into(),
                 fused_half_angle_rad: d.fused_half_angle_rad.into(),
                 altitude_m: (!d.altitude_m.is_nan()).then(|| (d.altitude_m.into(), d.altitude_sigma_m.into())),
@@ -248,10 +248,10 @@ impl PictureAnswer {
         let (solved, listed) = (from.u8()?, from.u8()?);
         if solved != 0 {
             answer.direction = Some(Direction {
-                axis: floats(from)?,
-                cov: floats(from)?,
-                axis_ecef: floats(from)?,
-                axis_body: floats(from)?,
+                axis: from.floats()?,
+                cov: from.floats()?,
+                axis_ecef: from.floats()?,
+                axis_body: from.floats()?,
                 half_angle_rad: from.f32()?,
                 fused_half_angle_rad: from.f32()?,
                 altitude_m: from.f32()?,
@@ -273,14 +273,6 @@ impl PictureAnswer {
         }
         Some(answer)
     }
-}
-
-fn floats<const N: usize>(from: &mut Reader<'_>) -> Option<[f32; N]> {
-    let mut out = [0.0; N];
-    for x in &mut out {
-        *x = from.f32()?;
-    }
-    Some(out)
 }
 
 #[cfg(test)]
@@ -306,7 +298,7 @@ mod tests {
         };
         let mut edges = [None; MAX_LISTED];
         (edges[0], edges[1]) = (Some(Edge { verdict: 5, ..edge }), Some(edge));
-        let whole = PictureAnswer {
+        let solved = PictureAnswer {
             status: 0,
             stage: 7,
             looks: 3,
@@ -321,7 +313,7 @@ mod tests {
             direction: Some(direction),
             edges,
         };
-        for answer in [whole, PictureAnswer { status: 1, direction: None, edges: [None; MAX_LISTED], ..whole }] {
+        for answer in [solved, PictureAnswer { status: 1, direction: None, edges: [None; MAX_LISTED], ..solved }] {
             let mut bytes = [0; 512];
             let mut out = Writer::new(&mut bytes);
             answer.write(&mut out);

@@ -2,7 +2,7 @@
 
 /// A picture that the camera has written to memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shot {
+pub struct Picture {
     /// Bytes that the camera wrote.
     pub bytes: usize,
     /// Time of the exposure, µs since the start.
@@ -31,9 +31,9 @@ pub trait Board {
     fn camera_answers(&mut self) -> bool;
     /// Takes the newest picture that was not taken yet, if there is one. The camera gets the buffer of the picture
     /// before.
-    fn next_shot(&mut self) -> Option<Shot>;
-    /// Returns the picture that was taken last: one byte per pixel, row by row.
-    fn picture(&self) -> &[u8];
+    fn next_picture(&mut self) -> Option<Picture>;
+    /// Returns the pixels of the picture that was taken last: one byte per pixel, row by row.
+    fn pixels(&self) -> &[u8];
     /// Reads copy 1 or 2 of the parameters from memory.
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);
     /// Writes copy 1 or 2 of the parameters. Returns false if the memory refuses.

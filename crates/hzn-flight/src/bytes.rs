@@ -98,4 +98,12 @@ impl<'a> Reader<'a> {
     pub fn f64(&mut self) -> Option<f64> {
         self.u64().map(f64::from_bits)
     }
+    /// Reads `N` single-precision numbers; `None` if fewer are left.
+    pub(crate) fn floats<const N: usize>(&mut self) -> Option<[f32; N]> {
+        let mut out = [0.0; N];
+        for x in &mut out {
+            *x = self.f32()?;
+        }
+        Some(out)
+    }
 }

@@ -1,9 +1,9 @@
 //! The contents of packets: telecommands, and telemetry other than the answers. The numbers are frozen.
 
 use crate::bytes::{Reader, Writer};
-use crate::numbered::numbered;
+use crate::numbered::numbered_enum;
 
-numbered! {
+numbered_enum! {
     /// Modes, as in HORACE (Barf 2014).
     pub enum Mode: u8 {
         /// The self-checks are done, and the computer waits for lift-off or a command. A picture is processed on
@@ -18,7 +18,7 @@ numbered! {
     }
 }
 
-numbered! {
+numbered_enum! {
     /// The outcome of a telecommand.
     pub enum Code: u8 {
         /// The telecommand was carried out.
@@ -28,19 +28,19 @@ numbered! {
         /// The arguments are too short, too long, or do not belong to this function.
         Arguments = 2 => "wrong arguments",
         /// There is no such function, or the packet is no telecommand.
-        Unknown = 3 => "no such function",
+        Unknown = 3 => "unknown function",
         /// The function is not allowed in this mode.
-        Mode = 4 => "not in this mode",
+        Mode = 4 => "not allowed in this mode",
         /// No parameter has this number.
-        UnknownParameter = 5 => "no such parameter",
+        UnknownParameter = 5 => "unknown parameter",
         /// A parameter, or the combination of all, was refused. Nothing changed.
-        Refused = 6 => "value refused, nothing changed",
+        Refused = 6 => "value refused; nothing changed",
         /// The parameters are in use, but the memory did not keep them: they are lost at the next reset.
-        NotStored = 7 => "in force, but not stored",
+        NotStored = 7 => "in use, but not stored",
     }
 }
 
-numbered! {
+numbered_enum! {
     /// Functions of telecommands: the first byte of the user data.
     pub enum Function: u8 {
         /// Changes the mode (u8).
@@ -62,7 +62,7 @@ numbered! {
     }
 }
 
-numbered! {
+numbered_enum! {
     /// Severity of an event.
     pub enum Severity: u8 {
         /// Everything is as it should be.
@@ -74,7 +74,7 @@ numbered! {
     }
 }
 
-numbered! {
+numbered_enum! {
     /// Something that happened, with two numbers, a and b, that say more.
     pub enum Event: u16 {
         /// The computer started. a: copy of the parameters in use (1 or 2; 0 for the defaults). b: their generation.
@@ -83,7 +83,7 @@ numbered! {
         /// refused.
         CopyBroken = 2 => "a copy of the parameters cannot be used",
         /// No copy can be used, so the defaults apply. a: 0. b: 0.
-        Defaults = 3 => "no copy of the parameters can be used: defaults",
+        Defaults = 3 => "no copy of the parameters can be used; the defaults are in use",
         /// The mode changed. a: mode before. b: mode now.
         ModeChanged = 4 => "mode changed",
         /// A telecommand was rejected. a: [`Code`]. b: function.
@@ -100,8 +100,8 @@ numbered! {
         Watchdog = 10 => "reset by the watchdog",
         /// The memory did not keep the parameters. a: copy (1 or 2). b: 0.
         StoreFailed = 11 => "parameters not stored",
-        /// The prior from navigation is impossible. a: 0. b: 0.
-        KnownRefused = 12 => "what navigation told cannot be",
+        /// The sensor refused the prior: its altitude or position is missing or impossible. a: 0. b: 0.
+        KnownRefused = 12 => "the altitude or position is missing or impossible",
     }
 }
 

@@ -1,7 +1,8 @@
 //! Enumerations with frozen numbers, because the numbers are in packets.
 
-/// Makes an enumeration from its variants, each with a number and a word, and the items `ALL`, `numbered` and `name`.
-macro_rules! numbered {
+/// Makes an enumeration from its variants, each with a number and a word. It gets the items `ALL`, `from_number` and
+/// `name`.
+macro_rules! numbered_enum {
     (
         $(#[$doc:meta])*
         pub enum $name:ident: $number:ident {
@@ -19,7 +20,7 @@ macro_rules! numbered {
             /// All variants, in the order of their definition.
             pub const ALL: &'static [Self] = &[$(Self::$variant),*];
             /// Returns the variant with the number `n`, if there is one.
-            pub fn numbered(n: $number) -> Option<Self> {
+            pub fn from_number(n: $number) -> Option<Self> {
                 Self::ALL.iter().copied().find(|&x| x as $number == n)
             }
             /// Returns the word for the variant in messages and commands.
@@ -32,4 +33,4 @@ macro_rules! numbered {
     };
 }
 
-pub(crate) use numbered;
+pub(crate) use numbered_enum;

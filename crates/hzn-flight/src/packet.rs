@@ -11,7 +11,7 @@
 //! ```
 
 use crate::bytes::{Reader, Writer};
-use crate::numbered::numbered;
+use crate::numbered::numbered_enum;
 
 /// The sync marker before every packet.
 pub const SYNC: [u8; 4] = [0x1A, 0xCF, 0xFC, 0x1D];
@@ -23,7 +23,7 @@ const CRC: usize = 2;
 
 const CRC16: crc::Crc<u16, crc::NoTable> = crc::Crc::<u16, crc::NoTable>::new(&crc::CRC_16_IBM_3740);
 
-numbered! {
+numbered_enum! {
     /// The subject of a packet: its application process identifier (APID). The numbers are frozen.
     pub enum Apid: u16 {
         /// State of the computer.
@@ -106,23 +106,23 @@ pub enum Scan<'a> {
 
 /// Searches for the first packet in `bytes`.
 pub fn scan(bytes: &[u8]) -> Scan<'_> {
-    let Some(at) = bytes.windows(SYNC.len()).position(|w| w == SYNC) else {
+    let Some(marker) = bytes.windows(SYNC.len()).position(|w| w == SYNC) else {
         // The last bytes may be the beginning of a marker.
         return Scan::More { skip: bytes.len().saturating_sub(SYNC.len() - 1) };
     };
-    let begin = at + SYNC.len();
+    let begin = marker + SYNC.len();
     let bad = Scan::Bad { skip: begin };
     let mut from = Reader::new(bytes.get(begin..).unwrap_or_default());
     let (Some(id), Some(sequence), Some(len)) = (from.u16(), from.u16(), from.u16()) else {
-        return Scan::More { skip: at };
+        return Scan::More { skip: marker };
     };
     let len = usize::from(len) + 1;
     if id >> 13 != 0 || id & 1 << 11 == 0 || len < TIME + CRC || SYNC.len() + HEADER + len > MAX_BYTES {
         return bad;
     }
     let end = begin + HEADER + len;
-    let Some(whole) = bytes.get(begin..end) else { return Scan::More { skip: at } };
-    let Some((checked, crc)) = whole.split_last_chunk::<CRC>() else { return bad };
+    let Some(packet_bytes) = bytes.get(begin..end) else { return Scan::More { skip: marker } };
+    let Some((checked, crc)) = packet_bytes.split_last_chunk::<CRC>() else { return bad };
     if CRC16.checksum(checked) != u16::from_be_bytes(*crc) {
         return bad;
     }
@@ -165,16 +165,16 @@ impl Inbox {
     pub fn is_waiting(&self) -> bool {
         self.len > 0
     }
-    /// Passes the next packet to `with`, or `None` for a broken packet. Returns the result of `with`; `None` if there
-    /// is no packet yet.
-    pub fn next<R>(&mut self, with: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
-        let (drop, result) = match scan(self.bytes.get(..self.len).unwrap_or_default()) {
+    /// Passes the next packet to `handle`, or `None` for a broken packet. Returns the result of `handle`; `None` if
+    /// there is no packet yet.
+    pub fn next<R>(&mut self, handle: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
+        let (used, result) = match scan(self.bytes.get(..self.len).unwrap_or_default()) {
             // A full inbox without a packet cannot become one.
             Scan::More { skip } => (if self.len == MAX_BYTES { skip.max(1) } else { skip }, None),
-            Scan::Packet { end, packet } => (end, Some(with(Some(packet)))),
-            Scan::Bad { skip } => (skip, Some(with(None))),
+            Scan::Packet { end, packet } => (end, Some(handle(Some(packet)))),
+            Scan::Bad { skip } => (skip, Some(handle(None))),
         };
-        self.remove(drop);
+        self.remove(used);
         result
     }
     /// Gives up the packet that has begun. The bytes after its sync marker may contain another packet.

@@ -67,7 +67,7 @@ impl Parameters {
     }
 
     /// Makes the default parameters before any are loaded: an ideal lens of 640×480 pixels at 230 km above the Earth.
-    pub fn idle() -> Self {
+    pub fn defaults() -> Self {
         let mut sensor = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 600.0));
         sensor.body.altitude_km = Some(230.0);
         Self::new(sensor)
@@ -87,7 +87,7 @@ impl Parameters {
 
     /// Returns the number of a parameter by its name in sensor.toml. If the name has several numbers, returns the
     /// first.
-    pub fn named(name: &str) -> Option<u16> {
+    pub fn number_of(name: &str) -> Option<u16> {
         Config::numbers().chain([HOUSEKEEPING]).find(|&id| self::name(id) == Some(name))
     }
 
@@ -110,10 +110,10 @@ impl Parameters {
         if let Some(value) = c.number(id) {
             return Some(value);
         }
-        if let Some(i) = within(id, CORNERS, MAX_POLYGONS as u16) {
+        if let Some(i) = index_within(id, CORNERS, MAX_POLYGONS as u16) {
             return Some(c.mask.polygons_px.get(i).map_or(0.0, |p| p.len() as f64));
         }
-        let i = within(id, CORNER, MAX_POLYGONS as u16 * POLYGON)?;
+        let i = index_within(id, CORNER, MAX_POLYGONS as u16 * POLYGON)?;
         let polygon = c.mask.polygons_px.get(i / usize::from(POLYGON))?;
         polygon.get(i % usize::from(POLYGON) / 2)?.get(i % 2).copied()
     }
@@ -123,17 +123,17 @@ impl Parameters {
     /// # Errors
     /// There is no such parameter, or the value is not possible for it.
     pub fn set(&mut self, id: u16, value: f64) -> Result<(), Refused> {
-        let no = Refused::Value(id, value);
+        let refused = Refused::Value(id, value);
         let c = &mut self.sensor;
         if id == HOUSEKEEPING {
-            return self.housekeeping_every.set_number(0, value).ok_or(no);
+            return self.housekeeping_every.set_number(0, value).ok_or(refused);
         }
-        if let Some(taken) = c.set_number(id, value) {
-            return if taken { Ok(()) } else { Err(no) };
+        if let Some(accepted) = c.set_number(id, value) {
+            return if accepted { Ok(()) } else { Err(refused) };
         }
-        if let Some(i) = within(id, CORNERS, MAX_POLYGONS as u16) {
+        if let Some(i) = index_within(id, CORNERS, MAX_POLYGONS as u16) {
             let mut corners = 0_u16;
-            corners.set_number(0, value).ok_or(no)?;
+            corners.set_number(0, value).ok_or(refused)?;
             let corners = usize::from(corners);
             let polygons = &mut c.mask.polygons_px;
             if corners == 0 {
@@ -142,16 +142,16 @@ impl Parameters {
             }
             // Polygons are numbered without gaps.
             if polygons.len() == i {
-                polygons.push(Polygon::new()).map_err(|_| no)?;
+                polygons.push(Polygon::new()).map_err(|_| refused)?;
             }
-            let polygon = polygons.get_mut(i).ok_or(no)?;
-            return polygon.resize(corners, [0.0; 2]).map_err(|_| no);
+            let polygon = polygons.get_mut(i).ok_or(refused)?;
+            return polygon.resize(corners, [0.0; 2]).map_err(|_| refused);
         }
-        if let Some(i) = within(id, CORNER, MAX_POLYGONS as u16 * POLYGON) {
-            let value = Some(value).filter(|x| x.is_finite()).ok_or(no)?;
-            let polygon = c.mask.polygons_px.get_mut(i / usize::from(POLYGON)).ok_or(no)?;
-            let corner = polygon.get_mut(i % usize::from(POLYGON) / 2).ok_or(no)?;
-            *corner.get_mut(i % 2).ok_or(no)? = value;
+        if let Some(i) = index_within(id, CORNER, MAX_POLYGONS as u16 * POLYGON) {
+            let value = Some(value).filter(|x| x.is_finite()).ok_or(refused)?;
+            let polygon = c.mask.polygons_px.get_mut(i / usize::from(POLYGON)).ok_or(refused)?;
+            let corner = polygon.get_mut(i % usize::from(POLYGON) / 2).ok_or(refused)?;
+            *corner.get_mut(i % 2).ok_or(refused)? = value;
             return Ok(());
         }
         Err(Refused::Unknown(id))
@@ -161,19 +161,19 @@ impl Parameters {
     ///
     /// # Errors
     /// Returns the first key that a flight computer cannot take.
-    pub fn flyable(&self) -> Result<(), &'static str> {
-        let mut same =
+    pub fn check_flyable(&self) -> Result<(), &'static str> {
+        let mut flown =
             Self { sensor: Config::new(self.sensor.camera.clone()), housekeeping_every: self.housekeeping_every };
         for id in self.numbers() {
             let value = self.get(id).unwrap_or(f64::NAN);
-            if same.set(id, value).is_err() {
+            if flown.set(id, value).is_err() {
                 return Err(name(id).unwrap_or("mask"));
             }
         }
         // Colours and orientation of pictures are handled on the ground, so `input` does not count. The mask was set by
         // its corners.
-        same.sensor.input = self.sensor.input;
-        match self.sensor.differing_on_ground(&same.sensor) {
+        flown.sensor.input = self.sensor.input;
+        match self.sensor.differing_on_ground(&flown.sensor) {
             Some(path) => Err(path),
             None => Ok(()),
         }
@@ -193,7 +193,7 @@ impl Parameters {
 }
 
 /// Returns the index of a number within a range of numbers.
-fn within(id: u16, first: u16, count: u16) -> Option<usize> {
+fn index_within(id: u16, first: u16, count: u16) -> Option<usize> {
     id.checked_sub(first).filter(|&i| i < count).map(usize::from)
 }
 
@@ -204,7 +204,7 @@ mod tests {
     use std::vec::Vec;
 
     fn full() -> Parameters {
-        let mut p = Parameters::idle();
+        let mut p = Parameters::defaults();
         p.sensor.camera.model = Model::KannalaBrandt;
         p.sensor.camera.k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
         p.sensor.camera.theta_max_deg = Some(54.0);
@@ -222,15 +222,15 @@ mod tests {
     fn every_parameter_survives_a_round_trip() {
         let from = full();
         from.check().unwrap();
-        let mut to = Parameters::idle();
+        let mut to = Parameters::defaults();
         for id in from.numbers() {
             assert!(name(id).is_some(), "{id}");
             to.set(id, from.get(id).unwrap()).unwrap();
         }
         assert_eq!(to, from);
         // In the other direction, parameters that the defaults do not have are removed.
-        for id in Parameters::idle().numbers() {
-            to.set(id, Parameters::idle().get(id).unwrap()).unwrap();
+        for id in Parameters::defaults().numbers() {
+            to.set(id, Parameters::defaults().get(id).unwrap()).unwrap();
         }
         assert_eq!(to.sensor.mask.polygons_px.len(), 0);
         assert_eq!(to.sensor.mount, None);

@@ -21,7 +21,7 @@ pub struct Loaded {
 /// Reads both copies by way of `buffer` and returns the newer valid one.
 #[inline(never)]
 pub fn load(board: &mut impl Board, buffer: &mut [u8]) -> Loaded {
-    let mut out = Loaded { parameters: Parameters::idle(), copy: 0, generation: 0, broken: [None; 2] };
+    let mut out = Loaded { parameters: Parameters::defaults(), copy: 0, generation: 0, broken: [None; 2] };
     for (copy, broken) in (1u8..).zip(&mut out.broken) {
         board.read_copy(copy, buffer);
         match table::read(buffer) {

@@ -40,8 +40,8 @@ pub enum TableError {
 impl core::fmt::Display for TableError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Header => f.write_str("no parameter table of this version, or cut off"),
-            Self::Checksum => f.write_str("the parameter table's checksum does not fit"),
+            Self::Header => f.write_str("not a parameter table of this version, or the table is cut off"),
+            Self::Checksum => f.write_str("the checksum of the parameter table is wrong"),
             Self::Refused(e) => e.fmt(f),
         }
     }
@@ -50,23 +50,23 @@ impl core::error::Error for TableError {}
 
 /// Writes a table into `out` and returns its length; `None` if there is no room.
 pub fn write(parameters: &Parameters, generation: u32, out: &mut [u8]) -> Option<usize> {
-    let mut at = HEADER;
+    let mut end = HEADER;
     let mut count = 0u16;
     for id in parameters.numbers() {
         let value = parameters.get(id)?;
-        let entry = out.get_mut(at..at + ENTRY)?;
+        let entry = out.get_mut(end..end + ENTRY)?;
         entry.get_mut(..2)?.copy_from_slice(&id.to_le_bytes());
         entry.get_mut(2..)?.copy_from_slice(&value.to_le_bytes());
-        at += ENTRY;
+        end += ENTRY;
         count += 1;
     }
     out.get_mut(..4)?.copy_from_slice(&MAGIC);
     out.get_mut(4..6)?.copy_from_slice(&VERSION.to_le_bytes());
     out.get_mut(6..8)?.copy_from_slice(&count.to_le_bytes());
     out.get_mut(8..12)?.copy_from_slice(&generation.to_le_bytes());
-    let crc = CRC32.checksum(out.get(..at)?);
-    out.get_mut(at..at + 4)?.copy_from_slice(&crc.to_le_bytes());
-    Some(at + 4)
+    let crc = CRC32.checksum(out.get(..end)?);
+    out.get_mut(end..end + 4)?.copy_from_slice(&crc.to_le_bytes());
+    Some(end + 4)
 }
 
 /// Reads the table at the start of `bytes` and ignores the bytes after it. Returns the checked parameters and the
@@ -75,8 +75,8 @@ pub fn write(parameters: &Parameters, generation: u32, out: &mut [u8]) -> Option
 /// # Errors
 /// The bytes are not a complete table, or its parameters are refused.
 pub fn read(bytes: &[u8]) -> Result<(Parameters, u32), TableError> {
-    let (entries, generation) = open(bytes)?;
-    let mut parameters = Parameters::idle();
+    let (entries, generation) = split(bytes)?;
+    let mut parameters = Parameters::defaults();
     for entry in entries.chunks_exact(ENTRY) {
         if let (Some(id), Some(value)) = (entry.first_chunk(), entry.last_chunk()) {
             parameters.set(u16::from_le_bytes(*id), f64::from_le_bytes(*value)).map_err(TableError::Refused)?;
@@ -88,11 +88,11 @@ pub fn read(bytes: &[u8]) -> Result<(Parameters, u32), TableError> {
 
 /// Returns the generation of the table at the start of `bytes`; `None` if it is not complete or its checksum is wrong.
 pub fn generation(bytes: &[u8]) -> Option<u32> {
-    open(bytes).ok().map(|(_, generation)| generation)
+    split(bytes).ok().map(|(_, generation)| generation)
 }
 
 /// Returns the entries and the generation of a table with the right checksum.
-fn open(bytes: &[u8]) -> Result<(&[u8], u32), TableError> {
+fn split(bytes: &[u8]) -> Result<(&[u8], u32), TableError> {
     let header: &[u8; HEADER] = bytes.first_chunk().ok_or(TableError::Header)?;
     let [m0, m1, m2, m3, v0, v1, n0, n1, g0, g1, g2, g3] = *header;
     if [m0, m1, m2, m3] != MAGIC || u16::from_le_bytes([v0, v1]) != VERSION {
@@ -114,7 +114,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn sample() -> ([u8; MAX_BYTES], usize) {
-        let mut p = Parameters::idle();
+        let mut p = Parameters::defaults();
         p.set(4, 777.25).unwrap();
         let mut bytes = [0; MAX_BYTES];
         let n = write(&p, 41, &mut bytes).unwrap();
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn the_largest_table_fits() {
-        let mut p = Parameters::idle();
+        let mut p = Parameters::defaults();
         for _ in 0..8 {
             let polygon = (0..16).map(|i| [f64::from(i), 1.0]).collect();
             p.sensor.mask.polygons_px.push(polygon).unwrap();

@@ -27,7 +27,7 @@ pub struct Place {
 
 impl Place {
     /// Makes a place from a vector in ECEF of any length; only its direction counts.
-    fn along(ecef: Vector3<f64>, distance_m: f64) -> Self {
+    fn from_vector(ecef: Vector3<f64>, distance_m: f64) -> Self {
         Self { direction: (ecef / norm(&ecef)).into(), distance_m }
     }
 
@@ -39,7 +39,7 @@ impl Place {
     /// Returns the place of the body as seen from a position (ECEF, metres).
     pub fn seen_from(&self, position_m: [f64; 3]) -> Self {
         let d = Vector3::from(self.position_m()) - Vector3::from(position_m);
-        Self::along(d, norm(&d))
+        Self::from_vector(d, norm(&d))
     }
 }
 
@@ -70,7 +70,7 @@ struct Time {
 }
 
 impl Time {
-    fn at(unix_s: f64) -> Self {
+    fn from_unix_s(unix_s: f64) -> Self {
         let t = tt_days_since_j2000(unix_s) / 36525.0;
         let node_deg = 125.04 - 1934.136 * t;
         let nutation_deg = -0.00478 * sin(node_deg);
@@ -83,7 +83,7 @@ impl Time {
     }
 
     /// Converts ecliptic longitude and latitude of date (degrees) to ECEF.
-    fn ecef(&self, longitude_deg: f64, latitude_deg: f64) -> Vector3<f64> {
+    fn ecliptic_to_ecef(&self, longitude_deg: f64, latitude_deg: f64) -> Vector3<f64> {
         let (se, ce) = (sin(self.obliquity_deg), cos(self.obliquity_deg));
         let (sb, cb) = (sin(latitude_deg), cos(latitude_deg));
         let (y, z) = (cb * sin(longitude_deg), sb);
@@ -97,13 +97,13 @@ impl Time {
 /// Greenwich. `unix_s` is UTC in seconds since 1970.
 pub fn sidereal_rad(unix_s: f64) -> f64 {
     // Does the same as `f64::rem_euclid`, which only the standard library has.
-    let rest = Time::at(unix_s).sidereal_deg % 360.0;
+    let rest = Time::from_unix_s(unix_s).sidereal_deg % 360.0;
     (if rest < 0.0 { rest + 360.0 } else { rest }).to_radians()
 }
 
 /// Returns the Sun as seen from the Earth's centre. `unix_s` is UTC in seconds since 1970.
 pub fn sun(unix_s: f64) -> Place {
-    let time = Time::at(unix_s);
+    let time = Time::from_unix_s(unix_s);
     let t = time.t;
     let mean_longitude = 280.46646 + 36000.76983 * t + 0.0003032 * t * t;
     let anomaly = 357.52911 + 35999.05029 * t - 0.0001537 * t * t;
@@ -116,12 +116,12 @@ pub fn sun(unix_s: f64) -> Place {
     let longitude = mean_longitude + centre - 0.00569 + time.nutation_deg - 0.0025 + 0.00179 * sin(elongation);
     let eccentricity = 0.016708634 - 0.000042037 * t;
     let distance_au = 1.000001018 * (1.0 - eccentricity * eccentricity) / (1.0 + eccentricity * cos(anomaly + centre));
-    Place::along(time.ecef(longitude, 0.0), distance_au * AU_KM * 1e3)
+    Place::from_vector(time.ecliptic_to_ecef(longitude, 0.0), distance_au * AU_KM * 1e3)
 }
 
 /// Returns the Moon as seen from the Earth's centre. `unix_s` is UTC in seconds since 1970.
 pub fn moon(unix_s: f64) -> Place {
-    let time = Time::at(unix_s);
+    let time = Time::from_unix_s(unix_s);
     let t = time.t;
     // Mean longitude of date, anomalies of Moon and Sun, argument of latitude, elongation.
     let mean = 218.31617 + 481267.88088 * t;
@@ -130,7 +130,7 @@ pub fn moon(unix_s: f64) -> Place {
     let f = 93.27283 + 483202.01873 * t;
     let d = 297.85027 + 445267.11135 * t;
     // (arcseconds, argument)
-    let of_longitude = [
+    let longitude_terms = [
         (22640.0, l),
         (769.0, 2.0 * l),
         (-4586.0, l - 2.0 * d),
@@ -147,10 +147,10 @@ pub fn moon(unix_s: f64) -> Place {
         (-55.0, 2.0 * f - 2.0 * d),
     ];
     let sum = |terms: &[(f64, f64)]| terms.iter().map(|&(a, x)| a * sin(x)).sum::<f64>() / 3600.0;
-    let from_mean = sum(&of_longitude);
-    let along = f + from_mean + sum(&[(412.0, 2.0 * f), (541.0, s)]);
+    let longitude_correction = sum(&longitude_terms);
+    let argument = f + longitude_correction + sum(&[(412.0, 2.0 * f), (541.0, s)]);
     let latitude = sum(&[
-        (18520.0, along),
+        (18520.0, argument),
         (-526.0, f - 2.0 * d),
         (44.0, l + f - 2.0 * d),
         (-31.0, -l + f - 2.0 * d),
@@ -165,7 +165,10 @@ pub fn moon(unix_s: f64) -> Place {
             - 205.0 * cos(s - 2.0 * d)
             - 171.0 * cos(l + 2.0 * d)
             - 152.0 * cos(l + s - 2.0 * d);
-    Place::along(time.ecef(mean + from_mean + time.nutation_deg, latitude), distance_km * 1e3)
+    Place::from_vector(
+        time.ecliptic_to_ecef(mean + longitude_correction + time.nutation_deg, latitude),
+        distance_km * 1e3,
+    )
 }
 
 #[cfg(test)]
@@ -176,11 +179,11 @@ mod tests {
     fn read(text: &str) -> Vec<serde_json::Value> {
         serde_json::from_str::<serde_json::Value>(text).unwrap()["cases"].as_array().unwrap().clone()
     }
-    fn apart_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
+    fn separation_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
         let (a, b) = (Vector3::from(a), Vector3::from(b));
         libm::atan2(norm(&a.cross(&b)), a.dot(&b)).to_degrees()
     }
-    fn three(v: &serde_json::Value) -> [f64; 3] {
+    fn vector(v: &serde_json::Value) -> [f64; 3] {
         core::array::from_fn(|i| v[i].as_f64().unwrap())
     }
 
@@ -191,10 +194,10 @@ mod tests {
             let day = |i: usize| case["jd_utc"][i].as_f64().unwrap();
             let unix_s = (day(0) - 2_440_587.5 + day(1)) * 86_400.0;
             assert_eq!(crate::time::tai_minus_utc_s(unix_s), case["tai_minus_utc_s"].as_f64().unwrap(), "{utc}");
-            let got = sun(unix_s);
-            let off_deg = apart_deg(got.direction, three(&case["sun_itrs_apparent_unit"]));
-            assert!(off_deg <= 0.01, "{utc}: {off_deg}");
-            let au = got.distance_m / (AU_KM * 1e3);
+            let place = sun(unix_s);
+            let error_deg = separation_deg(place.direction, vector(&case["sun_itrs_apparent_unit"]));
+            assert!(error_deg <= 0.01, "{utc}: {error_deg}");
+            let au = place.distance_m / (AU_KM * 1e3);
             assert!((au - case["distance_au"].as_f64().unwrap()).abs() < 1e-4, "{utc}: {au}");
         }
     }
@@ -204,12 +207,12 @@ mod tests {
         let (mut worst_deg, mut worst_km, mut square) = (0.0f64, 0.0f64, 0.0);
         let cases = read(include_str!("../tests/data/moon_position.json"));
         for case in &cases {
-            let want = three(&case["moon_itrs_km"]);
-            let got = moon(case["unix_s"].as_f64().unwrap());
-            let off = apart_deg(got.direction, want);
-            worst_deg = worst_deg.max(off);
-            square += off * off;
-            worst_km = worst_km.max((got.distance_m / 1e3 - norm(&Vector3::from(want))).abs());
+            let truth = vector(&case["moon_itrs_km"]);
+            let place = moon(case["unix_s"].as_f64().unwrap());
+            let error_deg = separation_deg(place.direction, truth);
+            worst_deg = worst_deg.max(error_deg);
+            square += error_deg * error_deg;
+            worst_km = worst_km.max((place.distance_m / 1e3 - norm(&Vector3::from(truth))).abs());
         }
         println!("{worst_deg}° at worst, {}° RMS, {worst_km} km", (square / cases.len() as f64).sqrt());
         assert!(worst_deg < 0.1 && worst_km < 600.0, "{worst_deg}° {worst_km} km");
@@ -222,6 +225,6 @@ mod tests {
         let under = moon.direction.map(|x| x * 6.378e6);
         let seen = moon.seen_from(under);
         assert!((moon.distance_m - seen.distance_m - 6.378e6).abs() < 1.0);
-        assert!(apart_deg(seen.direction, moon.direction) < 1e-5);
+        assert!(separation_deg(seen.direction, moon.direction) < 1e-5);
     }
 }

@@ -43,7 +43,7 @@ impl State {
 
     /// Returns what is known of the limb of a body before a picture with these data.
     pub(crate) fn expect_body(&self, body: usize, data: &FrameData) -> PyResult<Expected<f64>> {
-        self.core.expect_body(body, &data.to_frame(None)).map_err(errors::config)
+        self.core.expect_body(body, &data.to_prior(None)).map_err(errors::config)
     }
 
     /// Returns the sensor in double precision. Single stages do not exist in the precision of the flight computer.

@@ -79,7 +79,7 @@ int example(void) {
     print("inliers ");
     print_hex(answer.inliers);
     print("\n");
-    /* Mistakes are said, and change nothing. */
+    /* A mistake gets an error code and changes nothing. */
     frame.bytes = 100;
     if (hzn_process(sensor, &frame, NULL, &answer) != HZN_PICTURE || hzn_process(NULL, NULL, NULL, NULL) != HZN_NULL) {
         return 5;

@@ -46,7 +46,7 @@ pub const HZN_KNOWN: i32 = -6;
 #[derive(Debug)]
 pub struct HznSensor {
     /// The parameters from [`hzn_set`]; they are in use after [`hzn_apply`].
-    wanted: Parameters,
+    pending: Parameters,
     sensor: Sensor<f32>,
     workspace: FlightWorkspace,
 }
@@ -138,12 +138,12 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut 
     if bytes < size_of::<HznSensor>() || !place.is_aligned() {
         return HZN_MEMORY;
     }
-    let wanted = Parameters::idle();
-    let Ok(sensor) = Sensor::new(&wanted.sensor) else { return HZN_REFUSED };
+    let pending = Parameters::defaults();
+    let Ok(sensor) = Sensor::new(&pending.sensor) else { return HZN_REFUSED };
     // SAFETY: `place` is aligned and has room, as checked. Nothing there is dropped, because there is no sensor yet. A
     // workspace consists of arrays of numbers: all bytes are valid, and zeros are an empty workspace.
     unsafe {
-        (&raw mut (*place).wanted).write(wanted);
+        (&raw mut (*place).pending).write(pending);
         (&raw mut (*place).sensor).write(sensor);
         ptr::write_bytes(&raw mut (*place).workspace, 0, 1);
         out.write(place);
@@ -159,7 +159,7 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut 
 pub unsafe extern "C" fn hzn_set(sensor: *mut HznSensor, number: u16, value: f64) -> i32 {
     // SAFETY: the caller guarantees it.
     let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
-    code(sensor.wanted.set(number, value))
+    to_code(sensor.pending.set(number, value))
 }
 
 /// Writes the value of a parameter, as it was set last, to `value`.
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn hzn_set(sensor: *mut HznSensor, number: u16, value: f64
 pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *mut f64) -> i32 {
     // SAFETY: the caller guarantees it.
     let (Some(sensor), Some(value)) = (unsafe { sensor.as_ref() }, unsafe { value.as_mut() }) else { return HZN_NULL };
-    match sensor.wanted.get(number) {
+    match sensor.pending.get(number) {
         Some(found) => {
             *value = found;
             0
@@ -188,13 +188,13 @@ pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *
 pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
     // SAFETY: the caller guarantees it.
     let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
-    match (sensor.wanted.check(), Sensor::new(&sensor.wanted.sensor)) {
+    match (sensor.pending.check(), Sensor::new(&sensor.pending.sensor)) {
         (Ok(()), Ok(new)) => {
             sensor.sensor = new;
             0
         }
         _ => {
-            sensor.wanted = Parameters::new(sensor.sensor.config().clone());
+            sensor.pending = Parameters::new(sensor.sensor.config().clone());
             HZN_REFUSED
         }
     }
@@ -226,24 +226,24 @@ pub unsafe extern "C" fn hzn_process(
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
     let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
     // SAFETY: the caller guarantees it.
-    let frame = unsafe { known.as_ref() }.map_or_else(Prior::default, frame);
-    let Ok(expected) = sensor.sensor.expect(&frame) else { return HZN_KNOWN };
+    let prior = unsafe { known.as_ref() }.map_or_else(Prior::default, to_prior);
+    let Ok(expected) = sensor.sensor.expect(&prior) else { return HZN_KNOWN };
     let report = sensor.sensor.process(&mut sensor.workspace, &grey, &expected, &Unobserved);
-    *out = answer(&PictureAnswer::from_report(&report));
+    *out = to_answer(&PictureAnswer::from_report(&report));
     i32::from(out.status)
 }
 
-fn frame(known: &HznKnown) -> Prior<f32> {
-    let told = |v: [f32; 3]| (!v.iter().any(|x| x.is_nan())).then_some(v);
+fn to_prior(values: &HznKnown) -> Prior<f32> {
+    let known = |v: [f32; 3]| (!v.iter().any(|x| x.is_nan())).then_some(v);
     Prior {
-        altitude_m: (!known.altitude_m.is_nan()).then_some(known.altitude_m),
-        position_m: told(known.position_m),
-        rate_rad_s: told(known.rate_rad_s),
+        altitude_m: (!values.altitude_m.is_nan()).then_some(values.altitude_m),
+        position_m: known(values.position_m),
+        rate_rad_s: known(values.rate_rad_s),
         ..Prior::default()
     }
 }
 
-fn answer(a: &PictureAnswer) -> HznAnswer {
+fn to_answer(a: &PictureAnswer) -> HznAnswer {
     let nan = f32::NAN;
     let d = a.direction.as_ref();
     HznAnswer {
@@ -264,7 +264,7 @@ fn answer(a: &PictureAnswer) -> HznAnswer {
     }
 }
 
-fn code(result: Result<(), Refused>) -> i32 {
+fn to_code(result: Result<(), Refused>) -> i32 {
     match result {
         Ok(()) => 0,
         Err(Refused::Unknown(_)) => HZN_UNKNOWN_PARAMETER,

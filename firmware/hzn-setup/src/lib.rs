@@ -14,7 +14,7 @@ use hzn_core::{Config, Prior, Sensor};
 /// # Errors
 /// Returns the first field that is out of its limits.
 #[inline(never)]
-pub fn sensor(config: &Config) -> Result<Sensor<f32>, ConfigError> {
+pub fn new_sensor(config: &Config) -> Result<Sensor<f32>, ConfigError> {
     Sensor::new(config)
 }
 
@@ -23,6 +23,6 @@ pub fn sensor(config: &Config) -> Result<Sensor<f32>, ConfigError> {
 /// # Errors
 /// The altitude or the position is impossible.
 #[inline(never)]
-pub fn expect(sensor: &Sensor<f32>, frame: &Prior<f32>) -> Result<Expected<f32>, PriorError> {
-    sensor.expect(frame)
+pub fn expect(sensor: &Sensor<f32>, prior: &Prior<f32>) -> Result<Expected<f32>, PriorError> {
+    sensor.expect(prior)
 }

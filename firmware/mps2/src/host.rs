@@ -24,13 +24,13 @@ pub struct File {
 impl File {
     /// Opens a file for reading. `name` ends with a zero byte.
     pub fn open(name: &core::ffi::CStr) -> Option<Self> {
-        Self::with(name, nr::open::R_BINARY)
+        Self::open_with_mode(name, nr::open::R_BINARY)
     }
     /// Creates a file for writing, or empties it.
     pub fn create(name: &core::ffi::CStr) -> Option<Self> {
-        Self::with(name, nr::open::RW_TRUNC_BINARY)
+        Self::open_with_mode(name, nr::open::RW_TRUNC_BINARY)
     }
-    fn with(name: &core::ffi::CStr, mode: usize) -> Option<Self> {
+    fn open_with_mode(name: &core::ffi::CStr, mode: usize) -> Option<Self> {
         // SAFETY: SYS_OPEN reads the name; its length is passed.
         let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, name.count_bytes()) };
         (handle != usize::MAX).then_some(Self { handle })

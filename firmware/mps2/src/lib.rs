@@ -3,6 +3,7 @@
 //! | module | idea |
 //! |---|---|
 //! | [`board`] | external memory, timer, serial line, watchdog |
+//! | [`cases`] | the files of the images that measure the sensor |
 //! | [`host`] | files of the computer that emulates the board, by semihosting |
 //! | [`port`] | the board for the flight software |
 //! | [`watermark`] | the largest use of the stack |
@@ -10,6 +11,7 @@
 #![no_std]
 
 pub mod board;
+pub mod cases;
 pub mod host;
 pub mod port;
 pub mod watermark;

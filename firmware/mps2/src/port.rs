@@ -1,6 +1,6 @@
 //! The port of the flight software: the only file, besides `board`, that a new board rewrites.
 
-use hzn_flight::board::{Board, Shot};
+use hzn_flight::board::{Board, Picture};
 
 use crate::board::{self, FRAME_BYTES, Timer, Uart, Watchdog};
 use crate::host::{File, exit};
@@ -18,8 +18,8 @@ pub struct Mps2 {
     camera: Option<File>,
     frames: [&'static mut [u8]; board::FRAMES],
     /// Index of the buffer that is processed. The camera has the other one.
-    held: usize,
-    held_bytes: usize,
+    current: usize,
+    current_bytes: usize,
     ticks: u32,
     wraps: u64,
     /// Bytes that can still be written to flash before power is cut.
@@ -38,8 +38,8 @@ impl Mps2 {
             watchdog: board.watchdog,
             camera: File::open(c"frames.bin"),
             frames: board.frames,
-            held: 0,
-            held_bytes: 0,
+            current: 0,
+            current_bytes: 0,
             ticks: 0,
             wraps: 0,
             power: cut.then(|| u32::from_le_bytes(word)),
@@ -79,7 +79,7 @@ impl Board for Mps2 {
     fn camera_answers(&mut self) -> bool {
         self.camera.is_some()
     }
-    fn next_shot(&mut self) -> Option<Shot> {
+    fn next_picture(&mut self) -> Option<Picture> {
         let camera = self.camera.as_mut()?;
         let mut header = [0; 16];
         if !camera.read(&mut header) {
@@ -97,15 +97,15 @@ impl Board for Mps2 {
             return None;
         }
         // The camera fills the buffer that is not processed; then both buffers change roles.
-        let next = (self.held + 1) % board::FRAMES;
+        let next = (self.current + 1) % board::FRAMES;
         if !camera.read(self.frames.get_mut(next)?.get_mut(..bytes)?) {
             return None;
         }
-        (self.held, self.held_bytes) = (next, bytes);
-        Some(Shot { bytes, exposure_us: self.now_us(), lost })
+        (self.current, self.current_bytes) = (next, bytes);
+        Some(Picture { bytes, exposure_us: self.now_us(), lost })
     }
-    fn picture(&self) -> &[u8] {
-        self.frames.get(self.held).and_then(|f| f.get(..self.held_bytes)).unwrap_or_default()
+    fn pixels(&self) -> &[u8] {
+        self.frames.get(self.current).and_then(|f| f.get(..self.current_bytes)).unwrap_or_default()
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
         // Erased flash reads as 0xFF.
@@ -118,14 +118,14 @@ impl Board for Mps2 {
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
         let Some(mut file) = File::create(if copy == 1 { c"copy1.bin" } else { c"copy2.bin" }) else { return false };
         // A flash is written in small pieces, and power can be cut between any two of them.
-        for piece in bytes.chunks(8) {
+        for chunk in bytes.chunks(8) {
             if let Some(left) = &mut self.power {
-                match left.checked_sub(piece.len() as u32) {
+                match left.checked_sub(chunk.len() as u32) {
                     Some(rest) => *left = rest,
                     None => exit(99),
                 }
             }
-            if !file.write(piece) {
+            if !file.write(chunk) {
                 return false;
             }
         }

@@ -162,8 +162,8 @@ fn parameter(word: &str) -> Result<u16, String> {
     if let Ok(id) = word.parse::<u16>() {
         return parameters::name(id).map(|_| id).ok_or_else(|| format!("no parameter has the number {id}"));
     }
-    Parameters::named(word).ok_or_else(|| {
-        let ids = Parameters::idle();
+    Parameters::number_of(word).ok_or_else(|| {
+        let ids = Parameters::defaults();
         let names = ids.numbers().filter_map(parameters::name);
         let near = hzn_calib::nearest(word, names).map(|n| format!("; did you mean {n}?"));
         format!("{word} is no parameter{}", near.unwrap_or_default())
@@ -176,7 +176,7 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
     let name = parameters::name(id).unwrap_or("?");
     let cannot = |what: String| Err(format!("{name} cannot be {word}: it is {what}"));
     let number = word.parse::<f64>();
-    let taken = |x: f64| Parameters::idle().set(id, x).is_ok();
+    let taken = |x: f64| Parameters::defaults().set(id, x).is_ok();
     let choices = choices(name);
     if !choices.is_empty() {
         let named = choices.iter().find(|(choice, _)| *choice == word).map(|(_, number)| *number);
@@ -222,7 +222,7 @@ fn choices(name: &str) -> Vec<(&'static str, f64)> {
 fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     let sensor = hzn_calib::sensor::load(path)?;
     let parameters = Parameters::new(sensor.config);
-    parameters.flyable().map_err(|key| {
+    parameters.check_flyable().map_err(|key| {
         usage(format!(
             "{}: {key} has a value that does not fly; leave it at its default (book/reference/telemetry.md)",
             path.display()

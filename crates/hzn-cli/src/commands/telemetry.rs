@@ -157,7 +157,7 @@ impl Heard {
         }
         let time_s = packet.time_us as f64 * 1e-6;
         let from = &mut Reader::new(packet.user);
-        let apid = Apid::numbered(packet.apid);
+        let apid = Apid::from_number(packet.apid);
         let strange = || {
             let name = apid.map_or(String::new(), |a| format!(" ({})", a.name()));
             format!("a packet of APID {:#x}{name} with {} bytes is not understood", packet.apid, packet.user.len())
@@ -178,7 +178,7 @@ impl Heard {
             },
             Some(Apid::Event) => match EventRecord::read(from) {
                 Some(record) => {
-                    let level = match Severity::numbered(record.severity) {
+                    let level = match Severity::from_number(record.severity) {
                         Some(Severity::Information) => LogLevel::Info,
                         Some(Severity::Warning) => LogLevel::Warning,
                         Some(Severity::Error) | None => LogLevel::Error,
@@ -189,8 +189,8 @@ impl Heard {
             },
             Some(Apid::Acknowledge) => match Acknowledge::read(from) {
                 Some(a) => {
-                    let function = Function::numbered(a.function).map_or("?", Function::name);
-                    let code = Code::numbered(a.code).map_or("?", Code::name);
+                    let function = Function::from_number(a.function).map_or("?", Function::name);
+                    let code = Code::from_number(a.code).map_or("?", Code::name);
                     let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
                     self.note(time_s, level, &format!("command {} ({function}): {code}", a.sequence));
                 }
@@ -221,7 +221,7 @@ impl Heard {
 
     fn answer(&mut self, exposure: &Exposure, answer: &PictureAnswer, sink: &mut Option<Sink>) -> Result<(), Stop> {
         let time_s = exposure.exposure_us as f64 * 1e-6;
-        let Some(report) = answer.report() else {
+        let Some(report) = answer.to_report() else {
             self.note(time_s, LogLevel::Warning, &format!("picture {}: numbers that mean nothing", exposure.picture));
             return Ok(());
         };
@@ -264,12 +264,12 @@ impl Heard {
 
 fn event(record: &EventRecord) -> String {
     let EventRecord { number, a, b, .. } = *record;
-    let mode = |n: u32| u8::try_from(n).ok().and_then(Mode::numbered).map_or("?", Mode::name);
-    match Event::numbered(number) {
+    let mode = |n: u32| u8::try_from(n).ok().and_then(Mode::from_number).map_or("?", Mode::name);
+    match Event::from_number(number) {
         Some(Event::ModeChanged) => format!("{} to {} mode", mode(a), mode(b)),
         Some(Event::Started) => format!("started with copy {a} of the parameters, generation {b}"),
         Some(Event::CommandRejected) => {
-            let code = u8::try_from(a).ok().and_then(Code::numbered).map_or("?", Code::name);
+            let code = u8::try_from(a).ok().and_then(Code::from_number).map_or("?", Code::name);
             format!("telecommand rejected: {code} (function {b})")
         }
         Some(Event::Stored) => format!("parameters stored in copy {a}, generation {b}"),

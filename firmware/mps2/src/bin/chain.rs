@@ -54,7 +54,7 @@ fn run() -> Option<()> {
     let workspace = WORKSPACE.try_take()?;
     // `black_box` hides the configuration from the compiler, which would otherwise leave out the methods that it does
     // not choose.
-    let sensor = hzn_setup::sensor(black_box(&config())).ok()?;
+    let sensor = hzn_setup::new_sensor(black_box(&config())).ok()?;
     let expected = hzn_setup::expect(&sensor, &Prior::default()).ok()?;
     let picture = Grey::try_new(&*picture, Layout::packed(WIDTH.into(), HEIGHT.into(), 1, 8)).ok()?;
     let report = sensor.process(workspace, &picture, &expected, &Unobserved);

@@ -1,6 +1,7 @@
 //! Does the same as `measure` without a picture in memory: pictures of 640×480 pixels come row by row, as from a
-//! camera, and external memory is not used. `cases.bin` and `results.bin` are those of `measure`. The second count of
-//! ticks is for taking all rows, the third for the end of the picture; the counts of the stages are 0.
+//! camera, and external memory is not used. [`hzn_mps2::cases`] describes the files. The three calls are making the
+//! sensor, taking all rows, and the end of the picture; the ticks of the stages are 0. The position of a case is not
+//! used.
 
 #![no_std]
 #![no_main]
@@ -12,11 +13,10 @@ use hzn_core::{
     pipeline::{ROWS_HELD, RowBuffers, Workspace},
 };
 use hzn_flight::answer::PictureAnswer;
-use hzn_flight::bytes::Writer;
 use hzn_flight::table;
 use hzn_mps2::board::Board;
+use hzn_mps2::cases::{CaseHeader, STAGES, write_result};
 use hzn_mps2::host::{File, exit};
-use hzn_mps2::watermark;
 use static_cell::ConstStaticCell;
 
 const WIDTH: usize = 640;
@@ -43,28 +43,21 @@ fn run() -> Option<()> {
     let mut results = File::create(c"results.bin")?;
     let (picture, lists, table_buffer) = (PICTURE.try_take()?, LISTS.try_take()?, TABLE.try_take()?);
     loop {
-        let mut header = [0u8; 32];
-        if !cases.read(&mut header) {
-            return Some(());
-        }
-        let words: [u32; 8] = core::array::from_fn(|i| {
-            header.get(4 * i..).and_then(|h| h.first_chunk()).map_or(0, |w| u32::from_le_bytes(*w))
-        });
-        let [magic, table_len, frame_len, altitude, ..] = words;
-        if magic != u32::from_le_bytes(*b"CASE") || frame_len as usize != WIDTH * HEIGHT {
+        let Some(header) = CaseHeader::read(&mut cases).ok()? else { return Some(()) };
+        if header.picture_bytes != WIDTH * HEIGHT {
             return None;
         }
-        let table_bytes = table_buffer.get_mut(..table_len as usize)?;
+        let table_bytes = table_buffer.get_mut(..header.table_bytes)?;
         if !cases.read(table_bytes) {
             return None;
         }
         let (parameters, _) = table::read(table_bytes).ok()?;
-        let known = Prior { altitude_m: Some(f32::from_bits(altitude)).filter(|v| !v.is_nan()), ..Prior::default() };
+        let prior = Prior { altitude_m: header.altitude_m, ..Prior::default() };
 
         let t0 = timer.ticks();
         let sensor = Sensor::new(&parameters.sensor).ok()?;
         let t1 = timer.ticks();
-        let expected = sensor.expect(&known).ok()?;
+        let expected = sensor.expect(&prior).ok()?;
         let mut stream = sensor.rows(picture, 8, &expected).ok()?;
         let (mut row, mut taking) = ([0u8; WIDTH], 0u32);
         for _ in 0..HEIGHT {
@@ -79,24 +72,7 @@ fn run() -> Option<()> {
         let report = stream.finish(lists, &Unobserved);
         let t3 = timer.ticks();
 
-        let mut bytes = [0u8; 640];
-        let mut out = Writer::new(&mut bytes);
-        PictureAnswer::from_report(&report).write(&mut out);
-        let len = out.finish()?;
-        let mut head = [0u8; 88];
-        let mut out = Writer::new(&mut head);
-        out.bytes(b"DONE");
-        for ticks in [t1.wrapping_sub(t0), taking, t3.wrapping_sub(t2)] {
-            out.u32(ticks);
-        }
-        for _ in 0..8 {
-            out.u64(0);
-        }
-        out.u32(watermark::stack_bytes());
-        out.u32(len as u32);
-        out.finish()?;
-        if !results.write(&head) || !results.write(bytes.get(..len)?) {
-            return None;
-        }
+        let calls = [t1.wrapping_sub(t0), taking, t3.wrapping_sub(t2)];
+        write_result(&mut results, calls, [0; STAGES], &PictureAnswer::from_report(&report))?;
     }
 }

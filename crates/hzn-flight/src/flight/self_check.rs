@@ -1,0 +1,46 @@
+//! The self-checks at the start.
+
+use super::Flight;
+use crate::board::Board;
+use crate::messages::{Event, Mode};
+
+impl<B: Board> Flight<'_, B> {
+    /// Runs the self-checks of camera, memory and parameters. Default parameters fail the check: a sensor that was not
+    /// configured is of no use, so the computer enters safe mode.
+    pub(super) fn run_self_checks(&mut self, parameters: bool) {
+        let camera = self.board.camera_answers();
+        let memory = memory_works(&mut self.buffers.line.out, |_| ());
+        let failed = u8::from(!camera) | u8::from(!memory) << 1 | u8::from(!parameters) << 2;
+        self.state.self_check = failed;
+        if failed != 0 {
+            self.send_event(Event::SelfCheck, u32::from(failed), 0);
+            self.enter_mode(Mode::Safe);
+        }
+    }
+}
+
+/// Returns whether memory holds every bit, set and cleared. `meanwhile` changes the memory after each write; tests use
+/// it for stuck bits.
+fn memory_works(memory: &mut [u8], meanwhile: impl Fn(&mut [u8])) -> bool {
+    [0x55u8, 0xAA].iter().all(|&pattern| {
+        memory.fill(pattern);
+        meanwhile(core::hint::black_box(&mut *memory));
+        core::hint::black_box(&*memory).iter().all(|&b| b == pattern)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet::MAX_BYTES;
+
+    #[test]
+    fn a_bit_that_is_stuck_fails_the_self_check() {
+        let mut memory = [0; MAX_BYTES];
+        assert!(memory_works(&mut memory, |_| ()));
+        for bit in 0..8 * MAX_BYTES {
+            assert!(!memory_works(&mut memory, |m| m[bit / 8] |= 1 << (bit % 8)), "bit {bit} stuck at 1");
+            assert!(!memory_works(&mut memory, |m| m[bit / 8] &= !(1 << (bit % 8))), "bit {bit} stuck at 0");
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! A board that is made of vectors, and the ground that talks to it.
+
+use std::collections::VecDeque;
+
+use hzn_core::pixel;
+use hzn_flight::board::{Board, Picture};
+use hzn_flight::bytes::{Reader, Writer};
+use hzn_flight::flight::{Buffers, Flight, Lists};
+use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping};
+use hzn_flight::packet::{self, Apid, Scan};
+use hzn_flight::{Parameters, answer::PictureAnswer, table};
+
+pub(crate) const WIDTH: usize = 640;
+pub(crate) const HEIGHT: usize = 480;
+
+#[derive(Default)]
+pub(crate) struct Bench {
+    pub(crate) now_us: u64,
+    pub(crate) line: VecDeque<u8>,
+    pub(crate) sent: Vec<u8>,
+    pub(crate) pictures: VecDeque<(Vec<u8>, u32)>,
+    pub(crate) pixels: Vec<u8>,
+    pub(crate) copies: [Vec<u8>; 2],
+    /// Bytes that can still be written before power is cut.
+    pub(crate) power: Option<usize>,
+    pub(crate) lift_off: bool,
+    pub(crate) power_fails: bool,
+    pub(crate) camera_is_dead: bool,
+    pub(crate) fed: u32,
+}
+
+impl Board for Bench {
+    fn now_us(&mut self) -> u64 {
+        self.now_us += 10;
+        self.now_us
+    }
+    fn receive(&mut self) -> Option<u8> {
+        self.line.pop_front()
+    }
+    fn send(&mut self, bytes: &[u8]) {
+        self.sent.extend(bytes);
+    }
+    fn lift_off(&mut self) -> bool {
+        self.lift_off
+    }
+    fn power_fails(&mut self) -> bool {
+        self.power_fails
+    }
+    fn was_watchdog_reset(&mut self) -> bool {
+        false
+    }
+    fn feed_watchdog(&mut self) {
+        self.fed += 1;
+    }
+    fn camera_answers(&mut self) -> bool {
+        !self.camera_is_dead
+    }
+    fn next_picture(&mut self) -> Option<Picture> {
+        let (pixels, lost) = self.pictures.pop_front()?;
+        self.pixels = pixels;
+        Some(Picture { bytes: self.pixels.len(), exposure_us: self.now_us, lost })
+    }
+    fn pixels(&self) -> &[u8] {
+        &self.pixels
+    }
+    fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
+        into.fill(0xFF);
+        let kept = &self.copies[usize::from(copy) - 1];
+        into[..kept.len()].copy_from_slice(kept);
+    }
+    fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
+        let n = self.power.unwrap_or(bytes.len()).min(bytes.len());
+        // The memory is erased before it is written.
+        self.copies[usize::from(copy) - 1] = bytes[..n].to_vec();
+        n == bytes.len()
+    }
+    fn stack_bytes(&mut self) -> u32 {
+        1234
+    }
+}
+
+/// Draws sky above and ground below the limb of a body as wide as the Earth at 230 km.
+pub(crate) fn limb() -> Vec<u8> {
+    (0..WIDTH * HEIGHT)
+        .map(|i| {
+            let (x, y) = ((i % WIDTH) as f64 - 319.5, (i / WIDTH) as f64 - 239.5);
+            // The axis is 75 degrees below the optical axis, and the half-angle is 74.8 degrees.
+            let (sin, cos) = 75f64.to_radians().sin_cos();
+            let ray = [x / 600.0, y / 600.0, 1.0];
+            let along = (ray[1] * sin + cos) / (ray[0] * ray[0] + ray[1] * ray[1] + 1.0).sqrt();
+            let edge = ((along - 74.8f64.to_radians().cos()) * 600.0).clamp(-1.0, 1.0);
+            (100.0 + 90.0 * edge) as u8
+        })
+        .collect()
+}
+
+pub(crate) fn stored(generation: u32) -> Vec<u8> {
+    let mut p = Parameters::defaults();
+    p.set(33, f64::from(generation)).unwrap();
+    let mut bytes = vec![0; table::MAX_BYTES];
+    let n = table::write(&p, generation, &mut bytes).unwrap();
+    bytes.truncate(n);
+    bytes
+}
+
+pub(crate) fn ready() -> Bench {
+    Bench { copies: [stored(1), stored(2)], ..Bench::default() }
+}
+
+pub(crate) fn fly<R>(bench: Bench, turns: impl FnOnce(&mut Flight<'_, Bench>) -> R) -> R {
+    let (mut buffers, mut workspace) = (Box::new(Buffers::new()), Box::new(Lists::new()));
+    turns(&mut Flight::start(bench, &mut buffers, &mut workspace).unwrap())
+}
+
+pub(crate) fn command(sequence: u16, function: Function, arguments: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
+    let mut out = [0; packet::MAX_BYTES];
+    let user = |w: &mut Writer<'_>| {
+        w.u8(function as u8);
+        arguments(w);
+    };
+    let n = packet::write(&mut out, Apid::Command, sequence, 0, user).unwrap();
+    out[..n].to_vec()
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Sent {
+    pub(crate) housekeeping: Vec<Housekeeping>,
+    pub(crate) science: Vec<(Exposure, PictureAnswer)>,
+    pub(crate) events: Vec<(Event, u32, u32)>,
+    pub(crate) answers: Vec<(u8, u16, Code)>,
+    pub(crate) parameters: Vec<(u16, f64)>,
+    pub(crate) edge: Vec<pixel::Pixel>,
+}
+
+/// Returns everything that was sent since the last call.
+pub(crate) fn take_sent(flight: &mut Flight<'_, Bench>) -> Sent {
+    let sent = std::mem::take(&mut flight.board().sent);
+    let (mut rest, mut out) = (&sent[..], Sent::default());
+    let mut last_us = 0;
+    while !rest.is_empty() {
+        let Scan::Packet { end, packet } = packet::scan(rest) else { panic!("{rest:?}") };
+        rest = &rest[end..];
+        assert!(packet.time_us > last_us);
+        last_us = packet.time_us;
+        let mut r = Reader::new(packet.user);
+        match Apid::from_number(packet.apid).unwrap() {
+            Apid::Housekeeping => out.housekeeping.push(Housekeeping::read(&mut r).unwrap()),
+            Apid::Science => out.science.push((Exposure::read(&mut r).unwrap(), PictureAnswer::read(&mut r).unwrap())),
+            Apid::Event => {
+                let e = EventRecord::read(&mut r).unwrap();
+                out.events.push((Event::from_number(e.number).unwrap(), e.a, e.b));
+            }
+            Apid::Acknowledge => {
+                let a = Acknowledge::read(&mut r).unwrap();
+                out.answers.push((a.function, a.sequence, Code::from_number(a.code).unwrap()));
+            }
+            Apid::Parameters => {
+                for _ in 0..r.u8().unwrap() {
+                    out.parameters.push((r.u16().unwrap(), r.f64().unwrap()));
+                }
+            }
+            Apid::Edge => {
+                let part = EdgePart::read(&mut r).unwrap();
+                assert_eq!(usize::from(part.first), out.edge.len());
+                for _ in 0..part.count {
+                    out.edge.push(pixel::Pixel { x: r.u16().unwrap(), y: r.u16().unwrap() });
+                }
+            }
+            Apid::Command => panic!("a flight computer sends no commands"),
+        }
+        assert!(r.rest().is_empty(), "{packet:?}");
+    }
+    out
+}
+
+/// Sends bytes to the flight computer, runs a turn and returns everything that was sent back.
+pub(crate) fn send(flight: &mut Flight<'_, Bench>, bytes: &[u8]) -> Sent {
+    flight.board().line.extend(bytes);
+    flight.turn();
+    take_sent(flight)
+}
