@@ -96,7 +96,9 @@ impl Plan {
             fs::create_dir_all(&folder).map_err(text)?;
             for (frame, entry) in self.flight.frames.iter().zip(&manifest.frames) {
                 let picture = frame.render().map_err(|e| e.to_string())?;
-                let Samples::Bytes(bytes) = picture.samples() else { return Err("frames of 8 bits expected".into()) };
+                let Samples::Bytes(bytes) = picture.samples() else {
+                    return Err("the rendered frame must have 8 bits".into());
+                };
                 fs::write(folder.join(&entry.file), bytes).map_err(text)?;
             }
             // The description is written last, so that an incomplete case is rendered again.

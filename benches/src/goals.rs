@@ -21,7 +21,7 @@ const OF_CLEAN: (&str, f64, f64) = ("clean-1920x1080", 30.0, 1.0);
 /// Returns the table of goals. Cases that were not measured have no row.
 pub(crate) fn table(cases: &[CaseResult]) -> String {
     let case = |name: &str| cases.iter().find(|c| c.name == name);
-    let mut s = format!("| goal | reached | with {FEWER} points kept |\n|---|---|---|\n");
+    let mut s = format!("| goal | measured | with {FEWER} points kept |\n|---|---|---|\n");
     for (name, factor) in FACTORS {
         let Some(c) = case(name) else { continue };
         let [ours, fewer] = [&c.f32, &c.fewer].map(|t| c.opencv.median() / t.median());
@@ -37,7 +37,7 @@ pub(crate) fn table(cases: &[CaseResult]) -> String {
     let (name, ns, percent) = OF_CLEAN;
     if let Some(c) = case(name) {
         let point = median(&c.ns_a_point);
-        let _ = writeln!(s, "| {name}, every point kept, warm: at most {ns} ns a point | {point:.0} | |");
+        let _ = writeln!(s, "| {name}, every point kept, warm: at most {ns} ns per point | {point:.0} | |");
         let read = median(&c.pixels_percent);
         let _ = writeln!(s, "| {name}: at most {percent} % of the pixels read | {read:.2} | |");
     }

@@ -22,10 +22,11 @@ use sensors::Timed;
 use table::Results;
 
 const HELP: &str = "usage: cargo xtask bench [OPTION]...
-  --frames N   distinct frames a case, 8 or more (default 8)
+  --frames N   distinct frames per case, at least 8 (default 8)
   --rounds N   times that every frame is measured (default 7)
-  --only WORD  cases whose name contains WORD (clean, cloudy, 640x480, ...); book/results/benchmarks.md is left alone
-  --render     render the frames again even if they are there";
+  --only WORD  only cases whose name contains WORD (clean, cloudy, 640x480, ...); book/results/benchmarks.md is not
+               written
+  --render     render the frames again even if they exist";
 
 /// Options of the command line.
 struct Options {
@@ -51,7 +52,7 @@ impl Options {
             }
         }
         if o.frames < 8 || o.rounds == 0 {
-            return Err("--frames must be 8 or more and --rounds 1 or more".into());
+            return Err("--frames must be at least 8 and --rounds at least 1".into());
         }
         Ok(o)
     }

@@ -172,13 +172,13 @@ impl Results {
             s,
             "Written by `cargo xtask bench`. One thread of {}; {}. Each case has {} distinct frames, each measured {} \
              times with flushed caches, from the level to the covariance, hzn and the recipe taking turns with the \
-             same level; of each frame the best time, of these the median. Load of the machine at the start: {}.\n",
+             same level; the median over the frames of the best time of each frame. Load of the machine at the start: {}.\n",
             self.machine, self.versions, self.frames, self.rounds, self.load
         );
         let _ = writeln!(
             s,
             "| case | hzn f32, µs | f32, {FEWER} points kept, µs | hzn f64, µs | recipe, µs | ratio f32 | ratio f32, \
-             {FEWER} points | ratio f64 | f32 warm, µs | pixels read, % | all points, warm, ns a point |\n\
+             {FEWER} points | ratio f64 | f32 warm, µs | pixels read, % | all points, warm, ns per point |\n\
              |---|---|---|---|---|---|---|---|---|---|---|"
         );
         for c in &self.cases {
@@ -199,9 +199,9 @@ impl Results {
         }
         let _ = write!(
             s,
-            "\nWarm is the same picture once more, in the caches. What lies between that and the first column is \
-             memory: the picture, of which each row that the limb crosses lies elsewhere, and the program, which \
-             flushed caches do not hold either.\n\nOur goals, and what is reached of them:\n\n{}",
+            "\n'Warm' is a second run on the same picture, which is then in the caches. The difference to the first \
+             column is memory access: rows of the picture that the limb crosses are far apart in memory, and flushed \
+             caches do not hold the program either.\n\nOur goals and the measured values:\n\n{}",
             goals::table(&self.cases)
         );
         s.push_str("\nAngle between answer and truth in degrees, median / worst (frames answered):\n\n");

@@ -9,19 +9,18 @@ use crate::studies::{ALL, Study};
 
 const HEAD: &str = "# Reproduction
 
-Our numbers next to the published ones. `cargo xtask reproduce` writes this page; the command in a section writes that
-section alone. Every picture follows from its seed and every answer from its picture, so that every machine finds the \
-same
-numbers.
+This page compares our numbers with the published ones. `cargo xtask reproduce` writes it; the command in a section
+writes that section alone. Every picture follows from its seed and every answer from its picture, so every machine finds
+the same numbers.
 
 Sources: **[BB]** Braun & Barf 2022, **[W]** Wang, Wang & Jin 2022, **[B14]** Barf 2014, **[H15]** Barf et al. 2015.
 NEES is the squared error over the covariance, with two degrees of freedom: its mean is 2 for an honest covariance and
 larger for one that is too small.
 
-What a sensor is told about the scene decides the worth of a figure, so every section says it. **In-sample**: limb
+The value of a figure depends on what the sensor knows about the scene, so every section says this. **In-sample**: limb
 height or edge errors were fitted to the scene that is measured, or chosen on it. **Out of sample**: they come from
-nowhere near it. Values that were measured on other seeds of the same scene stand between the two: other clouds and
-noise, the same air and detector. Sections without these words are calculations.
+other scenes. Values that were measured on other seeds of the same scene are between the two: clouds and noise differ,
+air and detector are the same. Sections without these words are calculations.
 ";
 
 /// Document that contains sections.
@@ -48,7 +47,7 @@ impl Document {
             Self::Reproduction => Ok(put(text, study.name, section)),
             Self::Methods => {
                 let old = find(text, study.name).ok_or_else(|| {
-                    anyhow!("{}: no marks {} and {}", self.file(), begin(study.name), end(study.name))
+                    anyhow!("{}: the marks {} and {} are missing", self.file(), begin(study.name), end(study.name))
                 })?;
                 Ok(text.replace(old, section))
             }

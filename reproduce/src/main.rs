@@ -44,7 +44,7 @@ fn main() -> anyhow::Result<()> {
     }
     if let Some(unknown) = args.studies.iter().find(|name| ALL.iter().all(|s| s.name != **name)) {
         let names: Vec<&str> = ALL.iter().map(|s| s.name).collect();
-        bail!("no study {unknown:?}; there are {}", names.join(", "));
+        bail!("unknown study {unknown:?}; the studies are {}", names.join(", "));
     }
     if args.frames == Some(0) {
         bail!("--frames: must be 1 or more");
@@ -66,7 +66,7 @@ fn main() -> anyhow::Result<()> {
         std::fs::write(&path, document).with_context(|| path.display().to_string())?;
     }
     if args.frames.is_some() {
-        println!("--frames: a quick look; the documents are left alone");
+        println!("--frames is set, so no document is written");
     }
     Ok(())
 }

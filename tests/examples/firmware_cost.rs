@@ -15,22 +15,18 @@ use hzn_tests::emulated::{Board, Case, Measured, bits, chain, measure, measure_r
 
 const HEAD: &str = "# What the firmware costs
 
-Written by `cargo xtask firmware --write`; `cargo xtask test` fails when a figure grows by more than 5 %: \
-instructions, flash,
-static RAM, stack. Instructions are exact (QEMU 7.2, `-icount`), not cycles. f32, 600 points kept where a row says \
-nothing else; a
-row is the worst of its pictures. Every answer had the bits of the same sensor on the host.
+`cargo xtask firmware --write` writes this page. `cargo xtask test` fails if a figure (instructions, flash, static RAM,
+stack) grows by more than 5 %. Instructions are exact (QEMU 7.2, `-icount`); they are not cycles. The sensor computes in
+f32 and keeps 600 points, unless a row names another number. A row is the worst of its pictures. Every answer had the
+bits of the same sensor on the host.
 
-The goals are those of a Cortex-M7: 96 KiB (98304 bytes) of flash for the sensor alone, 96 KiB of RAM beside the \
-picture,
-0.6 million instructions for a clean picture of 1920×1080, 2 million for a cloudy one, 20 million for the worst. Flash \
-and the
-clean picture miss their goals, the latter also with 200 points kept; what fewer points lose is in \
-[porting.md](porting.md). On the
-Cortex-M4F, which computes double precision in software, the arithmetic
-for that takes some 9 KB of flash more, and `expect` nearly all of its time: the cone that an altitude or a position \
-leads to
-is worked out in double precision, once a picture; nothing else on a picture's way is (`cargo xtask test` looks for it).
+The goals are for a Cortex-M7: 96 KiB (98304 bytes) of flash for the sensor alone, 96 KiB of RAM in addition to the
+picture, 0.6 million instructions for a clean picture of 1920×1080, 2 million for a cloudy one, 20 million for the worst.
+Flash and the clean picture miss their goals, the clean picture also with 200 points kept;
+[porting.md](../guide/porting.md) says what fewer points cost. On the Cortex-M4F, double-precision arithmetic in software
+takes about 9 KB more flash and nearly all of the time of `expect`: `expect` calculates the cone of an altitude or a
+position in double precision, once per picture. No other code that runs per picture uses it (`cargo xtask test` checks
+this).
 ";
 
 /// Returns frames of a rocket's flight, clean or cloudy.
@@ -286,7 +282,7 @@ fn report() -> Result<String, String> {
         let hard = groups.iter().flat_map(|(hard, _)| hard);
         for (case, m) in usual.iter().chain(hard).zip(measured.iter().chain(worst.iter().flatten())) {
             if bits(&case.here()) != bits(&m.answer) {
-                return Err(format!("{} on {}: other bits than here", case.name, board.core()));
+                return Err(format!("{} on {}: the bits differ from those on this machine", case.name, board.core()));
             }
         }
         out += &format!("\n## {} ({})\n\n| picture | process, thousand | work, thousand |", board.core(), board.name());
@@ -303,7 +299,7 @@ fn report() -> Result<String, String> {
             out += "\n";
         }
         let first = &measured[0];
-        out += "\n| beforehand | thousand |\n|---|---|\n";
+        out += "\n| before the pictures | thousand |\n|---|---|\n";
         out += &format!("| making a sensor | {:.0} |\n", first.calls[0] as f64 / 1e3);
         out += &format!("| `expect` | {:.1} |\n", first.calls[1] as f64 / 1e3);
         let by_rows = by_rows.each_ref().map(|(kind, cases)| (kind, measure_rows(board, cases)));
@@ -325,8 +321,8 @@ fn report() -> Result<String, String> {
         }
         let [flash, ram] = sizes(board, "flight").ok_or("arm-none-eabi-size cannot be run")?;
         out += &format!(
-            "| flight | {flash} | {ram} | as the sensor with 600 points, and the loop: held to 96 KiB in all by a test \
-             |\n"
+            "| flight | {flash} | {ram} | as the sensor with 600 points, plus the loop; a test limits the total to 96 \
+             KiB |\n"
         );
     }
     Ok(out)
@@ -394,12 +390,12 @@ fn main() -> ExitCode {
                 if let Some((_, then)) = before.iter().find(|(n, _)| *n == name)
                     && now > then * 1.05
                 {
-                    eprintln!("{name}: {now} where {path} has {then}");
+                    eprintln!("{name}: {now}, but {then} in {path}");
                     grown = true;
                 }
             }
             if grown {
-                eprintln!("more than 5 % above {path}; if that is wanted: cargo xtask firmware --write");
+                eprintln!("more than 5 % above {path}; if this is intended, run cargo xtask firmware --write");
                 return ExitCode::FAILURE;
             }
         }

@@ -46,7 +46,7 @@ impl Board {
         let target = std::env::var_os("CARGO_TARGET_DIR")
             .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../target"), PathBuf::from);
         let path = target.join("firmware").join(self.name()).join("images").join(name);
-        assert!(path.is_file(), "{}: `cargo xtask firmware` builds it", path.display());
+        assert!(path.is_file(), "{} is missing; run `cargo xtask firmware`", path.display());
         path
     }
 
@@ -97,7 +97,7 @@ impl Case {
     /// Panics if the scene cannot be rendered, or not as bytes.
     pub fn rendered(name: String, sensor: &Config, frame: &hzn_sim::FlightFrame) -> Self {
         let picture = frame.render().expect("the scene can be rendered");
-        let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: 8 bits are expected") };
+        let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: the picture must have 8 bits") };
         let known = frame.known();
         let known = Prior {
             altitude_m: known.altitude_m.map(|h| h as f32),
@@ -116,7 +116,7 @@ impl Case {
         let camera = &self.sensor.camera;
         let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
         let picture = Grey::try_new(&self.bytes, layout).expect("the picture is whole");
-        let expected = horizon.expect(&self.known).expect("what is known is possible");
+        let expected = horizon.expect(&self.known).expect("the prior is possible");
         PictureAnswer::from_report(&horizon.process(&picture, &expected))
     }
 

@@ -99,9 +99,13 @@ pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
     known: &Prior<T>,
     observer: &impl Observer<T>,
 ) -> Result<Answer, Status> {
-    let expected = horizon.expect(known).expect("what is known of the picture is possible");
+    let expected = horizon.expect(known).expect("the prior is possible");
     let report = horizon.process_observed(picture, &expected, observer);
-    assert_eq!(report.status == Status::Ok, report.solution.is_some(), "a solution with `ok`, and only there");
+    assert_eq!(
+        report.status == Status::Ok,
+        report.solution.is_some(),
+        "the status is `ok` exactly if there is a solution"
+    );
     if report.solution.is_none() {
         // Test output is shown only if the test fails.
         let verdicts = report.candidates.iter().map(|c| format!("{} points {:?}", c.points, c.verdict));

@@ -34,7 +34,8 @@ fn crates_import_from_below() {
     for entry in fs::read_dir(&crates).unwrap() {
         let manifest = entry.unwrap().path().join("Cargo.toml");
         let name = manifest.parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
-        let (_, may) = MAY_IMPORT.iter().find(|(of, _)| *of == name).unwrap_or_else(|| panic!("{name} has no place"));
+        let (_, may) =
+            MAY_IMPORT.iter().find(|(of, _)| *of == name).unwrap_or_else(|| panic!("{name} is missing in MAY_IMPORT"));
         for import in imports(&manifest) {
             assert!(may.contains(&import.as_str()), "{name} imports {import}, which is not below it");
             seen += 1;

@@ -65,7 +65,7 @@ fn looked_over() -> Outcome {
     steps::run(in_firmware(on_this_machine("doc").arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"), ""))?;
     let toolchain = Toolchain::find()?;
     if matches!(toolchain, Toolchain::Debian) {
-        println!("the images' own lints: not with Debian's Rust, which has no clippy for the target");
+        println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
         return Ok(());
     }
     for (board, flags) in BOARDS {
@@ -137,7 +137,7 @@ fn images(board: &str) -> PathBuf {
 fn look_into(board: &str, image: &str) -> Outcome {
     let path = images(board).join(image);
     let symbols = output(Command::new("arm-none-eabi-nm").arg(&path))
-        .ok_or_else(|| Trouble::Failed(format!("{}: its symbols cannot be read", path.display())))?;
+        .ok_or_else(|| Trouble::Failed(format!("{}: nm cannot read the symbols", path.display())))?;
     let panics: Vec<&str> = symbols.lines().filter(|l| l.contains("panicking")).collect();
     if !panics.is_empty() {
         return Err(Trouble::Failed(format!("{board} {image}: a panic path is linked: {}", panics.join(", "))));
@@ -192,7 +192,7 @@ fn c_interface() -> Outcome {
     let emulated = said(&mut qemu)?;
     println!("{host}");
     if host != emulated {
-        return Err(Trouble::Failed(format!("the C example says something else in QEMU:\n{emulated}")));
+        return Err(Trouble::Failed(format!("the C example prints another result in QEMU:\n{emulated}")));
     }
     Ok(())
 }

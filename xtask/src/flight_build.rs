@@ -34,7 +34,9 @@ impl Toolchain {
         }
         apt_install(&["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"]).map_err(needs)?;
         if !has_debian_rust() {
-            return Err(Trouble::Missing(format!("needs `rustup target add {TARGET}`: Debian's Rust is not there")));
+            return Err(Trouble::Missing(format!(
+                "needs `rustup target add {TARGET}`: Debian's Rust is not installed"
+            )));
         }
         // The linker of bare targets, `rust-lld`, is a symbolic link into a package like `lld-22`. None of the packages
         // above depends on that package.

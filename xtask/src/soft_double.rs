@@ -52,7 +52,7 @@ pub(crate) fn look_into(image: &Path) -> Outcome {
     let calls = calls_by_function(&text);
     for part in LOOPS {
         if !calls.keys().any(|f| f.contains(part)) {
-            return Err(Trouble::Failed(format!("soft double: no function of {part} stands in the image by itself")));
+            return Err(Trouble::Failed(format!("soft double: the image has no separate function of {part}")));
         }
     }
     for (function, &count) in &calls {
@@ -67,7 +67,7 @@ pub(crate) fn look_into(image: &Path) -> Outcome {
             )));
         }
     }
-    println!("soft double: in no loop of a picture's way; {} functions looked into", calls.len());
+    println!("soft double: none in a loop over pixels or points; {} functions checked", calls.len());
     Ok(())
 }
 

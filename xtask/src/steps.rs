@@ -72,7 +72,7 @@ impl Steps {
         command.args(args).stdout(Stdio::piped());
         show(&command);
         let mut child = command.spawn()?;
-        let out = child.stdout.take().ok_or_else(|| Trouble::Failed("no output of cargo test".into()))?;
+        let out = child.stdout.take().ok_or_else(|| Trouble::Failed("cargo test has no standard output".into()))?;
         for line in BufReader::new(out).lines() {
             let line = line?;
             if let Some((passed, failed)) = counts(&line) {
@@ -108,7 +108,7 @@ impl Steps {
             wrong += u32::from(counts);
         }
         if self.strict && self.done.iter().any(|(_, _, o)| matches!(o, Err(Trouble::Missing(_)))) {
-            println!("  CI=true: nothing may be left out");
+            println!("  CI=true: a step that was left out counts as a failure");
         }
         println!("{} passed, {} failed", self.passed, self.failed);
         match wrong {

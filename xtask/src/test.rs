@@ -42,7 +42,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("firmware", firmware::test);
     all.step("demo", |_| demo());
     all.step("viewer", |_| viewer::test());
-    all.step("lenses beside OpenCV", |_| lenses_beside_opencv());
+    all.step("lenses against OpenCV", |_| lenses_beside_opencv());
     all.step("simulator rendered again", |_| simulator_rendered_again());
     all.step("files read by others", |_| files_read_by_others());
     all.step("wheel", |_| {
@@ -86,7 +86,7 @@ fn demo() -> Outcome {
     fs::create_dir_all(dir.parent().unwrap_or(&dir))?;
     steps::run(Command::new(target().join("debug/hzn")).arg("demo").arg(&dir))?;
     if recordings(&dir).is_empty() {
-        return Err(Trouble::Failed(format!("the demo left no .mcap in {}", dir.display())));
+        return Err(Trouble::Failed(format!("the demo has written no .mcap file into {}", dir.display())));
     }
     Ok(())
 }

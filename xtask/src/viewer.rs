@@ -78,7 +78,7 @@ fn shot() -> Result<PathBuf, Trouble> {
     let (demo, picture) = (demo_dir(), target().join("xtask").join("viewer.png"));
     let (recording, table) = (demo.join("flight.mcap"), demo.join("flight.csv"));
     if !recording.exists() || !table.exists() {
-        return Err(Trouble::Failed("there is no demo: `cargo xtask test demo viewer`".into()));
+        return Err(Trouble::Failed("the demo's files are missing; run `cargo xtask test demo viewer`".into()));
     }
     let _ = fs::remove_file(&picture);
     let frame = FRAME.to_string();
@@ -87,14 +87,15 @@ fn shot() -> Result<PathBuf, Trouble> {
         .map(str::to_owned);
     let said = window(&display, &arguments.each_ref().map(String::as_str))?;
     println!("{said}");
-    let expected = expected(&fs::read_to_string(&table)?).ok_or_else(|| Trouble::Failed("no such row".into()))?;
+    let expected = expected(&fs::read_to_string(&table)?)
+        .ok_or_else(|| Trouble::Failed("the demo's table has no row for this picture".into()))?;
     if said != expected {
-        return Err(Trouble::Failed(format!("the file says {expected:?}")));
+        return Err(Trouble::Failed(format!("the window must print {expected:?}")));
     }
     // A screenshot of a window without content has only a few kilobytes.
     match fs::metadata(&picture) {
         Ok(file) if file.len() > 60_000 => Ok(picture),
-        _ => Err(Trouble::Failed(format!("{} holds no picture of the window", picture.display()))),
+        _ => Err(Trouble::Failed(format!("{} is too small to be a screenshot of the window", picture.display()))),
     }
 }
 

@@ -68,5 +68,5 @@ fn installed(profile: &str) -> Result<PathBuf, Trouble> {
 
 fn only_wheel(folder: &Path) -> Result<PathBuf, Trouble> {
     let mut wheels = fs::read_dir(folder)?.flatten().map(|e| e.path()).filter(|p| p.extension().is_some());
-    wheels.next().ok_or_else(|| Trouble::Failed(format!("maturin left no wheel in {}", folder.display())))
+    wheels.next().ok_or_else(|| Trouble::Failed(format!("maturin has built no wheel in {}", folder.display())))
 }

@@ -15,7 +15,7 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::{Config, HostHorizon, Prior};
 
 const HELP: &str = "usage: cargo xtask bench ransac [--runs N]
-  --runs N     sets of points a cell, 10 or more (default 200; a tenth of them for the Hough transform)";
+  --runs N     point sets per cell, at least 10 (default 200; the Hough transform gets one tenth)";
 
 /// Number of points in a set.
 const POINTS: usize = 400;
@@ -99,7 +99,7 @@ fn runs(mut args: impl Iterator<Item = String>) -> Result<u32, String> {
             _ => return Err(HELP.into()),
         }
     }
-    if runs < 10 { Err("--runs must be 10 or more".into()) } else { Ok(runs) }
+    if runs < 10 { Err("--runs must be at least 10".into()) } else { Ok(runs) }
 }
 
 fn compare(runs: u32) -> Result<(), String> {
@@ -202,8 +202,8 @@ fn median(values: &[f64]) -> f64 {
 
 fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
     println!(
-        "{runs} sets of {POINTS} points a cell ({} for the Hough transform), {NOISE_PX} px on the limb, off nadir up \
-         to 60°.",
+        "{runs} sets of {POINTS} points per cell ({} for the Hough transform), errors of {NOISE_PX} px on the limb, up \
+         to 60° off nadir.",
         runs.div_ceil(10)
     );
     let head: String = OUTLIERS.iter().map(|r| format!(" {:.0} % |", r * 100.0)).collect();
@@ -216,7 +216,7 @@ fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
         }
     };
     table("solved to 2°, %", &|c| format!("{:.0}", c.success()));
-    table("median error where solved, degrees", &|c| format!("{:.3}", median(&c.errors_deg)));
+    table("median error of solved sets, degrees", &|c| format!("{:.3}", median(&c.errors_deg)));
     table("draws, mean", &|c| match c.draws {
         0 => "–".into(),
         draws => format!("{:.0}", draws as f64 / f64::from(c.runs)),

@@ -68,7 +68,7 @@ fn decode(folder: &Path) -> Result<(), String> {
     let cores = std::thread::available_parallelism().map_or(1, Into::into);
     let work = || -> Result<(), String> {
         while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let item = item.lock().ok().and_then(|mut i| i.take()).ok_or("a picture is taken twice")?;
+            let item = item.lock().ok().and_then(|mut i| i.take()).ok_or("two threads have taken the same picture")?;
             std::hint::black_box(item.payload.decode(None)?);
         }
         Ok(())
@@ -147,7 +147,8 @@ impl Way {
 /// Returns the processor time of all children that have ended, in seconds: fields 16 and 17 of /proc/self/stat.
 fn children_s() -> Result<f64, String> {
     const TICKS_A_SECOND: f64 = 100.0;
-    let stat = fs::read_to_string("/proc/self/stat").map_err(|e| format!("needs Linux's /proc: {e}"))?;
+    let stat = fs::read_to_string("/proc/self/stat")
+        .map_err(|e| format!("/proc/self/stat cannot be read (Linux only): {e}"))?;
     // The program's name, in brackets, may contain spaces.
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).ok_or("/proc/self/stat is too short");
@@ -184,8 +185,8 @@ fn table(ways: &[Way], options: &Options, megabytes: f64) -> String {
     let (frames, rounds) = (options.frames, options.rounds);
     let mut out = format!(
         "`cargo xtask bench run`: {frames} distinct PNGs of 1920x1080 ({megabytes:.0} MB), {cores} cores, {rounds} \
-         rounds taking turns, of each way the least time. Load of the machine at the end: {load}.\n\n\
-         | way | wall, s | frames a second | ratio | goal | processor time, s | ratio \
+         rounds, in which the ways take turns; the table shows the least time of each way. Load of the machine at the end: {load}.\n\n\
+         | way | wall, s | frames per second | ratio | goal | processor time, s | ratio \
          |\n|---|---|---|---|---|---|---|\n"
     );
     let Some(alone) = ways.first() else { return out };

@@ -89,11 +89,11 @@ pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
     s.text(format!(
         "{} pictures without a limb, {count} of each kind, of 480×360 to 1280×960 pixels through pinholes (27° to 110° \
          wide), equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 \
-         bits, with noise of 0.2 to 2.5 % of full scale; the ranges of each kind stand in `hzn_sim::artefact`. \
-         PriorKnowledge: the camera and the position, for the lower half of the table also an attitude that is wrong \
-         by {ATTITUDE_DEG}° (1σ about each axis). Every setting but `reject.threshold_px` has its default. Counted: \
-         pictures that are answered. Discs whose half-angle lies within three told sigmas of the expected one cannot \
-         be told from a limb by their shape and have a row of their own.",
+         bits, with noise of 0.2 to 2.5 % of full scale; `hzn_sim::artefact` has the ranges of each kind. Known to the \
+         sensor: the camera and the position, for the lower half of the table also an attitude that is wrong by \
+         {ATTITUDE_DEG}° (1σ about each axis). Every setting but `reject.threshold_px` has its default. The table \
+         counts the pictures that are answered. If the half-angle of a disc is within three sigmas of the expected \
+         one, its shape cannot distinguish it from a limb; these discs have a row of their own.",
         Kind::ALL.len() * count
     ));
     skies(&mut s, count)?;
@@ -181,10 +181,10 @@ fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
         Ok(Some((kind, with, alone)))
     })?;
     s.text(format!(
-        "Clean limbs with the same artefacts next to them: the body is lit all along, the limb crosses the picture \
-         over at least half its width at a height of 12 to 22 km and falls off exponentially; the artefact leaves at \
-         least 90 % of the limb alone and half of the sky dark. An answer more than {FALSE_SIGMAS}σ or {GROSS_DEG}° \
-         from the truth is false. Alone: the same pictures without the artefact."
+        "Clean limbs with the same artefacts next to them: the body is lit everywhere, and the limb crosses the \
+         picture over at least half its width, at a height of 12 to 22 km, and falls off exponentially. The artefact \
+         leaves at least 90 % of the limb free and half of the sky dark. An answer more than {FALSE_SIGMAS}σ or \
+         {GROSS_DEG}° from the truth is false. 'Alone' means the same pictures without the artefact."
     ));
     let row = |name: &str, of: &dyn Fn(Kind) -> bool| {
         let chosen: Vec<_> = all.iter().filter(|(k, ..)| of(*k)).collect();
@@ -213,10 +213,10 @@ fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
             "pictures",
             "answered alone",
             "answered",
-            "answered, attitude told",
+            "answered, with attitude",
             "false alone",
             "false",
-            "false, attitude told",
+            "false, with attitude",
         ],
         rows,
     );

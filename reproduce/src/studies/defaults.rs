@@ -38,7 +38,7 @@ pub(super) struct Rendered {
 
 impl Rendered {
     fn new(scene: &str, seed: u64, count: usize) -> anyhow::Result<Self> {
-        let mut scenario = Scenario::builtin(scene).ok_or_else(|| anyhow!("no scene {scene}"))?;
+        let mut scenario = Scenario::builtin(scene).ok_or_else(|| anyhow!("there is no built-in scene {scene}"))?;
         scenario.seed = seed;
         scenario.capture.frames = u32::try_from(count)?;
         Self::from_scenario(&scenario, scene == SKEWED).with_context(|| format!("{scene}, seed {seed}"))
@@ -163,7 +163,7 @@ impl Outcome {
 }
 
 const HEADS: [&str; 10] =
-    ["scene", "told", "answered", "false", "RMS", "worst", "NEES", "beyond 3σ", "beyond 5σ", "holds"];
+    ["scene", "known", "answered", "false", "RMS", "worst", "NEES", "beyond 3σ", "beyond 5σ", "holds"];
 
 /// Largest allowed share of answers beyond 3 sigma.
 const BEYOND: f64 = 0.02;
@@ -274,15 +274,15 @@ pub(super) fn untold(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut s = Section::default();
     s.text(format!(
-        "{} flights a scene with seeds of their own, {count} pictures each. *camera, position*: sensor.toml holds the \
-         camera (and the mask of the vehicle), every other key is the default, frames.csv the position. *camera, \
-         altitude*: the same with the altitude instead of the position. *truth of another flight*: limb height and \
-         noise measured with the truth on another seed, for comparison. The goals with defaults are at most 2 % beyond \
-         3σ, none beyond 5σ, a mean NEES of 0.4 to 3, no false answer, and with the altitude alone at most 1.3 times \
-         the RMS of the position. *calibrated on another flight*: limb height and noise as `hzn calibrate noise` finds \
-         them without truth on another seed; the goals are a mean NEES of 0.3 to 3 and at most 1.7 times the RMS with \
-         the truth. Rates of rotation are told in `{SKEWED}` alone, whose rolling shutter needs them, and left out in \
-         its last row. *lens*: as the first row, with a focal length that is wrong by as much as is told in \
+        "{} flights per scene with seeds of their own, {count} pictures each. *camera, position*: sensor.toml has the \
+         camera (and the mask of the vehicle), every other key is the default, and frames.csv has the position. \
+         *camera, altitude*: the same with the altitude instead of the position. *truth of another flight*: limb \
+         height and noise measured with the truth on another seed, for comparison. The goals with defaults are at most \
+         2 % beyond 3σ, none beyond 5σ, a mean NEES of 0.4 to 3, no false answer, and with the altitude alone at most \
+         1.3 times the RMS with the position. *calibrated on another flight*: limb height and noise as `hzn calibrate \
+         noise` finds them without truth on another seed; the goals are a mean NEES of 0.3 to 3 and at most 1.7 times \
+         the RMS with the truth. The prior has rates of rotation in `{SKEWED}` alone, whose rolling shutter needs \
+         them, and not in its last row. *lens*: as the first row, with a focal length whose error is the sigma in \
          `camera.focal_sigma_percent`; the goal is at most 1 % beyond 3σ. All rows are out of sample: nothing was \
          fitted to the flight that is answered.",
         SEEDS.len()
@@ -327,11 +327,11 @@ pub(super) fn untold(effort: &Effort) -> anyhow::Result<Section> {
     }
     s.table(HEADS, rows);
     s.text(
-        "What `hzn calibrate noise` finds on each flight without its truth, next to what the truth of the same \
-         pictures says. In brackets are edge noise over all pictures, scatter between pictures, a shift of all edges \
-         by their RMS (0.1 px at least), and a bend that they share. Goals: at most 2σ off, a sigma of at most 1.5 km \
-         in `rocket-clean` and `horace` and 3 km in `leo-infrared`, latitudes within 1 km, an alarm (χ² above 2) or a \
-         refusal in `tumble` without rates, and nowhere else.",
+        "The table compares what `hzn calibrate noise` finds on each flight without its truth with the truth of the \
+         same pictures. The parts of sigma in brackets come from edge noise over all pictures, scatter between \
+         pictures, a shift of all edges by their RMS (at least 0.1 px), and a bend that the pictures share. Goals: at \
+         most 2σ off; a sigma of at most 1.5 km in `rocket-clean` and `horace` and 3 km in `leo-infrared`; latitudes \
+         within 1 km; an alarm (χ² above 2) or a refusal in `tumble` without rates, and in no other flight.",
     );
     s.table(CALIBRATION, calibrations);
     if !bad.is_empty() {

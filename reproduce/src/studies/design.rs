@@ -33,7 +33,7 @@ fn by_vertical_fov(rows: u16, fov_deg: f64) -> Design {
 }
 
 fn sigmas(d: &Design) -> anyhow::Result<Sigmas> {
-    d.sigmas()?.ok_or_else(|| anyhow::anyhow!("no limb in view"))
+    d.sigmas()?.ok_or_else(|| anyhow::anyhow!("this design has no limb in view"))
 }
 
 /// Returns a cell with our 3-sigma value, the reference and their relative difference.
@@ -45,11 +45,11 @@ fn beside(sigma_deg: f64, reference_3_sigma_deg: f64) -> String {
 pub(super) fn sensitivity(_: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(
-        "Level pinhole camera 1920×1080 at 200 km, edge errors of 1 px over 300 px, points a pixel apart; 3 sigma, \
+        "Level pinhole camera 1920×1080 at 200 km; edge errors of 1 px over 300 px; points one pixel apart; 3 sigma, \
          ours / reference. [BB] print curves; the reference is an independent evaluation of their equations with the \
-         errata put right (book/theory/math.md), reached within 2 %. Roll is about the optical axis, pitch about the \
-         picture's horizontal. The same by hand: `hzn sensitivity --altitude 200 --limb-height 0 --fov 66:146:16 -o \
-         table.csv`.",
+         errata corrected (book/theory/math.md), and we agree with it within 2 %. Roll is about the optical axis, \
+         pitch about the horizontal of the picture. The same by hand: `hzn sensitivity --altitude 200 --limb-height 0 \
+         --fov 66:146:16 -o table.csv`.",
     );
     let head = ["", "roll [BB 33]", "pitch [BB 33]", "pitch, α known", "overbound [BB 37]"];
     let row = |name: String, d: &Design, r: [f64; 4]| -> anyhow::Result<Vec<String>> {
@@ -91,10 +91,10 @@ pub(super) fn sensitivity(_: &Effort) -> anyhow::Result<Section> {
     let high = |fov: f64| 2.0 * ((fov / 2.0).to_radians().tan() * 9.0 / 16.0).atan().to_degrees();
     let (a, b) = (best(&wide), best(&square));
     s.text(format!(
-        "**Optimum field of view** of the pitch with the half-angle free: {}° wide ({:.4}°), which is {:.0}° high; for \
-         a square picture {}°. [BB] quote about 118° (reference: 116°, 84° high, 110°), and call the axis roll: which \
-         it is depends on how the camera is mounted. With the half-angle known there is no optimum: the narrower the \
-         better, as long as the limb spans the picture. The curve is flat: a few degrees around it cost less than 0.5 \
+        "**Optimum field of view** of the pitch with a free half-angle: {}° wide ({:.4}°), which is {:.0}° high; for a \
+         square picture {}°. [BB] quote about 118° (reference: 116°, 84° high, 110°) and call the axis roll; the name \
+         depends on how the camera is mounted. With a known half-angle there is no optimum: a narrower field is better \
+         as long as the limb spans the picture. The curve is flat: a few degrees around the optimum cost less than 0.5 \
          %.",
         a.0,
         a.1,
@@ -124,8 +124,9 @@ pub(super) fn visibility(_: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(
         "In the plane of a pinhole picture the limb is an arc of an ellipse or of a hyperbola. An ellipse can be seen \
-         from a full field of view γ > 4α − π on, a hyperbola from γ > π − 4α on ([BB] section 2.7 has the two \
-         exchanged), the whole disc from 2α on. By hand: `hzn sensitivity visibility --limb-height 0`.",
+         if the full field of view γ is above 4α − π, a hyperbola if it is above π − 4α ([BB] section 2.7 has \
+         exchanged the two), and the whole disc if it is above 2α. By hand: `hzn sensitivity visibility --limb-height \
+         0`.",
     );
     let of = |km: f64| Visibility::new((6371.0f64 / (6371.0 + km)).asin());
     let rows = [80.0, 238.0, 800.0, 2600.0, 6000.0].map(|km| {
@@ -156,10 +157,10 @@ pub(super) fn visibility(_: &Effort) -> anyhow::Result<Section> {
 pub(super) fn spherical_earth(_: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(
-        "What a sensor measures is the axis of the limb's cone. Taking it for the direction to the Earth's centre, as \
-         a sphere has it, is wrong by up to 0.19°; hzn gives the limb axis itself in both frames, so nothing of this \
-         is left. At 45° latitude, without a limb height; the reference is the independent table of \
-         book/theory/math.md's source. By hand: `hzn sensitivity spherical-earth`.",
+        "A sensor measures the axis of the limb's cone. For a sphere this is the direction to the centre; for the \
+         Earth that assumption is wrong by up to 0.19°. `hzn` gives the limb axis itself in both frames, so this error \
+         does not occur. The table is for 45° latitude and a limb height of 0; the reference values were calculated \
+         independently of `hzn`. By hand: `hzn sensitivity spherical-earth`.",
     );
     let rows = [
         (100.0, [0.1894, 0.1865, 0.0029]),

@@ -47,13 +47,13 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(format!(
         "{count} pictures of 640×480 pixels through a pinhole of 59°, 60 to 90 km above clouds and dark sea as in the \
-         rocket scene, azimuth and roll anywhere, the optical axis from 40° above the horizontal to 70° below. An \
-         answer succeeds when its half-angle is within 10 % and its direction within 10 % of the half-angle; every \
-         other picture with a limb in view is a false negative, an answer without one a false positive."
+         rocket scene, with any azimuth and roll, the optical axis from 40° above the horizontal to 70° below. An \
+         answer succeeds if its half-angle is within 10 % and its direction within 10 % of the half-angle. Every other \
+         picture with a limb in view is a false negative; an answer to a picture without a limb is a false positive."
     ));
     s.text(
-        "**In-sample**: the limb height that is told is the rendering's own, ± 1 km, and the edge errors, 0.1 px over \
-         30 px, were chosen on such pictures.",
+        "**In-sample**: the sensor has the limb height of the rendering, ± 1 km; the edge errors, 0.1 px over 30 px, \
+         were chosen on pictures of this kind.",
     );
     let flight = pictures(count);
     let horace = preset(Preset::Horace2015, &flight, flight.sensor.body.clone());
@@ -80,15 +80,16 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
     );
     if !wrong.is_empty() {
         s.text(format!(
-            "Wrong answers of `hzn`: {wrong}. An error of twice the half-angle (some 81° here) has the Earth on the \
-             other side of the edge. This scene shows a weakness that the flights below do not; it is not solved."
+            "Wrong answers of `hzn`: {wrong}. If the error is twice the half-angle (about 81° here), the answer has \
+             the Earth on the other side of the edge. This scene shows a weakness that the flights below do not show; \
+             it is not solved."
         ));
     }
     s.text(
-        "[B14] and [H15] count on their own set of test pictures and their flight video, which are not public: \
-         pictures of a limb that is curved enough for a circle, seen by a camera that looks at the Earth. \
-         `horace-2015` rebuilds their method; the centre of its circle is not the direction to the Earth in a tilted \
-         picture (book/theory/methods.md), which is what its errors here are.",
+        "[B14] and [H15] count on their own set of test pictures and on their flight video, which are not public. In \
+         these pictures the limb is curved enough for a circle, and the camera looks at the Earth. `horace-2015` \
+         rebuilds their method; in a tilted picture the centre of its circle is not the direction to the Earth \
+         (book/theory/methods.md); this causes most of its errors here.",
     );
     own_camera(&mut s, effort)?;
     Ok(s)
@@ -114,7 +115,7 @@ const TURNING: [Turning; 4] = [
 
 impl Turning {
     fn scenario(&self) -> anyhow::Result<Scenario> {
-        let mut scenario = Scenario::builtin("horace").ok_or_else(|| anyhow!("no scene horace"))?;
+        let mut scenario = Scenario::builtin("horace").ok_or_else(|| anyhow!("there is no built-in scene horace"))?;
         if let Attitude::Spin(spin) = &mut scenario.attitude {
             spin.spin_hz = self.spin_hz;
         }
@@ -140,12 +141,12 @@ fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
     let count = effort.frames(60);
     let (scene, told) = simulated("horace", count)?;
     s.text(format!(
-        "**HORACE's own camera**: {count} pictures each of `hzn simulate horace`, 8 mm before pixels of 3.75 µm, \
-         1024×768, 27.0°×20.4°, T+75 s to T+215 s of a flight to 90 km, exposed for 1 ms, at 0.2, 1 and 2 turns a \
-         second; and at 2 with the Sun 4° above the horizontal, so that it passes through the picture. Position told. \
-         `hzn` is told nothing else, which is **out of sample**. `hzn, told` and `horace-2015` are told what was \
-         measured at one turn a second on {MEASURED} pictures of other seeds, {told}: **in-sample** for the scene, out \
-         of sample for the pictures."
+        "**HORACE's own camera**: {count} pictures each of `hzn simulate horace`, focal length 8 mm, pixels of 3.75 \
+         µm, 1024×768, 27.0°×20.4°, T+75 s to T+215 s of a flight to 90 km, exposed for 1 ms, at 0.2, 1 and 2 turns \
+         per second; and at 2 turns with the Sun 4° above the horizontal, so that it passes through the picture. The \
+         prior has the position. `hzn` has the default values otherwise, which is **out of sample**. `hzn, told` and \
+         `horace-2015` have the values that were measured at one turn per second on {MEASURED} pictures of other \
+         seeds, {told}: **in-sample** for the scene, out of sample for the pictures."
     ));
     let mut rows = Vec::new();
     let mut right = Vec::new();
@@ -190,8 +191,8 @@ fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
     };
     let worst = |name: &str| (0..TURNING.len() - 1).map(|i| 1.0 - share(name, i)).fold(0.0, f64::max);
     s.text(
-        "Their requirements on the same pictures ([B14]): an answer is right when its half-angle is within 10 % and \
-         its direction within 10 % of the half-angle.",
+        "Their requirements on the same pictures ([B14]): an answer is right if its half-angle is within 10 % and its \
+         direction within 10 % of the half-angle.",
     );
     s.table(
         ["requirement", "hzn", "hzn, told", "horace-2015"],

@@ -75,11 +75,11 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(100);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures at every angle off nadir, evenly over latitude, longitude, azimuth and roll: {SCENE}. [W]'s \
-         radiance curves are not printed; ours are analytic. The sensor is told position and a limb height of 25 km \
-         ± {LIMB_SIGMA_KM} km, or that height by latitude ± {LEFT_KM} km, and that all edge points may be shifted by \
-         {BIAS_PX} px. RMS error of the axis, errors above 2° counted apart as wrong, pictures without an answer by \
-         their status; [W] as they print it.",
+        "{count} pictures at every angle off nadir, spread evenly over latitude, longitude, azimuth and roll: {SCENE}. \
+         [W] do not print their radiance curves; ours are analytic. The prior has the position. The sensor knows a \
+         limb height of 25 km ± {LIMB_SIGMA_KM} km, or the height by latitude ± {LEFT_KM} km, and a possible common \
+         shift of all edge points by {BIAS_PX} px. The cells have the RMS error of the axis, the number of errors \
+         above 2° (wrong), the number of pictures without an answer by status, and the NEES; [W] is as printed there.",
     ));
     s.text("**In-sample**: limb height, its sigma, the common shift and the edge noise are those of the scene.");
     let mut rows = Vec::new();
@@ -112,15 +112,15 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     let published = Series::new("[W], published", Style::Dots, [(0.0, 0.04), (120.0, 0.16)]);
     s.figure("infrared", &series.fold(chart, Chart::with).with(published))?;
     s.text(
-        "`zju-2022` rebuilds [W]: Zernike points, RANSAC with pre-verification, an elliptic cone by (weighted) total \
-         least squares. Its five free parameters cost little on a whole disc and much on an arc, where neither \
-         altitude nor limb height helps it; `hzn` uses both, and the shape of the ellipsoid once an attitude good to \
-         5° tells where east is. What is left is the limb's height by latitude: its first harmonic along the limb \
-         cannot be told from a tilt (0.02° a kilometre here). A sensor that is not told of it but for a sigma that \
-         stands for a common height has a NEES above 2; from 25° to 45° off nadir the free cone of `zju-2022` takes up \
-         more of the slope. One that is told, and knows roughly where north is, is left with the noise and with what \
-         shifts all edge points alike, here a twentieth of a pixel of 30 km: on an arc that is half a hundredth of a \
-         degree.",
+        "`zju-2022` rebuilds [W]: Zernike points, RANSAC with pre-verification, and an elliptic cone by (weighted) \
+         total least squares. Its five free parameters cost little on a whole disc and much on an arc, because it uses \
+         neither the altitude nor the limb height. `hzn` uses both, and also the shape of the ellipsoid if an attitude \
+         with a sigma of 5° shows where east is. The remaining error is the limb height by latitude: its first \
+         harmonic along the limb cannot be separated from a tilt (0.02° per kilometre here). A sensor with one height \
+         and a sigma has a NEES above 2, because its sigma describes an error that is common to the whole limb. From \
+         25° to 45° off nadir, the free cone of `zju-2022` follows more of the slope. A sensor with the height by \
+         latitude and an attitude has only the noise and the common shift of all edge points left. The shift is a \
+         twentieth of a pixel of 30 km here; on an arc this is half a hundredth of a degree.",
     );
     Ok(s)
 }
@@ -152,12 +152,12 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
     let body = &flight.sensor.body;
     let sensors = sensors(&flight, &body.limb_height_by_latitude_km, body.limb_height_sigma_km);
     s.text(format!(
-        "{count} pictures of `hzn simulate leo-infrared` over one orbit, the optical axis swinging from nadir to 120° \
-         off it: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb half-level \
-         25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. Goals: 0.04° \
-         RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5° 0.015° and 0.03°; NEES 1 to 4. \
-         Measured on {MEASURED} pictures of other seeds and told to the sensor: {told}; where it is told one height, ± \
-         {LIMB_SIGMA_KM} km. The sensor.toml of the scene has the height by latitude."
+        "{count} pictures of `hzn simulate leo-infrared` over one orbit. The optical axis swings from nadir to 120° \
+         off nadir: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb \
+         half-level 25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. \
+         Goals: 0.04° RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5°, 0.015° and 0.03°; \
+         NEES 1 to 4. The sensor has values that were measured on {MEASURED} pictures of other seeds: {told}; a sensor \
+         with one height has ± {LIMB_SIGMA_KM} km. The sensor.toml of the scene has the height by latitude."
     ));
     s.text(OTHER_SEEDS);
     let flown = fly(&flight, &sensors)?;

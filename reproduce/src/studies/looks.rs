@@ -35,18 +35,19 @@ pub(super) fn lost_discs(effort: &Effort) -> anyhow::Result<Section> {
     };
     let mut s = Section::default();
     s.text(format!(
-        "Even discs without noise through equidistant lenses to 60° to 90°, {circles} image circles, {DISCS} discs \
-         under each as from 1500 to 19 000 km, half of the outline or more in view, at {LEVELS} fixed levels from 5 % \
-         to 91 % of the disc's brightness. A disc is lost when there is no answer, or one more than 0.2° off."
+        "Evenly bright discs without noise through equidistant lenses to 60° to 90°: {circles} image circles, under \
+         each {DISCS} discs seen from 1500 to 19 000 km, with half of the outline or more in view, at {LEVELS} fixed \
+         thresholds from 5 % to 91 % of the disc's brightness. A disc is lost if there is no answer or the answer is \
+         more than 0.2° off."
     ));
     s.table(
         ["outline", "combinations", "lost"],
         [row("whole in view", true), row("cut by the circle or the picture", false)],
     );
     s.text(
-        "A disc that touches the image circle over fewer pixels than the border's strides was met by a search line \
-         only, which gave a piece of its edge: 16 of 7880 such combinations were lost. An edge from a search line that \
-         ends at the border is now taken as a sign, and the border is then looked at pixel by pixel.",
+        "If a disc touches the image circle over fewer pixels than the strides along the border, only a search line \
+         meets its edge and gives a part of it. Without a check for this, 16 of 7880 of these combinations were lost. \
+         If an edge from a search line ends at the border, the sensor now searches the border pixel by pixel.",
     );
     Ok(s)
 }
@@ -88,9 +89,9 @@ pub(super) fn second_look(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(60);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures a scene, once with `recover.levels = []` and once by default; limb height told as 18 ± 7 km, \
-         noise by default. The discs of `full-disc`, and `horace` through HORACE's real camera (8 mm, 3.75 µm, \
-         1024×768: 27.0°×20.4°)."
+        "{count} pictures per scene, once with `recover.levels = []` and once by default. The sensor has a limb height \
+         of 18 ± 7 km and the default noise. The scenes are the discs of `full-disc`, and `horace` through HORACE's \
+         real camera (8 mm, 3.75 µm, 1024×768: 27.0°×20.4°)."
     ));
     let (mut rows, mut bad) = (Vec::new(), Vec::new());
     for name in ["full-disc", "horace"] {
@@ -130,11 +131,11 @@ const NIGHT: [f64; 3] = [0.022320, 0.942248, 0.334170];
 pub(super) fn real_pictures(_: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(
-        "Photographs of tests/data/real, reduced, at fixed levels (parts of full scale) and thresholds. \
-         `iss073e0293986-aurora`: night limb, airglow, aurora; its camera is not recorded, so lenses of 24 to 50 mm on \
-         a sensor 36 mm wide are assumed. `iss030e102170-night`: airglow and aurora, with the direction to the Earth \
-         from the stars. An answer is wanted in none of 40 settings of the first, and of the second only within 3σ of \
-         the truth. Limb height told as 17 ± 7 km.",
+        "Photographs of tests/data/real, reduced, at fixed brightness thresholds (levels, as parts of full scale) and \
+         consensus thresholds (px). `iss073e0293986-aurora`: night limb, airglow, aurora; its camera is not recorded, \
+         so lenses of 24 to 50 mm on a sensor 36 mm wide are assumed. `iss030e102170-night`: airglow and aurora, with \
+         the direction to the Earth from the stars. The sensor should answer none of the 40 settings of the first, and \
+         of the second only within 3σ of the truth. It has a limb height of 17 ± 7 km.",
     );
     let mut rows = Vec::new();
     let mut answers = Vec::new();
@@ -196,8 +197,9 @@ fn opssat(s: &mut Section) -> anyhow::Result<()> {
         rows.push([format!("{level}")].into_iter().chain(row).collect());
     }
     s.text(
-        "`opssat-2020-08-16`: the Earth's limb through haze, one black pixel all around from demosaicing, which joined \
-         the limb to the picture's outline; the fourth column is the largest distance from the axes above it.",
+        "`opssat-2020-08-16`: the Earth's limb through haze. Demosaicing left a frame of one black pixel, which joined \
+         the limb to the outline of the picture. The fourth column is the largest distance from the axes in the rows \
+         above.",
     );
     s.table(["level", "RMS", "σ", "from the others"], rows);
     Ok(())

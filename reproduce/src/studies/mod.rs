@@ -20,8 +20,9 @@ use hzn_sim::{Flight, Scenario};
 use crate::document::{Document, Section};
 
 /// Note on the results of sensors whose limb height and noise come from [`simulated`].
-const OTHER_SEEDS: &str = "**In-sample for the scene, out of sample for the pictures**: what is told was measured on \
-                           other seeds of the same scene, with other clouds and noise, the same air and detector.";
+const OTHER_SEEDS: &str = "**In-sample for the scene, out of sample for the pictures**: the values in sensor.toml were \
+                           measured on other seeds of the same scene: clouds and noise differ, air and detector are \
+                           the same.";
 
 /// Size of a campaign.
 pub(crate) struct Effort {
@@ -98,7 +99,7 @@ fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
 /// Returns a scene as `hzn simulate` makes it, with JPEG if the scene is stored as JPEG, and the measured values as
 /// text for a cell. The sensor has the limb height and the noise that were measured on other seeds.
 fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
-    let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
+    let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("there is no built-in scene {name}"))?;
     scenario.capture.frames = u32::try_from(count)?;
     let mut flight = scenario.flight().with_context(|| name.to_owned())?;
     let fits = Fit::measure(&scenario, MEASURED, &|_, _| ()).with_context(|| name.to_owned())?;

@@ -22,15 +22,16 @@ pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(120);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures of each scene of `hzn simulate` ({} of the infrared one), each through every preset. All are \
-         told the same: camera, mask, position, limb height and edge errors as measured on other pictures of the scene \
-         (`hzn simulate` writes them into its sensor.toml). The makers of `dlr-2022` set its threshold for their \
-         scene; here it is the median of what `otsu` finds on {LOOKED_AT} of the pictures. RMS, 95 % and NEES (2 is \
-         ideal) are those of answers within {GROSS_DEG}°; gross errors, above it, and false answers, without a limb in \
-         view, stand apart. Times are medians, two pictures at once.",
+        "{count} pictures of each scene of `hzn simulate` ({} of the infrared one), each through every preset. All \
+         presets get the same values: camera, mask, position, and the limb height and edge errors that were measured \
+         on other pictures of the scene (`hzn simulate` writes them into its sensor.toml). The makers of `dlr-2022` \
+         set its threshold for their scene; here it is the median of the thresholds that `otsu` finds on {LOOKED_AT} \
+         of the pictures. RMS, 95 % and NEES (2 is ideal) are for answers within {GROSS_DEG}°; gross errors (above it) \
+         and false answers (without a limb in view) have their own columns. Times are medians while two pictures are \
+         processed at once.",
         3 * count,
     ));
-    s.text(format!("{OTHER_SEEDS} The level of `dlr-2022` is in-sample: it comes from these very pictures."));
+    s.text(format!("{OTHER_SEEDS} The threshold of `dlr-2022` is in-sample: it comes from these pictures."));
     let mut rows = Vec::new();
     for (name, flight) in scenes(count)? {
         let level = usual_level(&flight)?;
@@ -50,7 +51,7 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     let (infrared, _) = simulated("leo-infrared", 3 * count)?;
     let third = |k: usize| Flight { frames: infrared.frames[k * count..(k + 1) * count].to_vec(), ..infrared.clone() };
     let (mut sun, _) = simulated("sun-moon", count)?;
-    sun.sensor.body = sun.sensor.bodies.first().cloned().ok_or_else(|| anyhow!("sun-moon looks for bodies"))?;
+    sun.sensor.body = sun.sensor.bodies.first().cloned().ok_or_else(|| anyhow!("the scene sun-moon has no bodies"))?;
     sun.sensor.binarize = sun.sensor.body.binarize.unwrap_or(sun.sensor.binarize);
     sun.sensor.covariance = sun.sensor.body.covariance.unwrap_or(sun.sensor.covariance);
     sun.sensor.bodies.clear();
