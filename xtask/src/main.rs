@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod demo;
 mod firmware;
 mod flight_build;
 mod machine;
@@ -19,6 +20,7 @@ mod reproduce;
 mod soft_double;
 mod steps;
 mod test;
+mod test_build;
 mod viewer;
 mod wheel;
 
@@ -54,7 +56,7 @@ fn main() -> ExitCode {
         "bench" => bench::run(rest),
         "reproduce" => reproduce::run(rest),
         "firmware" => firmware::run(rest),
-        "keys" => keys(),
+        "keys" => write_keys(),
         "viewer" => viewer::run(),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");
@@ -75,9 +77,7 @@ fn main() -> ExitCode {
 }
 
 /// Writes the documents that are derived from the keys of sensor.toml.
-fn keys() -> Result<(), String> {
+fn write_keys() -> Result<(), String> {
     let mut cargo = steps::cargo(&["run", "--quiet", "-p", "hzn-calib", "--example", "keys", "--", "."]);
-    steps::run(&mut cargo).map_err(|trouble| match trouble {
-        steps::Trouble::Failed(why) | steps::Trouble::Missing(why) => why,
-    })
+    steps::run(&mut cargo).map_err(steps::Trouble::into_message)
 }

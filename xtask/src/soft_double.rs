@@ -25,7 +25,7 @@ const STAGES: [&str; 11] = [
 ];
 /// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
 /// the number of places that may do so.
-const ONCE: [(&str, usize); 15] = [
+const ALLOWED_CONVERSIONS: [(&str, usize); 15] = [
     ("hzn_core::pipeline::search::Search<T,O>::candidate::{{closure}}", 34),
     ("hzn_core::pipeline::search::Search<T,O>::piece", 36),
     ("hzn_core::stages::consensus::Threshold<T>::new", 3),
@@ -46,7 +46,7 @@ const ONCE: [(&str, usize); 15] = [
 const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::pass"];
 
 /// Checks an image for a core that has single precision only.
-pub(crate) fn look_into(image: &Path) -> Outcome {
+pub(crate) fn check(image: &Path) -> Outcome {
     let text = output(Command::new("arm-none-eabi-objdump").args(["-d", "-C", "--no-show-raw-insn"]).arg(image))
         .ok_or_else(|| Trouble::Failed(format!("{} cannot be disassembled", image.display())))?;
     let calls = calls_by_function(&text);
@@ -60,7 +60,7 @@ pub(crate) fn look_into(image: &Path) -> Outcome {
         let checks = function.contains("::check")
             || function.contains("keys::Section>")
             || function.contains("Camera<T>::try_new");
-        let allowed = ONCE.iter().find(|(f, _)| f == function).map_or(0, |(_, n)| *n);
+        let allowed = ALLOWED_CONVERSIONS.iter().find(|(f, _)| f == function).map_or(0, |(_, n)| *n);
         if staged && !checks && count > allowed {
             return Err(Trouble::Failed(format!(
                 "{function} computes with soft doubles in {count} places, {allowed} are allowed"
