@@ -10,10 +10,10 @@ use hzn_core::HostHorizon;
 use hzn_core::camera::Camera;
 use rayon::prelude::*;
 
-use super::Effort;
 use super::defaults::{Outcome, Rendered};
-use crate::document::Section;
+use super::setup::Effort;
 use crate::fly::{Sensor, deg, fly_rendered, two_digits};
+use crate::section::Section;
 
 /// Number of pictures per variant.
 const PICTURES: usize = 24;
@@ -95,7 +95,7 @@ fn no_clouds(scenario: &mut Scenario) {
     }
 }
 
-pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
+pub(super) fn switched_off_effects(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut s = Section::default();
     s.text(format!(
@@ -114,7 +114,7 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
             scenario.seed = SEED;
             scenario.capture.frames = u32::try_from(count)?;
             change(&mut scenario);
-            rows.push(cells(
+            rows.push(row(
                 name,
                 &Rendered::from_scenario(&scenario, false).with_context(|| format!("{scene}: {name}"))?,
             )?);
@@ -135,15 +135,15 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
     Ok(s)
 }
 
-fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
+fn row(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
     let none = || "–".to_owned();
     let found = flight.calibration.as_ref();
-    let mut told = flight.untold();
+    let mut sensor = flight.default_sensor();
     let [points_km, curvature_km] = heights_km(flight)?;
-    told.body.limb_height_km = points_km;
-    told.body.limb_height_sigma_km = 1.0;
-    let cases = fly_rendered(&flight.flight, &flight.pictures, &[Sensor::new("told", told).without_rates()])?;
-    let outcome = Outcome { told: "", cases: cases.into_iter().flatten().collect() };
+    sensor.body.limb_height_km = points_km;
+    sensor.body.limb_height_sigma_km = 1.0;
+    let cases = fly_rendered(&flight.flight, &flight.pictures, &[Sensor::new("height given", sensor).without_rates()])?;
+    let outcome = Outcome { knowledge: "", cases: cases.into_iter().flatten().collect() };
     Ok(vec![
         name.to_owned(),
         match found {
@@ -167,7 +167,7 @@ fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
 /// each point in the fitted height. The mean over the pictures is weighted by the inverse variance of each picture's
 /// height.
 fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
-    let wide = noise::looks_with(&flight.untold()).context("no body with a limb height")?;
+    let wide = noise::looks_with(&flight.default_sensor()).context("no body with a limb height")?;
     let camera = Camera::try_new(&wide.camera)?;
     let each = flight.flight.frames.par_iter().zip(&flight.pictures).map_init(
         || HostHorizon::boxed(&wide),

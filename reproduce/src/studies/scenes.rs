@@ -5,16 +5,21 @@ use hzn_sim::Flight;
 use hzn_sim::evaluate::Case;
 use hzn_sim::scenario::MEASURED;
 
-use super::{Effort, OTHER_SEEDS, preset, simulated};
-use crate::document::Section;
-use crate::fly::{HEADS, Sensor, cells, evaluate, fly, wrong};
+use super::setup::{Effort, OTHER_SEEDS, preset, simulated};
+use crate::fly::{HEADS, Sensor, cells, evaluate, fly, list_wrong_answers};
+use crate::section::Section;
 
 /// Runs scenes through sensors and adds a table with one row per scene, sensor and body.
-fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight) -> Vec<Sensor>) -> anyhow::Result<()> {
-    let (mut rows, mut told, mut bad) = (Vec::new(), Vec::new(), Vec::new());
+fn add_rows(
+    s: &mut Section,
+    names: &[&str],
+    count: usize,
+    sensors: impl Fn(&Flight) -> Vec<Sensor>,
+) -> anyhow::Result<()> {
+    let (mut rows, mut measured, mut bad) = (Vec::new(), Vec::new(), Vec::new());
     for &name in names {
-        let (flight, what) = simulated(name, count)?;
-        told.push(what);
+        let (flight, text) = simulated(name, count)?;
+        measured.push(text);
         let bodies = flight.sensor.each_body();
         let sensors = sensors(&flight);
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
@@ -23,7 +28,7 @@ fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight)
                 let own: Vec<Case> = cases.iter().filter(|c| c.body == kind).cloned().collect();
                 let shown = if bodies.len() > 1 { format!("`{name}`, {kind}") } else { format!("`{name}`") };
                 rows.push([shown, sensor.name.clone()].into_iter().chain(cells(&evaluate(&own))).collect());
-                let wrong = wrong(&own);
+                let wrong = list_wrong_answers(&own);
                 if sensor.name.starts_with("hzn") && !wrong.is_empty() {
                     bad.push(format!("{}: {wrong}", sensor.name));
                 }
@@ -33,7 +38,7 @@ fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight)
     s.table(["scene", "sensor"].into_iter().chain(HEADS), rows);
     s.text(format!(
         "{OTHER_SEEDS} The values in sensor.toml, measured on {MEASURED} pictures of other seeds: {}.",
-        told.join("; ")
+        measured.join("; ")
     ));
     if !bad.is_empty() {
         s.text(format!("Wrong answers: {}.", bad.join("; ")));
@@ -63,7 +68,7 @@ pub(super) fn rocket(effort: &Effort) -> anyhow::Result<Section> {
             Sensor::new("dlr-2022", dlr),
         ]
     };
-    rows(&mut s, &["rocket-clean", "rocket"], count, sensors)?;
+    add_rows(&mut s, &["rocket-clean", "rocket"], count, sensors)?;
     s.text(
         "`dlr-2022` rebuilds [BB]: a fixed threshold, whole pixels, RANSAC on three points and their direct estimate, \
          whose direction uses neither altitude nor limb height. Its covariance is the overbound [BB 37]. In `rocket` \
@@ -83,6 +88,6 @@ pub(super) fn others(effort: &Effort) -> anyhow::Result<Section> {
          false. {BY_HAND}"
     ));
     let hzn = |flight: &Flight| vec![Sensor::new("hzn", flight.sensor.clone())];
-    rows(&mut s, &["horace-wide", "full-disc", "tumble", "sun-moon"], count, hzn)?;
+    add_rows(&mut s, &["horace-wide", "full-disc", "tumble", "sun-moon"], count, hzn)?;
     Ok(s)
 }
