@@ -11,10 +11,10 @@ pub(crate) fn markdown(results: &Results) -> String {
     let mut s = String::from("# Benchmarks\n\n");
     let _ = writeln!(
         s,
-        "`cargo xtask bench` writes this page. The times are for one thread of {}; {}. Each case has {} distinct frames. \
-         Each frame is measured {} times with flushed caches, from the threshold to the covariance; hzn and the recipe \
-         take turns and have the same threshold. A time is the median over the frames of the best time of each frame. \
-         Load of the machine at the start: {}.\n",
+        "`cargo xtask bench` writes this page. The times are for one thread of {}; {}. Each case has {} distinct \
+         frames. Each frame is measured {} times with flushed caches, from the threshold to the covariance; hzn and \
+         the recipe take turns and have the same threshold. A time is the median over the frames of the best time of \
+         each frame. Load of the machine at the start: {}.\n",
         results.machine, results.versions, results.frames, results.rounds, results.load
     );
     let _ = writeln!(

@@ -95,8 +95,8 @@ fn run(options: &Options) -> Result<(), String> {
     let target = PathBuf::from(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()));
     let folder = target.join("bench").join(format!("run-{}", options.frames));
     let megabytes = render_flight(&folder, options.frames)?;
-    let here = std::env::current_exe().map_err(text)?;
-    let mut ways = vec![Way::new("decoding alone", None, &here, &["decode"], &folder, None)];
+    let own_program = std::env::current_exe().map_err(text)?;
+    let mut ways = vec![Way::new("decoding alone", None, &own_program, &["decode"], &folder, None)];
     for (name, goal, file, more) in [
         ("`hzn run -o out.csv`", Some(1.15), "out.csv", &[][..]),
         ("`hzn run -o out.mcap --no-images`", None, "results.mcap", &["--no-images"]),
@@ -185,8 +185,8 @@ fn make_table(ways: &[Way], options: &Options, megabytes: f64) -> String {
     let (frames, rounds) = (options.frames, options.rounds);
     let mut out = format!(
         "`cargo xtask bench run`: {frames} distinct PNGs of 1920x1080 ({megabytes:.0} MB), {cores} cores, {rounds} \
-         rounds, in which the ways take turns; the table shows the least time of each way. Load of the machine at the end: {load}.\n\n\
-         | way | wall, s | frames per second | ratio | goal | processor time, s | ratio \
+         rounds, in which the ways take turns; the table shows the least time of each way. Load of the machine at the \
+         end: {load}.\n\n| way | wall, s | frames per second | ratio | goal | processor time, s | ratio \
          |\n|---|---|---|---|---|---|---|\n"
     );
     let Some(alone) = ways.first() else { return out };

@@ -95,8 +95,8 @@ impl Rendered {
         sensor
     }
 
-    /// Returns the sensor of [`Self::default_sensor`] after `hzn calibrate noise`; `None` if the calibration refused or raised
-    /// the alarm.
+    /// Returns the sensor of [`Self::default_sensor`] after `hzn calibrate noise`; `None` if the calibration refused or
+    /// raised the alarm.
     fn calibrated_sensor(&self) -> Option<Config> {
         let calibration = self.calibration.as_ref().ok().filter(|c| c.alarm().is_none())?;
         let mut sensor = self.default_sensor();

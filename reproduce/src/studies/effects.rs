@@ -184,8 +184,8 @@ fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
             let (rays, shares): (Vec<_>, Vec<_>) = noise::shares(&turning, &points, &solution)?.into_iter().unzip();
             let heights = frame.scene.tangent_heights_km(rays);
             let mean = heights.iter().sum::<f64>() / heights.len() as f64;
-            let seen = heights.iter().zip(&shares).map(|(h, share)| h * share).sum::<f64>();
-            Some([mean, seen, sighting.sigma_km.powi(-2)])
+            let weighted = heights.iter().zip(&shares).map(|(h, share)| h * share).sum::<f64>();
+            Some([mean, weighted, sighting.sigma_km.powi(-2)])
         },
     );
     let each: Vec<[f64; 3]> = each.flatten().collect();

@@ -29,8 +29,8 @@ const SCENE: &str = "384×288 pixels, equidistant lens of 92 px/rad to 90° off 
                      half-level 25 km ± 4.5 km over latitude with a scale of 5 km, blur 1 px, noise 2 %, 16 bits";
 
 /// Returns `hzn` with one limb height for all latitudes, the same with an attitude, the same with an attitude and the
-/// height by latitude, and `zju-2022`. `by_latitude_km` has rows of latitude in degrees and height in km; `height_sigma_km` is
-/// the remaining sigma of the height.
+/// height by latitude, and `zju-2022`. `by_latitude_km` has rows of latitude in degrees and height in km;
+/// `height_sigma_km` is the remaining sigma of the height.
 fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], height_sigma_km: f64) -> Vec<Sensor> {
     let one = body::Config {
         limb_height_sigma_km: COMMON_HEIGHT_SIGMA_KM,
@@ -157,8 +157,9 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
          off nadir: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb \
          half-level 25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. \
          Goals: 0.04° RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5°, 0.015° and 0.03°; \
-         NEES 1 to 4. The sensor has values that were measured on {MEASURED} pictures of other seeds: {measured}; a sensor \
-         with one height has ± {COMMON_HEIGHT_SIGMA_KM} km. The sensor.toml of the scene has the height by latitude."
+         NEES 1 to 4. The sensor has values that were measured on {MEASURED} pictures of other seeds: {measured}; a \
+         sensor with one height has ± {COMMON_HEIGHT_SIGMA_KM} km. The sensor.toml of the scene has the height by \
+         latitude."
     ));
     s.text(OTHER_SEEDS);
     let flown = fly(&flight, &sensors)?;

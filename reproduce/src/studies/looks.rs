@@ -188,8 +188,9 @@ fn add_opssat(s: &mut Section) -> anyhow::Result<()> {
     for level in BRIGHTNESS_THRESHOLDS.into_iter().skip(1) {
         let row = match photograph.answer_with_threshold(level, 3.0)? {
             Some(here) => {
-                let apart = found.iter().map(|f| f.off_deg(here.axis)).fold(0.0, f64::max);
-                let row = [format!("{:.2} px", here.rms_px), format!("{:.2}°", here.sigma_deg), format!("{apart:.4}°")];
+                let largest_deg = found.iter().map(|f| f.off_deg(here.axis)).fold(0.0, f64::max);
+                let row =
+                    [format!("{:.2} px", here.rms_px), format!("{:.2}°", here.sigma_deg), format!("{largest_deg:.4}°")];
                 found.push(here);
                 row
             }
