@@ -18,8 +18,8 @@ const ALTITUDES_KM: [f64; 3] = [70.0, 240.0, 800.0];
 const NOISE: [f64; 3] = [0.005, 0.02, 0.08];
 /// Share of the picture's width that the vehicle does not cover.
 const UNCOVERED_SHARE: [f64; 2] = [1.0, 0.3];
-/// Difference of the true value and the told value in standard deviations. The numbers are the middles of eight equally
-/// likely parts of a normal distribution, shuffled.
+/// Difference of the true value and the value that the sensor gets, in sigmas. The numbers are the middles of eight
+/// equally likely parts of a normal distribution, shuffled.
 const SIGMAS: [f64; FRAMES] = [0.49, -1.53, 0.89, -0.16, -0.49, 1.53, 0.16, -0.89];
 const HEIGHT_SIGMA_KM: f64 = 1.0;
 const ATTITUDE_SIGMA_DEG: f64 = 5.0;

@@ -207,10 +207,10 @@ fn answers(path: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
     let columns = lines.next().unwrap();
-    let apart = ["index", "file", "time_s", "elapsed_us"];
+    let not_answer = ["index", "file", "time_s", "elapsed_us"];
     lines
         .map(|cells| {
-            cells.into_iter().zip(&columns).filter(|(_, c)| !distance.contains(&c.as_str())).map(|(v, _)| v).collect()
+            cells.into_iter().zip(&columns).filter(|(_, c)| !not_answer.contains(&c.as_str())).map(|(v, _)| v).collect()
         })
         .collect()
 }

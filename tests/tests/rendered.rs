@@ -59,7 +59,7 @@ fn rocket_flight() {
     let flown = fly(&rocket(1920, 1080, 12, 1));
     for tally in [&flown.host, &flown.flight] {
         // The goals are: all answered, 0.06° RMS, none above 2°, and a NEES of 1 to 4 for rendered scenes. The NEES may
-        // be lower here: the limb is exactly as high as the sensor is told, and the sensor is told ±1 km.
+        // be lower here: the sensor has the exact limb height, with a sigma of 1 km.
         assert_eq!(tally.answered(), tally.frames);
         assert!(tally.rms_deg() <= 0.06 && tally.worst_deg() <= 2.0, "{tally}");
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
@@ -157,7 +157,7 @@ fn low_orbit_infrared() {
     }
 }
 
-/// Tests a limb height that varies by ±4.5 km between the poles, which the sensor is told. The test runs without an
+/// Tests a limb height that varies by ±4.5 km between the poles, which the sensor knows. The test runs without an
 /// attitude and with an attitude that has a sigma of 5°.
 #[test]
 fn low_orbit_infrared_with_limb_height_by_latitude() {
@@ -197,7 +197,7 @@ fn low_orbit_infrared_with_attitude_prior() {
         let tally = fly_with_attitude(flight);
         assert_eq!(tally.answered(), tally.frames);
         assert!(tally.rms_deg() <= limit_deg, "{tally}");
-        // The NEES is below 2: the sensor is told ±1 km of limb height, and the limb height is exactly as told.
+        // The NEES is below 2, because the sensor has the exact limb height, with a sigma of 1 km.
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
     }
 }
