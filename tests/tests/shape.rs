@@ -11,7 +11,7 @@ const MAX_FILE_LINES: usize = 450;
 const MAX_FUNCTION_LINES: usize = 100;
 const USUAL_FUNCTION_LINES: usize = 60;
 /// Number of functions that are longer today. It may only fall; the goal is 10.
-const MAX_LONG_FUNCTIONS: usize = 44;
+const MAX_LONG_FUNCTIONS: usize = 37;
 /// Files that are longer today. The list may only shrink.
 const STILL_LONG: &[&str] = &[
     "crates/hzn-calib/src/camera_file/read.rs",
