@@ -118,8 +118,8 @@ fn pitch_by_fov(design: fn(f64) -> Design) -> anyhow::Result<Curve> {
 }
 
 /// Adds the field of view with the smallest pitch, for wide and for square pictures.
-fn add_optimum(s: &mut Section, wide: &Curve, square: &Curve) {
-    let best = |curve: &Curve| curve.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 0.0));
+fn add_optimum(s: &mut Section, wide: &[(f64, f64)], square: &[(f64, f64)]) {
+    let best = |curve: &[(f64, f64)]| curve.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 0.0));
     let high = |fov: f64| 2.0 * ((fov / 2.0).to_radians().tan() * 9.0 / 16.0).atan().to_degrees();
     let (a, b) = (best(wide), best(square));
     s.text(format!(

@@ -199,7 +199,7 @@ fn add_turning_flights(s: &mut Section, scene: &Flight, count: usize) -> anyhow:
 }
 
 /// Adds the table of HORACE's requirements.
-fn add_requirements(s: &mut Section, right: &RightShares) {
+fn add_requirements(s: &mut Section, right: &[(String, f64)]) {
     // Share of a sensor's right answers in a flight; `flight` is the flight's number in `TURNING_FLIGHTS`.
     let share = |name: &str, flight: usize| right.iter().filter(|r| r.0 == name).nth(flight).map_or(f64::NAN, |r| r.1);
     let requirement = |text: &str, value: &dyn Fn(&str) -> f64| {

@@ -11,17 +11,17 @@ use hzn_tests::emulated::Case;
 const EXPENSIVE_PICTURES: u32 = 64;
 
 /// Pictures of the table.
-pub struct Pictures {
+pub(crate) struct Pictures {
     /// Frames of a rocket, and the Moon at the bottom of a dark sky.
-    pub usual: Vec<Case>,
+    pub(crate) usual: Vec<Case>,
     /// Expensive pictures of three sensors, each with the number of rows in the table.
-    pub expensive: [(Vec<Case>, usize); 3],
+    pub(crate) expensive: [(Vec<Case>, usize); 3],
     /// Frames for the sensor that takes rows, each group with its name.
-    pub by_rows: [(&'static str, Vec<Case>); 2],
+    pub(crate) by_rows: [(&'static str, Vec<Case>); 2],
 }
 
 impl Pictures {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut usual = Vec::new();
         for (w, h) in [(640, 480), (1024, 768), (1920, 1080)] {
             for clean in [true, false] {
@@ -164,14 +164,14 @@ fn hash_two(a: u32, b: u32) -> u32 {
 }
 
 /// Sensors for these pictures, each with a suffix for the picture's name.
-pub struct Sensors {
+pub(crate) struct Sensors {
     usual: (Config, &'static str),
     /// Sensor for one picture in eight.
     every_eighth: (Config, &'static str),
 }
 
 /// Returns an ordinary sensor, and one with the mask of a payload.
-pub fn usual_sensors() -> Sensors {
+pub(crate) fn usual_sensors() -> Sensors {
     let mut bare = Config::new(lens(W as u16, H as u16));
     bare.body.altitude_km = Some(150.0);
     let mut masked = bare.clone();
@@ -188,7 +188,7 @@ pub fn usual_sensors() -> Sensors {
 
 /// Returns a sensor with the largest number of polygons and corners in the mask: stars over most of the picture, with a
 /// long border.
-pub fn largest_mask() -> Sensors {
+pub(crate) fn largest_mask() -> Sensors {
     let mut sensor = usual_sensors().usual.0;
     for k in 0..8 {
         let star = |i: u32| {
@@ -202,13 +202,13 @@ pub fn largest_mask() -> Sensors {
 }
 
 /// Returns a sensor for the Moon, whose crescent may be so narrow that every row is a search line.
-pub fn moon() -> Sensors {
+pub(crate) fn moon() -> Sensors {
     let sensor = Config::preset(Preset::Moon, lens(W as u16, H as u16));
     Sensors { usual: (sensor.clone(), ", Moon"), every_eighth: (sensor, ", Moon") }
 }
 
 /// Makes the expensive pictures of these seeds.
-pub fn paint_expensive_pictures(seeds: std::ops::Range<u32>, sensors: &Sensors) -> Vec<Case> {
+pub(crate) fn paint_expensive_pictures(seeds: std::ops::Range<u32>, sensors: &Sensors) -> Vec<Case> {
     seeds.map(|seed| paint_expensive_picture(seed, sensors)).collect()
 }
 

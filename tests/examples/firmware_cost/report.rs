@@ -24,7 +24,7 @@ checks this).
 ";
 
 /// Returns the whole report.
-pub fn report() -> Result<String, String> {
+pub(crate) fn report() -> Result<String, String> {
     let pictures = Pictures::new();
     let mut out = HEAD.to_owned();
     for board in Board::ALL {
@@ -139,15 +139,15 @@ impl<'a> Measurement<'a> {
 }
 
 /// Line of the table, with instructions and work in thousands.
-pub struct Line {
-    pub name: String,
-    pub total: f64,
-    pub work: f64,
-    pub stages: Vec<f64>,
+pub(crate) struct Line {
+    pub(crate) name: String,
+    pub(crate) total: f64,
+    pub(crate) work: f64,
+    pub(crate) stages: Vec<f64>,
 }
 
 /// Returns a line for each name: the most expensive of its pictures.
-pub fn lines(cases: &[Case], measured: &[Measured]) -> Vec<Line> {
+pub(crate) fn lines(cases: &[Case], measured: &[Measured]) -> Vec<Line> {
     let mut out: Vec<Line> = Vec::new();
     for (case, m) in cases.iter().zip(measured) {
         let line = Line {
@@ -175,7 +175,7 @@ fn sizes(board: Board, image: &str) -> Option<[u64; 2]> {
 }
 
 /// Returns the figures of a report. The key of each figure is the heading, the first cell of its row, and the column.
-pub fn read_figures(text: &str) -> Vec<(String, f64)> {
+pub(crate) fn read_figures(text: &str) -> Vec<(String, f64)> {
     let mut out: Vec<(String, f64)> = Vec::new();
     let (mut heading, mut columns) = ("", Vec::new());
     for line in text.lines() {
