@@ -1,10 +1,10 @@
-"""The recipe that one would write with OpenCV, stage by stage, timed.
+"""Finds the limb as a usual program with OpenCV does, and measures the time of each stage.
 
 threshold -> findContours (external, every point) -> longest contour without border points ->
 fisheye.undistortPoints -> least squares for the direction (Braun & Barf, equation 24) -> normalise
 
-Run by the benchmark harness, which sends one JSON request a line and reads one JSON answer a line, so that both
-programs take turns on the same frames. The level is given: it is the one hzn has found.
+The benchmark harness runs this program. It sends one JSON request per line and reads one JSON answer per line, so that
+both programs take turns on the same frames. The level in the request is the threshold that hzn has found.
 """
 
 import json
@@ -43,7 +43,7 @@ def flush_caches():
     FLUSH[::64] += 1
 
 
-def recipe(case, image, level):
+def find_axis(case, image, level):
     clock = time.perf_counter_ns
     t0 = clock()
     _, binary = cv2.threshold(image, level - 1, 255, cv2.THRESH_BINARY, dst=case.binary)
@@ -90,10 +90,10 @@ def main():
         request = json.loads(line)
         if request["case"] != name:
             name, case = request["case"], Case(folder / request["case"])
-            # What the libraries prepare on first use is not the recipe's cost.
-            recipe(case, case.frames[0], 128)
+            # The libraries prepare things on first use; this time is not a cost of the recipe.
+            find_axis(case, case.frames[0], 128)
         flush_caches()
-        print(json.dumps(recipe(case, case.frames[request["frame"]], request["level"])), flush=True)
+        print(json.dumps(find_axis(case, case.frames[request["frame"]], request["level"])), flush=True)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ pub(crate) struct Case {
 /// Frame with its prior and its truth.
 pub(crate) struct Picture {
     pub(crate) bytes: Vec<u8>,
-    pub(crate) known: Prior<f64>,
+    pub(crate) prior: Prior<f64>,
     /// True limb axis in the camera frame.
     pub(crate) truth: [f64; 3],
 }
@@ -51,7 +51,7 @@ pub(crate) fn plans(frames: usize) -> Vec<Plan> {
         for kind in ["clean", "cloudy"] {
             // Twice the number is made, because a tumbling rocket sometimes shows little limb.
             let mut flight = rocket(width, height, frames * 2, 7);
-            let camera = whole_chip(width, height);
+            let camera = lens_without_image_circle(width, height);
             flight.sensor.camera = camera.clone();
             flight.frames.iter_mut().for_each(|f| f.scene.camera = camera.clone());
             if kind == "clean" {
@@ -71,7 +71,7 @@ pub(crate) fn plans(frames: usize) -> Vec<Plan> {
 
 /// Returns the rocket's lens, scaled by the diagonal of the picture. With this scale the image circle stays outside the
 /// picture in every format; the recipe does not know of image circles.
-fn whole_chip(width: u16, height: u16) -> camera::Config {
+fn lens_without_image_circle(width: u16, height: u16) -> camera::Config {
     let (w, h) = (f64::from(width), f64::from(height));
     let focal_px = 1233.0 * w.hypot(h) / 1920f64.hypot(1080.0);
     let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
@@ -89,14 +89,16 @@ impl Plan {
             frames: self.flight.frames.iter().enumerate().map(entry).collect(),
         };
         let path = folder.join("case.json");
-        let there =
+        let is_current =
             fs::read_to_string(&path).is_ok_and(|s| serde_json::from_str(&s).is_ok_and(|m: Manifest| m == manifest));
-        if render || !there {
+        if render || !is_current {
             eprintln!("rendering {}", self.name);
             fs::create_dir_all(&folder).map_err(text)?;
             for (frame, entry) in self.flight.frames.iter().zip(&manifest.frames) {
                 let picture = frame.render().map_err(|e| e.to_string())?;
-                let Samples::Bytes(bytes) = picture.samples() else { return Err("frames of 8 bits expected".into()) };
+                let Samples::Bytes(bytes) = picture.samples() else {
+                    return Err("the rendered frame must have 8 bits".into());
+                };
                 fs::write(folder.join(&entry.file), bytes).map_err(text)?;
             }
             // The description is written last, so that an incomplete case is rendered again.
@@ -107,7 +109,7 @@ impl Plan {
             let truth = frame.truth().map_err(|e| e.to_string())?;
             frames.push(Picture {
                 bytes: fs::read(folder.join(&entry.file)).map_err(text)?,
-                known: frame.prior(),
+                prior: frame.prior(),
                 truth: [truth.axis_x, truth.axis_y, truth.axis_z],
             });
         }

@@ -10,6 +10,7 @@ mod cases;
 mod goals;
 mod observers;
 mod opencv;
+mod results;
 mod sensors;
 mod table;
 
@@ -18,14 +19,15 @@ use std::process::ExitCode;
 
 use cases::Case;
 use opencv::Recipe;
+use results::{CaseResult, Results};
 use sensors::Timed;
-use table::Results;
 
 const HELP: &str = "usage: cargo xtask bench [OPTION]...
-  --frames N   distinct frames a case, 8 or more (default 8)
+  --frames N   distinct frames per case, at least 8 (default 8)
   --rounds N   times that every frame is measured (default 7)
-  --only WORD  cases whose name contains WORD (clean, cloudy, 640x480, ...); book/results/benchmarks.md is left alone
-  --render     render the frames again even if they are there";
+  --only WORD  only cases whose name contains WORD (clean, cloudy, 640x480, ...); book/results/benchmarks.md is not
+               written
+  --render     render the frames again even if they exist";
 
 /// Options of the command line.
 struct Options {
@@ -51,7 +53,7 @@ impl Options {
             }
         }
         if o.frames < 8 || o.rounds == 0 {
-            return Err("--frames must be 8 or more and --rounds 1 or more".into());
+            return Err("--frames must be at least 8 and --rounds at least 1".into());
         }
         Ok(o)
     }
@@ -80,51 +82,51 @@ fn run(options: &Options) -> Result<(), String> {
         eprintln!("measuring {}", case.name);
         results.push(measure(&case, options.rounds, &mut recipe)?);
     }
-    println!("{}", results.markdown());
+    println!("{}", table::markdown(&results));
     let json = serde_json::to_string_pretty(&results).map_err(|e| e.to_string())?;
     std::fs::write(folder.join("results.json"), json).map_err(text)?;
     if options.only.is_none() {
         std::fs::create_dir_all("docs").map_err(text)?;
-        std::fs::write("book/results/benchmarks.md", results.markdown()).map_err(text)?;
+        std::fs::write("book/results/benchmarks.md", table::markdown(&results)).map_err(text)?;
     }
     Ok(())
 }
 
 /// Measures one case: in each round, every program processes every frame in turn.
-fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<table::CaseResult, String> {
-    let mut single = sensors::flight(&case.sensor)?;
-    let mut fewer = sensors::fewer_points(&case.sensor)?;
-    let mut double = sensors::host(&case.sensor)?;
-    let mut result = table::CaseResult::new(case);
+fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<CaseResult, String> {
+    let mut single = sensors::flight_sensor(&case.sensor)?;
+    let mut fewer = sensors::sensor_with_fewer_points(&case.sensor)?;
+    let mut double = sensors::host_sensor(&case.sensor)?;
+    let mut result = CaseResult::new(case);
     for round in 0..rounds {
         for (i, frame) in case.frames.iter().enumerate() {
-            let f32_run = single.cold(case, frame)?;
-            let fewer_run = fewer.cold(case, frame)?;
-            let f64_run = double.cold(case, frame)?;
+            let f32_run = single.measure_cold(case, frame)?;
+            let fewer_run = fewer.measure_cold(case, frame)?;
+            let f64_run = double.measure_cold(case, frame)?;
             let theirs = recipe.measure(&case.name, i, f32_run.level.max(1))?;
             if round == 0 {
-                result.answers(frame, [&f32_run, &fewer_run, &f64_run], &theirs);
+                result.add_answers(frame, [&f32_run, &fewer_run, &f64_run], &theirs);
             }
-            result.f32.total(i, f32_run.elapsed_us);
-            result.fewer.total(i, fewer_run.elapsed_us);
-            result.f64.total(i, f64_run.elapsed_us);
-            result.opencv.total(i, theirs.total_us);
+            result.f32.add_total(i, f32_run.elapsed_us);
+            result.fewer.add_total(i, fewer_run.elapsed_us);
+            result.f64.add_total(i, f64_run.elapsed_us);
+            result.opencv.add_total(i, theirs.total_us);
             for (name, us) in theirs.stages_us {
-                result.opencv.stage(&name, i, us);
+                result.opencv.add_stage(&name, i, us);
             }
-            for (stage, us) in single.stages(case, frame)? {
-                result.f32.stage(stage, i, us);
+            for (stage, us) in single.measure_stages(case, frame)? {
+                result.f32.add_stage(stage, i, us);
             }
-            for (stage, us) in double.stages(case, frame)? {
-                result.f64.stage(stage, i, us);
+            for (stage, us) in double.measure_stages(case, frame)? {
+                result.f64.add_stage(stage, i, us);
             }
-            result.warm.total(i, single.warm(case, frame)?);
+            result.warm.add_total(i, single.measure_warm(case, frame)?);
         }
     }
-    let mut every = sensors::every_point(&case.sensor)?;
+    let mut every = sensors::sensor_with_every_point(&case.sensor)?;
     for frame in &case.frames {
-        result.pixels(single.distinct_pixels(case, frame)?, case.pixels());
-        let Timed { elapsed_us, points, .. } = every.warm_points(case, frame)?;
+        result.add_pixels(single.count_distinct_pixels(case, frame)?, case.pixels());
+        let Timed { elapsed_us, points, .. } = every.measure_warm_run(case, frame)?;
         if points > 0 {
             result.ns_a_point.push(elapsed_us * 1e3 / f64::from(points));
         }

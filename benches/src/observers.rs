@@ -17,7 +17,7 @@ impl Clock {
     pub(crate) fn start() -> Self {
         Self { since: Cell::new(Instant::now()), stage: Cell::new(None), us: Default::default() }
     }
-    fn turn(&self, next: Option<Stage>) {
+    fn switch_stage(&self, next: Option<Stage>) {
         let now = Instant::now();
         if let Some(cell) = self.stage.get().and_then(|s| self.us.get(s as usize)) {
             cell.set(cell.get() + now.duration_since(self.since.get()).as_secs_f64() * 1e6);
@@ -33,20 +33,20 @@ impl Clock {
 
 impl<T> Observer<T> for Clock {
     fn enter(&self, stage: Stage) {
-        self.turn(Some(stage));
+        self.switch_stage(Some(stage));
     }
     fn leave(&self) {
-        self.turn(None);
+        self.switch_stage(None);
     }
 }
 
 /// Map of the pixels that were read; each counts once.
-pub(crate) struct Touched {
+pub(crate) struct PixelMap {
     width: usize,
     bits: RefCell<Vec<u64>>,
 }
 
-impl Touched {
+impl PixelMap {
     pub(crate) fn new(width: u16, height: u16) -> Self {
         let (width, height) = (usize::from(width), usize::from(height));
         Self { width, bits: RefCell::new(vec![0; (width * height).div_ceil(64)]) }
@@ -56,7 +56,7 @@ impl Touched {
     }
 }
 
-impl<T> Observer<T> for Touched {
+impl<T> Observer<T> for PixelMap {
     fn pixel(&self, x: u16, y: u16) {
         let i = usize::from(y) * self.width + usize::from(x);
         if let Some(word) = self.bits.borrow_mut().get_mut(i / 64) {

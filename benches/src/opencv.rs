@@ -43,7 +43,7 @@ impl Recipe {
             .spawn()
             .map_err(|e| format!("{}: {e}", python.display()))?;
         let requests = child.stdin.take();
-        let out = child.stdout.take().ok_or("the recipe has no output")?;
+        let out = child.stdout.take().ok_or("the OpenCV recipe has no standard output")?;
         let mut recipe = Self { child, requests, answers: BufReader::new(out), versions: String::new() };
         let v: Versions = recipe.read()?;
         recipe.versions = format!("OpenCV {}, NumPy {}", v.opencv, v.numpy);
@@ -53,12 +53,12 @@ impl Recipe {
     fn read<A: for<'de> Deserialize<'de>>(&mut self) -> Result<A, String> {
         let mut line = String::new();
         self.answers.read_line(&mut line).map_err(|e| e.to_string())?;
-        serde_json::from_str(&line).map_err(|e| format!("the OpenCV recipe ended or answered nonsense: {e}"))
+        serde_json::from_str(&line).map_err(|e| format!("the OpenCV recipe ended or gave an invalid answer: {e}"))
     }
 
     /// Measures one frame with flushed caches.
     pub(crate) fn measure(&mut self, case: &str, frame: usize, level: u16) -> Result<Answer, String> {
-        let requests = self.requests.as_mut().ok_or("the recipe takes no requests")?;
+        let requests = self.requests.as_mut().ok_or("the OpenCV recipe has no standard input")?;
         writeln!(requests, "{}", json!({ "case": case, "frame": frame, "level": level })).map_err(|e| e.to_string())?;
         requests.flush().map_err(|e| e.to_string())?;
         self.read()

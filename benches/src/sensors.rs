@@ -9,7 +9,7 @@ use hzn_core::status::Status;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior};
 
 use crate::cases::{Case, Picture};
-use crate::observers::{Clock, Touched};
+use crate::observers::{Clock, PixelMap};
 
 /// Number of bytes that are touched to flush the caches; more than the caches hold.
 const FLUSH_BYTES: usize = 64 << 20;
@@ -35,27 +35,27 @@ pub(crate) struct Timed {
 }
 
 /// Makes a sensor in f32 with the lists of a flight computer.
-pub(crate) fn flight(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
-    Ok(Sensor::on(Box::new(FlightHorizon::new(config).map_err(|e| e.to_string())?)))
+pub(crate) fn flight_sensor(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
+    Ok(Sensor::from_horizon(Box::new(FlightHorizon::new(config).map_err(|e| e.to_string())?)))
 }
 
 /// Makes the same sensor with fewer points, as for a flight computer that is short of time.
-pub(crate) fn fewer_points(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
+pub(crate) fn sensor_with_fewer_points(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
     let mut config = config.clone();
     config.candidates.keep_points = FEWER;
-    flight(&config)
+    flight_sensor(&config)
 }
 
 /// Makes a sensor in f64 with the lists of a workstation.
-pub(crate) fn host(config: &Config) -> Result<Sensor<f64, 16384, 2048, 65536>, String> {
-    Ok(Sensor::on(Box::new(HostHorizon::new(config).map_err(|e| e.to_string())?)))
+pub(crate) fn host_sensor(config: &Config) -> Result<Sensor<f64, 16384, 2048, 65536>, String> {
+    Ok(Sensor::from_horizon(Box::new(HostHorizon::new(config).map_err(|e| e.to_string())?)))
 }
 
 /// Makes a sensor in f32 that keeps every point of an edge.
-pub(crate) fn every_point(config: &Config) -> Result<Sensor<f32, 16384, 2048, 16384>, String> {
+pub(crate) fn sensor_with_every_point(config: &Config) -> Result<Sensor<f32, 16384, 2048, 16384>, String> {
     let mut config = config.clone();
     config.candidates.keep_points = 0;
-    Ok(Sensor::on(Box::new(Horizon::new(&config).map_err(|e| e.to_string())?)))
+    Ok(Sensor::from_horizon(Box::new(Horizon::new(&config).map_err(|e| e.to_string())?)))
 }
 
 fn picture<'a>(case: &Case, frame: &'a Picture) -> Result<Grey<'a, u8>, String> {
@@ -63,16 +63,16 @@ fn picture<'a>(case: &Case, frame: &'a Picture) -> Result<Grey<'a, u8>, String> 
     Grey::try_new(&frame.bytes, Layout::packed(c.width.into(), c.height.into(), 1, 8)).map_err(|e| e.to_string())
 }
 
-fn known<T: Real>(frame: &Picture) -> Prior<T> {
+fn prior<T: Real>(frame: &Picture) -> Prior<T> {
     Prior {
-        altitude_m: frame.known.altitude_m.map(T::from_f64),
-        position_m: frame.known.position_m.map(|p| p.map(T::from_f64)),
+        altitude_m: frame.prior.altitude_m.map(T::from_f64),
+        position_m: frame.prior.position_m.map(|p| p.map(T::from_f64)),
         ..Prior::default()
     }
 }
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sensor<T, POINTS, BLOCKS, WORDS> {
-    fn on(horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>) -> Self {
+    fn from_horizon(horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>) -> Self {
         Self { horizon, flush: vec![1; FLUSH_BYTES] }
     }
 
@@ -81,11 +81,11 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         black_box(&self.flush);
     }
 
-    fn once(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
+    fn measure_once(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
         let picture = picture(case, frame)?;
-        let known = known(frame);
+        let prior = prior(frame);
         // The expected limb does not depend on the picture, so its time is not measured.
-        let expected = self.horizon.expect(&known).map_err(|e| e.to_string())?;
+        let expected = self.horizon.expect(&prior).map_err(|e| e.to_string())?;
         let start = Instant::now();
         let report = black_box(self.horizon.process(black_box(&picture), &expected));
         let elapsed_us = start.elapsed().as_secs_f64() * 1e6;
@@ -99,38 +99,38 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
     }
 
     /// Measures one run with flushed caches.
-    pub(crate) fn cold(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
+    pub(crate) fn measure_cold(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
         self.flush_caches();
-        self.once(case, frame)
+        self.measure_once(case, frame)
     }
 
     /// Returns the time in microseconds when the same frame has just been processed.
-    pub(crate) fn warm(&mut self, case: &Case, frame: &Picture) -> Result<f64, String> {
-        Ok(self.warm_points(case, frame)?.elapsed_us)
+    pub(crate) fn measure_warm(&mut self, case: &Case, frame: &Picture) -> Result<f64, String> {
+        Ok(self.measure_warm_run(case, frame)?.elapsed_us)
     }
 
-    /// Measures as [`Self::warm`] does, and returns the whole result of the run.
-    pub(crate) fn warm_points(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
-        let mut runs = (0..WARM_RUNS).map(|_| self.once(case, frame)).collect::<Result<Vec<_>, _>>()?;
+    /// Measures as [`Self::measure_warm`] does, and returns the whole result of the run.
+    pub(crate) fn measure_warm_run(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
+        let mut runs = (0..WARM_RUNS).map(|_| self.measure_once(case, frame)).collect::<Result<Vec<_>, _>>()?;
         runs.sort_by(|a, b| a.elapsed_us.total_cmp(&b.elapsed_us));
         Ok(runs.swap_remove(WARM_RUNS / 2))
     }
 
     /// Returns the time of each stage in microseconds, with flushed caches.
-    pub(crate) fn stages(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
+    pub(crate) fn measure_stages(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
         self.flush_caches();
         let picture = picture(case, frame)?;
-        let expected = self.horizon.expect(&known(frame)).map_err(|e| e.to_string())?;
+        let expected = self.horizon.expect(&prior(frame)).map_err(|e| e.to_string())?;
         let clock = Clock::start();
         black_box(self.horizon.process_observed(black_box(&picture), &expected, &clock));
         Ok(clock.stages())
     }
 
     /// Returns the number of pixels that are read at least once.
-    pub(crate) fn distinct_pixels(&mut self, case: &Case, frame: &Picture) -> Result<u64, String> {
+    pub(crate) fn count_distinct_pixels(&mut self, case: &Case, frame: &Picture) -> Result<u64, String> {
         let picture = picture(case, frame)?;
-        let expected = self.horizon.expect(&known(frame)).map_err(|e| e.to_string())?;
-        let touched = Touched::new(case.sensor.camera.width, case.sensor.camera.height);
+        let expected = self.horizon.expect(&prior(frame)).map_err(|e| e.to_string())?;
+        let touched = PixelMap::new(case.sensor.camera.width, case.sensor.camera.height);
         self.horizon.process_observed(&picture, &expected, &touched);
         Ok(touched.count())
     }

@@ -1,234 +1,62 @@
-//! Computes medians and makes the tables.
+//! Writes the results as tables.
 
 use std::fmt::Write;
 
-use hzn_core::status::Status;
-use serde::Serialize;
-
-use crate::cases::{Case, Picture};
 use crate::goals;
-use crate::opencv::{Answer, Recipe};
-use crate::sensors::{FEWER, Timed};
+use crate::results::{Results, median};
+use crate::sensors::FEWER;
 
-/// All measurements.
-#[derive(Serialize)]
-pub(crate) struct Results {
-    machine: String,
-    versions: String,
-    /// Load of the machine: mean number of runnable processes over the last minute.
-    load: String,
-    frames: usize,
-    rounds: usize,
-    cases: Vec<CaseResult>,
-}
-
-/// Measurements of one case.
-#[derive(Serialize)]
-pub(crate) struct CaseResult {
-    pub(crate) name: String,
-    pub(crate) f32: Times,
-    pub(crate) fewer: Times,
-    pub(crate) f64: Times,
-    pub(crate) warm: Times,
-    pub(crate) opencv: Times,
-    frames: usize,
-    answered: [usize; 4],
-    error_deg: [Vec<f64>; 4],
-    pub(crate) pixels_percent: Vec<f64>,
-    /// Nanoseconds per edge point, warm, with every point kept.
-    pub(crate) ns_a_point: Vec<f64>,
-}
-
-/// Times of one program in microseconds: the best round of each frame. On a busy machine a longer run is interrupted
-/// more often, so a median over rounds would favour the faster program.
-#[derive(Serialize, Default)]
-pub(crate) struct Times {
-    total_us: Vec<f64>,
-    /// Stages in the order of first appearance.
-    stages_us: Vec<(String, Vec<f64>)>,
-}
-
-impl Times {
-    pub(crate) fn total(&mut self, frame: usize, us: f64) {
-        keep_best(&mut self.total_us, frame, us);
-    }
-    pub(crate) fn stage(&mut self, name: &str, frame: usize, us: f64) {
-        match self.stages_us.iter_mut().find(|(n, _)| n == name) {
-            Some((_, list)) => keep_best(list, frame, us),
-            None => {
-                let mut list = Vec::new();
-                keep_best(&mut list, frame, us);
-                self.stages_us.push((name.to_owned(), list));
-            }
-        }
-    }
-    pub(crate) fn median(&self) -> f64 {
-        median(&self.total_us)
-    }
-    fn stages(&self) -> String {
-        let frames = self.total_us.len();
-        let one = |(name, us): &(String, Vec<f64>)| {
-            // A stage that a frame does not reach took no time there.
-            let mut all: Vec<f64> = us.iter().map(|us| if us.is_finite() { *us } else { 0.0 }).collect();
-            all.resize(frames.max(us.len()), 0.0);
-            format!("{name} {:.1}", median(&all))
-        };
-        self.stages_us.iter().map(one).collect::<Vec<_>>().join(", ")
-    }
-}
-
-/// Keeps the smallest time of each frame.
-fn keep_best(list: &mut Vec<f64>, frame: usize, us: f64) {
-    if list.len() <= frame {
-        list.resize(frame + 1, f64::INFINITY);
-    }
-    if let Some(best) = list.get_mut(frame) {
-        *best = best.min(us);
-    }
-}
-
-pub(crate) fn median(list: &[f64]) -> f64 {
-    let mut sorted = list.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let n = sorted.len();
-    match (sorted.get(n.wrapping_sub(1) / 2), sorted.get(n / 2)) {
-        (Some(a), Some(b)) => (a + b) / 2.0,
-        _ => f64::NAN,
-    }
-}
-
-/// Returns the angle between two directions in degrees; the result is accurate for small angles too.
-fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
-    cross.iter().map(|x| x * x).sum::<f64>().sqrt().atan2(dot).to_degrees()
-}
-
-impl CaseResult {
-    pub(crate) fn new(case: &Case) -> Self {
-        Self {
-            name: case.name.clone(),
-            f32: Times::default(),
-            fewer: Times::default(),
-            f64: Times::default(),
-            warm: Times::default(),
-            opencv: Times::default(),
-            frames: case.frames.len(),
-            answered: [0; 4],
-            error_deg: Default::default(),
-            pixels_percent: Vec::new(),
-            ns_a_point: Vec::new(),
-        }
-    }
-
-    /// Records the answers to a frame: hzn in f32, in f32 with fewer points, in f64, and the recipe.
-    pub(crate) fn answers(&mut self, frame: &Picture, hzn: [&Timed; 3], theirs: &Answer) {
-        let [single, fewer, double] = hzn.map(|t| t.axis.filter(|_| t.status == Status::Ok));
-        let axes = [single, fewer, double, theirs.axis];
-        for ((axis, count), errors) in axes.into_iter().zip(&mut self.answered).zip(&mut self.error_deg) {
-            if let Some(axis) = axis {
-                *count += 1;
-                errors.push(angle_deg(axis, frame.truth));
-            }
-        }
-    }
-
-    pub(crate) fn pixels(&mut self, read: u64, all: u64) {
-        self.pixels_percent.push(read as f64 * 100.0 / all as f64);
-    }
-
-    fn errors(&self) -> [String; 4] {
-        [0, 1, 2, 3].map(|i| {
-            let worst = self.error_deg[i].iter().copied().fold(f64::NAN, f64::max);
-            format!("{:.3} / {worst:.3} ({} of {})", median(&self.error_deg[i]), self.answered[i], self.frames)
-        })
-    }
-}
-
-impl Results {
-    pub(crate) fn new(recipe: &Recipe, frames: usize, rounds: usize) -> Self {
-        let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-        let model =
-            cpu.lines().find_map(|l| l.strip_prefix("model name")).map(|l| l.trim_start_matches(['\t', ':', ' ']));
-        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-        Self {
-            machine: model.unwrap_or("unknown processor").to_owned(),
-            versions: recipe.versions.clone(),
-            load: load.split_whitespace().next().unwrap_or("unknown").to_owned(),
-            frames,
-            rounds,
-            cases: Vec::new(),
-        }
-    }
-
-    pub(crate) fn push(&mut self, case: CaseResult) {
-        self.cases.push(case);
-    }
-
-    /// Returns the tables as Markdown.
-    pub(crate) fn markdown(&self) -> String {
-        let mut s = String::from("# Benchmarks\n\n");
+/// Returns the tables as Markdown.
+pub(crate) fn markdown(results: &Results) -> String {
+    let mut s = String::from("# Benchmarks\n\n");
+    let _ = writeln!(
+        s,
+        "`cargo xtask bench` writes this page. The times are for one thread of {}; {}. Each case has {} distinct \
+         frames. Each frame is measured {} times with flushed caches, from the threshold to the covariance; hzn and \
+         the recipe take turns and have the same threshold. A time is the median over the frames of the best time of \
+         each frame. Load of the machine at the start: {}.\n",
+        results.machine, results.versions, results.frames, results.rounds, results.load
+    );
+    let _ = writeln!(
+        s,
+        "| case | hzn f32, µs | f32, {FEWER} points kept, µs | hzn f64, µs | recipe, µs | ratio f32 | ratio f32, \
+         {FEWER} points | ratio f64 | f32 warm, µs | pixels read, % | all points, warm, ns per point |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|"
+    );
+    for c in &results.cases {
+        let (single, fewer, double) = (c.f32.median(), c.fewer.median(), c.f64.median());
+        let theirs = c.opencv.median();
         let _ = writeln!(
             s,
-            "Written by `cargo xtask bench`. One thread of {}; {}. Each case has {} distinct frames, each measured {} \
-             times with flushed caches, from the level to the covariance, hzn and the recipe taking turns with the \
-             same level; of each frame the best time, of these the median. Load of the machine at the start: {}.\n",
-            self.machine, self.versions, self.frames, self.rounds, self.load
+            "| {} | {single:.0} | {fewer:.0} | {double:.0} | {theirs:.0} | {:.1} | {:.1} | {:.1} | {:.0} | {:.2} | \
+             {:.0} |",
+            c.name,
+            theirs / single,
+            theirs / fewer,
+            theirs / double,
+            c.warm.median(),
+            median(&c.pixels_percent),
+            median(&c.ns_a_point)
         );
-        let _ = writeln!(
-            s,
-            "| case | hzn f32, µs | f32, {FEWER} points kept, µs | hzn f64, µs | recipe, µs | ratio f32 | ratio f32, \
-             {FEWER} points | ratio f64 | f32 warm, µs | pixels read, % | all points, warm, ns a point |\n\
-             |---|---|---|---|---|---|---|---|---|---|---|"
-        );
-        for c in &self.cases {
-            let (single, fewer, double) = (c.f32.median(), c.fewer.median(), c.f64.median());
-            let theirs = c.opencv.median();
-            let _ = writeln!(
-                s,
-                "| {} | {single:.0} | {fewer:.0} | {double:.0} | {theirs:.0} | {:.1} | {:.1} | {:.1} | {:.0} | {:.2} | \
-                 {:.0} |",
-                c.name,
-                theirs / single,
-                theirs / fewer,
-                theirs / double,
-                c.warm.median(),
-                median(&c.pixels_percent),
-                median(&c.ns_a_point)
-            );
-        }
-        let _ = write!(
-            s,
-            "\nWarm is the same picture once more, in the caches. What lies between that and the first column is \
-             memory: the picture, of which each row that the limb crosses lies elsewhere, and the program, which \
-             flushed caches do not hold either.\n\nOur goals, and what is reached of them:\n\n{}",
-            goals::table(&self.cases)
-        );
-        s.push_str("\nAngle between answer and truth in degrees, median / worst (frames answered):\n\n");
-        let _ = writeln!(s, "| case | hzn f32 | f32, {FEWER} points | hzn f64 | recipe |\n|---|---|---|---|---|");
-        for c in &self.cases {
-            let _ = writeln!(s, "| {} | {} |", c.name, c.errors().join(" | "));
-        }
-        s.push_str("\nStages, µs (hzn's with an observer, which costs a little):\n\n");
-        s.push_str("| case | program | stages |\n|---|---|---|\n");
-        for c in &self.cases {
-            for (name, times) in [("hzn f32", &c.f32), ("hzn f64", &c.f64), ("recipe", &c.opencv)] {
-                let _ = writeln!(s, "| {} | {name} | {} |", c.name, times.stages());
-            }
-        }
-        s
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn medians_and_angles() {
-        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
-        assert!(median(&[]).is_nan());
-        assert!((angle_deg([1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]) - 1e-9f64.to_degrees()).abs() < 1e-20);
+    let _ = write!(
+        s,
+        "\n'Warm' is a second run on the same picture, which is then in the caches. The difference to the first \
+         column is memory access: rows of the picture that the limb crosses are far apart in memory, and flushed \
+         caches do not hold the program either.\n\nOur goals and the measured values:\n\n{}",
+        goals::table(&results.cases)
+    );
+    s.push_str("\nAngle between answer and truth in degrees, median / worst (frames answered):\n\n");
+    let _ = writeln!(s, "| case | hzn f32 | f32, {FEWER} points | hzn f64 | recipe |\n|---|---|---|---|---|");
+    for c in &results.cases {
+        let _ = writeln!(s, "| {} | {} |", c.name, c.error_cells().join(" | "));
     }
+    s.push_str("\nStages, µs (hzn's with an observer, which costs a little):\n\n");
+    s.push_str("| case | program | stages |\n|---|---|---|\n");
+    for c in &results.cases {
+        for (name, times) in [("hzn f32", &c.f32), ("hzn f64", &c.f64), ("recipe", &c.opencv)] {
+            let _ = writeln!(s, "| {} | {name} | {} |", c.name, times.stages_text());
+        }
+    }
+    s
 }

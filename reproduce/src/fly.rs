@@ -42,7 +42,7 @@ impl Sensor {
         Self { without_rates: true, ..self }
     }
     /// Returns the prior of a picture for this sensor.
-    pub(crate) fn known(&self, frame: &FlightFrame) -> hzn_core::Prior<f64> {
+    pub(crate) fn prior(&self, frame: &FlightFrame) -> hzn_core::Prior<f64> {
         let known = match self.attitude_sigma_deg {
             Some(sigma_deg) => frame.prior_with_attitude(sigma_deg.to_radians()),
             None => frame.prior(),
@@ -64,7 +64,7 @@ pub(crate) struct Flown {
 }
 
 /// Results of one picture: the truth of each body, and for each sensor one answer per body with the time in µs.
-type Seen = (Vec<Truth>, Vec<(Vec<Answer>, f64)>);
+type PictureResults = (Vec<Truth>, Vec<(Vec<Answer>, f64)>);
 
 /// Runs the pictures of a flight through sensors. Returns one list of cases per sensor.
 pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec<Case>>> {
@@ -73,7 +73,7 @@ pub(crate) fn fly(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Vec
 
 /// Does the same as [`fly`] and returns the processing times too.
 pub(crate) fn fly_timed(flight: &Flight, sensors: &[Sensor]) -> anyhow::Result<Vec<Flown>> {
-    look_at_all(flight, sensors, &|frame| Ok(std::borrow::Cow::Owned(frame.render()?)))
+    process_all(flight, sensors, &|frame| Ok(std::borrow::Cow::Owned(frame.render()?)))
 }
 
 /// Does the same as [`fly`] with pictures that are rendered already, in the order of the flight's frames.
@@ -87,11 +87,11 @@ pub(crate) fn fly_rendered(
         let picture = place.and_then(|i| pictures.get(i)).with_context(|| format!("{} is not rendered", frame.file))?;
         Ok(std::borrow::Cow::Borrowed(picture))
     };
-    Ok(look_at_all(flight, sensors, &rendered)?.into_iter().map(|flown| flown.cases).collect())
+    Ok(process_all(flight, sensors, &rendered)?.into_iter().map(|flown| flown.cases).collect())
 }
 
 /// Runs every picture through every sensor; `picture` renders or finds a picture.
-fn look_at_all<'a>(
+fn process_all<'a>(
     flight: &Flight,
     sensors: &[Sensor],
     picture: &(dyn Fn(&FlightFrame) -> anyhow::Result<std::borrow::Cow<'a, Picture>> + Sync),
@@ -100,7 +100,7 @@ fn look_at_all<'a>(
     // An invalid configuration is refused here, not in a thread.
     make()?;
     let kinds: Vec<Kind> = flight.sensor.each_body().iter().map(|b| b.kind).collect();
-    let seen: Vec<Seen> = flight
+    let results: Vec<PictureResults> = flight
         .frames
         .par_iter()
         .map_init(make, |horizons, frame| {
@@ -109,30 +109,30 @@ fn look_at_all<'a>(
             let picture = picture(frame)?;
             let horizons = horizons.as_mut().map_err(|e| *e)?;
             let answers = horizons.iter_mut().zip(sensors);
-            let answers = answers.map(|(horizon, sensor)| look(horizon, sensor, frame, &picture, &truths));
+            let answers = answers.map(|(horizon, sensor)| process_picture(horizon, sensor, frame, &picture, &truths));
             let answers = answers.collect::<anyhow::Result<_>>()?;
             anyhow::Ok((truths, answers))
         })
         .collect::<anyhow::Result<_>>()?;
-    let truth: Vec<Truth> = seen.iter().flat_map(|(t, _)| t.clone()).collect();
-    let of = |i: usize| {
+    let truth: Vec<Truth> = results.iter().flat_map(|(t, _)| t.clone()).collect();
+    let flown_by = |i: usize| {
         let (answers, elapsed_us): (Vec<Vec<Answer>>, Vec<f64>) =
-            seen.iter().filter_map(|(_, a)| a.get(i).cloned()).unzip();
+            results.iter().filter_map(|(_, a)| a.get(i).cloned()).unzip();
         let camera = hzn_core::camera::Camera::try_new(&flight.sensor.camera)?;
         Ok(Flown { cases: pair(&answers.concat(), &truth, Some(&camera))?, elapsed_us })
     };
-    (0..sensors.len()).map(of).collect()
+    (0..sensors.len()).map(flown_by).collect()
 }
 
 /// Runs one picture through one sensor. Returns one answer per body and the processing time in µs.
-fn look(
+fn process_picture(
     horizon: &mut HostHorizon,
     sensor: &Sensor,
     frame: &FlightFrame,
     picture: &Picture,
     truths: &[Truth],
 ) -> anyhow::Result<(Vec<Answer>, f64)> {
-    let known = sensor.known(frame);
+    let known = sensor.prior(frame);
     let expected = (0..truths.len()).map(|which| horizon.expect_body(which, &known)).collect::<Result<Vec<_>, _>>();
     let expected = expected.with_context(|| frame.file.clone())?;
     let begun = Instant::now();
@@ -159,7 +159,7 @@ pub(crate) fn evaluate(cases: &[Case]) -> Evaluation {
 /// Returns the cells of an evaluation: answered, false answers, RMS, 95 %, worst, NEES with its interval.
 pub(crate) fn cells(e: &Evaluation) -> Vec<String> {
     let none = || "–".to_owned();
-    let error = |of: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or_else(none, |x| deg(of(x)));
+    let error = |value: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or_else(none, |x| deg(value(x)));
     let without = e.frames - e.with_limb;
     vec![
         format!("{}/{}", e.answered, e.with_limb),
@@ -193,7 +193,7 @@ pub(crate) fn two_digits(x: f64) -> String {
 
 /// Lists the answers that are not of this limb: their error is above [`GROSS_DEG`], or no limb is in view. The text is
 /// empty if there are none.
-pub(crate) fn wrong(cases: &[Case]) -> String {
+pub(crate) fn list_wrong_answers(cases: &[Case]) -> String {
     let wrong = cases.iter().filter_map(|c| {
         let m = c.miss?;
         let sigma = m.sigma_max_deg;
@@ -211,8 +211,8 @@ pub(crate) fn wrong(cases: &[Case]) -> String {
         }
     });
     let mut wrong: Vec<String> = wrong.collect();
-    let more = wrong.len().saturating_sub(SHOWN);
-    wrong.truncate(SHOWN);
+    let more = wrong.len().saturating_sub(MAX_LISTED);
+    wrong.truncate(MAX_LISTED);
     if more > 0 {
         wrong.push(format!("and {more} more"));
     }
@@ -220,7 +220,7 @@ pub(crate) fn wrong(cases: &[Case]) -> String {
 }
 
 /// Number of wrong answers that are listed one by one.
-const SHOWN: usize = 4;
+const MAX_LISTED: usize = 4;
 
 /// Limit of gross errors in degrees. With a larger error the sensor has fitted another curve than the limb.
 pub(crate) const GROSS_DEG: f64 = 2.0;

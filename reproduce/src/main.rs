@@ -1,13 +1,14 @@
 //! Measures our numbers to compare them with the published ones, and measures accuracy and honesty on rendered flights:
 //! `cargo xtask reproduce`. A sensor is honest if its errors are as large as its covariance says (NEES).
 //!
-//! A [`studies::Study`] has a name, a title and a function that measures and returns a [`document::Section`]. The
+//! A [`studies::Study`] has a name, a title and a function that measures and returns a [`section::Section`]. The
 //! sections make up `book/results/reproduction.md`. To add a study, write a function in `studies` and a line in
 //! [`studies::ALL`].
 #![forbid(unsafe_code)]
 
 mod document;
 mod fly;
+mod section;
 mod studies;
 
 use std::path::PathBuf;
@@ -15,7 +16,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::Parser;
 
-use studies::{ALL, Effort};
+use studies::{ALL, Effort, names_in};
 
 /// Measures the numbers of book/results/reproduction.md and of parts of book/theory/methods.md again, and writes them
 #[derive(Debug, Parser)]
@@ -44,7 +45,7 @@ fn main() -> anyhow::Result<()> {
     }
     if let Some(unknown) = args.studies.iter().find(|name| ALL.iter().all(|s| s.name != **name)) {
         let names: Vec<&str> = ALL.iter().map(|s| s.name).collect();
-        bail!("no study {unknown:?}; there are {}", names.join(", "));
+        bail!("unknown study {unknown:?}; the studies are {}", names.join(", "));
     }
     if args.frames == Some(0) {
         bail!("--frames: must be 1 or more");
@@ -62,11 +63,11 @@ fn main() -> anyhow::Result<()> {
         // The document is written after each study, so that no result is lost when a later study is stopped.
         let path = args.docs.join(study.document.file());
         let document = std::fs::read_to_string(&path).unwrap_or_default();
-        let document = study.document.put(&document, study, &text)?;
+        let document = study.document.put(&document, &names_in(study.document), study.name, &text)?;
         std::fs::write(&path, document).with_context(|| path.display().to_string())?;
     }
     if args.frames.is_some() {
-        println!("--frames: a quick look; the documents are left alone");
+        println!("--frames is set, so no document is written");
     }
     Ok(())
 }

@@ -1,11 +1,11 @@
-"""Puts the rays of hzn's lens models back into the picture with OpenCV and compares.
+"""Projects the rays of hzn's lens models into the picture with OpenCV and compares.
 
 usage: check_lenses.py RAYS FOLDER
 
-RAYS is hzn-calib's example `rays`, FOLDER is made. OpenCV's names of the models: cv2.projectPoints without coefficients is
-`pinhole`, with (k1, k2, p1, p2, k3) `brown-conrady`; cv2.fisheye is `kannala-brandt`, and without coefficients `equidistant`.
-OpenCV's fisheye takes points before the camera only: rays beyond 90 degrees are left out there, and counted. Exits 1 when a
-pixel is off by more than 1e-6.
+RAYS is hzn-calib's example `rays`; this program makes FOLDER. In OpenCV, cv2.projectPoints without coefficients is
+`pinhole`, with (k1, k2, p1, p2, k3) it is `brown-conrady`; cv2.fisheye is `kannala-brandt`, without coefficients
+`equidistant`. OpenCV's fisheye accepts only points in front of the camera: rays beyond 90 degrees are left out and counted.
+Exits with 1 if a pixel is off by more than 1e-6.
 """
 
 import csv
@@ -28,7 +28,7 @@ LENSES = [
 ]
 
 
-def opencv(model, rays, fx, fy, k):
+def project_with_opencv(model, rays, fx, fy, k):
     matrix = np.array([[fx, 0, CX], [0, fy, CY], [0, 0, 1]])
     still = np.zeros(3)
     if model in ("pinhole", "brown-conrady"):
@@ -46,17 +46,17 @@ def main():
         lines += [f"k = {k}"] if k else []
         lines += [f"theta_max_deg = {circle}"] if circle else []
         sensor.write_text("\n".join(lines) + "\n\n[body]\naltitude_km = 500.0\n")
-        told = subprocess.run([program, sensor], check=True, capture_output=True, text=True).stdout
-        rows = np.array([[float(x) for x in row] for row in list(csv.reader(told.splitlines()))[1:]])
+        printed = subprocess.run([program, sensor], check=True, capture_output=True, text=True).stdout
+        rows = np.array([[float(x) for x in row] for row in list(csv.reader(printed.splitlines()))[1:]])
         before = rows[:, 4] > 1e-6
         pixels, rays, again = rows[before, :2], rows[before, 2:5].copy(), rows[before, 5:7]
-        theirs = opencv(model, rays, fx, fy, k)
+        theirs = project_with_opencv(model, rays, fx, fy, k)
         off, back = np.abs(theirs - pixels).max(), np.abs(again - pixels).max()
         widest = np.degrees(np.arccos(rows[:, 4].min()))
         print(f"{model} {k}: {len(pixels)} pixels to {min(widest, 90.0):.1f} deg off axis, {off:.1e} px from OpenCV, "
               f"{back:.1e} px there and back; {len(rows) - len(pixels)} pixels beyond 90 deg not compared")
         if not (len(pixels) > 2000 and off < 1e-6 and back < 1e-6):
-            sys.exit(f"{model}: not OpenCV's lens")
+            sys.exit(f"{model}: the pixels differ from OpenCV's")
 
 
 main()

@@ -1,8 +1,8 @@
-"""Reads hzn recordings with the reference reader and holds them to what hzn promises.
+"""Reads hzn recordings with the reference reader and checks what hzn promises about them.
 
 usage: check_mcap.py FILE.mcap...
 
-Every CRC is checked, every message decoded. Prints one line a file; exits 1 at the first promise that is broken.
+Checks every CRC and decodes every message. Prints one line per file; exits with 1 at the first broken promise.
 """
 
 import importlib
@@ -36,15 +36,15 @@ def need(condition, message):
 
 
 def check_layout(path):
-    """The attachment is first, pictures alone are stored uncompressed, and the data section's CRC holds."""
+    """Checks that the attachment is first, the compression is a known one, and the data section's CRC is right."""
     with open(path, "rb") as f:
         records = list(StreamReader(f, validate_crcs=True, emit_chunks=True).records)
     kinds = [type(r) for r in records]
-    need(Attachment in kinds, "no attachment")
+    need(Attachment in kinds, "the file has no attachment")
     if Chunk in kinds:
-        need(kinds.index(Attachment) < kinds.index(Chunk), "the sensor.toml is not first")
-    need(DataEnd in kinds, "the file does not end as it should")
-    need({r.compression for r in records if isinstance(r, Chunk)} <= {"", "zstd"}, "unknown compression")
+        need(kinds.index(Attachment) < kinds.index(Chunk), "the attachment sensor.toml is not the first record")
+    need(DataEnd in kinds, "the record DataEnd is missing")
+    need({r.compression for r in records if isinstance(r, Chunk)} <= {"", "zstd"}, "a chunk has an unknown compression")
 
 
 def fields(message):
@@ -52,7 +52,7 @@ def fields(message):
 
 
 def check_schema(schema):
-    """Every message of an embedded schema is what Foxglove publishes."""
+    """Checks that every message of an embedded schema is the one that Foxglove publishes."""
     for file in FileDescriptorSet.FromString(schema.data).file:
         if file.package != "foxglove":
             continue
@@ -67,19 +67,19 @@ def check_schema(schema):
 
 
 def check_stamp(topic, message, log_time):
-    """The message's own time is the log time, and it stands in the camera's frame."""
+    """Checks that the message's own time is the log time, and that its frame is right."""
     stamp = message.timestamp
-    need(stamp.seconds * 10**9 + stamp.nanos == log_time, f"{topic}: another time within than without")
+    need(stamp.seconds * 10**9 + stamp.nanos == log_time, f"{topic}: the time in the message differs from the log time")
     for p in getattr(message, "points", []):
-        need(p.timestamp == stamp, f"{topic}: an annotation of another time than its picture")
+        need(p.timestamp == stamp, f"{topic}: an annotation and its picture have different times")
     if hasattr(message, "frame_id"):
-        need(message.frame_id == "camera", f"{topic}: frame {message.frame_id}")
+        need(message.frame_id == "camera", f"{topic}: the frame is {message.frame_id}, not camera")
     if topic in FRAMES:
-        need((message.parent_frame_id, message.child_frame_id) == FRAMES[topic], f"{topic}: wrong frames")
+        need((message.parent_frame_id, message.child_frame_id) == FRAMES[topic], f"{topic}: the frames are not {FRAMES[topic]}")
 
 
 def distance_to_line(point, line):
-    """Distance of a point from a polyline."""
+    """Returns the distance of a point from a polyline."""
     best = float("inf")
     for a, b in zip(line, line[1:]):
         dx, dy = b.x - a.x, b.y - a.y
@@ -90,11 +90,11 @@ def distance_to_line(point, line):
 
 
 def check_annotations(message):
-    """Inliers lie on the drawn limb; both went through the same half pixel."""
+    """Returns the median distance of the inliers from the drawn limb; both have the same offset of half a pixel."""
     by_kind = {}
     for p in message.points:
         kind = next((m.value for m in p.metadata if m.key == "kind"), None)
-        need(kind in {"edge", "limb", "inlier", "rejected", "axis"}, f"annotation of kind {kind}")
+        need(kind in {"edge", "limb", "inlier", "rejected", "axis"}, f"an annotation has the unknown kind {kind}")
         by_kind.setdefault(kind, []).append(list(p.points))
     inliers = [q for points in by_kind.get("inlier", []) for q in points]
     limbs = by_kind.get("limb", [])
@@ -111,14 +111,14 @@ def check(path):
     with open(path, "rb") as f:
         reader = make_reader(f, validate_crcs=True, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
-        need(summary is not None and summary.statistics is not None, "no summary")
+        need(summary is not None and summary.statistics is not None, "the file has no summary")
         for attachment in reader.iter_attachments():
             if attachment.name == "sensor.toml":
                 tomllib.loads(attachment.data.decode())
                 break
         else:
             need(False, "sensor.toml is not attached")
-        need([m.name for m in reader.iter_metadata()][:1] == ["hzn"], "no metadata hzn")
+        need([m.name for m in reader.iter_metadata()][:1] == ["hzn"], "the first metadata record is not hzn")
         for schema, channel, message in reader.iter_messages():
             need(schema.name in SCHEMAS.get(channel.topic, set()), f"{channel.topic} has schema {schema.name}")
             if schema.encoding == "protobuf":
@@ -134,23 +134,25 @@ def check(path):
             times.setdefault(channel.topic, set()).add(message.log_time)
             if channel.topic == "/hzn/report":
                 allowed = json.loads(schema.data)["properties"]
-                need(set(decoded) <= set(allowed), f"unknown columns {set(decoded) - set(allowed)}")
-                need(("axis_x" in decoded) == (decoded["status"] == "ok"), "an axis beside another status than ok")
+                need(set(decoded) <= set(allowed), f"a report has unknown columns: {set(decoded) - set(allowed)}")
+                need(("axis_x" in decoded) == (decoded["status"] == "ok"),
+                     "a report must have an axis if and only if its status is ok")
                 reports.append(decoded)
             elif schema.name == "foxglove.CompressedImage":
                 signature = SIGNATURES.get(decoded.format)
-                need(signature is not None and decoded.data.startswith(signature), f"a picture that is no {decoded.format}")
+                signed = signature is not None and decoded.data.startswith(signature)
+                need(signed, f"the data of a picture are not {decoded.format}")
             elif schema.name == "foxglove.RawImage":
-                need(len(decoded.data) == decoded.step * decoded.height, "a raw picture of another size than it says")
+                need(len(decoded.data) == decoded.step * decoded.height, "a raw picture has the wrong number of bytes")
             elif channel.topic == "/camera/annotations":
                 worst = max(worst, check_annotations(decoded) or 0.0)
-    need(sum(counts.values()) == summary.statistics.message_count, "the statistics miscount")
-    need(times.get("/camera/image", set()) <= times.get("/camera/annotations", set()), "a picture without annotations")
+    need(sum(counts.values()) == summary.statistics.message_count, "the statistics are wrong")
+    need(times.get("/camera/image", set()) <= times.get("/camera/annotations", set()), "a picture has no annotations")
     need(worst < 3.0, f"half of the inliers are more than {worst:.1f} px off the drawn limb")
     with open(path, "rb") as f:
         streamed = sum(1 for _ in NonSeekingReader(f, validate_crcs=True).iter_messages(log_time_order=False))
-    need(streamed == summary.statistics.message_count, "the index and the stream differ")
-    print(f"{path}: {len(reports)} reports, {counts['/camera/image']} pictures, {streamed} messages, CRCs hold")
+    need(streamed == summary.statistics.message_count, "the index and the stream have different numbers of messages")
+    print(f"{path}: {len(reports)} reports, {counts['/camera/image']} pictures, {streamed} messages, all CRCs right")
 
 
 if __name__ == "__main__":

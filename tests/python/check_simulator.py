@@ -2,10 +2,10 @@
 
 usage: check_simulator.py HZN FOLDER
 
-FOLDER is made: a scene.toml with a map of its own, and what `HZN simulate` makes of it. Lens: OpenCV's fisheye. Tangent
-heights: the lowest geodetic height along each ray, by search. Nothing is taken from the simulator but frames.csv, truth.csv
-and the picture. Where a ray only just meets the ground, a hundredth of a pixel decides what it sees: there a few pixels
-may be off by up to 0.03 of full scale. Exits 1 when any is off by more, or one in 100 by more than 0.003.
+This program makes FOLDER: a scene.toml with a map of its own, and the output of `HZN simulate`. The lens is OpenCV's
+fisheye. The tangent height of a ray is its lowest geodetic height, by search. Only frames.csv, truth.csv and the picture
+come from the simulator. Where a ray grazes the ground, a hundredth of a pixel decides what it sees, so a few pixels may be
+off by up to 0.03 of full scale. Exits with 1 if a pixel is off by more, or if one in 100 is off by more than 0.003.
 """
 
 import csv
@@ -61,7 +61,8 @@ bits = 16
 
 
 def world_map():
-    """Bands and patches, smooth enough for both programs' interpolation; red is never less than blue, so no sea."""
+    """Returns bands and patches that are smooth enough for the interpolation of both programs; as red is never less than
+    blue, there is no sea."""
     lat, lon = np.mgrid[90:-90:181j, -180:180:361j][:, :180, :360]
     red = 120 + 60 * np.sin(np.radians(12 * lon)) * np.cos(np.radians(9 * lat))
     green = 110 + 50 * np.cos(np.radians(7 * lon + 5 * lat))
@@ -83,7 +84,7 @@ def rotation(w, x, y, z):
 
 
 def height(p):
-    """Geodetic height and latitude, by Bowring's method."""
+    """Returns geodetic height and latitude, by Bowring's method."""
     r = np.hypot(p[..., 0], p[..., 1])
     e2, ep2 = 1 - (B / A) ** 2, (A / B) ** 2 - 1
     u = np.arctan2(p[..., 2] * A, r * B)
@@ -101,7 +102,7 @@ def sun_path(mu0, grazing, radius):
 
 
 def lens():
-    """Every pixel's place and unit ray; pixel centres at integers, as OpenCV has them."""
+    """Returns place and unit ray of every pixel; pixel centres are at integers, as in OpenCV."""
     grid = np.stack(np.meshgrid(np.arange(W, dtype=float), np.arange(H, dtype=float)), axis=-1).reshape(-1, 1, 2)
     matrix = np.array([[FX, 0, CX], [0, FY, CY], [0, 0, 1]])
     plane = cv2.fisheye.undistortPoints(grid, matrix, np.array(K), criteria=(3, 100, 1e-12))[:, 0]
@@ -114,19 +115,19 @@ def render(position, quaternion, sun, ground):
     turn = rotation(*quaternion)
     rays_e, sun_e = rays @ turn.T, turn @ sun
 
-    # Where a ray meets the ellipsoid: a quadratic in metres.
+    # A ray meets the ellipsoid at the root of a quadratic in metres.
     d = np.array([1 / A**2, 1 / A**2, 1 / B**2])
     qa, qb, qc = (rays_e**2) @ d, 2 * (rays_e * position) @ d, position**2 @ d - 1
     disc = qb**2 - 4 * qa * qc
     hit = (disc > 0) & (qb < 0)
     near = (-qb - np.sqrt(np.maximum(disc, 0))) / (2 * qa)
 
-    # Where it comes lowest otherwise: a parabola through three heights, drawn in three times.
+    # Otherwise its lowest point is that of a parabola through three heights, refined three times.
     lowest = -qb / (2 * qa)
     for step in (2e4, 2e3, 2e2):
         h0, h1, h2 = (height(position + (lowest + s)[:, None] * rays_e)[0] for s in (-step, 0.0, step))
         lowest = lowest + step * 0.5 * (h0 - h2) / (h0 - 2 * h1 + h2)
-    # A ray that leads away is lowest where it starts.
+    # A ray that leads upwards is lowest at its start.
     lowest = np.maximum(lowest, 0)
     point = position + np.where(hit, near, lowest)[:, None] * rays_e
     tangent, lat = height(point)
@@ -183,14 +184,14 @@ def main():
         sun = np.array([float(true[k]) for k in ("sun_x", "sun_y", "sun_z")])
         theirs = cv2.imread(str(out / row["file"]), cv2.IMREAD_UNCHANGED) / 65535.0
         ours = render(position, quaternion, sun, ground)
-        # The Moon is in view, and not drawn again.
+        # The Moon is in view, but this program does not draw it, so the pixels around it do not count.
         moon = np.array([float(true[k]) for k in ("moon_x", "moon_y", "moon_z")])
-        beside = (lens()[1] @ moon < np.cos(np.radians(1.5))).reshape(H, W)
-        off = np.abs(theirs - ours) * beside
+        without_moon = (lens()[1] @ moon < np.cos(np.radians(1.5))).reshape(H, W)
+        off = np.abs(theirs - ours) * without_moon
         print(f"{row['file']}: mean {theirs.mean():.3f}, differences {off.max():.5f} at most, {off.mean():.6f} on average, "
               f"{100 * np.mean(off > 0.003):.2f} % above 0.003")
         if not (theirs.shape == ours.shape and theirs.mean() > 0.05 and off.max() < 0.03 and np.mean(off > 0.003) < 0.01 and off.mean() < 5e-4):
-            sys.exit(f"{row['file']}: not the documented picture")
+            sys.exit(f"{row['file']}: the picture differs from the documented model")
 
 
 main()

@@ -38,54 +38,68 @@ impl Disc {
     pub fn paint(&self, config: &Config, seed: u32) -> Vec<u8> {
         let camera = Camera::<f64>::try_new(&config.camera).expect("the lens is valid");
         let (w, h) = (usize::from(config.camera.width), usize::from(config.camera.height));
+        let plane = (0..w * h).map(|i| self.pixel(&camera, (i % w) as f64, (i / w) as f64)).collect();
+        self.add_noise(&self.blur(plane, w, h), seed)
+    }
+
+    /// Returns the brightness at a place in the picture, without blur and noise.
+    fn brightness_at(&self, camera: &Camera<f64>, u: f64, v: f64) -> f64 {
         let e = Vector3::from(self.axis);
-        let light = |u: f64, v: f64| -> f64 {
-            let Some(s) = camera.unproject(ImagePoint { u, v }) else { return 0.0 };
-            let s = Vector3::from(s.xyz());
-            let off = s.cross(&e).norm().atan2(s.dot(&e));
-            let ratio = off / self.half_angle_rad;
-            let halo = self.halo / ratio.max(1.0).powi(2);
-            if ratio >= 1.0 {
-                return halo;
-            }
-            let Some(sun) = self.sun else { return self.brightness };
-            // Normal at the visible point of the sphere: it is −e at the centre of the disc and turns outwards to the
-            // limb.
-            let across = (s - e * s.dot(&e)).try_normalize(1e-12).unwrap_or_default();
-            let normal = across * ratio - e * (1.0 - ratio * ratio).sqrt();
-            // Lommel and Seeliger: the disc is bright up to the limb, as the Moon is, and a full disc is even.
-            let (lit, seen) = (normal.dot(&Vector3::from(sun)).max(0.0), -normal.dot(&s));
-            halo.max(self.brightness * 2.0 * lit / (lit + seen.max(0.0)).max(1e-9))
-        };
+        let Some(s) = camera.unproject(ImagePoint { u, v }) else { return 0.0 };
+        let s = Vector3::from(s.xyz());
+        let off = s.cross(&e).norm().atan2(s.dot(&e));
+        let ratio = off / self.half_angle_rad;
+        let halo = self.halo / ratio.max(1.0).powi(2);
+        if ratio >= 1.0 {
+            return halo;
+        }
+        let Some(sun) = self.sun else { return self.brightness };
+        // Normal at the visible point of the sphere: it is −e at the centre of the disc and turns outwards to the
+        // limb.
+        let outwards = (s - e * s.dot(&e)).try_normalize(1e-12).unwrap_or_default();
+        let normal = outwards * ratio - e * (1.0 - ratio * ratio).sqrt();
+        // Lommel and Seeliger: the disc is bright up to the limb, as the Moon is, and a full disc is even.
+        let (lit, seen) = (normal.dot(&Vector3::from(sun)).max(0.0), -normal.dot(&s));
+        halo.max(self.brightness * 2.0 * lit / (lit + seen.max(0.0)).max(1e-9))
+    }
+
+    /// Returns the mean brightness of a pixel.
+    fn pixel(&self, camera: &Camera<f64>, x: f64, y: f64) -> f64 {
+        let brightness = |u, v| self.brightness_at(camera, u, v);
         let sample = |k: usize| (k as f64 + 0.5) / FINE as f64 - 0.5;
-        let mut plane: Vec<f64> = (0..w * h)
-            .map(|i| {
-                let (x, y) = ((i % w) as f64, (i / w) as f64);
-                let centre = light(x, y);
-                // One sample is enough where the brightness is even.
-                let flat = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)]
-                    .iter()
-                    .all(|(dx, dy)| (light(x + dx, y + dy) - centre).abs() < 0.5);
-                if flat {
-                    return centre;
-                }
-                let all = (0..FINE * FINE).map(|k| light(x + sample(k % FINE), y + sample(k / FINE)));
-                all.sum::<f64>() / (FINE * FINE) as f64
-            })
-            .collect();
+        let centre = brightness(x, y);
+        // One sample is enough where the brightness is even.
+        let flat = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)]
+            .iter()
+            .all(|(dx, dy)| (brightness(x + dx, y + dy) - centre).abs() < 0.5);
+        if flat {
+            return centre;
+        }
+        let all = (0..FINE * FINE).map(|k| brightness(x + sample(k % FINE), y + sample(k / FINE)));
+        all.sum::<f64>() / (FINE * FINE) as f64
+    }
+
+    /// Blurs the picture, first along the rows and then along the columns.
+    fn blur(&self, mut plane: Vec<f64>, w: usize, h: usize) -> Vec<f64> {
         let reach = (4.0 * self.blur_px).ceil() as isize;
         let kernel: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / self.blur_px).powi(2)).exp()).collect();
         let total: f64 = kernel.iter().sum();
         for (dx, dy) in [(1isize, 0isize), (0, 1)] {
             let old = plane.clone();
-            let at =
+            let value_at =
                 |x: isize, y: isize| old[y.clamp(0, h as isize - 1) as usize * w + x.clamp(0, w as isize - 1) as usize];
             for (i, p) in plane.iter_mut().enumerate() {
                 let (x, y) = ((i % w) as isize, (i / w) as isize);
-                let blurred = kernel.iter().zip(-reach..).map(|(k, o)| k * at(x + o * dx, y + o * dy)).sum::<f64>();
+                let blurred =
+                    kernel.iter().zip(-reach..).map(|(k, o)| k * value_at(x + o * dx, y + o * dy)).sum::<f64>();
                 *p = blurred / total;
             }
         }
+        plane
+    }
+
+    /// Adds the brightness of the sky (8 counts) and the noise, and rounds to counts.
+    fn add_noise(&self, plane: &[f64], seed: u32) -> Vec<u8> {
         let mut state = seed | 1;
         let mut uniform = move || {
             state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -116,7 +130,7 @@ pub fn direction(config: &Config, u: f64, v: f64) -> [f64; 3] {
 ///
 /// # Panics
 /// Panics if the lens is refused.
-pub fn apart_px(config: &Config, a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn distance_px(config: &Config, a: [f64; 3], b: [f64; 3]) -> f64 {
     let camera = Camera::<f64>::try_new(&config.camera).expect("the lens is valid");
     let place = |d| UnitVec3::try_new(d).and_then(|d| camera.project(&d));
     match (place(a), place(b)) {

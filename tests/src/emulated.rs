@@ -46,7 +46,7 @@ impl Board {
         let target = std::env::var_os("CARGO_TARGET_DIR")
             .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../target"), PathBuf::from);
         let path = target.join("firmware").join(self.name()).join("images").join(name);
-        assert!(path.is_file(), "{}: `cargo xtask firmware` builds it", path.display());
+        assert!(path.is_file(), "{} is missing; run `cargo xtask firmware`", path.display());
         path
     }
 
@@ -72,7 +72,7 @@ pub struct Case {
     /// Configuration of the sensor.
     pub sensor: Config,
     /// Prior of the picture.
-    pub known: Prior<f32>,
+    pub prior: Prior<f32>,
     /// The picture, one byte per pixel, in the size that the sensor expects.
     pub bytes: Vec<u8>,
 }
@@ -97,26 +97,26 @@ impl Case {
     /// Panics if the scene cannot be rendered, or not as bytes.
     pub fn rendered(name: String, sensor: &Config, frame: &hzn_sim::FlightFrame) -> Self {
         let picture = frame.render().expect("the scene can be rendered");
-        let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: 8 bits are expected") };
+        let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("{name}: the picture must have 8 bits") };
         let known = frame.prior();
-        let known = Prior {
+        let prior = Prior {
             altitude_m: known.altitude_m.map(|h| h as f32),
             position_m: known.position_m.map(|p| p.map(|x| x as f32)),
             ..Prior::default()
         };
-        Self { name, sensor: sensor.clone(), known, bytes: bytes.clone() }
+        Self { name, sensor: sensor.clone(), prior, bytes: bytes.clone() }
     }
 
     /// Returns the answer of the same sensor on this machine.
     ///
     /// # Panics
     /// Panics if the configuration or the prior is refused.
-    pub fn here(&self) -> PictureAnswer {
+    pub fn answer_on_host(&self) -> PictureAnswer {
         let mut horizon = Box::new(FlightHorizon::new(&self.sensor).expect("the configuration is valid"));
         let camera = &self.sensor.camera;
         let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
         let picture = Grey::try_new(&self.bytes, layout).expect("the picture is whole");
-        let expected = horizon.expect(&self.known).expect("what is known is possible");
+        let expected = horizon.expect(&self.prior).expect("the prior is possible");
         PictureAnswer::from_report(&horizon.process(&picture, &expected))
     }
 
@@ -124,8 +124,8 @@ impl Case {
         let mut bytes = [0; table::MAX_BYTES];
         let parameters = Parameters::new(self.sensor.clone());
         let n = table::write(&parameters, 1, &mut bytes).expect("a table fits");
-        let [x, y, z] = self.known.position_m.unwrap_or([f32::NAN; 3]);
-        let altitude = self.known.altitude_m.unwrap_or(f32::NAN);
+        let [x, y, z] = self.prior.position_m.unwrap_or([f32::NAN; 3]);
+        let altitude = self.prior.altitude_m.unwrap_or(f32::NAN);
         out.extend_from_slice(b"CASE");
         out.extend_from_slice(&(n as u32).to_le_bytes());
         out.extend_from_slice(&(self.bytes.len() as u32).to_le_bytes());
@@ -138,7 +138,7 @@ impl Case {
 }
 
 /// Returns the bytes of an answer. Two answers have equal bytes if every bit is equal.
-pub fn bits(answer: &PictureAnswer) -> Vec<u8> {
+pub fn answer_bytes(answer: &PictureAnswer) -> Vec<u8> {
     let mut bytes = vec![0; 640];
     let mut out = Writer::new(&mut bytes);
     answer.write(&mut out);
@@ -169,7 +169,7 @@ pub fn measure_rows(board: Board, cases: &[Case]) -> Vec<Measured> {
 ///
 /// # Panics
 /// Panics if QEMU or the image fails.
-pub fn chain(board: Board, picture: &[u8]) -> [u32; 11] {
+pub fn run_chain(board: Board, picture: &[u8]) -> [u32; 11] {
     let dir = tempfile::tempdir().expect("a temporary folder can be made");
     std::fs::write(dir.path().join("picture.bin"), picture).expect("the folder is writable");
     let status = board.qemu(&board.image("chain"), 10).args(["-serial", "null"]).current_dir(dir.path()).status();

@@ -17,5 +17,5 @@ pub mod sensors;
 pub mod table;
 pub mod tally;
 
-pub use sensors::{Answer, Sensors, known};
+pub use sensors::{Answer, Sensors, prior_of_scene};
 pub use tally::Tally;

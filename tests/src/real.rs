@@ -57,8 +57,8 @@ impl Photograph {
     ///
     /// # Panics
     /// Panics if the folder cannot be written.
-    pub fn overlay(&self, answer: Option<&Answer>, points: &Points) {
-        let dir = overlays();
+    pub fn write_overlay(&self, answer: Option<&Answer>, points: &Points) {
+        let dir = overlay_folder();
         std::fs::create_dir_all(&dir).expect("the target folder is writable");
         let mut out = self.rgb.clone();
         let size = i64::from(self.rgb.width() / 1600);
@@ -76,7 +76,7 @@ impl Photograph {
             for &(p, weight) in &points.chosen {
                 dot(p, 1 + size, if weight > 0.0 { [0, 255, 0] } else { [255, 255, 0] });
             }
-            for p in limb(&self.sensor, a) {
+            for p in limb_points(&self.sensor, a) {
                 dot(p, size / 2, [255, 0, 0]);
             }
         }
@@ -87,10 +87,10 @@ impl Photograph {
 /// Returns how far above (negative) or below the fitted limb the picture is steepest, in pixels. Each value is the
 /// median over an eighth of the width; it is NaN where there is no limb. The search goes `reach` pixels up and down,
 /// and does not depend on thresholds, candidates or inliers.
-pub fn steepest(photograph: &Photograph, answer: &Answer, reach: u32) -> [f64; 8] {
+pub fn steepest_offset_px(photograph: &Photograph, answer: &Answer, reach: u32) -> [f64; 8] {
     let mut found: [Vec<f64>; 8] = Default::default();
     let (w, h) = photograph.rgb.dimensions();
-    for [x, y] in limb(&photograph.sensor, answer) {
+    for [x, y] in limb_points(&photograph.sensor, answer) {
         let (column, row) = (x as u32, y.round() as u32);
         if row < reach + 6 || row + reach + 6 >= h || column < 3 || column + 4 > w {
             continue;
@@ -108,7 +108,7 @@ pub fn steepest(photograph: &Photograph, answer: &Answer, reach: u32) -> [f64; 8
 }
 
 /// Returns the folder that overlays are written to.
-pub fn overlays() -> PathBuf {
+pub fn overlay_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/overlays")
 }
 
@@ -116,7 +116,7 @@ pub fn overlays() -> PathBuf {
 ///
 /// # Panics
 /// Panics if the lens is refused.
-pub fn limb(sensor: &Config, answer: &Answer) -> Vec<[f64; 2]> {
+pub fn limb_points(sensor: &Config, answer: &Answer) -> Vec<[f64; 2]> {
     let camera = Camera::<f64>::try_new(&sensor.camera).expect("the lens is valid");
     let e = Vector3::from(answer.axis);
     let b1 = e.cross(&e.map(|v| if v.abs() < 0.6 { 1.0 } else { 0.0 })).normalize();
@@ -144,32 +144,32 @@ pub struct Points {
 
 impl Points {
     /// Returns the share of the picture's width that has inliers, in strips of 16 pixels.
-    pub fn along(&self, width: u32) -> f64 {
-        let mut held = vec![false; (width as usize).div_ceil(16)];
+    pub fn width_with_inliers(&self, width: u32) -> f64 {
+        let mut has_inliers = vec![false; (width as usize).div_ceil(16)];
         for &([x, _], weight) in &self.chosen {
-            if let Some(strip) = held.get_mut((x.max(0.0) / 16.0) as usize) {
+            if let Some(strip) = has_inliers.get_mut((x.max(0.0) / 16.0) as usize) {
                 *strip |= weight > 0.0;
             }
         }
-        held.iter().filter(|&&h| h).count() as f64 / held.len() as f64
+        has_inliers.iter().filter(|&&h| h).count() as f64 / has_inliers.len() as f64
     }
 }
 
 /// Observer that collects the points of candidates.
 #[derive(Debug, Default)]
-pub struct Watch {
+pub struct PointRecorder {
     all: RefCell<Vec<([f64; 2], f64)>>,
     best: RefCell<Points>,
 }
 
-impl Watch {
+impl PointRecorder {
     /// Returns the collected points.
     pub fn points(self) -> Points {
         self.best.into_inner()
     }
 }
 
-impl<T: Real> Observer<T> for Watch {
+impl<T: Real> Observer<T> for PointRecorder {
     fn edge(&self, _: u32, _: impl Iterator<Item = hzn_core::pixel::Pixel>, _: u32) {
         self.all.borrow_mut().clear();
     }

@@ -58,13 +58,16 @@ impl Sensors {
 
     /// Returns the answers of both sensors (f64, f32), or the status if there is no answer.
     pub fn both(&mut self, picture: &impl Pixels, scene: &Scene) -> (Result<Answer, Status>, Result<Answer, Status>) {
-        (look(&mut self.host, picture, &known(scene)), look(&mut self.flight, picture, &known(scene)))
+        (
+            process(&mut self.host, picture, &prior_of_scene(scene)),
+            process(&mut self.flight, picture, &prior_of_scene(scene)),
+        )
     }
 }
 
 /// Returns the prior that a navigation system would give for a scene: the altitude, for `earth` also the position, and
 /// no attitude.
-pub fn known<T: Real>(scene: &Scene) -> Prior<T> {
+pub fn prior_of_scene<T: Real>(scene: &Scene) -> Prior<T> {
     let position_m = scene.pose.position_m;
     let altitude_m = Globe::new(&scene.body).altitude_m(position_m);
     Prior {
@@ -78,30 +81,34 @@ pub fn known<T: Real>(scene: &Scene) -> Prior<T> {
 ///
 /// # Errors
 /// Returns the status if it is not `ok`.
-pub fn look<T: Real, const P: usize, const B: usize, const W: usize>(
+pub fn process<T: Real, const P: usize, const B: usize, const W: usize>(
     horizon: &mut Horizon<T, P, B, W>,
     picture: &impl Pixels,
-    known: &Prior<T>,
+    prior: &Prior<T>,
 ) -> Result<Answer, Status> {
-    look_observed(horizon, picture, known, &Unobserved)
+    process_observed(horizon, picture, prior, &Unobserved)
 }
 
-/// Does the same as [`look`] with an observer.
+/// Does the same as [`process`] with an observer.
 ///
 /// # Errors
 /// Returns the status if it is not `ok`.
 ///
 /// # Panics
 /// Panics if the prior is impossible or the report contradicts itself.
-pub fn look_observed<T: Real, const P: usize, const B: usize, const W: usize>(
+pub fn process_observed<T: Real, const P: usize, const B: usize, const W: usize>(
     horizon: &mut Horizon<T, P, B, W>,
     picture: &impl Pixels,
-    known: &Prior<T>,
+    prior: &Prior<T>,
     observer: &impl Observer<T>,
 ) -> Result<Answer, Status> {
-    let expected = horizon.expect(known).expect("what is known of the picture is possible");
+    let expected = horizon.expect(prior).expect("the prior is possible");
     let report = horizon.process_observed(picture, &expected, observer);
-    assert_eq!(report.status == Status::Ok, report.solution.is_some(), "a solution with `ok`, and only there");
+    assert_eq!(
+        report.status == Status::Ok,
+        report.solution.is_some(),
+        "the status is `ok` exactly if there is a solution"
+    );
     if report.solution.is_none() {
         // Test output is shown only if the test fails.
         let verdicts = report.candidates.iter().map(|c| format!("{} points {:?}", c.points, c.verdict));

@@ -8,7 +8,7 @@ use hzn_core::{Config, Prior, body, covariance};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Band, Clouds, Detector, Disc, Foreground, Look, Pose, Profile, Scene, flight};
 
-use crate::sensors::look;
+use crate::sensors::process;
 use crate::{Sensors, Tally};
 
 /// Number of pictures per cell.
@@ -17,9 +17,9 @@ const SIZE: (u16, u16) = (640, 480);
 const ALTITUDES_KM: [f64; 3] = [70.0, 240.0, 800.0];
 const NOISE: [f64; 3] = [0.005, 0.02, 0.08];
 /// Share of the picture's width that the vehicle does not cover.
-const OPEN: [f64; 2] = [1.0, 0.3];
-/// Difference of the true value and the told value in standard deviations. The numbers are the middles of eight equally
-/// likely parts of a normal distribution, shuffled.
+const UNCOVERED_SHARE: [f64; 2] = [1.0, 0.3];
+/// Difference of the true value and the value that the sensor gets, in sigmas. The numbers are the middles of eight
+/// equally likely parts of a normal distribution, shuffled.
 const SIGMAS: [f64; FRAMES] = [0.49, -1.53, 0.89, -0.16, -0.49, 1.53, 0.16, -0.89];
 const HEIGHT_SIGMA_KM: f64 = 1.0;
 const ATTITUDE_SIGMA_DEG: f64 = 5.0;
@@ -106,10 +106,10 @@ pub fn measure((sensor, scenes): &(Config, Vec<Scene>)) -> [Tally; 2] {
         let truth = scene.truth("", 0.0).expect("the scene is valid");
         let picture = scene.render().expect("the scene is valid");
         let error_rad = [0, 3, 5].map(|k| ATTITUDE_SIGMA_DEG.to_radians() * SIGMAS[(i + k) % FRAMES]);
-        let position: Prior<f64> = crate::known(scene);
+        let position: Prior<f64> = crate::prior_of_scene(scene);
         let attitude = Prior { cam_to_ecef: scene.pose.disturbed(error_rad).cam_to_ecef(), ..position };
         for (tally, known) in tallies.iter_mut().zip([attitude, position]) {
-            let answer = look(&mut sensors.host, &picture.view(), &known);
+            let answer = process(&mut sensors.host, &picture.view(), &known);
             tally.add(answer.ok().as_ref(), [truth.axis_x, truth.axis_y, truth.axis_z]);
         }
     }
@@ -126,7 +126,7 @@ pub fn markdown() -> String {
     for (name, camera, errors_px) in lenses() {
         for altitude_km in ALTITUDES_KM {
             for noise in NOISE {
-                for open in OPEN {
+                for open in UNCOVERED_SHARE {
                     let [t, u] = measure(&cell(&camera, errors_px, altitude_km, noise, open));
                     let _ = writeln!(
                         out,

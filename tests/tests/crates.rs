@@ -20,7 +20,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
 
 /// Returns the crates of this project that a Cargo.toml lists in `[dependencies]`. Dependencies for tests and builds
 /// are left out.
-fn imports(manifest: &Path) -> Vec<String> {
+fn read_imports(manifest: &Path) -> Vec<String> {
     let text = fs::read_to_string(manifest).unwrap();
     let table = text.split("\n[").find(|table| table.starts_with("dependencies]")).unwrap_or_default();
     let name = |line: &str| line.split(['.', ' ', '=']).next().unwrap_or_default().to_owned();
@@ -30,17 +30,20 @@ fn imports(manifest: &Path) -> Vec<String> {
 #[test]
 fn crates_import_from_below() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates");
-    let mut seen = 0;
+    let mut imports_read = 0;
     for entry in fs::read_dir(&crates).unwrap() {
         let manifest = entry.unwrap().path().join("Cargo.toml");
         let name = manifest.parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
-        let (_, may) = MAY_IMPORT.iter().find(|(of, _)| *of == name).unwrap_or_else(|| panic!("{name} has no place"));
-        for import in imports(&manifest) {
+        let (_, may) = MAY_IMPORT
+            .iter()
+            .find(|(importer, _)| *importer == name)
+            .unwrap_or_else(|| panic!("{name} is missing in MAY_IMPORT"));
+        for import in read_imports(&manifest) {
             assert!(may.contains(&import.as_str()), "{name} imports {import}, which is not below it");
-            seen += 1;
+            imports_read += 1;
         }
     }
-    assert!(seen > 20, "{seen} imports were read");
+    assert!(imports_read > 20, "{imports_read} imports were read");
     // The library must not link crates that parse arguments, catch signals or draw progress bars and charts.
     let run = fs::read_to_string(crates.join("hzn-run/Cargo.toml")).unwrap();
     for theirs in ["clap", "ctrlc", "indicatif", "plotters"] {

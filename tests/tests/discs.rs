@@ -10,22 +10,25 @@ use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon, Preset, Prior};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Detector, Light, Look, Pose, Scene, Visible, World};
-use hzn_tests::disc::{Disc, apart_px, direction};
-use hzn_tests::sensors::look;
+use hzn_tests::disc::{Disc, direction, distance_px};
+use hzn_tests::sensors::process;
 use hzn_tests::{Answer, Sensors};
 
 fn config(preset: Preset, focal_px: f64) -> Config {
     Config::preset(preset, camera::Config::ideal(Model::Pinhole, 640, 480, focal_px))
 }
 
-fn frame<T: Real>(sun: Option<[f64; 3]>) -> Prior<T> {
+fn prior_with_sun<T: Real>(sun: Option<[f64; 3]>) -> Prior<T> {
     Prior { sun: sun.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))), ..Prior::default() }
 }
 
 /// Returns the answers of both precisions.
-fn both(sensors: &mut Sensors, data: &[u8], sun: Option<[f64; 3]>) -> [Result<Answer, Status>; 2] {
+fn process_both(sensors: &mut Sensors, data: &[u8], sun: Option<[f64; 3]>) -> [Result<Answer, Status>; 2] {
     let picture = Grey::try_new(data, Layout::packed(640, 480, 1, 8)).unwrap();
-    [look(&mut sensors.host, &picture, &frame(sun)), look(&mut sensors.flight, &picture, &frame(sun))]
+    [
+        process(&mut sensors.host, &picture, &prior_with_sun(sun)),
+        process(&mut sensors.flight, &picture, &prior_with_sun(sun)),
+    ]
 }
 
 fn sun(axis: [f64; 3], half_angle_rad: f64) -> Disc {
@@ -44,9 +47,9 @@ fn the_sun_blooms() {
             let axis = direction(&config, u, v);
             let bloom = bloom.min(if n >= 4 { 4.0 } else { 10.0 });
             let data = sun(axis, 0.2666f64.to_radians() * bloom).paint(&config, 7 * n as u32 + 1);
-            for (k, answer) in both(&mut sensors, &data, None).into_iter().enumerate() {
+            for (k, answer) in process_both(&mut sensors, &data, None).into_iter().enumerate() {
                 let answer = answer.unwrap_or_else(|s| panic!("{u} {v}, bloom {bloom}: {s}"));
-                let px = apart_px(&config, answer.axis, axis);
+                let px = distance_px(&config, answer.axis, axis);
                 squares[k] += px * px / 24.0;
                 assert!(px < 0.3, "{u} {v}, bloom {bloom}: {px}");
             }
@@ -69,9 +72,9 @@ fn the_sun_at_the_edge_of_the_picture() {
         let u = f64::from(12 - 20 * n / 11) - 0.4;
         let axis = direction(&config, u, v);
         let data = sun(axis, 0.2666f64.to_radians() * 5.0).paint(&config, n as u32 + 1);
-        for answer in both(&mut sensors, &data, None) {
+        for answer in process_both(&mut sensors, &data, None) {
             let answer = answer.unwrap_or_else(|s| panic!("{u} {v}: {s}"));
-            let px = apart_px(&config, answer.axis, axis);
+            let px = distance_px(&config, answer.axis, axis);
             (worst, squares) = (worst.max(px), squares + px * px / 24.0);
         }
     }
@@ -87,11 +90,11 @@ fn single_precision_holds_a_twentieth_of_a_pixel_through_a_long_lens() {
     for (u, v) in [(320.4, 240.3), (250.9, 260.1), (390.2, 220.7)] {
         let axis = direction(&config, u, v);
         let data = Disc { noise: 1.0, ..sun(axis, 0.2666f64.to_radians()) }.paint(&config, 5);
-        let [host, flight] = both(&mut sensors, &data, None).map(Result::unwrap);
-        let (px, radius_px) = (apart_px(&config, host.axis, flight.axis), |a: &Answer| a.half_angle_rad * 43_600.0);
+        let [host, flight] = process_both(&mut sensors, &data, None).map(Result::unwrap);
+        let (px, radius_px) = (distance_px(&config, host.axis, flight.axis), |a: &Answer| a.half_angle_rad * 43_600.0);
         println!(
             "{u} {v}: f64 {:.4} px off, f32 {px:.4} px from it, radii {:.3} {:.3}",
-            apart_px(&config, host.axis, axis),
+            distance_px(&config, host.axis, axis),
             radius_px(&host),
             radius_px(&flight)
         );
@@ -125,9 +128,9 @@ fn the_moon_is_lit_from_the_side() {
             let data = disc.paint(&config, phase_deg as u32 + turn_deg as u32);
             count += 1.0;
             for (k, known) in [None, Some(to_sun)].into_iter().enumerate() {
-                for answer in both(&mut sensors, &data, known) {
+                for answer in process_both(&mut sensors, &data, known) {
                     let answer = answer.unwrap_or_else(|s| panic!("phase {phase_deg}, {turn_deg}, Sun {known:?}: {s}"));
-                    let px = apart_px(&config, answer.axis, axis);
+                    let px = distance_px(&config, answer.axis, axis);
                     println!("phase {phase_deg}, {turn_deg}, Sun known {}: {px:.3} px", known.is_some());
                     squares[k] += px * px / 2.0;
                     assert!(px < 2.0, "phase {phase_deg}, {turn_deg}, Sun {known:?}: {px}");
@@ -150,7 +153,7 @@ fn the_moon_is_no_larger_than_it_blooms() {
         let axis = direction(&config, 300.6, 250.2);
         let disc = Disc { sun: None, ..sun(axis, 0.2589f64.to_radians() * times) };
         let data = Disc { halo: 0.0, ..disc }.paint(&config, 5);
-        for answer in both(&mut Sensors::new(&config), &data, None) {
+        for answer in process_both(&mut Sensors::new(&config), &data, None) {
             assert_eq!(answer.is_ok(), is_moon, "{focal_px} px, {times}: {answer:?}");
             assert!(answer.is_ok() || matches!(answer, Err(Status::Rejected)), "{answer:?}");
         }
@@ -193,19 +196,19 @@ fn the_level_follows_the_limb_of_the_picture_before() {
 fn earth_and_moon_in_one_picture() {
     let camera = camera::Config::ideal(Model::Pinhole, 1280, 960, 3600.0);
     let mut config = Config::preset(Preset::Moon, camera.clone());
-    let of = |kind: Kind, preset: Preset| body::Config {
+    let body = |kind: Kind, preset: Preset| body::Config {
         kind,
         limb_height_km: if kind == Kind::Earth { 18.7 } else { 0.0 },
         limb_height_sigma_km: if kind == Kind::Earth { 2.0 } else { 0.0 },
         binarize: Some(Config::preset(preset, camera.clone()).binarize),
         ..body::Config::default()
     };
-    let mut moon = of(Kind::Moon, Preset::Moon);
+    let mut moon = body(Kind::Moon, Preset::Moon);
     // The Moon's ground is dark compared with clouds and air.
     if let Some(own) = &mut moon.binarize {
         own.level = 0.06;
     }
-    config.bodies = [of(Kind::Earth, Preset::Hzn), moon].into_iter().collect();
+    config.bodies = [body(Kind::Earth, Preset::Hzn), moon].into_iter().collect();
     let mut horizon = HostHorizon::boxed(&config).unwrap();
     let lens = Camera::<f64>::try_new(&camera).unwrap();
     for (n, (u, v)) in [(400.3, 240.6), (860.8, 120.2), (640.1, 560.9)].into_iter().enumerate() {
@@ -223,7 +226,7 @@ fn earth_and_moon_in_one_picture() {
         scene.detector = Detector { psf_sigma_px: 0.9, read_noise: 0.01, ..Detector::default() };
         scene.seed = n as u64;
         let picture = scene.render().unwrap();
-        let known = Prior { position_m: Some(pose.position_m), ..frame(Some(sun)) };
+        let known = Prior { position_m: Some(pose.position_m), ..prior_with_sun(Some(sun)) };
         let expected = [0, 1].map(|which| horizon.expect_body(which, &known).unwrap());
         let reports = horizon.process_each(&picture.view(), &expected);
         for (report, (kind, limit_deg)) in reports.iter().zip([(Kind::Earth, 0.1), (Kind::Moon, 0.016)]) {

@@ -11,8 +11,8 @@ use hzn_core::threshold;
 use hzn_core::{Config, FlightHorizon, Prior, camera};
 use hzn_flight::flight::{Buffers, Lists};
 use hzn_flight::{Parameters, table};
-use hzn_sim::flight::{leo_infrared, rocket};
-use hzn_tests::emulated::{Board, Case, bits, chain, measure, measure_rows};
+use hzn_sim::flight::{Flight, leo_infrared, rocket};
+use hzn_tests::emulated::{Board, Case, answer_bytes, measure, measure_rows, run_chain};
 use hzn_tests::real::Photograph;
 
 /// Returns the pictures: rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and patterns
@@ -43,14 +43,14 @@ fn cases() -> Vec<Case> {
             view.at(x as u16, y as u16) as u8
         };
         let bytes = (0..usize::from(view.width()) * usize::from(view.height())).map(pixel).collect();
-        cases.push(Case { name: file.into(), sensor: photograph.sensor.clone(), known: Prior::default(), bytes });
+        cases.push(Case { name: file.into(), sensor: photograph.sensor.clone(), prior: Prior::default(), bytes });
     }
     let sensor = rocket(640, 480, 1, 1).sensor;
-    let told = Prior { altitude_m: Some(2e5f32), ..Prior::default() };
+    let prior = Prior { altitude_m: Some(2e5f32), ..Prior::default() };
     let paint = |name: &str, f: &dyn Fn(usize, usize) -> u8| Case {
         name: name.into(),
         sensor: sensor.clone(),
-        known: told,
+        prior,
         bytes: (0..640 * 480).map(|i| f(i % 640, i / 640)).collect(),
     };
     cases.push(paint("black", &|_, _| 0));
@@ -65,19 +65,19 @@ fn cases() -> Vec<Case> {
 fn same_bits_as_here() {
     let cases = cases();
     assert!(cases.len() >= 50, "{}", cases.len());
-    let here: Vec<_> = cases.iter().map(Case::here).collect();
+    let host: Vec<_> = cases.iter().map(Case::answer_on_host).collect();
     let mut ok = 0;
     for board in Board::ALL {
-        for ((case, here), there) in cases.iter().zip(&here).zip(measure(board, &cases)) {
+        for ((case, host), there) in cases.iter().zip(&host).zip(measure(board, &cases)) {
             assert_eq!(
-                bits(here),
-                bits(&there.answer),
-                "{} on {}:\n{here:?}\n{:?}",
+                answer_bytes(host),
+                answer_bytes(&there.answer),
+                "{} on {}:\n{host:?}\n{:?}",
                 case.name,
                 board.core(),
                 there.answer
             );
-            ok += u32::from(here.status == Status::Ok as u8);
+            ok += u32::from(host.status == Status::Ok as u8);
         }
     }
     println!("{} pictures on two boards, {ok} answers", cases.len());
@@ -95,22 +95,22 @@ fn rows_have_the_bits_of_the_picture() {
         .frames
         .iter()
         .map(|frame| Case {
-            known: Prior { altitude_m: Some(frame.prior().altitude_m.unwrap_or(2e5) as f32), ..Prior::default() },
+            prior: Prior { altitude_m: Some(frame.prior().altitude_m.unwrap_or(2e5) as f32), ..Prior::default() },
             ..Case::rendered(frame.file.clone(), &flight.sensor, frame)
         })
         .collect();
     for board in Board::ALL {
         let mut whole = 0;
         for (case, there) in cases.iter().zip(measure_rows(board, &cases)) {
-            let here = case.here();
-            assert_eq!((here.status, here.level), (there.answer.status, there.answer.level), "{}", case.name);
+            let host = case.answer_on_host();
+            assert_eq!((host.status, host.level), (there.answer.status, there.answer.level), "{}", case.name);
             // If both dropped equally many pixels, the directions agree in every bit.
-            if there.answer.dropped == here.dropped {
+            if there.answer.dropped == host.dropped {
                 whole += 1;
-                assert_eq!(here.direction, there.answer.direction, "{} on {}", case.name, board.core());
-            } else if let (Some(a), Some(b)) = (here.direction, there.answer.direction) {
-                let apart: f32 = a.axis.iter().zip(b.axis).map(|(a, b)| (a - b) * (a - b)).sum();
-                assert!(apart.sqrt().to_degrees() < 0.02, "{}: {}", case.name, apart.sqrt().to_degrees());
+                assert_eq!(host.direction, there.answer.direction, "{} on {}", case.name, board.core());
+            } else if let (Some(a), Some(b)) = (host.direction, there.answer.direction) {
+                let distance: f32 = a.axis.iter().zip(b.axis).map(|(a, b)| (a - b) * (a - b)).sum();
+                assert!(distance.sqrt().to_degrees() < 0.02, "{}: {}", case.name, distance.sqrt().to_degrees());
             }
         }
         println!("{}: {whole} of {} pictures without a full list", board.core(), cases.len());
@@ -130,12 +130,12 @@ impl Bench {
     fn path(&self, name: &str) -> PathBuf {
         self.dir.path().join(name)
     }
-    fn copy(&self, number: u8, config: &Config, generation: u32) {
+    fn write_parameter_copy(&self, number: u8, config: &Config, generation: u32) {
         let mut bytes = vec![0; table::MAX_BYTES];
         let n = table::write(&Parameters::new(config.clone()), generation, &mut bytes).unwrap();
         std::fs::write(self.path(&format!("copy{number}.bin")), &bytes[..n]).unwrap();
     }
-    fn frames(&self, pictures: &[(Vec<u8>, u32)]) {
+    fn write_frames(&self, pictures: &[(Vec<u8>, u32)]) {
         let mut out = Vec::new();
         for (bytes, lost) in pictures {
             out.extend_from_slice(b"FRAM");
@@ -148,10 +148,10 @@ impl Bench {
     }
     /// Runs the image until it ends by itself and returns its exit status. What the image sends is in `sent.bin`.
     fn run(&self, line: &[u8]) -> i32 {
-        self.run_at(line, 0)
+        self.run_with_shift(line, 0)
     }
     /// Does the same as `run`, with an instruction that takes `2^shift` ns.
-    fn run_at(&self, line: &[u8], shift: u32) -> i32 {
+    fn run_with_shift(&self, line: &[u8], shift: u32) -> i32 {
         std::fs::write(self.path("line.bin"), line).unwrap();
         let sent = std::fs::File::create(self.path("sent.bin")).unwrap();
         let mut command = self.board.qemu(&self.board.image("flight"), shift);
@@ -207,10 +207,10 @@ fn answers(path: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
     let columns = lines.next().unwrap();
-    let apart = ["index", "file", "time_s", "elapsed_us"];
+    let not_answer = ["index", "file", "time_s", "elapsed_us"];
     lines
         .map(|cells| {
-            cells.into_iter().zip(&columns).filter(|(_, c)| !apart.contains(&c.as_str())).map(|(v, _)| v).collect()
+            cells.into_iter().zip(&columns).filter(|(_, c)| !not_answer.contains(&c.as_str())).map(|(v, _)| v).collect()
         })
         .collect()
 }
@@ -227,20 +227,13 @@ fn an_exchange_over_the_line() {
     for board in Board::ALL {
         let bench = Bench::new(board);
         let dir = bench.dir.path();
-        std::fs::create_dir(bench.path("pictures")).unwrap();
-        let mut pictures = Vec::new();
-        for frame in &flight.frames {
-            let picture = frame.render().unwrap();
-            picture.save(&bench.path("pictures").join(&frame.file)).unwrap();
-            let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("8 bits") };
-            pictures.push((bytes.clone(), 0));
-        }
+        let mut pictures = save_pictures(&flight, &bench.path("pictures"));
         // In between, one picture has the wrong size and three are lost.
         pictures.insert(4, (vec![7; 1000], 3));
-        bench.frames(&pictures);
+        bench.write_frames(&pictures);
         let mut before = flight.sensor.clone();
         before.reject.threshold_px = 5.0;
-        bench.copy(1, &before, 1);
+        bench.write_parameter_copy(1, &before, 1);
 
         let mut commands =
             vec!["set reject.threshold_px 2.5 covariance.sigma_px 0.2", "read reject.threshold_px", "dump-edges"];
@@ -252,40 +245,62 @@ fn an_exchange_over_the_line() {
         hzn_run(dir, &args);
         let line = std::fs::read(bench.path("commands.bin")).unwrap();
         assert_eq!(bench.run(&line), 0);
-
-        let said = hzn_run(dir, &["telemetry", "sent.bin", "-o", "sent.csv", "--housekeeping", "hk.csv"]);
-        assert!(said.contains("started with copy 1 of the parameters, generation 1"), "{said}");
-        assert!(said.contains("parameters stored in copy 2, generation 2"), "{said}");
-        assert!(said.contains("parameter 81 reject.threshold_px = 2.5"), "{said}");
-        assert!(said.contains("edge of picture 1, candidate"), "{said}");
-        assert!(
-            said.contains("picture of wrong size (1000, 307200)") && said.contains("pictures lost (3, 0)"),
-            "{said}"
-        );
-        assert!(said.contains("(set): value refused; nothing changed"), "{said}");
-        assert!(said.contains("standby to shut-down mode"), "{said}");
-        assert!(!said.contains("broken packets") && !said.contains("lost on the way"), "{said}");
-        let housekeeping = std::fs::read_to_string(bench.path("hk.csv")).unwrap();
-        let last: Vec<&str> = housekeeping.lines().last().unwrap().split(',').collect();
-        let column = |name: &str| housekeeping.lines().next().unwrap().split(',').position(|c| c == name).unwrap();
-        assert_eq!((last[column("pictures")], last[column("lost")], last[column("refused")]), ("10", "3", "1"));
-        // Besides the pictures, RAM holds the lists, the buffers and the stack.
-        let stack: usize = last[column("stack_bytes")].parse().unwrap();
-        println!("{}: most stack {stack} bytes", board.name());
-        assert!(size_of::<Lists>() + size_of::<Buffers>() + stack < 96 * 1024);
+        let printed = hzn_run(dir, &["telemetry", "sent.bin", "-o", "sent.csv", "--housekeeping", "hk.csv"]);
+        assert_events(&printed);
+        assert_housekeeping(&bench);
 
         let mut after = before;
         after.reject.threshold_px = 2.5;
         after.covariance.sigma_px = 0.2;
         std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&after).unwrap()).unwrap();
         hzn_run(dir, &["run", "pictures", "--flight", "-o", "here.csv"]);
-        let (sent, here) = (answers(&bench.path("sent.csv")), answers(&bench.path("here.csv")));
+        let (sent, host) = (answers(&bench.path("sent.csv")), answers(&bench.path("here.csv")));
         assert_eq!(sent.len(), 10);
-        assert_eq!(sent, here, "{}", board.name());
+        assert_eq!(sent, host, "{}", board.name());
         hzn_run(dir, &["telemetry", "sent.bin", "-o", "sent.mcap"]);
         hzn_run(dir, &["export", "sent.mcap", "-o", "again.csv"]);
-        assert_eq!(answers(&bench.path("again.csv")), here);
+        assert_eq!(answers(&bench.path("again.csv")), host);
     }
+}
+
+/// Renders a flight, saves the pictures in a new folder, and returns their bytes, each with 0 lost pictures before it.
+fn save_pictures(flight: &Flight, folder: &Path) -> Vec<(Vec<u8>, u32)> {
+    std::fs::create_dir(folder).unwrap();
+    let mut pictures = Vec::new();
+    for frame in &flight.frames {
+        let picture = frame.render().unwrap();
+        picture.save(&folder.join(&frame.file)).unwrap();
+        let hzn_sim::Samples::Bytes(bytes) = picture.samples() else { panic!("8 bits") };
+        pictures.push((bytes.clone(), 0));
+    }
+    pictures
+}
+
+/// Asserts that the decoded telemetry has every event of the exchange, and no broken or lost packet.
+fn assert_events(printed: &str) {
+    assert!(printed.contains("started with copy 1 of the parameters, generation 1"), "{printed}");
+    assert!(printed.contains("parameters stored in copy 2, generation 2"), "{printed}");
+    assert!(printed.contains("parameter 81 reject.threshold_px = 2.5"), "{printed}");
+    assert!(printed.contains("edge of picture 1, candidate"), "{printed}");
+    assert!(
+        printed.contains("picture of wrong size (1000, 307200)") && printed.contains("pictures lost (3, 0)"),
+        "{printed}"
+    );
+    assert!(printed.contains("(set): value refused, nothing changed"), "{printed}");
+    assert!(printed.contains("standby to shut-down mode"), "{printed}");
+    assert!(!printed.contains("broken packets") && !printed.contains("lost on the way"), "{printed}");
+}
+
+/// Asserts the counters of the last housekeeping packet, and that the RAM is large enough for the stack.
+fn assert_housekeeping(bench: &Bench) {
+    let housekeeping = std::fs::read_to_string(bench.path("hk.csv")).unwrap();
+    let last: Vec<&str> = housekeeping.lines().last().unwrap().split(',').collect();
+    let column = |name: &str| housekeeping.lines().next().unwrap().split(',').position(|c| c == name).unwrap();
+    assert_eq!((last[column("pictures")], last[column("lost")], last[column("refused")]), ("10", "3", "1"));
+    // Besides the pictures, RAM holds the lists, the buffers and the stack.
+    let stack: usize = last[column("stack_bytes")].parse().unwrap();
+    println!("{}: most stack {stack} bytes", bench.board.name());
+    assert!(size_of::<Lists>() + size_of::<Buffers>() + stack < 96 * 1024);
 }
 
 /// Tests a power cut in the middle of writing the parameters: after the reset the old parameters are in use, and the
@@ -295,9 +310,9 @@ fn an_exchange_over_the_line() {
 fn a_power_cut_in_the_middle_of_a_parameter_write() {
     let sensor = rocket(640, 480, 1, 1).sensor;
     let bench = Bench::new(Board::An500);
-    bench.frames(&[]);
-    bench.copy(1, &sensor, 1);
-    bench.copy(2, &sensor, 2);
+    bench.write_frames(&[]);
+    bench.write_parameter_copy(1, &sensor, 1);
+    bench.write_parameter_copy(2, &sensor, 2);
     std::fs::write(bench.path("cut.bin"), 200u32.to_le_bytes()).unwrap();
     hzn_run(bench.dir.path(), &["telecommand", "set body.altitude_km 99", "-o", "one.bin"]);
     let line = std::fs::read(bench.path("one.bin")).unwrap();
@@ -307,10 +322,10 @@ fn a_power_cut_in_the_middle_of_a_parameter_write() {
     hzn_run(bench.dir.path(), &["telecommand", "read body.altitude_km", "mode shut-down", "-o", "two.bin"]);
     let line = std::fs::read(bench.path("two.bin")).unwrap();
     assert_eq!(bench.run(&line), 0);
-    let said = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
-    assert!(said.contains("started with copy 2 of the parameters, generation 2"), "{said}");
-    assert!(said.contains("a copy of the parameters cannot be used (1, 2)"), "{said}");
-    assert!(said.contains("parameter 32 body.altitude_km = NaN"), "{said}");
+    let printed = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
+    assert!(printed.contains("started with copy 2 of the parameters, generation 2"), "{printed}");
+    assert!(printed.contains("a copy of the parameters cannot be used (1, 2)"), "{printed}");
+    assert!(printed.contains("parameter 32 body.altitude_km = NaN"), "{printed}");
 }
 
 /// Tests a turn of the flight loop that never ends: the watchdog restarts the program, which reports this and obeys
@@ -320,7 +335,7 @@ fn a_power_cut_in_the_middle_of_a_parameter_write() {
 fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
     for board in Board::ALL {
         let bench = Bench::new(board);
-        bench.copy(1, &rocket(640, 480, 1, 1).sensor, 1);
+        bench.write_parameter_copy(1, &rocket(640, 480, 1, 1).sensor, 1);
         let hangs = [*b"HANG", [0; 4], [0; 4], [0; 4]].concat();
         std::fs::write(bench.path("frames.bin"), hangs).unwrap();
         // Commands that were received before the reset are lost with it.
@@ -329,12 +344,12 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
         hzn_run(bench.dir.path(), &args);
         let line = std::fs::read(bench.path("commands.bin")).unwrap();
         // The watchdog's two seconds are 31 million instructions at this shift.
-        assert_eq!(bench.run_at(&line, 6), 0);
-        let said = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
-        println!("{said}");
-        assert_eq!(said.matches("started with copy 1 of the parameters").count(), 2, "{said}");
-        assert_eq!(said.matches("reset by the watchdog").count(), 1, "{said}");
-        assert!(said.contains("standby to shut-down mode"), "{said}");
+        assert_eq!(bench.run_with_shift(&line, 6), 0);
+        let printed = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
+        println!("{printed}");
+        assert_eq!(printed.matches("started with copy 1 of the parameters").count(), 2, "{printed}");
+        assert_eq!(printed.matches("reset by the watchdog").count(), 1, "{printed}");
+        assert!(printed.contains("standby to shut-down mode"), "{printed}");
     }
 }
 
@@ -354,17 +369,17 @@ fn the_sensor_alone_answers_with_the_same_bits() {
     }
     let mut ok = 0;
     for frame in &flight.frames {
-        let case = Case { known: Prior::default(), ..Case::rendered(frame.file.clone(), &sensor, frame) };
+        let case = Case { prior: Prior::default(), ..Case::rendered(frame.file.clone(), &sensor, frame) };
         let mut horizon = Box::new(FlightHorizon::new(&sensor).unwrap());
         let picture = Grey::try_new(&case.bytes, Layout::packed(1920, 1080, 1, 8)).unwrap();
-        let expected = horizon.expect(&case.known).unwrap();
+        let expected = horizon.expect(&case.prior).unwrap();
         let report = horizon.process(&picture, &expected);
         let direction = report.solution.as_ref().map_or([0; 9], |s| {
             let ([x, y, z], [[xx, xy, xz], [_, yy, yz], [_, _, zz]]) = (s.axis.xyz(), s.covariance.rows());
             [x, y, z, xx, xy, xz, yy, yz, zz].map(f32::to_bits)
         });
         for board in Board::ALL {
-            let words = chain(board, &case.bytes);
+            let words = run_chain(board, &case.bytes);
             assert_eq!((words[0], &words[1..10]), (report.status as u32, &direction[..]), "{} {board:?}", case.name);
             // The last word is the high-water mark of the stack in bytes. The stack is painted, so that the number is
             // measured.

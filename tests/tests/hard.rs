@@ -34,13 +34,13 @@ fn truth(scene: &Scene) -> [f64; 3] {
 }
 
 /// Asserts that both precisions answer, with errors of at most `limits_deg` (f64, f32) and of at most five sigma.
-fn found(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]) {
-    assert_eq!(found_or_refused(what, scene, sensor, limits_deg), 2, "{what}");
+fn assert_found(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]) {
+    assert_eq!(assert_found_or_refused(what, scene, sensor, limits_deg), 2, "{what}");
 }
 
 /// Returns how many of both precisions answer. Asserts that their errors are at most `limits_deg` (f64, f32) and at
 /// most five sigma.
-fn found_or_refused(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]) -> usize {
+fn assert_found_or_refused(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]) -> usize {
     let (host, flight) = Sensors::new(sensor).both(&scene.render().unwrap().view(), scene);
     let mut answers = 0;
     for ((kind, answer), limit_deg) in [("f64", host), ("f32", flight)].into_iter().zip(limits_deg) {
@@ -70,7 +70,7 @@ fn limb_lit_only_in_part() {
             // The lit part is at one end of the limb in view, so the dark part ends the edge within the picture.
             let half_width_rad = 0.5 * share * (last - first);
             s.light = Light::Sector { centre_rad: first + half_width_rad, half_width_rad, fade_rad: 0.03 };
-            found(&format!("{share} lit, {seed}"), &s, &sensor(&s), [0.15; 2]);
+            assert_found(&format!("{share} lit, {seed}"), &s, &sensor(&s), [0.15; 2]);
         }
     }
 }
@@ -91,9 +91,9 @@ fn edge_half_cloud_half_limb() {
         let mut sensor = sensor(&s);
         sensor.reject.threshold_px = 1.0;
         sensor.covariance = covariance::Config::default();
-        found_or_refused(&format!("half cloud {seed}"), &s, &sensor, [0.25; 2]);
+        assert_found_or_refused(&format!("half cloud {seed}"), &s, &sensor, [0.25; 2]);
         sensor.select.max_band = 1.0;
-        answers += found_or_refused(&format!("half cloud {seed}, bands allowed"), &s, &sensor, [0.25; 2]);
+        answers += assert_found_or_refused(&format!("half cloud {seed}, bands allowed"), &s, &sensor, [0.25; 2]);
     }
     assert!(answers >= 12, "{answers} of 16");
 }
@@ -109,9 +109,9 @@ fn bright_band_has_two_edges() {
             s.disc = Disc { surface: 0.03, clouds: None, band: Some(Band { brightness: 0.9, depth_km, fade_km }) };
             let what = format!("band of {depth_km} km, {seed}");
             let mut sensor = sensor(&s);
-            found_or_refused(&what, &s, &sensor, [0.05; 2]);
+            assert_found_or_refused(&what, &s, &sensor, [0.05; 2]);
             sensor.select.max_band = 1.0;
-            found(&what, &s, &sensor, [0.05; 2]);
+            assert_found(&what, &s, &sensor, [0.05; 2]);
         }
     }
 }
@@ -124,7 +124,7 @@ fn payload_in_front_without_a_mask() {
         let box_ = vec![[520.0, 100.0], [660.0, 90.0], [660.0, 400.0], [540.0, 400.0]];
         s.foreground =
             vec![Foreground { polygon_px: mast, brightness: 0.5 }, Foreground { polygon_px: box_, brightness: 0.7 }];
-        found(&format!("payload {seed}"), &s, &sensor(&s), [0.15; 2]);
+        assert_found(&format!("payload {seed}"), &s, &sensor(&s), [0.15; 2]);
     }
 }
 
@@ -137,7 +137,7 @@ fn image_circle() {
             ..Camera::ideal(Model::Equidistant, 640, 480, 230.0 / 40f64.to_radians())
         };
         let s = scene(camera, seed);
-        found(&format!("image circle {seed}"), &s, &sensor(&s), [0.08; 2]);
+        assert_found(&format!("image circle {seed}"), &s, &sensor(&s), [0.08; 2]);
     }
 }
 
@@ -166,7 +166,7 @@ fn full_disc_inside_the_picture() {
     for (i, off_rad) in [[0.0; 3], [0.1, 0.05, 0.3], [-0.08, 0.12, 1.0]].into_iter().enumerate() {
         // A twentieth of a pixel at 1000 px/rad is 0.003°.
         let s = far_away(body.clone(), 1000.0, 8e6, off_rad);
-        found(&format!("sphere {i}"), &s, &sensor(&s), [0.003; 2]);
+        assert_found(&format!("sphere {i}"), &s, &sensor(&s), [0.003; 2]);
     }
 }
 
@@ -182,7 +182,7 @@ fn moon_and_sun_at_the_edge_of_the_picture() {
             let s = far_away(disc(kind), 12_900.0, distance_m, off_rad);
             // A pixel is 0.0044°. Single precision resolves cos α to 6e-8, which is 0.0008° for a half-angle this
             // small. The centre of a cut disc moves with its radius.
-            found(&format!("{name} {i}"), &s, &sensor(&s), [0.0004, 0.002]);
+            assert_found(&format!("{name} {i}"), &s, &sensor(&s), [0.0004, 0.002]);
         }
     }
 }
@@ -201,7 +201,7 @@ fn all_lens_models() {
     for camera in lenses {
         for seed in 0..4 {
             let s = scene(camera.clone(), seed);
-            found(&format!("{:?} {seed}", camera.model), &s, &sensor(&s), [0.08; 2]);
+            assert_found(&format!("{:?} {seed}", camera.model), &s, &sensor(&s), [0.08; 2]);
         }
     }
 }

@@ -8,13 +8,13 @@ fn root() -> PathBuf {
 }
 
 /// Collects the documents: Markdown outside of folders that a build makes.
-fn pages(dir: &Path, out: &mut Vec<PathBuf>) {
+fn collect_pages(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if path.is_dir() {
             if !name.starts_with("target") && name != ".git" && name != "hzn-demo" && name != ".venv" {
-                pages(&path, out);
+                collect_pages(&path, out);
             }
         } else if name.ends_with(".md") {
             out.push(path);
@@ -24,7 +24,7 @@ fn pages(dir: &Path, out: &mut Vec<PathBuf>) {
 
 /// Returns the targets of `[text](target)` outside of code. Links to other sites and to headings of the same page are
 /// left out.
-fn targets(text: &str) -> Vec<String> {
+fn find_targets(text: &str) -> Vec<String> {
     let mut fenced = false;
     let prose = text.lines().filter(|line| {
         fenced ^= line.trim_start().starts_with("```");
@@ -38,12 +38,12 @@ fn targets(text: &str) -> Vec<String> {
 #[test]
 fn every_link_leads_somewhere() {
     let mut documents = Vec::new();
-    pages(&root(), &mut documents);
+    collect_pages(&root(), &mut documents);
     assert!(documents.len() > 15, "{documents:?}");
     let mut checked = 0;
     let mut broken = Vec::new();
     for page in documents {
-        for target in targets(&fs::read_to_string(&page).unwrap()) {
+        for target in find_targets(&fs::read_to_string(&page).unwrap()) {
             let path = target.split('#').next().unwrap_or_default();
             checked += 1;
             if !page.parent().unwrap().join(path).exists() {

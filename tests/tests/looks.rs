@@ -12,11 +12,11 @@ use hzn_sim::painted::LensWithDiscs;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Clouds, Light, Look, Pose, Scene, Visible};
 use hzn_tests::real::Photograph;
-use hzn_tests::sensors::look;
+use hzn_tests::sensors::process;
 use hzn_tests::{Sensors, Tally};
 
 /// Returns the configuration of a sensor with a fixed threshold and with the disc's altitude.
-fn told(lens: &camera::Config, altitude_km: f64, level: f64) -> Config {
+fn fixed_threshold_config(lens: &camera::Config, altitude_km: f64, level: f64) -> Config {
     let mut config = Config::new(lens.clone());
     config.body = body::Config {
         kind: Kind::EarthSphere,
@@ -30,7 +30,7 @@ fn told(lens: &camera::Config, altitude_km: f64, level: f64) -> Config {
     config
 }
 
-fn seen(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report<f64> {
+fn process_picture(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report<f64> {
     let picture = Grey::try_new(data, Layout::packed(lens.width.into(), lens.height.into(), 1, 8)).unwrap();
     let expected = horizon.expect(&Prior::default()).unwrap();
     horizon.process(&picture, &expected)
@@ -48,8 +48,9 @@ fn no_disc_is_lost_under_an_image_circle() {
             let axis = UnitVec3::try_new(disc.axis).unwrap();
             for k in 0..10 {
                 let level = disc.dark + (disc.lit - disc.dark) * (0.05 + 0.09 * f64::from(k));
-                let mut horizon = HostHorizon::boxed(&told(&with_discs.lens, *altitude_km, level)).unwrap();
-                let report = seen(&mut horizon, &data, &with_discs.lens);
+                let mut horizon =
+                    HostHorizon::boxed(&fixed_threshold_config(&under.lens, *altitude_km, level)).unwrap();
+                let report = process_picture(&mut horizon, &data, &under.lens);
                 let right = report.solution.is_some_and(|s| s.axis.angle_rad(&axis).to_degrees() < 0.2);
                 count += 1;
                 if !right {
@@ -70,8 +71,8 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let answer = |sensor: &Config| {
         let sensors = &mut Sensors::new(sensor);
         let [host, flight] = [
-            look(&mut sensors.host, &p.view(), &Prior::default()),
-            look(&mut sensors.flight, &p.view(), &Prior::default()),
+            process(&mut sensors.host, &p.view(), &Prior::default()),
+            process(&mut sensors.flight, &p.view(), &Prior::default()),
         ];
         let why = || {
             let mut horizon = HostHorizon::boxed(sensor).unwrap();
@@ -94,15 +95,15 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
             "level {level}: {} of {} points, RMS {:.2} px, {:.5?}",
             found.inliers, found.points, found.rms_px, found.axis
         );
-        let apart_deg = axes.iter().map(|&axis| found.error_deg(axis)).fold(0.0, f64::max);
-        assert!(apart_deg < found.sigma_deg(), "level {level}: {apart_deg}, sigma {}", found.sigma_deg());
+        let difference_deg = axes.iter().map(|&axis| found.error_deg(axis)).fold(0.0, f64::max);
+        assert!(difference_deg < found.sigma_deg(), "level {level}: {difference_deg}, sigma {}", found.sigma_deg());
         axes.push(found.axis);
     }
     // If the frame is not left out, the picture's own outline belongs to the edge. The sensor then has fewer inliers or
     // no answer.
     p.sensor.recover.frame_px = 0;
     p.sensor.binarize = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
-    let with = look(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default());
+    let with = process(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default());
     assert!(
         with.is_err() || with.is_ok_and(|a| 2 * a.inliers < a.points && a.error_deg(axes[0]) < a.sigma_deg()),
         "{with:?}"
@@ -116,22 +117,27 @@ fn half_lit_discs_are_looked_at_again() {
     let (mut answered, mut at_once) = (0, 0);
     let count = 24;
     for n in 0..count {
-        let of = |k: u32| {
+        let random = |k: u32| {
             f64::from((n + 1u32).wrapping_mul(2_654_435_761).wrapping_add(k * 40_503_001) >> 8 & 0xFFFF) / 65536.0
         };
-        let altitude_km = 3000.0 * 10f64.powf(of(1));
+        let altitude_km = 3000.0 * 10f64.powf(random(1));
         let half_angle = (6371.0 / (6371.0 + altitude_km)).asin();
-        let lens = camera::Config::ideal(Model::Pinhole, 320, 320, 320.0 * (0.25 + 0.15 * of(2)) / half_angle.tan());
+        let lens =
+            camera::Config::ideal(Model::Pinhole, 320, 320, 320.0 * (0.25 + 0.15 * random(2)) / half_angle.tan());
         let turn = std::f64::consts::TAU;
-        let look_to =
-            Look { azimuth_rad: turn * of(3), depression_rad: (89.0 - 3.0 * of(4)).to_radians(), roll_rad: 0.3 };
-        let pose = Pose::looking(position_m(120.0 * of(5) - 60.0, 20.0, altitude_km), look_to);
-        let (phase, side) = ((60.0 + 40.0 * of(6)).to_radians(), turn * of(7));
+        let look_to = Look {
+            azimuth_rad: turn * random(3),
+            depression_rad: (89.0 - 3.0 * random(4)).to_radians(),
+            roll_rad: 0.3,
+        };
+        let pose = Pose::looking(position_m(120.0 * random(5) - 60.0, 20.0, altitude_km), look_to);
+        let (phase, side) = ((60.0 + 40.0 * random(6)).to_radians(), turn * random(7));
         let sun = [phase.sin() * side.cos(), phase.sin() * side.sin(), -phase.cos()];
         let direction = pose.cam_to_ecef().unwrap().apply(&UnitVec3::try_new(sun).unwrap()).xyz();
         let mut scene = Scene::new(lens.clone(), pose);
-        let clouds = Clouds { cover: 0.3 + 0.3 * of(8), brightness: 0.9, seed: n.into(), ..Visible::default().clouds };
-        scene.disc = hzn_sim::Disc { surface: 0.12 + 0.1 * of(9), clouds: Some(clouds), band: None };
+        let clouds =
+            Clouds { cover: 0.3 + 0.3 * random(8), brightness: 0.9, seed: n.into(), ..Visible::default().clouds };
+        scene.disc = hzn_sim::Disc { surface: 0.12 + 0.1 * random(9), clouds: Some(clouds), band: None };
         scene.light = Light::Sun { direction, twilight_rad: 0.02 };
         scene.body.limb_height_km = 15.0;
         (scene.detector.psf_sigma_px, scene.detector.read_noise, scene.seed) = (0.9, 0.01, n.into());
@@ -142,7 +148,7 @@ fn half_lit_discs_are_looked_at_again() {
         config.recover.levels.clear();
         let mut once = HostHorizon::boxed(&config).unwrap();
         let [one, several] = [&mut once, &mut again].map(|horizon| {
-            let expected = horizon.expect(&hzn_tests::known(&scene)).unwrap();
+            let expected = horizon.expect(&hzn_tests::prior_of_scene(&scene)).unwrap();
             horizon.process(&picture.view(), &expected)
         });
         println!(
@@ -178,11 +184,12 @@ fn a_thermal_array_answers_by_default() {
     let [mut sensor, mut known] = [sensor, known].map(|c| HostHorizon::boxed(&c).unwrap());
     let (mut tally, mut bound_deg2, mut count) = (Tally::default(), 0.0, 0.0);
     for seed in 0..60u32 {
-        let of = |k: u32| f64::from(seed.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 8 & 0xFFFF) / 65536.0;
+        let random =
+            |k: u32| f64::from(seed.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 8 & 0xFFFF) / 65536.0;
         let look_to = Look {
-            azimuth_rad: core::f64::consts::TAU * of(1),
-            depression_rad: (16.0 + 8.0 * of(2)).to_radians(),
-            roll_rad: core::f64::consts::TAU * of(3),
+            azimuth_rad: core::f64::consts::TAU * random(1),
+            depression_rad: (16.0 + 8.0 * random(2)).to_radians(),
+            roll_rad: core::f64::consts::TAU * random(3),
         };
         let mut scene = Scene::new(camera.clone(), Pose::looking(position_m(20.0, 10.0, 400.0), look_to));
         scene.body = sensor.config().body.clone();
@@ -194,14 +201,14 @@ fn a_thermal_array_answers_by_default() {
             .collect();
         let picture = Grey::try_new(&words[..], Layout::packed(32, 24, 1, 16)).unwrap();
         let truth = scene.truth("", 0.0).unwrap();
-        let told = hzn_tests::known(&scene);
-        let answer = look(&mut sensor, &picture, &told);
+        let prior = hzn_tests::prior_of_scene(&scene);
+        let answer = process(&mut sensor, &picture, &prior);
         if let Err(status) = answer {
-            let expected = sensor.expect(&told).unwrap();
+            let expected = sensor.expect(&prior).unwrap();
             println!("{seed}: {status}, {:?}", sensor.process(&picture, &expected).candidates);
         }
         tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
-        if let Ok(bound) = look(&mut known, &picture, &told) {
+        if let Ok(bound) = process(&mut known, &picture, &prior) {
             let p = bound.covariance_rad2;
             bound_deg2 += (p[0][0] + p[1][1] + p[2][2]).sqrt().to_degrees().powi(2);
             count += 1.0;

@@ -6,7 +6,7 @@ use hzn_core::{Config, Preset, fit};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Detector, Disc, EdgeNoise, Look, Pose, Scene};
-use hzn_tests::sensors::look;
+use hzn_tests::sensors::process;
 use hzn_tests::{Sensors, Tally};
 
 /// Runs a flight through the f64 sensor of a preset with the flight's camera, body and mask; `change` alters the
@@ -20,7 +20,7 @@ fn fly(flight: &Flight, preset: Preset, change: impl Fn(&mut Config)) -> Tally {
     let mut tally = Tally::default();
     for frame in &flight.frames {
         let truth = frame.truth().unwrap();
-        let answer = look(&mut sensors.host, &frame.render().unwrap().view(), &frame.prior());
+        let answer = process(&mut sensors.host, &frame.render().unwrap().view(), &frame.prior());
         if let Err(status) = &answer {
             println!("{}: {status}", frame.file);
         }

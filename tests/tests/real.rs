@@ -4,30 +4,30 @@
 
 use hzn_core::Prior;
 use hzn_core::status::Status;
-use hzn_tests::real::{Photograph, Points, Watch, steepest};
-use hzn_tests::sensors::{look, look_observed};
+use hzn_tests::real::{Photograph, PointRecorder, Points, steepest_offset_px};
+use hzn_tests::sensors::{process, process_observed};
 use hzn_tests::{Answer, Sensors};
 
-struct Looked {
+struct BothAnswers {
     host: Result<Answer, Status>,
     flight: Result<Answer, Status>,
     points: Points,
 }
 
 /// Asserts that the picture is steepest within `limit_px` of the fitted limb, in these eighths of its width.
-fn lies_on_the_limb(photograph: &Photograph, answer: &Answer, eighths: std::ops::Range<usize>, limit_px: f64) {
+fn assert_on_limb(photograph: &Photograph, answer: &Answer, eighths: std::ops::Range<usize>, limit_px: f64) {
     // The search goes 20 px far. Farther off are clouds that are steeper than the haze.
-    let off = steepest(photograph, answer, 20);
+    let off = steepest_offset_px(photograph, answer, 20);
     assert!(off[eighths.clone()].iter().all(|px| px.abs() <= limit_px), "{off:.1?} in {eighths:?}");
 }
 
-fn through(photograph: &Photograph) -> Looked {
+fn process_both(photograph: &Photograph) -> BothAnswers {
     let mut sensors = Sensors::new(&photograph.sensor);
-    let watch = Watch::default();
-    let host = look_observed(&mut sensors.host, &photograph.view(), &Prior::default(), &watch);
-    let flight = look(&mut sensors.flight, &photograph.view(), &Prior::default());
+    let watch = PointRecorder::default();
+    let host = process_observed(&mut sensors.host, &photograph.view(), &Prior::default(), &watch);
+    let flight = process(&mut sensors.flight, &photograph.view(), &Prior::default());
     let points = watch.points();
-    photograph.overlay(host.as_ref().ok(), &points);
+    photograph.write_overlay(host.as_ref().ok(), &points);
     for (kind, answer) in [("host", &host), ("flight", &flight)] {
         match answer {
             Ok(a) => println!(
@@ -44,19 +44,23 @@ fn through(photograph: &Photograph) -> Looked {
             Err(status) => println!("{} {kind}: {status}", photograph.name),
         }
     }
-    println!("{}: inliers along {:.1} % of the width", photograph.name, 100.0 * points.along(photograph.rgb.width()));
+    println!(
+        "{}: inliers along {:.1} % of the width",
+        photograph.name,
+        100.0 * points.width_with_inliers(photograph.rgb.width())
+    );
     if let Ok(a) = &host {
-        println!("{}: steepest {:.1?} px from the limb", photograph.name, steepest(photograph, a, 20));
+        println!("{}: steepest {:.1?} px from the limb", photograph.name, steepest_offset_px(photograph, a, 20));
     }
-    Looked { host, flight, points }
+    BothAnswers { host, flight, points }
 }
 
 /// Returns the largest change of the axis in degrees when the threshold is forced to 80 % and to 120 %.
-fn change_with_level_deg(photograph: &Photograph, axis: [f64; 3]) -> f64 {
+fn change_with_threshold_deg(photograph: &Photograph, axis: [f64; 3]) -> f64 {
     let moved = [0.8, 1.2].map(|scale| {
         let mut sensor = photograph.sensor.clone();
         sensor.binarize.scale = scale;
-        let answer = look(&mut Sensors::new(&sensor).host, &photograph.view(), &Prior::default());
+        let answer = process(&mut Sensors::new(&sensor).host, &photograph.view(), &Prior::default());
         answer.map_or(f64::INFINITY, |a| a.error_deg(axis))
     });
     println!("{}: {moved:.4?}° with the level at 80 % and 120 %", photograph.name);
@@ -66,30 +70,30 @@ fn change_with_level_deg(photograph: &Photograph, axis: [f64; 3]) -> f64 {
 #[test]
 fn iss_limb_over_broken_cloud_full_size() {
     let p = Photograph::load("full/iss-limb-2020-11-20.jpg");
-    let l = through(&p);
+    let l = process_both(&p);
     let a = l.host.expect("the limb is found");
     // The limb spans the picture. The test requires inliers along 80 % of the width, 4000 inliers, an RMS of at most
     // 1.5 px, and a change of at most 0.05°.
-    assert!(l.points.along(p.rgb.width()) >= 0.8);
+    assert!(l.points.width_with_inliers(p.rgb.width()) >= 0.8);
     assert!(a.inliers >= 4000 && a.rms_px <= 1.5, "{a:?}");
     // The haze is about 25 px thick here. Where clouds lie behind the haze, the picture is steepest a few pixels
     // farther down.
-    lies_on_the_limb(&p, &a, 0..8, 8.0);
-    assert!(change_with_level_deg(&p, a.axis) <= 0.05);
+    assert_on_limb(&p, &a, 0..8, 8.0);
+    assert!(change_with_threshold_deg(&p, a.axis) <= 0.05);
 }
 
 #[test]
 fn iss_limb_over_broken_cloud_reduced() {
     let p = Photograph::load("iss-limb-2020-11-20.jpg");
-    let l = through(&p);
+    let l = process_both(&p);
     let a = l.host.expect("the limb is found");
     // At a third of the size the test requires a third of the inliers and at most half of the RMS.
-    assert!(l.points.along(p.rgb.width()) >= 0.8);
+    assert!(l.points.width_with_inliers(p.rgb.width()) >= 0.8);
     assert!(a.inliers >= 1300 && a.rms_px <= 0.75, "{a:?}");
-    lies_on_the_limb(&p, &a, 0..8, 2.0);
+    assert_on_limb(&p, &a, 0..8, 2.0);
     // The haze fades over few pixels here. The threshold moves the limb only within the haze, and sigma must cover
     // that.
-    assert!(change_with_level_deg(&p, a.axis) <= 2.0 * a.sigma_deg());
+    assert!(change_with_threshold_deg(&p, a.axis) <= 2.0 * a.sigma_deg());
     let f = l.flight.expect("the flight computer finds it too");
     // The 1598 border pixels fit into both lists, so both sensors use the same points.
     assert!(f.error_deg(a.axis) <= 1e-3, "{}°", f.error_deg(a.axis));
@@ -99,14 +103,14 @@ fn iss_limb_over_broken_cloud_reduced() {
 fn iss_limb_is_the_same_at_both_sizes() {
     let answers = ["full/iss-limb-2020-11-20.jpg", "iss-limb-2020-11-20.jpg"].map(|file| {
         let p = Photograph::load(file);
-        look(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default()).expect("the limb is found")
+        process(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default()).expect("the limb is found")
     });
     // Both answers must agree within the claimed sigmas. They differ, because haze that spans more pixels is cut at
     // another depth.
-    let apart_deg = answers[0].error_deg(answers[1].axis);
+    let difference_deg = answers[0].error_deg(answers[1].axis);
     let sigma_deg = answers[0].sigma_deg().hypot(answers[1].sigma_deg());
-    println!("{apart_deg:.4}° between the sizes, sigma {sigma_deg:.4}°");
-    assert!(apart_deg <= 2.0 * sigma_deg, "{apart_deg}°");
+    println!("{difference_deg:.4}° between the sizes, sigma {sigma_deg:.4}°");
+    assert!(difference_deg <= 2.0 * sigma_deg, "{difference_deg}°");
 }
 
 #[test]
@@ -120,11 +124,11 @@ fn limb_behind_the_solar_array() {
     ];
     let answers = cases.map(|(file, inliers, rms_px, eighths, steep_px)| {
         let p = Photograph::load(file);
-        let l = through(&p);
+        let l = process_both(&p);
         let a = l.host.expect("the limb is found");
         assert!(a.inliers >= inliers && a.rms_px <= rms_px, "{a:?}");
-        assert!(l.points.along(p.rgb.width()) >= 0.7);
-        lies_on_the_limb(&p, &a, eighths, steep_px);
+        assert!(l.points.width_with_inliers(p.rgb.width()) >= 0.7);
+        assert_on_limb(&p, &a, eighths, steep_px);
         // The edges of the array must be outliers: in this left part of the picture only a few points are inliers, by
         // chance.
         let beyond = p.rgb.width() as f64 * 0.22;
@@ -139,14 +143,14 @@ fn limb_behind_the_solar_array() {
         }
         a
     });
-    let apart_deg = answers[0].error_deg(answers[1].axis);
-    println!("{apart_deg:.4}° between the sizes");
-    assert!(apart_deg <= answers[0].sigma_deg() + answers[1].sigma_deg(), "{apart_deg}°");
+    let difference_deg = answers[0].error_deg(answers[1].axis);
+    println!("{difference_deg:.4}° between the sizes");
+    assert!(difference_deg <= answers[0].sigma_deg() + answers[1].sigma_deg(), "{difference_deg}°");
 }
 
 #[test]
 fn aurora_is_refused_or_doubted() {
-    let l = through(&Photograph::load("iss073e0293986-aurora.jpg"));
+    let l = process_both(&Photograph::load("iss073e0293986-aurora.jpg"));
     for answer in [l.host, l.flight].into_iter().flatten() {
         assert!(answer.sigma_deg() > 1.0, "{answer:?}");
     }
@@ -155,35 +159,35 @@ fn aurora_is_refused_or_doubted() {
 #[test]
 fn pluto() {
     let p = Photograph::load("pluto-pia19948.jpg");
-    let l = through(&p);
+    let l = process_both(&p);
     let (a, f) = (l.host.expect("found in f64"), l.flight.expect("found in f32"));
     // Mountains of a few kilometres are some pixels high here (1.35 px/km), so the RMS must be below 2 px. 0.001° is
     // 0.45 px.
     assert!(a.inliers >= 250 && a.rms_px <= 2.0, "{a:?}");
-    assert!(l.points.along(p.rgb.width()) >= 0.8);
+    assert!(l.points.width_with_inliers(p.rgb.width()) >= 0.8);
     assert!(f.error_deg(a.axis) <= 1e-3, "{}°", f.error_deg(a.axis));
     // In the left quarter the crescent is as dim as the haze, and ridges are steeper than the limb.
-    lies_on_the_limb(&p, &a, 2..8, 5.0);
+    assert_on_limb(&p, &a, 2..8, 5.0);
     // sin α = 1188.3 / (1188.3 + 18000) gives α = 3.5506°. 200 km of altitude change α by 0.037°.
     assert!((a.free_half_angle_rad.to_degrees() - 3.5506).abs() <= 0.037);
 }
 
 /// Returns centre and radius of the disc in pixels: a least-squares fit (Kåsa) to the points where the rows and columns
 /// near the middle cross `level`. The disc is darker towards its limb, but equally on all sides.
-fn circle(p: &Photograph, level: f64) -> [f64; 3] {
+fn fit_circle(p: &Photograph, level: f64) -> [f64; 3] {
     let n = p.rgb.width();
     let mut points: Vec<[f64; 2]> = Vec::new();
     // These rows and columns cross the limb at less than 60° from its normal.
     for i in n / 2 - 170..n / 2 + 170 {
         for along_row in [true, false] {
-            let at = |j: u32| if along_row { p.brightness(j, i) } else { p.brightness(i, j) };
+            let brightness = |j: u32| if along_row { p.brightness(j, i) } else { p.brightness(i, j) };
             let mut push = |j: u32, k: u32| {
-                let (a, b) = (at(j), at(k));
+                let (a, b) = (brightness(j), brightness(k));
                 let t = f64::from(j) + (level - a) / (b - a) * (f64::from(k) - f64::from(j));
                 points.push(if along_row { [t, i.into()] } else { [i.into(), t] });
             };
-            let first = (1..n / 2).find(|&j| at(j) >= level).expect("the disc is crossed");
-            let last = (n / 2..n - 1).rev().find(|&j| at(j) >= level).expect("the disc is crossed");
+            let first = (1..n / 2).find(|&j| brightness(j) >= level).expect("the disc is crossed");
+            let last = (n / 2..n - 1).rev().find(|&j| brightness(j) >= level).expect("the disc is crossed");
             push(first - 1, first);
             push(last + 1, last);
         }
@@ -203,9 +207,9 @@ fn circle(p: &Photograph, level: f64) -> [f64; 3] {
 #[test]
 fn sun() {
     let p = Photograph::load("sun-hmi-continuum-2023-01-31.png");
-    let fits = [40.0, 60.0, 80.0].map(|level| circle(&p, level));
+    let fits = [40.0, 60.0, 80.0].map(|level| fit_circle(&p, level));
     println!("circles at three levels {fits:.3?}");
-    let l = through(&p);
+    let l = process_both(&p);
     for (answer, limit_px) in [(l.host.expect("found in f64"), 0.1), (l.flight.expect("found in f32"), 0.1)] {
         let [x, y, z] = answer.axis;
         let c = &p.sensor.camera;

@@ -6,7 +6,7 @@ use hzn_core::status::Status;
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::pose::position_m;
 use hzn_sim::{Look, Pose, Sky};
-use hzn_tests::sensors::look;
+use hzn_tests::sensors::process;
 use hzn_tests::{Answer, Sensors, Tally};
 
 /// Results of f64 and f32 over a flight: the tallies and the largest differences of the axes. `same_deg` (degrees) is
@@ -30,11 +30,11 @@ fn fly(flight: &Flight) -> Flown {
         out.host.add(host.as_ref().ok(), axis);
         out.flight.add(small.as_ref().ok(), axis);
         if let (Ok(a), Ok(b)) = (host, small) {
-            let apart_deg = a.error_deg(b.axis);
+            let difference_deg = a.error_deg(b.axis);
             if a.dropped == b.dropped {
-                out.same_deg = out.same_deg.max(apart_deg);
+                out.same_deg = out.same_deg.max(difference_deg);
             } else {
-                out.thinned_sigmas = out.thinned_sigmas.max(apart_deg / a.sigma_deg());
+                out.thinned_sigmas = out.thinned_sigmas.max(difference_deg / a.sigma_deg());
             }
         } else {
             println!("{}: {:?} {:?}", frame.file, host.err(), small.err());
@@ -47,7 +47,7 @@ fn fly(flight: &Flight) -> Flown {
     out
 }
 
-fn known_limits(flown: &Flown) {
+fn assert_difference_limits(flown: &Flown) {
     // With the same points, single precision costs at most a thousandth of a degree. The flight computer's shorter list
     // can make it take other points of the same edge. The noise of these points differs too, but by less than a sigma.
     assert!(flown.same_deg <= 1e-3, "{:e}", flown.same_deg);
@@ -59,12 +59,12 @@ fn rocket_flight() {
     let flown = fly(&rocket(1920, 1080, 12, 1));
     for tally in [&flown.host, &flown.flight] {
         // The goals are: all answered, 0.06° RMS, none above 2°, and a NEES of 1 to 4 for rendered scenes. The NEES may
-        // be lower here: the limb is exactly as high as the sensor is told, and the sensor is told ±1 km.
+        // be lower here: the sensor has the exact limb height, with a sigma of 1 km.
         assert_eq!(tally.answered(), tally.frames);
         assert!(tally.rms_deg() <= 0.06 && tally.worst_deg() <= 2.0, "{tally}");
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
     }
-    known_limits(&flown);
+    assert_difference_limits(&flown);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn rocket_flight_with_payload_in_view() {
         assert!(tally.rms_deg() <= 0.12 && tally.worst_deg() <= 2.0, "{tally}");
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
     }
-    known_limits(&flown);
+    assert_difference_limits(&flown);
 }
 
 /// Compares the scatter of the answers with the bound of Cramér and Rao. The picture is an evenly bright Earth with
@@ -111,7 +111,8 @@ fn white_noise_against_the_bound() {
                 scene.seed = seed;
                 let picture = scene.render().unwrap();
                 let answer =
-                    hzn_tests::sensors::look(&mut sensors.host, &picture.view(), &hzn_tests::known(&scene)).unwrap();
+                    hzn_tests::sensors::process(&mut sensors.host, &picture.view(), &hzn_tests::prior_of_scene(&scene))
+                        .unwrap();
                 let [x, y, z] = answer.axis;
                 errors.push([x - truth.axis_x, y - truth.axis_y, z - truth.axis_z].map(f64::to_degrees));
                 let p = answer.covariance_rad2;
@@ -132,7 +133,7 @@ fn white_noise_against_the_bound() {
 }
 
 /// Splits the frames of a flight that swings from 0° to 120° off nadir: up to 90° and beyond.
-fn halves(flight: Flight) -> [Flight; 2] {
+fn split_at_90_deg(flight: Flight) -> [Flight; 2] {
     let (mut near, mut far) = (flight.clone(), flight);
     let middle = near.frames.len() * 3 / 4;
     near.frames.truncate(middle + 1);
@@ -145,42 +146,44 @@ const LEO_DEG: [f64; 2] = [0.04, 0.08];
 
 #[test]
 fn low_orbit_infrared() {
-    for (flight, limit_deg) in halves(leo_infrared(25, 1)).iter().zip(LEO_DEG) {
+    for (flight, limit_deg) in split_at_90_deg(leo_infrared(25, 1)).iter().zip(LEO_DEG) {
         let flown = fly(flight);
         for tally in [&flown.host, &flown.flight] {
             assert_eq!(tally.answered(), tally.frames);
             assert!(tally.rms_deg() <= limit_deg, "{tally}");
             assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
         }
-        known_limits(&flown);
+        assert_difference_limits(&flown);
     }
 }
 
-/// Tests a limb height that varies by ±4.5 km between the poles, which the sensor is told. The test runs without an
+/// Tests a limb height that varies by ±4.5 km between the poles, which the sensor knows. The test runs without an
 /// attitude and with an attitude that has a sigma of 5°.
 #[test]
 fn low_orbit_infrared_with_limb_height_by_latitude() {
     let rows = [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
     let mut flight = leo_infrared(25, 2).with_limb_height_by_latitude_km(&rows);
     flight.sensor.body.limb_height_by_latitude_km = rows.into_iter().collect();
-    for (flight, (limit_deg, with_attitude_deg)) in halves(flight).iter().zip(LEO_DEG.into_iter().zip([0.015, 0.03])) {
+    for (flight, (limit_deg, with_attitude_deg)) in
+        split_at_90_deg(flight).iter().zip(LEO_DEG.into_iter().zip([0.015, 0.03]))
+    {
         let flown = fly(flight);
         assert_eq!(flown.host.answered(), flown.host.frames);
         assert!(flown.host.rms_deg() <= limit_deg, "{}", flown.host);
         assert!((0.5..=4.0).contains(&flown.host.mean_nees()), "{}", flown.host);
-        let tally = with_attitude(flight);
+        let tally = fly_with_attitude(flight);
         assert!(tally.rms_deg() <= with_attitude_deg && (0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
     }
 }
 
 /// Runs a flight through the sensor of a workstation, with a prior attitude that has a sigma of 5°.
-fn with_attitude(flight: &Flight) -> Tally {
+fn fly_with_attitude(flight: &Flight) -> Tally {
     let mut sensors = Sensors::new(&flight.sensor);
     let mut tally = Tally::default();
     for frame in &flight.frames {
         let truth = frame.truth().unwrap();
         let known = frame.prior_with_attitude(5f64.to_radians());
-        let answer = look(&mut sensors.host, &frame.render().unwrap().view(), &known);
+        let answer = process(&mut sensors.host, &frame.render().unwrap().view(), &known);
         tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
     }
     println!("{} with prior: {tally}", flight.name);
@@ -190,17 +193,17 @@ fn with_attitude(flight: &Flight) -> Tally {
 #[test]
 fn low_orbit_infrared_with_attitude_prior() {
     // The Earth's flattening turns the axis of a fitted circle; a prior attitude with a sigma of 5° removes that.
-    for (flight, limit_deg) in halves(leo_infrared(25, 1)).iter().zip([0.015, 0.03]) {
-        let tally = with_attitude(flight);
+    for (flight, limit_deg) in split_at_90_deg(leo_infrared(25, 1)).iter().zip([0.015, 0.03]) {
+        let tally = fly_with_attitude(flight);
         assert_eq!(tally.answered(), tally.frames);
         assert!(tally.rms_deg() <= limit_deg, "{tally}");
-        // The NEES is below 2: the sensor is told ±1 km of limb height, and the limb height is exactly as told.
+        // The NEES is below 2, because the sensor has the exact limb height, with a sigma of 1 km.
         assert!((0.5..=4.0).contains(&tally.mean_nees()), "{tally}");
     }
 }
 
 /// Asserts that neither sensor answers a picture.
-fn refused(what: &str, answers: (Result<Answer, Status>, Result<Answer, Status>)) {
+fn assert_refused(what: &str, answers: (Result<Answer, Status>, Result<Answer, Status>)) {
     println!("{what}: {:?} {:?}", answers.0.as_ref().err(), answers.1.as_ref().err());
     assert!(answers.0.is_err() && answers.1.is_err(), "{what}: {answers:?}");
 }
@@ -219,7 +222,10 @@ fn sky_and_clouds_are_not_answered() {
             scene.pose = Pose::looking(position, Look { azimuth_rad: i as f64, depression_rad, roll_rad: 0.0 });
             scene.sky = Sky { stars: 20_000, star_brightness: 20.0, ..scene.sky };
             assert!(!scene.truth("", 0.0).unwrap().has_limb());
-            refused(&format!("{depression_deg}° down, {i}"), sensors.both(&scene.render().unwrap().view(), &scene));
+            assert_refused(
+                &format!("{depression_deg}° down, {i}"),
+                sensors.both(&scene.render().unwrap().view(), &scene),
+            );
         }
     }
 }
@@ -256,7 +262,7 @@ fn pictures_of_nothing_are_not_answered() {
         add("gradient".into(), &|x, _| (x * 255 / w) as u8);
         for (name, data) in pictures {
             let view = ImageView::from_bytes(&data, Layout::packed(w, h, 1, 8), Channel::Mean).unwrap();
-            refused(&name, sensors.both(&view, &scene));
+            assert_refused(&name, sensors.both(&view, &scene));
         }
     }
 }

@@ -24,8 +24,8 @@ type Lists = Workspace<f32, 16384, 256, 512>;
 
 /// Edge points of each candidate, with every bit.
 #[derive(Default)]
-struct Seen(RefCell<BTreeMap<u32, Vec<[u32; 2]>>>);
-impl Observer<f32> for Seen {
+struct EdgePoints(RefCell<BTreeMap<u32, Vec<[u32; 2]>>>);
+impl Observer<f32> for EdgePoints {
     fn point(&self, candidate: u32, p: ImagePoint<f32>) {
         self.0.borrow_mut().entry(candidate).or_default().push([p.u.to_bits(), p.v.to_bits()]);
     }
@@ -34,7 +34,7 @@ impl Observer<f32> for Seen {
 struct Case {
     name: String,
     sensor: Config,
-    known: Prior<f32>,
+    prior: Prior<f32>,
     bytes: Vec<u8>,
 }
 
@@ -47,7 +47,7 @@ fn cases() -> Vec<Case> {
         for frame in &flight.frames {
             let case = hzn_tests::emulated::Case::rendered(frame.file.clone(), &flight.sensor, frame);
             let name = format!("{} {}", flight.name, frame.file);
-            cases.push(Case { name, sensor: case.sensor, known: case.known, bytes: case.bytes });
+            cases.push(Case { name, sensor: case.sensor, prior: case.prior, bytes: case.bytes });
         }
     }
     for file in ["iss-limb-2020-11-20.jpg", "pluto-pia19948.jpg", "sun-hmi-continuum-2023-01-31.png"] {
@@ -57,27 +57,27 @@ fn cases() -> Vec<Case> {
         let bytes = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| view.at(x, y) as u8).collect();
         let mut sensor = photograph.sensor.clone();
         sensor.candidates.keep_points = 600;
-        cases.push(Case { name: file.into(), sensor, known: Prior::default(), bytes });
+        cases.push(Case { name: file.into(), sensor, prior: Prior::default(), bytes });
     }
     cases
 }
 
 impl Case {
-    fn whole(&self, sensor: &Sensor<f32>, seen: &Seen) -> Report<f32> {
+    fn process_whole(&self, sensor: &Sensor<f32>, points: &EdgePoints) -> Report<f32> {
         let camera = &self.sensor.camera;
         let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
         let picture = Grey::try_new(&self.bytes, layout).unwrap();
-        let expected = sensor.expect(&self.known).unwrap();
-        sensor.process(&mut Box::new(Lists::new()), &picture, &expected, seen)
+        let expected = sensor.expect(&self.prior).unwrap();
+        sensor.process(&mut Box::new(Lists::new()), &picture, &expected, points)
     }
-    fn by_rows(&self, sensor: &Sensor<f32>, seen: &Seen) -> Report<f32> {
-        let expected = sensor.expect(&self.known).unwrap();
+    fn process_rows(&self, sensor: &Sensor<f32>, points: &EdgePoints) -> Report<f32> {
+        let expected = sensor.expect(&self.prior).unwrap();
         let mut rows = Box::new(Large::new());
         let mut stream = sensor.rows(&mut rows, 8, &expected).unwrap();
         for row in self.bytes.chunks(self.sensor.camera.width.into()) {
             stream.push_row(row).unwrap();
         }
-        stream.finish(&mut Box::new(Lists::new()), seen)
+        stream.finish(&mut Box::new(Lists::new()), points)
     }
 }
 
@@ -87,7 +87,7 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
     let cases = cases();
     for case in &cases {
         // Both get the threshold that the picture itself gives.
-        let own = case.whole(&Sensor::new(&case.sensor).unwrap(), &Seen::default()).level;
+        let own = case.process_whole(&Sensor::new(&case.sensor).unwrap(), &EdgePoints::default()).level;
         let mut config = case.sensor.clone();
         config.binarize.method = Method::Fixed;
         config.binarize.level = own.max(1).into();
@@ -96,8 +96,8 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         (config.select.max_band, config.select.max_departure) = (1.0, 1e6);
         config.recover.frame_px = 0;
         let sensor = Sensor::new(&config).unwrap();
-        let (there, here) = (Seen::default(), Seen::default());
-        let (want, got) = (case.whole(&sensor, &there), case.by_rows(&sensor, &here));
+        let (there, here) = (EdgePoints::default(), EdgePoints::default());
+        let (want, got) = (case.process_whole(&sensor, &there), case.process_rows(&sensor, &here));
         assert_eq!((want.status, want.level), (got.status, got.level), "{}", case.name);
         let (there, here) = (there.0.into_inner(), here.0.into_inner());
         let beyond = got.counters.cut_points;
@@ -107,21 +107,21 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
             assert_eq!(there, here, "{}", case.name);
         }
         wide += u32::from(beyond > 0);
-        let mut apart_deg = 0.0;
+        let mut difference_deg = 0.0;
         if let (Some(a), Some(b)) = (&want.solution, &got.solution) {
             ok += 1;
-            let apart: f64 = (0..3).map(|k| f64::from(a.axis.xyz()[k] - b.axis.xyz()[k]).powi(2)).sum();
-            apart_deg = apart.sqrt().to_degrees();
+            let distance: f64 = (0..3).map(|k| f64::from(a.axis.xyz()[k] - b.axis.xyz()[k]).powi(2)).sum();
+            difference_deg = distance.sqrt().to_degrees();
             if beyond == 0 && got.counters.dropped == want.counters.dropped {
-                assert!(apart_deg < 1e-4, "{}: {apart_deg}", case.name);
+                assert!(difference_deg < 1e-4, "{}: {difference_deg}", case.name);
                 assert_eq!((a.axis.xyz(), a.covariance.rows()), (b.axis.xyz(), b.covariance.rows()), "{}", case.name);
             }
         }
         let points: usize = there.values().map(Vec::len).sum();
-        println!("{}: {}, {points} points, {beyond} cut, {apart_deg:.6} deg apart", case.name, got.status);
+        println!("{}: {}, {points} points, {beyond} cut, {difference_deg:.6} deg apart", case.name, got.status);
         // Haze through a long lens covers many more rows than are held, and its edges have more pixels than fit. The
         // edge is then another one, but the limb is the same.
-        assert!(apart_deg < 0.1, "{}: {apart_deg}", case.name);
+        assert!(difference_deg < 0.1, "{}: {difference_deg}", case.name);
     }
     println!("{} pictures, {ok} answers, {wide} with edges wider than the rows held", cases.len());
     assert!(ok >= 18 && wide * 2 < cases.len() as u32, "{ok} {wide}");
@@ -144,7 +144,7 @@ fn memory_without_a_frame() {
         config.binarize.method = Method::Fixed;
         config.binarize.level = 60.0;
         let sensor = Sensor::new(&config).unwrap();
-        let expected = sensor.expect(&case.known).unwrap();
+        let expected = sensor.expect(&case.prior).unwrap();
         let mut rows = Box::new(Vga::new());
         let mut stream = sensor.rows(&mut rows, 8, &expected).unwrap();
         for row in case.bytes.chunks(640) {

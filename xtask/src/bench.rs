@@ -17,7 +17,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         if let Some((first, rest)) = args.split_first()
             && first == "run"
         {
-            return sequence(rest);
+            return compare_sequence(rest);
         }
         if let Some((first, rest)) = args.split_first()
             && first == "python"
@@ -31,15 +31,15 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
                 cargo(&["run", "--quiet", "--release", "--package", "hzn-benches", "--bin", "ransac", "--"]);
             return steps::run(samplers.args(rest));
         }
-        let python = python::environment("benches", Path::new("benches/requirements.txt"))?;
+        let python = python::prepare_environment("benches", Path::new("benches/requirements.txt"))?;
         let mut harness = cargo(&["run", "--quiet", "--release", "--package", "hzn-benches"]);
         steps::run(harness.args(["--", "--python"]).arg(python).args(args))
     };
-    go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
+    go().map_err(Trouble::into_message)
 }
 
 /// Compares `hzn run` on a sequence of PNGs with decoding alone.
-fn sequence(args: &[String]) -> Result<(), Trouble> {
+fn compare_sequence(args: &[String]) -> Result<(), Trouble> {
     steps::run(&mut cargo(&["build", "--quiet", "--release", "--package", "hzn-cli", "--package", "hzn-benches"]))?;
     let release = target().join("release");
     steps::run(Command::new(release.join("sequence")).arg("--hzn").arg(release.join("hzn")).args(args))

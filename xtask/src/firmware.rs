@@ -8,7 +8,7 @@ use crate::flight_build::Toolchain;
 use crate::machine::{apt_install, output, root, target};
 use crate::soft_double;
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
-use crate::test::built_with_the_tests;
+use crate::test_build::build_tests;
 
 /// Boards, each with the compiler flags for its core.
 const BOARDS: [(&str, &str); 2] = [("an386", ""), (M7, M7_FLAGS)];
@@ -26,12 +26,12 @@ pub(crate) fn build() -> Outcome {
     for (board, flags) in BOARDS {
         let dir = format!("firmware/{board}");
         let (mut command, built) = toolchain.cargo("build", &dir, &["--package", "hzn-mps2", "--features", board]);
-        steps::run(in_firmware(&mut command, flags))?;
+        steps::run(configure_for_firmware(&mut command, flags))?;
         let images = images(board);
         fs::create_dir_all(&images)?;
         for image in IMAGES {
             fs::copy(built.join(image), images.join(image))?;
-            look_into(board, image)?;
+            check_no_panics(board, image)?;
         }
     }
     Ok(())
@@ -40,19 +40,19 @@ pub(crate) fn build() -> Outcome {
 /// Builds what the image tests need, then runs the tests and checks the costs and the C interface.
 pub(crate) fn test(steps: &mut Steps) -> Outcome {
     build()?;
-    soft_double::look_into(&images("an386").join("measure"))?;
-    linked_with(METHODS)?;
-    looked_over()?;
-    built_with_the_tests()?;
+    soft_double::check(&images("an386").join("measure"))?;
+    build_flight_image(METHODS)?;
+    lint_and_document()?;
+    build_tests()?;
     // `--workspace` avoids a second build with other features.
     steps.cargo_test(&["--workspace", "--test", "firmware", "--", "--ignored"])?;
     steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
-    c_interface()
+    check_c_interface()
 }
 
 /// Runs the lints, the documentation build and the tests of the firmware workspace. A test checks that the C header
 /// agrees with the library.
-fn looked_over() -> Outcome {
+fn lint_and_document() -> Outcome {
     let dir = target().join("firmware/host");
     let here = ["--package", "hzn-c"];
     let on_this_machine = |verb: &str| {
@@ -60,18 +60,18 @@ fn looked_over() -> Outcome {
         command.arg("--target-dir").arg(&dir).args(here);
         command
     };
-    steps::run(in_firmware(on_this_machine("test").arg("--quiet"), ""))?;
-    steps::run(in_firmware(on_this_machine("clippy").args(["--all-targets", "--", "-D", "warnings"]), ""))?;
-    steps::run(in_firmware(on_this_machine("doc").arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"), ""))?;
+    steps::run(configure_for_firmware(on_this_machine("test").arg("--quiet"), ""))?;
+    steps::run(configure_for_firmware(on_this_machine("clippy").args(["--all-targets", "--", "-D", "warnings"]), ""))?;
+    steps::run(configure_for_firmware(on_this_machine("doc").arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"), ""))?;
     let toolchain = Toolchain::find()?;
     if matches!(toolchain, Toolchain::Debian) {
-        println!("the images' own lints: not with Debian's Rust, which has no clippy for the target");
+        println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
         return Ok(());
     }
     for (board, flags) in BOARDS {
         let args = ["--package", "hzn-mps2", "--features", board];
         let (mut command, _) = toolchain.cargo("clippy", &format!("firmware/{board}"), &args);
-        steps::run(in_firmware(command.args(["--", "-D", "warnings"]), flags))?;
+        steps::run(configure_for_firmware(command.args(["--", "-D", "warnings"]), flags))?;
     }
     Ok(())
 }
@@ -80,21 +80,21 @@ fn looked_over() -> Outcome {
 const METHODS: &[&str] = &["dlr", "zju", "horace", "erf"];
 
 /// Builds the flight image of an M7 with features of hzn-core. The linker shows that none of its methods can panic.
-fn linked_with(features: &[&str]) -> Result<PathBuf, Trouble> {
+fn build_flight_image(features: &[&str]) -> Result<PathBuf, Trouble> {
     let chosen: Vec<String> = features.iter().map(|f| format!("hzn-core/{f}")).chain([M7.to_owned()]).collect();
     let args = ["--package", "hzn-mps2", "--bin", "flight", "--features", &chosen.join(",")];
     let (mut command, built) = Toolchain::find()?.cargo("build", &format!("firmware/{M7}"), &args);
-    steps::run(in_firmware(&mut command, M7_FLAGS))?;
+    steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
     Ok(built.join("flight"))
 }
 
 /// Prints how much flash the methods of published systems take, as the table of book/theory/methods.md.
-fn by_feature() -> Outcome {
+fn print_flash_by_feature() -> Outcome {
     let mut table = "| features of hzn-core | flash, bytes |\n|---|---:|\n".to_owned();
     let each = METHODS.iter().map(core::slice::from_ref);
     for features in core::iter::once(&[][..]).chain(each).chain([METHODS]) {
         let named: Vec<String> = features.iter().map(|f| format!("`{f}`")).collect();
-        let size = said(Command::new("arm-none-eabi-size").arg(linked_with(features)?))?;
+        let size = output_of(Command::new("arm-none-eabi-size").arg(build_flight_image(features)?))?;
         let numbers = size.lines().nth(1).unwrap_or_default().split_whitespace().take(2);
         let flash: u64 = numbers.filter_map(|n| n.parse::<u64>().ok()).sum();
         let name = if named.is_empty() { "none: the `hzn` chain".to_owned() } else { named.join(", ") };
@@ -109,17 +109,17 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let go = || -> Outcome {
         std::env::set_current_dir(root())?;
         if args.iter().any(|a| a == "--by-feature") {
-            return by_feature();
+            return print_flash_by_feature();
         }
         build()?;
         let mut table = cargo(&["run", "--quiet", "--release", "--package", "hzn-tests", "--example", "firmware_cost"]);
         let write: &[&str] = if args.iter().any(|a| a == "--write") { &["--write", COSTS] } else { &[] };
         steps::run(table.arg("--").args(write))
     };
-    go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
+    go().map_err(Trouble::into_message)
 }
 
-fn in_firmware<'a>(command: &'a mut Command, flags: &str) -> &'a mut Command {
+fn configure_for_firmware<'a>(command: &'a mut Command, flags: &str) -> &'a mut Command {
     command.current_dir(root().join("firmware"));
     if !flags.is_empty() {
         // This variable adds to the flags of `firmware/.cargo/config.toml`; RUSTFLAGS would replace them.
@@ -134,10 +134,10 @@ fn images(board: &str) -> PathBuf {
 
 /// Checks that nothing in an image can panic, and prints the size of the image. The linker ensures this already,
 /// because the panic handler calls a function that does not exist. The symbols must not contain a panic path either.
-fn look_into(board: &str, image: &str) -> Outcome {
+fn check_no_panics(board: &str, image: &str) -> Outcome {
     let path = images(board).join(image);
     let symbols = output(Command::new("arm-none-eabi-nm").arg(&path))
-        .ok_or_else(|| Trouble::Failed(format!("{}: its symbols cannot be read", path.display())))?;
+        .ok_or_else(|| Trouble::Failed(format!("{}: nm cannot read the symbols", path.display())))?;
     let panics: Vec<&str> = symbols.lines().filter(|l| l.contains("panicking")).collect();
     if !panics.is_empty() {
         return Err(Trouble::Failed(format!("{board} {image}: a panic path is linked: {}", panics.join(", "))));
@@ -146,14 +146,14 @@ fn look_into(board: &str, image: &str) -> Outcome {
 }
 
 /// Checks that the C example gives the same bits on this machine and in QEMU.
-fn c_interface() -> Outcome {
+fn check_c_interface() -> Outcome {
     let toolchain = Toolchain::find()?;
     let library = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
     let (mut command, there) = toolchain.cargo("rustc", &format!("firmware/{M7}"), &library);
-    steps::run(in_firmware(&mut command, M7_FLAGS))?;
+    steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
     let here = target().join("firmware/host");
     let mut command = cargo(&["rustc", "--release"]);
-    steps::run(in_firmware(command.arg("--target-dir").arg(&here).args(library), ""))?;
+    steps::run(configure_for_firmware(command.arg("--target-dir").arg(&here).args(library), ""))?;
 
     let c = root().join("firmware/hzn-c");
     let (example, include) = (c.join("example"), format!("-I{}", c.join("include").display()));
@@ -184,21 +184,21 @@ fn c_interface() -> Outcome {
             .args(["-lgcc", "-o"])
             .arg(out.join("an500")),
     )?;
-    let host = said(&mut Command::new(out.join("host")))?;
+    let host = output_of(&mut Command::new(out.join("host")))?;
     let mut qemu = Command::new("timeout");
     qemu.args(["60", "qemu-system-arm", "-M", "mps2-an500", "-display", "none", "-monitor", "none", "-serial", "null"])
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
         .arg(out.join("an500"));
-    let emulated = said(&mut qemu)?;
+    let emulated = output_of(&mut qemu)?;
     println!("{host}");
     if host != emulated {
-        return Err(Trouble::Failed(format!("the C example says something else in QEMU:\n{emulated}")));
+        return Err(Trouble::Failed(format!("the C example prints another result in QEMU:\n{emulated}")));
     }
     Ok(())
 }
 
 /// Returns what a program prints on both streams; an error if the program fails.
-fn said(command: &mut Command) -> Result<String, Trouble> {
+fn output_of(command: &mut Command) -> Result<String, Trouble> {
     steps::show(command);
     let out = command.stdin(std::process::Stdio::null()).output()?;
     let text = [out.stdout, out.stderr].concat();

@@ -27,14 +27,16 @@ impl Toolchain {
         let add = || {
             has("rustup")
                 && run_within(Command::new("rustup").args(["target", "add", TARGET]), Duration::from_secs(60))
-                && installed()
+                && has_core_library()
         };
-        if installed() || add() {
+        if has_core_library() || add() {
             return Ok(Self::Own);
         }
-        apt_install(&["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"]).map_err(needs)?;
+        apt_install(&["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"]).map_err(with_rustup_hint)?;
         if !has_debian_rust() {
-            return Err(Trouble::Missing(format!("needs `rustup target add {TARGET}`: Debian's Rust is not there")));
+            return Err(Trouble::Missing(format!(
+                "needs `rustup target add {TARGET}`: Debian's Rust is not installed"
+            )));
         }
         // The linker of bare targets, `rust-lld`, is a symbolic link into a package like `lld-22`. None of the packages
         // above depends on that package.
@@ -42,7 +44,7 @@ impl Toolchain {
             && let Ok(to) = std::fs::read_link("/usr/bin/rust-lld")
             && let Some(lld) = to.file_name().and_then(|n| n.to_str()).filter(|n| n.starts_with("lld-"))
         {
-            apt_install(&[lld]).map_err(needs)?;
+            apt_install(&[lld]).map_err(with_rustup_hint)?;
         }
         Ok(Self::Debian)
     }
@@ -73,7 +75,7 @@ pub(crate) fn run_step() -> Outcome {
     run(&mut Toolchain::find()?.cargo("build", "flight", &["--package", "hzn-core"]).0)
 }
 
-fn needs(trouble: Trouble) -> Trouble {
+fn with_rustup_hint(trouble: Trouble) -> Trouble {
     match trouble {
         Trouble::Missing(how) => Trouble::Missing(format!("needs `rustup target add {TARGET}`, or {how}")),
         failed => failed,
@@ -81,7 +83,7 @@ fn needs(trouble: Trouble) -> Trouble {
 }
 
 /// Returns whether the toolchain on PATH has a compiled core library for the target.
-fn installed() -> bool {
+fn has_core_library() -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let dir = output(Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]));
     let entries = dir.and_then(|d| std::fs::read_dir(d).ok());

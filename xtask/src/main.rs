@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod demo;
 mod firmware;
 mod flight_build;
 mod machine;
@@ -19,6 +20,7 @@ mod reproduce;
 mod soft_double;
 mod steps;
 mod test;
+mod test_build;
 mod viewer;
 mod wheel;
 
@@ -26,19 +28,22 @@ use std::process::ExitCode;
 
 const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|keys|viewer> [OPTION]...
 
-  test [STEP]...     all steps, or those whose name contains one of the words;
+  test [STEP]...     runs all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
-  bench [ARG]...     hzn-core beside the OpenCV recipe; arguments go to hzn-benches (see --help there)
-  bench run [ARG]... `hzn run` on PNGs beside decoding them alone
-  bench python       what the Python package costs beside the sensor, into book/results/python-measured.md
-  bench ransac [--runs N] samplers of outliers beside each other, on simulated edge points
-  reproduce [STUDY]... measures again what book/results/reproduction.md says, and writes it (see --help there)
+  bench [ARG]...     compares hzn-core with the OpenCV recipe; arguments go to hzn-benches (see --help there)
+  bench run [ARG]... compares `hzn run` on PNGs with decoding alone
+  bench python       measures the cost of the Python package compared with the sensor; writes
+                     book/results/python-measured.md
+  bench ransac [--runs N]
+                     compares samplers of outliers on simulated edge points
+  reproduce [STUDY]...
+                     measures the numbers of book/results/reproduction.md again and writes the file (see --help there)
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
-                     --by-feature says instead what the methods of published systems take of flash
+                     --by-feature prints only how much flash the methods of published systems take
   keys               writes the table of book/reference/sensor-toml.md, the template and the JSON schema from the
                      keys in hzn-core
-  viewer             makes book/images/viewer.png anew, after `cargo xtask test demo`";
+  viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -51,7 +56,7 @@ fn main() -> ExitCode {
         "bench" => bench::run(rest),
         "reproduce" => reproduce::run(rest),
         "firmware" => firmware::run(rest),
-        "keys" => keys(),
+        "keys" => write_keys(),
         "viewer" => viewer::run(),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");
@@ -72,9 +77,7 @@ fn main() -> ExitCode {
 }
 
 /// Writes the documents that are derived from the keys of sensor.toml.
-fn keys() -> Result<(), String> {
+fn write_keys() -> Result<(), String> {
     let mut cargo = steps::cargo(&["run", "--quiet", "-p", "hzn-calib", "--example", "keys", "--", "."]);
-    steps::run(&mut cargo).map_err(|trouble| match trouble {
-        steps::Trouble::Failed(why) | steps::Trouble::Missing(why) => why,
-    })
+    steps::run(&mut cargo).map_err(steps::Trouble::into_message)
 }

@@ -9,7 +9,7 @@ use crate::steps::{Trouble, run};
 
 /// Returns the Python of an environment with the packages that `requirements` lists. The environment is made once, and
 /// made again when the list changes.
-pub(crate) fn environment(name: &str, requirements: &Path) -> Result<PathBuf, Trouble> {
+pub(crate) fn prepare_environment(name: &str, requirements: &Path) -> Result<PathBuf, Trouble> {
     let list = fs::read_to_string(requirements)?;
     let dir = target().join("venv").join(name);
     let python = dir.join("bin/python");

@@ -10,5 +10,5 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         let mut campaigns = cargo(&["run", "--quiet", "--release", "--package", "hzn-reproduce"]);
         steps::run(campaigns.arg("--").args(args))
     };
-    go().map_err(|(Trouble::Failed(why) | Trouble::Missing(why))| why)
+    go().map_err(Trouble::into_message)
 }

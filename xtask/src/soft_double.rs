@@ -25,7 +25,7 @@ const STAGES: [&str; 11] = [
 ];
 /// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
 /// the number of places that may do so.
-const ONCE: [(&str, usize); 15] = [
+const ALLOWED_CONVERSIONS: [(&str, usize); 15] = [
     ("hzn_core::pipeline::search::Search<T,O>::candidate::{{closure}}", 34),
     ("hzn_core::pipeline::search::Search<T,O>::piece", 36),
     ("hzn_core::stages::consensus::Threshold<T>::new", 3),
@@ -46,13 +46,13 @@ const ONCE: [(&str, usize); 15] = [
 const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::pass"];
 
 /// Checks an image for a core that has single precision only.
-pub(crate) fn look_into(image: &Path) -> Outcome {
+pub(crate) fn check(image: &Path) -> Outcome {
     let text = output(Command::new("arm-none-eabi-objdump").args(["-d", "-C", "--no-show-raw-insn"]).arg(image))
         .ok_or_else(|| Trouble::Failed(format!("{} cannot be disassembled", image.display())))?;
     let calls = calls_by_function(&text);
     for part in LOOPS {
         if !calls.keys().any(|f| f.contains(part)) {
-            return Err(Trouble::Failed(format!("soft double: no function of {part} stands in the image by itself")));
+            return Err(Trouble::Failed(format!("soft double: the image has no separate function of {part}")));
         }
     }
     for (function, &count) in &calls {
@@ -60,14 +60,14 @@ pub(crate) fn look_into(image: &Path) -> Outcome {
         let checks = function.contains("::check")
             || function.contains("keys::Section>")
             || function.contains("Camera<T>::try_new");
-        let allowed = ONCE.iter().find(|(f, _)| f == function).map_or(0, |(_, n)| *n);
+        let allowed = ALLOWED_CONVERSIONS.iter().find(|(f, _)| f == function).map_or(0, |(_, n)| *n);
         if staged && !checks && count > allowed {
             return Err(Trouble::Failed(format!(
                 "{function} computes with soft doubles in {count} places, {allowed} are allowed"
             )));
         }
     }
-    println!("soft double: in no loop of a picture's way; {} functions looked into", calls.len());
+    println!("soft double: none in a loop over pixels or points; {} functions checked", calls.len());
     Ok(())
 }
 

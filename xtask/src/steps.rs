@@ -1,5 +1,6 @@
 //! Runs named steps, measures their time and prints a complete summary.
 
+use std::ffi::OsString;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -11,6 +12,15 @@ pub(crate) enum Trouble {
     Failed(String),
     /// The step cannot run here; the text says what it needs.
     Missing(String),
+}
+
+impl Trouble {
+    /// Returns the text without the kind.
+    pub(crate) fn into_message(self) -> String {
+        match self {
+            Self::Failed(why) | Self::Missing(why) => why,
+        }
+    }
 }
 
 impl From<std::io::Error> for Trouble {
@@ -72,10 +82,10 @@ impl Steps {
         command.args(args).stdout(Stdio::piped());
         show(&command);
         let mut child = command.spawn()?;
-        let out = child.stdout.take().ok_or_else(|| Trouble::Failed("no output of cargo test".into()))?;
+        let out = child.stdout.take().ok_or_else(|| Trouble::Failed("cargo test has no standard output".into()))?;
         for line in BufReader::new(out).lines() {
             let line = line?;
-            if let Some((passed, failed)) = counts(&line) {
+            if let Some((passed, failed)) = parse_counts(&line) {
                 self.passed += passed;
                 self.failed += failed;
             }
@@ -108,7 +118,7 @@ impl Steps {
             wrong += u32::from(counts);
         }
         if self.strict && self.done.iter().any(|(_, _, o)| matches!(o, Err(Trouble::Missing(_)))) {
-            println!("  CI=true: nothing may be left out");
+            println!("  CI=true: a step that was left out counts as a failure");
         }
         println!("{} passed, {} failed", self.passed, self.failed);
         match wrong {
@@ -119,7 +129,7 @@ impl Steps {
 }
 
 /// Returns the numbers of passed and failed tests in a line like `test result: ok. 12 passed; 0 failed; ...`.
-fn counts(line: &str) -> Option<(u64, u64)> {
+fn parse_counts(line: &str) -> Option<(u64, u64)> {
     let rest = line.trim_start().strip_prefix("test result: ")?;
     let number = |word: &str| {
         let before = rest.split(word).next()?.trim_end();
@@ -128,9 +138,14 @@ fn counts(line: &str) -> Option<(u64, u64)> {
     Some((number("passed")?, number("failed")?))
 }
 
+/// Returns the cargo that runs this program.
+pub(crate) fn cargo_program() -> OsString {
+    std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
+}
+
 /// Returns a call of the cargo that runs this program, with the committed versions and without input.
 pub(crate) fn cargo(args: &[&str]) -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let mut command = Command::new(cargo_program());
     command.args(args).arg("--locked").stdin(Stdio::null());
     command
 }
@@ -158,13 +173,13 @@ pub(crate) fn run(command: &mut Command) -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::counts;
+    use super::parse_counts;
 
     #[test]
     fn result_lines_are_read() {
         let line = "test result: FAILED. 9 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.06s";
-        assert_eq!(counts(line), Some((9, 1)));
-        assert_eq!(counts("test result: ok. 12 passed; 0 failed; 0 ignored"), Some((12, 0)));
-        assert_eq!(counts("test results are fine"), None);
+        assert_eq!(parse_counts(line), Some((9, 1)));
+        assert_eq!(parse_counts("test result: ok. 12 passed; 0 failed; 0 ignored"), Some((12, 0)));
+        assert_eq!(parse_counts("test results are fine"), None);
     }
 }

@@ -1,17 +1,19 @@
 //! Runs all checks, the cheapest first.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
+use crate::demo::{demo_dir, find_recordings, run_demo};
 use crate::machine::{apt_install, has, root, target};
-use crate::steps::{self, Outcome, Steps, Trouble, cargo};
+use crate::steps::{self, Outcome, Steps, cargo};
+use crate::test_build::build_tests;
 use crate::{firmware, flight_build, python, viewer, wheel};
 
 pub(crate) fn run(only: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
     let mut all = Steps::new(only);
-    all.step("format", |_| steps::run(Command::new(cargo_program()).args(["fmt", "--all", "--check"])));
+    all.step("format", |_| steps::run(Command::new(steps::cargo_program()).args(["fmt", "--all", "--check"])));
     all.step("lints", |_| {
         steps::run(cargo(&["clippy", "--workspace", "--all-targets"]).args(["--", "-D", "warnings"]))
     });
@@ -23,88 +25,45 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("feature sets of hzn-core", |_| {
         ["std", "serde", "std,serde", "dlr", "zju", "horace", "erf", "_edges", "dlr,zju,horace,erf"]
             .into_iter()
-            .try_for_each(|features| {
-                run_cargo(&[
-                    "check",
-                    "--quiet",
-                    "--package",
-                    "hzn-core",
-                    "--no-default-features",
-                    "--features",
-                    features,
-                ])
-            })
+            .try_for_each(check_core_with)
     });
     all.step("documents", |_| {
         steps::run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
     });
     all.step("flight build", |_| flight_build::run_step());
     all.step("firmware", firmware::test);
-    all.step("demo", |_| demo());
+    all.step("demo", |_| run_demo());
     all.step("viewer", |_| viewer::test());
-    all.step("lenses beside OpenCV", |_| lenses_beside_opencv());
-    all.step("simulator rendered again", |_| simulator_rendered_again());
-    all.step("files read by others", |_| files_read_by_others());
+    all.step("lenses against OpenCV", |_| compare_lenses_with_opencv());
+    all.step("simulator rendered again", |_| compare_simulator_with_python());
+    all.step("files read by others", |_| read_files_with_other_readers());
     all.step("wheel", |_| {
-        built_with_the_tests()?;
+        build_tests()?;
         wheel::run_step(&fs::canonicalize(target().join("debug/hzn"))?)
     });
     all.conclude()
 }
 
-fn cargo_program() -> std::ffi::OsString {
-    std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
-}
-
-fn run_cargo(args: &[&str]) -> Outcome {
-    steps::run(&mut cargo(args))
-}
-
-/// Builds the tests, and with them the binaries and examples. Every step uses this same command, so nothing is built
-/// twice. Another selection of packages would have other features and would build again.
-pub(crate) fn built_with_the_tests() -> Outcome {
-    run_cargo(&["test", "--workspace", "--no-run", "--quiet"])?;
-    if target().join("debug/hzn").exists() {
-        return Ok(());
-    }
-    // This build makes a binary only if the tests of its own package are built.
-    run_cargo(&["build", "--profile", "test", "--workspace", "--bins"])
-}
-
-/// Returns the folder for the demo's files.
-pub(crate) fn demo_dir() -> PathBuf {
-    target().join("xtask").join("hzn-demo")
-}
-
-/// Runs `hzn demo` with the binary that the test build has made.
-fn demo() -> Outcome {
-    built_with_the_tests()?;
-    let dir = demo_dir();
-    if dir.exists() {
-        fs::remove_dir_all(&dir)?;
-    }
-    fs::create_dir_all(dir.parent().unwrap_or(&dir))?;
-    steps::run(Command::new(target().join("debug/hzn")).arg("demo").arg(&dir))?;
-    if recordings(&dir).is_empty() {
-        return Err(Trouble::Failed(format!("the demo left no .mcap in {}", dir.display())));
-    }
-    Ok(())
+/// Compiles hzn-core alone with these features.
+fn check_core_with(features: &str) -> Outcome {
+    let core_alone = ["check", "--quiet", "--package", "hzn-core", "--no-default-features", "--features", features];
+    steps::run(&mut cargo(&core_alone))
 }
 
 /// Compares the lens models with those of OpenCV.
-fn lenses_beside_opencv() -> Outcome {
-    compared_in_python("check_lenses.py", "debug/examples/rays", "lenses")
+fn compare_lenses_with_opencv() -> Outcome {
+    compare_in_python("check_lenses.py", "debug/examples/rays", "lenses")
 }
 
 /// Compares a simulated picture with one that NumPy and OpenCV compute from the documented model.
-fn simulator_rendered_again() -> Outcome {
-    compared_in_python("check_simulator.py", "debug/hzn", "simulator")
+fn compare_simulator_with_python() -> Outcome {
+    compare_in_python("check_simulator.py", "debug/hzn", "simulator")
 }
 
 /// Runs a script of tests/python. Its arguments are one of our programs and a folder that the script makes.
-fn compared_in_python(script: &str, program: &str, folder: &str) -> Outcome {
-    let python = python::environment("benches", Path::new("benches/requirements.txt"))?;
-    built_with_the_tests()?;
+fn compare_in_python(script: &str, program: &str, folder: &str) -> Outcome {
+    let python = python::prepare_environment("benches", Path::new("benches/requirements.txt"))?;
+    build_tests()?;
     let dir = target().join("xtask").join(folder);
     if dir.exists() {
         fs::remove_dir_all(&dir)?;
@@ -115,28 +74,13 @@ fn compared_in_python(script: &str, program: &str, folder: &str) -> Outcome {
 }
 
 /// Reads a sample and the recordings of the demo with the reference readers.
-fn files_read_by_others() -> Outcome {
-    let python = python::environment("tests", Path::new("tests/python/requirements.txt"))?;
+fn read_files_with_other_readers() -> Outcome {
+    let python = python::prepare_environment("tests", Path::new("tests/python/requirements.txt"))?;
     let sample = target().join("xtask").join("sample.mcap");
     fs::create_dir_all(sample.parent().unwrap_or(&sample))?;
-    built_with_the_tests()?;
+    build_tests()?;
     steps::run(Command::new(target().join("debug/examples/sample")).arg(&sample))?;
-    let mut files = recordings(&demo_dir());
+    let mut files = find_recordings(&demo_dir());
     files.push(sample);
     steps::run(Command::new(python).arg("tests/python/check_mcap.py").args(files))
-}
-
-/// Returns the recordings in a folder and its subfolders.
-fn recordings(dir: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            found.append(&mut recordings(&path));
-        } else if path.extension().is_some_and(|e| e == "mcap") {
-            found.push(path);
-        }
-    }
-    found.sort();
-    found
 }

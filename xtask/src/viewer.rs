@@ -5,9 +5,10 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+use crate::demo::demo_dir;
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{Outcome, Trouble, show};
-use crate::test::{built_with_the_tests, demo_dir};
+use crate::test_build::build_tests;
 
 /// Packages for a display without a screen, for OpenGL without a graphics card, and for the libraries that a window
 /// loads when it starts.
@@ -43,7 +44,7 @@ impl Display {
             BufReader::new(out).read_line(&mut number)?;
         }
         let display = Self { server, name: format!(":{}", number.trim()) };
-        if number.trim().is_empty() { Err(Trouble::Failed("Xvfb does not start".into())) } else { Ok(display) }
+        if number.trim().is_empty() { Err(Trouble::Failed("Xvfb did not start".into())) } else { Ok(display) }
     }
 }
 
@@ -55,7 +56,7 @@ impl Drop for Display {
 }
 
 /// Starts the window with arguments and returns what it prints.
-fn window(display: &Display, arguments: &[&str]) -> Result<String, Trouble> {
+fn run_window(display: &Display, arguments: &[&str]) -> Result<String, Trouble> {
     let mut command = Command::new(target().join("debug/hzn"));
     command.arg("view").args(arguments).stdin(Stdio::null()).stderr(Stdio::inherit());
     // With software rendering the picture is the same on every machine.
@@ -70,37 +71,38 @@ fn window(display: &Display, arguments: &[&str]) -> Result<String, Trouble> {
 
 /// Shows the demo's recording in the window and returns the file of the screenshot. The window prints the result of the
 /// picture, which must be equal to the row in the demo's table.
-fn shot() -> Result<PathBuf, Trouble> {
+fn take_screenshot() -> Result<PathBuf, Trouble> {
     if !has("Xvfb") {
         apt_install(PACKAGES)?;
     }
-    built_with_the_tests()?;
+    build_tests()?;
     let (demo, picture) = (demo_dir(), target().join("xtask").join("viewer.png"));
     let (recording, table) = (demo.join("flight.mcap"), demo.join("flight.csv"));
     if !recording.exists() || !table.exists() {
-        return Err(Trouble::Failed("there is no demo: `cargo xtask test demo viewer`".into()));
+        return Err(Trouble::Failed("the demo's files are missing; run `cargo xtask test demo viewer`".into()));
     }
     let _ = fs::remove_file(&picture);
     let frame = FRAME.to_string();
     let display = Display::start()?;
     let arguments = [&recording.to_string_lossy(), "--frame", &frame, "--screenshot", &picture.to_string_lossy()]
         .map(str::to_owned);
-    let said = window(&display, &arguments.each_ref().map(String::as_str))?;
-    println!("{said}");
-    let expected = expected(&fs::read_to_string(&table)?).ok_or_else(|| Trouble::Failed("no such row".into()))?;
-    if said != expected {
-        return Err(Trouble::Failed(format!("the file says {expected:?}")));
+    let printed = run_window(&display, &arguments.each_ref().map(String::as_str))?;
+    println!("{printed}");
+    let expected = expected_line(&fs::read_to_string(&table)?)
+        .ok_or_else(|| Trouble::Failed("the demo's table has no row for this picture".into()))?;
+    if printed != expected {
+        return Err(Trouble::Failed(format!("the window must print {expected:?}")));
     }
     // A screenshot of a window without content has only a few kilobytes.
     match fs::metadata(&picture) {
         Ok(file) if file.len() > 60_000 => Ok(picture),
-        _ => Err(Trouble::Failed(format!("{} holds no picture of the window", picture.display()))),
+        _ => Err(Trouble::Failed(format!("{} is too small to be a screenshot of the window", picture.display()))),
     }
 }
 
 /// Returns what the window must print for the picture: index, file, body, status and axis from the table of the same
 /// run.
-fn expected(table: &str) -> Option<String> {
+fn expected_line(table: &str) -> Option<String> {
     let column = |name: &str| table.lines().next()?.split(',').position(|c| c == name);
     let row: Vec<&str> = table.lines().nth(FRAME + 1)?.split(',').collect();
     let cells: Option<Vec<&str>> = ["index", "file", "body", "status", "axis_x", "axis_y", "axis_z"]
@@ -112,16 +114,13 @@ fn expected(table: &str) -> Option<String> {
 
 /// Runs the check as a step of `cargo xtask test`.
 pub(crate) fn test() -> Outcome {
-    shot().map(|_| ())
+    take_screenshot().map(|_| ())
 }
 
 /// `cargo xtask viewer`: makes the viewer's picture in the documents again.
 pub(crate) fn run() -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
-    let told = |t: Trouble| match t {
-        Trouble::Failed(why) | Trouble::Missing(why) => why,
-    };
-    let picture = shot().map_err(told)?;
+    let picture = take_screenshot().map_err(Trouble::into_message)?;
     let kept = Path::new("book/images/viewer.png");
     fs::copy(picture, kept).map_err(|e| e.to_string())?;
     println!("written: {}", kept.display());

@@ -14,8 +14,8 @@ const CRATE: &str = "crates/hzn-py";
 /// `hzn` is the program of the same build.
 pub(crate) fn run_step(hzn: &Path) -> Outcome {
     let folder = Path::new(CRATE);
-    let python = installed("dev")?;
-    let scratch = scratch()?;
+    let python = install_wheel("dev")?;
+    let scratch = make_scratch()?;
     let tests = fs::canonicalize(folder.join("tests"))?;
     let module = |args: &[&str]| {
         let mut command = Command::new(&python);
@@ -36,23 +36,23 @@ pub(crate) fn run_step(hzn: &Path) -> Outcome {
 /// Measures the wheel of a release build.
 pub(crate) fn measure(args: &[String]) -> Outcome {
     let folder = fs::canonicalize(CRATE)?;
-    let python = installed("release")?;
+    let python = install_wheel("release")?;
     let mut measure = Command::new(python);
     measure.arg(folder.join("benches/measure.py")).arg(fs::canonicalize("book/results")?.join("python-measured.md"));
-    steps::run(measure.args(args).current_dir(scratch()?))
+    steps::run(measure.args(args).current_dir(make_scratch()?))
 }
 
 /// Returns a folder away from the sources, so that Python imports the installed package.
-fn scratch() -> Result<PathBuf, Trouble> {
+fn make_scratch() -> Result<PathBuf, Trouble> {
     let scratch = target().join("xtask");
     fs::create_dir_all(&scratch)?;
     Ok(fs::canonicalize(scratch)?)
 }
 
 /// Builds and installs the wheel of this profile, and returns the Python that has it.
-fn installed(profile: &str) -> Result<PathBuf, Trouble> {
+fn install_wheel(profile: &str) -> Result<PathBuf, Trouble> {
     let folder = Path::new(CRATE);
-    let python = python::environment("wheel", &folder.join("tests/requirements.txt"))?;
+    let python = python::prepare_environment("wheel", &folder.join("tests/requirements.txt"))?;
     let wheels = target().join("wheels");
     if wheels.exists() {
         fs::remove_dir_all(&wheels)?;
@@ -60,13 +60,13 @@ fn installed(profile: &str) -> Result<PathBuf, Trouble> {
     let mut maturin = Command::new(&python);
     maturin.args(["-m", "maturin", "build", "--locked", "--profile", profile, "--manifest-path"]);
     steps::run(maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(&wheels))?;
-    let wheel = only_wheel(&wheels)?;
+    let wheel = find_wheel(&wheels)?;
     let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--force-reinstall", "--no-deps"];
     steps::run(Command::new(&python).args(pip).arg(wheel))?;
     Ok(python)
 }
 
-fn only_wheel(folder: &Path) -> Result<PathBuf, Trouble> {
+fn find_wheel(folder: &Path) -> Result<PathBuf, Trouble> {
     let mut wheels = fs::read_dir(folder)?.flatten().map(|e| e.path()).filter(|p| p.extension().is_some());
-    wheels.next().ok_or_else(|| Trouble::Failed(format!("maturin left no wheel in {}", folder.display())))
+    wheels.next().ok_or_else(|| Trouble::Failed(format!("maturin has built no wheel in {}", folder.display())))
 }

@@ -15,7 +15,7 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::{Config, HostHorizon, Prior};
 
 const HELP: &str = "usage: cargo xtask bench ransac [--runs N]
-  --runs N     sets of points a cell, 10 or more (default 200; a tenth of them for the Hough transform)";
+  --runs N     point sets per cell, at least 10 (default 200; the Hough transform gets one tenth)";
 
 /// Number of points in a set.
 const POINTS: usize = 400;
@@ -44,8 +44,8 @@ impl Rng {
     }
 }
 
-/// Set of points with its truth.
-struct Set {
+/// Simulated edge points with their true axis.
+struct PointSet {
     points: Vec<ImagePoint<f64>>,
     axis: UnitVec3<Cam, f64>,
 }
@@ -82,7 +82,7 @@ struct Cell {
 }
 
 fn main() -> ExitCode {
-    match runs(std::env::args().skip(1)).and_then(compare) {
+    match parse_runs(std::env::args().skip(1)).and_then(compare) {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             eprintln!("{e}");
@@ -91,7 +91,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn runs(mut args: impl Iterator<Item = String>) -> Result<u32, String> {
+fn parse_runs(mut args: impl Iterator<Item = String>) -> Result<u32, String> {
     let mut runs = 200;
     while let Some(arg) = args.next() {
         match arg.as_str() {
@@ -99,7 +99,7 @@ fn runs(mut args: impl Iterator<Item = String>) -> Result<u32, String> {
             _ => return Err(HELP.into()),
         }
     }
-    if runs < 10 { Err("--runs must be 10 or more".into()) } else { Ok(runs) }
+    if runs < 10 { Err("--runs must be at least 10".into()) } else { Ok(runs) }
 }
 
 fn compare(runs: u32) -> Result<(), String> {
@@ -118,7 +118,7 @@ fn compare(runs: u32) -> Result<(), String> {
     for (column, &share) in OUTLIERS.iter().enumerate() {
         for run in 0..runs {
             let mut rng = Rng::new(u64::from(run) + 1000 * column as u64);
-            let set = Set::draw(&mut rng, &camera, half_angle_rad, share)?;
+            let set = PointSet::draw(&mut rng, &camera, half_angle_rad, share)?;
             for (contender, row) in contenders.iter().zip(&mut cells) {
                 let slow = contender.method.is_none();
                 if slow && run % 10 != 0 {
@@ -134,25 +134,25 @@ fn compare(runs: u32) -> Result<(), String> {
                         // Without an answer, all draws were made.
                         (found.map(|a| a.axis), found.map_or(method.max_draws, |a| a.draws))
                     }
-                    None => (hough(&camera, &set.points), 0),
+                    None => (find_axis_by_hough(&camera, &set.points), 0),
                 };
                 row[column].add(start.elapsed().as_secs_f64() * 1e6, found, &set.axis);
             }
         }
         eprintln!("{:.0} % outliers measured", share * 100.0);
     }
-    print(&contenders, &cells, runs);
+    print_tables(&contenders, &cells, runs);
     Ok(())
 }
 
-impl Set {
+impl PointSet {
     /// Draws a set with the camera up to 60° off nadir. The outliers lie anywhere in the image circle.
     fn draw(rng: &mut Rng, camera: &Camera<f64>, half_angle_rad: f64, outliers: f64) -> Result<Self, String> {
         let (off, around) = (60f64.to_radians() * rng.uniform(), TAU * rng.uniform());
         let axis = UnitVec3::try_new([off.sin() * around.cos(), off.sin() * around.sin(), off.cos()])
             .ok_or("the axis has no length")?;
         let e = axis.xyz();
-        let (b1, b2) = basis(e);
+        let (b1, b2) = perpendicular_basis(e);
         let (sin, cos) = half_angle_rad.sin_cos();
         let inside = |p: &ImagePoint<f64>| {
             (0.0..=383.0).contains(&p.u) && (0.0..=287.0).contains(&p.v) && camera.unproject(*p).is_some()
@@ -200,10 +200,10 @@ fn median(values: &[f64]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
+fn print_tables(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
     println!(
-        "{runs} sets of {POINTS} points a cell ({} for the Hough transform), {NOISE_PX} px on the limb, off nadir up \
-         to 60°.",
+        "{runs} sets of {POINTS} points per cell ({} for the Hough transform), errors of {NOISE_PX} px on the limb, up \
+         to 60° off nadir.",
         runs.div_ceil(10)
     );
     let head: String = OUTLIERS.iter().map(|r| format!(" {:.0} % |", r * 100.0)).collect();
@@ -216,7 +216,7 @@ fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
         }
     };
     table("solved to 2°, %", &|c| format!("{:.0}", c.success()));
-    table("median error where solved, degrees", &|c| format!("{:.3}", median(&c.errors_deg)));
+    table("median error of solved sets, degrees", &|c| format!("{:.3}", median(&c.errors_deg)));
     table("draws, mean", &|c| match c.draws {
         0 => "–".into(),
         draws => format!("{:.0}", draws as f64 / f64::from(c.runs)),
@@ -234,7 +234,7 @@ fn print(contenders: &[Contender], cells: &[Vec<Cell>], runs: u32) {
 /// Returns the axis of the cone with the most votes. First, axes lie on a grid of 2° and half-angles in bins of 1°;
 /// then both are refined to 0.5° about the best axis. This method is a reference for the samplers and is not meant for
 /// a flight computer.
-fn hough(camera: &Camera<f64>, points: &[ImagePoint<f64>]) -> Option<UnitVec3<Cam, f64>> {
+fn find_axis_by_hough(camera: &Camera<f64>, points: &[ImagePoint<f64>]) -> Option<UnitVec3<Cam, f64>> {
     let rays: Vec<[f64; 3]> = points.iter().filter_map(|p| camera.unproject(*p)).map(|r| r.xyz()).collect();
     // Axes are every 2° from the optical axis to 120° off it, and every 2° around it.
     let coarse = (0..=60).flat_map(|ring| {
@@ -245,17 +245,17 @@ fn hough(camera: &Camera<f64>, points: &[ImagePoint<f64>]) -> Option<UnitVec3<Ca
             [sin * c, sin * s, cos]
         })
     });
-    let (best, _) = coarse.map(|e| (e, votes(&rays, &e, 1.0))).max_by_key(|(_, n)| *n)?;
-    let (b1, b2) = basis(best);
+    let (best, _) = coarse.map(|e| (e, count_votes(&rays, &e, 1.0))).max_by_key(|(_, n)| *n)?;
+    let (b1, b2) = perpendicular_basis(best);
     let fine = (-4..=4).flat_map(|i| (-4..=4).map(move |j| (f64::from(i), f64::from(j)))).filter_map(|(i, j)| {
         let step = 0.5f64.to_radians();
         UnitVec3::<Cam, f64>::try_new([0, 1, 2].map(|k| best[k] + step * (i * b1[k] + j * b2[k])))
     });
-    fine.map(|e| (e, votes(&rays, &e.xyz(), 0.5))).max_by_key(|(_, n)| *n).map(|(e, _)| e)
+    fine.map(|e| (e, count_votes(&rays, &e.xyz(), 0.5))).max_by_key(|(_, n)| *n).map(|(e, _)| e)
 }
 
 /// Returns the number of rays in the fullest bin of the angle to an axis; only angles from 20° to 90° count.
-fn votes(rays: &[[f64; 3]], e: &[f64; 3], bin_deg: f64) -> u32 {
+fn count_votes(rays: &[[f64; 3]], e: &[f64; 3], bin_deg: f64) -> u32 {
     let mut bins = [0u32; 200];
     for s in rays {
         let angle = (s[0] * e[0] + s[1] * e[1] + s[2] * e[2]).clamp(-1.0, 1.0).acos().to_degrees();
@@ -267,7 +267,7 @@ fn votes(rays: &[[f64; 3]], e: &[f64; 3], bin_deg: f64) -> u32 {
 }
 
 /// Returns two unit vectors that are perpendicular to a unit vector and to each other.
-fn basis(e: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+fn perpendicular_basis(e: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let aside = if e[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };

@@ -68,7 +68,7 @@ fn decode(folder: &Path) -> Result<(), String> {
     let cores = std::thread::available_parallelism().map_or(1, Into::into);
     let work = || -> Result<(), String> {
         while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let item = item.lock().ok().and_then(|mut i| i.take()).ok_or("a picture is taken twice")?;
+            let item = item.lock().ok().and_then(|mut i| i.take()).ok_or("two threads have taken the same picture")?;
             std::hint::black_box(item.payload.decode(None)?);
         }
         Ok(())
@@ -94,9 +94,9 @@ fn run(options: &Options) -> Result<(), String> {
     let text = |e: std::io::Error| e.to_string();
     let target = PathBuf::from(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()));
     let folder = target.join("bench").join(format!("run-{}", options.frames));
-    let megabytes = render(&folder, options.frames)?;
-    let here = std::env::current_exe().map_err(text)?;
-    let mut ways = vec![Way::new("decoding alone", None, &here, &["decode"], &folder, None)];
+    let megabytes = render_flight(&folder, options.frames)?;
+    let own_program = std::env::current_exe().map_err(text)?;
+    let mut ways = vec![Way::new("decoding alone", None, &own_program, &["decode"], &folder, None)];
     for (name, goal, file, more) in [
         ("`hzn run -o out.csv`", Some(1.15), "out.csv", &[][..]),
         ("`hzn run -o out.mcap --no-images`", None, "results.mcap", &["--no-images"]),
@@ -108,7 +108,7 @@ fn run(options: &Options) -> Result<(), String> {
     for _ in 0..options.rounds {
         ways.iter_mut().try_for_each(Way::measure)?;
     }
-    let table = table(&ways, options, megabytes);
+    let table = make_table(&ways, options, megabytes);
     println!("{table}");
     fs::write(target.join("bench").join("run.md"), table).map_err(text)
 }
@@ -135,28 +135,29 @@ impl Way {
             // Overwriting an old file does not cost the same as writing a new one.
             let _ = fs::remove_file(output);
         }
-        let before = children_s()?;
+        let before = processor_time_of_children_s()?;
         let start = Instant::now();
         let status = self.command.status().map_err(|e| format!("{}: {e}", self.name))?;
         self.wall_s = self.wall_s.min(start.elapsed().as_secs_f64());
-        self.processor_s = self.processor_s.min(children_s()? - before);
+        self.processor_s = self.processor_s.min(processor_time_of_children_s()? - before);
         if status.success() { Ok(()) } else { Err(format!("{}: {status}", self.name)) }
     }
 }
 
 /// Returns the processor time of all children that have ended, in seconds: fields 16 and 17 of /proc/self/stat.
-fn children_s() -> Result<f64, String> {
-    const TICKS_A_SECOND: f64 = 100.0;
-    let stat = fs::read_to_string("/proc/self/stat").map_err(|e| format!("needs Linux's /proc: {e}"))?;
+fn processor_time_of_children_s() -> Result<f64, String> {
+    const TICKS_PER_SECOND: f64 = 100.0;
+    let stat = fs::read_to_string("/proc/self/stat")
+        .map_err(|e| format!("/proc/self/stat cannot be read (Linux only): {e}"))?;
     // The program's name, in brackets, may contain spaces.
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).ok_or("/proc/self/stat is too short");
-    Ok((ticks(13)? + ticks(14)?) / TICKS_A_SECOND)
+    Ok((ticks(13)? + ticks(14)?) / TICKS_PER_SECOND)
 }
 
 /// Writes a rocket flight as a folder with pictures, sensor.toml and frames.csv. Returns the size of the pictures in
 /// megabytes.
-fn render(folder: &Path, frames: usize) -> Result<f64, String> {
+fn render_flight(folder: &Path, frames: usize) -> Result<f64, String> {
     let text = |e: std::io::Error| format!("{}: {e}", folder.display());
     fs::create_dir_all(folder).map_err(text)?;
     let flight = hzn_sim::flight::rocket(1920, 1080, frames, 5);
@@ -177,15 +178,15 @@ fn render(folder: &Path, frames: usize) -> Result<f64, String> {
     Ok(bytes as f64 / 1e6)
 }
 
-fn table(ways: &[Way], options: &Options, megabytes: f64) -> String {
+fn make_table(ways: &[Way], options: &Options, megabytes: f64) -> String {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load = load.split_whitespace().next().unwrap_or("unknown").to_owned();
     let (frames, rounds) = (options.frames, options.rounds);
     let mut out = format!(
         "`cargo xtask bench run`: {frames} distinct PNGs of 1920x1080 ({megabytes:.0} MB), {cores} cores, {rounds} \
-         rounds taking turns, of each way the least time. Load of the machine at the end: {load}.\n\n\
-         | way | wall, s | frames a second | ratio | goal | processor time, s | ratio \
+         rounds, in which the ways take turns; the table shows the least time of each way. Load of the machine at the \
+         end: {load}.\n\n| way | wall, s | frames per second | ratio | goal | processor time, s | ratio \
          |\n|---|---|---|---|---|---|---|\n"
     );
     let Some(alone) = ways.first() else { return out };

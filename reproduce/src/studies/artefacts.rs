@@ -8,19 +8,19 @@ use hzn_core::{observer::Unobserved, verdict::Verdict};
 use hzn_sim::artefact::{FALSE_SIGMAS, GROSS_DEG, Kind, Outcome, PriorKnowledge, Trial, process_trial};
 use rayon::prelude::*;
 
-use super::Effort;
-use crate::document::Section;
+use super::setup::Effort;
+use crate::section::Section;
 
 /// Values of `reject.threshold_px` in addition to the default, in pixels.
 const THRESHOLDS_PX: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0];
 /// Error of the prior attitude, 1σ about each axis in degrees.
 const ATTITUDE_DEG: f64 = 5.0;
 /// Number of pictures of each kind.
-const OF_EACH: usize = 200;
+const PICTURES_PER_KIND: usize = 200;
 /// First seed; no gate was developed on these pictures.
 const FIRST_SEED: u64 = 8_000_000;
 /// Number of false answers that are listed one by one.
-const LISTED: usize = 24;
+const MAX_LISTED: usize = 24;
 
 /// Returns a sensor with default settings except for its consensus threshold in pixels; `None` is the default.
 fn sensor(trial: &Trial, threshold_px: Option<f64>) -> Config {
@@ -32,7 +32,7 @@ fn sensor(trial: &Trial, threshold_px: Option<f64>) -> Config {
 }
 
 /// Kind of artefact, with the outcomes of limbs next to artefacts and of limbs alone.
-type Beside = (Kind, Vec<Outcome>, Vec<Outcome>);
+type LimbOutcomes = (Kind, Vec<Outcome>, Vec<Outcome>);
 
 /// Consensus threshold of the sensor in pixels, and whether the prior has an attitude.
 #[derive(Clone, Copy, PartialEq)]
@@ -56,25 +56,25 @@ impl Setting {
 }
 
 /// Runs a picture through a sensor in several settings.
-fn seen(horizon: &mut HostHorizon, trial: &Trial, settings: &[Setting]) -> anyhow::Result<Vec<Outcome>> {
+fn process_in_settings(horizon: &mut HostHorizon, trial: &Trial, settings: &[Setting]) -> anyhow::Result<Vec<Outcome>> {
     let picture = trial.render()?;
     let one = |s: &Setting| {
-        let told = PriorKnowledge { attitude_sigma_deg: s.attitude.then_some(ATTITUDE_DEG) };
-        Ok(process_trial(horizon, &sensor(trial, s.threshold_px), trial, &picture, told, &Unobserved)?)
+        let prior = PriorKnowledge { attitude_sigma_deg: s.attitude.then_some(ATTITUDE_DEG) };
+        Ok(look(horizon, &sensor(trial, s.threshold_px), trial, &picture, prior, &Unobserved)?)
     };
     settings.iter().map(one).collect()
 }
 
-/// Calls `of` for every trial on all cores and returns the results. Trials that cannot be drawn are left out.
-fn each<T: Send>(
+/// Calls `measure` for every trial on all cores and returns the results. Trials that cannot be drawn are left out.
+fn for_each_trial<T: Send>(
     trials: Vec<(Kind, u64)>,
-    of: impl Fn(&mut HostHorizon, Kind, u64) -> anyhow::Result<Option<T>> + Sync,
+    measure: impl Fn(&mut HostHorizon, Kind, u64) -> anyhow::Result<Option<T>> + Sync,
 ) -> anyhow::Result<Vec<T>> {
     let make = || HostHorizon::boxed(&Config::new(hzn_core::camera::Config::ideal(Default::default(), 64, 48, 60.0)));
     make()?;
     let all: Vec<Option<T>> = trials
         .into_par_iter()
-        .map_init(make, |horizon, (kind, seed)| of(horizon.as_mut().map_err(|e| *e)?, kind, seed))
+        .map_init(make, |horizon, (kind, seed)| measure(horizon.as_mut().map_err(|e| *e)?, kind, seed))
         .collect::<anyhow::Result<_>>()?;
     Ok(all.into_iter().flatten().collect())
 }
@@ -84,125 +84,160 @@ fn seeds(count: usize) -> Vec<(Kind, u64)> {
 }
 
 pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
-    let count = effort.frames(OF_EACH);
+    let count = effort.frames(PICTURES_PER_KIND);
     let mut s = Section::default();
     s.text(format!(
         "{} pictures without a limb, {count} of each kind, of 480×360 to 1280×960 pixels through pinholes (27° to 110° \
          wide), equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 \
-         bits, with noise of 0.2 to 2.5 % of full scale; the ranges of each kind stand in `hzn_sim::artefact`. \
-         PriorKnowledge: the camera and the position, for the lower half of the table also an attitude that is wrong \
-         by {ATTITUDE_DEG}° (1σ about each axis). Every setting but `reject.threshold_px` has its default. Counted: \
-         pictures that are answered. Discs whose half-angle lies within three told sigmas of the expected one cannot \
-         be told from a limb by their shape and have a row of their own.",
+         bits, with noise of 0.2 to 2.5 % of full scale; `hzn_sim::artefact` has the ranges of each kind. Known to the \
+         sensor: the camera and the position, for the lower half of the table also an attitude that is wrong by \
+         {ATTITUDE_DEG}° (1σ about each axis). Every setting but `reject.threshold_px` has its default. The table \
+         counts the pictures that are answered. If the half-angle of a disc is within three sigmas of the expected \
+         one, its shape cannot distinguish it from a limb; these discs have a row of their own.",
         Kind::ALL.len() * count
     ));
-    skies(&mut s, count)?;
-    limbs(&mut s, count)?;
+    add_skies(&mut s, count)?;
+    add_limbs(&mut s, count)?;
     Ok(s)
 }
 
 /// Measures pictures without a limb.
-fn skies(s: &mut Section, count: usize) -> anyhow::Result<()> {
+fn add_skies(s: &mut Section, count: usize) -> anyhow::Result<()> {
     let settings = Setting::all();
-    let all = each(seeds(count), |horizon, kind, seed| {
+    let trials = for_each_trial(seeds(count), |horizon, kind, seed| {
         let trial = Trial::without_limb(kind, seed)?;
-        Ok(Some((kind, seed, seen(horizon, &trial, &settings)?)))
+        Ok(Some((kind, seed, process_in_settings(horizon, &trial, &settings)?)))
     })?;
-    let head = |first: &'static str| {
-        [first.to_owned(), "pictures".into()].into_iter().chain(settings.iter().take(7).map(|s| s.name()))
-    };
-    let matching = |o: &[Outcome]| o.iter().any(|o| o.matching_disc);
-    let counts = |attitude: bool, of: &dyn Fn(Kind, &[Outcome]) -> bool| {
-        let chosen: Vec<&Vec<Outcome>> = all.iter().filter(|(k, _, o)| of(*k, o)).map(|(.., o)| o).collect();
-        let at = |i: usize| chosen.iter().filter(|o| o.get(i).is_some_and(Outcome::is_false)).count().to_string();
-        let columns = settings.iter().enumerate().filter(|(_, s)| s.attitude == attitude).map(|(i, _)| at(i));
-        std::iter::once(chosen.len().to_string()).chain(columns).collect::<Vec<_>>()
-    };
+    let skies = Skies { settings, trials };
     for (attitude, title) in [(false, "no attitude"), (true, "with attitude")] {
-        let row = |name: &str, cells: Vec<String>| std::iter::once(name.to_owned()).chain(cells).collect();
-        let mut rows: Vec<Vec<String>> = Vec::new();
-        for &kind in Kind::ALL {
-            rows.push(row(kind.name(), counts(attitude, &|k, o| k == kind && !matching(o))));
-        }
-        rows.push(row("**all of these**", counts(attitude, &|_, o| !matching(o))));
-        rows.push(row("discs of the expected half-angle", counts(attitude, &|_, o| matching(o))));
-        s.table(head(title), rows);
+        skies.add_false_answers(s, attitude, title);
     }
-    let discs = all.iter().filter(|(k, ..)| k.is_disc()).count();
-    let own = |i: usize| all.iter().filter(|(_, _, o)| matching(o) && o.get(i).is_some_and(Outcome::is_false)).count();
-    let worst = (0..THRESHOLDS_PX.len() + 1).map(own).max().unwrap_or(0);
-    s.text(format!(
-        "Discs of the expected half-angle that are answered, at the worst threshold and without an attitude: {worst} \
-         of \
-         {discs} pictures with discs ({:.1} %).",
-        100.0 * worst as f64 / discs.max(1) as f64
-    ));
-    let mut listed: Vec<String> = Vec::new();
-    for (kind, seed, outcomes) in all.iter().filter(|(.., o)| !matching(o)) {
-        let wrong = settings.iter().zip(outcomes).filter(|(_, o)| o.is_false());
-        let mut at: Vec<String> = wrong.map(|(s, _)| s.name()).collect();
-        at.dedup();
-        if !at.is_empty() {
-            listed.push(format!("{} {seed} ({})", kind.name(), at.join("; ")));
-        }
-    }
-    let more = listed.len().saturating_sub(LISTED);
-    listed.truncate(LISTED);
-    if !listed.is_empty() {
-        let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
-        s.text(format!("False answers by kind and seed: {}{rest}.", listed.join(", ")));
-    }
-    let rows = Kind::ALL.iter().map(|&kind| {
-        let mut refused: BTreeMap<&str, usize> = BTreeMap::new();
-        let at_default = all.iter().filter(|(k, ..)| *k == kind).filter_map(|(.., o)| o.first());
-        for candidate in at_default.flat_map(|o| &o.candidates) {
-            if !matches!(candidate.verdict, Verdict::Chosen | Verdict::Passed) {
-                *refused.entry(candidate.verdict.name()).or_default() += 1;
-            }
-        }
-        let mut by: Vec<(usize, &str)> = refused.into_iter().map(|(name, n)| (n, name)).collect();
-        by.sort_by(|a, b| b.cmp(a));
-        let by: Vec<String> = by.into_iter().map(|(n, name)| format!("{name} {n}")).collect();
-        vec![kind.name().to_owned(), by.join(", ")]
-    });
-    s.table(["kind", "verdicts on its edges at the default"], rows);
+    skies.add_matching_discs(s);
+    skies.list_false_answers(s);
+    skies.add_verdicts(s);
     Ok(())
 }
 
+/// Pictures without a limb: kind and seed of each, with its outcomes in every setting.
+struct Skies {
+    settings: Vec<Setting>,
+    trials: Vec<(Kind, u64, Vec<Outcome>)>,
+}
+
+impl Skies {
+    /// Returns whether the picture shows a disc of the expected half-angle.
+    fn is_matching(outcomes: &[Outcome]) -> bool {
+        outcomes.iter().any(|o| o.matching_disc)
+    }
+
+    /// Adds the numbers of false answers by kind and threshold, with or without an attitude in the prior.
+    fn add_false_answers(&self, s: &mut Section, attitude: bool, title: &str) {
+        let counts = |is_chosen: &dyn Fn(Kind, &[Outcome]) -> bool| {
+            let chosen: Vec<&Vec<Outcome>> =
+                self.trials.iter().filter(|(k, _, o)| is_chosen(*k, o)).map(|(.., o)| o).collect();
+            let count =
+                |i: usize| chosen.iter().filter(|o| o.get(i).is_some_and(Outcome::is_false)).count().to_string();
+            let columns =
+                self.settings.iter().enumerate().filter(|(_, s)| s.attitude == attitude).map(|(i, _)| count(i));
+            std::iter::once(chosen.len().to_string()).chain(columns).collect::<Vec<_>>()
+        };
+        let row = |name: &str, cells: Vec<String>| std::iter::once(name.to_owned()).chain(cells).collect();
+        let mut rows: Vec<Vec<String>> = Vec::new();
+        for &kind in Kind::ALL {
+            rows.push(row(kind.name(), counts(&|k, o| k == kind && !Self::is_matching(o))));
+        }
+        rows.push(row("**all of these**", counts(&|_, o| !Self::is_matching(o))));
+        rows.push(row("discs of the expected half-angle", counts(&|_, o| Self::is_matching(o))));
+        let thresholds = self.settings.iter().take(7).map(|s| s.name());
+        s.table([title.to_owned(), "pictures".into()].into_iter().chain(thresholds), rows);
+    }
+
+    fn add_matching_discs(&self, s: &mut Section) {
+        let discs = self.trials.iter().filter(|(k, ..)| k.is_disc()).count();
+        let answered = |i: usize| {
+            let is_answered = |o: &[Outcome]| Self::is_matching(o) && o.get(i).is_some_and(Outcome::is_false);
+            self.trials.iter().filter(|(_, _, o)| is_answered(o)).count()
+        };
+        let worst = (0..THRESHOLDS_PX.len() + 1).map(answered).max().unwrap_or(0);
+        s.text(format!(
+            "Discs of the expected half-angle that are answered, at the worst threshold and without an attitude: \
+             {worst} of {discs} pictures with discs ({:.1} %).",
+            100.0 * worst as f64 / discs.max(1) as f64
+        ));
+    }
+
+    /// Lists false answers to pictures without a disc of the expected half-angle.
+    fn list_false_answers(&self, s: &mut Section) {
+        let mut listed: Vec<String> = Vec::new();
+        for (kind, seed, outcomes) in self.trials.iter().filter(|(.., o)| !Self::is_matching(o)) {
+            let wrong = self.settings.iter().zip(outcomes).filter(|(_, o)| o.is_false());
+            let mut names: Vec<String> = wrong.map(|(s, _)| s.name()).collect();
+            names.dedup();
+            if !names.is_empty() {
+                listed.push(format!("{} {seed} ({})", kind.name(), names.join("; ")));
+            }
+        }
+        let more = listed.len().saturating_sub(MAX_LISTED);
+        listed.truncate(MAX_LISTED);
+        if !listed.is_empty() {
+            let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
+            s.text(format!("False answers by kind and seed: {}{rest}.", listed.join(", ")));
+        }
+    }
+
+    /// Adds the numbers of edges by the gate that they fail, at the default threshold.
+    fn add_verdicts(&self, s: &mut Section) {
+        let rows = Kind::ALL.iter().map(|&kind| {
+            let mut refused: BTreeMap<&str, usize> = BTreeMap::new();
+            let at_default = self.trials.iter().filter(|(k, ..)| *k == kind).filter_map(|(.., o)| o.first());
+            for candidate in at_default.flat_map(|o| &o.candidates) {
+                if !matches!(candidate.verdict, Verdict::Chosen | Verdict::Passed) {
+                    *refused.entry(candidate.verdict.name()).or_default() += 1;
+                }
+            }
+            let mut by: Vec<(usize, &str)> = refused.into_iter().map(|(name, n)| (n, name)).collect();
+            by.sort_by(|a, b| b.cmp(a));
+            let by: Vec<String> = by.into_iter().map(|(n, name)| format!("{name} {n}")).collect();
+            vec![kind.name().to_owned(), by.join(", ")]
+        });
+        s.table(["kind", "verdicts on its edges at the default"], rows);
+    }
+}
+
 /// Measures clean limbs next to the same artefacts.
-fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
-    let of_each = count.div_ceil(2);
+fn add_limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
+    let per_kind = count.div_ceil(2);
     let settings = [Setting::DEFAULT, Setting { attitude: true, ..Setting::DEFAULT }];
     // Some seeds have no room for both limb and artefact, so 50 % more seeds are tried.
-    let all = each(seeds(of_each + of_each / 2), |horizon, kind, seed| {
-        let Some(trial) = Trial::with_limb(kind, seed)? else { return Ok(None) };
-        let with = seen(horizon, &trial, &settings)?;
-        let alone = seen(horizon, &trial.cleaned(), &settings[..1])?;
+    let all = for_each_trial(seeds(per_kind + per_kind / 2), |horizon, kind, seed| {
+        let Some(trial) = Trial::beside_limb(kind, seed)? else { return Ok(None) };
+        let with = process_in_settings(horizon, &trial, &settings)?;
+        let alone = process_in_settings(horizon, &trial.cleaned(), &settings[..1])?;
         Ok(Some((kind, with, alone)))
     })?;
     s.text(format!(
-        "Clean limbs with the same artefacts next to them: the body is lit all along, the limb crosses the picture \
-         over at least half its width at a height of 12 to 22 km and falls off exponentially; the artefact leaves at \
-         least 90 % of the limb alone and half of the sky dark. An answer more than {FALSE_SIGMAS}σ or {GROSS_DEG}° \
-         from the truth is false. Alone: the same pictures without the artefact."
+        "Clean limbs with the same artefacts next to them: the body is lit everywhere, and the limb crosses the \
+         picture over at least half its width, at a height of 12 to 22 km, and falls off exponentially. The artefact \
+         leaves at least 90 % of the limb free and half of the sky dark. An answer more than {FALSE_SIGMAS}σ or \
+         {GROSS_DEG}° from the truth is false. 'Alone' means the same pictures without the artefact."
     ));
-    let row = |name: &str, of: &dyn Fn(Kind) -> bool| {
-        let chosen: Vec<_> = all.iter().filter(|(k, ..)| of(*k)).collect();
+    let row = |name: &str, is_chosen: &dyn Fn(Kind) -> bool| {
+        let chosen: Vec<_> = all.iter().filter(|(k, ..)| is_chosen(*k)).collect();
         let n = chosen.len();
-        let share = |of: &dyn Fn(&Beside) -> bool| {
-            format!("{:.1} %", 100.0 * chosen.iter().filter(|c| of(c)).count() as f64 / n.max(1) as f64)
+        let share = |test: &dyn Fn(&LimbOutcomes) -> bool| {
+            format!("{:.1} %", 100.0 * chosen.iter().filter(|c| test(c)).count() as f64 / n.max(1) as f64)
         };
-        let at = |o: &[Outcome], i: usize, of: fn(&Outcome) -> bool| o.get(i).is_some_and(of);
+        let has = |o: &[Outcome], i: usize, test: fn(&Outcome) -> bool| o.get(i).is_some_and(test);
         let answered = |o: &Outcome| o.found.is_some();
         vec![
             name.to_owned(),
             n.to_string(),
-            share(&|(_, _, alone)| at(alone, 0, answered)),
-            share(&|(_, with, _)| at(with, 0, answered)),
-            share(&|(_, with, _)| at(with, 1, answered)),
-            chosen.iter().filter(|(_, _, alone)| at(alone, 0, Outcome::is_false)).count().to_string(),
-            chosen.iter().filter(|(_, with, _)| at(with, 0, Outcome::is_false)).count().to_string(),
-            chosen.iter().filter(|(_, with, _)| at(with, 1, Outcome::is_false)).count().to_string(),
+            share(&|(_, _, alone)| has(alone, 0, answered)),
+            share(&|(_, with, _)| has(with, 0, answered)),
+            share(&|(_, with, _)| has(with, 1, answered)),
+            chosen.iter().filter(|(_, _, alone)| has(alone, 0, Outcome::is_false)).count().to_string(),
+            chosen.iter().filter(|(_, with, _)| has(with, 0, Outcome::is_false)).count().to_string(),
+            chosen.iter().filter(|(_, with, _)| has(with, 1, Outcome::is_false)).count().to_string(),
         ]
     };
     let mut rows: Vec<Vec<String>> = Kind::ALL.iter().map(|&kind| row(kind.name(), &|k| k == kind)).collect();
@@ -213,10 +248,10 @@ fn limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
             "pictures",
             "answered alone",
             "answered",
-            "answered, attitude told",
+            "answered, with attitude",
             "false alone",
             "false",
-            "false, attitude told",
+            "false, with attitude",
         ],
         rows,
     );

@@ -10,10 +10,10 @@ use hzn_core::HostHorizon;
 use hzn_core::camera::Camera;
 use rayon::prelude::*;
 
-use super::Effort;
 use super::defaults::{Outcome, Rendered};
-use crate::document::Section;
+use super::setup::Effort;
 use crate::fly::{Sensor, deg, fly_rendered, two_digits};
+use crate::section::Section;
 
 /// Number of pictures per variant.
 const PICTURES: usize = 24;
@@ -95,25 +95,26 @@ fn no_clouds(scenario: &mut Scenario) {
     }
 }
 
-pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
+pub(super) fn switched_off_effects(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures of one flight, rendered anew with effects switched off. *found*: the limb height of `hzn \
-         calibrate noise`, from the curvature of the limb. *points*: the mean true height of the edge points. \
-         *curvature*: the true heights of the points, each with its share in the fitted height; where the height \
-         varies along the limb a fit with free half-angle takes the variation for another curvature. *found* less \
-         *curvature* is geometry: rolling shutter, whose rates are not told here. χ²: the scatter of the pictures' \
-         limb heights over their errors. RMS and NEES: with the height of *points* ± 1 km told, and the default noise.",
+        "{count} pictures of one flight, rendered again with effects switched off. *found* is the limb height of `hzn \
+         calibrate noise`, from the curvature of the limb. *points* is the mean true height of the edge points. \
+         *curvature* is the mean of the true heights of the points, weighted by their shares in the fitted height; \
+         where the height varies along the limb, a fit with a free half-angle mistakes the variation for another \
+         curvature. *found* minus *curvature* is geometry: the rolling shutter, whose rates the sensor does not know \
+         here. χ² compares the scatter of the pictures' limb heights with their errors. RMS and NEES are for a sensor \
+         with the height of *points* ± 1 km and the default noise.",
     ));
     for (scene, variants) in [("rocket", ROCKET), ("tumble", TUMBLE)] {
         let mut rows = Vec::new();
         for (name, change) in variants {
-            let mut scenario = Scenario::builtin(scene).ok_or_else(|| anyhow!("no scene {scene}"))?;
+            let mut scenario = Scenario::builtin(scene).ok_or_else(|| anyhow!("there is no built-in scene {scene}"))?;
             scenario.seed = SEED;
             scenario.capture.frames = u32::try_from(count)?;
             change(&mut scenario);
-            rows.push(cells(
+            rows.push(row(
                 name,
                 &Rendered::from_scenario(&scenario, false).with_context(|| format!("{scene}: {name}"))?,
             )?);
@@ -121,28 +122,28 @@ pub(super) fn switched_off(effort: &Effort) -> anyhow::Result<Section> {
         s.table([&format!("`{scene}`"), "found", "points", "curvature", "χ²", "edge RMS", "RMS", "NEES"], rows);
     }
     s.text(
-        "`rocket`: *found* is *curvature* in every row, so the fit and the calibration are right; the limb itself is \
-         not of one height. Its light changes along the limb with the angle from the Sun, the edge stands where half \
-         of the local brightness is left, and a tone curve moves that place up by 6 km and its variation with it. A \
-         free half-angle reads the variation as curvature, which is why the calibrated height is 1 to 2 km below the \
-         mean height of the points. The Sun's stray light falls on none of the answered pictures of this flight, so it \
-         is not the cause; JPEG and shutter change 0.2 km or less. `tumble`: the shutter is the smaller part of the \
-         excess. The exposure controller saturates the bright limb; where the band is clipped, half of the clipped \
-         value is found farther out, by several kilometres and not everywhere alike. With an exposure that does not \
-         clip the errors are a fifth. A camera for this sensor should be exposed so that the limb is not saturated.",
+        "`rocket`: *found* equals *curvature* in every row, so fit and calibration are right; the height of the limb \
+         itself varies. The light of the limb changes along the limb with the angle from the Sun, the edge is at half \
+         of the local brightness, and a tone curve moves this place up by 6 km and increases its variation. A fit with \
+         a free half-angle mistakes the variation for curvature, so the calibrated height is 1 to 2 km below the mean \
+         height of the points. The Sun's stray light is in none of the answered pictures of this flight, so it is not \
+         the cause; JPEG and shutter change 0.2 km or less. `tumble`: the shutter is the smaller part of the excess. \
+         The exposure controller saturates the bright limb; where the band is clipped, half of the clipped value is \
+         several kilometres farther out, and not equally everywhere. With an exposure that does not clip, the errors \
+         are a fifth. A camera for this sensor should be exposed so that the limb is not saturated.",
     );
     Ok(s)
 }
 
-fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
+fn row(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
     let none = || "–".to_owned();
     let found = flight.calibration.as_ref();
-    let mut told = flight.untold();
+    let mut sensor = flight.default_sensor();
     let [points_km, curvature_km] = heights_km(flight)?;
-    told.body.limb_height_km = points_km;
-    told.body.limb_height_sigma_km = 1.0;
-    let cases = fly_rendered(&flight.flight, &flight.pictures, &[Sensor::new("told", told).without_rates()])?;
-    let outcome = Outcome { told: "", cases: cases.into_iter().flatten().collect() };
+    sensor.body.limb_height_km = points_km;
+    sensor.body.limb_height_sigma_km = 1.0;
+    let cases = fly_rendered(&flight.flight, &flight.pictures, &[Sensor::new("height given", sensor).without_rates()])?;
+    let outcome = Outcome { knowledge: "", cases: cases.into_iter().flatten().collect() };
     Ok(vec![
         name.to_owned(),
         match found {
@@ -166,7 +167,7 @@ fn cells(name: &str, flight: &Rendered) -> anyhow::Result<Vec<String>> {
 /// each point in the fitted height. The mean over the pictures is weighted by the inverse variance of each picture's
 /// height.
 fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
-    let wide = noise::config_for_calibration(&flight.untold()).context("no body with a limb height")?;
+    let wide = noise::config_for_calibration(&flight.default_sensor()).context("no body with a limb height")?;
     let camera = Camera::try_new(&wide.camera)?;
     let each = flight.flight.frames.par_iter().zip(&flight.pictures).map_init(
         || HostHorizon::boxed(&wide),
@@ -183,8 +184,8 @@ fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
             let (rays, shares): (Vec<_>, Vec<_>) = noise::shares(&turning, &points, &solution)?.into_iter().unzip();
             let heights = frame.scene.tangent_heights_km(rays);
             let mean = heights.iter().sum::<f64>() / heights.len() as f64;
-            let seen = heights.iter().zip(&shares).map(|(h, share)| h * share).sum::<f64>();
-            Some([mean, seen, sighting.sigma_km.powi(-2)])
+            let weighted = heights.iter().zip(&shares).map(|(h, share)| h * share).sum::<f64>();
+            Some([mean, weighted, sighting.sigma_km.powi(-2)])
         },
     );
     let each: Vec<[f64; 3]> = each.flatten().collect();

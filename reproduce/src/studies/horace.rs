@@ -11,9 +11,9 @@ use hzn_sim::scenario::FIT_PICTURES;
 use hzn_sim::trajectory::Attitude;
 use hzn_sim::{Flight, Look, Pose, Scenario};
 
-use super::{Effort, halton, preset, simulated};
-use crate::document::Section;
-use crate::fly::{Sensor, deg, evaluate, fly, two_digits, wrong};
+use super::setup::{Effort, halton, preset, simulated};
+use crate::fly::{Sensor, deg, evaluate, fly, list_wrong_answers, two_digits};
+use crate::section::Section;
 
 /// Returns `count` pictures of a spinning rocket without rate control. Azimuth and roll are arbitrary. The optical axis
 /// points from 40° above the horizontal to 70° below, so some of the pictures show no limb.
@@ -47,20 +47,21 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(format!(
         "{count} pictures of 640×480 pixels through a pinhole of 59°, 60 to 90 km above clouds and dark sea as in the \
-         rocket scene, azimuth and roll anywhere, the optical axis from 40° above the horizontal to 70° below. An \
-         answer succeeds when its half-angle is within 10 % and its direction within 10 % of the half-angle; every \
-         other picture with a limb in view is a false negative, an answer without one a false positive."
+         rocket scene, with any azimuth and roll, the optical axis from 40° above the horizontal to 70° below. An \
+         answer succeeds if its half-angle is within 10 % and its direction within 10 % of the half-angle. Every other \
+         picture with a limb in view is a false negative; an answer to a picture without a limb is a false positive."
     ));
     s.text(
-        "**In-sample**: the limb height that is told is the rendering's own, ± 1 km, and the edge errors, 0.1 px over \
-         30 px, were chosen on such pictures.",
+        "**In-sample**: the sensor has the limb height of the rendering, ± 1 km; the edge errors, 0.1 px over 30 px, \
+         were chosen on pictures of this kind.",
     );
     let flight = pictures(count);
     let horace = preset(Preset::Horace2015, &flight, flight.sensor.body.clone());
     let sensors = [Sensor::new("hzn", flight.sensor.clone()), Sensor::new("horace-2015", horace)];
     let flown = fly(&flight, &sensors)?;
     let row = |name: String, e: &Evaluation| {
-        let error = |of: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or("–".into(), |x| deg(of(x)));
+        let error =
+            |value: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or("–".into(), |x| deg(value(x)));
         vec![
             name,
             format!("{}/{}", e.answered, e.with_limb),
@@ -72,7 +73,7 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
         ]
     };
     let published = ["[B14], [H15]", "", "10.29 %", "0 %", "0.6° (accuracy)", "", ""].map(str::to_owned).to_vec();
-    let wrong = wrong(&flown[0]);
+    let wrong = list_wrong_answers(&flown[0]);
     let ours = sensors.into_iter().zip(&flown).map(|(sensor, cases)| row(sensor.name, &evaluate(cases)));
     s.table(
         ["sensor", "answered", "false negatives", "false positives", "median", "RMS", "worst"],
@@ -80,17 +81,18 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
     );
     if !wrong.is_empty() {
         s.text(format!(
-            "Wrong answers of `hzn`: {wrong}. An error of twice the half-angle (some 81° here) has the Earth on the \
-             other side of the edge. This scene shows a weakness that the flights below do not; it is not solved."
+            "Wrong answers of `hzn`: {wrong}. If the error is twice the half-angle (about 81° here), the answer has \
+             the Earth on the other side of the edge. This scene shows a weakness that the flights below do not show; \
+             it is not solved."
         ));
     }
     s.text(
-        "[B14] and [H15] count on their own set of test pictures and their flight video, which are not public: \
-         pictures of a limb that is curved enough for a circle, seen by a camera that looks at the Earth. \
-         `horace-2015` rebuilds their method; the centre of its circle is not the direction to the Earth in a tilted \
-         picture (book/theory/methods.md), which is what its errors here are.",
+        "[B14] and [H15] count on their own set of test pictures and on their flight video, which are not public. In \
+         these pictures the limb is curved enough for a circle, and the camera looks at the Earth. `horace-2015` \
+         rebuilds their method; in a tilted picture the centre of its circle is not the direction to the Earth \
+         (book/theory/methods.md); this causes most of its errors here.",
     );
-    own_camera(&mut s, effort)?;
+    add_own_camera(&mut s, effort)?;
     Ok(s)
 }
 
@@ -99,22 +101,22 @@ fn percent(x: f64) -> String {
 }
 
 /// Flight of HORACE's camera: its turns per second, and whether the Sun is low enough to come into view.
-struct Turning {
+struct TurningFlight {
     spin_hz: f64,
     low_sun: bool,
 }
 
 /// Flights from the undisturbed to the most disturbed one; the second is the unchanged scene.
-const TURNING: [Turning; 4] = [
-    Turning { spin_hz: 0.2, low_sun: false },
-    Turning { spin_hz: 1.0, low_sun: false },
-    Turning { spin_hz: 2.0, low_sun: false },
-    Turning { spin_hz: 2.0, low_sun: true },
+const TURNING_FLIGHTS: [TurningFlight; 4] = [
+    TurningFlight { spin_hz: 0.2, low_sun: false },
+    TurningFlight { spin_hz: 1.0, low_sun: false },
+    TurningFlight { spin_hz: 2.0, low_sun: false },
+    TurningFlight { spin_hz: 2.0, low_sun: true },
 ];
 
-impl Turning {
+impl TurningFlight {
     fn scenario(&self) -> anyhow::Result<Scenario> {
-        let mut scenario = Scenario::builtin("horace").ok_or_else(|| anyhow!("no scene horace"))?;
+        let mut scenario = Scenario::builtin("horace").ok_or_else(|| anyhow!("there is no built-in scene horace"))?;
         if let Attitude::Spin(spin) = &mut scenario.attitude {
             spin.spin_hz = self.spin_hz;
         }
@@ -129,39 +131,50 @@ impl Turning {
 }
 
 /// Returns a sensor that knows the camera with its mask, the position, and nothing else.
-fn untold(flight: &Flight) -> Config {
+fn sensor_with_position_only(flight: &Flight) -> Config {
     let own = Config::preset(Preset::Hzn, flight.sensor.camera.clone());
     let body = body::Config { altitude_sigma_km: flight.sensor.body.altitude_sigma_km, ..own.body };
     Config { body, mask: flight.sensor.mask.clone(), ..own }
 }
 
 /// Measures the scene `horace` against its requirements: P-S-04, P-S-09, P-S-10.
-fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
+fn add_own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
     let count = effort.frames(60);
-    let (scene, told) = simulated("horace", count)?;
+    let (scene, measured) = simulated("horace", count)?;
     s.text(format!(
-        "**HORACE's own camera**: {count} pictures each of `hzn simulate horace`, 8 mm before pixels of 3.75 µm, \
-         1024×768, 27.0°×20.4°, T+75 s to T+215 s of a flight to 90 km, exposed for 1 ms, at 0.2, 1 and 2 turns a \
-         second; and at 2 with the Sun 4° above the horizontal, so that it passes through the picture. Position told. \
-         `hzn` is told nothing else, which is **out of sample**. `hzn, told` and `horace-2015` are told what was \
-         measured at one turn a second on {FIT_PICTURES} pictures of other seeds, {told}: **in-sample** for the scene, out \
-         of sample for the pictures."
+        "**HORACE's own camera**: {count} pictures each of `hzn simulate horace`, focal length 8 mm, pixels of 3.75 \
+         µm, 1024×768, 27.0°×20.4°, T+75 s to T+215 s of a flight to 90 km, exposed for 1 ms, at 0.2, 1 and 2 turns \
+         per second; and at 2 turns with the Sun 4° above the horizontal, so that it passes through the picture. The \
+         prior has the position. `hzn` has the default values otherwise, which is **out of sample**. `hzn, told` and \
+         `horace-2015` have the values that were measured at one turn per second on {FIT_PICTURES} pictures of other \
+         seeds, {measured}: **in-sample** for the scene, out of sample for the pictures."
     ));
+    let right = add_turning_flights(s, &scene, count)?;
+    add_requirements(s, &right);
+    Ok(())
+}
+
+/// Names of sensors, each with the share of its right answers in a flight, flight after flight.
+type RightShares = Vec<(String, f64)>;
+
+/// Adds the table of the turning flights, and returns the shares of right answers. `scene` has the measured values.
+fn add_turning_flights(s: &mut Section, scene: &Flight, count: usize) -> anyhow::Result<RightShares> {
     let mut rows = Vec::new();
     let mut right = Vec::new();
-    for turning in &TURNING {
+    for turning in &TURNING_FLIGHTS {
         let mut scenario = turning.scenario()?;
         scenario.capture.frames = u32::try_from(count)?;
         let flight = scenario.flight().context("horace")?;
         let sensors = [
-            Sensor::new("hzn", untold(&flight)),
+            Sensor::new("hzn", sensor_with_position_only(&flight)),
             Sensor::new("hzn, told", scene.sensor.clone()),
-            Sensor::new("horace-2015", preset(Preset::Horace2015, &scene, scene.sensor.body.clone())),
+            Sensor::new("horace-2015", preset(Preset::Horace2015, scene, scene.sensor.body.clone())),
         ];
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
             let e = evaluate(&cases);
-            let error =
-                |of: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or("–".into(), |x| deg(of(x)));
+            let error = |value: fn(&hzn_sim::evaluate::Errors) -> f64| {
+                e.errors.as_ref().map_or("–".into(), |x| deg(value(x)))
+            };
             let without = e.frames - e.with_limb;
             rows.push(vec![
                 turning.name(),
@@ -182,16 +195,21 @@ fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
         ["turns", "sensor", "answered", "right", "false negatives", "false", "median", "RMS", "worst", "NEES"],
         rows,
     );
-    // Share of a sensor's right answers in a flight; `flight` is the flight's number in `TURNING`.
+    Ok(right)
+}
+
+/// Adds the table of HORACE's requirements.
+fn add_requirements(s: &mut Section, right: &[(String, f64)]) {
+    // Share of a sensor's right answers in a flight; `flight` is the flight's number in `TURNING_FLIGHTS`.
     let share = |name: &str, flight: usize| right.iter().filter(|r| r.0 == name).nth(flight).map_or(f64::NAN, |r| r.1);
     let requirement = |text: &str, value: &dyn Fn(&str) -> f64| {
         let cells = ["hzn", "hzn, told", "horace-2015"].map(|name| percent(value(name)));
         std::iter::once(text.to_owned()).chain(cells).collect::<Vec<_>>()
     };
-    let worst = |name: &str| (0..TURNING.len() - 1).map(|i| 1.0 - share(name, i)).fold(0.0, f64::max);
+    let worst = |name: &str| (0..TURNING_FLIGHTS.len() - 1).map(|i| 1.0 - share(name, i)).fold(0.0, f64::max);
     s.text(
-        "Their requirements on the same pictures ([B14]): an answer is right when its half-angle is within 10 % and \
-         its direction within 10 % of the half-angle.",
+        "Their requirements on the same pictures ([B14]): an answer is right if its half-angle is within 10 % and its \
+         direction within 10 % of the half-angle.",
     );
     s.table(
         ["requirement", "hzn", "hzn, told", "horace-2015"],
@@ -202,5 +220,4 @@ fn own_camera(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
             requirement("P-S-10, the worst of 0.2, 1 and 2 Hz", &worst),
         ],
     );
-    Ok(())
 }

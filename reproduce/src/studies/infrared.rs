@@ -9,17 +9,17 @@ use hzn_sim::pose::position_m;
 use hzn_sim::scenario::FIT_PICTURES;
 use hzn_sim::{Flight, Look, Pose};
 
-use super::{Effort, OTHER_SEEDS, halton, preset, simulated};
-use crate::document::Section;
+use super::setup::{Effort, OTHER_SEEDS, halton, preset, simulated};
 use crate::fly::{GROSS_DEG, HEADS, Sensor, cells, deg, evaluate, fly, two_digits};
+use crate::section::Section;
 
 /// Height of the half-level of the radiance, as rows of latitude in degrees and height in km: 25 km ± 4.5 km.
-const LIMB_KM: [[f64; 2]; 3] = [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
+const LIMB_HEIGHTS_KM: [[f64; 2]; 3] = [[-90.0, 20.5], [0.0, 25.0], [90.0, 29.5]];
 /// Sigma of the limb height in km for a sensor with one height for all latitudes: the spread of the table over
 /// latitudes.
-const LIMB_SIGMA_KM: f64 = 2.6;
+const COMMON_HEIGHT_SIGMA_KM: f64 = 2.6;
 /// Sigma of the limb height in km for a sensor that knows the table.
-const LEFT_KM: f64 = 0.2;
+const HEIGHT_SIGMA_BY_LATITUDE_KM: f64 = 0.2;
 /// Common shift of all edge points in pixels, caused by blur and by noise that is cut off at black. A pixel is 30 km of
 /// limb height. `hzn simulate` measures the shift.
 const BIAS_PX: f64 = 0.05;
@@ -29,16 +29,16 @@ const SCENE: &str = "384×288 pixels, equidistant lens of 92 px/rad to 90° off 
                      half-level 25 km ± 4.5 km over latitude with a scale of 5 km, blur 1 px, noise 2 %, 16 bits";
 
 /// Returns `hzn` with one limb height for all latitudes, the same with an attitude, the same with an attitude and the
-/// height by latitude, and `zju-2022`. `by_latitude_km` has rows of latitude in degrees and height in km; `left_km` is
-/// the remaining sigma of the height.
-fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], left_km: f64) -> Vec<Sensor> {
+/// height by latitude, and `zju-2022`. `by_latitude_km` has rows of latitude in degrees and height in km;
+/// `height_sigma_km` is the remaining sigma of the height.
+fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], height_sigma_km: f64) -> Vec<Sensor> {
     let one = body::Config {
-        limb_height_sigma_km: LIMB_SIGMA_KM,
+        limb_height_sigma_km: COMMON_HEIGHT_SIGMA_KM,
         limb_height_by_latitude_km: Default::default(),
         ..flight.sensor.body.clone()
     };
     let each = body::Config {
-        limb_height_sigma_km: left_km,
+        limb_height_sigma_km: height_sigma_km,
         limb_height_by_latitude_km: by_latitude_km.iter().copied().collect(),
         ..one.clone()
     };
@@ -53,8 +53,8 @@ fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], left_km: f64) -> Vec<Se
 }
 
 /// Returns `count` pictures at this angle off nadir, spread evenly over the globe, azimuth and roll.
-fn at(off_nadir_deg: f64, count: usize) -> Flight {
-    let mut flight = leo_infrared(2, 1).with_limb_height_by_latitude_km(&LIMB_KM);
+fn pictures_off_nadir(off_nadir_deg: f64, count: usize) -> Flight {
+    let mut flight = leo_infrared(2, 1).with_limb_height_by_latitude_km(&LIMB_HEIGHTS_KM);
     let Some(pattern) = flight.frames.first().cloned() else { return flight };
     let frame = |i: usize| {
         let n = i + 1;
@@ -75,11 +75,12 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(100);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures at every angle off nadir, evenly over latitude, longitude, azimuth and roll: {SCENE}. [W]'s \
-         radiance curves are not printed; ours are analytic. The sensor is told position and a limb height of 25 km \
-         ± {LIMB_SIGMA_KM} km, or that height by latitude ± {LEFT_KM} km, and that all edge points may be shifted by \
-         {BIAS_PX} px. RMS error of the axis, errors above 2° counted apart as wrong, pictures without an answer by \
-         their status; [W] as they print it.",
+        "{count} pictures at every angle off nadir, spread evenly over latitude, longitude, azimuth and roll: {SCENE}. \
+         [W] do not print their radiance curves; ours are analytic. The prior has the position. The sensor knows a \
+         limb height of 25 km ± {COMMON_HEIGHT_SIGMA_KM} km, or the height by latitude ± {HEIGHT_SIGMA_BY_LATITUDE_KM} \
+         km, and a possible common shift of all edge points by {BIAS_PX} px. The cells have the RMS error of the axis, \
+         the number of errors above 2° (wrong), the number of pictures without an answer by status, and the NEES; [W] \
+         is as printed there.",
     ));
     s.text("**In-sample**: limb height, its sigma, the common shift and the edge noise are those of the scene.");
     let mut rows = Vec::new();
@@ -87,9 +88,9 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     let mut names = Vec::new();
     for step in 0..=24 {
         let angle = 5.0 * f64::from(step);
-        let mut flight = at(angle, count);
+        let mut flight = pictures_off_nadir(angle, count);
         flight.sensor.covariance.bias_px = BIAS_PX;
-        let sensors = sensors(&flight, &LIMB_KM, LEFT_KM);
+        let sensors = sensors(&flight, &LIMB_HEIGHTS_KM, HEIGHT_SIGMA_BY_LATITUDE_KM);
         names = sensors.iter().map(|s| s.name.clone()).collect();
         curves.resize(sensors.len(), Vec::new());
         let published = match step {
@@ -99,7 +100,7 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
         };
         let mut row = vec![format!("{angle}°"), published.to_owned()];
         for (cases, curve) in fly(&flight, &sensors)?.iter().zip(&mut curves) {
-            let (cell, rms_deg) = beside_gross(cases);
+            let (cell, rms_deg) = rms_and_gross_cell(cases);
             curve.push((angle, rms_deg));
             row.push(cell);
         }
@@ -112,22 +113,22 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     let published = Series::new("[W], published", Style::Dots, [(0.0, 0.04), (120.0, 0.16)]);
     s.figure("infrared", &series.fold(chart, Chart::with).with(published))?;
     s.text(
-        "`zju-2022` rebuilds [W]: Zernike points, RANSAC with pre-verification, an elliptic cone by (weighted) total \
-         least squares. Its five free parameters cost little on a whole disc and much on an arc, where neither \
-         altitude nor limb height helps it; `hzn` uses both, and the shape of the ellipsoid once an attitude good to \
-         5° tells where east is. What is left is the limb's height by latitude: its first harmonic along the limb \
-         cannot be told from a tilt (0.02° a kilometre here). A sensor that is not told of it but for a sigma that \
-         stands for a common height has a NEES above 2; from 25° to 45° off nadir the free cone of `zju-2022` takes up \
-         more of the slope. One that is told, and knows roughly where north is, is left with the noise and with what \
-         shifts all edge points alike, here a twentieth of a pixel of 30 km: on an arc that is half a hundredth of a \
-         degree.",
+        "`zju-2022` rebuilds [W]: Zernike points, RANSAC with pre-verification, and an elliptic cone by (weighted) \
+         total least squares. Its five free parameters cost little on a whole disc and much on an arc, because it uses \
+         neither the altitude nor the limb height. `hzn` uses both, and also the shape of the ellipsoid if an attitude \
+         with a sigma of 5° shows where east is. The remaining error is the limb height by latitude: its first \
+         harmonic along the limb cannot be separated from a tilt (0.02° per kilometre here). A sensor with one height \
+         and a sigma has a NEES above 2, because its sigma describes an error that is common to the whole limb. From \
+         25° to 45° off nadir, the free cone of `zju-2022` follows more of the slope. A sensor with the height by \
+         latitude and an attitude has only the noise and the common shift of all edge points left. The shift is a \
+         twentieth of a pixel of 30 km here; on an arc this is half a hundredth of a degree.",
     );
     Ok(s)
 }
 
 /// Returns a cell and the RMS of the errors up to [`GROSS_DEG`]. The cell has this RMS, the pictures without an answer
 /// by their status, the number of larger errors, and the NEES of the errors up to the limit.
-fn beside_gross(cases: &[Case]) -> (String, f64) {
+fn rms_and_gross_cell(cases: &[Case]) -> (String, f64) {
     let gross = |c: &Case| c.miss.is_some_and(|m| m.angle_deg > GROSS_DEG);
     let (bad, good): (Vec<&Case>, Vec<&Case>) = cases.iter().partition(|c| gross(c));
     let e = Evaluation::new(&good);
@@ -148,16 +149,17 @@ fn beside_gross(cases: &[Case]) -> (String, f64) {
 pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(200);
     let mut s = Section::default();
-    let (flight, told) = simulated("leo-infrared", count)?;
+    let (flight, measured) = simulated("leo-infrared", count)?;
     let body = &flight.sensor.body;
     let sensors = sensors(&flight, &body.limb_height_by_latitude_km, body.limb_height_sigma_km);
     s.text(format!(
-        "{count} pictures of `hzn simulate leo-infrared` over one orbit, the optical axis swinging from nadir to 120° \
-         off it: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb half-level \
-         25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. Goals: 0.04° \
-         RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5° 0.015° and 0.03°; NEES 1 to 4. \
-         Measured on {FIT_PICTURES} pictures of other seeds and told to the sensor: {told}; where it is told one height, ± \
-         {LIMB_SIGMA_KM} km. The sensor.toml of the scene has the height by latitude."
+        "{count} pictures of `hzn simulate leo-infrared` over one orbit. The optical axis swings from nadir to 120° \
+         off nadir: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb \
+         half-level 25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. \
+         Goals: 0.04° RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5°, 0.015° and 0.03°; \
+         NEES 1 to 4. The sensor has values that were measured on {FIT_PICTURES} pictures of other seeds: {measured}; a \
+         sensor with one height has ± {COMMON_HEIGHT_SIGMA_KM} km. The sensor.toml of the scene has the height by \
+         latitude."
     ));
     s.text(OTHER_SEEDS);
     let flown = fly(&flight, &sensors)?;

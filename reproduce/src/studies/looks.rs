@@ -13,9 +13,9 @@ use hzn_sim::Scenario;
 use hzn_sim::painted::LensWithDiscs;
 use rayon::prelude::*;
 
-use super::Effort;
-use crate::document::Section;
-use crate::fly::{HEADS, Sensor, cells, evaluate, fly, wrong};
+use super::setup::Effort;
+use crate::fly::{HEADS, Sensor, cells, evaluate, fly, list_wrong_answers};
+use crate::section::Section;
 
 /// Number of brightness thresholds between the sky and the disc.
 const LEVELS: u32 = 20;
@@ -26,34 +26,35 @@ const DISCS: usize = 20;
 pub(super) fn lost_discs(effort: &Effort) -> anyhow::Result<Section> {
     let circles = effort.frames(25) as u32;
     let outcomes: Vec<Vec<(bool, bool)>> =
-        (0..circles).into_par_iter().map(under_a_circle).collect::<anyhow::Result<_>>()?;
+        (0..circles).into_par_iter().map(find_discs_under_circle).collect::<anyhow::Result<_>>()?;
     let all: Vec<(bool, bool)> = outcomes.into_iter().flatten().collect();
     let row = |name: &str, whole: bool| {
-        let of = all.iter().filter(|(w, _)| *w == whole);
-        let (count, lost) = (of.clone().count(), of.filter(|(_, right)| !right).count());
+        let outlines = all.iter().filter(|(w, _)| *w == whole);
+        let (count, lost) = (outlines.clone().count(), outlines.filter(|(_, right)| !right).count());
         vec![name.to_owned(), count.to_string(), lost.to_string()]
     };
     let mut s = Section::default();
     s.text(format!(
-        "Even discs without noise through equidistant lenses to 60° to 90°, {circles} image circles, {DISCS} discs \
-         under each as from 1500 to 19 000 km, half of the outline or more in view, at {LEVELS} fixed levels from 5 % \
-         to 91 % of the disc's brightness. A disc is lost when there is no answer, or one more than 0.2° off."
+        "Evenly bright discs without noise through equidistant lenses to 60° to 90°: {circles} image circles, under \
+         each {DISCS} discs seen from 1500 to 19 000 km, with half of the outline or more in view, at {LEVELS} fixed \
+         thresholds from 5 % to 91 % of the disc's brightness. A disc is lost if there is no answer or the answer is \
+         more than 0.2° off."
     ));
     s.table(
         ["outline", "combinations", "lost"],
         [row("whole in view", true), row("cut by the circle or the picture", false)],
     );
     s.text(
-        "A disc that touches the image circle over fewer pixels than the border's strides was met by a search line \
-         only, which gave a piece of its edge: 16 of 7880 such combinations were lost. An edge from a search line that \
-         ends at the border is now taken as a sign, and the border is then looked at pixel by pixel.",
+        "If a disc touches the image circle over fewer pixels than the strides along the border, only a search line \
+         meets its edge and gives a part of it. Without a check for this, 16 of 7880 of these combinations were lost. \
+         If an edge from a search line ends at the border, the sensor now searches the border pixel by pixel.",
     );
     Ok(s)
 }
 
 /// Returns for each disc at each threshold whether its whole outline is in view, and whether the disc was found.
-fn under_a_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
-    let with_discs = LensWithDiscs::new(number, DISCS);
+fn find_discs_under_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
+    let under = LensWithDiscs::new(number, DISCS);
     let mut out = Vec::new();
     for (disc, altitude_km) in &with_discs.discs {
         let data = with_discs.canvas.paint(disc);
@@ -88,23 +89,23 @@ pub(super) fn second_look(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(60);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures a scene, once with `recover.levels = []` and once by default; limb height told as 18 ± 7 km, \
-         noise by default. The discs of `full-disc`, and `horace` through HORACE's real camera (8 mm, 3.75 µm, \
-         1024×768: 27.0°×20.4°)."
+        "{count} pictures per scene, once with `recover.levels = []` and once by default. The sensor has a limb height \
+         of 18 ± 7 km and the default noise. The scenes are the discs of `full-disc`, and `horace` through HORACE's \
+         real camera (8 mm, 3.75 µm, 1024×768: 27.0°×20.4°)."
     ));
     let (mut rows, mut bad) = (Vec::new(), Vec::new());
     for name in ["full-disc", "horace"] {
         let mut scenario = Scenario::builtin(name).with_context(|| name.to_owned())?;
         (scenario.capture.frames, scenario.seed) = (u32::try_from(count)?, 4711);
         let flight = scenario.flight()?;
-        let mut told = flight.sensor.clone();
-        (told.body.limb_height_km, told.body.limb_height_sigma_km) = (18.0, 7.0);
-        let mut once = told.clone();
+        let mut several = flight.sensor.clone();
+        (several.body.limb_height_km, several.body.limb_height_sigma_km) = (18.0, 7.0);
+        let mut once = several.clone();
         once.recover.levels.clear();
-        let sensors = [Sensor::new("one look", once), Sensor::new("default", told)];
+        let sensors = [Sensor::new("one look", once), Sensor::new("default", several)];
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
             rows.push([format!("`{name}`"), sensor.name.clone()].into_iter().chain(cells(&evaluate(&cases))).collect());
-            let wrong = wrong(&cases);
+            let wrong = list_wrong_answers(&cases);
             if !wrong.is_empty() {
                 bad.push(format!("`{name}`, {}: {wrong}", sensor.name));
             }
@@ -118,30 +119,30 @@ pub(super) fn second_look(effort: &Effort) -> anyhow::Result<Section> {
 }
 
 /// Eight brightness thresholds, as parts of full scale.
-const EIGHT: [f64; 8] = [0.05, 0.08, 0.12, 0.16, 0.2, 0.3, 0.4, 0.5];
+const BRIGHTNESS_THRESHOLDS: [f64; 8] = [0.05, 0.08, 0.12, 0.16, 0.2, 0.3, 0.4, 0.5];
 /// Five consensus thresholds in pixels.
-const FIVE: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 5.0];
+const CONSENSUS_THRESHOLDS_PX: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 5.0];
 /// Possible focal lengths of the lens of the aurora picture in millimetres, on a sensor 36 mm wide.
 const LENSES_MM: [f64; 4] = [24.0, 28.0, 35.0, 50.0];
 /// Direction to the Earth in iss030e102170-night.jpg (unit vector in the camera frame), from its stars.
-const NIGHT: [f64; 3] = [0.022320, 0.942248, 0.334170];
+const NIGHT_EARTH_DIRECTION: [f64; 3] = [0.022320, 0.942248, 0.334170];
 
 /// Measures photographs at many brightness thresholds and consensus thresholds.
 pub(super) fn real_pictures(_: &Effort) -> anyhow::Result<Section> {
     let mut s = Section::default();
     s.text(
-        "Photographs of tests/data/real, reduced, at fixed levels (parts of full scale) and thresholds. \
-         `iss073e0293986-aurora`: night limb, airglow, aurora; its camera is not recorded, so lenses of 24 to 50 mm on \
-         a sensor 36 mm wide are assumed. `iss030e102170-night`: airglow and aurora, with the direction to the Earth \
-         from the stars. An answer is wanted in none of 40 settings of the first, and of the second only within 3σ of \
-         the truth. Limb height told as 17 ± 7 km.",
+        "Photographs of tests/data/real, reduced, at fixed brightness thresholds (levels, as parts of full scale) and \
+         consensus thresholds (px). `iss073e0293986-aurora`: night limb, airglow, aurora; its camera is not recorded, \
+         so lenses of 24 to 50 mm on a sensor 36 mm wide are assumed. `iss030e102170-night`: airglow and aurora, with \
+         the direction to the Earth from the stars. The sensor should answer none of the 40 settings of the first, and \
+         of the second only within 3σ of the truth. It has a limb height of 17 ± 7 km.",
     );
     let mut rows = Vec::new();
     let mut answers = Vec::new();
     for (name, focal_mm, truth) in LENSES_MM.iter().map(|&mm| ("iss073e0293986-aurora.jpg", Some(mm), None)).chain([(
         "iss030e102170-night.jpg",
         None,
-        Some(NIGHT),
+        Some(NIGHT_EARTH_DIRECTION),
     )]) {
         let mut photograph = Photograph::load(name)?;
         if let Some(mm) = focal_mm {
@@ -149,10 +150,11 @@ pub(super) fn real_pictures(_: &Effort) -> anyhow::Result<Section> {
             let focal_px = mm / 36.0 * f64::from(camera.width);
             (camera.fx_px, camera.fy_px) = (focal_px, focal_px);
         }
-        let settings: Vec<(f64, f64)> = EIGHT.iter().flat_map(|&l| FIVE.iter().map(move |&t| (l, t))).collect();
-        let found: Vec<Option<Found>> = settings
+        let settings: Vec<(f64, f64)> =
+            BRIGHTNESS_THRESHOLDS.iter().flat_map(|&l| CONSENSUS_THRESHOLDS_PX.iter().map(move |&t| (l, t))).collect();
+        let found: Vec<Option<MeasuredAxis>> = settings
             .par_iter()
-            .map(|&(level, threshold)| photograph.at(level, threshold))
+            .map(|&(level, threshold)| photograph.answer_with_threshold(level, threshold))
             .collect::<anyhow::Result<_>>()?;
         let shown = focal_mm.map_or_else(|| name.to_owned(), |mm| format!("{name}, {mm} mm"));
         let mut beyond = 0;
@@ -174,20 +176,21 @@ pub(super) fn real_pictures(_: &Effort) -> anyhow::Result<Section> {
     if !answers.is_empty() {
         s.text(format!("Answers: {}.", answers.join("; ")));
     }
-    opssat(&mut s)?;
+    add_opssat(&mut s)?;
     Ok(s)
 }
 
 /// Measures a photograph with a dark frame of one pixel and with haze: the axis must not depend on the threshold.
-fn opssat(s: &mut Section) -> anyhow::Result<()> {
+fn add_opssat(s: &mut Section) -> anyhow::Result<()> {
     let photograph = Photograph::load("opssat-2020-08-16.png")?;
-    let mut found: Vec<Found> = Vec::new();
+    let mut found: Vec<MeasuredAxis> = Vec::new();
     let mut rows = Vec::new();
-    for level in EIGHT.into_iter().skip(1) {
-        let row = match photograph.at(level, 3.0)? {
+    for level in BRIGHTNESS_THRESHOLDS.into_iter().skip(1) {
+        let row = match photograph.answer_with_threshold(level, 3.0)? {
             Some(here) => {
-                let apart = found.iter().map(|f| f.off_deg(here.axis)).fold(0.0, f64::max);
-                let row = [format!("{:.2} px", here.rms_px), format!("{:.2}°", here.sigma_deg), format!("{apart:.4}°")];
+                let largest_deg = found.iter().map(|f| f.off_deg(here.axis)).fold(0.0, f64::max);
+                let row =
+                    [format!("{:.2} px", here.rms_px), format!("{:.2}°", here.sigma_deg), format!("{largest_deg:.4}°")];
                 found.push(here);
                 row
             }
@@ -196,8 +199,9 @@ fn opssat(s: &mut Section) -> anyhow::Result<()> {
         rows.push([format!("{level}")].into_iter().chain(row).collect());
     }
     s.text(
-        "`opssat-2020-08-16`: the Earth's limb through haze, one black pixel all around from demosaicing, which joined \
-         the limb to the picture's outline; the fourth column is the largest distance from the axes above it.",
+        "`opssat-2020-08-16`: the Earth's limb through haze. Demosaicing left a frame of one black pixel, which joined \
+         the limb to the outline of the picture. The fourth column is the largest distance from the axes in the rows \
+         above.",
     );
     s.table(["level", "RMS", "σ", "from the others"], rows);
     Ok(())
@@ -208,13 +212,13 @@ struct Photograph {
     rgb: image::RgbImage,
 }
 
-struct Found {
+struct MeasuredAxis {
     axis: [f64; 3],
     sigma_deg: f64,
     rms_px: f64,
 }
 
-impl Found {
+impl MeasuredAxis {
     fn off_deg(&self, axis: [f64; 3]) -> f64 {
         let unit = |v| UnitVec3::<Cam, f64>::try_new(v);
         unit(self.axis).zip(unit(axis)).map_or(f64::NAN, |(a, b)| a.angle_rad(&b).to_degrees())
@@ -230,7 +234,7 @@ impl Photograph {
     }
 
     /// Returns the answer at a fixed brightness threshold (part of full scale) and a consensus threshold in pixels.
-    fn at(&self, level: f64, threshold_px: f64) -> anyhow::Result<Option<Found>> {
+    fn answer_with_threshold(&self, level: f64, threshold_px: f64) -> anyhow::Result<Option<MeasuredAxis>> {
         let mut config = self.sensor.clone();
         config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
         config.reject.threshold_px = threshold_px;
@@ -238,7 +242,7 @@ impl Photograph {
         let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);
         let view = ImageView::from_bytes(self.rgb.as_raw(), layout, Channel::Mean)?;
         let expected = horizon.expect(&Prior::default())?;
-        Ok(horizon.process(&view, &expected).solution.map(|s| Found {
+        Ok(horizon.process(&view, &expected).solution.map(|s| MeasuredAxis {
             axis: s.axis.xyz(),
             sigma_deg: s.covariance.sigma_max_rad().to_degrees(),
             rms_px: s.rms_px,

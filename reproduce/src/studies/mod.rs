@@ -9,32 +9,12 @@ mod infrared;
 mod looks;
 mod presets;
 mod scenes;
+mod setup;
 
-use anyhow::{Context, anyhow};
-use hzn_core::Preset;
-use hzn_core::body::Kind;
-use hzn_core::{Config, body, covariance};
-use hzn_sim::scenario::{FIT_PICTURES, Fit};
-use hzn_sim::{Flight, Scenario};
+use crate::document::Document;
+use crate::section::Section;
 
-use crate::document::{Document, Section};
-
-/// Note on the results of sensors whose limb height and noise come from [`simulated`].
-const OTHER_SEEDS: &str = "**In-sample for the scene, out of sample for the pictures**: what is told was measured on \
-                           other seeds of the same scene, with other clouds and noise, the same air and detector.";
-
-/// Size of a campaign.
-pub(crate) struct Effort {
-    /// Frames per scene instead of the study's own number.
-    pub(crate) frames: Option<usize>,
-}
-
-impl Effort {
-    /// Returns the number of frames per scene; `own` is the study's own number.
-    pub(crate) fn frames(&self, own: usize) -> usize {
-        self.frames.unwrap_or(own)
-    }
-}
+pub(crate) use setup::Effort;
 
 /// Study with its section of a document.
 pub(crate) struct Study {
@@ -59,64 +39,42 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("rocket", "Accuracy and honesty: sounding rocket", scenes::rocket),
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
-    reproduced("defaults", "Honesty with default settings", defaults::untold),
-    reproduced("effects", "What moves the limb in the scenes", effects::switched_off),
+    reproduced("defaults", "Honesty with default settings", defaults::default_settings),
+    reproduced("effects", "What moves the limb in the scenes", effects::switched_off_effects),
     reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),
     reproduced("second-look", "One look and several", looks::second_look),
     reproduced("real-pictures", "Photographs at many settings", looks::real_pictures),
-    Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compared },
+    Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compare_presets },
 ];
 
 const fn reproduced(name: &'static str, title: &'static str, run: fn(&Effort) -> anyhow::Result<Section>) -> Study {
     Study { name, title, document: Document::Reproduction, run }
 }
 
-/// Returns the radical inverse. Its points fill 0…1 evenly and are the same in every run.
-fn halton(mut index: usize, base: usize) -> f64 {
-    let (mut out, mut part) = (0.0, 1.0);
-    while index > 0 {
-        part /= base as f64;
-        out += part * (index % base) as f64;
-        index /= base;
+/// Returns the names of the sections of a document, in their order.
+pub(crate) fn names_in(document: Document) -> Vec<&'static str> {
+    ALL.iter().filter(|study| study.document == document).map(|study| study.name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::document::find_section;
+
+    #[test]
+    fn the_documents_hold_every_study_and_its_figures() {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../book");
+        let text = |document: Document| std::fs::read_to_string(docs.join(document.file())).unwrap();
+        for study in ALL {
+            let document = text(study.document);
+            let section = find_section(&document, study.name).unwrap_or_else(|| panic!("{} was not run", study.name));
+            assert!(section.contains(study.title), "{}", study.name);
+        }
+        for figure in text(Document::Reproduction).split("](figures/").skip(1) {
+            let file = figure.split(')').next().unwrap();
+            assert!(docs.join("results/figures").join(file).is_file(), "{file}");
+        }
     }
-    out
-}
-
-/// Returns the configuration of a published system for a flight. The system has its own methods, but the camera, mask
-/// and body of `hzn`. It also has the edge noise of `hzn`, if that is given.
-fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
-    let own = Config::preset(preset, flight.sensor.camera.clone());
-    let covariance::Config { noise, sigma_px, correlation_px, .. } = flight.sensor.covariance;
-    // If the noise comes from the residuals of the pictures, there is no given noise for a published system.
-    let covariance = match noise {
-        covariance::Noise::Told => covariance::Config { sigma_px, correlation_px, ..own.covariance },
-        _ => own.covariance,
-    };
-    Config { body, mask: flight.sensor.mask.clone(), covariance, ..own }
-}
-
-/// Returns a scene as `hzn simulate` makes it, with JPEG if the scene is stored as JPEG, and the measured values as
-/// text for a cell. The sensor has the limb height and the noise that were measured on other seeds.
-fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, String)> {
-    let mut scenario = Scenario::builtin(name).ok_or_else(|| anyhow!("no scene {name}"))?;
-    scenario.capture.frames = u32::try_from(count)?;
-    let mut flight = scenario.flight().with_context(|| name.to_owned())?;
-    let fits = Fit::measure(&scenario, FIT_PICTURES, &|_, _| ()).with_context(|| name.to_owned())?;
-    fits.iter().for_each(|fit| fit.apply(&mut flight.sensor));
-    let told = |body: Kind| {
-        let Some(fit) = fits.iter().find(|fit| fit.body == body) else { return "nothing could be measured".to_owned() };
-        let noise = match fit.noise {
-            covariance::Noise::Told => format!("{:.2} px over {:.0} px", fit.sigma_px, fit.correlation_px),
-            _ => "edge errors by each picture's residuals".to_owned(),
-        };
-        let limb = (fit.limb_height_sigma_km > 0.0)
-            .then(|| format!("{:.1} km ± {:.1} km, ", fit.limb_height_km, fit.limb_height_sigma_km));
-        limb.unwrap_or_default() + &noise
-    };
-    let of = |body: &Kind| match scenario.bodies.len() {
-        1 => format!("`{name}` {}", told(*body)),
-        _ => format!("`{name}`, {}: {}", body.name(), told(*body)),
-    };
-    let told: Vec<String> = scenario.bodies.iter().map(of).collect();
-    Ok((flight, told.join("; ")))
 }

@@ -8,32 +8,33 @@ use hzn_core::image::Pixels;
 use hzn_sim::evaluate::Case;
 use hzn_sim::{Flight, Picture};
 
-use super::{Effort, OTHER_SEEDS, simulated};
-use crate::document::Section;
+use super::setup::{self, Effort, OTHER_SEEDS, simulated};
 use crate::fly::{Flown, GROSS_DEG, Sensor, deg, evaluate, fly_timed, two_digits};
+use crate::section::Section;
 
 /// Number of pictures from which the fixed threshold is set.
-const LOOKED_AT: usize = 9;
+const THRESHOLD_PICTURES: usize = 9;
 
 /// The four presets that are compared.
 const PRESETS: [Preset; 4] = [Preset::Hzn, Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015];
 
-pub(super) fn compared(effort: &Effort) -> anyhow::Result<Section> {
+pub(super) fn compare_presets(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(120);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures of each scene of `hzn simulate` ({} of the infrared one), each through every preset. All are \
-         told the same: camera, mask, position, limb height and edge errors as measured on other pictures of the scene \
-         (`hzn simulate` writes them into its sensor.toml). The makers of `dlr-2022` set its threshold for their \
-         scene; here it is the median of what `otsu` finds on {LOOKED_AT} of the pictures. RMS, 95 % and NEES (2 is \
-         ideal) are those of answers within {GROSS_DEG}°; gross errors, above it, and false answers, without a limb in \
-         view, stand apart. Times are medians, two pictures at once.",
+        "{count} pictures of each scene of `hzn simulate` ({} of the infrared one), each through every preset. All \
+         presets get the same values: camera, mask, position, and the limb height and edge errors that were measured \
+         on other pictures of the scene (`hzn simulate` writes them into its sensor.toml). The makers of `dlr-2022` \
+         set its threshold for their scene; here it is the median of the thresholds that `otsu` finds on \
+         {THRESHOLD_PICTURES} of the pictures. RMS, 95 % and NEES (2 is ideal) are for answers within {GROSS_DEG}°; \
+         gross errors (above it) and false answers (without a limb in view) have their own columns. Times are medians \
+         while two pictures are processed at once.",
         3 * count,
     ));
-    s.text(format!("{OTHER_SEEDS} The level of `dlr-2022` is in-sample: it comes from these very pictures."));
+    s.text(format!("{OTHER_SEEDS} The threshold of `dlr-2022` is in-sample: it comes from these pictures."));
     let mut rows = Vec::new();
     for (name, flight) in scenes(count)? {
-        let level = usual_level(&flight)?;
+        let level = median_threshold(&flight)?;
         let sensors: Vec<Sensor> = PRESETS.iter().map(|&p| sensor(p, &flight, level)).collect();
         for (sensor, flown) in sensors.iter().zip(fly_timed(&flight, &sensors)?) {
             rows.push(row(name, &sensor.name, &flown));
@@ -50,7 +51,7 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     let (infrared, _) = simulated("leo-infrared", 3 * count)?;
     let third = |k: usize| Flight { frames: infrared.frames[k * count..(k + 1) * count].to_vec(), ..infrared.clone() };
     let (mut sun, _) = simulated("sun-moon", count)?;
-    sun.sensor.body = sun.sensor.bodies.first().cloned().ok_or_else(|| anyhow!("sun-moon looks for bodies"))?;
+    sun.sensor.body = sun.sensor.bodies.first().cloned().ok_or_else(|| anyhow!("the scene sun-moon has no bodies"))?;
     sun.sensor.binarize = sun.sensor.body.binarize.unwrap_or(sun.sensor.binarize);
     sun.sensor.covariance = sun.sensor.body.covariance.unwrap_or(sun.sensor.covariance);
     sun.sensor.bodies.clear();
@@ -68,7 +69,7 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
 
 /// Returns a preset that knows as much as the scene's own sensor.
 fn sensor(preset: Preset, flight: &Flight, level: f64) -> Sensor {
-    let mut config = super::preset(preset, flight, flight.sensor.body.clone());
+    let mut config = setup::preset(preset, flight, flight.sensor.body.clone());
     match preset {
         Preset::Hzn => config = flight.sensor.clone(),
         Preset::Dlr2022 => config.binarize.level = level,
@@ -79,12 +80,12 @@ fn sensor(preset: Preset, flight: &Flight, level: f64) -> Sensor {
 
 /// Returns the threshold that `otsu` usually finds (the median), or for the Sun the threshold of the scene's sensor, as
 /// a fraction of full scale.
-fn usual_level(flight: &Flight) -> anyhow::Result<f64> {
+fn median_threshold(flight: &Flight) -> anyhow::Result<f64> {
     if flight.sensor.body.kind == Kind::Sun {
         return Ok(flight.sensor.binarize.level);
     }
     let mut horizon = HostHorizon::boxed(&flight.sensor)?;
-    let step = flight.frames.len().div_ceil(LOOKED_AT).max(1);
+    let step = flight.frames.len().div_ceil(THRESHOLD_PICTURES).max(1);
     let mut levels = Vec::new();
     for frame in flight.frames.iter().step_by(step) {
         let picture: Picture = frame.render()?;
@@ -101,7 +102,8 @@ fn row(scene: &str, preset: &str, flown: &Flown) -> Vec<String> {
     let all = evaluate(&flown.cases);
     let good: Vec<Case> = flown.cases.iter().filter(|c| !gross(c)).cloned().collect();
     let good = evaluate(&good);
-    let error = |of: fn(&hzn_sim::evaluate::Errors) -> f64| good.errors.as_ref().map_or("–".into(), |x| deg(of(x)));
+    let error =
+        |value: fn(&hzn_sim::evaluate::Errors) -> f64| good.errors.as_ref().map_or("–".into(), |x| deg(value(x)));
     let without = all.frames - all.with_limb;
     let mut times = flown.elapsed_us.clone();
     times.sort_by(f64::total_cmp);

@@ -5,16 +5,21 @@ use hzn_sim::Flight;
 use hzn_sim::evaluate::Case;
 use hzn_sim::scenario::FIT_PICTURES;
 
-use super::{Effort, OTHER_SEEDS, preset, simulated};
-use crate::document::Section;
-use crate::fly::{HEADS, Sensor, cells, evaluate, fly, wrong};
+use super::setup::{Effort, OTHER_SEEDS, preset, simulated};
+use crate::fly::{HEADS, Sensor, cells, evaluate, fly, list_wrong_answers};
+use crate::section::Section;
 
 /// Runs scenes through sensors and adds a table with one row per scene, sensor and body.
-fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight) -> Vec<Sensor>) -> anyhow::Result<()> {
-    let (mut rows, mut told, mut bad) = (Vec::new(), Vec::new(), Vec::new());
+fn add_rows(
+    s: &mut Section,
+    names: &[&str],
+    count: usize,
+    sensors: impl Fn(&Flight) -> Vec<Sensor>,
+) -> anyhow::Result<()> {
+    let (mut rows, mut measured, mut bad) = (Vec::new(), Vec::new(), Vec::new());
     for &name in names {
-        let (flight, what) = simulated(name, count)?;
-        told.push(what);
+        let (flight, text) = simulated(name, count)?;
+        measured.push(text);
         let bodies = flight.sensor.each_body();
         let sensors = sensors(&flight);
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
@@ -23,7 +28,7 @@ fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight)
                 let own: Vec<Case> = cases.iter().filter(|c| c.body == kind).cloned().collect();
                 let shown = if bodies.len() > 1 { format!("`{name}`, {kind}") } else { format!("`{name}`") };
                 rows.push([shown, sensor.name.clone()].into_iter().chain(cells(&evaluate(&own))).collect());
-                let wrong = wrong(&own);
+                let wrong = list_wrong_answers(&own);
                 if sensor.name.starts_with("hzn") && !wrong.is_empty() {
                     bad.push(format!("{}: {wrong}", sensor.name));
                 }
@@ -32,8 +37,8 @@ fn rows(s: &mut Section, names: &[&str], count: usize, sensors: impl Fn(&Flight)
     }
     s.table(["scene", "sensor"].into_iter().chain(HEADS), rows);
     s.text(format!(
-        "{OTHER_SEEDS} Measured on {FIT_PICTURES} pictures of other seeds and told to the sensor: {}.",
-        told.join("; ")
+        "{OTHER_SEEDS} The values in sensor.toml, measured on {FIT_PICTURES} pictures of other seeds: {}.",
+        measured.join("; ")
     ));
     if !bad.is_empty() {
         s.text(format!("Wrong answers: {}.", bad.join("; ")));
@@ -48,11 +53,11 @@ pub(super) fn rocket(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(200);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures a scene of 1920×1080 pixels through a fisheye of 92°, from T+60 s to T+430 s of a flight to \
-         238 km over clouds, sea and land; the limb falls off exponentially (scale 8 km, each colour its own depth), \
-         PSF 0.9 px, noise 2 %, 8 bits. `rocket-clean`: no Sun in view; goals: all answered, 0.06° RMS, none above 2°, \
-         NEES 1 to 4. `rocket`: Sun, lens ghosts and payload in view, colour, sRGB, JPEG; goals: 98 % answered, none \
-         above 2°, none without a limb. Position told. {BY_HAND}"
+        "{count} pictures per scene of 1920×1080 pixels through a fisheye of 92°, from T+60 s to T+430 s of a flight \
+         to 238 km over clouds, sea and land; the limb falls off exponentially (scale 8 km, a different depth for each \
+         colour), PSF 0.9 px, noise 2 %, 8 bits. `rocket-clean`: no Sun in view; goals: all answered, 0.06° RMS, none \
+         above 2°, NEES 1 to 4. `rocket`: Sun, lens ghosts and payload in view, colour, sRGB, JPEG; goals: 98 % \
+         answered, none above 2°, none without a limb. The prior has the position. {BY_HAND}"
     ));
     let sensors = |flight: &Flight| {
         let hzn = flight.sensor.clone();
@@ -63,12 +68,13 @@ pub(super) fn rocket(effort: &Effort) -> anyhow::Result<Section> {
             Sensor::new("dlr-2022", dlr),
         ]
     };
-    rows(&mut s, &["rocket-clean", "rocket"], count, sensors)?;
+    add_rows(&mut s, &["rocket-clean", "rocket"], count, sensors)?;
     s.text(
         "`dlr-2022` rebuilds [BB]: a fixed threshold, whole pixels, RANSAC on three points and their direct estimate, \
-         whose direction does not use altitude and limb height. Its covariance is the overbound [BB 37]. In `rocket` \
-         the limb's half level moves within the flight, as the Sun's veil lies under a tone curve: that is its sigma, \
-         and most of its error (0.03° a kilometre).",
+         whose direction uses neither altitude nor limb height. Its covariance is the overbound [BB 37]. In `rocket` \
+         the half level of the limb moves within the flight, because the camera applies a tone curve to a picture with \
+         the Sun's veil. This movement is the sigma of the limb height, and it causes most of the error (0.03° per \
+         kilometre).",
     );
     Ok(s)
 }
@@ -77,10 +83,11 @@ pub(super) fn others(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(200);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures a scene, as book/theory/simulator.md describes them. `tumble` is coarse (4 km of limb \
-         height a pixel) and has limb, Sun and nothing in view by turns: an answer without a limb is false. {BY_HAND}"
+        "{count} pictures per scene, as book/theory/simulator.md describes them. `tumble` is coarse (4 km of limb \
+         height per pixel) and shows the limb, the Sun or nothing in turn; an answer to a picture without a limb is \
+         false. {BY_HAND}"
     ));
     let hzn = |flight: &Flight| vec![Sensor::new("hzn", flight.sensor.clone())];
-    rows(&mut s, &["horace-wide", "full-disc", "tumble", "sun-moon"], count, hzn)?;
+    add_rows(&mut s, &["horace-wide", "full-disc", "tumble", "sun-moon"], count, hzn)?;
     Ok(s)
 }

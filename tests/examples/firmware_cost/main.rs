@@ -1,0 +1,74 @@
+//! Measures what the firmware costs in QEMU: instructions by stage, and memory. It prints
+//! book/results/firmware-cost.md. `--check FILE` compares the result with an earlier one and fails if instructions,
+//! flash, static RAM or stack grew by more than 5 %. `--search FROM TO` prints the most expensive of the pictures made
+//! with these seeds.
+
+mod pictures;
+mod report;
+
+use std::process::ExitCode;
+
+use hzn_tests::emulated::{Board, measure};
+
+use pictures::{Sensors, largest_mask, moon, paint_expensive_pictures, usual_sensors};
+use report::{lines, read_figures, report};
+
+/// Prints the most expensive of many pictures, on the M7.
+fn search(seeds: std::ops::Range<u32>, sensors: &Sensors) {
+    let mut found = Vec::new();
+    for from in seeds.clone().step_by(16) {
+        let cases = paint_expensive_pictures(from..(from + 16).min(seeds.end), sensors);
+        found.extend(lines(&cases, &measure(Board::An500, &cases)));
+    }
+    found.sort_by(|a, b| b.total.total_cmp(&a.total));
+    for line in found.iter().take(20) {
+        let stages: Vec<String> = line.stages.iter().map(|n| format!("{n:.0}")).collect();
+        println!("{:8.0} {:6.0} {}: {}", line.total, line.work, line.name, stages.join(" "));
+    }
+}
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    if let [flag, from, to] = &args[..]
+        && let ("--search", Ok(from), Ok(to)) = (flag.as_str(), from.parse(), to.parse())
+    {
+        for sensors in [usual_sensors(), largest_mask(), moon()] {
+            search(from..to, &sensors);
+        }
+        return ExitCode::SUCCESS;
+    }
+    let text = match report() {
+        Ok(text) => text,
+        Err(e) => {
+            eprintln!("{e}");
+            return ExitCode::FAILURE;
+        }
+    };
+    print!("{text}");
+    match &args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["--write", path] => {
+            if let Err(e) = std::fs::write(path, text) {
+                eprintln!("{path}: {e}");
+                return ExitCode::FAILURE;
+            }
+        }
+        ["--check", path] => {
+            let before = read_figures(&std::fs::read_to_string(path).unwrap_or_default());
+            let mut grown = before.is_empty();
+            for (name, now) in read_figures(&text) {
+                if let Some((_, then)) = before.iter().find(|(n, _)| *n == name)
+                    && now > then * 1.05
+                {
+                    eprintln!("{name}: {now}, but {then} in {path}");
+                    grown = true;
+                }
+            }
+            if grown {
+                eprintln!("more than 5 % above {path}; if this is intended, run cargo xtask firmware --write");
+                return ExitCode::FAILURE;
+            }
+        }
+        _ => {}
+    }
+    ExitCode::SUCCESS
+}

@@ -1,0 +1,205 @@
+//! Makes the report: instructions and memory of both boards, as Markdown.
+
+use std::process::Command;
+
+use hzn_core::status::Stage;
+use hzn_tests::emulated::{Board, Case, Measured, answer_bytes, measure, measure_rows, run_chain};
+
+use crate::pictures::Pictures;
+
+const HEAD: &str = "# What the firmware costs
+
+`cargo xtask firmware --write` writes this page. `cargo xtask test` fails if a figure (instructions, flash, static RAM,
+stack) grows by more than 5 %. Instructions are exact (QEMU 7.2, `-icount`); they are not cycles. The sensor computes in
+f32 and keeps 600 points, unless a row names another number. A row is the worst of its pictures. Every answer had the
+bits of the same sensor on the host.
+
+The goals are for a Cortex-M7: 96 KiB (98304 bytes) of flash for the sensor alone, 96 KiB of RAM in addition to the
+picture, 0.6 million instructions for a clean picture of 1920×1080, 2 million for a cloudy one, 20 million for the
+worst. Flash and the clean picture miss their goals, the clean picture also with 200 points kept;
+[porting.md](../guide/porting.md) says what fewer points cost. On the Cortex-M4F, double-precision arithmetic in
+software takes about 9 KB more flash and nearly all of the time of `expect`: `expect` calculates the cone of an altitude
+or a position in double precision, once per picture. No other code that runs per picture uses it (`cargo xtask test`
+checks this).
+";
+
+/// Returns the whole report.
+pub(crate) fn report() -> Result<String, String> {
+    let pictures = Pictures::new();
+    let mut out = HEAD.to_owned();
+    for board in Board::ALL {
+        out += &Measurement::new(board, &pictures).section()?;
+    }
+    Ok(out)
+}
+
+/// Measurements of one board.
+struct Measurement<'a> {
+    board: Board,
+    pictures: &'a Pictures,
+    usual: Vec<Measured>,
+    expensive: [Vec<Measured>; 3],
+    by_rows: [(&'static str, Vec<Measured>); 2],
+}
+
+impl<'a> Measurement<'a> {
+    fn new(board: Board, pictures: &'a Pictures) -> Self {
+        Self {
+            board,
+            pictures,
+            usual: measure(board, &pictures.usual),
+            expensive: pictures.expensive.each_ref().map(|(cases, _)| measure(board, cases)),
+            by_rows: pictures.by_rows.each_ref().map(|(kind, cases)| (*kind, measure_rows(board, cases))),
+        }
+    }
+
+    /// Returns the section of the board.
+    fn section(&self) -> Result<String, String> {
+        self.check_answers()?;
+        let mut out = format!("\n## {} ({})\n\n", self.board.core(), self.board.name());
+        out += &self.picture_table();
+        out += &self.preparation_table();
+        out += &self.row_table();
+        out += &self.memory_table()?;
+        Ok(out)
+    }
+
+    /// Checks that every answer has the bits of the same sensor on this machine.
+    fn check_answers(&self) -> Result<(), String> {
+        let cases = self.pictures.usual.iter().chain(self.pictures.expensive.iter().flat_map(|(cases, _)| cases));
+        for (case, m) in cases.zip(self.usual.iter().chain(self.expensive.iter().flatten())) {
+            if answer_bytes(&case.answer_on_host()) != answer_bytes(&m.answer) {
+                let core = self.board.core();
+                return Err(format!("{} on {core}: the bits differ from those on this machine", case.name));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the instructions and the work of each picture.
+    fn picture_table(&self) -> String {
+        let mut out = String::from("| picture | process, thousand | work, thousand |");
+        Stage::ALL.iter().for_each(|s| out += &format!(" {} |", s.name()));
+        out += &format!("\n|---|---|---|{}\n", "---|".repeat(Stage::ALL.len()));
+        let worst = self.pictures.expensive.iter().zip(&self.expensive).flat_map(|((cases, shown), measured)| {
+            let mut hardest = lines(cases, measured);
+            hardest.sort_by(|a, b| b.total.total_cmp(&a.total));
+            hardest.into_iter().take(*shown).map(|l| Line { name: format!("worst found: {}", l.name), ..l })
+        });
+        for line in lines(&self.pictures.usual, &self.usual).into_iter().chain(worst) {
+            out += &format!("| {} | {:.0} | {:.0} |", line.name, line.total, line.work);
+            line.stages.iter().for_each(|n| out += &format!(" {n:.0} |"));
+            out += "\n";
+        }
+        out
+    }
+
+    /// Returns the instructions that are needed before a picture.
+    fn preparation_table(&self) -> String {
+        let first = &self.usual[0];
+        let mut out = String::from("\n| before the pictures | thousand |\n|---|---|\n");
+        out += &format!("| making a sensor | {:.0} |\n", first.calls[0] as f64 / 1e3);
+        out += &format!("| `expect` | {:.1} |\n", first.calls[1] as f64 / 1e3);
+        out
+    }
+
+    /// Returns the instructions of pictures that come row by row.
+    fn row_table(&self) -> String {
+        let head = "| row by row | taking the rows, thousand | the end of the picture, thousand |";
+        let mut out = format!("\n{head}\n|---|---|---|\n");
+        for (kind, measured) in &self.by_rows {
+            let max = |call: usize| measured.iter().map(|m| m.calls[call]).max().unwrap_or(0) as f64 / 1e3;
+            out += &format!("| 640×480 {kind} by rows | {:.0} | {:.0} |\n", max(1), max(2));
+        }
+        out
+    }
+
+    /// Returns flash, RAM and stack of each image.
+    fn memory_table(&self) -> Result<String, String> {
+        let max = |measured: &mut dyn Iterator<Item = &Measured>| measured.map(|m| m.stack_bytes).max().unwrap_or(0);
+        let usual = &self.pictures.usual;
+        let all = &mut self.usual.iter().chain(self.expensive.iter().flatten());
+        let stacks = [
+            ("chain", "the sensor alone, 600 points", run_chain(self.board, &usual[usual.len() - 2].bytes)[10]),
+            ("measure", "the sensor alone, all points", max(all)),
+            ("rows", "row by row, 640×480", max(&mut self.by_rows.iter().flat_map(|(_, measured)| measured))),
+        ];
+        let sizes = |image: &str| sizes(self.board, image).ok_or("arm-none-eabi-size cannot be run");
+        let mut out =
+            String::from("\n| image | flash, bytes | static RAM, bytes | stack, bytes |\n|---|---|---|---|\n");
+        for (image, what, stack) in stacks {
+            let [flash, ram] = sizes(image)?;
+            out += &format!("| {what} | {flash} | {ram} | {stack} |\n");
+        }
+        let [flash, ram] = sizes("flight")?;
+        let stack = "as the sensor with 600 points, plus the loop; a test limits the total to 96 KiB";
+        out += &format!("| flight | {flash} | {ram} | {stack} |\n");
+        Ok(out)
+    }
+}
+
+/// Line of the table, with instructions and work in thousands.
+pub(crate) struct Line {
+    pub(crate) name: String,
+    pub(crate) total: f64,
+    pub(crate) work: f64,
+    pub(crate) stages: Vec<f64>,
+}
+
+/// Returns a line for each name: the most expensive of its pictures.
+pub(crate) fn lines(cases: &[Case], measured: &[Measured]) -> Vec<Line> {
+    let mut out: Vec<Line> = Vec::new();
+    for (case, m) in cases.iter().zip(measured) {
+        let line = Line {
+            name: case.name.clone(),
+            total: m.calls[2] as f64 / 1e3,
+            work: f64::from(m.answer.work) / 1e3,
+            stages: m.stages.iter().map(|&n| n as f64 / 1e3).collect(),
+        };
+        match out.iter_mut().find(|l| l.name == line.name) {
+            Some(same) if same.total < line.total => *same = line,
+            Some(_) => {}
+            None => out.push(line),
+        }
+    }
+    out
+}
+
+/// Returns text + data, and data + bss, of an image in bytes.
+fn sizes(board: Board, image: &str) -> Option<[u64; 2]> {
+    let out = Command::new("arm-none-eabi-size").arg(board.image(image)).output().ok()?;
+    let text = String::from_utf8(out.stdout).ok()?;
+    let numbers: Vec<u64> = text.lines().nth(1)?.split_whitespace().take(3).filter_map(|n| n.parse().ok()).collect();
+    let [text, data, bss] = numbers[..] else { return None };
+    Some([text + data, data + bss])
+}
+
+/// Returns the figures of a report. The key of each figure is the heading, the first cell of its row, and the column.
+pub(crate) fn read_figures(text: &str) -> Vec<(String, f64)> {
+    let mut out: Vec<(String, f64)> = Vec::new();
+    let (mut heading, mut columns) = ("", Vec::new());
+    for line in text.lines() {
+        if let Some(h) = line.strip_prefix("## ") {
+            heading = h;
+        }
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        let [_, name, values @ .., _] = &cells[..] else {
+            columns.clear();
+            continue;
+        };
+        if columns.is_empty() {
+            columns = values.to_vec();
+        }
+        // Of the worst pictures only the first counts, because another one may become the worst.
+        let name = name.split(": ").next().unwrap_or(name);
+        for (value, column) in values.iter().zip(&columns) {
+            let key = format!("{heading}, {name}, {column}");
+            // Only the total of a picture is compared; its work and its stages are for information.
+            let read_only = *column == "work, thousand" || Stage::ALL.iter().any(|s| s.name() == *column);
+            if let (Ok(n), false) = (value.parse(), read_only || out.iter().any(|(k, _)| *k == key)) {
+                out.push((key, n));
+            }
+        }
+    }
+    out
+}
